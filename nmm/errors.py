@@ -1,0 +1,51 @@
+"""The errors that nmm raises: one root, and below it what the user can tell apart.
+
+Every message says what was expected, what came, and what is available.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class NmmError(Exception):
+    """Root of every error that nmm raises on purpose."""
+
+
+class InputError(NmmError, ValueError):
+    """Something that the user gave is wrong: a name, a shape, a number, a file."""
+
+
+class RobotError(InputError):
+    """A robot description (URDF, xacro, `pin.Model`) cannot be used, and why."""
+
+
+class ScenarioError(InputError):
+    """A scenario file or a `--set` is wrong: the message names file, key and what was expected."""
+
+
+class RunError(NmmError, RuntimeError):
+    """A computation that began with good input could not go on."""
+
+
+class SingularError(RunError):
+    """The matrix that a resolver has to invert lost rank."""
+
+
+class DivergedError(RunError):
+    """The motion grew without bound; `alpha * dt` is usually too large."""
+
+
+def unknown(kind: str, name: object, available: Iterable[str], where: str = "") -> str:
+    """One line for a name that does not exist: what came, the nearest match, what there is.
+
+    >>> unknown("frame", "eee", ["ee", "link1"])
+    "unknown frame 'eee' (did you mean 'ee'?); available: ee, link1"
+    """
+    names = list(available)
+    near = difflib.get_close_matches(str(name), names, n=1)
+    hint = f" (did you mean {near[0]!r}?)" if near else ""
+    listing = ", ".join(names) if names else "none"
+    prefix = f"{where}: " if where else ""
+    return f"{prefix}unknown {kind} {name!r}{hint}; available: {listing}"
