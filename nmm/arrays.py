@@ -1,0 +1,55 @@
+"""The arrays that users give: turned into float64, checked once, with errors that name them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nmm.errors import InputError
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+def array(value: ArrayLike, name: str) -> Array:
+    """A C-contiguous float64 copy of `value`; `InputError` if it holds anything but finite numbers."""
+    try:
+        result = np.array(value, dtype=np.float64, order="C")
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: expected numbers, got {value!r}") from None
+    if not np.all(np.isfinite(result)):
+        raise InputError(f"{name}: expected finite numbers, got {np.array2string(result, threshold=20)}")
+    return result
+
+
+def vector(value: ArrayLike, length: int | None, name: str) -> Array:
+    """A finite float64 vector of `length` numbers (any length when None)."""
+    result = array(value, name)
+    if result.ndim != 1 or (length is not None and result.size != length):
+        expected = "a vector" if length is None else f"{length} numbers"
+        raise InputError(f"{name}: expected {expected}, got shape {result.shape}")
+    return result
+
+
+def scalar(value: ArrayLike, name: str) -> float:
+    """A finite number."""
+    result = array(value, name)
+    if result.ndim != 0:
+        raise InputError(f"{name}: expected a number, got shape {result.shape}")
+    return float(result)
+
+
+def positive(value: ArrayLike, name: str) -> float:
+    """A finite number above zero."""
+    result = scalar(value, name)
+    if result <= 0.0:
+        raise InputError(f"{name}: expected a number above 0, got {result:g}")
+    return result
+
+
+def matrix(value: ArrayLike, shape: tuple[int, int], name: str) -> Array:
+    """A finite float64 matrix of the given shape."""
+    result = array(value, name)
+    if result.shape != shape:
+        raise InputError(f"{name}: expected a matrix of shape {shape}, got {result.shape}")
+    return result

@@ -1,0 +1,149 @@
+"""Kernels: plain functions on arrays that run as they stand and, fused by numba, in a 1 kHz loop.
+
+A *kernel* is a module-level function with one of the signatures below, written in the subset of
+Python that numba compiles. The decorator compiles it (cached on disk) and notes its address, so
+that a compiled program can call whatever kernels a user combined, as a C program calls through
+function pointers: no code is generated, no combination is compiled anew, and a new kernel is one
+new function in one new file.
+
+The same function runs as it stands: `Kernel.plain` is the undecorated function, and a program run
+in plain Python (`NUMBA_DISABLE_JIT=1`, or `program.py_func`) calls the plain kernels.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numba
+import platformdirs
+from numba import types
+from numba.core import cgutils
+from numba.core.dispatcher import Dispatcher
+from numba.extending import intrinsic, overload
+
+Plain = Callable[..., None]
+
+_scalar = types.float64
+_vector = types.float64[::1]
+_matrix = types.float64[:, ::1]
+_stack = types.float64[:, :, ::1]
+_stack4 = types.float64[:, :, :, ::1]
+_integers = types.int64[::1]
+
+#: y = phi(t, q), its partial derivative in time and its Jacobian in the coordinates:
+#: (t, q, placements, jacobians, hessians, G, G_q, slots, parameters, value, value_t, value_q)
+#: with frame k of the function at placements[slots[k]] (3, 4) = [R | p], jacobians[slots[k]] (6, n),
+#: hessians[slots[k]] (6, n, n); value_t and value_q (rows, n) come filled with zeros.
+FUNCTION = types.void(
+    _scalar, _vector, _stack, _stack, _stack4, _matrix, _stack, _integers, _vector, _vector, _vector, _matrix
+)
+#: qp_dot = G(qp) up: (qp, parameters, G, G_q) with G_q[i, j, k] = dG[i, j] / dqp[k]
+PLATFORM = types.void(_vector, _vector, _matrix, _stack)
+#: u from J u = rate and the gradient h: (J, rate, Jc, rate_c, h, parameters, options, state, u, report)
+RESOLVER = types.void(
+    _matrix, _vector, _matrix, _vector, _vector, _vector, _integers, _integers, _vector, _vector
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Kernel:
+    """A function in its two forms: `plain` Python and compiled, reachable by `address`.
+
+    Calling the kernel calls the compiled form.
+    """
+
+    plain: Plain
+    compiled: Plain
+    address: int
+
+    def __call__(self, *arguments: Any) -> None:
+        self.compiled(*arguments)
+
+
+_plain_by_address: dict[int, Plain] = {}
+
+
+@cache
+def cache_folder() -> str:
+    """Folder of numba's cache for this very text of nmm's kernels.
+
+    numba notices a change of the file that holds a compiled function, but not of the files that
+    hold what it calls; a digest of all sources that hold compiled functions does.
+    """
+    digest = hashlib.sha256(numba.__version__.encode())
+    for source in sorted(Path(__file__).parent.rglob("*.py")):
+        text = source.read_bytes()
+        if b"nmm.compiled import" in text or source == Path(__file__):
+            digest.update(text)
+    return str(Path(platformdirs.user_cache_dir("nmm")) / digest.hexdigest()[:16])
+
+
+def compiled(function: Callable[..., Any]) -> Any:
+    """`numba.njit` with nmm's options and nmm's cache folder; `.py_func` is the plain function.
+
+    Divisions by zero give inf and nan as in numpy (`error_model`): a singular matrix is a case
+    that the resolvers report, not an exception out of compiled code.
+    """
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = cache_folder()
+    try:
+        return numba.njit(cache=True, error_model="numpy")(function)
+    finally:
+        numba.config.CACHE_DIR = before
+
+
+def kernel(signature: Any) -> Callable[[Plain], Kernel]:
+    """Decorator: compile a function of one of this module's signatures into a `Kernel`."""
+
+    def decorate(function: Plain) -> Kernel:
+        dispatcher = compiled(function)
+        if not isinstance(dispatcher, Dispatcher):  # NUMBA_DISABLE_JIT=1: run as it stands
+            address = id(function)
+        else:
+            dispatcher.compile(signature.args)
+            result = dispatcher.overloads[signature.args]
+            address = result.library.get_pointer_to_function(result.fndesc.llvm_func_name)
+        _plain_by_address[address] = function
+        return Kernel(function, dispatcher, address)
+
+    return decorate
+
+
+def _caller(signature: Any) -> Callable[..., None]:
+    """A function `call(address, *arguments)` for kernels of one signature, plain and compiled."""
+
+    def call(address, *arguments):  # type: ignore[no-untyped-def]  # numba wants it bare
+        _plain_by_address[address](*arguments)
+
+    @intrinsic
+    def through_pointer(context, address, arguments):  # type: ignore[no-untyped-def]
+        def generate(context, builder, signature_here, values):  # type: ignore[no-untyped-def]
+            convention = context.call_conv
+            pointer_type = convention.get_function_type(types.none, signature.args).as_pointer()
+            function = builder.inttoptr(values[0], pointer_type)
+            unpacked = cgutils.unpack_tuple(builder, values[1])
+            status, _ = convention.call_function(builder, function, types.none, signature.args, unpacked)
+            with cgutils.if_unlikely(builder, status.is_error):
+                convention.return_status_propagate(builder, status)
+            return context.get_dummy_value()
+
+        return types.void(types.int64, types.Tuple(signature.args)), generate
+
+    @overload(call)
+    def call_compiled(address, *arguments):  # type: ignore[no-untyped-def]
+        def through(address, *arguments):  # type: ignore[no-untyped-def]
+            through_pointer(address, arguments)
+
+        return through
+
+    return call
+
+
+call_function = _caller(FUNCTION)
+call_platform = _caller(PLATFORM)
+call_resolver = _caller(RESOLVER)
