@@ -1,0 +1,64 @@
+"""Objectives H(q), minimised: one row each, added and scaled like numbers."""
+
+from __future__ import annotations
+
+from nmm.arrays import Array, scalar
+from nmm.configuration import Configuration
+from nmm.function import Function, Row
+from nmm.robot import Robot
+
+
+class Objective(Function):
+    """H(q), a function with one row. It is minimised: to maximise w, minimise `-w`.
+
+    `a + b`, `2.0 * a` and `-a` make sums and multiples.
+    """
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        return (Row("H", "1"),)
+
+    def terms(self) -> tuple[tuple[float, Function], ...]:
+        """The weighted functions that add up to H."""
+        return ((1.0, self),)
+
+    def value(self, configuration: Configuration) -> float:
+        """H(q)."""
+        return sum(
+            weight * float(function.evaluate(0.0, configuration).value[0])
+            for weight, function in self.terms()
+        )
+
+    def gradient(self, configuration: Configuration) -> Array:
+        """∂H/∂q, shape (n,): ordinary partial derivatives in the coordinates."""
+        parts = [
+            weight * function.evaluate(0.0, configuration).value_q[0] for weight, function in self.terms()
+        ]
+        gradient: Array = sum(parts[1:], parts[0])
+        return gradient
+
+    def __add__(self, other: Objective) -> Objective:
+        return Sum(*self.terms(), *other.terms())
+
+    def __mul__(self, factor: float) -> Objective:
+        return Sum(*((scalar(factor, "weight") * weight, function) for weight, function in self.terms()))
+
+    __rmul__ = __mul__
+
+    def __neg__(self) -> Objective:
+        return -1.0 * self
+
+    def __sub__(self, other: Objective) -> Objective:
+        return self + -other
+
+
+class Sum(Objective):
+    """A weighted sum of functions of one row: `Sum((2.0, a), (-1.0, b))`."""
+
+    def __init__(self, *terms: tuple[float, Function]) -> None:
+        self._terms = tuple((scalar(weight, "weight"), function) for weight, function in terms)
+
+    def terms(self) -> tuple[tuple[float, Function], ...]:
+        return self._terms
+
+    def stages(self, robot: Robot) -> tuple[()]:
+        return ()

@@ -1,0 +1,42 @@
+"""The unicycle: it rolls forward and turns on the spot, and never slides sideways."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+import numpy as np
+
+from nmm.compiled import PLATFORM, Kernel, kernel
+from nmm.platforms.base import Array, Platform
+
+
+@kernel(PLATFORM)
+def unicycle(qp: Array, parameters: Array, G: Array, G_q: Array) -> None:
+    """G = [[cos θ, 0], [sin θ, 0], [0, 1]] (paper, section V-A)."""
+    cosine = math.cos(qp[2])
+    sine = math.sin(qp[2])
+    G[0, 0] = cosine
+    G[1, 0] = sine
+    G[2, 1] = 1.0
+    G_q[0, 0, 2] = -sine
+    G_q[1, 0, 2] = cosine
+
+
+class Unicycle(Platform):
+    """qp = [x, y, theta] (m, m, rad), up = [v, omega] (m/s, rad/s).
+
+    x, y is the midpoint of the wheels' axle, theta its heading from the world's x axis.
+    """
+
+    name: ClassVar[str] = "unicycle"
+    inputs: ClassVar[tuple[str, ...]] = ("v", "omega")
+    input_units: ClassVar[tuple[str, ...]] = ("m/s", "rad/s")
+
+    @property
+    def velocity_map(self) -> Kernel:
+        return unicycle
+
+    def pfaffian(self, qp: Array) -> Array:
+        """No sideways motion of the axle: -sin θ x_dot + cos θ y_dot = 0."""
+        return np.array([[-math.sin(qp[2]), math.cos(qp[2]), 0.0]])

@@ -1,0 +1,165 @@
+"""What a robot is: Pinocchio models, a platform, and the names of coordinates and inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from nmm.arrays import scalar, vector
+from nmm.errors import InputError, unknown
+from nmm.platforms.base import Platform
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Wheel:
+    """A wheel that only rolls: not a coordinate (its angle follows from the motion), turned in playback.
+
+    Attributes
+    ----------
+    joint : name of its joint in the display model
+    center : (3,) wheel centre in the root link's frame, m
+    axis : (3,) unit spin axis in the root link's frame, horizontal
+    radius : m
+    """
+
+    joint: str
+    center: Array
+    axis: Array
+    radius: float
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A manipulator on a wheeled platform. Made by `nmm.load`; nothing in it changes afterwards.
+
+    Attributes
+    ----------
+    name : the robot's name
+    model : kinematics: joints x, y, theta, then the arm, in Pinocchio's order; nq = nv = n
+    collision_model : collision shapes, on `model`
+    display_model : as `model`, with the wheels as joints
+    visual_model : visual shapes, on `display_model`
+    platform : states G(qp)
+    wheels : the wheels that playback turns
+    source : the file, the bundled name, or "pin.Model"
+    arguments : the xacro arguments that the file was read with
+    notes : what loading did to the file, a sentence each
+    """
+
+    name: str
+    model: pin.Model
+    collision_model: pin.GeometryModel
+    display_model: pin.Model
+    visual_model: pin.GeometryModel
+    platform: Platform
+    wheels: tuple[Wheel, ...] = ()
+    source: str = ""
+    arguments: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.model.nq != self.model.nv:
+            raise InputError(
+                f"{self.name}: expected one number per joint, got nq {self.model.nq}, nv {self.model.nv}"
+            )
+        head = self.q_names[: self.platform.n_p]
+        if head != self.platform.coordinates:
+            raise InputError(
+                f"{self.name}: the {self.platform.name} platform expects the first coordinates to be "
+                f"{', '.join(self.platform.coordinates)}, the model has {', '.join(head)}"
+            )
+
+    @cached_property
+    def q_names(self) -> tuple[str, ...]:
+        """Names of the n coordinates: the platform's, then the arm's joints."""
+        model = self.model
+        names = [""] * model.nq
+        for joint in range(1, model.njoints):
+            names[model.joints[joint].idx_q] = model.names[joint]
+        return tuple(names)
+
+    @cached_property
+    def u_names(self) -> tuple[str, ...]:
+        """Names of the p + n_m inputs: the platform's, then the arm's joints."""
+        return self.platform.inputs + self.q_names[self.platform.n_p :]
+
+    @cached_property
+    def q_units(self) -> tuple[str, ...]:
+        """Unit of each coordinate: m or rad."""
+        model = self.model
+        units = [""] * model.nq
+        for joint in range(1, model.njoints):
+            kind = model.joints[joint].shortname()
+            units[model.joints[joint].idx_q] = "m" if "JointModelP" in kind else "rad"
+        return tuple(units)
+
+    @cached_property
+    def u_units(self) -> tuple[str, ...]:
+        """Unit of each input."""
+        return self.platform.input_units + tuple(f"{unit}/s" for unit in self.q_units[self.platform.n_p :])
+
+    @property
+    def n(self) -> int:
+        """Number of coordinates."""
+        return int(self.model.nq)
+
+    @property
+    def n_u(self) -> int:
+        """Number of inputs, p + n_m."""
+        return self.n - self.platform.n_p + self.platform.p
+
+    @property
+    def frames(self) -> tuple[str, ...]:
+        """Names of the frames that a task may speak of, in the model's order."""
+        seen = dict.fromkeys(frame.name for frame in self.model.frames)
+        return tuple(name for name in seen if name != "universe")
+
+    def frame_id(self, name: str) -> int:
+        """Pinocchio's index of a frame; of the link's where a link and a joint share the name."""
+        for kind in (pin.FrameType.BODY, pin.FrameType.OP_FRAME):
+            if self.model.existFrame(name, kind):
+                return int(self.model.getFrameId(name, kind))
+        if name == "universe" or not self.model.existFrame(name):
+            raise InputError(unknown("frame", name, self.frames, f"robot {self.name}"))
+        return int(self.model.getFrameId(name))
+
+    def coordinate(self, name: str) -> int:
+        """Index of a coordinate in q; `InputError` lists the names."""
+        if name not in self.q_names:
+            raise InputError(unknown("coordinate", name, self.q_names, f"robot {self.name}"))
+        return self.q_names.index(name)
+
+    def input(self, name: str) -> int:
+        """Index of an input in u; `InputError` lists the names."""
+        if name not in self.u_names:
+            raise InputError(unknown("input", name, self.u_names, f"robot {self.name}"))
+        return self.u_names.index(name)
+
+    def q(self, values: Mapping[str, float] | ArrayLike | None = None) -> Array:
+        """A configuration: from a vector, or by name with zero for what is not named."""
+        if values is None:
+            return np.zeros(self.n)
+        if isinstance(values, Mapping):
+            q = np.zeros(self.n)
+            for name, value in values.items():
+                q[self.coordinate(name)] = scalar(value, name)
+            return q
+        try:
+            return vector(values, self.n, "q")
+        except InputError as error:
+            raise InputError(f"{error} (robot {self.name} has q = {', '.join(self.q_names)})") from None
+
+    def S(self, q: ArrayLike) -> Array:
+        """S = blkdiag(G(qp), I), shape (n, n_u): q_dot = S(q) u (paper, eqs. 2 and 3)."""
+        n_p, p = self.platform.n_p, self.platform.p
+        S = np.zeros((self.n, self.n_u))
+        S[:n_p, :p] = self.platform.G(self.q(q)[:n_p])
+        S[n_p:, p:] = np.eye(self.n - n_p)
+        return S
