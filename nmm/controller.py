@@ -1,0 +1,201 @@
+"""The controller: robot + task + objective + resolver, u = controller(t, q), fit for a 1 kHz loop."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.arrays import Array, Integers
+from nmm.equations import Results, drive, results, step
+from nmm.errors import InputError, SingularError
+from nmm.function import Row
+from nmm.objectives.base import Objective
+from nmm.program import Program
+from nmm.resolvers.base import REPORT, Resolver, Shape, Status
+from nmm.robot import Robot
+from nmm.tasks.task import Stack, Task
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """Everything that a controller found at (t, q): copies, in the units of the task's rows.
+
+    r, target, error, rate (s,), J (s, m) of J_bar u = rate; objective H and gradient h (m,);
+    u (m,), q_dot = S u (n,); residual ‖J u - rate‖; status; measure (see `Resolution`); partition
+    (s,) the columns of Ja, -1 where there is none.
+    """
+
+    t: float
+    q: Array
+    r: Array
+    target: Array
+    error: Array
+    rate: Array
+    J: Array
+    objective: float
+    h: Array
+    u: Array
+    q_dot: Array
+    residual: float
+    status: Status
+    measure: float
+    partition: Integers
+
+
+class Controller:
+    """u = controller(t, q): the inputs with which `robot` does `task` and descends `objective`.
+
+    Parameters
+    ----------
+    robot : the robot
+    task : a `Task`, or several, done together
+    resolver : how the redundancy is resolved
+    objective : H(q) to minimise; None for the plain solution
+    constraint : the added task y = h(q) of the extended Jacobian
+
+    Raises
+    ------
+    InputError : a frame, coordinate or input that the robot lacks; more rows than inputs; a
+        constraint with a resolver that takes none, or none with one that does
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        task: Task | Stack | Sequence[Task],
+        resolver: Resolver,
+        objective: Objective | None = None,
+        constraint: Task | Stack | Sequence[Task] | None = None,
+    ) -> None:
+        self.robot = robot
+        self.task = Stack.of(task)
+        self.resolver = resolver
+        self.objective = objective
+        self.constraint = Stack() if constraint is None else Stack.of(constraint)
+        if self.constraint.tasks and not resolver.uses_constraint:
+            raise InputError(f"constraint: resolver {resolver.name} takes none, ej does")
+        self.rows: tuple[Row, ...] = self.task.rows(robot)
+        constraint_rows = self.constraint.rows(robot)
+
+        every = (*self.task, *self.constraint)
+        weighted = () if objective is None else objective.terms()
+        functions = [f for task in every for f in (task.function, task.reference)]
+        program = Program(robot, [*functions, *(function for _, function in weighted)])
+        first = program.first_rows
+        table = [
+            (first[2 * i] + j, first[2 * i + 1] + j, int(row.angular))
+            for i, task in enumerate(every)
+            for j, row in enumerate(task.rows(robot))
+        ]
+        s, k, m = len(self.rows), len(constraint_rows), robot.n_u
+        setup = resolver.setup(Shape(s, k, robot.u_names))
+        program.pack(
+            [[s, k, m, resolver.kernel.address], table, first[2 * len(every) :], setup.options],
+            [
+                _gains(self.task, robot),
+                _gains(self.constraint, robot),
+                [weight for weight, _ in weighted],
+                setup.parameters,
+            ],
+            [np.zeros((s + k) * (4 + m) + 1 + 2 * m + REPORT + robot.n)],
+        )
+        self._program = program
+        self._prepare = program.prepare
+        self._start = setup.state
+        self._state = setup.state.copy()
+        self._arguments = (program.tables, program.numbers, program.memory, self._state)
+        self._results: Results = results(program.tables, program.memory)
+        self._u = self._results.u
+        self._report = self._results.report
+        self._shape = (robot.n,)
+        finishes = type(resolver).finish is not Resolver.finish
+        self._solve = self._solve_and_finish if finishes else self._solve_compiled
+
+    def __call__(self, t: float, q: ArrayLike) -> Array:
+        """Inputs u (m,) at time t (s) and configuration q (n,), in the units of `robot.u_units`.
+
+        Raises
+        ------
+        SingularError : the matrix to invert lost rank, or an input is not finite
+        InputError : q has the wrong length or holds numbers that are not finite
+        """
+        # Another kind of array would be compiled for anew, so anything but the plain kind is copied.
+        if type(q) is not np.ndarray or q.dtype != np.float64 or q.shape != self._shape or not q.flags.carray:
+            q = self.robot.q(q)
+        self._solve(float(t), q)
+        if self._report[0]:
+            self._fail(t, q)
+        return self._u.copy()
+
+    def _solve_compiled(self, t: float, q: Array) -> None:
+        self._prepare(t, q)
+        step(t, q, *self._arguments)
+
+    def _solve_and_finish(self, t: float, q: Array) -> None:
+        self._solve_compiled(t, q)
+        task = self._results.task
+        self.resolver.finish(task.J, task.rate, self._results.h, self._u, self._report)
+        drive(self._u, self._program.buffers.G, self._results.q_dot)
+
+    def _fail(self, t: float, q: Array) -> None:
+        self.robot.q(q)  # a q that is not finite is the caller's error
+        status = Status(int(self._report[0]))
+        raise SingularError(f"at t = {t:g} s: {status.meaning}")
+
+    def evaluate(self, t: float, q: ArrayLike) -> Step:
+        """All quantities at (t, q); a singular matrix is reported in `status`, not raised."""
+        q = self.robot.q(q)
+        self._solve(float(t), q)
+        return self.last(t, q)
+
+    def last(self, t: float, q: Array) -> Step:
+        """The quantities of the call just made at (t, q), as copies."""
+        found = self._results
+        task = found.task
+        return Step(
+            t=float(t),
+            q=q.copy(),
+            r=task.r.copy(),
+            target=task.target.copy(),
+            error=task.error.copy(),
+            rate=task.rate.copy(),
+            J=task.J.copy(),
+            objective=float(found.H[0]),
+            h=found.h.copy(),
+            u=found.u.copy(),
+            q_dot=found.q_dot.copy(),
+            residual=float(found.report[1]),
+            status=Status(int(found.report[0])),
+            measure=float(found.report[2]),
+            partition=self._state[1:].copy(),
+        )
+
+    def velocity(self, t: float, q: Array) -> Array:
+        """q_dot = S(q) u (n,) of the closed loop at (t, q); raises as a call does."""
+        self._solve(float(t), q)
+        if self._report[0]:
+            self._fail(t, q)
+        return self._results.q_dot.copy()
+
+    def reset(self) -> None:
+        """Forget the partition: the next call chooses it anew."""
+        self._state[:] = self._start
+
+    def hold_partition(self, hold: bool) -> None:
+        """Keep the partition through the calls that follow (the stages of an integration step), or not."""
+        self._state[0] = int(hold)
+
+
+def _gains(stack: Stack, robot: Robot) -> Array:
+    """The block-diagonal gain of a stack, row after row."""
+    s = len(stack.rows(robot))
+    K = np.zeros((s, s))
+    first = 0
+    for task in stack:
+        block = task.gain_matrix(robot)
+        K[first : first + len(block), first : first + len(block)] = block
+        first += len(block)
+    return K.ravel()

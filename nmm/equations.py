@@ -1,0 +1,169 @@
+"""The compiled control step: from functions to J_bar u = rate and h, from these to u and q_dot.
+
+This is where the multiplication by S happens, once for all: J_bar = (∂f/∂q - ∂g/∂q) S,
+h = Sᵀ ∂H/∂q, q_dot = S u (paper, eqs. 2, 6 and 13).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from nmm.arrays import Array
+from nmm.compiled import call_resolver, compiled
+from nmm.packing import section
+from nmm.program import MEMORY, NUMBERS, TABLES, Buffers, buffers, run
+from nmm.resolvers.base import REPORT
+
+
+class Equation(NamedTuple):
+    """J u = rate for a stack of tasks: value r (s,), target (s,), error (s,), rate (s,), J (s, m)."""
+
+    r: Array
+    target: Array
+    error: Array
+    rate: Array
+    J: Array
+
+
+class Results(NamedTuple):
+    """What one step leaves behind, as views of one block of memory.
+
+    task, constraint : their equations
+    H (1,), h (m,) : the objective and its gradient seen by the inputs
+    u (m,) : the inputs
+    report : [status, residual, measure]
+    q_dot (n,) : S u
+    """
+
+    task: Equation
+    constraint: Equation
+    H: Array
+    h: Array
+    u: Array
+    report: Array
+    q_dot: Array
+
+
+# Sections of the packed vectors, after the program's own.
+SHAPE, ROWS, TERMS, OPTIONS = TABLES, TABLES + 1, TABLES + 2, TABLES + 3
+GAINS, CONSTRAINT_GAINS, WEIGHTS, RESOLVER = NUMBERS, NUMBERS + 1, NUMBERS + 2, NUMBERS + 3
+BLOCK = MEMORY
+
+
+@compiled
+def equation_views(s: int, m: int, block: Array) -> Equation:
+    """The views of a block of s (4 + m) numbers."""
+    return Equation(
+        block[:s],
+        block[s : 2 * s],
+        block[2 * s : 3 * s],
+        block[3 * s : 4 * s],
+        block[4 * s :].reshape((s, m)),
+    )
+
+
+@compiled
+def results(tables: Array, memory: Array) -> Results:
+    """The views; shape = [s, k, m, ...]."""
+    shape = section(tables, SHAPE)
+    block = section(memory, BLOCK)
+    s, k, m = shape[0], shape[1], shape[2]
+    a = s * (4 + m)
+    b = a + k * (4 + m)
+    return Results(
+        equation_views(s, m, block[:a]),
+        equation_views(k, m, block[a:b]),
+        block[b : b + 1],
+        block[b + 1 : b + 1 + m],
+        block[b + 1 + m : b + 1 + 2 * m],
+        block[b + 1 + 2 * m : b + 1 + 2 * m + REPORT],
+        block[b + 1 + 2 * m + REPORT :],
+    )
+
+
+@compiled
+def times_S(row: Array, G: Array, out: Array) -> None:
+    """out += row S, S = blkdiag(G, I): a derivative in the coordinates, seen by the inputs."""
+    n_p, p = G.shape
+    for j in range(p):
+        for i in range(n_p):
+            out[j] += row[i] * G[i, j]
+    for j in range(row.shape[0] - n_p):
+        out[p + j] += row[n_p + j]
+
+
+@compiled
+def drive(u: Array, G: Array, q_dot: Array) -> None:
+    """q_dot = S u."""
+    n_p, p = G.shape
+    for i in range(n_p):
+        q_dot[i] = 0.0
+        for j in range(p):
+            q_dot[i] += G[i, j] * u[j]
+    q_dot[n_p:] = u[p:]
+
+
+@compiled
+def write_equation(rows: Array, gain: Array, b: Buffers, e: Equation) -> None:
+    """rate = ∂g/∂t + K e, J_bar = (∂f/∂q - ∂g/∂q) S; a row is [row of f, row of g, is an angle]."""
+    s = e.r.shape[0]
+    difference = np.empty(b.value_q.shape[1])
+    for i in range(s):
+        f = rows[3 * i]
+        g = rows[3 * i + 1]
+        e.r[i] = b.value[f]
+        e.target[i] = b.value[g]
+        error = b.value[g] - b.value[f]
+        if rows[3 * i + 2] == 1:  # to (-π, π]
+            error = math.pi - (math.pi - error) % (2.0 * math.pi)
+        e.error[i] = error
+        e.rate[i] = b.value_t[g] - b.value_t[f]
+        e.J[i] = 0.0
+        for j in range(difference.shape[0]):
+            difference[j] = b.value_q[f, j] - b.value_q[g, j]
+        times_S(difference, b.G, e.J[i])
+    for i in range(s):
+        for j in range(s):
+            e.rate[i] += gain[i * s + j] * e.error[j]
+
+
+@compiled
+def step(t: float, q: Array, tables: Array, numbers: Array, memory: Array, state: Array) -> None:
+    """One control step: functions, equations, gradient, inputs. Pinocchio's part is in `memory` already.
+
+    shape = [s, k, m, resolver kernel]; terms: the rows of the objective's terms.
+    """
+    b = buffers(tables, memory)
+    run(t, q, tables, numbers, b)
+    e = results(tables, memory)
+    shape = section(tables, SHAPE)
+    rows = section(tables, ROWS)
+    write_equation(rows, section(numbers, GAINS), b, e.task)
+    write_equation(rows[3 * shape[0] :], section(numbers, CONSTRAINT_GAINS), b, e.constraint)
+    terms = section(tables, TERMS)
+    weights = section(numbers, WEIGHTS)
+    e.H[0] = 0.0
+    e.h[:] = 0.0
+    gradient = np.zeros(q.shape[0])
+    for i in range(terms.shape[0]):
+        e.H[0] += weights[i] * b.value[terms[i]]
+        for j in range(q.shape[0]):
+            gradient[j] += weights[i] * b.value_q[terms[i], j]
+    times_S(gradient, b.G, e.h)
+    call_resolver(
+        shape[3],
+        e.task.J,
+        e.task.rate,
+        e.constraint.J,
+        e.constraint.rate,
+        e.h,
+        section(numbers, RESOLVER),
+        section(tables, OPTIONS),
+        state,
+        e.u,
+        e.report,
+    )
+    drive(e.u, b.G, e.q_dot)

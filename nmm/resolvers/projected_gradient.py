@@ -1,0 +1,132 @@
+"""Projected Gradient: the minimum-norm solution and the gradient's part in J's null space (paper, III-B)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.arrays import Array, array, positive, scalar
+from nmm.compiled import RESOLVER, Kernel, kernel
+from nmm.errors import InputError, unknown
+from nmm.linear_algebra import minimum_norm, orthonormal_rows, residual_norm
+from nmm.resolvers.base import Resolver, Setup, Shape
+
+
+@kernel(RESOLVER)
+def projected_gradient(
+    J: Array, rate: Array, Jc: Array, rate_c: Array, h: Array,
+    parameters: Array, options: Array, state: Array, u: Array, report: Array,
+) -> None:  # fmt: skip
+    """u = J⁺ rate - α (I - J⁺ J) h, with J⁺ J = Qᵀ Q from J's orthonormal rows.
+
+    With weights, in the coordinates ũ = C⁻¹ u in which the weighted norm is the Euclidean one.
+    parameters = [α, tolerance, C row after row], options = [weighted].
+    """
+    s, m = J.shape
+    alpha = parameters[0]
+    weighted = options[0] == 1
+    C = parameters[2:].reshape((m, m)) if weighted else np.empty((0, 0))
+    work = np.empty((s, m))
+    gradient = np.empty(m)
+    if weighted:
+        for j in range(m):
+            gradient[j] = 0.0
+            for k in range(m):
+                gradient[j] += C[k, j] * h[k]
+            for i in range(s):
+                work[i, j] = 0.0
+                for k in range(m):
+                    work[i, j] += J[i, k] * C[k, j]
+    else:
+        gradient[:] = h
+        work[:, :] = J
+    order = np.empty(s, dtype=np.int64)
+    L = np.empty((s, s))
+    Q = np.empty((s, m))
+    report[2] = orthonormal_rows(work, order, L, Q)
+    if report[2] <= parameters[1]:
+        report[0] = 1.0
+        return
+    solution = np.empty(m)
+    minimum_norm(rate, order, L, Q, solution)
+    for j in range(m):
+        solution[j] -= alpha * gradient[j]
+    for i in range(s):
+        along = 0.0
+        for j in range(m):
+            along += Q[i, j] * gradient[j]
+        for j in range(m):
+            solution[j] += alpha * along * Q[i, j]
+    if weighted:
+        for j in range(m):
+            u[j] = 0.0
+            for k in range(m):
+                u[j] += C[j, k] * solution[k]
+    else:
+        u[:] = solution
+    report[1] = residual_norm(J, u, rate)
+    report[0] = 0.0 if math.isfinite(report[1]) else 4.0
+
+
+class ProjectedGradient(Resolver):
+    """u = J⁺ rate - α (I - J⁺ J) h (paper, eqs. 5 and 7).
+
+    With weights W, u minimises ½ (u - u0)ᵀ W (u - u0) under J u = rate with u0 = -α W⁻¹ h: the
+    steepest descent of H in the metric W. (u0 = -α h with a weighted pseudoinverse, the literal
+    reading of eq. 5, can increase H.)
+
+    Parameters
+    ----------
+    alpha : step size α > 0, 1/s times the unit of H's curvature
+    weights : None; m positive numbers; a mapping from input names (1 for the rest): a large weight
+        spares the input; or a symmetric positive definite (m, m) matrix
+    tolerance : J counts as singular below this ratio of smallest to largest pivot
+    """
+
+    name: ClassVar[str] = "pg"
+
+    def __init__(
+        self,
+        alpha: float = 10.0,
+        weights: ArrayLike | Mapping[str, float] | None = None,
+        tolerance: float = 1e-10,
+    ) -> None:
+        self.alpha = positive(alpha, "alpha")
+        self.weights = weights
+        self.tolerance = positive(tolerance, "tolerance")
+
+    @property
+    def kernel(self) -> Kernel:
+        return projected_gradient
+
+    def setup(self, shape: Shape) -> Setup:
+        self.check(shape)
+        state = np.full(1 + shape.s, -1, dtype=np.int64)
+        head = np.array([self.alpha, self.tolerance])
+        if self.weights is None:
+            return Setup(head, np.zeros(1, dtype=np.int64), state)
+        C = np.linalg.inv(np.linalg.cholesky(self._matrix(self.weights, shape))).T
+        return Setup(np.concatenate([head, C.ravel()]), np.ones(1, dtype=np.int64), state)
+
+    def _matrix(self, weights: ArrayLike | Mapping[str, float], shape: Shape) -> Array:
+        if isinstance(weights, Mapping):
+            diagonal = np.ones(shape.m)
+            for name, value in weights.items():
+                if name not in shape.inputs:
+                    raise InputError(unknown("input", name, shape.inputs, "weights"))
+                diagonal[shape.inputs.index(name)] = scalar(value, f"weight of {name}")
+            W = np.diag(diagonal)
+        else:
+            given = array(weights, "weights")
+            W = np.diag(given) if given.ndim == 1 else given
+        if W.shape != (shape.m, shape.m):
+            raise InputError(
+                f"weights: expected {shape.m} numbers or a {shape.m} x {shape.m} matrix, got {W.shape}"
+            )
+        if not np.array_equal(W, W.T) or np.linalg.eigvalsh(W).min() <= 0.0:
+            raise InputError("weights: expected numbers above 0, or a symmetric positive definite matrix")
+        return W

@@ -1,0 +1,191 @@
+"""Reduced Gradient: optimisation in the inputs that the task leaves free (paper, III-C)."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from nmm.arrays import Array, positive
+from nmm.compiled import RESOLVER, Kernel, compiled, kernel
+from nmm.errors import InputError, unknown
+from nmm.linear_algebra import eliminate, orthonormal_rows, residual_norm
+from nmm.resolvers.base import Resolver, Setup, Shape
+
+#: A partition: the inputs whose columns form Ja, by name or by index.
+Partition = Sequence[str | int]
+
+MOST_CANDIDATES = 20_000
+
+
+@compiled
+def solve_partition(J: Array, rate: Array, columns: Array, is_basic: Array, X: Array) -> tuple[float, float]:
+    """X = Ja⁻¹ [rate, Jb], shape (s, 1 + m - s). Returns det Ja and its pivot ratio; marks Ja's columns."""
+    s, m = J.shape
+    is_basic[:] = 0
+    Ja = np.empty((s, s))
+    for j in range(s):
+        is_basic[columns[j]] = 1
+        for i in range(s):
+            Ja[i, j] = J[i, columns[j]]
+    for i in range(s):
+        X[i, 0] = rate[i]
+    b = 1
+    for j in range(m):
+        if is_basic[j] == 0:
+            for i in range(s):
+                X[i, b] = J[i, j]
+            b += 1
+    return eliminate(Ja, X)
+
+
+@compiled
+def best_partition(J: Array, candidates: Array, columns: Array) -> None:
+    """Write into `columns` the candidate with the largest |det Ja|, the first of equals."""
+    s = J.shape[0]
+    Ja = np.empty((s, s))
+    nothing = np.empty((s, 0))
+    largest = -1.0
+    for c in range(candidates.shape[0]):
+        for j in range(s):
+            for i in range(s):
+                Ja[i, j] = J[i, candidates[c, j]]
+        size = abs(eliminate(Ja, nothing)[0])
+        if size > largest * (1.0 + 1e-12):  # rounding must not reverse the order of equals
+            largest = size
+            columns[:] = candidates[c]
+
+
+@kernel(RESOLVER)
+def reduced_gradient(
+    J: Array, rate: Array, Jc: Array, rate_c: Array, h: Array,
+    parameters: Array, options: Array, state: Array, u: Array, report: Array,
+) -> None:  # fmt: skip
+    """ub = -α (hb - (Ja⁻¹ Jb)ᵀ ha), ua = Ja⁻¹ (rate - Jb ub).
+
+    parameters = [α, threshold, tolerance], options = [normalised, candidates...],
+    state = [locked, the s basic columns (-1 before the first call)].
+    """
+    s, m = J.shape
+    normalised = options[0] == 1
+    candidates = options[1:].reshape(((options.shape[0] - 1) // s, s))
+    columns = state[1:]
+    X = np.empty((s, 1 + m - s))
+    is_basic = np.empty(m, dtype=np.int64)
+    order = np.empty(s, dtype=np.int64)
+    L = np.empty((s, s))
+    Q = np.empty((s, m))
+
+    volume = 1.0
+    if normalised:  # sqrt(det J Jᵀ), by Cauchy-Binet the norm of all det Ja
+        if orthonormal_rows(J, order, L, Q) <= parameters[2]:
+            report[0] = 1.0
+            return
+        for i in range(s):
+            volume *= L[i, i]
+    if columns[0] < 0:
+        best_partition(J, candidates, columns)
+    determinant, ratio = solve_partition(J, rate, columns, is_basic, X)
+    if abs(determinant) < parameters[1] * volume and state[0] == 0:
+        best_partition(J, candidates, columns)
+        determinant, ratio = solve_partition(J, rate, columns, is_basic, X)
+    report[2] = abs(determinant) / volume
+    if ratio <= parameters[2]:
+        report[0] = 1.0 if orthonormal_rows(J, order, L, Q) <= parameters[2] else 2.0
+        return
+
+    alpha = parameters[0]
+    for i in range(s):
+        u[columns[i]] = X[i, 0]
+    b = 1
+    for j in range(m):
+        if is_basic[j] == 0:
+            reduced = h[j]
+            for i in range(s):
+                reduced -= X[i, b] * h[columns[i]]
+            u[j] = -alpha * reduced
+            for i in range(s):
+                u[columns[i]] -= X[i, b] * u[j]
+            b += 1
+    report[1] = residual_norm(J, u, rate)
+    report[0] = 0.0 if math.isfinite(report[1]) else 4.0
+
+
+class ReducedGradient(Resolver):
+    """J T = [Ja Jb]: ub descends the reduced gradient of H, ua does the task (paper, eqs. 9 and 10).
+
+    Which columns form Ja is the *partition*. It is chosen at the start as the candidate with the
+    largest |det Ja|, kept while its measure stays at or above `threshold`, then chosen again.
+
+    Parameters
+    ----------
+    alpha : step size α > 0, 1/s times the unit of H's curvature
+    partitions : "automatic": all candidates, measured by |det Ja| / sqrt(det J Jᵀ), a number in
+        [0, 1] (Cauchy-Binet); or a list of candidates, measured by |det Ja| (the paper's rule:
+        [("v", "q1"), ("v", "omega")] in case 1; the arm's joints when n_m = s)
+    threshold : Θ; 0.01 for given candidates (the paper's), 0.05 for automatic ones
+    tolerance : Ja or J counts as singular below this ratio of smallest to largest pivot
+    """
+
+    name: ClassVar[str] = "rg"
+
+    def __init__(
+        self,
+        alpha: float = 10.0,
+        partitions: Literal["automatic"] | Sequence[Partition] = "automatic",
+        threshold: float | None = None,
+        tolerance: float = 1e-10,
+    ) -> None:
+        self.alpha = positive(alpha, "alpha")
+        self.automatic = isinstance(partitions, str)
+        if self.automatic and partitions != "automatic":
+            raise InputError(f"partitions: expected 'automatic' or lists of inputs, got {partitions!r}")
+        self.partitions: tuple[tuple[str | int, ...], ...] = (
+            () if self.automatic else tuple(tuple(p) for p in partitions)
+        )
+        if not self.automatic and not self.partitions:
+            raise InputError("partitions: expected at least one list of inputs, or 'automatic'")
+        self.threshold = positive(
+            (0.05 if self.automatic else 0.01) if threshold is None else threshold, "threshold"
+        )
+        if self.automatic and self.threshold >= 1.0:
+            raise InputError(f"threshold: expected below 1 with automatic partitions, got {self.threshold:g}")
+        self.tolerance = positive(tolerance, "tolerance")
+
+    @property
+    def kernel(self) -> Kernel:
+        return reduced_gradient
+
+    def setup(self, shape: Shape) -> Setup:
+        self.check(shape)
+        if self.automatic:
+            count = math.comb(shape.m, shape.s)
+            if count > MOST_CANDIDATES:
+                raise InputError(f"partitions: {count} candidates are too many to try; give a list of some")
+            candidates = list(itertools.combinations(range(shape.m), shape.s))
+        else:
+            candidates = [self._columns(partition, shape) for partition in self.partitions]
+        options = np.array([int(self.automatic), *itertools.chain.from_iterable(candidates)], dtype=np.int64)
+        state = np.full(1 + shape.s, -1, dtype=np.int64)
+        state[0] = 0
+        return Setup(np.array([self.alpha, self.threshold, self.tolerance]), options, state)
+
+    @staticmethod
+    def _columns(partition: Sequence[str | int], shape: Shape) -> tuple[int, ...]:
+        columns = []
+        for item in partition:
+            if isinstance(item, str) and item not in shape.inputs:
+                raise InputError(unknown("input", item, shape.inputs, "partitions"))
+            column = shape.inputs.index(item) if isinstance(item, str) else int(item)
+            if not 0 <= column < shape.m:
+                raise InputError(f"partitions: expected an index from 0 to {shape.m - 1}, got {column}")
+            columns.append(column)
+        if len(columns) != shape.s or len(set(columns)) != len(columns):
+            raise InputError(
+                f"partitions: expected {shape.s} different inputs, as many as the task has rows, "
+                f"got {list(partition)}"
+            )
+        return tuple(columns)
