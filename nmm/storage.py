@@ -1,0 +1,174 @@
+"""A run's folder: written whole or not at all, read back without pickle."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import yaml
+
+from nmm.errors import InputError
+from nmm.summary import FORMAT
+
+if TYPE_CHECKING:
+    from nmm.trajectory import Trajectory
+
+ARRAYS = ("t", "q", "u", "r", "r_d", "error", "objective", "sigma_min", "partition", "residual")
+OPTIONAL_ARRAYS = ("path", "desired", "target")
+
+
+@contextmanager
+def replaced_folder(folder: str | Path, is_ours: Callable[[Path], bool]) -> Iterator[Path]:
+    """A temporary folder beside `folder` that takes its place when the block ends without an error.
+
+    Raises
+    ------
+    InputError : `folder` exists and is not one of ours, or cannot be written
+    """
+    final = Path(folder)
+    check_replaceable(final, is_ours)
+    try:
+        final.parent.mkdir(parents=True, exist_ok=True)
+        temporary = Path(tempfile.mkdtemp(prefix=f".{final.name}-", dir=final.parent))
+    except OSError as error:
+        raise InputError(f"{final}: cannot be written: {error.strerror}") from None
+    try:
+        temporary.chmod(0o755)
+        yield temporary
+        old: Path | None = None
+        if final.exists():
+            old = Path(tempfile.mkdtemp(prefix=f".{final.name}-old-", dir=final.parent))
+            final.rename(old / final.name)
+        temporary.rename(final)
+        if old is not None:
+            shutil.rmtree(old, ignore_errors=True)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def check_replaceable(folder: str | Path, is_ours: Callable[[Path], bool]) -> None:
+    """`InputError` when `folder` exists, holds something, and is not one of ours."""
+    final = Path(folder)
+    if final.is_dir() and (not any(final.iterdir()) or is_ours(final)):
+        return
+    if final.exists() or final.is_symlink():
+        raise InputError(f"{final}: exists and was not written by nmm; expected a new folder or one of nmm's")
+
+
+def is_run(folder: Path) -> bool:
+    """Whether a folder holds a run that nmm wrote."""
+    try:
+        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return isinstance(summary, dict) and summary.get("format") == FORMAT
+
+
+def save(trajectory: Trajectory, folder: str | Path, *, figures: bool = True, html: bool = False) -> Path:
+    """Write trajectory.npz, trajectory.csv, summary.json, scenario.yaml, figures and playback.html.
+
+    Parameters
+    ----------
+    folder : a new folder, or one of nmm's, which is replaced
+    figures : whether to draw the figures (PNG)
+    html : whether to write playback.html
+
+    Raises
+    ------
+    InputError : the folder exists and is not ours, or cannot be written
+    """
+    with replaced_folder(folder, is_run) as temporary:
+        np.savez_compressed(temporary / "trajectory.npz", **_arrays(trajectory))
+        _write_csv(trajectory, temporary / "trajectory.csv")
+        summary = trajectory.summary()
+        (temporary / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+        if trajectory.scenario is not None:
+            text = yaml.safe_dump(trajectory.scenario, sort_keys=False, allow_unicode=True)
+            (temporary / "scenario.yaml").write_text(text, encoding="utf-8")
+        if figures and len(trajectory) > 1:
+            from nmm.figures import write_run_figures
+
+            write_run_figures(trajectory, temporary)
+        if html and len(trajectory):
+            from nmm.playback import write_html
+
+            title = trajectory.robot.name if trajectory.scenario is None else str(trajectory.scenario["name"])
+            write_html([trajectory.motion()], temporary / "playback.html", title=title)
+    return Path(folder)
+
+
+def load(folder: str | Path) -> Trajectory:
+    """Read a run's folder; `InputError` names what is missing."""
+    from nmm.loading import load as load_robot
+    from nmm.scenario import Scenario
+    from nmm.trajectory import Outcome, Trajectory
+
+    folder = Path(folder)
+    if not is_run(folder):
+        raise InputError(f"{folder}: expected a run's folder (with trajectory.npz and nmm's summary.json)")
+    summary: dict[str, Any] = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    try:
+        with np.load(folder / "trajectory.npz", allow_pickle=False) as file:
+            arrays = {name: file[name] for name in ARRAYS}
+            arrays |= {name: file.get(name) for name in OPTIONAL_ARRAYS}
+    except (OSError, ValueError, KeyError) as error:
+        raise InputError(f"{folder / 'trajectory.npz'}: cannot be read: {error}") from None
+    scenario = None
+    if (folder / "scenario.yaml").exists():
+        loaded = Scenario.load(folder / "scenario.yaml")
+        scenario, robot = loaded.resolved(), loaded.robot()
+    else:
+        source = summary["robot"]
+        robot = load_robot(source["source"], arguments=source["arguments"])
+    return Trajectory(
+        robot=robot,
+        r_names=tuple(summary["r_names"]),
+        r_units=tuple(summary["r_units"]),
+        resolver=summary["resolver"],
+        method=summary["method"],
+        dt=summary["dt"],
+        outcome=Outcome(summary["outcome"]),
+        message=summary["message"],
+        warnings=tuple(summary["warnings"]),
+        frame=summary["frame"],
+        scenario=scenario,
+        **arrays,
+    )
+
+
+def _arrays(trajectory: Trajectory) -> dict[str, Any]:
+    arrays = {name: getattr(trajectory, name) for name in ARRAYS}
+    arrays |= {
+        name: getattr(trajectory, name) for name in OPTIONAL_ARRAYS if getattr(trajectory, name) is not None
+    }
+    arrays["q_names"] = np.array(trajectory.robot.q_names)
+    arrays["u_names"] = np.array(trajectory.robot.u_names)
+    arrays["r_names"] = np.array(trajectory.r_names)
+    return arrays
+
+
+def _write_csv(trajectory: Trajectory, path: Path) -> None:
+    robot, rows = trajectory.robot, trajectory.r_names
+    columns = [
+        ("t", trajectory.t),
+        *((name, trajectory.q[:, i]) for i, name in enumerate(robot.q_names)),
+        *((f"u_{name}", trajectory.u[:, i]) for i, name in enumerate(robot.u_names)),
+        *((f"r_{name}", trajectory.r[:, i]) for i, name in enumerate(rows)),
+        *((f"r_d_{name}", trajectory.r_d[:, i]) for i, name in enumerate(rows)),
+        *((f"error_{name}", trajectory.error[:, i]) for i, name in enumerate(rows)),
+        ("objective", trajectory.objective),
+        ("sigma_min", trajectory.sigma_min),
+        *((f"partition_{i}", trajectory.partition[:, i]) for i in range(len(rows))),
+        ("residual", trajectory.residual),
+    ]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow([name for name, _ in columns])
+        writer.writerows(zip(*(values.tolist() for _, values in columns), strict=True))
