@@ -13,7 +13,8 @@ from nmm.configuration import Configuration
 from nmm.errors import InputError
 from nmm.function import Callback, Evaluation, Stage
 
-#: Step of the central differences: the cube root of the machine's precision balances truncation and rounding.
+#: Step of the central differences: the cube root of the machine's precision balances truncation and rounding
+#: where the values change over distances near 1. It does not grow with t or q: nor does a sine's period.
 STEP = float(np.cbrt(np.finfo(float).eps))
 
 TimeConfigurationFunction = Callable[[float, Configuration], ArrayLike]
@@ -52,10 +53,13 @@ def differentiated(
 
     def checked(result: ArrayLike, shape: tuple[int, ...], what: str) -> Array:
         try:
-            array = np.asarray(result, dtype=np.float64).reshape(shape)
+            array = np.asarray(result, dtype=np.float64)
         except (TypeError, ValueError):
             raise InputError(f"{name}: expected {what} of shape {shape}, got {result!r}") from None
-        return array
+        # Axes of length 1 come and go, but a transposed Jacobian is not one.
+        if [k for k in array.shape if k != 1] != [k for k in shape if k != 1]:
+            raise InputError(f"{name}: expected {what} of shape {shape}, got shape {array.shape}")
+        return array.reshape(shape)
 
     def callback(t: float, configuration: Configuration) -> Evaluation:
         robot, q = configuration.robot, configuration.q
@@ -68,17 +72,15 @@ def differentiated(
         if value_t is not None:
             y_t = checked(value_t(t, configuration), (rows,), "a time derivative")
         elif depends_on_time:
-            step = STEP * max(1.0, abs(t))
-            y_t = (at(t + step, q) - at(t - step, q)) / (2 * step)
+            y_t = (at(t + STEP, q) - at(t - STEP, q)) / ((t + STEP) - (t - STEP))
         if value_q is not None:
             y_q = checked(value_q(t, configuration), (rows, robot.n), "a Jacobian")
         elif depends_on_configuration:
             for j in range(robot.n):
-                step = STEP * max(1.0, abs(q[j]))
                 ahead, behind = q.copy(), q.copy()
-                ahead[j] += step
-                behind[j] -= step
-                y_q[:, j] = (at(t, ahead) - at(t, behind)) / (2 * step)
+                ahead[j] += STEP
+                behind[j] -= STEP
+                y_q[:, j] = (at(t, ahead) - at(t, behind)) / (ahead[j] - behind[j])
         return Evaluation(y, y_t, y_q)
 
     return callback

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from nmm.errors import NmmError
 from nmm.robot import Robot
 
 Array = NDArray[np.float64]
@@ -73,54 +75,50 @@ def frame_hessian(raw: Array) -> Array:
     return np.ascontiguousarray(raw.ravel().reshape(raw.shape, order="F"))
 
 
-class Kinematics:
-    """The kinematics of a few frames, computed over and over in arrays that stay where they are.
+def kinematics_updater(
+    robot: Robot, frames: tuple[str, ...], placements: Array, jacobians: Array, hessians: Array
+) -> Callable[[float, Array], None]:
+    """What a control loop uses where a `Configuration` would allocate.
 
-    What a control loop uses where a `Configuration` would allocate: `update_at(t, q)` overwrites
-    `placements` (k, 3, 4) = [R | p], `jacobians` (k, 6, n) and, if asked for, `hessians`
-    (k, 6, n, n) of the k frames, all in world axes.
+    The function returned, `update(t, q)`, computes the kinematics of k frames at q (n,), float64,
+    in world axes: `placements` (k, 3, 4) = [R | p], `jacobians` (k, 6, n) and, if it is not empty,
+    `hessians` (k, 6, n, n). The time is not read.
     """
+    model, data = robot.model, robot.model.createData()
+    compute_jacobians, update_placement = pin.computeJointJacobians, pin.updateFramePlacement
+    frame_jacobian, axes = pin.getFrameJacobian, JACOBIAN_FRAME
+    ids = [robot.frame_id(name) for name in frames]
+    work = [
+        (frame_id, placements[slot], _matrix_view(data.oMf[frame_id]), jacobians[slot])
+        for slot, frame_id in enumerate(ids)
+    ]
 
-    def __init__(
-        self, robot: Robot, frames: tuple[str, ...], placements: Array, jacobians: Array, hessians: Array
-    ) -> None:
-        self._model = robot.model
-        self._data = robot.model.createData()
-        self._frames = []
-        for slot, name in enumerate(frames):
-            frame_id = robot.frame_id(name)
-            placement = self._data.oMf[frame_id]
-            # Views of Pinocchio's own memory: they follow updateFramePlacement at no cost.
-            self._frames.append(
-                (
-                    frame_id,
-                    placements[slot, :, :3],
-                    placement.rotation,
-                    placements[slot, :, 3],
-                    placement.translation,
-                    jacobians[slot],
-                )
-            )
-        self._hessians = hessians
+    # Local names, not attributes: a third of this function's own time is looking things up.
+    def update(t: float, q: Array) -> None:
+        compute_jacobians(model, data, q)
+        for frame_id, placement, source, jacobian in work:
+            update_placement(model, data, frame_id)
+            placement[...] = source
+            jacobian[...] = frame_jacobian(model, data, frame_id, axes)
 
-    def update_at(self, t: float, q: Array) -> None:
-        """Compute everything at q, shape (n,), float64; the time t is not read."""
-        model, data = self._model, self._data
-        _compute_jacobians(model, data, q)
-        for frame_id, rotation, R, translation, p, jacobian in self._frames:
-            _update_placement(model, data, frame_id)
-            rotation[...] = R
-            translation[...] = p
-            jacobian[...] = _frame_jacobian(model, data, frame_id, JACOBIAN_FRAME)
-        if self._hessians.size:
-            pin.computeJointKinematicHessians(model, data)
-            for hessian, frame in zip(self._hessians, self._frames, strict=True):
-                hessian[...] = frame_hessian(
-                    pin.getFrameKinematicHessian(model, data, frame[0], JACOBIAN_FRAME)
-                )
+    def update_with_hessians(t: float, q: Array) -> None:
+        update(t, q)
+        pin.computeJointKinematicHessians(model, data)
+        for hessian, frame_id in zip(hessians, ids, strict=True):
+            hessian[...] = frame_hessian(pin.getFrameKinematicHessian(model, data, frame_id, axes))
+
+    return update_with_hessians if hessians.size else update
 
 
-# Looked up once: a control step spends half its time in calls such as these.
-_compute_jacobians = pin.computeJointJacobians
-_update_placement = pin.updateFramePlacement
-_frame_jacobian = pin.getFrameJacobian
+def _matrix_view(placement: pin.SE3) -> Array:
+    """[R | p] as a (3, 4) view of Pinocchio's own memory, which follows updateFramePlacement at no cost.
+
+    Pinocchio keeps R (column by column) and p next to each other; should that ever change, this
+    raises instead of reading something else.
+    """
+    rotation, translation = placement.rotation, placement.translation
+    start = rotation.__array_interface__["data"][0]
+    beside = translation.__array_interface__["data"][0] == start + 9 * rotation.itemsize
+    if not (beside and rotation.flags.f_contiguous):
+        raise NmmError("this version of Pinocchio keeps placements in another way than nmm expects")
+    return np.lib.stride_tricks.as_strided(rotation, (3, 4), (8, 24))

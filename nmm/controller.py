@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,8 @@ from nmm.program import Program
 from nmm.resolvers.base import REPORT, Resolver, Shape, Status
 from nmm.robot import Robot
 from nmm.tasks.task import Stack, Task
+
+FLOAT64 = np.dtype(np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,16 +105,12 @@ class Controller:
             [np.zeros((s + k) * (4 + m) + 1 + 2 * m + REPORT + robot.n)],
         )
         self._program = program
-        self._prepare = program.prepare
         self._start = setup.state
         self._state = setup.state.copy()
-        self._arguments = (program.tables, program.numbers, program.memory, self._state)
         self._results: Results = results(program.tables, program.memory)
         self._u = self._results.u
-        self._report = self._results.report
         self._shape = (robot.n,)
-        finishes = type(resolver).finish is not Resolver.finish
-        self._solve = self._solve_and_finish if finishes else self._solve_compiled
+        self._solve = self._solver()
 
     def __call__(self, t: float, q: ArrayLike) -> Array:
         """Inputs u (m,) at time t (s) and configuration q (n,), in the units of `robot.u_units`.
@@ -123,26 +121,37 @@ class Controller:
         InputError : q has the wrong length or holds numbers that are not finite
         """
         # Another kind of array would be compiled for anew, so anything but the plain kind is copied.
-        if type(q) is not np.ndarray or q.dtype != np.float64 or q.shape != self._shape or not q.flags.carray:
+        if (
+            type(q) is not np.ndarray
+            or q.dtype is not FLOAT64
+            or q.shape != self._shape
+            or not q.flags.carray
+        ):
             q = self.robot.q(q)
-        self._solve(float(t), q)
-        if self._report[0]:
+        if self._solve(float(t), q):
             self._fail(t, q)
         return self._u.copy()
 
-    def _solve_compiled(self, t: float, q: Array) -> None:
-        self._prepare(t, q)
-        step(t, q, *self._arguments)
+    def _solver(self) -> Callable[[float, Array], float]:
+        """solve(t, q) -> status, with everything it needs at hand."""
+        program, state, found, resolver = self._program, self._state, self._results, self.resolver
+        prepare, tables, numbers, memory = program.prepare, program.tables, program.numbers, program.memory
 
-    def _solve_and_finish(self, t: float, q: Array) -> None:
-        self._solve_compiled(t, q)
-        task = self._results.task
-        self.resolver.finish(task.J, task.rate, self._results.h, self._u, self._report)
-        drive(self._u, self._program.buffers.G, self._results.q_dot)
+        def solve(t: float, q: Array) -> float:
+            prepare(t, q)
+            return step(t, q, tables, numbers, memory, state)
+
+        def solve_and_finish(t: float, q: Array) -> float:
+            solve(t, q)
+            resolver.finish(found.task.J, found.task.rate, found.h, found.u, found.report)
+            drive(found.u, program.buffers.G, found.q_dot)
+            return float(found.report[0])
+
+        return solve if type(resolver).finish is Resolver.finish else solve_and_finish
 
     def _fail(self, t: float, q: Array) -> None:
         self.robot.q(q)  # a q that is not finite is the caller's error
-        status = Status(int(self._report[0]))
+        status = Status(int(self._results.report[0]))
         raise SingularError(f"at t = {t:g} s: {status.meaning}")
 
     def evaluate(self, t: float, q: ArrayLike) -> Step:
@@ -175,8 +184,7 @@ class Controller:
 
     def velocity(self, t: float, q: Array) -> Array:
         """q_dot = S(q) u (n,) of the closed loop at (t, q); raises as a call does."""
-        self._solve(float(t), q)
-        if self._report[0]:
+        if self._solve(t, q):
             self._fail(t, q)
         return self._results.q_dot.copy()
 

@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from nmm.arrays import Array
-from nmm.compiled import call_resolver, compiled
+from nmm.compiled import call_resolver, compiled, inlined, view
 from nmm.packing import section
-from nmm.program import MEMORY, NUMBERS, TABLES, Buffers, buffers, run
+from nmm.program import MEMORY, NUMBERS, SIZES, TABLES, Buffers, run
 from nmm.resolvers.base import REPORT
 
 
@@ -53,46 +53,48 @@ GAINS, CONSTRAINT_GAINS, WEIGHTS, RESOLVER = NUMBERS, NUMBERS + 1, NUMBERS + 2, 
 BLOCK = MEMORY
 
 
-@compiled
-def equation_views(s: int, m: int, block: Array) -> Equation:
-    """The views of a block of s (4 + m) numbers."""
+@inlined
+def equation_views(s: int, m: int, memory: Array, first: int) -> Equation:
+    """The views of s (4 + m) numbers."""
     return Equation(
-        block[:s],
-        block[s : 2 * s],
-        block[2 * s : 3 * s],
-        block[3 * s : 4 * s],
-        block[4 * s :].reshape((s, m)),
+        view(memory, first, (s,)),
+        view(memory, first + s, (s,)),
+        view(memory, first + 2 * s, (s,)),
+        view(memory, first + 3 * s, (s,)),
+        view(memory, first + 4 * s, (s, m)),
     )
 
 
-@compiled
+@inlined
 def results(tables: Array, memory: Array) -> Results:
     """The views; shape = [s, k, m, ...]."""
     shape = section(tables, SHAPE)
-    block = section(memory, BLOCK)
     s, k, m = shape[0], shape[1], shape[2]
-    a = s * (4 + m)
-    b = a + k * (4 + m)
+    a = int(memory[BLOCK])
+    b = a + s * (4 + m)
+    c = b + k * (4 + m)
+    d = c + 1 + 2 * m
     return Results(
-        equation_views(s, m, block[:a]),
-        equation_views(k, m, block[a:b]),
-        block[b : b + 1],
-        block[b + 1 : b + 1 + m],
-        block[b + 1 + m : b + 1 + 2 * m],
-        block[b + 1 + 2 * m : b + 1 + 2 * m + REPORT],
-        block[b + 1 + 2 * m + REPORT :],
+        equation_views(s, m, memory, a),
+        equation_views(k, m, memory, b),
+        view(memory, c, (1,)),
+        view(memory, c + 1, (m,)),
+        view(memory, c + 1 + m, (m,)),
+        view(memory, d, (REPORT,)),
+        view(memory, d + REPORT, (section(tables, SIZES)[0],)),
     )
 
 
 @compiled
-def times_S(row: Array, G: Array, out: Array) -> None:
-    """out += row S, S = blkdiag(G, I): a derivative in the coordinates, seen by the inputs."""
+def times_S(rows: Array, row: int, G: Array, out: Array) -> None:
+    """out = rows[row] S, S = blkdiag(G, I): a derivative in the coordinates, seen by the inputs."""
     n_p, p = G.shape
     for j in range(p):
+        out[j] = 0.0
         for i in range(n_p):
-            out[j] += row[i] * G[i, j]
-    for j in range(row.shape[0] - n_p):
-        out[p + j] += row[n_p + j]
+            out[j] += rows[row, i] * G[i, j]
+    for j in range(rows.shape[1] - n_p):
+        out[p + j] = rows[row, n_p + j]
 
 
 @compiled
@@ -103,14 +105,15 @@ def drive(u: Array, G: Array, q_dot: Array) -> None:
         q_dot[i] = 0.0
         for j in range(p):
             q_dot[i] += G[i, j] * u[j]
-    q_dot[n_p:] = u[p:]
+    for j in range(u.shape[0] - p):
+        q_dot[n_p + j] = u[p + j]
 
 
 @compiled
 def write_equation(rows: Array, gain: Array, b: Buffers, e: Equation) -> None:
     """rate = ∂g/∂t + K e, J_bar = (∂f/∂q - ∂g/∂q) S; a row is [row of f, row of g, is an angle]."""
     s = e.r.shape[0]
-    difference = np.empty(b.value_q.shape[1])
+    n = b.value_q.shape[1]
     for i in range(s):
         f = rows[3 * i]
         g = rows[3 * i + 1]
@@ -121,23 +124,22 @@ def write_equation(rows: Array, gain: Array, b: Buffers, e: Equation) -> None:
             error = math.pi - (math.pi - error) % (2.0 * math.pi)
         e.error[i] = error
         e.rate[i] = b.value_t[g] - b.value_t[f]
-        e.J[i] = 0.0
-        for j in range(difference.shape[0]):
-            difference[j] = b.value_q[f, j] - b.value_q[g, j]
-        times_S(difference, b.G, e.J[i])
+        for j in range(n):  # in place: f's derivative is not read again
+            b.value_q[f, j] -= b.value_q[g, j]
+        times_S(b.value_q, f, b.G, e.J[i])
     for i in range(s):
         for j in range(s):
             e.rate[i] += gain[i * s + j] * e.error[j]
 
 
 @compiled
-def step(t: float, q: Array, tables: Array, numbers: Array, memory: Array, state: Array) -> None:
-    """One control step: functions, equations, gradient, inputs. Pinocchio's part is in `memory` already.
+def step(t: float, q: Array, tables: Array, numbers: Array, memory: Array, state: Array) -> float:
+    """One control step: functions, equations, gradient, inputs. Returns the resolver's status.
 
-    shape = [s, k, m, resolver kernel]; terms: the rows of the objective's terms.
+    Pinocchio's part is in `memory` already. shape = [s, k, m, resolver kernel]; terms: the rows
+    of the objective's terms.
     """
-    b = buffers(tables, memory)
-    run(t, q, tables, numbers, b)
+    b = run(t, q, tables, numbers, memory)
     e = results(tables, memory)
     shape = section(tables, SHAPE)
     rows = section(tables, ROWS)
@@ -145,14 +147,17 @@ def step(t: float, q: Array, tables: Array, numbers: Array, memory: Array, state
     write_equation(rows[3 * shape[0] :], section(numbers, CONSTRAINT_GAINS), b, e.constraint)
     terms = section(tables, TERMS)
     weights = section(numbers, WEIGHTS)
+    gradient = np.zeros((1, q.shape[0]))
     e.H[0] = 0.0
-    e.h[:] = 0.0
-    gradient = np.zeros(q.shape[0])
     for i in range(terms.shape[0]):
         e.H[0] += weights[i] * b.value[terms[i]]
         for j in range(q.shape[0]):
-            gradient[j] += weights[i] * b.value_q[terms[i], j]
-    times_S(gradient, b.G, e.h)
+            gradient[0, j] += weights[i] * b.value_q[terms[i], j]
+    times_S(gradient, 0, b.G, e.h)
+    for j in range(e.u.shape[0]):
+        e.u[j] = math.nan  # what a resolver that finds no solution leaves behind
+    for j in range(e.report.shape[0]):
+        e.report[j] = math.nan
     call_resolver(
         shape[3],
         e.task.J,
@@ -167,3 +172,4 @@ def step(t: float, q: Array, tables: Array, numbers: Array, memory: Array, state
         e.report,
     )
     drive(e.u, b.G, e.q_dot)
+    return e.report[0]

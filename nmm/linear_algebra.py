@@ -73,19 +73,26 @@ def orthonormal_rows(J: Array, order: Array, L: Array, Q: Array) -> float:
 
 
 @compiled
-def minimum_norm(rate: Array, order: Array, L: Array, Q: Array, u: Array) -> None:
-    """u = J⁺ rate from `orthonormal_rows`: L y = rate[order], u = Qᵀ y."""
+def closest_solution(rate: Array, u0: Array, order: Array, L: Array, Q: Array, u: Array) -> None:
+    """The solution of J u = rate closest to u0, J⁺ rate + (I - J⁺ J) u0, from `orthonormal_rows`.
+
+    u = u0 + Qᵀ (y - Q u0) with L y = rate[order].
+    """
     s, m = Q.shape
     y = np.empty(s)
+    for j in range(m):
+        u[j] = u0[j]
     for i in range(s):
         y[i] = rate[order[i]]
         for j in range(i):
             y[i] -= L[i, j] * y[j]
         y[i] /= L[i, i]
-    for j in range(m):
-        u[j] = 0.0
-        for i in range(s):
-            u[j] += Q[i, j] * y[i]
+    for i in range(s):
+        missing = y[i]
+        for j in range(m):
+            missing -= Q[i, j] * u0[j]
+        for j in range(m):
+            u[j] += missing * Q[i, j]
 
 
 @compiled
@@ -101,48 +108,42 @@ def pseudoinverse_transposed(order: Array, L: Array, Q: Array, X: Array) -> None
 
 
 @compiled
-def eliminate(A: Array, B: Array) -> tuple[float, float]:
-    """Solve A X = B in place (B becomes X, A is destroyed); A (s, s), B (s, k).
+def eliminate(M: Array) -> tuple[float, float]:
+    """Solve A X = B in place: M = [A B], shape (s, s + k), becomes [*, X].
 
     Gaussian elimination with partial pivoting. Returns det A and the ratio of the smallest to the
-    largest pivot; when a pivot is zero both are 0 and B is not a solution.
+    largest pivot; when a pivot is zero both are 0 and there is no solution.
     """
-    s = A.shape[0]
-    k = B.shape[1]
+    s, width = M.shape
     determinant = 1.0
     smallest = math.inf
     largest = 0.0
     for i in range(s):
         pivot = i
         for row in range(i + 1, s):
-            if abs(A[row, i]) > abs(A[pivot, i]):
+            if abs(M[row, i]) > abs(M[pivot, i]):
                 pivot = row
-        size = abs(A[pivot, i])
+        size = abs(M[pivot, i])
         if size == 0.0:
             return 0.0, 0.0
         smallest = min(smallest, size)
         largest = max(largest, size)
         if pivot != i:
             determinant = -determinant
-            for j in range(s):
-                A[i, j], A[pivot, j] = A[pivot, j], A[i, j]
-            for j in range(k):
-                B[i, j], B[pivot, j] = B[pivot, j], B[i, j]
-        determinant *= A[i, i]
+            for j in range(i, width):
+                M[i, j], M[pivot, j] = M[pivot, j], M[i, j]
+        determinant *= M[i, i]
         for row in range(i + 1, s):
-            factor = A[row, i] / A[i, i]
-            if factor != 0.0:
-                for j in range(i + 1, s):
-                    A[row, j] -= factor * A[i, j]
-                for j in range(k):
-                    B[row, j] -= factor * B[i, j]
+            factor = M[row, i] / M[i, i]
+            for j in range(i + 1, width):
+                M[row, j] -= factor * M[i, j]
     for i in range(s - 1, -1, -1):
-        for j in range(k):
-            x = B[i, j]
+        for j in range(s, width):
+            x = M[i, j]
             for row in range(i + 1, s):
-                x -= A[i, row] * B[row, j]
-            B[i, j] = x / A[i, i]
-    return determinant, smallest / largest
+                x -= M[i, row] * M[row, j]
+            M[i, j] = x / M[i, i]
+    return determinant, smallest / largest if largest > 0.0 else math.nan
 
 
 @compiled

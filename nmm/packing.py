@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nmm.compiled import compiled
+from nmm.compiled import inlined, view
 
 
 def pack(sections: Sequence[Any], dtype: type) -> NDArray[Any]:
@@ -21,7 +21,8 @@ def pack(sections: Sequence[Any], dtype: type) -> NDArray[Any]:
     return np.concatenate([ends.astype(dtype), *flat])
 
 
-@compiled
+@inlined
 def section(packed: NDArray[Any], number: int) -> NDArray[Any]:
     """The view of one section."""
-    return packed[int(packed[number]) : int(packed[number + 1])]
+    first = int(packed[number])
+    return view(packed, first, (int(packed[number + 1]) - first,))

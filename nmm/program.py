@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array
-from nmm.compiled import call_function, call_platform, compiled
-from nmm.configuration import Configuration, Kinematics
+from nmm.compiled import call_function, call_platform, compiled, inlined, view
+from nmm.configuration import Configuration, kinematics_updater
 from nmm.function import Callback, Evaluation, Function, Stage
 from nmm.packing import pack, section
 from nmm.robot import Robot
@@ -40,35 +40,34 @@ PARAMETERS, NUMBERS = 0, 1
 WORK, MEMORY = 0, 1
 
 
-@compiled
+@inlined
 def buffers(tables: Array, memory: Array) -> Buffers:
     """The views; sizes = [n, n_p, p, frames, frames with Hessians, rows, ...]."""
     sizes = section(tables, SIZES)
-    work = section(memory, WORK)
     n, n_p, p, k, kh, rows = sizes[0], sizes[1], sizes[2], sizes[3], sizes[4], sizes[5]
-    a = k * 12
-    b = a + k * 6 * n
-    c = b + kh * 6 * n * n
-    d = c + n_p * p
-    e = d + n_p * p * n_p
-    f = e + rows
-    g = f + rows
+    a = int(memory[WORK])
+    b = a + k * 12
+    c = b + k * 6 * n
+    d = c + kh * 6 * n * n
+    e = d + n_p * p
+    f = e + n_p * p * n_p
     return Buffers(
-        work[:a].reshape((k, 3, 4)),
-        work[a:b].reshape((k, 6, n)),
-        work[b:c].reshape((kh, 6, n, n)),
-        work[c:d].reshape((n_p, p)),
-        work[d:e].reshape((n_p, p, n_p)),
-        work[e:f],
-        work[f:g],
-        work[g : g + rows * n].reshape((rows, n)),
+        view(memory, a, (k, 3, 4)),
+        view(memory, b, (k, 6, n)),
+        view(memory, c, (kh, 6, n, n)),
+        view(memory, d, (n_p, p)),
+        view(memory, e, (n_p, p, n_p)),
+        view(memory, f, (rows,)),
+        view(memory, f + rows, (rows,)),
+        view(memory, f + 2 * rows, (rows, n)),
     )
 
 
 @compiled
-def run(t: float, q: Array, tables: Array, numbers: Array, b: Buffers) -> None:
-    """Evaluate the platform and every stage at (t, q); the kinematics of the frames are in place.
+def run(t: float, q: Array, tables: Array, numbers: Array, memory: Array) -> Buffers:
+    """Evaluate the platform and every stage at (t, q), into the buffers returned.
 
+    The kinematics of the frames are in `memory` already.
     sizes[6:8] = [platform kernel, number of its parameters, which come first]; a stage is
     [kernel, first row, last row, first slot, last slot, first parameter, last parameter].
     """
@@ -76,14 +75,15 @@ def run(t: float, q: Array, tables: Array, numbers: Array, b: Buffers) -> None:
     stages = section(tables, STAGES)
     slots = section(tables, SLOTS)
     parameters = section(numbers, PARAMETERS)
-    b.G[:] = 0.0
-    b.G_q[:] = 0.0
-    b.value_t[:] = 0.0
-    b.value_q[:] = 0.0
-    call_platform(sizes[6], q[: sizes[1]], parameters[: sizes[7]], b.G, b.G_q)
+    b = buffers(tables, memory)
+    work = section(memory, WORK)
+    n, k = sizes[0], sizes[3]
+    for i in range(k * (12 + 6 * n) + sizes[4] * 6 * n * n, work.shape[0]):  # all but the kinematics
+        work[i] = 0.0
+    call_platform(sizes[6], view(q, 0, (sizes[1],)), view(parameters, 0, (sizes[7],)), b.G, b.G_q)
     for i in range(0, stages.shape[0], 7):
-        first = stages[i + 1]
-        last = stages[i + 2]
+        row = stages[i + 1]
+        rows = stages[i + 2] - row
         call_function(
             stages[i],
             t,
@@ -93,18 +93,13 @@ def run(t: float, q: Array, tables: Array, numbers: Array, b: Buffers) -> None:
             b.hessians,
             b.G,
             b.G_q,
-            slots[stages[i + 3] : stages[i + 4]],
-            parameters[stages[i + 5] : stages[i + 6]],
-            b.value[first:last],
-            b.value_t[first:last],
-            b.value_q[first:last],
+            view(slots, stages[i + 3], (stages[i + 4] - stages[i + 3],)),
+            view(parameters, stages[i + 5], (stages[i + 6] - stages[i + 5],)),
+            view(b.value, row, (rows,)),
+            view(b.value_t, row, (rows,)),
+            view(b.value_q, row * n, (rows, n)),
         )
-
-
-@compiled
-def run_alone(t: float, q: Array, tables: Array, numbers: Array, memory: Array) -> None:
-    """`run`, from Python."""
-    run(t, q, tables, numbers, buffers(tables, memory))
+    return b
 
 
 class Program:
@@ -185,25 +180,19 @@ class Program:
         self.memory = pack([np.zeros(floats), *memory], np.float64)
         self.buffers = buffers(self.tables, self.memory)
         parameters = section(self.numbers, PARAMETERS)
-        self._callbacks = [(callback, parameters[a:z]) for callback, a, z in self._placed_callbacks]
+        callbacks = [(callback, parameters[a:z]) for callback, a, z in self._placed_callbacks]
         views = self.buffers
-        self._kinematics = Kinematics(
+        self.prepare = update = kinematics_updater(
             self.robot, tuple(self._frames), views.placements, views.jacobians, views.hessians
         )
-        self.prepare = self._prepare_with_callbacks if self._callbacks else self._kinematics.update_at
-
-    def _prepare_with_callbacks(self, t: float, q: Array) -> None:
-        self._kinematics.update_at(t, q)
-        configuration = Configuration(self.robot, q)
-        for callback, block in self._callbacks:
-            value, value_t, value_q = callback(t, configuration)
-            block[:] = np.concatenate([value, value_t, value_q.ravel()])
+        if callbacks:
+            self.prepare = _with_callbacks(self.robot, update, callbacks)
 
     def evaluate(self, t: float, q: Array) -> list[Evaluation]:
         """Every function's value, time derivative and Jacobian at (t, q), as copies."""
         q = np.array(q, dtype=np.float64)
         self.prepare(t, q)
-        run_alone(float(t), q, self.tables, self.numbers, self.memory)
+        run(float(t), q, self.tables, self.numbers, self.memory)
         b = self.buffers
         return [
             Evaluation(b.value[a:z].copy(), b.value_t[a:z].copy(), b.value_q[a:z].copy())
@@ -211,3 +200,18 @@ class Program:
                 (first, first + length) for first, length in zip(self.first_rows, self._lengths, strict=True)
             )
         ]
+
+
+def _with_callbacks(
+    robot: Robot, update: Callable[[float, Array], None], callbacks: Sequence[tuple[Callback, Array]]
+) -> Callable[[float, Array], None]:
+    """`update`, then the users' Python functions, whose results go where their kernels read them."""
+
+    def prepare(t: float, q: Array) -> None:
+        update(t, q)
+        configuration = Configuration(robot, q)
+        for callback, block in callbacks:
+            value, value_t, value_q = callback(t, configuration)
+            block[:] = np.concatenate([value, value_t, value_q.ravel()])
+
+    return prepare

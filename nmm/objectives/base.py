@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from nmm.arrays import Array, scalar
 from nmm.configuration import Configuration
-from nmm.function import Function, Row
+from nmm.errors import InputError
+from nmm.function import Function, Row, Stage
 from nmm.robot import Robot
 
 
@@ -55,10 +56,14 @@ class Sum(Objective):
     """A weighted sum of functions of one row: `Sum((2.0, a), (-1.0, b))`."""
 
     def __init__(self, *terms: tuple[float, Function]) -> None:
-        self._terms = tuple((scalar(weight, "weight"), function) for weight, function in terms)
+        self._terms = tuple(
+            (scalar(weight, "weight") * inner, part)
+            for weight, function in terms
+            for inner, part in (function.terms() if isinstance(function, Objective) else ((1.0, function),))
+        )
 
     def terms(self) -> tuple[tuple[float, Function], ...]:
         return self._terms
 
-    def stages(self, robot: Robot) -> tuple[()]:
-        return ()
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        raise InputError("sum of objectives: expected as an objective, it is no task of its own")

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicSpline, KroghInterpolator, PPoly, make_interp_spline
+from scipy.interpolate import BSpline, CubicSpline, KroghInterpolator, PPoly, make_interp_spline
 
 from nmm.arrays import Array, array, positive, vector
 from nmm.compiled import FUNCTION, kernel
@@ -167,6 +168,10 @@ class Spline(PiecewisePolynomial):
             raise InputError(unknown("ends", ends, ("rest", "natural", "periodic")))
         if ends == "periodic" and not np.allclose(table[0], table[-1], rtol=0, atol=1e-12):
             raise InputError("points: expected the last to equal the first for periodic ends")
+        if ends == "periodic":
+            table[-1] = table[0]  # SciPy wants them equal to the last bit
+        if degree == 5 and ends == "natural" and len(breaks) < 3:
+            raise InputError(f"points: expected at least 3 for degree 5 with natural ends, got {len(breaks)}")
         if degree == 3:
             polynomial: PPoly = CubicSpline(breaks, table, bc_type="clamped" if ends == "rest" else ends)
         else:
@@ -178,11 +183,11 @@ class Spline(PiecewisePolynomial):
         super().__init__(polynomial, unit)
 
 
-def _pieces(spline: object, breaks: Array) -> PPoly:
-    """A B-spline as polynomials between the breaks (its knots repeat at the ends)."""
-    whole = PPoly.from_spline(spline)  # type: ignore[arg-type]  # the stubs know one spline class only
-    kept = [int(np.searchsorted(whole.x, start, side="right")) - 1 for start in breaks[:-1]]
-    return PPoly(whole.c[:, kept, :], breaks)
+def _pieces(spline: BSpline, breaks: Array) -> PPoly:
+    """A B-spline as polynomials between the breaks (`PPoly.from_spline` takes one component only)."""
+    starts = breaks[:-1]
+    taylor = [spline(starts, nu=power) / math.factorial(power) for power in range(spline.k, -1, -1)]
+    return PPoly(np.array(taylor), breaks)
 
 
 def _waypoints(times: ArrayLike, points: ArrayLike) -> tuple[Array, Array]:

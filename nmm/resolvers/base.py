@@ -88,7 +88,7 @@ class Resolution:
 
     @property
     def singular(self) -> bool:
-        """Whether the matrix to invert lost rank; u is then not a solution."""
+        """Whether the matrix to invert lost rank; u is then not a number."""
         return self.status is not Status.SOLVED
 
 
@@ -158,9 +158,13 @@ class Resolver(ABC):
             raise InputError(f"Jc: expected {m} columns, got shape {Jc.shape}")
         rate_c = vector(np.zeros(0) if rate_c is None else rate_c, len(Jc), "rate_c")
         names = tuple(inputs) if inputs is not None else tuple(f"u{i}" for i in range(m))
+        if len(names) != m:
+            raise InputError(f"inputs: expected {m} names, as J has columns, got {len(names)}")
         setup = self.setup(Shape(s, len(Jc), names))
         state = setup.state.copy() if state is None else np.array(state, dtype=np.int64)
-        u, report = np.zeros(m), np.zeros(REPORT)
+        if state.shape != setup.state.shape or not np.all((state[1:] >= -1) & (state[1:] < m)):
+            raise InputError(f"state: expected one of {s} rows and {m} inputs, got {state}")
+        u, report = np.full(m, np.nan), np.full(REPORT, np.nan)
         rate, h = vector(rate, s, "rate"), vector(h, m, "h")
         self.kernel(J, rate, Jc, rate_c, h, setup.parameters, setup.options, state, u, report)
         self.finish(J, rate, h, u, report)

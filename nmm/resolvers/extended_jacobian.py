@@ -21,13 +21,12 @@ def extended_jacobian(
 ) -> None:  # fmt: skip
     """[J; Jc] u = [rate; rate_c]; parameters = [tolerance]."""
     s, m = J.shape
-    A = np.empty((m, m))
-    B = np.empty((m, 1))
+    M = np.empty((m, m + 1))
     for i in range(m):
         for j in range(m):
-            A[i, j] = J[i, j] if i < s else Jc[i - s, j]
-        B[i, 0] = rate[i] if i < s else rate_c[i - s]
-    _, ratio = eliminate(A, B)
+            M[i, j] = J[i, j] if i < s else Jc[i - s, j]
+        M[i, m] = rate[i] if i < s else rate_c[i - s]
+    _, ratio = eliminate(M)
     report[2] = ratio
     if ratio <= parameters[0]:
         order = np.empty(s, dtype=np.int64)
@@ -36,7 +35,7 @@ def extended_jacobian(
         report[0] = 1.0 if orthonormal_rows(J, order, L, Q) <= parameters[0] else 3.0
         return
     for j in range(m):
-        u[j] = B[j, 0]
+        u[j] = M[j, m]
     report[1] = residual_norm(J, u, rate)
     report[0] = 0.0 if math.isfinite(report[1]) else 4.0
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array, array, positive, scalar
 from nmm.compiled import RESOLVER, Kernel, kernel
 from nmm.errors import InputError, unknown
-from nmm.linear_algebra import minimum_norm, orthonormal_rows, residual_norm
+from nmm.linear_algebra import closest_solution, orthonormal_rows, residual_norm
 from nmm.resolvers.base import Resolver, Setup, Shape
 
 
@@ -27,47 +27,36 @@ def projected_gradient(
     parameters = [α, tolerance, C row after row], options = [weighted].
     """
     s, m = J.shape
-    alpha = parameters[0]
-    weighted = options[0] == 1
-    C = parameters[2:].reshape((m, m)) if weighted else np.empty((0, 0))
-    work = np.empty((s, m))
-    gradient = np.empty(m)
-    if weighted:
-        for j in range(m):
-            gradient[j] = 0.0
-            for k in range(m):
-                gradient[j] += C[k, j] * h[k]
-            for i in range(s):
-                work[i, j] = 0.0
-                for k in range(m):
-                    work[i, j] += J[i, k] * C[k, j]
-    else:
-        gradient[:] = h
-        work[:, :] = J
     order = np.empty(s, dtype=np.int64)
     L = np.empty((s, s))
     Q = np.empty((s, m))
-    report[2] = orthonormal_rows(work, order, L, Q)
+    u0 = np.empty(m)
+    if options[0] == 0:
+        for j in range(m):
+            u0[j] = -parameters[0] * h[j]
+        report[2] = orthonormal_rows(J, order, L, Q)
+        if report[2] > parameters[1]:
+            closest_solution(rate, u0, order, L, Q, u)
+    else:
+        C = parameters[2:].reshape((m, m))
+        weighted_J = np.zeros((s, m))
+        solution = np.empty(m)
+        for j in range(m):
+            u0[j] = 0.0
+            for k in range(m):
+                u0[j] -= parameters[0] * C[k, j] * h[k]
+                for i in range(s):
+                    weighted_J[i, j] += J[i, k] * C[k, j]
+        report[2] = orthonormal_rows(weighted_J, order, L, Q)
+        if report[2] > parameters[1]:
+            closest_solution(rate, u0, order, L, Q, solution)
+            for j in range(m):
+                u[j] = 0.0
+                for k in range(m):
+                    u[j] += C[j, k] * solution[k]
     if report[2] <= parameters[1]:
         report[0] = 1.0
         return
-    solution = np.empty(m)
-    minimum_norm(rate, order, L, Q, solution)
-    for j in range(m):
-        solution[j] -= alpha * gradient[j]
-    for i in range(s):
-        along = 0.0
-        for j in range(m):
-            along += Q[i, j] * gradient[j]
-        for j in range(m):
-            solution[j] += alpha * along * Q[i, j]
-    if weighted:
-        for j in range(m):
-            u[j] = 0.0
-            for k in range(m):
-                u[j] += C[j, k] * solution[k]
-    else:
-        u[:] = solution
     report[1] = residual_norm(J, u, rate)
     report[0] = 0.0 if math.isfinite(report[1]) else 4.0
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -22,24 +22,16 @@ MOST_CANDIDATES = 20_000
 
 
 @compiled
-def solve_partition(J: Array, rate: Array, columns: Array, is_basic: Array, X: Array) -> tuple[float, float]:
-    """X = Ja⁻¹ [rate, Jb], shape (s, 1 + m - s). Returns det Ja and its pivot ratio; marks Ja's columns."""
+def solve_partition(J: Array, rate: Array, columns: Array, M: Array) -> tuple[float, float]:
+    """M = [*, Ja⁻¹ J, Ja⁻¹ rate], shape (s, s + m + 1). Returns det Ja and the ratio of its pivots."""
     s, m = J.shape
-    is_basic[:] = 0
-    Ja = np.empty((s, s))
-    for j in range(s):
-        is_basic[columns[j]] = 1
-        for i in range(s):
-            Ja[i, j] = J[i, columns[j]]
     for i in range(s):
-        X[i, 0] = rate[i]
-    b = 1
-    for j in range(m):
-        if is_basic[j] == 0:
-            for i in range(s):
-                X[i, b] = J[i, j]
-            b += 1
-    return eliminate(Ja, X)
+        for j in range(s):
+            M[i, j] = J[i, columns[j]]
+        for j in range(m):
+            M[i, s + j] = J[i, j]
+        M[i, s + m] = rate[i]
+    return eliminate(M)
 
 
 @compiled
@@ -47,16 +39,30 @@ def best_partition(J: Array, candidates: Array, columns: Array) -> None:
     """Write into `columns` the candidate with the largest |det Ja|, the first of equals."""
     s = J.shape[0]
     Ja = np.empty((s, s))
-    nothing = np.empty((s, 0))
     largest = -1.0
-    for c in range(candidates.shape[0]):
+    for c in range(0, candidates.shape[0], s):
         for j in range(s):
             for i in range(s):
-                Ja[i, j] = J[i, candidates[c, j]]
-        size = abs(eliminate(Ja, nothing)[0])
+                Ja[i, j] = J[i, candidates[c + j]]
+        size = abs(eliminate(Ja)[0])
         if size > largest * (1.0 + 1e-12):  # rounding must not reverse the order of equals
             largest = size
-            columns[:] = candidates[c]
+            for j in range(s):
+                columns[j] = candidates[c + j]
+
+
+@compiled
+def volume(J: Array, tolerance: float) -> float:
+    """sqrt(det J Jᵀ), by Cauchy-Binet the norm of all det Ja; 0 when J lost rank."""
+    s, m = J.shape
+    order = np.empty(s, dtype=np.int64)
+    L = np.empty((s, s))
+    if orthonormal_rows(J, order, L, np.empty((s, m))) <= tolerance:
+        return 0.0
+    product = 1.0
+    for i in range(s):
+        product *= L[i, i]
+    return product
 
 
 @kernel(RESOLVER)
@@ -70,48 +76,50 @@ def reduced_gradient(
     state = [locked, the s basic columns (-1 before the first call)].
     """
     s, m = J.shape
-    normalised = options[0] == 1
-    candidates = options[1:].reshape(((options.shape[0] - 1) // s, s))
+    alpha = parameters[0]
+    tolerance = parameters[2]
+    candidates = options[1:]
     columns = state[1:]
-    X = np.empty((s, 1 + m - s))
-    is_basic = np.empty(m, dtype=np.int64)
-    order = np.empty(s, dtype=np.int64)
-    L = np.empty((s, s))
-    Q = np.empty((s, m))
-
-    volume = 1.0
-    if normalised:  # sqrt(det J Jᵀ), by Cauchy-Binet the norm of all det Ja
-        if orthonormal_rows(J, order, L, Q) <= parameters[2]:
+    scale = 1.0
+    if options[0] == 1:
+        scale = volume(J, tolerance)
+        if scale == 0.0:
             report[0] = 1.0
             return
-        for i in range(s):
-            volume *= L[i, i]
     if columns[0] < 0:
         best_partition(J, candidates, columns)
-    determinant, ratio = solve_partition(J, rate, columns, is_basic, X)
-    if abs(determinant) < parameters[1] * volume and state[0] == 0:
+    M = np.empty((s, s + m + 1))
+    determinant, ratio = solve_partition(J, rate, columns, M)
+    if abs(determinant) < parameters[1] * scale and state[0] == 0:
         best_partition(J, candidates, columns)
-        determinant, ratio = solve_partition(J, rate, columns, is_basic, X)
-    report[2] = abs(determinant) / volume
-    if ratio <= parameters[2]:
-        report[0] = 1.0 if orthonormal_rows(J, order, L, Q) <= parameters[2] else 2.0
+        determinant, ratio = solve_partition(J, rate, columns, M)
+    report[2] = abs(determinant) / scale
+    if ratio <= tolerance:
+        report[0] = 1.0 if volume(J, tolerance) == 0.0 else 2.0
         return
 
-    alpha = parameters[0]
+    for j in range(m):  # the reduced gradient; it is zero on Ja's own columns up to rounding
+        reduced = h[j]
+        for i in range(s):
+            reduced -= M[i, s + j] * h[columns[i]]
+        u[j] = -alpha * reduced
     for i in range(s):
-        u[columns[i]] = X[i, 0]
-    b = 1
-    for j in range(m):
-        if is_basic[j] == 0:
-            reduced = h[j]
-            for i in range(s):
-                reduced -= X[i, b] * h[columns[i]]
-            u[j] = -alpha * reduced
-            for i in range(s):
-                u[columns[i]] -= X[i, b] * u[j]
-            b += 1
+        u[columns[i]] = 0.0
+    for i in range(s):
+        ua = M[i, s + m]
+        for j in range(m):
+            ua -= M[i, s + j] * u[j]
+        M[i, 0] = ua
+    for i in range(s):
+        u[columns[i]] = M[i, 0]
     report[1] = residual_norm(J, u, rate)
     report[0] = 0.0 if math.isfinite(report[1]) else 4.0
+
+
+def _as_tuple(partition: Partition) -> tuple[str | int, ...]:
+    if isinstance(partition, str | int):
+        raise InputError(f"partitions: expected lists of inputs, as in [['v', 'q1']], got {partition!r}")
+    return tuple(partition)
 
 
 class ReducedGradient(Resolver):
@@ -144,7 +152,7 @@ class ReducedGradient(Resolver):
         if self.automatic and partitions != "automatic":
             raise InputError(f"partitions: expected 'automatic' or lists of inputs, got {partitions!r}")
         self.partitions: tuple[tuple[str | int, ...], ...] = (
-            () if self.automatic else tuple(tuple(p) for p in partitions)
+            () if self.automatic else tuple(_as_tuple(p) for p in partitions)
         )
         if not self.automatic and not self.partitions:
             raise InputError("partitions: expected at least one list of inputs, or 'automatic'")
@@ -179,6 +187,8 @@ class ReducedGradient(Resolver):
         for item in partition:
             if isinstance(item, str) and item not in shape.inputs:
                 raise InputError(unknown("input", item, shape.inputs, "partitions"))
+            if not isinstance(item, (str, int, np.integer)):
+                raise InputError(f"partitions: expected names or indices of inputs, got {item!r}")
             column = shape.inputs.index(item) if isinstance(item, str) else int(item)
             if not 0 <= column < shape.m:
                 raise InputError(f"partitions: expected an index from 0 to {shape.m - 1}, got {column}")

@@ -1,0 +1,107 @@
+"""Time of a control step u = controller(t, q), in µs, all in one run:
+
+    python benchmarks/step.py
+
+fused     through the public API, as a user's loop calls it
+floor     Pinocchio's calls and one function written by hand for the case (`floor.py`)
+unfused   the same controller with every kernel run as plain Python (NUMBA_DISABLE_JIT=1)
+callable  fused, with the objective as a user's own Python function in the middle
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import timeit
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+import nmm
+
+CASES = {1: "unicycle_2r_position", 4: "unicycle_3r_position"}
+RESOLVERS = ("rg", "pg")
+T = 0.3
+
+
+def microseconds(function: Callable[[], object], seconds: float = 1.0) -> float:
+    """The best of nine means: the step's own time, without what else the machine does."""
+    once = min(timeit.repeat(function, number=3, repeat=3)) / 3
+    number = max(1, int(seconds / 9 / once))
+    return min(timeit.repeat(function, number=number, repeat=9)) / number * 1e6
+
+
+def controllers() -> dict[str, tuple[nmm.Controller, np.ndarray]]:
+    """The cases' controllers, each with a configuration near the start of its motion."""
+    found = {}
+    for case, name in CASES.items():
+        for resolver in RESOLVERS:
+            scenario = nmm.Scenario.load(name).with_resolver(resolver)
+            robot = scenario.robot()
+            q = scenario.run_from() + 0.1 * np.arange(robot.n)
+            found[f"case {case} {resolver}"] = (scenario.controller(), q)
+    return found
+
+
+def with_python_objective(controller: nmm.Controller) -> nmm.Controller:
+    """The same controller, its objective evaluated by a Python function with its gradient."""
+    objective = controller.objective
+    squares = objective.squares
+    robot = controller.robot
+    A = np.array([[dict(_named(s)).get(name, 0.0) for name in robot.q_names] for s in squares])
+    c = np.array([s.target for s in squares])
+    by_hand = nmm.CallableObjective(
+        lambda configuration: 0.5 * float(np.sum((A @ configuration.q - c) ** 2)),
+        lambda configuration: A.T @ (A @ configuration.q - c),
+    )
+    return nmm.Controller(robot, controller.task, controller.resolver, by_hand)
+
+
+def _named(square: nmm.Square) -> list[tuple[str, float]]:
+    of = square.combination
+    return [(of, 1.0)] if isinstance(of, str) else list(of.items())
+
+
+def unfused() -> dict[str, float]:
+    """Times of the plain form, measured in a process of its own."""
+    environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
+    command = [sys.executable, str(Path(__file__).resolve()), "--plain"]
+    answer = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    times: dict[str, float] = json.loads(answer.stdout)
+    return times
+
+
+def main() -> int:
+    """Print the table; exit status 1 when a fused step takes more than 2.5 times its floor."""
+    found = controllers()
+    if "--plain" in sys.argv:
+        print(json.dumps({name: microseconds(lambda c=c, q=q: c(T, q)) for name, (c, q) in found.items()}))
+        return 0
+
+    from floor import floor_controller
+
+    plain = unfused()
+    print(f"{'µs a step':12s}{'floor':>8s}{'fused':>8s}{'ratio':>8s}{'unfused':>9s}{'callable':>10s}")
+    worst = 0.0
+    for name, (controller, q) in found.items():
+        case, resolver = int(name.split()[1]), name.split()[2]
+        by_hand = floor_controller(case, resolver, controller.robot.model)
+        difference = np.abs(by_hand(T, q) - controller(T, q)).max()
+        if difference > 1e-11:
+            raise SystemExit(f"{name}: the floor and the toolkit differ by {difference:.1e}")
+        # Interleaved, so that a slow moment of the machine does not fall on one of them alone.
+        times = [(microseconds(lambda: by_hand(T, q), 0.5), microseconds(lambda: controller(T, q), 0.5)) for _ in range(3)]
+        floor, fused = (min(column) for column in zip(*times, strict=True))
+        user = with_python_objective(controller)
+        callable_time = microseconds(lambda: user(T, q))
+        worst = max(worst, fused / floor)
+        print(f"{name:12s}{floor:8.2f}{fused:8.2f}{fused / floor:8.2f}{plain[name]:9.1f}{callable_time:10.1f}")
+    print(f"worst ratio {worst:.2f} (aim: at most 2.5)")
+    return int(worst > 2.5)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
