@@ -96,7 +96,7 @@ def simulate(
     if unstable:
         worst = max(unstable, key=lambda found: found.rate)
         advice = worst.describe(method, dt)
-        if outcome is Outcome.COMPLETED and 2 * len(unstable) > examined:
+        if outcome is Outcome.COMPLETED and (2 * len(unstable) > examined or recorder.keeps_erring):
             outcome, message = Outcome.UNSTABLE, advice
         elif outcome is Outcome.COMPLETED:
             recorder.warnings.append(f"for part of the run {advice}")

@@ -182,6 +182,13 @@ class Recorder:
         """The time of the last sample."""
         return float(self._times[self._count - 1]) if self._count else 0.0
 
+    @property
+    def keeps_erring(self) -> bool:
+        """Whether the task error of the second half is still of the size of the first half's."""
+        error = np.linalg.norm(self._rows[2, : self._count], axis=1)
+        half = self._count // 2
+        return bool(half and error[half:].max() > 0.1 * error[:half].max())
+
     def add(self, sample: Step) -> None:
         """Record one sample."""
         k = self._count

@@ -1,0 +1,162 @@
+"""Simulation: laws of every run, and every way in which a run can end."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy import pi
+
+import nmm
+from nmm.integrators import METHODS
+from nmm.robot import Robot
+from nmm.stability import find_instability
+
+START = {"x": -1, "y": -1, "theta": pi}
+CIRCLE = nmm.Circle([2, 2], 3, 0.08 * pi, 5 / 4 * pi)
+TIP = nmm.Task(nmm.Position("ee", "xy"), CIRCLE)
+H1 = nmm.Quadratic(nmm.Square({"theta": 1, "q1": 1, "q2": 1}, pi / 2), nmm.Square("q1", pi / 4))
+
+
+def case_1(robot: Robot, alpha: float = 10.0) -> nmm.Controller:
+    return nmm.Controller(robot, TIP, nmm.ReducedGradient(alpha, [("v", "q1"), ("v", "omega")]), H1)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_tracks_and_reports_its_rows(robot_2r: Robot, method: str) -> None:
+    run = nmm.simulate(case_1(robot_2r), START, 2.0, 0.005, method)
+    assert run.complete, run.message
+    assert len(run) == 401
+    assert run.t[0] == 0.0
+    assert run.t[-1] == 2.0
+    # e_dot = -K e exactly in continuous time; first-order methods miss it by O(dt).
+    expected = run.error[0] * np.exp(-2.0)
+    order_one = method in ("euler", "zoh")
+    assert np.allclose(run.error[-1], expected, rtol=0, atol=0.02 if order_one else 1e-4)
+    assert np.all(run.residual < 1e-10)
+
+
+def test_the_last_step_is_shorter_when_dt_does_not_divide_the_duration(robot_2r: Robot) -> None:
+    run = nmm.simulate(case_1(robot_2r), START, 0.0525, 0.01)
+    assert np.allclose(np.diff(run.t)[:-1], 0.01)
+    assert run.t[-1] == 0.0525
+    assert 0 < run.t[-1] - run.t[-2] < 0.01
+
+
+def test_zero_order_hold_drives_exact_arcs(robot_2r: Robot) -> None:
+    """With constant v and omega the unicycle drives a circle of radius v / omega."""
+    v, omega = 0.7, 1.3
+    constant = nmm.CallableResolver(lambda J, rate, h: np.array([v, omega, 0.2, -0.1]))
+    run = nmm.simulate(nmm.Controller(robot_2r, TIP, constant), START, 2.0, 0.02, "zoh")
+    angle = pi + omega * run.t
+    centre = np.array([-1 - v / omega * np.sin(pi), -1 + v / omega * np.cos(pi)])
+    arc = centre + v / omega * np.stack([np.sin(angle), -np.cos(angle)], axis=1)
+    # RK4's local error on an arc: (omega dt)^5 v / omega / 120 a step.
+    assert np.abs(run.q[:, :2] - arc).max() < 100 * (omega * 0.02) ** 5 / 120
+    assert np.allclose(run.q[:, 2], angle, rtol=0, atol=1e-13)
+    assert np.allclose(run.q[:, 3:], np.outer(run.t, [0.2, -0.1]), rtol=0, atol=1e-13)
+
+
+def test_planning_mode_follows_from_a_start_on_the_path(robot_2r: Robot) -> None:
+    """Without feedback an initial error stays as it is: f(q(t)) - g(t) is constant."""
+    controller = nmm.Controller(
+        robot_2r, nmm.Task(TIP.function, CIRCLE, gain=None), nmm.ProjectedGradient(), H1
+    )
+    run = nmm.simulate(controller, START, 2.0, 0.002)
+    assert np.allclose(run.error, run.error[0], rtol=0, atol=1e-6)
+    assert run.error_norm[0] > 2.0
+
+
+def test_alpha_dt_too_large_is_reported_as_such(robot_2r: Robot) -> None:
+    diverged = nmm.simulate(case_1(robot_2r, alpha=1000.0), START, 5.0, 0.005)
+    assert diverged.outcome is nmm.Outcome.DIVERGED
+    assert "alpha * dt" in diverged.message
+    assert "dt below" in diverged.message
+    assert 1 <= len(diverged) < 1001
+    assert np.all(np.isfinite(diverged.q))
+
+    bounded = nmm.simulate(case_1(robot_2r, alpha=200.0), START, 25.0, 0.005)
+    assert bounded.outcome in (nmm.Outcome.UNSTABLE, nmm.Outcome.DIVERGED)
+    assert "alpha * dt" in bounded.message
+
+    fine = nmm.simulate(case_1(robot_2r), START, 5.0, 0.005)
+    assert fine.complete
+    assert fine.warnings == ()
+
+
+@pytest.mark.parametrize(("method", "limit"), [("euler", 2.0), ("midpoint", 2.0), ("rk4", 2.785)])
+def test_the_stability_limit_is_the_textbooks(robot_2r: Robot, method: str, limit: float) -> None:
+    """H = ½ q2² with a task that leaves q2 alone decays with exactly alpha: the limit is z = -alpha dt."""
+    task = nmm.Task(nmm.Coordinates("theta", "q1"), [0.0, 0.0])
+    alpha = 50.0
+    controller = nmm.Controller(robot_2r, task, nmm.ProjectedGradient(alpha), nmm.Quadratic(nmm.Square("q2")))
+    from nmm.integrators import integrator
+
+    stability = integrator(method, robot_2r, 1e-9).stability
+    q = np.array([0, 0, 0.1, 0.1, 0.1])
+    assert find_instability(controller, 0.0, q, 0.99 * limit / alpha, stability) is None
+    found = find_instability(controller, 0.0, q, 1.5 * limit / alpha, stability)
+    assert found is not None
+    assert found.rate == pytest.approx(alpha, rel=1e-6)
+    assert found.limit == pytest.approx(limit / alpha, rel=2e-3)
+
+
+def test_a_singular_run_keeps_what_it_has() -> None:
+    """With d = 0 a straight arm along the wheels' axle cannot move sideways: J loses rank on the way."""
+    robot = nmm.load("unicycle_2r", arguments={"d": 0})
+    line = nmm.Line([0.8, 0.0], [3.0, 0.0], 4.0)
+    task = nmm.Task(nmm.Position("ee", "xy"), line)
+    controller = nmm.Controller(robot, task, nmm.ReducedGradient(10.0, [("omega", "q1")]))
+    run = nmm.simulate(controller, {}, 4.0, 0.005)
+    assert run.outcome is nmm.Outcome.SINGULAR
+    assert "Ja" in run.message
+    assert "t = 0 s" in run.message
+    assert len(run) == 0
+
+
+def test_an_interrupted_run_keeps_what_it_has(robot_2r: Robot) -> None:
+    def interrupt(fraction: float) -> None:
+        if fraction > 0.5:
+            raise KeyboardInterrupt
+
+    run = nmm.simulate(case_1(robot_2r), START, 2.0, 0.005, progress=interrupt)
+    assert run.outcome is nmm.Outcome.INTERRUPTED
+    assert 200 <= len(run) < 220
+    assert "interrupted" in run.message
+    assert len(run.q) == len(run.u) == len(run.sigma_min) == len(run.t)
+
+
+def test_progress_goes_from_nothing_to_one(robot_2r: Robot) -> None:
+    seen: list[float] = []
+    nmm.simulate(case_1(robot_2r), START, 1.0, 0.005, progress=seen.append)
+    assert seen[0] == 0.0
+    assert seen[-1] == 1.0
+    assert seen == sorted(seen)
+
+
+def test_a_run_is_repeatable_to_the_last_bit(robot_2r: Robot) -> None:
+    controller = case_1(robot_2r)
+    first = nmm.simulate(controller, START, 1.0)
+    second = nmm.simulate(controller, START, 1.0)
+    assert np.array_equal(first.q, second.q)
+    assert np.array_equal(first.u, second.u)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"duration": 0.0}, "duration"),
+        ({"duration": np.nan}, "duration"),
+        ({"dt": -0.1}, "dt"),
+        ({"dt": 1e-12}, "samples"),
+        ({"method": "rk5"}, "rk4"),
+        ({"q0": [0, 0, 0]}, "5 numbers"),
+        ({"q0": [0, 0, 0, 0, np.inf]}, "finite"),
+        ({"q0": {"q7": 1.0}}, "q7"),
+        ({"tolerance": 0.0}, "tolerance"),
+    ],
+)
+def test_bad_input_is_refused(robot_2r: Robot, change: dict, words: str) -> None:
+    arguments = {"q0": START, "duration": 1.0, "dt": 0.01, "method": "rk4", "tolerance": 1e-9} | change
+    q0, duration = arguments.pop("q0"), arguments.pop("duration")
+    with pytest.raises(nmm.InputError, match=words):
+        nmm.simulate(case_1(robot_2r), q0, duration, **arguments)
