@@ -30,7 +30,7 @@ def test_the_arrays_are_the_contracts(run: nmm.Trajectory, tmp_path: Path) -> No
         assert arrays[name].shape == shape, name
     assert list(arrays["q_names"]) == ["x", "y", "theta", "q1", "q2"]
     assert list(arrays["u_names"]) == ["v", "omega", "q1", "q2"]
-    # With a straight arm |Δ12| = d + l1 + l2 exceeds |Δ13| = l1 + l2: the paper's rule starts with [v, omega].
+    # With a straight arm |Δ12| = d + l1 + l2 exceeds |Δ13| = l1 + l2: the rule starts with [v, omega].
     assert np.all(arrays["partition"] == [0, 1])
 
 
@@ -46,19 +46,7 @@ def test_the_csv_says_the_same_as_the_npz(run: nmm.Trajectory, tmp_path: Path) -
 
 def test_a_folder_is_read_back_as_it_was(run: nmm.Trajectory, tmp_path: Path) -> None:
     back = nmm.Trajectory.load(run.save(tmp_path / "run", figures=False))
-    for name in (
-        "t",
-        "q",
-        "u",
-        "r",
-        "r_d",
-        "error",
-        "objective",
-        "sigma_min",
-        "partition",
-        "path",
-        "desired",
-    ):
+    for name in (*ARRAYS, "path", "desired"):
         assert np.array_equal(getattr(back, name), getattr(run, name)), name
     assert back.robot.q_names == run.robot.q_names
     assert back.outcome is run.outcome
