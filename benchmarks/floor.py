@@ -164,7 +164,11 @@ def floor_controller(case: int, resolver: str, model: pin.Model) -> Callable[[fl
     by_hand = FLOORS[case, resolver]
     partition = np.zeros(1, dtype=np.int64)
     buffer = np.empty(model.nv - 1)
-    jacobians, placement, frame_jacobian = pin.computeJointJacobians, pin.updateFramePlacement, pin.getFrameJacobian
+    jacobians, placement, frame_jacobian = (
+        pin.computeJointJacobians,
+        pin.updateFramePlacement,
+        pin.getFrameJacobian,
+    )
     axes = pin.LOCAL_WORLD_ALIGNED
 
     def controller(t: float, q: np.ndarray) -> np.ndarray:

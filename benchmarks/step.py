@@ -41,7 +41,7 @@ def controllers() -> dict[str, tuple[nmm.Controller, np.ndarray]]:
         for resolver in RESOLVERS:
             scenario = nmm.Scenario.load(name).with_resolver(resolver)
             robot = scenario.robot()
-            q = scenario.run_from() + 0.1 * np.arange(robot.n)
+            q = robot.q(scenario.parts.q0) + 0.1 * np.arange(robot.n)
             found[f"case {case} {resolver}"] = (scenario.controller(), q)
     return found
 
@@ -74,31 +74,35 @@ def unfused() -> dict[str, float]:
     return times
 
 
+def compare(name: str, controller: nmm.Controller, q: np.ndarray) -> tuple[float, float, float]:
+    """Times of floor, fused, and fused with a Python objective, for the same inputs."""
+    from floor import floor_controller
+
+    by_hand = floor_controller(int(name.split()[1]), name.split()[2], controller.robot.model)
+    difference = np.abs(by_hand(T, q) - controller(T, q)).max()
+    if difference > 1e-11:
+        raise SystemExit(f"{name}: the floor and the toolkit differ by {difference:.1e}")
+    floors, fused = [], []
+    for _ in range(3):  # interleaved, so that a slow moment of the machine does not fall on one alone
+        floors.append(microseconds(lambda: by_hand(T, q), 0.5))
+        fused.append(microseconds(lambda: controller(T, q), 0.5))
+    user = with_python_objective(controller)
+    return min(floors), min(fused), microseconds(lambda: user(T, q))
+
+
 def main() -> int:
     """Print the table; exit status 1 when a fused step takes more than 2.5 times its floor."""
     found = controllers()
     if "--plain" in sys.argv:
         print(json.dumps({name: microseconds(lambda c=c, q=q: c(T, q)) for name, (c, q) in found.items()}))
         return 0
-
-    from floor import floor_controller
-
     plain = unfused()
     print(f"{'µs a step':12s}{'floor':>8s}{'fused':>8s}{'ratio':>8s}{'unfused':>9s}{'callable':>10s}")
     worst = 0.0
     for name, (controller, q) in found.items():
-        case, resolver = int(name.split()[1]), name.split()[2]
-        by_hand = floor_controller(case, resolver, controller.robot.model)
-        difference = np.abs(by_hand(T, q) - controller(T, q)).max()
-        if difference > 1e-11:
-            raise SystemExit(f"{name}: the floor and the toolkit differ by {difference:.1e}")
-        # Interleaved, so that a slow moment of the machine does not fall on one of them alone.
-        times = [(microseconds(lambda: by_hand(T, q), 0.5), microseconds(lambda: controller(T, q), 0.5)) for _ in range(3)]
-        floor, fused = (min(column) for column in zip(*times, strict=True))
-        user = with_python_objective(controller)
-        callable_time = microseconds(lambda: user(T, q))
+        floor, fused, user = compare(name, controller, q)
         worst = max(worst, fused / floor)
-        print(f"{name:12s}{floor:8.2f}{fused:8.2f}{fused / floor:8.2f}{plain[name]:9.1f}{callable_time:10.1f}")
+        print(f"{name:12s}{floor:8.2f}{fused:8.2f}{fused / floor:8.2f}{plain[name]:9.1f}{user:10.1f}")
     print(f"worst ratio {worst:.2f} (aim: at most 2.5)")
     return int(worst > 2.5)
 
