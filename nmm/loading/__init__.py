@@ -1,0 +1,9 @@
+"""Loading robots: from a bundled name, a URDF or xacro file, or a Pinocchio model."""
+
+from __future__ import annotations
+
+from nmm.loading.bundled import bundled_robots, bundled_scenarios
+from nmm.loading.check import Problem, find_problems
+from nmm.loading.load import load
+
+__all__ = ["Problem", "bundled_robots", "bundled_scenarios", "find_problems", "load"]

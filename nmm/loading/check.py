@@ -1,0 +1,129 @@
+"""Checks a URDF before Pinocchio sees it.
+
+Pinocchio answers most faults with one and the same sentence and the cause on the C library's standard
+error, and takes others (a cycle beside the tree, a link with two parents, a zero axis) without a word.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Container
+from dataclasses import dataclass
+from pathlib import Path
+
+from nmm.errors import RobotError
+from nmm.loading.check_joints import check_joint, check_mimics
+from nmm.loading.check_links import FindMesh, check_link, check_material
+from nmm.loading.check_tree import check_names, check_tree
+from nmm.loading.findings import Findings, Problem, children
+from nmm.loading.xml_tree import Element, XmlError, parse
+
+_SHOWN = 12
+_VERSION = re.compile(r"1\.[012]")
+
+__all__ = ["CheckedUrdf", "Problem", "check", "find_problems"]
+
+
+@dataclass(frozen=True)
+class CheckedUrdf:
+    """A description without problems.
+
+    Attributes
+    ----------
+    root : its <robot> element
+    name : the robot's name
+    meshes : files of its meshes, by the name in the description
+    """
+
+    root: Element
+    name: str
+    meshes: dict[str, Path]
+
+
+def find_problems(
+    xml_text: str, find_mesh: FindMesh | None = None, locked: Container[str] = ()
+) -> list[Problem]:
+    """All that is wrong with a URDF.
+
+    Parameters
+    ----------
+    xml_text : the expanded description
+    find_mesh : the path of a mesh by its name in the file, or a sentence that says why there is none;
+        without it, mesh files are taken to exist
+    locked : names of joints that will not move, so that they may mimic others
+    """
+    return _inspect(xml_text, find_mesh or Path, locked)[1]
+
+
+def check(
+    xml_text: str,
+    where: str,
+    find_mesh: FindMesh | None = None,
+    locked: Container[str] = (),
+    lines: bool = True,
+) -> CheckedUrdf:
+    """The description, if nothing is wrong with it.
+
+    Parameters
+    ----------
+    xml_text, find_mesh, locked : as for `find_problems`
+    where : the file, for the message
+    lines : whether the text's lines are those of the file
+
+    Raises
+    ------
+    RobotError : names the file and every problem in one line
+    """
+    checked, problems = _inspect(xml_text, find_mesh or Path, locked)
+    if checked is not None and not problems:
+        return checked
+    shown = [str(problem) if lines else problem.message for problem in problems[:_SHOWN]]
+    more = [f"and {len(problems) - _SHOWN} more"] if len(problems) > _SHOWN else []
+    raise RobotError(f"{where}: {'; '.join(shown + more)}")
+
+
+def _inspect(
+    text: str, find_mesh: FindMesh, locked: Container[str]
+) -> tuple[CheckedUrdf | None, list[Problem]]:
+    try:
+        root = parse(text)
+    except XmlError as error:
+        return None, [Problem(str(error), error.line)]
+    if root.tag != "robot":
+        return None, [Problem(f"expected <robot> as the root element, got <{root.tag}>", root.line)]
+    # A xacro file is no URDF: whatever else is wrong follows from that.
+    for element in root.iter():
+        if element.tag.startswith("xacro:") and isinstance(element, Element):
+            message = f"holds xacro (<{element.tag}>): name the file .xacro, so that it is expanded"
+            return None, [Problem(message, element.line)]
+    findings = Findings()
+    meshes = _check_robot(root, findings, find_mesh, locked)
+    return CheckedUrdf(root, root.get("name") or "", meshes), findings.problems
+
+
+def _check_robot(
+    root: Element, findings: Findings, find_mesh: FindMesh, locked: Container[str]
+) -> dict[str, Path]:
+    if not root.get("name"):
+        findings.add(root, "<robot> has no name")
+    version = root.get("version", "1.0")
+    if not _VERSION.fullmatch(version):
+        findings.add(root, f"<robot> version: expected 1.0, 1.1 or 1.2, got {version!r}")
+    links, joints = children(root, "link"), children(root, "joint")
+    check_names(links, "link", findings)
+    check_names(joints, "joint", findings)
+    check_tree(links, joints, findings)
+    materials: set[str] = set()
+    for material in children(root, "material"):
+        check_material(material, "robot", findings)
+        name = material.get("name", "")
+        if name in materials:
+            findings.add(material, f"two materials named {name!r}")
+        materials.add(name)
+    meshes: dict[str, Path] = {}
+    for link in links:
+        meshes |= check_link(link, findings, find_mesh)
+    for joint in joints:
+        check_joint(joint, findings)
+    check_mimics(joints, findings, locked)
+    return meshes

@@ -1,0 +1,39 @@
+"""Files as text, and text as one line of an error message."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from nmm.errors import RobotError
+
+
+def read_text(path: Path) -> str:
+    """The text of a UTF-8 file.
+
+    Raises
+    ------
+    FileNotFoundError : there is no such file (the caller knows who named it)
+    RobotError : a directory, unreadable, or not UTF-8
+    """
+    try:
+        return path.read_bytes().decode("utf-8-sig")
+    except FileNotFoundError:
+        raise
+    except UnicodeDecodeError as error:
+        line = path.read_bytes()[: error.start].count(b"\n") + 1
+        raise RobotError(f"{path}: line {line}: not UTF-8 text") from None
+    except IsADirectoryError:
+        raise RobotError(f"{path}: expected a .urdf or .xacro file, this is a directory") from None
+    except OSError as error:
+        raise RobotError(f"{path}: cannot be read ({error.strerror})") from None
+
+
+def printable(text: str) -> str:
+    """The text with control characters, line breaks among them, as escapes: names in files may hold any."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def one_line(text: str, limit: int = 300) -> str:
+    """The text with all white space as single spaces, cut after `limit` characters."""
+    joined = " ".join(text.split())
+    return joined if len(joined) <= limit else f"{joined[: limit - 1]}…"

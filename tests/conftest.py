@@ -1,0 +1,29 @@
+"""What the tests share."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from nmm.loading import load
+from nmm.robot import Robot
+
+
+@pytest.fixture(scope="session")
+def robot_2r() -> Robot:
+    return load("unicycle_2r")
+
+
+@pytest.fixture(scope="session")
+def robot_3r() -> Robot:
+    return load("unicycle_3r")
+
+
+@pytest.fixture(scope="session")
+def robots(robot_2r: Robot, robot_3r: Robot) -> dict[str, Robot]:
+    return {robot.name: robot for robot in (robot_2r, robot_3r)}
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(2006)
