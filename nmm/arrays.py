@@ -18,8 +18,13 @@ def array(value: ArrayLike, name: str) -> Array:
     except (TypeError, ValueError):
         raise InputError(f"{name}: expected numbers, got {value!r}") from None
     if not np.all(np.isfinite(result)):
-        raise InputError(f"{name}: expected finite numbers, got {np.array2string(result, threshold=20)}")
+        raise InputError(f"{name}: expected finite numbers, got {one_line(result)}")
     return result
+
+
+def one_line(value: Array) -> str:
+    """An array for an error message."""
+    return " ".join(np.array2string(value, threshold=20).split())
 
 
 def vector(value: ArrayLike, length: int | None, name: str) -> Array:

@@ -132,6 +132,10 @@ class Controller:
             self._fail(t, q)
         return self._u.copy()
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Copies and pickles are built anew: views of memory and addresses of kernels do not travel."""
+        return type(self), (self.robot, self.task, self.resolver, self.objective, self.constraint)
+
     def _solver(self) -> Callable[[float, Array], float]:
         """solve(t, q) -> status, with everything it needs at hand."""
         program, state, found, resolver = self._program, self._state, self._results, self.resolver
@@ -184,7 +188,7 @@ class Controller:
 
     def velocity(self, t: float, q: Array) -> Array:
         """q_dot = S(q) u (n,) of the closed loop at (t, q); raises as a call does."""
-        if self._solve(t, q):
+        if self._solve(float(t), q):  # another kind of number would be compiled for anew
             self._fail(t, q)
         return self._results.q_dot.copy()
 

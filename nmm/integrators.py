@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy.integrate import DOP853
 
 from nmm.arrays import Array
 from nmm.compiled import call_platform, compiled
@@ -74,6 +73,8 @@ class Adaptive:
         self.tolerance = tolerance
 
     def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
+        from scipy.integrate import DOP853  # here: a quarter of a second that other methods need not pay
+
         solver = DOP853(
             velocity, t, q, t + dt, rtol=max(self.tolerance, 1e-13), atol=self.tolerance, first_step=dt
         )

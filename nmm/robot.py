@@ -54,10 +54,10 @@ class Robot:
     """
 
     name: str
-    model: pin.Model
-    collision_model: pin.GeometryModel
-    display_model: pin.Model
-    visual_model: pin.GeometryModel
+    model: pin.Model = field(repr=False)
+    collision_model: pin.GeometryModel = field(repr=False)
+    display_model: pin.Model = field(repr=False)
+    visual_model: pin.GeometryModel = field(repr=False)
     platform: Platform
     wheels: tuple[Wheel, ...] = ()
     source: str = ""

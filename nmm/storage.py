@@ -20,7 +20,7 @@ from nmm.summary import FORMAT
 if TYPE_CHECKING:
     from nmm.trajectory import Trajectory
 
-ARRAYS = ("t", "q", "u", "r", "r_d", "error", "objective", "sigma_min", "partition", "residual")
+ARRAYS = ("t", "q", "u", "q_dot", "r", "r_d", "error", "objective", "sigma_min", "partition", "residual")
 OPTIONAL_ARRAYS = ("path", "desired", "target")
 
 

@@ -71,10 +71,8 @@ def summarise(trajectory: Trajectory) -> dict[str, Any]:
 def lateral_slip(trajectory: Trajectory) -> float:
     """The largest |A(qp) qp_dot| of the run, m/s: how much the motion violates the wheels' constraints."""
     platform = trajectory.robot.platform
-    n_p, p = platform.n_p, platform.p
-    worst = 0.0
-    for q, u in zip(trajectory.q, trajectory.u, strict=True):
-        rates = platform.pfaffian(q[:n_p]) @ (platform.G(q[:n_p]) @ u[:p])
-        if rates.size:
-            worst = max(worst, float(np.abs(rates).max()))
-    return worst
+    rates = [
+        platform.pfaffian(q) @ q_dot
+        for q, q_dot in zip(trajectory.q[:, : platform.n_p], trajectory.q_dot[:, : platform.n_p], strict=True)
+    ]
+    return float(np.abs(rates).max(initial=0.0))

@@ -40,6 +40,7 @@ class Trajectory:
     ----------
     robot : the robot that moved
     t (N,) s; q (N, n); u (N, n_u): times, coordinates, inputs, in `robot.q_units`, `robot.u_units`
+    q_dot (N, n): S(q) u, per second
     r, r_d, error (N, s): task value, target and error (angles wrapped), in `r_units`
     objective (N,): H(q)
     sigma_min (N,): smallest singular value of J_bar
@@ -58,6 +59,7 @@ class Trajectory:
     t: Array
     q: Array
     u: Array
+    q_dot: Array
     r: Array
     r_d: Array
     error: Array
@@ -81,6 +83,10 @@ class Trajectory:
 
     def __len__(self) -> int:
         return len(self.t)
+
+    def __repr__(self) -> str:
+        end = f"{self.t[-1]:g} s in {len(self)} samples" if len(self) else "no samples"
+        return f"Trajectory({self.robot.name}, {self.resolver}, {self.outcome}, {end})"
 
     @property
     def complete(self) -> bool:
@@ -162,6 +168,7 @@ class Recorder:
         count = len(times)
         self.q = np.empty((count, robot.n))
         self._u = np.empty((count, robot.n_u))
+        self._q_dot = np.empty((count, robot.n))
         self._rows = np.empty((3, count, s))
         self._scalars = np.empty((2, count))
         self._J = np.empty((count, s, robot.n_u))
@@ -194,6 +201,7 @@ class Recorder:
         k = self._count
         self.q[k] = sample.q
         self._u[k] = sample.u
+        self._q_dot[k] = sample.q_dot
         self._rows[0, k] = sample.r
         self._rows[1, k] = sample.target
         self._rows[2, k] = sample.error
@@ -222,6 +230,7 @@ class Recorder:
             t=self.t.copy(),
             q=self.q[:count].copy(),
             u=self._u[:count].copy(),
+            q_dot=self._q_dot[:count].copy(),
             r=self._rows[0, :count].copy(),
             r_d=self._rows[1, :count].copy(),
             error=self._rows[2, :count].copy(),

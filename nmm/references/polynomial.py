@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import BSpline, CubicSpline, KroghInterpolator, PPoly, make_interp_spline
 
 from nmm.arrays import Array, array, positive, vector
 from nmm.compiled import FUNCTION, kernel
 from nmm.errors import InputError, unknown
 from nmm.function import Function, Row, Stage
 from nmm.robot import Robot
+
+if TYPE_CHECKING:  # SciPy is imported where it is used: a third of a second that a circle need not pay
+    from scipy.interpolate import BSpline
 
 
 @kernel(FUNCTION)
@@ -46,21 +48,29 @@ def piecewise_polynomial(
 
 
 class PiecewisePolynomial(Function):
-    """A reference from SciPy's `PPoly`: breaks in s, coefficients (order, pieces, s).
+    """Polynomials of time, piece after piece; from SciPy: `PiecewisePolynomial(p.x, p.c)` for a `PPoly` p.
 
     Before the first break and after the last it stays where it is, at rest.
 
     Parameters
     ----------
-    polynomial : scipy.interpolate.PPoly with one axis of values
+    breaks : (pieces + 1,) s, increasing
+    coefficients : (order, pieces, s), highest power first, in the time since the piece's beginning
     unit : unit of the values, for tables and plots
     """
 
-    def __init__(self, polynomial: PPoly, unit: str = "m") -> None:
-        self.polynomial = polynomial
+    def __init__(self, breaks: ArrayLike, coefficients: ArrayLike, unit: str = "m") -> None:
         self.unit = unit
-        self._breaks = array(polynomial.x, "breaks")
-        self._coefficients = array(polynomial.c, "coefficients")
+        self._breaks = vector(breaks, None, "breaks")
+        self._coefficients = array(coefficients, "coefficients")
+        pieces = self._breaks.size - 1
+        if self._coefficients.ndim != 3 or self._coefficients.shape[1] != pieces:
+            raise InputError(
+                f"coefficients: expected shape (order, {pieces}, components) for {pieces + 1} breaks, "
+                f"got {self._coefficients.shape}"
+            )
+        if np.any(np.diff(self._breaks) <= 0.0):
+            raise InputError("breaks: expected them to increase")
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         return tuple(Row(f"r{i}", self.unit) for i in range(self._coefficients.shape[2]))
@@ -80,7 +90,7 @@ class Constant(PiecewisePolynomial):
 
     def __init__(self, value: ArrayLike, unit: str = "m") -> None:
         value = vector(np.atleast_1d(array(value, "value")), None, "value")
-        super().__init__(PPoly(value[None, None, :], np.array([0.0, 1.0])), unit)
+        super().__init__([0.0, 1.0], value[None, None, :], unit)
 
 
 class Polynomial(PiecewisePolynomial):
@@ -96,12 +106,13 @@ class Polynomial(PiecewisePolynomial):
         table = array(coefficients, "coefficients")
         if table.ndim != 2 or table.size == 0:
             raise InputError(f"coefficients: expected a table (power, component), got shape {table.shape}")
-        breaks = np.array([0.0, positive(duration, "duration")])
-        super().__init__(PPoly(table[::-1, None, :], breaks), unit)
+        super().__init__([0.0, positive(duration, "duration")], table[::-1, None, :], unit)
 
     @classmethod
     def through(cls, times: ArrayLike, points: ArrayLike, unit: str = "m") -> Polynomial:
         """The polynomial of lowest degree through `points` (k, s) at `times` (k,), the first of them 0."""
+        from scipy.interpolate import KroghInterpolator
+
         breaks, table = _waypoints(times, points)
         if breaks[0] != 0.0:
             raise InputError(f"times: expected the first to be 0, got {breaks[0]:g}")
@@ -137,7 +148,7 @@ class Line(PiecewisePolynomial):
             raise InputError(unknown("profile", profile, profiles))
         coefficients = np.array(profiles[profile])[:, None, None] * (b - a)
         coefficients[-1, 0] += a
-        super().__init__(PPoly(coefficients, np.array([0.0, T])), unit)
+        super().__init__([0.0, T], coefficients, unit)
 
 
 class Spline(PiecewisePolynomial):
@@ -159,6 +170,8 @@ class Spline(PiecewisePolynomial):
         ends: Literal["rest", "natural", "periodic"] = "rest",
         unit: str = "m",
     ) -> None:
+        from scipy.interpolate import CubicSpline, make_interp_spline
+
         breaks, table = _waypoints(times, points)
         if degree not in (3, 5) or (degree == 5 and ends == "periodic"):
             raise InputError(
@@ -173,21 +186,21 @@ class Spline(PiecewisePolynomial):
         if degree == 5 and ends == "natural" and len(breaks) < 3:
             raise InputError(f"points: expected at least 3 for degree 5 with natural ends, got {len(breaks)}")
         if degree == 3:
-            polynomial: PPoly = CubicSpline(breaks, table, bc_type="clamped" if ends == "rest" else ends)
+            coefficients = CubicSpline(breaks, table, bc_type="clamped" if ends == "rest" else ends).c
         else:
             zero = np.zeros(table.shape[1])
             orders = (1, 2) if ends == "rest" else (3, 4)
             conditions: Any = [(order, zero) for order in orders]  # the stubs know no derivative conditions
             spline = make_interp_spline(breaks, table, k=5, bc_type=(conditions, conditions))
-            polynomial = _pieces(spline, breaks)
-        super().__init__(polynomial, unit)
+            coefficients = _pieces(spline, breaks)
+        super().__init__(breaks, coefficients, unit)
 
 
-def _pieces(spline: BSpline, breaks: Array) -> PPoly:
+def _pieces(spline: BSpline, breaks: Array) -> Array:
     """A B-spline as polynomials between the breaks (`PPoly.from_spline` takes one component only)."""
     starts = breaks[:-1]
     taylor = [spline(starts, nu=power) / math.factorial(power) for power in range(spline.k, -1, -1)]
-    return PPoly(np.array(taylor), breaks)
+    return np.array(taylor)
 
 
 def _waypoints(times: ArrayLike, points: ArrayLike) -> tuple[Array, Array]:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array
 from nmm.compiled import RESOLVER, Kernel, kernel
 from nmm.errors import InputError
+from nmm.linear_algebra import residual_norm
 from nmm.resolvers.base import Resolver, Setup, Shape, Status
 
 
@@ -55,6 +56,6 @@ class CallableResolver(Resolver):
         if found.shape != u.shape:
             raise InputError(f"callable resolver: expected u of shape {u.shape}, got {found.shape}")
         u[:] = found
-        report[1] = np.linalg.norm(J @ u - rate)
+        report[1] = residual_norm(J, u, rate)
         if not np.isfinite(report[1]):
             report[0] = Status.NOT_FINITE

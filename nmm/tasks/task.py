@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, array
+from nmm.arrays import Array, array, one_line
 from nmm.errors import InputError
 from nmm.function import Function, Row
 from nmm.references.polynomial import Constant
@@ -65,7 +65,7 @@ class Task:
             )
         if np.linalg.eigvalsh(gain + gain.T).min() <= 0.0:
             raise InputError(
-                f"{name}: expected positive definite (above 0; None for planning mode), got {self.gain!r}"
+                f"{name}: expected positive definite (above 0; None for planning mode), got {one_line(gain)}"
             )
         return gain
 
