@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -66,6 +67,9 @@ class Kernel:
         self.compiled(*arguments)
 
 
+#: How many folders of compiled kernels are kept.
+KEPT_CACHES = 8
+
 _plain_by_address: dict[int, Plain] = {}
 
 
@@ -81,7 +85,18 @@ def cache_folder() -> str:
         text = source.read_bytes()
         if b"nmm.compiled import" in text or source == Path(__file__):
             digest.update(text)
-    return str(Path(platformdirs.user_cache_dir("nmm")) / digest.hexdigest()[:16])
+    folder = Path(platformdirs.user_cache_dir("nmm")) / digest.hexdigest()[:16]
+    if not folder.exists():
+        _forget_old_caches(folder.parent)
+    return str(folder)
+
+
+def _forget_old_caches(parent: Path) -> None:
+    """Keep the latest few: each text of the kernels, each version of nmm, leaves a folder behind."""
+    siblings = [path for path in parent.glob("*") if path.is_dir()]
+    siblings.sort(key=lambda path: path.stat().st_mtime, reverse=True)
+    for old in siblings[KEPT_CACHES - 1 :]:
+        shutil.rmtree(old, ignore_errors=True)
 
 
 def compiled(function: Callable[..., Any]) -> Any:

@@ -72,6 +72,10 @@ class Controller:
         objective: Objective | None = None,
         constraint: Task | Stack | Sequence[Task] | None = None,
     ) -> None:
+        _expect(robot, Robot, "robot")
+        _expect(resolver, Resolver, "resolver")
+        if objective is not None:
+            _expect(objective, Objective, "objective")
         self.robot = robot
         self.task = Stack.of(task)
         self.resolver = resolver
@@ -83,7 +87,7 @@ class Controller:
         constraint_rows = self.constraint.rows(robot)
 
         every = (*self.task, *self.constraint)
-        weighted = () if objective is None else objective.terms()
+        weighted = () if objective is None else objective.terms_on(robot)
         functions = [f for task in every for f in (task.function, task.reference)]
         program = Program(robot, [*functions, *(function for _, function in weighted)])
         first = program.first_rows
@@ -127,10 +131,15 @@ class Controller:
             or q.shape != self._shape
             or not q.flags.carray
         ):
-            q = self.robot.q(q)
+            q = self._copied(q)
         if self._solve(float(t), q):
             self._fail(t, q)
         return self._u.copy()
+
+    def _copied(self, q: ArrayLike | None) -> Array:
+        if q is None:
+            raise InputError(f"q: expected {self.robot.n} numbers, got None")
+        return self.robot.q(q)
 
     def __reduce__(self) -> tuple[object, ...]:
         """Copies and pickles are built anew: views of memory and addresses of kernels do not travel."""
@@ -159,8 +168,11 @@ class Controller:
         raise SingularError(f"at t = {t:g} s: {status.meaning}")
 
     def evaluate(self, t: float, q: ArrayLike) -> Step:
-        """All quantities at (t, q); a singular matrix is reported in `status`, not raised."""
-        q = self.robot.q(q)
+        """All quantities at (t, q); a singular matrix is reported in `status`, not raised.
+
+        Like a call, it may choose another partition (see `reset`).
+        """
+        q = self._copied(q)
         self._solve(float(t), q)
         return self.last(t, q)
 
@@ -186,10 +198,9 @@ class Controller:
             partition=self._state[1:].copy(),
         )
 
-    def velocity(self, t: float, q: Array) -> Array:
+    def velocity(self, t: float, q: ArrayLike) -> Array:
         """q_dot = S(q) u (n,) of the closed loop at (t, q); raises as a call does."""
-        if self._solve(float(t), q):  # another kind of number would be compiled for anew
-            self._fail(t, q)
+        self(t, q)
         return self._results.q_dot.copy()
 
     def reset(self) -> None:
@@ -199,6 +210,11 @@ class Controller:
     def hold_partition(self, hold: bool) -> None:
         """Keep the partition through the calls that follow (the stages of an integration step), or not."""
         self._state[0] = int(hold)
+
+
+def _expect(given: object, kind: type, name: str) -> None:
+    if not isinstance(given, kind):
+        raise InputError(f"controller: expected a {kind.__name__} as {name}, got {given!r}")
 
 
 def _gains(stack: Stack, robot: Robot) -> Array:

@@ -39,7 +39,7 @@ def linearisation(controller: Controller, t: float, q: Array) -> Array:
         F = np.empty((q.size, q.size))
         for j in range(q.size):
             offset = np.zeros(q.size)
-            offset[j] = STEP * max(1.0, abs(q[j]))
+            offset[j] = STEP
             difference = controller.velocity(t, q + offset) - controller.velocity(t, q - offset)
             F[:, j] = difference / (2 * offset[j])
     finally:

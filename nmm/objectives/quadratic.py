@@ -56,6 +56,8 @@ class Quadratic(Objective):
         if not squares:
             raise InputError("quadratic objective: expected at least one term")
         for square in squares:
+            if not square.combination:
+                raise InputError("quadratic objective: expected a coordinate in every term, got none")
             name = f"term {label(square.combination)}"
             scalar(square.target, f"{name}: target")
             positive(square.weight, f"{name}: weight")

@@ -64,7 +64,13 @@ class PiecewisePolynomial(Function):
         self._breaks = vector(breaks, None, "breaks")
         self._coefficients = array(coefficients, "coefficients")
         pieces = self._breaks.size - 1
-        if self._coefficients.ndim != 3 or self._coefficients.shape[1] != pieces:
+        if pieces < 1:
+            raise InputError(f"breaks: expected at least 2, got {pieces + 1}")
+        if (
+            self._coefficients.ndim != 3
+            or self._coefficients.shape[1] != pieces
+            or not self._coefficients.size
+        ):
             raise InputError(
                 f"coefficients: expected shape (order, {pieces}, components) for {pieces + 1} breaks, "
                 f"got {self._coefficients.shape}"

@@ -73,7 +73,8 @@ class ProjectedGradient(Resolver):
     alpha : step size α > 0, 1/s times the unit of H's curvature
     weights : None; m positive numbers; a mapping from input names (1 for the rest): a large weight
         spares the input; or a symmetric positive definite (m, m) matrix
-    tolerance : J counts as singular below this ratio of smallest to largest pivot
+    tolerance : J counts as singular below this ratio of smallest to largest pivot, whatever the
+        rows' units: rows of very different size want to be scaled first
     """
 
     name: ClassVar[str] = "pg"

@@ -33,6 +33,10 @@ class Task:
     gain: ArrayLike | None = 1.0
 
     def __post_init__(self) -> None:
+        if not isinstance(self.function, Function):
+            raise InputError(
+                f"task: expected a function of the robot, as Position('ee'), got {self.function!r}"
+            )
         if not isinstance(self.reference, Function):
             object.__setattr__(self, "reference", Constant(np.atleast_1d(self.reference)))
 
@@ -81,7 +85,10 @@ class Stack:
         """A stack from a task, a stack or a sequence of tasks."""
         if isinstance(tasks, Stack):
             return tasks
-        return cls((tasks,) if isinstance(tasks, Task) else tuple(tasks))
+        stacked = (tasks,) if isinstance(tasks, Task) else tasks
+        if not isinstance(stacked, Sequence) or not all(isinstance(task, Task) for task in stacked):
+            raise InputError(f"expected a Task or a list of Tasks, got {tasks!r}")
+        return cls(tuple(stacked))
 
     def __iter__(self) -> Iterator[Task]:
         return iter(self.tasks)

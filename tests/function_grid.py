@@ -1,0 +1,216 @@
+"""Every kind of function of nmm over the grid of its options, for the tests that go through all of them.
+
+A new function is tested by a new entry in `ENTRIES`; `test_derivatives.py` notices when one is missing.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import itertools
+import pkgutil
+from collections.abc import Iterator
+from dataclasses import dataclass
+from types import ModuleType
+
+import numpy as np
+from numpy import pi
+from numpy.typing import NDArray
+from scipy.interpolate import PPoly
+
+import nmm
+from nmm.configuration import Configuration
+from nmm.function import Evaluation, Function
+from nmm.objectives import CallableObjective, JointRange, Manipulability, Objective, Quadratic, Square, Sum
+from nmm.references import (
+    Bearing,
+    CallableReference,
+    Circle,
+    Constant,
+    Line,
+    PiecewisePolynomial,
+    Polynomial,
+    Spline,
+)
+from nmm.robot import Robot
+from nmm.tasks import CallableFunction, Coordinates, Heading, Position
+
+Array = NDArray[np.float64]
+
+BOTH = ("unicycle_2r", "unicycle_3r")
+SPATIAL = ("unicycle_3r",)
+
+
+@dataclass(frozen=True)
+class Entry:
+    name: str
+    function: Function
+    robots: tuple[str, ...] = BOTH
+
+
+#: Instants before, in, between the breaks of, and after the references below; none within 0.01 s of a break.
+TIMES = (-0.4, 0.37, 1.61, 2.9, 7.3)
+_BREAKS = np.array([0.0, 0.8, 2.0, 3.1, 4.4, 6.0])
+_POINTS = np.array([[0.3, 5.0], [1.0, 4.0], [0.2, 3.0], [-1.0, 3.5], [-0.5, 4.5], [0.3, 5.0]])
+_TARGET = (6.0, 2.0)
+
+
+def _hand(configuration: Configuration) -> Array:
+    """A function of the configuration that nmm does not have: a point and an angle made of several things."""
+    p = configuration.placement("ee").translation
+    q = configuration.q
+    return np.array([p[0] * p[1], np.sin(q[3]) * p[0] + q[2] ** 2])
+
+
+def _hand_jacobian(configuration: Configuration) -> Array:
+    p, q = configuration.placement("ee").translation, configuration.q
+    x, y = configuration.jacobian("ee")[:2]
+    jacobian = np.vstack([p[0] * y + p[1] * x, np.sin(q[3]) * x])
+    jacobian[1, 3] += np.cos(q[3]) * p[0]
+    jacobian[1, 2] += 2 * q[2]
+    return jacobian
+
+
+def _moving(t: float, configuration: Configuration) -> Array:
+    return np.array([np.sin(2 * t), t**2]) * _hand(configuration)
+
+
+def _moving_rate(t: float, configuration: Configuration) -> Array:
+    return np.array([2 * np.cos(2 * t), 2 * t]) * _hand(configuration)
+
+
+def _moving_jacobian(t: float, configuration: Configuration) -> Array:
+    return np.array([[np.sin(2 * t)], [t**2]]) * _hand_jacobian(configuration)
+
+
+def _height(configuration: Configuration) -> float:
+    return float(np.cos(_hand(configuration)[0]) + configuration.q[4] ** 3)
+
+
+def _height_gradient(configuration: Configuration) -> Array:
+    gradient: Array = -np.sin(_hand(configuration)[0]) * _hand_jacobian(configuration)[0]
+    gradient[4] += 3 * configuration.q[4] ** 2
+    return gradient
+
+
+def _tasks() -> Iterator[Entry]:
+    for axes in ("x", "y", "z", "xy", "yx", "xz", "zyx", "xyz"):
+        yield Entry(f"position {axes}", Position("ee", axes))
+    for frame in ("link1", "link2"):
+        yield Entry(f"position of {frame}", Position(frame, ("x", "y")))
+    for direction, about in itertools.product(("x", "y", "z", (0.6, -0.3, 0.7)), "xyz"):
+        vertical = direction == "z" and about == "z"  # undefined for links that stay horizontal
+        robots = SPATIAL if vertical else BOTH
+        yield Entry(f"heading of {direction} about {about}", Heading("ee", direction, about), robots)
+    yield Entry("heading of link1", Heading("link1"))
+    yield Entry("coordinate", Coordinates("q2"))
+    yield Entry("combinations", Coordinates("y", {"theta": 1, "q1": 1, "q2": -2.5}, {"x": 3.0}))
+    yield Entry("callable function", CallableFunction(_hand, ["a", "b"]))
+    yield Entry("callable function, jacobian", CallableFunction(_hand, ["a", "b"], jacobian=_hand_jacobian))
+    yield Entry("callable angle", CallableFunction(lambda c: c.q[2] + c.q[3], ["a"], angular=[True]))
+
+
+def _references() -> Iterator[Entry]:
+    yield Entry("circle", Circle([2, 2], 3, 0.08 * pi, 5 / 4 * pi))
+    for plane in ("xy", "yz", "zx"):
+        yield Entry(f"circle in {plane}", Circle([2, -1, 0.5], 0.7, -1.3, 0.4, plane))
+    yield Entry("constant", Constant([1.0, -2.0]))
+    yield Entry("constant number", Constant(0.7, "rad"))
+    for profile in ("constant", "smooth"):
+        yield Entry(f"line, {profile}", Line([0, 1, 2], [3, -1, 2.5], 3.5, profile))
+    yield Entry("polynomial", Polynomial([[1, 2], [0.5, -1], [0.1, 0.3], [-0.2, 0.01]], 5.0))
+    yield Entry("polynomial through points", Polynomial.through(_BREAKS[:4], _POINTS[:4]))
+    pieces = PPoly(np.sin(np.arange(24.0)).reshape(4, 3, 2), [0.1, 1.0, 2.0, 5.0])
+    yield Entry("piecewise polynomial", PiecewisePolynomial(pieces.x, pieces.c))
+    for degree, ends in ((3, "rest"), (3, "natural"), (3, "periodic"), (5, "rest"), (5, "natural")):
+        yield Entry(f"spline of degree {degree}, {ends}", Spline(_BREAKS, _POINTS, degree, ends))
+    yield Entry("bearing of a circle", Bearing(Circle([2, 2], 3, 0.08 * pi, 5 / 4 * pi), _TARGET))
+    yield Entry("bearing of a circle in space", Bearing(Circle([2, 2, 1], 3, 0.5, plane="zx"), (6, 2, 9)))
+    yield Entry("bearing of a spline", Bearing(Spline(_BREAKS, _POINTS), _TARGET))
+    yield Entry("bearing of a link", Bearing(Position("link2", "xy"), _TARGET))
+    yield Entry("bearing of the end-effector", Bearing(Position("ee", "xyz"), _TARGET))
+    yield Entry(
+        "bearing of a callable", Bearing(CallableReference(_moving, 2, of_configuration=True), _TARGET)
+    )
+    yield Entry("callable of time", CallableReference(lambda t: [np.sin(3 * t), t**3], 2))
+    yield Entry(
+        "callable of time, rate",
+        CallableReference(lambda t: np.sin(3 * t), 1, rate=lambda t: 3 * np.cos(3 * t), unit="rad"),
+    )
+    yield Entry("callable of both", CallableReference(_moving, 2, of_configuration=True))
+    yield Entry(
+        "callable of both, derivatives",
+        CallableReference(_moving, 2, rate=_moving_rate, jacobian=_moving_jacobian, of_configuration=True),
+    )
+
+
+def _objectives() -> Iterator[Entry]:
+    h1 = Quadratic(Square({"theta": 1, "q1": 1, "q2": 1}, pi / 2), Square("q1", pi / 4))
+    yield Entry("quadratic", h1)
+    yield Entry(
+        "quadratic, weights", Quadratic(Square({"x": 1, "q2": -3}, 0.2, 4.0), Square("theta", -1, 0.1))
+    )
+    yield Entry("joint range", JointRange(["q1", "q2"], [-1, -2], [2, 3]))
+    for of, rows, robots in (
+        ("robot", "x", BOTH),
+        ("robot", "xy", BOTH),
+        ("robot", ("y", "rz"), BOTH),
+        ("robot", ("x", "y", "rz"), BOTH),
+        ("robot", "xyz", SPATIAL),
+        ("robot", ("x", "y", "z", "rx"), SPATIAL),
+        ("robot", ("x", "y", "z", "rx", "rz"), SPATIAL),
+        ("arm", "y", BOTH),
+        ("arm", "xy", BOTH),
+        ("arm", ("rz",), BOTH),
+        ("arm", "xyz", SPATIAL),
+        ("arm", ("rx", "ry", "rz"), SPATIAL),
+    ):
+        yield Entry(f"manipulability of the {of}, {' '.join(rows)}", Manipulability("ee", rows, of), robots)
+    yield Entry("manipulability of a link", Manipulability("link2", "xy"))
+    yield Entry("callable objective", CallableObjective(_height))
+    yield Entry("callable objective, gradient", CallableObjective(_height, _height_gradient))
+    yield Entry("sum", Sum((2.0, h1), (-0.5, Manipulability("ee", "xy")), (1.0, Coordinates("x"))))
+    yield Entry("sum of sums", Sum((3.0, h1 + CallableObjective(_height)), (-2.0, h1 - 0.5 * h1)))
+    yield Entry("negative", -Manipulability("ee", "xy", "arm"))
+    yield Entry("difference", 2.0 * h1 - Manipulability("ee", "xy") * 0.3)
+
+
+ENTRIES = (*_tasks(), *_references(), *_objectives())
+
+
+def evaluate(function: Function, t: float, configuration: Configuration) -> Evaluation:
+    """Value and derivatives, of an objective too (a sum is evaluated by its terms)."""
+    if isinstance(function, Objective):
+        gradient = function.gradient(configuration)
+        return Evaluation(np.array([function.value(configuration)]), np.zeros(1), gradient[None])
+    return function.evaluate(t, configuration)
+
+
+def random_configuration(robot: Robot, rng: np.random.Generator) -> Array:
+    """Within 5 m of the origin, theta in several turns, arm joints in one turn to either side."""
+    q = rng.uniform(-2 * pi, 2 * pi, robot.n)
+    q[:2] = rng.uniform(-5, 5, 2)
+    q[2] = rng.uniform(-25, 25)
+    return q
+
+
+def modules() -> list[ModuleType]:
+    """All modules of the mathematics."""
+    names = [nmm.__name__ + "." + name for name in ("equations", "program", "controller", "integrators")]
+    for package in ("platforms", "tasks", "references", "objectives", "resolvers"):
+        found = importlib.import_module(f"nmm.{package}")
+        names += [info.name for info in pkgutil.iter_modules(found.__path__, f"nmm.{package}.")]
+    return [importlib.import_module(name) for name in names]
+
+
+def concrete_subclasses(base: type) -> set[type]:
+    """All classes of nmm below `base` that can be made."""
+    modules()
+    found: set[type] = set()
+    waiting = [base]
+    while waiting:
+        for kind in waiting.pop().__subclasses__():
+            waiting.append(kind)
+            if kind.__module__.startswith("nmm.") and not inspect.isabstract(kind):
+                found.add(kind)
+    return found

@@ -1,0 +1,233 @@
+"""One formula, two forms: what numba makes of it gives what Python gives, is made once, and kept on disk."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from function_grid import ENTRIES, TIMES, Entry, evaluate, modules, random_configuration
+from numba.core.dispatcher import Dispatcher
+from numpy.typing import NDArray
+from paper_cases import CASES, TIP
+
+from nmm.compiled import Kernel
+from nmm.configuration import Configuration
+from nmm.controller import Controller
+from nmm.function import Stage
+from nmm.loading import load
+from nmm.objectives import Sum
+from nmm.platforms import PLATFORMS
+from nmm.resolvers import CallableResolver, ExtendedJacobian, ProjectedGradient, ReducedGradient, Resolver
+from nmm.resolvers.base import REPORT, Shape
+from nmm.robot import Robot
+from nmm.tasks import Coordinates, Task
+
+Array = NDArray[np.float64]
+
+#: Both forms do the same operations in the same order; libm's sine may differ from LLVM's in the last bit.
+TOLERANCE = 1e-14
+
+
+def assert_same(plain: Array, compiled: Array) -> None:
+    scale = np.abs(plain).max(initial=1.0)
+    np.testing.assert_allclose(compiled, plain, rtol=0, atol=TOLERANCE * scale)
+
+
+def kernels() -> dict[str, Kernel]:
+    found = {}
+    for module in modules():
+        for name, thing in vars(module).items():
+            if isinstance(thing, Kernel):
+                found[name] = thing
+    return found
+
+
+def stage_arguments(stage: Stage, t: float, configuration: Configuration) -> list[Array]:
+    """What the stage's kernel reads at (t, q), computed here without nmm's program."""
+    robot = configuration.robot
+    poses = [configuration.placement(frame) for frame in stage.frames]
+    placements = [np.c_[pose.rotation, pose.translation] for pose in poses]
+    hessians = [configuration.hessian(f) for f in stage.frames]
+    qp = configuration.q[: robot.platform.n_p]
+    G_q = np.stack([robot.platform.G_dot(qp, e) for e in np.eye(len(qp))], axis=-1)
+    parameters = stage.parameters
+    if stage.callback is not None:
+        parameters = np.concatenate([part.ravel() for part in stage.callback(t, configuration)])
+    k, n = len(stage.frames), robot.n
+    return [
+        np.array(placements).reshape(k, 3, 4),
+        np.array([configuration.jacobian(f) for f in stage.frames]).reshape(k, 6, n),
+        np.array(hessians).reshape(k, 6, n, n),
+        robot.platform.G(qp),
+        np.ascontiguousarray(G_q),
+        np.arange(k),
+        parameters,
+    ]
+
+
+SINGLE = [entry for entry in ENTRIES if not isinstance(entry.function, Sum)]
+
+
+@pytest.mark.parametrize("entry", SINGLE, ids=[entry.name for entry in SINGLE])
+def test_function_kernels(entry: Entry, robots: dict[str, Robot], rng: np.random.Generator) -> None:
+    """Each kernel by itself, in both forms, and all of a function's against the program's run."""
+    robot = robots[entry.robots[0]]
+    q = random_configuration(robot, rng)
+    configuration = Configuration(robot, q)
+    for t in TIMES[:4]:
+        stages = entry.function.stages(robot)
+        rows = max(stage.rows for stage in stages)
+        outcomes = [[np.zeros(rows), np.zeros(rows), np.zeros((rows, robot.n))] for _ in range(2)]
+        for stage in stages:
+            arguments = stage_arguments(stage, t, configuration)
+            for form, outcome in zip((stage.kernel.plain, stage.kernel), outcomes, strict=True):
+                form(t, q, *arguments, *(array[: stage.rows] for array in outcome))
+        for plain, compiled in zip(*outcomes, strict=True):
+            assert_same(plain, compiled)
+        count = len(entry.function.rows(robot))
+        for plain, found in zip(outcomes[0], entry.function.evaluate(t, configuration), strict=True):
+            assert_same(plain[:count], found)
+
+
+@pytest.mark.parametrize("name", PLATFORMS)
+def test_platform_kernels(name: str, rng: np.random.Generator) -> None:
+    platform = PLATFORMS[name]()
+    for qp in rng.uniform(-5, 5, (20, platform.n_p)):
+        both = []
+        for form in (platform.velocity_map.plain, platform.velocity_map):
+            G, G_q = np.zeros((platform.n_p, platform.p)), np.zeros((platform.n_p, platform.p, platform.n_p))
+            form(qp, platform.parameters, G, G_q)
+            both.append(np.append(G, G_q))
+        assert_same(*both)
+
+
+RESOLVERS = [
+    ReducedGradient(3.0),
+    ReducedGradient(3.0, [("u0", "u1"), ("u2", "u3")]),
+    ProjectedGradient(3.0),
+    ProjectedGradient(3.0, [1, 2, 3, 4]),
+    ExtendedJacobian(),
+    CallableResolver(lambda J, rate, h: h),
+]
+
+
+@pytest.mark.parametrize("resolver", RESOLVERS, ids=lambda r: r.name)
+def test_resolver_kernels(resolver: Resolver, rng: np.random.Generator) -> None:
+    for J in (rng.normal(size=(2, 4)), np.ones((2, 4)), np.array([[1.0, 0, 0, 0], [0, 1e-20, 1, 1]])):
+        Jc = rng.normal(size=(2 if resolver.uses_constraint else 0, 4))
+        rate, rate_c, h = rng.normal(size=2), rng.normal(size=len(Jc)), rng.normal(size=4)
+        setup = resolver.setup(Shape(2, len(Jc), ("u0", "u1", "u2", "u3")))
+        both = []
+        for form in (resolver.kernel.plain, resolver.kernel):
+            u, report, state = np.zeros(4), np.zeros(REPORT), setup.state.copy()
+            form(J, rate, Jc, rate_c, h, setup.parameters, setup.options, state, u, report)
+            both.append(np.concatenate([u, report, state]))
+        assert_same(*both)
+
+
+def test_no_kernel_is_left_out(robots: dict[str, Robot]) -> None:
+    run = {resolver.kernel for resolver in RESOLVERS}
+    run |= {PLATFORMS[name]().velocity_map for name in PLATFORMS}
+    for entry in SINGLE:
+        run |= {stage.kernel for stage in entry.function.stages(robots[entry.robots[0]])}
+    assert not {name for name, kernel in kernels().items() if kernel not in run}
+
+
+# Whole programs, in other processes.
+
+
+def answers() -> dict[str, Array]:
+    """Everything the two forms are compared by: the grid's functions, and the inputs of the cases."""
+    found = {}
+    rng = np.random.default_rng(7)
+    robots = {name: load(name) for name in ("unicycle_2r", "unicycle_3r")}
+    for entry in ENTRIES:
+        robot = robots[entry.robots[-1]]
+        configuration = Configuration(robot, random_configuration(robot, rng))
+        parts = evaluate(entry.function, 0.37, configuration)
+        found[entry.name] = np.concatenate([part.ravel() for part in parts])
+    for case in CASES:
+        robot = robots[case.robot]
+        s = 2 if case.name == "case 1" else 3
+        added = Task(Coordinates(*("q1", "q2")[: robot.n_u - s]), np.zeros(robot.n_u - s))
+        controllers = {
+            "rg": case.controller(robot, case.rg()),
+            "automatic": case.controller(robot, ReducedGradient()),
+            "pg": case.controller(robot, ProjectedGradient()),
+            "weighted": case.controller(robot, ProjectedGradient(weights={"v": 3.0})),
+            "ej": Controller(robot, case.tasks, ExtendedJacobian(), constraint=added),
+        }
+        for kind, controller in controllers.items():
+            for t in (0.0, 1.0, 12.0):
+                q = case.q0 + rng.normal(scale=0.3, size=robot.n)
+                step = controller.evaluate(t, q)
+                numbers = (step.u, step.q_dot, step.J.ravel(), step.h, [step.measure, step.status])
+                found[f"{case.name} {kind} {t}"] = np.concatenate(numbers)
+    return found
+
+
+def dispatchers() -> dict[str, Dispatcher]:
+    """All functions of nmm that numba compiles, by module and name."""
+    found = {}
+    for place, module in list(sys.modules.items()):
+        if place.split(".")[0] != "nmm":
+            continue
+        for name, thing in vars(module).items():
+            function = thing.compiled if isinstance(thing, Kernel) else thing
+            if isinstance(function, Dispatcher) and function.py_func.__module__ == place:
+                found[f"{place}.{name}"] = function
+    return found
+
+
+def main(folder: str) -> None:
+    """In the other process: save the answers, and how often numba's cache was hit and missed."""
+    np.savez(Path(folder) / "answers.npz", **answers())
+    counts = {
+        name: [sum(function.stats.cache_hits.values()), sum(function.stats.cache_misses.values())]
+        for name, function in dispatchers().items()
+    }
+    (Path(folder) / "cache.json").write_text(json.dumps(counts))
+
+
+def in_another_process(folder: Path, **environment: str) -> None:
+    code = f"import test_compiled_forms as forms; forms.main({str(folder)!r})"
+    subprocess.run(
+        [sys.executable, "-c", code], cwd=Path(__file__).parent, env=os.environ | environment, check=True
+    )
+
+
+def test_the_whole_step_in_plain_python(tmp_path: Path) -> None:
+    in_another_process(tmp_path, NUMBA_DISABLE_JIT="1")
+    assert json.loads((tmp_path / "cache.json").read_text()) == {}, "something was compiled after all"
+    plain = np.load(tmp_path / "answers.npz")
+    compiled = answers()
+    assert set(plain) == set(compiled)
+    for name, found in compiled.items():
+        # The inputs pass the rounding on, multiplied by the condition of what was inverted (below 1e3 here).
+        scale = np.abs(plain[name]).max(initial=1.0)
+        tolerance = 1e-12 if name.startswith("case") else TOLERANCE
+        np.testing.assert_allclose(found, plain[name], rtol=0, atol=tolerance * scale, err_msg=name)
+
+
+def test_another_process_compiles_nothing(tmp_path: Path) -> None:
+    answers()  # so that the cache on disk holds all
+    in_another_process(tmp_path)
+    counts = json.loads((tmp_path / "cache.json").read_text())
+    assert {name for name, (_, misses) in counts.items() if misses} == set()
+    assert sum(hits > 0 for hits, _ in counts.values()) > len(kernels())
+    assert counts["nmm.equations.step"] == [1, 0]
+
+
+def test_a_new_controller_compiles_nothing(robot_2r: Robot, robot_3r: Robot) -> None:
+    """Whatever is combined: the kernels are called through their addresses."""
+    answers()
+    before = {name: len(function.signatures) for name, function in dispatchers().items()}
+    mixed = [TIP, Task(Coordinates("q1"), [0.0])]
+    Controller(robot_2r, mixed, ProjectedGradient(), CASES[2].objective)(0.0, np.ones(5))
+    Controller(robot_3r, [TIP], ReducedGradient(), CASES[3].objective)(0.0, np.ones(6))
+    assert {name: len(function.signatures) for name, function in dispatchers().items()} == before

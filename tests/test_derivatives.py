@@ -1,0 +1,184 @@
+"""Every analytic derivative against central differences, over the grid of options and on both robots."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from function_grid import ENTRIES, TIMES, Entry, concrete_subclasses, evaluate, random_configuration
+from numpy.typing import NDArray
+from paper_cases import CASES, Case
+
+from nmm.configuration import Configuration
+from nmm.controller import Controller
+from nmm.function import Function
+from nmm.objectives import Objective, Sum
+from nmm.platforms import PLATFORMS
+from nmm.program import Program
+from nmm.references import CallableReference
+from nmm.robot import Robot
+
+Array = NDArray[np.float64]
+
+STEP = 1e-3
+#: Of the largest entry, or of 1 where that is smaller. The stencil is good to 1e-10; what nmm itself takes by
+#: differences (callables without derivatives) is good to 1e-9.
+TOLERANCE = 1e-8
+
+
+def derivative(function: Callable[[float], Array]) -> Array:
+    """At 0, by the fourth-order stencil."""
+    near = function(STEP) - function(-STEP)
+    far = function(2 * STEP) - function(-2 * STEP)
+    return (8 * near - far) / (12 * STEP)
+
+
+def partials(function: Callable[[Array], Array], at: Array) -> Array:
+    """The derivatives in every component of `at`, along a last axis."""
+    return np.stack([derivative(lambda h, e=e: function(at + h * e)) for e in np.eye(at.size)], axis=-1)
+
+
+def assert_close(found: Array, expected: Array) -> None:
+    assert found.shape == expected.shape
+    assert np.all(np.isfinite(found))
+    scale = max(1.0, float(np.abs(expected).max(initial=0.0)))
+    np.testing.assert_allclose(found, expected, rtol=0, atol=TOLERANCE * scale)
+
+
+def continuous(values: Array, near: Array, angular: list[bool]) -> Array:
+    """The values, with angles taken on the branch of `near`."""
+    jump = 2 * np.pi * np.round((values - near) / (2 * np.pi))
+    return values - np.where(angular, jump, 0.0)
+
+
+@pytest.mark.parametrize("entry", ENTRIES, ids=[entry.name for entry in ENTRIES])
+def test_value_t_and_value_q(entry: Entry, robots: dict[str, Robot], rng: np.random.Generator) -> None:
+    for name, t in itertools.product(entry.robots, TIMES):
+        check_function(entry.function, robots[name], t, random_configuration(robots[name], rng))
+
+
+def check_function(function: Function, robot: Robot, t: float, q: Array) -> None:
+    found = evaluate(function, t, Configuration(robot, q))
+    angular = [row.angular for row in function.rows(robot)]
+
+    def value(t: float, q: Array) -> Array:
+        return continuous(evaluate(function, t, Configuration(robot, q)).value, found.value, angular)
+
+    assert_close(found.value_t, derivative(lambda h: value(t + h, q)))
+    assert_close(found.value_q, partials(lambda q: value(t, q), q))
+
+
+def test_the_grid_holds_every_function() -> None:
+    missing = concrete_subclasses(Function) - {type(entry.function) for entry in ENTRIES}
+    assert not missing, f"add entries to function_grid.py for {sorted(kind.__name__ for kind in missing)}"
+
+
+@pytest.mark.parametrize("name", ["unicycle_2r", "unicycle_3r"])
+def test_functions_laid_out_together_do_not_disturb_each_other(
+    name: str, robots: dict[str, Robot], rng: np.random.Generator
+) -> None:
+    robot = robots[name]
+    listed = [e.function for e in ENTRIES if name in e.robots and not isinstance(e.function, Sum)]
+    functions = [listed[k] for k in rng.permutation(len(listed))]
+    program = Program(robot, functions)
+    program.pack()
+    for t in TIMES[:3]:
+        q = random_configuration(robot, rng)
+        for function, together in zip(functions, program.evaluate(t, q), strict=True):
+            alone = function.evaluate(t, Configuration(robot, q))
+            for a, b in zip(together, alone, strict=True):
+                np.testing.assert_array_equal(a, b, err_msg=repr(function))
+
+
+def test_an_objective_as_a_function_is_its_value_and_gradient(
+    robot_3r: Robot, rng: np.random.Generator
+) -> None:
+    configuration = Configuration(robot_3r, random_configuration(robot_3r, rng))
+    for function in (entry.function for entry in ENTRIES):
+        if isinstance(function, Objective) and not isinstance(function, Sum):
+            found = function.evaluate(0.0, configuration)
+            assert found.value[0] == function.value(configuration)
+            np.testing.assert_array_equal(found.value_q[0], function.gradient(configuration))
+
+
+def test_differences_of_callables_stay_good_late_and_far_away(robot_2r: Robot) -> None:
+    """After an hour, and kilometres and hundreds of turns away, a sine still changes over a radian."""
+    q = np.array([3000.0, -4000.0, 800.0, 300.0, -500.0])
+    late = CallableReference(  # fast in t and in x, slow in theta
+        lambda t, c: np.sin(6 * t) + np.sin(3 * c.q[0]) + np.cos(c.q[2] + 2 * c.q[3]),
+        1,
+        of_configuration=True,
+    )
+    found = late.evaluate(3600.0, Configuration(robot_2r, q))
+    assert found.value_t[0] == pytest.approx(6 * np.cos(6 * 3600.0), rel=1e-6)
+    slope = -np.sin(q[2] + 2 * q[3])
+    expected = [3 * np.cos(3 * q[0]), 0.0, slope, 2 * slope, 0.0]
+    np.testing.assert_allclose(found.value_q[0], expected, rtol=1e-6, atol=1e-8)
+
+
+each_case = pytest.mark.parametrize("case", CASES, ids=[case.name for case in CASES])
+
+
+@each_case
+def test_J_bar_and_h_are_derivatives_along_every_input(
+    case: Case, robots: dict[str, Robot], rng: np.random.Generator
+) -> None:
+    robot = robots[case.robot]
+    for t in (0.0, 3.3, 17.0):
+        check_equation(case.controller(robot), t, case.q0 + rng.normal(scale=0.7, size=robot.n))
+
+
+def check_equation(controller: Controller, t: float, q: Array) -> None:
+    here = controller.evaluate(t, q)
+    angular = [row.angular for row in controller.rows]
+    S = controller.robot.S(q)
+
+    def of_inputs(u: Array) -> Array:
+        """f - g, and H, where a short motion with the inputs u leads."""
+        there = controller.evaluate(t, q + S @ u)
+        return np.append(-continuous(there.error, here.error, angular), there.objective)
+
+    assert_close(np.vstack([here.J, here.h]), partials(of_inputs, np.zeros(len(here.u))))
+
+
+@each_case
+def test_the_error_obeys_its_equation(case: Case, robots: dict[str, Robot], rng: np.random.Generator) -> None:
+    """J_bar u = rate means e_dot = -K e along the motion: however the target moves, and with q too."""
+    controller = case.controller(robots[case.robot])
+    q = case.q0 + rng.normal(scale=0.3, size=case.q0.size)
+    here = controller.evaluate(4.0, q)
+    assert_close(derivative(lambda h: controller.evaluate(4.0 + h, q + h * here.q_dot).error), -here.error)
+
+
+@pytest.mark.parametrize("name", PLATFORMS)
+def test_platform_G_q(name: str, rng: np.random.Generator) -> None:
+    platform = PLATFORMS[name]()
+    for qp in rng.uniform(-4, 4, (20, platform.n_p)):
+        G_q = partials(platform.G, qp)
+        for direction in (*np.eye(platform.n_p), rng.normal(size=platform.n_p)):
+            assert_close(platform.G_dot(qp, direction), G_q @ direction)
+
+
+@pytest.mark.parametrize("name", ["unicycle_2r", "unicycle_3r"])
+def test_frame_jacobians_and_hessians(name: str, robots: dict[str, Robot], rng: np.random.Generator) -> None:
+    robot = robots[name]
+    for frame in robot.frames:
+        q = random_configuration(robot, rng)
+        check_frame(robot, frame, q)
+
+
+def check_frame(robot: Robot, frame: str, q: Array) -> None:
+    here = Configuration(robot, q)
+    R = here.placement(frame).rotation
+
+    def pose(q: Array) -> Array:
+        there = Configuration(robot, q).placement(frame)
+        turn = there.rotation @ R.T
+        # Half the skew part of a rotation is the sine of its angle times its axis.
+        axis = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+        return np.concatenate([there.translation, axis / 2])
+
+    assert_close(here.jacobian(frame), partials(pose, q))
+    assert_close(here.hessian(frame), partials(lambda q: Configuration(robot, q).jacobian(frame), q))

@@ -1,0 +1,205 @@
+"""What the base classes promise to those who add a platform, a function or a resolver of their own."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from function_grid import random_configuration
+from numpy.typing import NDArray
+from paper_cases import CASES, H1, TIP, Case
+from test_derivatives import assert_close, check_equation, check_function, partials
+
+from nmm.compiled import FUNCTION, PLATFORM, RESOLVER, Kernel, kernel
+from nmm.configuration import Configuration
+from nmm.controller import Controller
+from nmm.errors import InputError
+from nmm.function import Function, Row, Stage
+from nmm.objectives import Manipulability, Sum
+from nmm.platforms import Platform
+from nmm.references import Line
+from nmm.resolvers import ProjectedGradient, ReducedGradient, Resolver, Setup, Shape
+from nmm.robot import Robot
+from nmm.tasks import CallableFunction, Task
+
+Array = NDArray[np.float64]
+
+
+@kernel(PLATFORM)
+def turret(qp: Array, parameters: Array, G: Array, G_q: Array) -> None:
+    """The platform turns q1 along with itself, by a gear that slips: parameters = [ratio, slip]."""
+    ratio = parameters[0]
+    slip = parameters[1]
+    G[0, 0] = math.cos(qp[2])
+    G[1, 0] = math.sin(qp[2])
+    G[2, 1] = 1.0
+    G[3, 1] = ratio * math.cos(qp[3])
+    G[3, 2] = 1.0 + slip * math.sin(qp[3] + qp[2])
+    G_q[0, 0, 2] = -math.sin(qp[2])
+    G_q[1, 0, 2] = math.cos(qp[2])
+    G_q[3, 1, 3] = -ratio * math.sin(qp[3])
+    G_q[3, 2, 2] = slip * math.cos(qp[3] + qp[2])
+    G_q[3, 2, 3] = slip * math.cos(qp[3] + qp[2])
+
+
+class Turret(Platform):
+    """Four coordinates, the arm's first joint among them, and three inputs."""
+
+    name: ClassVar[str] = "turret"
+    coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "theta", "q1")
+    inputs: ClassVar[tuple[str, ...]] = ("v", "omega", "turret")
+    input_units: ClassVar[tuple[str, ...]] = ("m/s", "rad/s", "rad/s")
+
+    def __init__(self, ratio: float, slip: float) -> None:
+        self._parameters = np.array([ratio, slip])
+
+    @property
+    def parameters(self) -> Array:
+        return self._parameters
+
+    @property
+    def velocity_map(self) -> Kernel:
+        return turret
+
+    def pfaffian(self, qp: Array) -> Array:
+        return np.array([[-math.sin(qp[2]), math.cos(qp[2]), 0.0, 0.0]])
+
+
+@pytest.fixture(scope="module")
+def robot(robot_2r: Robot) -> Robot:
+    return dataclasses.replace(robot_2r, platform=Turret(0.7, 0.3))
+
+
+def test_platform_with_its_own_joint(robot: Robot, rng: np.random.Generator) -> None:
+    platform = robot.platform
+    assert robot.u_names == ("v", "omega", "turret", "q2")
+    assert (robot.n, robot.n_u, platform.n_p, platform.p) == (5, 4, 4, 3)
+    for _ in range(10):
+        q = random_configuration(robot, rng)
+        G = platform.G(q[:4])
+        np.testing.assert_allclose(platform.A(q[:4]) @ G, 0.0, atol=1e-15)
+        S = robot.S(q)
+        np.testing.assert_array_equal(S[:4, :3], G)
+        np.testing.assert_array_equal(S[4], [0, 0, 0, 1])
+        assert np.all(S[:4, 3] == 0.0)
+        G_q = partials(platform.G, q[:4])
+        direction = rng.normal(size=4)
+        assert_close(platform.G_dot(q[:4], direction), G_q @ direction)
+
+
+@pytest.mark.parametrize("rows", ["x", "xy", ("x", "y", "rz")], ids=str)
+def test_manipulability_follows_every_platform(
+    rows: tuple[str, ...], robot: Robot, rng: np.random.Generator
+) -> None:
+    """Its gradient has dG/dq in it, in the platform's own joint too."""
+    for _ in range(5):
+        check_function(Manipulability("ee", rows), robot, 0.0, random_configuration(robot, rng))
+    check_function(Manipulability("ee", "y", "arm"), robot, 0.0, random_configuration(robot, rng))
+
+
+@pytest.mark.parametrize("case", CASES[:3], ids=[case.name for case in CASES[:3]])
+def test_the_controller_takes_every_platform(case: Case, robot: Robot, rng: np.random.Generator) -> None:
+    q = case.q0 + rng.normal(scale=0.5, size=5)
+    for resolver in (ProjectedGradient(), ReducedGradient()):
+        controller = case.controller(robot, resolver)
+        check_equation(controller, 3.0, q)
+        step = controller.evaluate(3.0, q)
+        assert step.residual < 1e-10
+        assert_close(step.q_dot, robot.S(q) @ step.u)
+
+
+def test_a_model_without_the_platforms_joints_is_refused(robot_3r: Robot) -> None:
+    class Elsewhere(Turret):
+        coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "theta", "hitch")
+
+    with pytest.raises(InputError, match=r"expects the first coordinates to be x, y, theta, hitch.*has .*q1"):
+        dataclasses.replace(robot_3r, platform=Elsewhere(0.0, 0.0))
+
+
+@kernel(FUNCTION)
+def square_distance(
+    t: float, q: Array, placements: Array, jacobians: Array, hessians: Array, G: Array, G_q: Array,
+    slots: Array, parameters: Array, value: Array, value_t: Array, value_q: Array,
+) -> None:  # fmt: skip
+    """Between two frames, with a beat in time; parameters = [frequency]."""
+    value[0] = math.sin(parameters[0] * t)
+    value_t[0] = parameters[0] * math.cos(parameters[0] * t)
+    for i in range(3):
+        difference = placements[slots[0], i, 3] - placements[slots[1], i, 3]
+        value[0] += difference * difference
+        for j in range(q.shape[0]):
+            value_q[0, j] += 2 * difference * (jacobians[slots[0], i, j] - jacobians[slots[1], i, j])
+
+
+class SquareDistance(Function):
+    def __init__(self, a: str, b: str, frequency: float) -> None:
+        self.a, self.b, self.frequency = a, b, frequency
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        return (Row("distance", "m²"),)
+
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        return (Stage(square_distance, 1, (self.a, self.b), np.array([self.frequency])),)
+
+
+def test_function_with_its_own_kernel(robot_3r: Robot, rng: np.random.Generator) -> None:
+    own = SquareDistance("ee", "base_footprint", 0.0)
+
+    def distance(configuration: Configuration) -> float:
+        a, b = (configuration.placement(frame).translation for frame in ("ee", "base_footprint"))
+        return float(np.sum((a - b) ** 2))
+
+    q = random_configuration(robot_3r, rng)
+    check_function(SquareDistance("link2", "ee", 3.0), robot_3r, 0.4, q)
+    objective = Sum((0.3, own), (1.0, Manipulability("ee")))
+    inputs = []
+    for function in (own, CallableFunction(distance, ["distance"])):
+        task = Task(function, Line(0.5, 1.5, 3.0))
+        inputs.append(Controller(robot_3r, task, ProjectedGradient(), objective)(1.0, q))
+    np.testing.assert_allclose(*inputs, rtol=0, atol=1e-8)
+
+
+@kernel(RESOLVER)
+def steepest(
+    J: Array, rate: Array, Jc: Array, rate_c: Array, h: Array,
+    parameters: Array, options: Array, state: Array, u: Array, report: Array,
+) -> None:  # fmt: skip
+    """One row: u = J' rate / |J|^2; counts its calls in state[1]."""
+    square = 0.0
+    for j in range(J.shape[1]):
+        square += J[0, j] * J[0, j]
+    for j in range(J.shape[1]):
+        u[j] = J[0, j] * rate[0] / square
+    state[1] += 1
+    report[0] = 0.0
+    report[1] = 0.0
+    report[2] = square
+
+
+class Steepest(Resolver):
+    name: ClassVar[str] = "steepest"
+
+    @property
+    def kernel(self) -> Kernel:
+        return steepest
+
+    def setup(self, shape: Shape) -> Setup:
+        self.check(shape)
+        return Setup(np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros(2, dtype=np.int64))
+
+
+def test_resolver_with_its_own_kernel(robot_2r: Robot, rng: np.random.Generator) -> None:
+    task = Task(SquareDistance("ee", "base_footprint", 0.0), [0.4])
+    q = random_configuration(robot_2r, rng)
+    controller = Controller(robot_2r, task, Steepest(), H1)
+    expected = Controller(robot_2r, task, ProjectedGradient())(0.0, q)
+    for calls in (1, 2, 3):
+        np.testing.assert_allclose(controller(0.0, q), expected, rtol=1e-13)
+        assert controller.evaluate(0.0, q).partition[0] == 2 * calls
+    controller.reset()
+    assert controller.evaluate(0.0, q).partition[0] == 1
+    with pytest.raises(InputError, match="resolver steepest takes none"):
+        Controller(robot_2r, task, Steepest(), constraint=TIP)

@@ -1,0 +1,235 @@
+"""Which columns the reduced gradient inverts, and when it changes them; what resolvers refuse."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+import twin
+from numpy.typing import NDArray
+
+from nmm.errors import InputError
+from nmm.resolvers import ExtendedJacobian, ProjectedGradient, ReducedGradient, Status
+from nmm.resolvers.base import Shape
+
+Array = NDArray[np.float64]
+
+SHAPES = [(1, 1), (1, 4), (2, 4), (3, 3), (3, 4), (3, 5), (5, 6), (6, 9)]
+each_shape = pytest.mark.parametrize("shape", SHAPES, ids=str)
+
+
+def measures(J: Array) -> dict[tuple[int, ...], float]:
+    """|det Ja| / sqrt(det J Jᵀ) of all partitions, by numpy."""
+    s, m = J.shape
+    volume = np.prod(np.linalg.svd(J, compute_uv=False))
+    every = itertools.combinations(range(m), s)
+    return {basic: abs(np.linalg.det(J[:, list(basic)])) / volume for basic in every}
+
+
+@each_shape
+def test_measures_lie_between_0_and_1_and_their_squares_add_up_to_1(
+    shape: tuple[int, int], rng: np.random.Generator
+) -> None:
+    s, m = shape
+    J, rg = rng.normal(size=shape), ReducedGradient()
+    total = 0.0
+    for basic, expected in measures(J).items():
+        held = np.array([1, *basic])
+        found = rg.resolve(J, np.zeros(s), np.zeros(m), state=held)
+        assert tuple(found.state) == (1, *basic)
+        assert 0.0 <= found.measure <= 1.0 + 1e-12
+        assert found.measure == pytest.approx(expected, rel=1e-9, abs=1e-12)
+        total += found.measure**2
+    assert total == pytest.approx(1.0, rel=1e-12)
+
+
+@each_shape
+def test_the_first_partition_is_the_best(shape: tuple[int, int], rng: np.random.Generator) -> None:
+    s, m = shape
+    for _ in range(20):
+        J = rng.normal(size=shape)
+        every = measures(J)
+        best = max(every, key=lambda basic: every[basic])
+        found = ReducedGradient().resolve(J, np.zeros(s), np.zeros(m))
+        assert tuple(found.state) == (0, *best)
+        # The largest of C(m, s) numbers whose squares add up to 1.
+        assert found.measure >= len(every) ** -0.5 - 1e-12
+        # Neither the task's units nor its variables decide.
+        mixed = ReducedGradient().resolve(rng.normal(size=(s, s)) @ J, np.zeros(s), np.zeros(m))
+        assert tuple(mixed.state) == (0, *best)
+        assert mixed.measure == pytest.approx(found.measure, rel=1e-8)
+
+
+def walk(rng: np.random.Generator, count: int, shape: tuple[int, int]) -> list[Array]:
+    """Jacobians that change slowly and come far."""
+    a, b, c = (rng.normal(size=shape) for _ in range(3))
+    return [a * np.cos(k / 40) + b * np.sin(k / 29) + c * np.sin(k / 17) for k in range(count)]
+
+
+@pytest.mark.parametrize("threshold", [0.02, 0.2, 0.5])
+@pytest.mark.parametrize("shape", [(1, 3), (2, 4), (3, 5)], ids=str)
+def test_automatic_partitions_are_kept_until_below_the_threshold(
+    shape: tuple[int, int], threshold: float, rng: np.random.Generator
+) -> None:
+    s, m = shape
+    rg = ReducedGradient(threshold=threshold)
+    state, kept, switches = None, None, 0
+    for J in walk(rng, 600, shape):
+        every = measures(J)
+        best = max(every, key=lambda basic: every[basic])
+        if kept is None:
+            kept = best
+        elif every[kept] < threshold:
+            switches += kept != best
+            kept = best
+        found = rg.resolve(J, np.ones(s), np.ones(m), state=state)
+        assert tuple(found.state[1:]) == kept
+        assert found.status is Status.SOLVED
+        assert found.residual < 1e-9
+        state = found.state
+    assert switches >= 3
+
+
+def test_a_step_does_not_change_the_state_that_it_was_given(rng: np.random.Generator) -> None:
+    rg = ReducedGradient()
+    before = rg.resolve(rng.normal(size=(2, 4)), np.zeros(2), np.zeros(4)).state
+    copy = before.copy()
+    rg.resolve(np.eye(4)[[3, 2]], np.zeros(2), np.zeros(4), state=before)
+    np.testing.assert_array_equal(before, copy)
+
+
+PAPER = [("v", "q1"), ("v", "omega")]
+NAMES = ("v", "omega", "q1", "q2")
+
+
+def planar(d13: float, d12: float) -> Array:
+    """A 2 x 4 Jacobian with these two minors."""
+    return np.array([[1.0, 0.3, -0.2, 0.1], [0.0, d12, d13, 0.4]])
+
+
+def chosen(J: Array, state: Any = None, **options: Any) -> tuple[tuple[int, ...], NDArray[np.int64]]:
+    rg = ReducedGradient(partitions=PAPER, **options)
+    found = rg.resolve(J, [0.3, 0.1], np.zeros(4), inputs=NAMES, state=state)
+    return tuple(found.state[1:]), found.state
+
+
+def test_the_papers_rule() -> None:
+    """1) start with [j1 j3] if |Δ13| >= |Δ12|; 2) below Θ = 0.01 go to the other."""
+    first, second = (0, 2), (0, 1)
+    assert chosen(planar(0.5, 0.4))[0] == first
+    assert chosen(planar(-0.5, 0.4))[0] == first
+    assert chosen(planar(0.4, 0.4))[0] == first
+    assert chosen(planar(0.4, -0.4))[0] == first
+    assert chosen(planar(0.4, np.nextafter(0.4, 1)))[0] == first  # what rounding makes of equals
+    assert chosen(planar(0.3999, -0.4))[0] == second
+    _, state = chosen(planar(0.5, 0.4))
+    basic, state = chosen(planar(0.0101, 0.3), state)
+    assert basic == first
+    basic, state = chosen(planar(-0.0099, 0.3), state)
+    assert basic == second
+    basic, state = chosen(planar(0.5, 0.0101), state)
+    assert basic == second
+    basic, state = chosen(planar(0.5, 0.0), state)
+    assert basic == first
+    # Both below: the larger, which no rule of the paper covers.
+    assert chosen(planar(0.001, 0.002), state)[0] == second
+    assert chosen(planar(0.02, 0.5), chosen(planar(0.5, 0.4))[1], threshold=0.03)[0] == second
+
+
+def test_the_papers_rule_on_the_paper_robot(rng: np.random.Generator) -> None:
+    paper = twin.Planar()
+    for q in rng.uniform(-4, 4, (200, 5)):
+        minors = paper.minors(q)
+        expected = (0, 2) if abs(minors[1, 3]) >= abs(minors[1, 2]) else (0, 1)
+        assert chosen(paper.J(q))[0] == expected
+
+
+def test_a_held_partition_stays() -> None:
+    """state[0] = 1 is how an integrator keeps one right-hand side through a step."""
+    _, state = chosen(planar(0.5, 0.4))
+    state[0] = 1
+    basic, held = chosen(planar(0.001, 0.4), state)
+    assert basic == (0, 2)
+    assert held[0] == 1
+    held[0] = 0
+    assert chosen(planar(0.001, 0.4), held)[0] == (0, 1)
+    # One that is held may become singular; that is reported, not evaded.
+    found = ReducedGradient().resolve(np.eye(4)[:2], [1, 1], np.zeros(4), state=np.array([1, 2, 3]))
+    assert found.status is Status.SINGULAR_JA
+
+
+def test_the_arm_alone_as_basis_is_the_papers_special_case(rng: np.random.Generator) -> None:
+    """n_m = s, Ja = Jm (with the up whose dimensions match)."""
+    rg = ReducedGradient(10.0, [("q1", "q2")])
+    paper = twin.Planar()
+    for q in rng.uniform(-4, 4, (50, 5)):
+        J, gradient, rate = paper.J(q), rng.normal(size=5), rng.normal(size=2)
+        # The platform's Jacobian: x and y carry the arm along, theta turns it as omega does.
+        Jp = np.column_stack([np.eye(2), J[:, 1]])
+        expected = twin.reduced_gradient_on_arm(Jp, J[:, 2:], twin.G(q), rate, gradient[:3], gradient[3:])
+        found = rg.resolve(J, rate, twin.S(q).T @ gradient, inputs=NAMES)
+        tolerance = 1e-14 * np.linalg.cond(J[:, 2:]) ** 2
+        scale = np.abs(expected).max(initial=1.0)
+        np.testing.assert_allclose(found.u, expected, rtol=0, atol=tolerance * scale)
+
+
+def resolved(resolver: Any, shape: tuple[int, int] = (2, 4), **changed: Any) -> Callable[[], Any]:
+    s, m = shape
+    J = np.random.default_rng(0).normal(size=shape)
+    return lambda: resolver.resolve(**({"J": J, "rate": np.ones(s), "h": np.zeros(m)} | changed))
+
+
+RG, PG, EJ = ReducedGradient(), ProjectedGradient(), ExtendedJacobian()
+REFUSED: list[tuple[Callable[[], Any], str]] = [
+    (resolved(PG, (5, 4)), "5 rows for 4 inputs .*at most 4"),
+    (resolved(RG, (3, 2)), "3 rows for 2 inputs"),
+    (resolved(PG, J=np.ones(4)), r"J: expected a matrix, got shape \(4,\)"),
+    (resolved(PG, J=np.zeros((0, 4)), rate=[]), "at least one row"),
+    (resolved(PG, J=[[1, np.nan, 0, 0], [0, 1, 0, 0]]), "J: expected finite numbers"),
+    (resolved(PG, rate=[1.0, np.inf]), "rate: expected finite numbers"),
+    (resolved(PG, rate=[1.0]), r"rate: expected 2 numbers, got shape \(1,\)"),
+    (resolved(PG, h=np.zeros(3)), r"h: expected 4 numbers, got shape \(3,\)"),
+    (resolved(PG, h="steep"), "h: expected numbers, got 'steep'"),
+    (resolved(PG, inputs=("a", "b")), "inputs: expected 4 names.*got 2"),
+    (resolved(RG, state=[0, 1, 2, 3]), "state: expected one of 2 rows and 4 inputs"),
+    (resolved(RG, state=[0, 1, 9]), "state: expected one of 2 rows and 4 inputs"),
+    (resolved(EJ), r"constraint: expected 2 rows \(4 inputs less 2 rows of the task\), got 0"),
+    (resolved(EJ, Jc=np.ones((2, 3)), rate_c=[0, 0]), "Jc: expected 4 columns"),
+    (resolved(EJ, Jc=np.ones((2, 4)), rate_c=[0]), r"rate_c: expected 2 numbers, got shape \(1,\)"),
+    (resolved(EJ, Jc=np.ones((2, 4))), r"rate_c: expected 2 numbers, got shape \(0,\)"),
+    (resolved(ProjectedGradient(weights=[1, 2, 3])), r"weights: expected 4 numbers or a 4 x 4 matrix, got"),
+    (resolved(ProjectedGradient(weights=2.0)), "weights: expected 4 numbers"),
+    (resolved(ProjectedGradient(weights=[1, 2, 0, 3])), "weights: expected numbers above 0"),
+    (resolved(ProjectedGradient(weights=[1, 2, -1, 3])), "weights: expected numbers above 0"),
+    (resolved(ProjectedGradient(weights=np.tri(4))), "symmetric positive definite"),
+    (resolved(ProjectedGradient(weights=np.ones((4, 4)))), "symmetric positive definite"),
+    (resolved(ProjectedGradient(weights={"w": 2.0}), inputs=NAMES), "weights: unknown input 'w'.*: v, omega"),
+    (resolved(ProjectedGradient(weights={"v": np.nan}), inputs=NAMES), "weight of v: expected finite"),
+    (resolved(ReducedGradient(partitions=[("v", "q7")]), inputs=NAMES), "partitions: unknown input 'q7'.*q1"),
+    (resolved(ReducedGradient(partitions=[(0, 4)])), "partitions: expected an index from 0 to 3, got 4"),
+    (resolved(ReducedGradient(partitions=[(0, -1)])), "partitions: expected an index from 0 to 3, got -1"),
+    (resolved(ReducedGradient(partitions=[(0, 1.5)])), "expected names or indices of inputs, got 1.5"),
+    (resolved(ReducedGradient(partitions=[(0, 0)])), "2 different inputs, as many as the task has rows"),
+    (resolved(ReducedGradient(partitions=[(0, 1), (0,)])), r"2 different inputs.*got \[0\]"),
+    (lambda: ReducedGradient(partitions="best"), "partitions: expected 'automatic' or lists"),
+    (lambda: ReducedGradient(partitions=[]), "partitions: expected at least one list"),
+    (lambda: ReducedGradient(partitions=["v", "q1"]), r"partitions: expected lists of inputs.*got 'v'"),
+    (lambda: ReducedGradient(partitions=[0, 2]), r"partitions: expected lists of inputs.*got 0"),
+    (lambda: ReducedGradient(threshold=1.0), "threshold: expected below 1 with automatic"),
+    (lambda: ReducedGradient(threshold=0.0), "threshold: expected a number above 0"),
+    (lambda: ReducedGradient(alpha=-1.0), "alpha: expected a number above 0, got -1"),
+    (lambda: ProjectedGradient(alpha=0.0), "alpha: expected a number above 0, got 0"),
+    (lambda: ProjectedGradient(tolerance=np.nan), "tolerance: expected finite"),
+    (lambda: ExtendedJacobian(tolerance=-1e-9), "tolerance: expected a number above 0"),
+    (lambda: RG.setup(Shape(10, 0, tuple(map(str, range(20))))), "184756 candidates are too many"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("call", "message"), REFUSED, ids=[message for _, message in REFUSED])
+def test_bad_input_is_refused_in_one_line(call: Callable[[], Any], message: str) -> None:
+    with pytest.raises(InputError, match=message) as caught:
+        call()
+    assert "\n" not in str(caught.value)

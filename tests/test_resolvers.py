@@ -1,0 +1,286 @@
+"""The resolvers on random problems: against the twin's formulas, and the laws that their answers obey."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+import twin
+from numpy.typing import NDArray
+from test_linear_algebra import with_condition
+
+from nmm.errors import InputError
+from nmm.resolvers import (
+    RESOLVERS,
+    CallableResolver,
+    ExtendedJacobian,
+    ProjectedGradient,
+    ReducedGradient,
+    Resolution,
+    Resolver,
+    Status,
+)
+
+Array = NDArray[np.float64]
+
+SHAPES = [(1, 1), (1, 4), (2, 2), (2, 4), (3, 3), (3, 4), (3, 5), (4, 7), (5, 6), (6, 6), (6, 8), (6, 12)]
+each_shape = pytest.mark.parametrize("shape", SHAPES, ids=str)
+redundant = pytest.mark.parametrize("shape", [(s, m) for s, m in SHAPES if s < m], ids=str)
+
+
+class Problem:
+    """J, rate, h of a shape, and the constraint's rows that make J_e square."""
+
+    def __init__(self, shape: tuple[int, int], rng: np.random.Generator) -> None:
+        self.s, self.m = shape
+        self.J, self.rate, self.h = rng.normal(size=shape), rng.normal(size=self.s), rng.normal(size=self.m)
+        self.Jc = rng.normal(size=(self.m - self.s, self.m))
+        self.rate_c = rng.normal(size=self.m - self.s)
+
+    def given(self, resolver: Resolver, **changed: Any) -> Resolution:
+        numbers = {"J": self.J, "rate": self.rate, "h": self.h}
+        if resolver.uses_constraint:
+            numbers |= {"Jc": self.Jc, "rate_c": self.rate_c}
+        return resolver.resolve(**(numbers | changed))
+
+
+def three() -> tuple[Resolver, ...]:
+    return ReducedGradient(3.0), ProjectedGradient(3.0), ExtendedJacobian()
+
+
+def close(found: Array, expected: Array, tolerance: float = 1e-10) -> None:
+    scale = np.abs(expected).max(initial=1.0)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=tolerance * scale)
+
+
+@each_shape
+def test_every_resolver_does_the_task(shape: tuple[int, int], rng: np.random.Generator) -> None:
+    for _ in range(20):
+        problem = Problem(shape, rng)
+        weighted = ProjectedGradient(3.0, weights=rng.uniform(0.1, 10, problem.m))
+        for resolver in (*three(), weighted):
+            found = problem.given(resolver)
+            assert found.status is Status.SOLVED
+            assert not found.singular
+            # How far J u can be from rate at all: the rounding of a product with a u of that size.
+            tolerance = 1e-10 * max(1.0, float(np.abs(found.u).max()))
+            np.testing.assert_allclose(problem.J @ found.u, problem.rate, rtol=0, atol=tolerance)
+            true = np.linalg.norm(problem.J @ found.u - problem.rate)
+            assert found.residual == pytest.approx(true, abs=tolerance * 1e-3)
+
+
+@each_shape
+def test_projected_gradient_is_the_papers(shape: tuple[int, int], rng: np.random.Generator) -> None:
+    for _ in range(20):
+        problem = Problem(shape, rng)
+        J, rate, h = problem.J, problem.rate, problem.h
+        scale = np.linalg.cond(J)
+        u = problem.given(ProjectedGradient(7.0)).u
+        close(u, twin.projected_gradient(J, rate, h, np.eye(problem.m), 7.0), 1e-13 * scale)
+        # What the task asks for is in J's row space; the rest does not move the task and descends H.
+        task = problem.given(ProjectedGradient(7.0), h=np.zeros(problem.m)).u
+        free = u - task
+        close(J @ free, np.zeros(problem.s), 1e-13 * scale)
+        close(np.linalg.lstsq(J.T, task, rcond=None)[0] @ J, task, 1e-13 * scale)
+        assert h @ free <= 1e-12
+        assert np.linalg.norm(task) <= np.linalg.norm(problem.given(ReducedGradient(7.0)).u) * (1 + 1e-12)
+
+
+@each_shape
+def test_weighted_projected_gradient_meets_the_kkt_conditions(
+    shape: tuple[int, int], rng: np.random.Generator
+) -> None:
+    """u minimises (u - u0)' W (u - u0) / 2 under J u = rate, u0 = -alpha W^-1 h: a linear system says so."""
+    problem = Problem(shape, rng)
+    J, s, m = problem.J, problem.s, problem.m
+    root = rng.normal(size=(m, m))
+    full = root @ root.T + 0.1 * np.eye(m)
+    diagonal = rng.uniform(0.1, 10, m)
+    names = [f"u{i}" for i in range(m)]
+    by_name = dict(zip(names[:-1], diagonal, strict=False))  # the last has weight 1
+    for weights, W in (
+        ((full + full.T) / 2, (full + full.T) / 2),
+        (diagonal, np.diag(diagonal)),
+        (by_name, np.diag([*diagonal[:-1], 1.0])),
+    ):
+        resolver = ProjectedGradient(2.0, weights=weights)
+        u = problem.given(resolver, inputs=names).u
+        system = np.block([[W, J.T], [J, np.zeros((s, s))]])
+        solution = np.linalg.solve(system, np.concatenate([-2.0 * problem.h, problem.rate]))
+        close(u, solution[:m], 1e-13 * np.linalg.cond(system))
+        free = problem.given(resolver, rate=np.zeros(s), inputs=names).u
+        assert problem.h @ free <= 1e-12
+    close(
+        problem.given(ProjectedGradient(2.0, weights=5.0 * np.ones(m))).u,
+        problem.given(ProjectedGradient(0.4)).u,
+    )
+
+
+def test_a_large_weight_spares_its_input(rng: np.random.Generator) -> None:
+    problem = Problem((2, 4), rng)
+    names = ["v", "omega", "q1", "q2"]
+    u = problem.given(ProjectedGradient(weights={"omega": 1e8}), inputs=names, h=np.zeros(4)).u
+    assert abs(u[1]) < 1e-6 * np.linalg.norm(u)
+
+
+@redundant
+def test_reduced_gradient_is_the_papers_for_every_partition(
+    shape: tuple[int, int], rng: np.random.Generator
+) -> None:
+    problem = Problem(shape, rng)
+    s, m = shape
+    for basic in itertools.islice(itertools.combinations(range(m), s), 100):
+        expected = twin.reduced_gradient(problem.J, problem.rate, problem.h, np.eye(m), basic, 5.0)
+        condition = np.linalg.cond(problem.J[:, list(basic)])
+        shuffled = list(rng.permutation(basic))
+        for partition in (basic, shuffled, [f"u{i}" for i in basic]):
+            found = problem.given(ReducedGradient(5.0, [partition], threshold=1e-300))
+            close(found.u, expected, 1e-14 * condition**2)
+            assert set(found.state[1:]) == set(basic)
+            determinant = np.linalg.det(problem.J[:, list(basic)])
+            assert found.measure == pytest.approx(abs(determinant), rel=1e-12 * condition)
+
+
+@redundant
+def test_the_reduced_gradient_descends(shape: tuple[int, int], rng: np.random.Generator) -> None:
+    """With rate = 0, H changes by h' u = -|ub|^2 / alpha (eq. 10)."""
+    for _ in range(20):
+        problem = Problem(shape, rng)
+        found = problem.given(ReducedGradient(5.0), rate=np.zeros(problem.s))
+        free = np.delete(found.u, found.state[1:])
+        assert problem.h @ found.u == pytest.approx(-(free @ free) / 5.0, rel=1e-10)
+
+
+@pytest.mark.parametrize("shape", [(1, 2), (2, 3), (3, 4), (5, 6), (6, 7)], ids=str)
+def test_rg_and_pg_are_parallel_with_one_degree_left(
+    shape: tuple[int, int], rng: np.random.Generator
+) -> None:
+    """The self-motions have one direction, and RG's is longer, by the partition's measure squared."""
+    for _ in range(20):
+        problem = Problem(shape, rng)
+        rg = problem.given(ReducedGradient(5.0), rate=np.zeros(problem.s))
+        pg = problem.given(ProjectedGradient(5.0), rate=np.zeros(problem.s))
+        assert 0.0 < rg.measure <= 1.0
+        close(rg.u * rg.measure**2, pg.u, 1e-11)
+
+
+@each_shape
+def test_extended_jacobian_is_numpys(shape: tuple[int, int], rng: np.random.Generator) -> None:
+    for _ in range(20):
+        problem = Problem(shape, rng)
+        found = problem.given(ExtendedJacobian())
+        expected = twin.extended_jacobian(problem.J, problem.rate, problem.Jc, problem.rate_c)
+        close(found.u, expected, 1e-13 * np.linalg.cond(np.vstack([problem.J, problem.Jc])))
+        close(problem.Jc @ found.u, problem.rate_c)
+
+
+@pytest.mark.parametrize("s", [1, 2, 4, 6])
+def test_no_redundancy_left(s: int, rng: np.random.Generator) -> None:
+    problem = Problem((s, s), rng)
+    for resolver in three():
+        close(
+            problem.given(resolver).u,
+            np.linalg.solve(problem.J, problem.rate),
+            1e-13 * np.linalg.cond(problem.J),
+        )
+
+
+@redundant
+def test_near_a_singularity_the_answer_is_as_good_as_numpys(
+    shape: tuple[int, int], rng: np.random.Generator
+) -> None:
+    """With cond J = 1e6, a solution through J J' would keep four digits; a stable one keeps ten."""
+    for _ in range(10):
+        problem = Problem(shape, rng)
+        problem.J = with_condition(shape, 1e6, rng)
+        size = np.linalg.norm(problem.J, 2)
+        for resolver in three():
+            found = problem.given(resolver)
+            assert found.status is Status.SOLVED
+            assert found.residual <= 1e-13 * size * np.linalg.norm(found.u)
+        expected = twin.projected_gradient(problem.J, problem.rate, problem.h, np.eye(problem.m), 3.0)
+        close(problem.given(ProjectedGradient(3.0)).u, expected, 1e-9)
+
+
+@pytest.mark.parametrize("shape", [(2, 2), (2, 4), (3, 5), (6, 8)], ids=str)
+def test_what_is_singular_is_told_apart(shape: tuple[int, int], rng: np.random.Generator) -> None:
+    s, m = shape
+    problem = Problem(shape, rng)
+    first = list(range(s))
+    more = ReducedGradient(partitions=[first]), ProjectedGradient(weights=np.ones(m))
+    for J in (
+        np.vstack([problem.J[:-1], problem.J[:1]]),
+        np.vstack([problem.J[:-1], rng.normal(size=(1, s - 1)) @ problem.J[:-1]]),
+        np.vstack([problem.J[:-1], np.zeros((1, m))]),
+        np.zeros(shape),
+    ):
+        for resolver in (*three(), *more):
+            found = problem.given(resolver, J=J)
+            assert found.status is Status.SINGULAR_J, resolver.name
+            assert found.singular
+            assert np.all(np.isnan(found.u))
+            assert np.isnan(found.residual)
+    if s == m:
+        return
+    J = problem.J.copy()
+    J[:, 1] = 2.0 * J[:, 0]
+    assert problem.given(ReducedGradient(partitions=[first]), J=J).status is Status.SINGULAR_JA
+    assert problem.given(ReducedGradient(), J=J).status is Status.SOLVED
+    assert problem.given(ProjectedGradient(), J=J).status is Status.SOLVED
+    Jc = problem.Jc.copy()
+    Jc[0] = problem.J[0] - problem.J[-1]
+    assert problem.given(ExtendedJacobian(), Jc=Jc).status is Status.SINGULAR_JE
+    assert problem.given(ExtendedJacobian(), Jc=0.0 * Jc).status is Status.SINGULAR_JE
+    assert len({status.meaning for status in Status}) == len(Status)
+
+
+@redundant
+def test_invariances(shape: tuple[int, int], rng: np.random.Generator) -> None:
+    problem = Problem(shape, rng)
+    s, m = shape
+    J, rate, h = problem.J, problem.rate, problem.h
+    mix = np.linalg.qr(rng.normal(size=(s, s)))[0] * rng.uniform(0.3, 3.0, s)
+    order = rng.permutation(m)
+    turn = np.linalg.qr(rng.normal(size=(m, m)))[0]
+    D = np.diag(rng.uniform(0.3, 3.0, m))
+    for resolver in three():
+        u = problem.given(resolver).u
+        # The task may be written in other variables, and the inputs be listed in another order.
+        close(problem.given(resolver, J=mix @ J, rate=mix @ rate).u, u)
+        changed = {"Jc": problem.Jc[:, order]} if resolver.uses_constraint else {}
+        close(problem.given(resolver, J=J[:, order], h=h[order], **changed).u, u[order])
+        # The answer is linear in what is asked.
+        parts = problem.given(resolver, h=0.0 * h).u + problem.given(resolver, rate=0.0 * rate).u
+        if not resolver.uses_constraint:
+            close(parts, u)
+    u = problem.given(ProjectedGradient(3.0)).u
+    close(turn @ problem.given(ProjectedGradient(3.0), J=J @ turn, h=turn.T @ h).u, u)
+    # Weights that follow the units take the units out.
+    close(D @ problem.given(ProjectedGradient(3.0, weights=D @ D), J=J @ D, h=D @ h).u, u)
+    close(problem.given(ReducedGradient(6.0), h=h / 2).u, problem.given(ReducedGradient(3.0)).u)
+
+
+def test_resolvers_by_name() -> None:
+    assert set(RESOLVERS) == {"rg", "pg", "ej"}
+    assert all(kind.name == name for name, kind in RESOLVERS.items())
+
+
+def test_callable_resolver(rng: np.random.Generator) -> None:
+    problem = Problem((2, 4), rng)
+
+    def damped(J: Array, rate: Array, h: Array) -> Array:
+        u: Array = J.T @ np.linalg.solve(J @ J.T, rate)
+        J[:], rate[:], h[:] = 0.0, 0.0, 0.0  # its own copies
+        return u
+
+    found = problem.given(CallableResolver(damped))
+    close(found.u, np.linalg.pinv(problem.J) @ problem.rate)
+    assert found.status is Status.SOLVED
+    assert found.residual < 1e-12
+    assert problem.given(CallableResolver(damped), J=np.zeros((2, 4))).status is Status.SINGULAR_J
+    nowhere = CallableResolver(lambda J, rate, h: np.full(4, np.nan))
+    assert problem.given(nowhere).status is Status.NOT_FINITE
+    with pytest.raises(InputError, match=r"expected u of shape \(4,\), got \(3,\)"):
+        problem.given(CallableResolver(lambda J, rate, h: np.zeros(3)))
