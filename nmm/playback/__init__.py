@@ -1,0 +1,8 @@
+"""Playback: motions in a browser with MeshCat, as one file or live.
+
+Names are loaded when first used (`lazy_loader`; the list of names is `__init__.pyi`).
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,65 @@
+"""One file that plays motions in any browser, without a network and without a server."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from nmm.errors import InputError
+from nmm.playback.motion import Motion
+from nmm.playback.page import file_page
+from nmm.playback.scene import playback_scene
+
+
+def write_html(
+    motions: Sequence[Motion],
+    path: str | Path,
+    *,
+    title: str | None = None,
+    ghosts: int | None = None,
+    fps: float = 60.0,
+    autoplay: bool = False,
+) -> Path:
+    """Write a page that plays the motions, each in a colour of its own.
+
+    It opens at the first instant. `#t=3.2` after the file's address opens it at 3.2 s, `#play` plays.
+
+    Parameters
+    ----------
+    motions : at least one
+    path : the file to write; it appears whole or not at all, and replaces an older one
+    title : heading; the first robot's name when not given
+    ghosts : transparent copies of each robot along its way; 6 when not given, 3 of each of several
+    fps : frames for each second of motion
+    autoplay : whether it plays when it is opened
+
+    Raises
+    ------
+    InputError : no motion, or the file cannot be written
+    """
+    if title is None:
+        title = motions[0].robot.name if motions else ""
+    commands = playback_scene(motions, title=title, ghosts=ghosts, fps=fps, autoplay=autoplay)
+    return _write_atomically(Path(path), file_page(commands, title))
+
+
+def _write_atomically(path: Path, text: str) -> Path:
+    temporary = ""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        descriptor, temporary = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
+        with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+            file.write(text)
+        umask = os.umask(0)
+        os.umask(umask)
+        os.chmod(temporary, 0o666 & ~umask)
+        os.replace(temporary, path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
+    finally:
+        # Gone already when it took the file's place.
+        if temporary:
+            Path(temporary).unlink(missing_ok=True)
+    return path

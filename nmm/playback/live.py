@@ -1,0 +1,165 @@
+"""MeshCat live in a browser: motions that are played, or a robot that a control loop moves."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+import webbrowser
+from collections.abc import Sequence
+from types import TracebackType
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.arrays import vector
+from nmm.playback.encoding import encode
+from nmm.playback.motion import Motion
+from nmm.playback.page import socket_page
+from nmm.playback.rolling import Rolling
+from nmm.playback.scene import live_scene, playback_scene
+from nmm.playback.server import PageServer
+from nmm.robot import Robot
+
+
+def play(
+    motions: Sequence[Motion],
+    *,
+    port: int | None = None,
+    open_browser: bool = True,
+    title: str | None = None,
+    ghosts: int | None = None,
+    stop: threading.Event | None = None,
+) -> None:
+    """Play motions in a browser, in real time; returns at Ctrl-C or when `stop` is set.
+
+    The address is printed. Each page that opens it plays by itself, with the same controls as the file
+    of `write_html`. Only this machine can reach it, and nothing stays behind however the process ends.
+
+    Parameters
+    ----------
+    motions : at least one
+    port : port on 127.0.0.1; a free one when not given
+    open_browser : whether to open the page in the user's browser
+    title : heading; the first robot's name when not given
+    ghosts : transparent copies of each robot along its way; 6 when not given, 3 of each of several
+    stop : ends the playback when set (by another thread)
+
+    Raises
+    ------
+    InputError : no motion; the port is taken, not allowed or not a port
+    """
+    if title is None:
+        title = motions[0].robot.name if motions else ""
+    heading = title
+    hello = [
+        encode(command) for command in playback_scene(motions, title=heading, ghosts=ghosts, autoplay=True)
+    ]
+    server = PageServer(lambda host: socket_page(heading, host), hello, port=port)
+    try:
+        print(f"Playing at {server.url} (Ctrl-C ends it)", flush=True)
+        if open_browser:
+            _open(server.url)
+        stop = stop or threading.Event()
+        # Not for ever at once: on some systems Ctrl-C cannot end that.
+        while not stop.wait(timeout=0.5):
+            pass
+    except KeyboardInterrupt:
+        print(flush=True)
+    finally:
+        server.close()
+
+
+class LiveViewer:
+    """A robot in a browser that your own loop moves: `display(q)` returns at once.
+
+        with LiveViewer(robot) as viewer:
+            print(viewer.url)
+            while ...:
+                viewer.display(q)
+
+    Pages are drawn at most 60 times a second, with the newest q; a slow page, or none, costs the loop
+    nothing. The server lives in this process, on 127.0.0.1 only, and ends with it.
+
+    Parameters
+    ----------
+    robot : the robot
+    q : where it stands at first; zero when not given
+    port : port on 127.0.0.1; a free one when not given
+    open_browser : whether to open the page in the user's browser
+
+    Raises
+    ------
+    InputError : wrong q; the port is taken, not allowed or not a port
+    """
+
+    def __init__(
+        self, robot: Robot, q: ArrayLike | None = None, *, port: int | None = None, open_browser: bool = False
+    ) -> None:
+        self.robot = robot
+        self._state = robot.q(q), np.zeros(len(robot.wheels))
+        self._rolling = Rolling(robot)
+        commands, self._drawn = live_scene(robot, self._state[0], title=robot.name)
+        self._server = PageServer(
+            lambda host: socket_page(robot.name, host), [encode(c) for c in commands], self._pose, port=port
+        )
+        if open_browser:
+            _open(self.url)
+
+    @property
+    def url(self) -> str:
+        """Address of the page."""
+        return self._server.url
+
+    def display(self, q: ArrayLike, wheel_angles: ArrayLike | None = None) -> None:
+        """Show the robot at q.
+
+        Parameters
+        ----------
+        q : (n,) coordinates in m and rad
+        wheel_angles : (wheels,) rad; when not given, the wheels roll from the last q to this one
+
+        Raises
+        ------
+        InputError : wrong lengths, numbers that are not finite
+        RunError : the viewer has been closed
+        """
+        after = self.robot.q(q)
+        if wheel_angles is None:
+            before, turned = self._state
+            wheels = turned + self._rolling.steps(np.array([before, after]))[0]
+        else:
+            wheels = vector(wheel_angles, len(self.robot.wheels), "wheel_angles")
+        self._state = after, wheels
+        self._server.changed()
+
+    def _pose(self) -> str:
+        """The newest placements as a command; the server's thread asks for it."""
+        matrices = self._drawn.placements.relative(*self._state)
+        transforms = [
+            [path, matrix.T.ravel().tolist()]
+            for path, matrix in zip(self._drawn.paths, matrices, strict=True)
+        ]
+        return encode({"type": "pose", "transforms": transforms})
+
+    def close(self) -> None:
+        """End the server and free its port; again is nothing."""
+        self._server.close()
+
+    def __enter__(self) -> LiveViewer:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _open(url: str) -> None:
+    """Open the user's browser, if there is a screen: a browser for the terminal would take it over."""
+    screen = sys.platform in ("darwin", "win32") or any(
+        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
+    )
+    if screen:
+        # Some browsers keep the one who opened them waiting.
+        threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()

@@ -1,0 +1,91 @@
+"""What playback shows: a robot's motion in plain arrays, checked once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import pinocchio as pin
+
+from nmm.arrays import Array, array, matrix, vector
+from nmm.errors import InputError
+from nmm.robot import Robot
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """N samples of a robot that moves, and what belongs into the picture with it.
+
+    Attributes
+    ----------
+    robot : the robot
+    t (N,) : times in s, ascending
+    q (N, n), u (N, n_u) : coordinates and inputs, in `robot.q_units` and `robot.u_units`
+    path (N, 3) : the end-effector's path, m in the world; computed from `frame` when not given
+    desired (M, 3) : the desired path, m in the world
+    target (3,) : a fixed point to look at, m in the world
+    label : name in the legend, such as "RG"
+    frame : the end-effector's frame
+
+    Raises
+    ------
+    InputError : wrong shapes, no samples, times that do not ascend, numbers that are not finite,
+        an unknown frame
+    """
+
+    robot: Robot
+    t: Array
+    q: Array
+    u: Array
+    path: Array | None = None
+    desired: Array | None = None
+    target: Array | None = None
+    label: str = ""
+    frame: str | None = None
+
+    def __post_init__(self) -> None:
+        t = vector(self.t, None, "t")
+        if not t.size:
+            raise InputError("t: expected at least one sample, got none")
+        if np.any(np.diff(t) <= 0.0):
+            raise InputError("t: expected ascending times")
+        checked: dict[str, Array | None] = {
+            "t": t,
+            "q": matrix(self.q, (t.size, self.robot.n), "q"),
+            "u": matrix(self.u, (t.size, self.robot.n_u), "u"),
+            "path": None if self.path is None else matrix(self.path, (t.size, 3), "path"),
+            "desired": None if self.desired is None else _points(self.desired, "desired"),
+            "target": None if self.target is None else vector(self.target, 3, "target"),
+        }
+        for name, value in checked.items():
+            if value is not None:
+                value.flags.writeable = False
+            object.__setattr__(self, name, value)
+        if self.frame is not None:
+            self.robot.frame_id(self.frame)
+
+    @property
+    def duration(self) -> float:
+        """Time from the first sample to the last, s."""
+        return float(self.t[-1] - self.t[0])
+
+    @cached_property
+    def driven(self) -> Array | None:
+        """Path that the end-effector drove, (N, 3) m; None when neither `path` nor `frame` is given."""
+        if self.path is not None or self.frame is None:
+            return self.path
+        model = self.robot.model
+        data, frame = model.createData(), self.robot.frame_id(self.frame)
+        path = np.empty((len(self.t), 3))
+        for k, q in enumerate(self.q):
+            pin.framesForwardKinematics(model, data, q)
+            path[k] = data.oMf[frame].translation
+        return path
+
+
+def _points(value: Array, name: str) -> Array:
+    points = array(value, name)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise InputError(f"{name}: expected points of shape (M, 3), got shape {points.shape}")
+    return points

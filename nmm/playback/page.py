@@ -1,0 +1,67 @@
+"""The page: MeshCat's viewer, our controls around it, and where its commands come from."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterable
+from importlib import metadata, resources
+from importlib.util import find_spec
+from pathlib import Path
+
+from nmm.errors import RunError
+from nmm.playback.drawing import Command
+from nmm.playback.encoding import encode
+
+#: In the order in which they depend on one another.
+SCRIPTS = ("commands.js", "scenery.js", "ghosts.js", "camera.js", "player.js", "start.js")
+
+#: What the browser may load: nothing but the page itself (and the socket that it came with). MeshCat
+#: evaluates text, and so do the tools that test pages.
+POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; "
+    "img-src data: blob:; connect-src {sources}"
+)
+
+
+def file_page(commands: Iterable[Command], title: str) -> str:
+    """A page that holds its commands and needs nothing else."""
+    lines = "\n".join(encode(command) for command in commands)
+    block = f'<script type="application/json" id="commands">\n{lines}\n</script>\n'
+    return _page(title, source="page", sources="'none'", before_scripts=block)
+
+
+def socket_page(title: str, host: str) -> str:
+    """A page that gets its commands from the server at `host` (address:port)."""
+    return _page(title, source="socket", sources=f"ws://{host}", before_scripts="")
+
+
+def _page(title: str, *, source: str, sources: str, before_scripts: str) -> str:
+    scripts = "\n".join(f"<script>\n{_resource(name)}</script>" for name in SCRIPTS)
+    parts = {
+        "policy": POLICY.format(sources=sources),
+        "version": metadata.version("nmm"),
+        "title": html.escape(title),
+        "source": source,
+        "style": _resource("style.css"),
+        "meshcat": _meshcat_viewer(),
+        "scripts": before_scripts + scripts,
+    }
+    # Split once, so that nothing that is put in is searched for more places.
+    pieces = _resource("page.html").split("@")
+    return "".join(parts[piece] if i % 2 else piece for i, piece in enumerate(pieces))
+
+
+def _resource(name: str) -> str:
+    return resources.files("nmm.playback").joinpath("web", name).read_text(encoding="utf-8")
+
+
+def _meshcat_viewer() -> str:
+    """The JavaScript that MeshCat's own server sends."""
+    spec = find_spec("meshcat")
+    if spec is None or spec.origin is None:
+        raise RunError("playback needs the package meshcat, which is not installed")
+    path = Path(spec.origin).parent / "viewer" / "dist" / "main.min.js"
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise RunError(f"{path}: MeshCat's viewer cannot be read: {error.strerror}") from None

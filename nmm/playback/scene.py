@@ -1,0 +1,236 @@
+"""The scene: robots that move, their paths and ghosts, the target, the ground, and where to look from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from nmm.arrays import Array
+from nmm.errors import InputError
+from nmm.playback.drawing import Command, Drawing, DrawnRobot, Rgb
+from nmm.playback.encoding import packed
+from nmm.playback.extent import corners, robot_boxes
+from nmm.playback.keyframes import Keyframes, ghost_samples, keyframes
+from nmm.playback.motion import Motion
+from nmm.playback.rolling import wheel_angles
+from nmm.playback.shapes import Y_TO_Z, cylinder, sphere
+from nmm.robot import Robot
+
+#: Colours of the motions: told apart by readers with any colour vision.
+COLORS: tuple[Rgb, ...] = (
+    (0.09, 0.42, 0.83),
+    (0.87, 0.33, 0.09),
+    (0.05, 0.60, 0.45),
+    (0.70, 0.36, 0.66),
+    (0.80, 0.62, 0.05),
+    (0.35, 0.70, 0.90),
+)
+DESIRED: Rgb = (0.16, 0.18, 0.22)
+TARGET: Rgb = (0.83, 0.10, 0.22)
+
+#: Instants at which the room that the robots take is measured.
+INSTANTS = 80
+
+
+def playback_scene(
+    motions: Sequence[Motion],
+    *,
+    title: str,
+    ghosts: int | None = None,
+    fps: float = 60.0,
+    autoplay: bool = False,
+) -> list[Command]:
+    """Commands for motions that are played: robots, paths, ghosts, animation.
+
+    Parameters
+    ----------
+    motions : at least one
+    title : heading of the page
+    ghosts : transparent copies of each robot along its way; 6 when not given, 3 of each of several
+    fps : frames for each second of motion
+    autoplay : whether the page begins to play by itself
+
+    Raises
+    ------
+    InputError : no motion
+    """
+    if not motions:
+        raise InputError("motions: expected at least one motion, got none")
+    frames = [keyframes(motion, fps) for motion in motions]
+    start = min(float(motion.t[0]) for motion in motions)
+    end = max(float(motion.t[-1]) for motion in motions)
+    times = np.linspace(start, end, INSTANTS)
+    boxes = _boxes(motions, frames, times)
+    size = _size(boxes, motions)
+    several = len(motions) > 1
+    if ghosts is None:
+        ghosts = 3 if several else 6
+    drawing = Drawing()
+    drawing.add(
+        "stage",
+        title=title,
+        live=False,
+        autoplay=autoplay,
+        start=start,
+        duration=end - start,
+        view=packed(_view(boxes, motions), np.float64),
+        follow=_held(boxes, np.mean([_at(times, frame, frame.q[:, :2]) for frame in frames], axis=0)),
+        size=size,
+    )
+    animations = []
+    for i, (motion, frame) in enumerate(zip(motions, frames, strict=True)):
+        color = COLORS[i % len(COLORS)]
+        path = f"/nmm/motion {i}"
+        robot = DrawnRobot(drawing, motion.robot, f"{path}/robot", tint=color if several else None, rank=i)
+        robot.place(frame.q[0], frame.wheels[0])
+        animations += robot.animations(frame, start)
+        samples = ghost_samples(motion, ghosts)
+        if samples:
+            robot.ghosts(f"{path}/ghosts", motion.q[samples], wheel_angles(motion)[samples])
+        drawing.add(
+            "motion",
+            path=path,
+            root=robot.root,
+            label=motion.label,
+            color=list(color),
+            tag=motion.label if several else "",
+            height=float(boxes[i, 0, 1, 2]),
+        )
+        if motion.driven is not None:
+            drawing.add(
+                "path",
+                path=f"{path}/path",
+                color=list(color),
+                points=packed(motion.driven, np.float32),
+                times=packed(motion.t - start, np.float64),
+            )
+    _desired(drawing, motions)
+    _targets(drawing, motions, size)
+    drawing.add("set_animation", animations=animations, options={"play": False, "repetitions": 1})
+    drawing.add("ready")
+    return drawing.commands
+
+
+def live_scene(robot: Robot, q: Array, *, title: str, room: float = 2.0) -> tuple[list[Command], DrawnRobot]:
+    """Commands for a robot that somebody moves from outside, and the robot, to place it.
+
+    Parameters
+    ----------
+    q : (n,) where it stands at first
+    room : ground to show around it, m
+    """
+    wheels = np.zeros(len(robot.wheels))
+    box = robot_boxes(robot, q[np.newaxis], wheels[np.newaxis])[0]
+    around = box + np.array([[-room, -room, 0.0], [room, room, 0.0]])
+    drawing = Drawing()
+    drawing.add(
+        "stage",
+        title=title,
+        live=True,
+        autoplay=False,
+        start=0.0,
+        duration=0.0,
+        view=packed(corners(around), np.float64),
+        follow=_held(box[np.newaxis, np.newaxis], q[np.newaxis, :2]),
+        size=0.5 * float(np.linalg.norm(np.ptp(around, axis=0))),
+    )
+    drawn = DrawnRobot(drawing, robot, "/nmm/motion 0/robot")
+    drawn.place(q, wheels)
+    drawing.add(
+        "motion",
+        path="/nmm/motion 0",
+        root=drawn.root,
+        label=robot.name,
+        color=list(COLORS[0]),
+        tag="",
+        height=float(box[1, 2]),
+    )
+    drawing.add("ready")
+    return drawing.commands, drawn
+
+
+def _desired(drawing: Drawing, motions: Sequence[Motion]) -> None:
+    """Each desired path once: motions that are compared usually share it."""
+    seen: list[Array] = []
+    for motion in motions:
+        path = motion.desired
+        if path is None or any(path.shape == other.shape and np.allclose(path, other) for other in seen):
+            continue
+        drawing.add(
+            "path",
+            path=f"/nmm/desired {len(seen)}",
+            color=list(DESIRED),
+            points=packed(path, np.float32),
+            times=None,
+        )
+        seen.append(path)
+
+
+def _targets(drawing: Drawing, motions: Sequence[Motion], size: float) -> None:
+    """A ball on a pole at each target."""
+    targets = {tuple(motion.target.tolist()) for motion in motions if motion.target is not None}
+    radius = min(max(0.015 * size, 0.02), 0.2)
+    for i, (x, y, z) in enumerate(sorted(targets)):
+        path = f"/nmm/target {i}"
+        place = np.eye(4)
+        place[:3, 3] = x, y, z
+        drawing.transform(path, place)
+        drawing.object(f"{path}/ball", sphere(radius), TARGET)
+        if z > radius:
+            pole, foot = Y_TO_Z.copy(), Y_TO_Z.copy()
+            pole[2, 3], foot[2, 3] = -0.5 * z, -z + 0.1 * radius
+            drawing.object(f"{path}/pole", cylinder(0.22 * radius, z), (0.45, 0.47, 0.52))
+            drawing.object(f"{path}/foot", cylinder(1.6 * radius, 0.2 * radius), (0.45, 0.47, 0.52))
+            drawing.transform(f"{path}/pole", pole)
+            drawing.transform(f"{path}/foot", foot)
+    if targets:
+        drawing.add("target", color=list(TARGET))
+
+
+def _boxes(motions: Sequence[Motion], frames: Sequence[Keyframes], times: Array) -> Array:
+    """Boxes around the robots at the times, (motions, times, 2, 3)."""
+    return np.array(
+        [
+            robot_boxes(motion.robot, _at(times, frame, frame.q), _at(times, frame, frame.wheels))
+            for motion, frame in zip(motions, frames, strict=True)
+        ]
+    )
+
+
+def _at(times: Array, frames: Keyframes, values: Array) -> Array:
+    columns = [np.interp(times, frames.t, column) for column in values.T]
+    return np.array(columns).T.reshape(len(times), values.shape[1])
+
+
+def _view(boxes: Array, motions: Sequence[Motion]) -> Array:
+    """Points that the camera has to hold, (P, 3)."""
+    points = [corners(boxes).reshape(-1, 3)]
+    for motion in motions:
+        points += [
+            line[:: max(1, len(line) // 200)] for line in (motion.driven, motion.desired) if line is not None
+        ]
+        if motion.target is not None:
+            points.append(motion.target[np.newaxis])
+    return np.vstack(points)
+
+
+def _size(boxes: Array, motions: Sequence[Motion]) -> float:
+    """Half the diagonal of everything that is shown, m."""
+    return max(0.5 * float(np.linalg.norm(np.ptp(_view(boxes, motions), axis=0))), 1e-3)
+
+
+def _held(boxes: Array, middle: Array) -> dict[str, float]:
+    """What a camera holds that follows the robots' middle: an upright cylinder, m.
+
+    Parameters
+    ----------
+    boxes : (motions, K, 2, 3) around the robots at K instants
+    middle : (K, 2) the robots' middle then
+    """
+    offsets = corners(boxes)[..., :2] - middle[:, np.newaxis]
+    return {
+        "radius": float(np.linalg.norm(offsets, axis=-1).max()),
+        "low": float(boxes[..., 2].min()),
+        "high": float(boxes[..., 2].max()),
+    }

@@ -1,0 +1,194 @@
+"""A web server in a thread of this process, on the loopback interface: it ends when the process does."""
+
+from __future__ import annotations
+
+import asyncio
+import atexit
+import socket
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+
+import tornado.web
+import tornado.websocket
+from tornado.httpserver import HTTPServer
+from tornado.netutil import bind_sockets
+
+from nmm.errors import InputError, RunError
+
+LOOPBACK = "127.0.0.1"
+#: Tried in this order when no port is asked for; if all are taken, the system chooses.
+PORTS = range(7000, 7020)
+#: Pause between two poses sent to a page, s: no screen shows more.
+PERIOD = 1.0 / 60.0
+
+
+class PageServer:
+    """Serves one page and sends it commands.
+
+    A page that connects gets `hello`, then, whenever `changed()` has been called, what `latest()` says:
+    a page that is slow, or asleep in a background tab, misses what is old and delays nobody.
+
+    Parameters
+    ----------
+    page : makes the page, given the server's address "127.0.0.1:port"
+    hello : lines of commands for a page that has just connected
+    latest : lines for what is new; called in the server's thread
+    port : the port, or None for a free one
+
+    Raises
+    ------
+    InputError : the port is taken, not allowed, or not a port
+    """
+
+    def __init__(
+        self,
+        page: Callable[[str], str],
+        hello: Sequence[str],
+        latest: Callable[[], str] | None = None,
+        *,
+        port: int | None = None,
+    ) -> None:
+        self._socket = _listen(port)
+        self.port = int(self._socket.getsockname()[1])
+        self.host = f"{LOOPBACK}:{self.port}"
+        self.url = f"http://{self.host}/"
+        try:
+            self.page = page(self.host).encode("utf-8")
+        except BaseException:
+            self._socket.close()
+            raise
+        self.hello = hello
+        self.latest = latest
+        self.pages: set[_Socket] = set()
+        self._loop = asyncio.new_event_loop()
+        self._notified = False
+        self._closed = False
+        self._started: Future[None] = Future()
+        self._thread = threading.Thread(target=self._run, name=f"nmm playback {self.port}", daemon=True)
+        self._thread.start()
+        self._started.result(timeout=10.0)
+        atexit.register(self.close)
+
+    def changed(self) -> None:
+        """Say that `latest` has something new. Never waits for a page. `RunError` once closed."""
+        if self._closed:
+            raise RunError("the viewer has been closed")
+        if not self._notified:
+            self._notified = True
+            self._loop.call_soon_threadsafe(self._wake)
+
+    def close(self) -> None:
+        """Stop, close the pages' connections and free the port; again is nothing."""
+        if self._closed:
+            return
+        self._closed = True
+        atexit.unregister(self.close)
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join(timeout=5.0)
+
+    def _wake(self) -> None:
+        self._notified = False
+        for page in self.pages:
+            page.news.set()
+
+    def _run(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        try:
+            application = tornado.web.Application(
+                [("/", _Page, {"server": self}), ("/socket", _Socket, {"server": self})],
+                log_function=lambda handler: None,
+            )
+            http = HTTPServer(application)
+            http.add_sockets([self._socket])
+        except Exception as error:
+            self._started.set_exception(error)
+            raise
+        self._started.set_result(None)
+        try:
+            self._loop.run_forever()
+        finally:
+            http.stop()
+            self._loop.run_until_complete(self._hang_up(http))
+            self._loop.close()
+
+    async def _hang_up(self, http: HTTPServer) -> None:
+        for page in tuple(self.pages):
+            page.close()
+        # A page that does not answer is left alone.
+        await asyncio.wait([asyncio.ensure_future(http.close_all_connections())], timeout=1.0)
+        waiting = [task for task in asyncio.all_tasks() if task is not asyncio.current_task()]
+        for task in waiting:
+            task.cancel()
+        await asyncio.gather(*waiting, return_exceptions=True)
+
+
+class _Local(tornado.web.RequestHandler):
+    """Answers only who asked for this address: a name that some site points at 127.0.0.1 is not it."""
+
+    def initialize(self, server: PageServer) -> None:
+        self.server = server
+
+    def prepare(self) -> None:
+        if self.request.host not in (self.server.host, f"localhost:{self.server.port}"):
+            raise tornado.web.HTTPError(403)
+
+
+class _Page(_Local):
+    def get(self) -> None:
+        self.set_header("Content-Type", "text/html; charset=utf-8")
+        self.set_header("Cache-Control", "no-store")
+        self.finish(self.server.page)
+
+
+class _Socket(tornado.websocket.WebSocketHandler, _Local):
+    def open(self, *args: str, **kwargs: str) -> None:
+        self.news = asyncio.Event()
+        self.news.set()
+        self.server.pages.add(self)
+        # A task of its own: Tornado notices that a page has gone only once this method has returned.
+        self._sending = asyncio.ensure_future(self._send())
+
+    async def _send(self) -> None:
+        server = self.server
+        try:
+            await self.write_message("\n".join(server.hello))
+            while server.latest is not None:
+                await self.news.wait()
+                self.news.clear()
+                line = server.latest()
+                if line:
+                    await self.write_message(line)
+                await asyncio.sleep(PERIOD)
+        except tornado.websocket.WebSocketClosedError:
+            server.pages.discard(self)
+
+    def on_message(self, message: str | bytes) -> None:
+        """Pages have nothing to say."""
+
+    def on_close(self) -> None:
+        self.server.pages.discard(self)
+        self._sending.cancel()
+
+
+def _listen(port: int | None) -> socket.socket:
+    """A socket that listens on loopback only."""
+    if port is None:
+        for candidate in (*PORTS, 0):
+            try:
+                return bind_sockets(candidate, LOOPBACK, socket.AF_INET)[0]
+            except OSError:
+                continue
+        raise RunError(f"no free port on {LOOPBACK}")
+    if not 0 < port < 65536:
+        raise InputError(f"port: expected a number from 1 to 65535, got {port}")
+    try:
+        return bind_sockets(port, LOOPBACK, socket.AF_INET)[0]
+    except PermissionError:
+        raise InputError(
+            f"port: {port} is reserved; expected one above 1023 or none, for a free one"
+        ) from None
+    except OSError:
+        raise InputError(
+            f"port: {port} is in use; expected a free port, or none, to have one found"
+        ) from None

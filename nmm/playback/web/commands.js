@@ -1,0 +1,69 @@
+// What the page is told to draw. Commands come as lines of JSON, from the page itself or from a socket, and
+// are carried out in order and at once; those not known here are MeshCat's.
+"use strict";
+const nmm = (window.nmm = { hooks: {}, geometries: {} });
+
+nmm.viewer = window.viewer = new MeshCat.Viewer(document.getElementById("view"));
+
+{
+  const THREE = MeshCat.THREE;
+  const ARRAYS = { f32: Float32Array, f64: Float64Array, u32: Uint32Array };
+
+  nmm.split = (path) => path.split("/").filter((name) => name.length > 0);
+  nmm.node = (path) => nmm.viewer.scene_tree.find(nmm.split(path)).object;
+  nmm.color = (rgb) => new THREE.Color(...rgb).convertSRGBToLinear();
+
+  nmm.decode = (line) =>
+    JSON.parse(line, (_, value) => {
+      if (value === null || typeof value !== "object") return value;
+      const keys = Object.keys(value);
+      const kind = keys.length === 1 ? ARRAYS[keys[0]] : undefined;
+      if (kind === undefined) return value;
+      const text = atob(value[keys[0]]);
+      const bytes = new Uint8Array(text.length);
+      for (let i = 0; i < text.length; i++) bytes[i] = text.charCodeAt(i);
+      return new kind(bytes.buffer);
+    });
+
+  nmm.execute = (command) => {
+    const own = nmm.hooks[command.type];
+    if (own === undefined) nmm.viewer.handle_command(command);
+    else own(command);
+    nmm.viewer.set_dirty();
+  };
+
+  nmm.hooks.geometry = ({ id, data }) => {
+    const geometry = new THREE.ObjectLoader().parseGeometries([{ ...data, uuid: id }])[id];
+    if (geometry.attributes.normal === undefined) geometry.computeVertexNormals();
+    nmm.geometries[id] = geometry;
+  };
+
+  nmm.hooks.object = ({ path, geometry, material }) => {
+    const shape = nmm.geometries[geometry];
+    const mesh = new THREE.Mesh(
+      shape,
+      new THREE.MeshPhongMaterial({
+        color: nmm.color(material.color),
+        specular: 0x202020,
+        shininess: 40,
+        opacity: material.opacity,
+        transparent: material.opacity < 1,
+        // Files of meshes do not always agree on which side is outside.
+        side: shape.type === "BufferGeometry" ? THREE.DoubleSide : THREE.FrontSide,
+        polygonOffset: material.rank > 0,
+        polygonOffsetFactor: material.rank,
+        polygonOffsetUnits: 2 * material.rank,
+      }),
+    );
+    mesh.castShadow = mesh.receiveShadow = true;
+    nmm.viewer.set_object(nmm.split(path), mesh);
+  };
+
+  nmm.hooks.pose = ({ transforms }) => {
+    for (const [path, matrix] of transforms) nmm.viewer.set_transform(nmm.split(path), matrix);
+    nmm.viewer.scene.updateMatrixWorld();
+    nmm.camera.update();
+    const root = new THREE.Vector3().setFromMatrixPosition(nmm.node(nmm.motions[0].root).matrixWorld);
+    nmm.scenery.center(root.x, -root.z);
+  };
+}

@@ -1,0 +1,174 @@
+"""The live viewer without a browser: who can reach it, what it does with bad pages, and its end."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playback_robot import drive, hand_built_robot, straight
+
+from nmm.errors import InputError, RunError
+from nmm.playback import LiveViewer, play, wheel_angles
+from nmm.robot import Robot
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory: pytest.TempPathFactory) -> Robot:
+    return hand_built_robot(tmp_path_factory.mktemp("robot"))
+
+
+def listening() -> dict[int, str]:
+    """Ports that something on this machine listens on, with the address, as the kernel says."""
+    found = {}
+    for table in ("/proc/net/tcp", "/proc/net/tcp6"):
+        for line in Path(table).read_text(encoding="ascii").splitlines()[1:]:
+            _, local, _, state = line.split()[:4]
+            if state == "0A":
+                address, port = local.split(":")
+                found[int(port, 16)] = address
+    return found
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def test_the_server_listens_on_loopback_only_and_ends(robot: Robot) -> None:
+    before = threading.active_count()
+    with LiveViewer(robot) as viewer:
+        port = int(viewer.url.rsplit(":", 1)[1].strip("/"))
+        assert listening()[port] == "0100007F"
+        with urllib.request.urlopen(viewer.url, timeout=5) as answer:
+            assert b"MeshCat" in answer.read()
+    assert port not in listening()
+    assert threading.active_count() == before
+    viewer.close()
+    with pytest.raises(RunError, match="closed"):
+        viewer.display(np.zeros(6))
+
+
+def test_the_server_does_not_answer_to_other_names(robot: Robot) -> None:
+    with LiveViewer(robot) as viewer:
+        request = urllib.request.Request(viewer.url, headers={"Host": "example.org"})
+        with pytest.raises(urllib.error.HTTPError, match="403"):
+            urllib.request.urlopen(request, timeout=5)
+
+
+@pytest.mark.parametrize("port", [0, -1, 65536])
+def test_a_port_that_is_none_is_refused(robot: Robot, port: int) -> None:
+    with pytest.raises(InputError, match="from 1 to 65535"):
+        LiveViewer(robot, port=port)
+
+
+def test_a_port_in_use_is_refused(robot: Robot) -> None:
+    with LiveViewer(robot) as viewer:
+        port = int(viewer.url.rsplit(":", 1)[1].strip("/"))
+        with pytest.raises(InputError, match=f"port: {port} is in use"):
+            play([drive(robot, duration=1.0)], port=port, open_browser=False)
+        with LiveViewer(robot) as other:
+            assert other.url != viewer.url
+
+
+def test_a_page_that_never_reads_holds_up_nobody(robot: Robot) -> None:
+    with LiveViewer(robot) as viewer:
+        address = viewer.url.removeprefix("http://").strip("/")
+        with socket.create_connection(tuple(address.split(":")), timeout=5) as page:
+            page.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            page.sendall(
+                f"GET /socket HTTP/1.1\r\nHost: {address}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+                "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n\r\n".encode()
+            )
+            assert b"101 Switching" in page.recv(100)
+            begin = time.monotonic()
+            for k in range(2000):
+                viewer.display(np.full(6, 1e-3 * k))
+            assert time.monotonic() - begin < 2.0
+            begin = time.monotonic()
+            viewer.close()
+            assert time.monotonic() - begin < 4.0
+
+
+def test_wheels_roll_from_pose_to_pose(robot: Robot) -> None:
+    motion = straight(robot, 0.5, 0.7, np.linspace(0.0, 2.0, 50))
+    with LiveViewer(robot, motion.q[0]) as viewer:
+        for q in motion.q:
+            viewer.display(q)
+        np.testing.assert_allclose(viewer._state[1], wheel_angles(motion)[-1], atol=1e-12)
+        viewer.display(motion.q[0], [1.0, 2.0])
+        np.testing.assert_array_equal(viewer._state[1], [1.0, 2.0])
+        with pytest.raises(InputError, match="wheel_angles: expected 2 numbers"):
+            viewer.display(motion.q[0], [1.0])
+
+
+def test_playing_ends_when_asked(robot: Robot) -> None:
+    stop = threading.Event()
+    port = free_port()
+    options = {"port": port, "open_browser": False, "stop": stop}
+    player = threading.Thread(target=play, args=([drive(robot, duration=1.0)],), kwargs=options)
+    player.start()
+    wait_for(lambda: port in listening())
+    stop.set()
+    player.join(timeout=5)
+    assert not player.is_alive()
+    assert port not in listening()
+
+
+def wait_for(condition: Callable[[], bool], timeout: float = 20.0) -> None:
+    end = time.monotonic() + timeout
+    while not condition():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.05)
+
+
+def children(pid: int) -> list[str]:
+    return Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii").split()
+
+
+PLAYER = """
+    import sys
+    from pathlib import Path
+    sys.path.insert(0, {tests!r})
+    from playback_robot import drive, hand_built_robot
+    from nmm.playback import play
+    play([drive(hand_built_robot(Path({folder!r})), duration=1.0)], port={port}, open_browser=False)
+    print("returned")
+"""
+
+
+def start_player(folder: Path) -> tuple[subprocess.Popen[str], int]:
+    """A process that plays live, and its port."""
+    port = free_port()
+    code = textwrap.dedent(PLAYER).format(tests=str(Path(__file__).parent), folder=str(folder), port=port)
+    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    wait_for(lambda: port in listening() or process.poll() is not None, timeout=60.0)
+    assert listening().get(port) == "0100007F"
+    return process, port
+
+
+@pytest.mark.parametrize(
+    ("number", "status"),
+    [(signal.SIGINT, 0), (signal.SIGTERM, -signal.SIGTERM), (signal.SIGKILL, -signal.SIGKILL)],
+)
+def test_nothing_stays_behind(tmp_path: Path, number: signal.Signals, status: int) -> None:
+    process, port = start_player(tmp_path)
+    assert children(process.pid) == []
+    with socket.create_connection(("127.0.0.1", port), timeout=5):
+        process.send_signal(number)
+        output, _ = process.communicate(timeout=10)
+    assert process.returncode == status
+    assert f"http://127.0.0.1:{port}/" in output
+    assert ("returned" in output) == (number == signal.SIGINT)
+    assert port not in listening()
