@@ -1,0 +1,19 @@
+"""Figures of runs, drawn with matplotlib's objects alone: no display, no pyplot, no global state."""
+
+from nmm.figures.composed import comparison, overview, write_run_figures
+from nmm.figures.curves import coordinates, errors, inputs, singular_values, tracking
+from nmm.figures.motion import stroboscopic
+from nmm.figures.objective import objective_comparison
+
+__all__ = [
+    "comparison",
+    "coordinates",
+    "errors",
+    "inputs",
+    "objective_comparison",
+    "overview",
+    "singular_values",
+    "stroboscopic",
+    "tracking",
+    "write_run_figures",
+]

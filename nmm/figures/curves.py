@@ -1,0 +1,289 @@
+"""Curves over time of one run: errors, tracked components, inputs, coordinates, singular values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from nmm.arrays import Array
+from nmm.figures import style
+from nmm.trajectory import Trajectory
+
+#: Errors below this fraction of the largest are rounding, and say nothing of the rate of decay.
+_FLOOR = 1e-9
+
+
+def errors(trajectory: Trajectory, gain: float | None = None) -> Figure:
+    """The task error's components over time, a panel a unit, and ‖e‖ on a logarithmic scale.
+
+    Parameters
+    ----------
+    trajectory : the run
+    gain : K of the guide ‖e(0)‖ exp(-K t), 1/s; when not given, the one that all tasks of the run's
+        scenario share, or else the rate fitted to the run
+    """
+    kinds = style.groups(trajectory.r_units)
+    legends = [style.legend_rows(_error_names(trajectory, rows)) for rows in kinds.values()]
+    made, panels = style.stack([1.15] * len(kinds) + [1.5], [*legends, 1])
+    for axes, (unit, rows) in zip(panels, kinds.items(), strict=False):
+        draw_components(axes, trajectory, rows, unit)
+    draw_error_norm(panels[-1], trajectory, gain)
+    return made
+
+
+def draw_components(axes: Axes, trajectory: Trajectory, rows: Sequence[int], unit: str) -> None:
+    """Components of the task error that share a unit."""
+    for k, (row, name) in enumerate(zip(rows, _error_names(trajectory, rows), strict=True)):
+        color, dashes = style.CYCLE[k % 7], style.DASHES[k % 4]
+        style.curve(axes, trajectory.t, trajectory.error[:, row], name, color, dashes)
+    axes.axhline(0.0, color=style.GREY, linewidth=0.7, zorder=1)
+    _finish(axes, trajectory, f"error [{unit}]", named=False)
+
+
+def _error_names(trajectory: Trajectory, rows: Sequence[int]) -> list[str]:
+    return [f"e of {trajectory.r_names[row]}" for row in rows]
+
+
+def draw_error_norm(
+    axes: Axes, trajectory: Trajectory, gain: float | None = None, *, named: bool = True
+) -> None:
+    """‖e‖ on a logarithmic scale, with exp(-K t) for the gain given, or the rate fitted."""
+    t, norm = trajectory.t, trajectory.error_norm
+    unit = style.units(trajectory.r_units)
+    positive = norm[np.isfinite(norm) & (norm > 0.0)]
+    style.label(axes, y=f"‖e‖ {unit}")
+    style.time_axis(axes, t, named=named)
+    if not positive.size:
+        style.note(axes, "the error is zero throughout")
+        return
+    style.curve(axes, t, np.where(norm > 0.0, norm, np.nan), "‖e‖", style.BLUE)
+    lowest, highest = max(float(positive.min()), 1e-16), float(positive.max())
+    gain = _stated_gain(trajectory) if gain is None else gain
+    rate = fitted_rate(t, norm) if gain is None else gain
+    if rate is not None and rate > 0.0:
+        guide = norm[0] * np.exp(-rate * (t - t[0]))
+        seen = guide >= lowest * 0.5
+        name = f"‖e(0)‖ exp(−K t), K = {rate:.4g} 1/s{' (fitted)' if gain is None else ''}"
+        axes.plot(t[seen], guide[seen], ":", color=style.BLACK, linewidth=1.8, label=name)
+    style.log_axis(axes, lowest, highest)
+    style.legend(axes)
+
+
+def _stated_gain(trajectory: Trajectory) -> float | None:
+    """The gain K that all tasks of the run's scenario share, 1/s; None where it says no such number."""
+    tasks = (trajectory.scenario or {}).get("task", [])
+    gains = [task.get("gain") for task in (tasks if isinstance(tasks, list) else [tasks])]
+    if not gains or not isinstance(gains[0], int | float) or any(gain != gains[0] for gain in gains):
+        return None
+    return float(gains[0])
+
+
+def fitted_rate(t: Array, values: Array) -> float | None:
+    """K of exp(-K t) fitted to positive values before they reach rounding; None where nothing decays."""
+    if len(t) < 3 or not values[0] > 0.0:
+        return None
+    below = np.flatnonzero(~(values > _FLOOR * values[0]))
+    end = int(below[0]) if below.size else len(t)
+    if end < 3 or not values[end - 1] < 0.5 * values[0]:
+        return None
+    return float(-np.polyfit(t[:end], np.log(values[:end]), 1)[0])
+
+
+def tracking(trajectory: Trajectory) -> Figure:
+    """Each component of the task over time, its reference dashed (the paper's Fig. 9)."""
+    count = len(trajectory.r_names)
+    made, panels = style.stack([1.1] * count)
+    for row, axes in enumerate(panels):
+        name = trajectory.r_names[row]
+        color = style.CYCLE[row % 7]
+        style.curve(axes, trajectory.t, _unwrapped(trajectory, row), name, color)
+        reference = _unwrapped(trajectory, row, reference=True)
+        style.curve(axes, trajectory.t, reference, "reference", style.BLACK, "--")
+        axes.lines[-1].set_linewidth(1.0)
+        _finish(axes, trajectory, f"{name} [{trajectory.r_units[row]}]", named=row == count - 1)
+    return made
+
+
+def _unwrapped(trajectory: Trajectory, row: int, *, reference: bool = False) -> Array:
+    """A component without the jumps of 2π that an angle's display would make."""
+    target: Array = trajectory.r_d[:, row]
+    if trajectory.r_units[row] == "rad":
+        target = np.unwrap(target)
+    return target if reference else target - trajectory.error[:, row]
+
+
+def inputs(trajectory: Trajectory) -> Figure:
+    """The inputs over time: the platform's in one panel, the arm's in another.
+
+    Where the initial transient dwarfs the rest, it has panels of its own at the left, and those at
+    the right are scaled to what comes after it.
+    """
+    parts = list(input_parts(trajectory).values())
+    legends = [style.legend_rows(input_names(trajectory, columns)) for columns in parts]
+    heights = [1.45] * len(parts)
+    total = style.BOTTOM + style.column_height(heights, legends)
+    made = style.figure(style.PAGE, total)
+    transient = _transient(trajectory)
+    edge = style.PAGE - style.RIGHT
+    split = style.LEFT if transient is None else 2.6
+    panels = style.column(made, heights, legends, split, edge, total)
+    start, end = float(trajectory.t[0]), float(trajectory.t[-1])
+    for k, (axes, columns) in enumerate(zip(panels, parts, strict=True)):
+        named = k == len(parts) - 1
+        draw_inputs(axes, trajectory, columns, named=named, since=start if transient is None else transient)
+        if transient is None:
+            style.legend(axes)
+    if transient is None:
+        return made
+    lefts = style.column(made, heights, legends, style.LEFT, split - 0.55, total)
+    for k, (left, right, columns) in enumerate(zip(lefts, panels, parts, strict=True)):
+        draw_inputs(left, trajectory, columns, named=k == len(parts) - 1, until=transient)
+        left.set_xlim(start, transient)
+        left.xaxis.set_major_locator(MaxNLocator(nbins=4))
+        style.legend(left, style.PAGE - style.LEFT - style.RIGHT)
+        right.set_xlim(transient, end)
+        right.set_ylabel("")
+    return made
+
+
+def _transient(trajectory: Trajectory) -> float | None:
+    """When the large inputs of the start are over, s; None where they are no larger than the rest."""
+    t, size = trajectory.t, np.abs(trajectory.u).max(axis=1)
+    if len(t) < 50 or not np.all(np.isfinite(size)):
+        return None
+    later = float(size[t > t[0] + 0.2 * (t[-1] - t[0])].max(initial=0.0))
+    if not size.max() > 4.0 * later:
+        return None
+    above = np.flatnonzero(size > 1.5 * later)
+    return float(np.ceil(2.0 * t[above[-1]]) / 2.0) if above.size else None
+
+
+def input_parts(trajectory: Trajectory) -> dict[str, list[int]]:
+    """Columns of u of the platform and of the arm."""
+    robot = trajectory.robot
+    p = robot.platform.p
+    parts = {"platform": list(range(p)), "arm": list(range(p, robot.n_u))}
+    return {name: columns for name, columns in parts.items() if columns}
+
+
+def draw_inputs(
+    axes: Axes,
+    trajectory: Trajectory,
+    columns: Sequence[int],
+    *,
+    named: bool = True,
+    since: float = -np.inf,
+    until: float = np.inf,
+) -> None:
+    """Some of the inputs over time, between two times, s."""
+    robot = trajectory.robot
+    seen = (trajectory.t >= since) & (trajectory.t <= until)
+    for k, (column, name) in enumerate(zip(columns, input_names(trajectory, columns), strict=True)):
+        color, dashes = style.CYCLE[k % 7], style.DASHES[k % 4]
+        style.curve(axes, trajectory.t[seen], trajectory.u[seen, column], name, color, dashes)
+    axes.axhline(0.0, color=style.GREY, linewidth=0.7, zorder=1)
+    part = "arm" if columns[0] >= robot.platform.p else "platform"
+    style.label(axes, y=f"{part} {style.units(robot.u_units[c] for c in columns)}")
+    style.value_axis(axes)
+    style.time_axis(axes, trajectory.t, named=named)
+
+
+def input_names(trajectory: Trajectory, columns: Sequence[int]) -> list[str]:
+    """What a legend calls some of the inputs: with their units where these differ."""
+    robot = trajectory.robot
+    kinds = {robot.u_units[column] for column in columns}
+    names = [input_symbol(trajectory, column) for column in columns]
+    if len(kinds) == 1:
+        return names
+    return [f"{name} [{robot.u_units[column]}]" for name, column in zip(names, columns, strict=True)]
+
+
+def input_symbol(trajectory: Trajectory, column: int) -> str:
+    """An input as the paper writes it: v, ω; the rate of a joint q1 with a dot above its q."""
+    robot = trajectory.robot
+    name = style.pretty(robot.u_names[column])
+    is_rate = column >= robot.platform.p and len(name) == 2 and name[0] == "q"
+    return f"{name[0]}\u0307{name[1]}" if is_rate else name
+
+
+def coordinates(trajectory: Trajectory) -> Figure:
+    """The coordinates over time: the platform's position, its angles, the arm."""
+    robot = trajectory.robot
+    n_p = robot.platform.n_p
+    parts = [
+        ("platform", unit, [c for c in range(n_p) if robot.q_units[c] == unit])
+        for unit in dict.fromkeys(robot.q_units[:n_p])
+    ]
+    parts += [
+        ("arm", unit, [c for c in range(n_p, robot.n) if robot.q_units[c] == unit])
+        for unit in dict.fromkeys(robot.q_units[n_p:])
+    ]
+    legends = [
+        style.legend_rows([style.pretty(robot.q_names[column]) for column in columns])
+        for _, _, columns in parts
+    ]
+    made, panels = style.stack([1.2] * len(parts), legends)
+    for index, (axes, (part, unit, columns)) in enumerate(zip(panels, parts, strict=True)):
+        for k, column in enumerate(columns):
+            name = style.pretty(robot.q_names[column])
+            style.curve(
+                axes, trajectory.t, trajectory.q[:, column], name, style.CYCLE[k % 7], style.DASHES[k % 4]
+            )
+        _finish(axes, trajectory, f"{part} [{unit}]", named=index == len(parts) - 1)
+    return made
+
+
+def singular_values(trajectory: Trajectory) -> Figure:
+    """The smallest singular value of J_bar over time; below it RG's partition, its switches marked."""
+    partitioned = bool(np.any(trajectory.partition >= 0))
+    made, panels = style.stack([1.7, 0.28] if partitioned else [1.7])
+    draw_singular_value(panels[0], trajectory, named=not partitioned)
+    if partitioned:
+        _draw_partition(panels[1], trajectory)
+    return made
+
+
+def draw_singular_value(axes: Axes, trajectory: Trajectory, *, named: bool = True) -> None:
+    """The smallest singular value of J_bar over time, RG's switches of partition marked."""
+    style.curve(axes, trajectory.t, trajectory.sigma_min, "smallest singular value of J_bar", style.BLUE)
+    for k, sample in enumerate(_switched(trajectory)):
+        name = "switch of partition" if k == 0 else None
+        axes.axvline(trajectory.t[sample], color=style.VERMILLION, linestyle="--", linewidth=1.0, label=name)
+    _finish(axes, trajectory, "σ_min", named=named)
+    axes.set_ylim(bottom=0.0)
+
+
+def _switched(trajectory: Trajectory) -> list[int]:
+    """The samples from which another partition is in use."""
+    changes = np.any(np.diff(trajectory.partition, axis=0) != 0, axis=1)
+    return [int(k) + 1 for k in np.flatnonzero(changes)]
+
+
+def _draw_partition(axes: Axes, trajectory: Trajectory) -> None:
+    """Which inputs are basic (Ja), as a band over time."""
+    t = trajectory.t
+    colors: dict[tuple[int, ...], str] = {}
+    for first, last in pairwise([0, *_switched(trajectory), len(t) - 1]):
+        columns = tuple(sorted(int(c) for c in trajectory.partition[first]))
+        names = ", ".join(style.pretty(trajectory.robot.u_names[c]) for c in columns if c >= 0)
+        color = colors.setdefault(columns, style.CYCLE[len(colors) % 7])
+        axes.axvspan(t[first], t[last], color=color, alpha=0.25, linewidth=0)
+        if t[last] - t[first] > 0.15 * (t[-1] - t[0]):
+            axes.text(0.5 * (t[first] + t[last]), 0.5, names, ha="center", va="center", fontsize=style.SMALL)
+    axes.set_ylim(0.0, 1.0)
+    axes.set_yticks([])
+    axes.grid(False)
+    style.label(axes, y="Ja")
+    style.time_axis(axes, t)
+
+
+def _finish(axes: Axes, trajectory: Trajectory, y: str, *, named: bool = True) -> None:
+    style.label(axes, y=y)
+    style.value_axis(axes)
+    style.time_axis(axes, trajectory.t, named=named)
+    style.legend(axes)

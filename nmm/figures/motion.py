@@ -1,0 +1,266 @@
+"""Stroboscopic views: the robot drawn at instants of a run, from above and from the side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import ArrayLike
+
+from nmm.arrays import Array
+from nmm.errors import InputError
+from nmm.figures import style
+from nmm.figures.silhouette import Pose, Silhouette
+from nmm.trajectory import Trajectory
+
+#: Distance of a time's label from what it belongs to, m.
+_LABEL = 0.12
+#: When no instants are given: at most so many, at least so many, a platform's length apart.
+MOST, LEAST = 11, 4
+#: Strength of the earliest drawing, of 1 for the last.
+FAINTEST = 0.4
+#: Room for the x axis' label between two views, in.
+_BETWEEN = 0.2
+#: A view's world axes: across the page, up the page.
+ABOVE, SIDE = (0, 1), (0, 2)
+_AXES = "xyz"
+#: A run whose arm rises or falls by more than this is drawn from the side too, m.
+_RISES = 0.01
+_PATH_COLOR, _BODY, _EDGE, _ARM = style.BLUE, "#B9C0CA", "#3F4652", style.VERMILLION
+
+
+def stroboscopic(trajectory: Trajectory, instants: ArrayLike | int | None = None) -> Figure:
+    """The robot seen from above at instants of the run (the paper's Figs. 3, 5 and 7).
+
+    Platform with wheels and heading, arm, end-effector's path, desired path, start, end and the
+    target looked at; drawings fade towards the start. A second view from the side, with the same
+    x axis, where the arm leaves the plane.
+
+    Parameters
+    ----------
+    trajectory : the run, of at least one sample
+    instants : times to draw at, s, or how many, evenly spaced; when not given 11, or fewer where
+        they would cover each other
+
+    Raises
+    ------
+    InputError : no sample; an instant outside the run
+    """
+    scene = Scene(trajectory, instants)
+    across = style.PAGE - style.LEFT - style.RIGHT
+    heights = [scene.height(view, across) for view in scene.views]
+    total = style.BOTTOM + style.column_height(heights, [1] * len(heights)) + _BETWEEN * (len(heights) - 1)
+    made = style.figure(style.PAGE, total)
+    top = total
+    for index, (view, height) in enumerate(zip(scene.views, heights, strict=True)):
+        top -= style.GAP + height
+        axes = style.place(made, style.LEFT, top, across, height)
+        scene.draw(axes, view)
+        if index == 0:
+            style.legend(axes)
+        top -= _BETWEEN
+    return made
+
+
+class Scene:
+    """What is drawn of a run: the robot's poses, its paths, its marks."""
+
+    def __init__(self, trajectory: Trajectory, instants: ArrayLike | int | None = None) -> None:
+        if not len(trajectory):
+            raise InputError("figure of the motion: expected a run with at least one sample, got none")
+        self.trajectory = trajectory
+        silhouette = Silhouette(trajectory.robot, trajectory.frame)
+        if instants is None:
+            instants = _how_many(trajectory, silhouette)
+        wanted = _instants(trajectory.t, instants)
+        samples = np.unique(np.searchsorted(trajectory.t, wanted - 1e-9).clip(0, len(trajectory) - 1))
+        self.times = trajectory.t[samples]
+        self.poses: list[Pose] = [silhouette.at(trajectory.q[k]) for k in samples]
+        self.lines = _lines(trajectory)
+        self.labels = _label_places(self.poses, list(self.lines.values()))
+        heights = np.array([[*pose.joints[:, 2], *pose.tip[:, 2]] for pose in self.poses])
+        rises = heights.size > 0 and float(np.ptp(heights, axis=0).max()) > _RISES
+        self.views = (ABOVE, SIDE) if rises else (ABOVE,)
+
+    def limits(self, view: tuple[int, int]) -> list[tuple[float, float]]:
+        """Limits of both axes that hold everything, with a margin, m."""
+        points = [*(pose.points() for pose in self.poses), *self.lines.values()]
+        if view == ABOVE:
+            points.append(np.column_stack([self.labels, np.zeros(len(self.labels))]))
+        if self.trajectory.target is not None:
+            points.append(self.trajectory.target[None])
+        found = np.vstack([part[np.all(np.isfinite(part), axis=1)] for part in points])[:, view]
+        low, high = found.min(axis=0), found.max(axis=0)
+        if view == SIDE:
+            low[1] = min(low[1], 0.0)
+        # The margin is the same on all sides, but no view gets narrower than a third of the other axis.
+        margin = 0.04 * float(np.max(high - low))
+        return [(float(a) - margin, float(b) + margin) for a, b in zip(low, high, strict=True)]
+
+    def height(self, view: tuple[int, int], width: float) -> float:
+        """How high a view is that has this width, in the same unit."""
+        (left, right), (low, high) = self.limits(view)
+        return width * (high - low) / (right - left)
+
+    def draw(self, axes: Axes, view: tuple[int, int]) -> None:
+        """Draw the scene seen along the world axis that `view` leaves out."""
+        across, up = view
+        trajectory = self.trajectory
+        style.label(axes, x=f"{_AXES[across]} [m]", y=f"{_AXES[up]} [m]")
+        axes.set_aspect("equal", adjustable="box")
+        horizontal, vertical = self.limits(view)
+        axes.set_xlim(*horizontal)
+        axes.set_ylim(*vertical)
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_locator(MaxNLocator(nbins=9, steps=[1, 2, 5, 10]))
+        strengths = np.linspace(FAINTEST, 1.0, len(self.poses)) if len(self.poses) > 1 else [1.0]
+        for k, (pose, strength) in enumerate(zip(self.poses, strengths, strict=True)):
+            # From the side the robots of a round path stand behind each other: every second one is enough.
+            if view == SIDE and len(self.poses) > 6 and (len(self.poses) - 1 - k) % 2:
+                continue
+            _draw_pose(axes, pose, view, float(strength), k / len(self.poses))
+            if view == ABOVE:
+                axes.text(
+                    float(self.labels[k, 0]), float(self.labels[k, 1]),
+                    f"{style.number(round(float(self.times[k]), 2))} s", color=style.GREY,
+                    fontsize=style.SMALL - 1.0, ha="center", va="center", zorder=7,
+                )  # fmt: skip
+        desired, path = self.lines.get("desired"), self.lines.get("path")
+        if desired is not None:
+            axes.plot(
+                desired[:, across], desired[:, up], "--", color=style.BLACK, linewidth=1.1,
+                dashes=(4, 2.5), label="desired path", zorder=5.2,
+            )  # fmt: skip
+        if path is not None:
+            name = f"path of {trajectory.frame}" if trajectory.frame else "path of the platform"
+            axes.plot(path[:, across], path[:, up], color=_PATH_COLOR, linewidth=1.5, label=name, zorder=5.1)
+            for point, marker, text in ((path[0], "o", "start"), (path[-1], "s", "end")):
+                axes.plot(
+                    point[across], point[up], marker, color=style.GREEN if text == "start" else style.PINK,
+                    markersize=6, markeredgecolor="white", markeredgewidth=0.8, label=text,
+                    linestyle="none", zorder=6,
+                )  # fmt: skip
+        if trajectory.target is not None:
+            axes.plot(
+                trajectory.target[across], trajectory.target[up], "*", color=style.ORANGE, markersize=12,
+                markeredgecolor=style.BLACK, markeredgewidth=0.7, label="target", linestyle="none", zorder=6,
+            )  # fmt: skip
+
+
+def _label_places(poses: Sequence[Pose], lines: Sequence[Array]) -> Array:
+    """Where the times are written, (k, 2): beside each platform, where the least else is drawn."""
+    drawn = [_outline(pose) for pose in poses] + [line[:: max(1, len(line) // 300), :2] for line in lines]
+    angles = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+    places: list[Array] = []
+    for pose in poses:
+        body = np.vstack(pose.body)[:, :2]
+        centre = 0.5 * (body.min(axis=0) + body.max(axis=0))
+        reach = float(np.linalg.norm(body - centre, axis=1).max())
+        candidates = centre + (reach + _LABEL) * np.column_stack([np.cos(angles), np.sin(angles)])
+        occupied = np.vstack([*drawn, *[place[None] for place in places]])
+        near = occupied[np.abs(occupied - centre).max(axis=1) < 3.0 * reach + 4.0 * _LABEL]
+        # A text is wider than high: distances across count half.
+        offsets = (candidates[:, None] - near[None]) * (0.5, 1.0)
+        clearance = np.linalg.norm(offsets, axis=2).min(axis=1)
+        places.append(candidates[int(np.argmax(clearance))])
+    return np.array(places)
+
+
+def _outline(pose: Pose) -> Array:
+    """Points spread over a robot's drawing from above."""
+    fractions = np.linspace(0.0, 1.0, 6)[:, None]
+    links = [ends[0] + fractions * (ends[1] - ends[0]) for ends in pose.links]
+    return np.vstack([*pose.body, *pose.wheels, *links])[:, :2]
+
+
+def _how_many(trajectory: Trajectory, silhouette: Silhouette) -> int:
+    """So many instants that the platform moves by about its length from one to the next."""
+    body = np.vstack(silhouette.at(trajectory.q[0]).body)[:, :2]
+    length = float(np.linalg.norm(body.max(axis=0) - body.min(axis=0)))
+    driven = float(np.linalg.norm(np.diff(trajectory.q[:, :2], axis=0), axis=1).sum())
+    if not np.isfinite(driven):
+        return LEAST
+    return int(np.clip(1 + driven // (1.1 * length), LEAST, MOST)) if len(trajectory) > 1 else 1
+
+
+def _instants(t: Array, instants: ArrayLike | int) -> Array:
+    if isinstance(instants, int):
+        if instants < 1:
+            raise InputError(f"instants: expected at least 1, got {instants}")
+        return np.linspace(t[0], t[-1], instants) if instants > 1 else t[-1:]
+    times = np.atleast_1d(np.asarray(instants, dtype=np.float64))
+    if times.size == 0 or not np.all((times >= t[0] - 1e-9) & (times <= t[-1] + 1e-9)):
+        raise InputError(f"instants: expected times from {t[0]:g} s to {t[-1]:g} s, got {instants}")
+    return np.sort(times)
+
+
+def _lines(trajectory: Trajectory) -> dict[str, Array]:
+    """The paths to draw, (k, 3) each, with few enough points."""
+    every = max(1, len(trajectory) // 1500)
+    kept = np.unique([*range(0, len(trajectory), every), len(trajectory) - 1])
+    if trajectory.path is None:
+        x_y = trajectory.q[kept, :2]
+        return {"path": np.column_stack([x_y, np.zeros(len(kept))])}
+    lines = {"path": trajectory.path[kept]}
+    if trajectory.desired is not None:
+        lines["desired"] = trajectory.desired[kept]
+    return lines
+
+
+def _faded(color: str, strength: float) -> tuple[float, float, float]:
+    """A colour mixed with white: opaque, so that what lies below does not shine through."""
+    red, green, blue = (1.0 - strength * (1.0 - part) for part in to_rgb(color))
+    return red, green, blue
+
+
+def _draw_pose(axes: Axes, pose: Pose, view: tuple[int, int], strength: float, later: float) -> None:
+    """One drawing of the robot: above the earlier ones (`later` in [0, 1)), all arms above all platforms."""
+    edge, body = _faded(_EDGE, strength), _faded(_BODY, strength)
+    zorder = 3.0 + later
+    shapes = [hull(points[:, view]) for points in pose.body]
+    # Edges of all shapes first, faces above them: what stays visible is the edge of their union.
+    axes.add_collection(
+        PolyCollection(shapes, facecolors="none", edgecolors=[edge], linewidths=1.6, zorder=zorder),
+        autolim=False,
+    )
+    axes.add_collection(PolyCollection(shapes, facecolors=[body], linewidths=0, zorder=zorder), autolim=False)
+    marks = [hull(points[:, view]) for points in pose.wheels]
+    if view == ABOVE:
+        marks.append(pose.heading[:, view])
+    axes.add_collection(PolyCollection(marks, facecolors=[edge], linewidths=0, zorder=zorder), autolim=False)
+    zorder = 4.0 + later
+    lines = [ends[:, view] for ends in pose.links]
+    for color, width in ((edge, 4.0), (_faded(_ARM, strength), 2.6)):
+        drawn = LineCollection(lines, colors=[color], linewidths=width, capstyle="round", zorder=zorder)
+        axes.add_collection(drawn, autolim=False)
+    joints, tips = pose.joints[:, view], pose.tip[:, view]
+    axes.plot(
+        joints[:, 0], joints[:, 1], "o", markersize=4.2, color="white", markeredgecolor=edge,
+        markeredgewidth=1.1, zorder=zorder, linestyle="none",
+    )  # fmt: skip
+    axes.plot(tips[:, 0], tips[:, 1], "o", markersize=3.0, color=edge, zorder=zorder, linestyle="none")
+
+
+def hull(points: Array) -> Array:
+    """The convex hull of points (k, 2), counter-clockwise (Andrew's monotone chain)."""
+    ordered = sorted(set(map(tuple, points.tolist())))
+    if len(ordered) < 3:
+        return points
+    chains = []
+    for sequence in (ordered, ordered[::-1]):
+        chain: list[tuple[float, ...]] = []
+        for point in sequence:
+            while len(chain) > 1 and _turn(chain[-2], chain[-1], point) <= 0.0:
+                chain.pop()
+            chain.append(point)
+        chains.append(chain[:-1])
+    return np.array(chains[0] + chains[1])
+
+
+def _turn(a: Sequence[float], b: Sequence[float], c: Sequence[float]) -> float:
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

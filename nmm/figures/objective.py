@@ -1,0 +1,140 @@
+"""H(q) over time, resolver against resolver (the paper's Figs. 4, 6, 8 and 10)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from nmm.arrays import Array
+from nmm.errors import InputError
+from nmm.figures import style
+from nmm.trajectory import Trajectory
+
+#: A logarithmic axis shows H down to this fraction of its largest value.
+_FLOOR = 1e-8
+#: The inset, in fractions of its axes: left, lower edge, width, height.
+_INSET = (0.42, 0.28, 0.56, 0.66)
+
+
+def objective_comparison(
+    trajectories: Sequence[Trajectory], zoom: tuple[float, float] | None = None, symbol: str = "H(q)"
+) -> Figure:
+    """H of several runs over time: above, with an inset on the initial transient; below, logarithmic.
+
+    The logarithmic panel is there where H stays above zero, the inset where it hides no curve.
+
+    Parameters
+    ----------
+    trajectories : runs of the same scenario
+    zoom : the inset's limits in time, s; when not given, until the slowest run has come close
+    symbol : what the axes call H
+
+    Raises
+    ------
+    InputError : no run with a sample
+    """
+    runs = [run for run in trajectories if len(run)]
+    if not runs:
+        raise InputError("figure of the objective: expected a run with at least one sample, got none")
+    logarithmic = _can_be_logarithmic(runs)
+    made, panels = style.stack([1.9, 1.4] if logarithmic else [2.1])
+    draw_objective(panels[0], runs, symbol, named=not logarithmic)
+    style.legend(panels[0])
+    first, last = _transient(runs) if zoom is None else zoom
+    if _inset_is_free(panels[0], runs, last):
+        _draw_inset(panels[0], runs, first, last)
+    if logarithmic:
+        draw_objective(panels[1], runs, symbol, logarithmic=True)
+    return made
+
+
+def has_objective(trajectories: Sequence[Trajectory]) -> bool:
+    """Whether any run had something to minimise."""
+    return any(len(run) and bool(np.any(run.objective != 0.0)) for run in trajectories)
+
+
+def draw_objective(
+    axes: Axes,
+    runs: Sequence[Trajectory],
+    symbol: str = "H(q)",
+    *,
+    logarithmic: bool = False,
+    named: bool = True,
+) -> None:
+    """H of each run over time, in its resolver's colour."""
+    for run, look in zip(runs, style.looks([run.resolver for run in runs]), strict=True):
+        H = np.where(run.objective > 0.0, run.objective, np.nan) if logarithmic else run.objective
+        style.curve(axes, run.t, H, *look)
+    style.label(axes, y=symbol)
+    style.time_axis(axes, _longest(runs), named=named)
+    if not logarithmic:
+        style.value_axis(axes)
+        return
+    H = _finite(runs)
+    H = H[H > 0.0]
+    style.log_axis(axes, max(float(H.min()), _FLOOR * float(H.max())), float(H.max()))
+
+
+def draw_best_objective(axes: Axes, runs: Sequence[Trajectory], symbol: str = "H(q)") -> None:
+    """H in one panel: logarithmic where it stays above zero."""
+    if has_objective(runs):
+        draw_objective(axes, runs, symbol, logarithmic=_can_be_logarithmic(runs))
+    else:
+        style.time_axis(axes, _longest(runs))
+        style.note(axes, "no objective")
+
+
+def _finite(runs: Sequence[Trajectory]) -> Array:
+    H = np.concatenate([run.objective for run in runs])
+    return H[np.isfinite(H)]
+
+
+def _can_be_logarithmic(runs: Sequence[Trajectory]) -> bool:
+    """Whether H stays above zero and falls by more than a linear axis shows."""
+    H = _finite(runs)
+    return bool(H.size and H.min() >= 0.0 and H.max() > 10.0 * float(np.median(H)))
+
+
+def _longest(runs: Sequence[Trajectory]) -> Array:
+    return max((run.t for run in runs), key=lambda t: float(t[-1]))
+
+
+def _transient(runs: Sequence[Trajectory]) -> tuple[float, float]:
+    """From the start until a while after the slowest run has done 98 % of its way."""
+    start, end = float(runs[0].t[0]), float(_longest(runs)[-1])
+    settled = start
+    for run in runs:
+        fallen = run.objective - np.min(run.objective)
+        away = np.flatnonzero(fallen > 0.02 * fallen[0])
+        if away.size:
+            settled = max(settled, float(run.t[away[-1]]))
+    length = 1.2 * (settled - start)
+    return start, start + min(max(length, 0.02 * (end - start)), 0.2 * (end - start))
+
+
+def _inset_is_free(axes: Axes, runs: Sequence[Trajectory], last: float) -> bool:
+    """Whether an inset is of use, and lies over no curve."""
+    t = _longest(runs)
+    low, high = axes.get_ylim()
+    edge = low + (_INSET[1] - 0.12) * (high - low)
+    begins = float(t[0]) + (_INSET[0] - 0.08) * float(t[-1] - t[0])
+    below = all(bool(np.all(run.objective[run.t >= begins] < edge)) for run in runs)
+    return below and last < float(t[-1]) and len(t) > 2
+
+
+def _draw_inset(axes: Axes, runs: Sequence[Trajectory], first: float, last: float) -> None:
+    """The initial transient, in the empty upper right of the axes."""
+    inset = axes.inset_axes(_INSET)
+    for run, look in zip(runs, style.looks([run.resolver for run in runs]), strict=True):
+        seen = (run.t >= first - 1e-9) & (run.t <= last + 1e-9)
+        style.curve(inset, run.t[seen], run.objective[seen], None, look.color, look.dashes)
+    style.dress(inset, size=style.SMALL - 1.0)
+    inset.set_xlim(first, last)
+    style.value_axis(inset)
+    inset.xaxis.set_major_locator(MaxNLocator(nbins=6))
+    inset.xaxis.set_major_formatter(style.plain())
+    inset.set_title("initial transient, t [s]", fontsize=style.SMALL - 1.0, pad=3, color=style.BLACK)

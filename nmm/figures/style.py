@@ -1,0 +1,285 @@
+"""The house style: colours, sizes, axes. Set on every artist, so that no global state is touched.
+
+Matplotlib's rcParams are one per process; a library that changes them changes its user's figures,
+and two threads that change them change each other's. Nothing here reads or writes them.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
+
+from nmm.arrays import Array
+
+#: Okabe and Ito's colours, told apart by colour-blind readers.
+BLUE, VERMILLION, GREEN, PINK = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
+ORANGE, SKY, BLACK = "#E69F00", "#56B4E9", "#222222"
+CYCLE = (BLUE, VERMILLION, GREEN, PINK, ORANGE, SKY, BLACK)
+DASHES = ("-", "--", "-.", ":")
+#: Colour and dashes of a resolver, the same in every figure.
+RESOLVERS: Mapping[str, tuple[str, str]] = {
+    "rg": (BLUE, "-"),
+    "pg": (VERMILLION, "--"),
+    "ej": (GREEN, "-."),
+}
+GREY, LIGHT = "#6B7280", "#E5E7EB"
+DPI = 180
+TEXT, SMALL = 9.0, 8.0
+WIDTH = 1.4
+#: Figure width, and the strip that axes need for their labels at the left and below, in.
+PAGE, LEFT, RIGHT, BOTTOM = 5.2, 0.8, 0.2, 0.46
+#: Height above a panel for a legend of one row, and for each row more, in.
+GAP, ROW = 0.34, 0.16
+
+_GREEK = {"theta": "θ", "omega": "ω", "phi": "φ", "psi": "ψ", "alpha": "α", "beta": "β", "delta": "δ"}
+_SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def figure(width: float, height: float) -> Figure:
+    """An empty white figure of this size, in, with a canvas that needs no display."""
+    made = Figure(figsize=(width, height), dpi=DPI, facecolor="white")
+    FigureCanvasAgg(made)
+    return made
+
+
+def place(
+    made: Figure, left: float, bottom: float, width: float, height: float, share: Axes | None = None
+) -> Axes:
+    """Axes at a place given in inches, in the house style; `share` shares its x axis."""
+    total = made.get_size_inches()
+    rectangle = (left / total[0], bottom / total[1], width / total[0], height / total[1])
+    axes = made.add_axes(rectangle, sharex=share)
+    dress(axes)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    return axes
+
+
+def dress(axes: Axes, size: float = SMALL) -> None:
+    """Grid, ticks and frame of the house style; `size` of the ticks' numbers, pt."""
+    axes.set_axisbelow(True)
+    axes.grid(True, color=LIGHT, linewidth=0.7)
+    axes.tick_params(labelsize=size, color=GREY, labelcolor=BLACK, width=0.7, length=3)
+    for spine in axes.spines.values():
+        spine.set_color(GREY)
+        spine.set_linewidth(0.7)
+
+
+def column(
+    made: Figure, heights: Sequence[float], legends: Sequence[int], left: float, right: float, top: float
+) -> list[Axes]:
+    """Panels one above the other that share their x axis, the first on top.
+
+    Parameters
+    ----------
+    heights : of the panels, in
+    legends : how many rows of legend stand above each panel
+    left, right, top : where the column is, in, from the figure's left and lower edges
+    """
+    panels: list[Axes] = []
+    for height, rows in zip(heights, legends, strict=True):
+        top -= room(rows) + height
+        panels.append(place(made, left, top, right - left, height, panels[0] if panels else None))
+    for axes in panels[:-1]:
+        axes.tick_params(labelbottom=False)
+    return panels
+
+
+def column_height(heights: Sequence[float], legends: Sequence[int]) -> float:
+    """How high a column of panels is, with its legends and without the labels below it, in."""
+    return sum(heights) + sum(room(rows) for rows in legends)
+
+
+def stack(heights: Sequence[float], legends: Sequence[int] | None = None) -> tuple[Figure, list[Axes]]:
+    """A figure of one column of panels, as wide as a page."""
+    legends = [1] * len(heights) if legends is None else legends
+    total = BOTTOM + column_height(heights, legends)
+    made = figure(PAGE, total)
+    return made, column(made, heights, legends, LEFT, PAGE - RIGHT, total)
+
+
+def room(rows: int) -> float:
+    """Height above a panel that holds so many rows of legend, in."""
+    return GAP + ROW * max(rows - 1, 0)
+
+
+def legend_columns(names: Sequence[str], width: float = PAGE - LEFT - RIGHT) -> int:
+    """How many legend entries fit side by side into a width, in."""
+    lengths = [0.42 + 0.058 * len(name) for name in names]
+    if sum(lengths) <= width:
+        return max(len(names), 1)
+    return max(1, min(len(names), int(width / max(lengths))))
+
+
+def legend_rows(names: Sequence[str], width: float = PAGE - LEFT - RIGHT) -> int:
+    """How many rows a legend takes that fits into a width, in."""
+    return -(-len(names) // legend_columns(names, width)) if names else 1
+
+
+def label(axes: Axes, *, x: str = "", y: str = "") -> None:
+    """Axis labels, with units."""
+    if x:
+        axes.set_xlabel(x, fontsize=TEXT, color=BLACK, labelpad=3)
+    if y:
+        axes.set_ylabel(y, fontsize=TEXT, color=BLACK, labelpad=4)
+
+
+def time_axis(axes: Axes, t: Array, *, named: bool = True) -> None:
+    """Time from the first to the last sample, s."""
+    if len(t) > 1:
+        axes.set_xlim(float(t[0]), float(t[-1]))
+    axes.xaxis.set_major_locator(MaxNLocator(nbins=10, steps=[1, 2, 5, 10]))
+    axes.xaxis.set_major_formatter(plain())
+    if named:
+        label(axes, x="time t [s]")
+
+
+def value_axis(axes: Axes) -> None:
+    """About five plain ticks on the y axis."""
+    axes.yaxis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 2.5, 5, 10]))
+    axes.yaxis.set_major_formatter(plain())
+
+
+def log_axis(axes: Axes, lowest: float, highest: float) -> None:
+    """A logarithmic y axis over whole decades that hold [lowest, highest], both above 0."""
+    low, high = int(np.floor(np.log10(lowest))), int(np.ceil(np.log10(highest)))
+    high = max(high, low + 1)
+    axes.set_yscale("log")
+    axes.set_ylim(10.0**low, 10.0**high)
+    axes.yaxis.set_major_locator(LogLocator(base=10.0, numticks=7))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: power(value)))
+    axes.yaxis.set_minor_locator(NullLocator())
+    axes.yaxis.set_minor_formatter(NullFormatter())
+
+
+def plain() -> FuncFormatter:
+    """Plain numbers at the ticks. A formatter belongs to one axis."""
+    return FuncFormatter(lambda value, _: number(value))
+
+
+def number(value: float) -> str:
+    """A tick's number: 0.25, −3, 2·10⁻⁴."""
+    if value == 0.0 or 1e-3 <= abs(value) < 1e4:
+        return f"{value:.6g}".replace("-", "−")
+    mantissa, exponent = f"{value:.2e}".split("e")
+    short = mantissa.rstrip("0").rstrip(".").replace("-", "−")
+    decade = f"10{str(int(exponent)).translate(_SUPERSCRIPTS)}"
+    return decade if short == "1" else f"{short}·{decade}"
+
+
+def power(value: float) -> str:
+    """A decade: 10⁻³."""
+    return f"10{str(round(np.log10(value))).translate(_SUPERSCRIPTS)}" if value > 0.0 else ""
+
+
+def legend(axes: Axes, width: float | None = None) -> None:
+    """A legend above the axes, where no curve can be, in as few rows as fit into a width, in."""
+    handles, names = axes.get_legend_handles_labels()
+    if not handles:
+        return
+    if width is None:
+        width = float(axes.get_window_extent().width) / DPI
+    axes.legend(
+        handles,
+        names,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=legend_columns(names, width),
+        frameon=False,
+        fontsize=SMALL,
+        labelcolor=BLACK,
+        borderaxespad=0.25,
+        borderpad=0.0,
+        handlelength=1.9,
+        handletextpad=0.5,
+        columnspacing=1.4,
+        labelspacing=0.25,
+    )
+
+
+def pretty(name: str) -> str:
+    """A coordinate's or an input's name as the paper writes it: theta → θ, q1 → q₁."""
+    if name in _GREEK:
+        return _GREEK[name]
+    indexed = re.fullmatch(r"([A-Za-z])_?(\d+)", name)
+    return indexed[1] + indexed[2].translate(_SUBSCRIPTS) if indexed else name
+
+
+def units(names: Iterable[str]) -> str:
+    """The units of an axis that several quantities share: "[m/s, rad/s]"."""
+    return f"[{', '.join(dict.fromkeys(names))}]"
+
+
+def groups(kinds: Sequence[str]) -> dict[str, list[int]]:
+    """Indices by unit, in order of appearance."""
+    found: dict[str, list[int]] = {}
+    for index, kind in enumerate(kinds):
+        found.setdefault(kind, []).append(index)
+    return found
+
+
+class Look(NamedTuple):
+    """How a run appears in a figure of several: its name, its colour, its dashes."""
+
+    name: str
+    color: str
+    dashes: str
+
+
+def looks(resolvers: Sequence[str]) -> list[Look]:
+    """The look of each of several runs: its resolver's, unless another run has it already."""
+    found: list[Look] = []
+    spare = [color for color in CYCLE if color not in {color for color, _ in RESOLVERS.values()}]
+    for k, resolver in enumerate(resolvers):
+        earlier = resolvers[:k].count(resolver)
+        name = resolver.upper() if not earlier else f"{resolver.upper()} ({earlier + 1})"
+        color, dashes = RESOLVERS.get(resolver, (spare[k % len(spare)], DASHES[k % len(DASHES)]))
+        if earlier:
+            color, dashes = spare[k % len(spare)], DASHES[k % len(DASHES)]
+        found.append(Look(name, color, dashes))
+    return found
+
+
+def thin(t: Array, y: Array, most: int = 1200) -> tuple[Array, Array]:
+    """Fewer samples with the same picture: the smallest and the largest of each bin, and both ends."""
+    width = -(-2 * len(t) // most)
+    if width <= 2:
+        return t, y
+    bins = len(t) // width
+    parts = np.nan_to_num(y[: bins * width]).reshape(bins, width)
+    first = np.arange(bins) * width
+    picked = [[0, len(t) - 1], first + parts.argmin(axis=1), first + parts.argmax(axis=1)]
+    rest = np.nan_to_num(y[bins * width :])
+    if rest.size:
+        picked.append([bins * width + int(rest.argmin()), bins * width + int(rest.argmax())])
+    kept = np.unique(np.concatenate(picked))
+    return t[kept], y[kept]
+
+
+def curve(axes: Axes, t: Array, y: Array, name: str | None, color: str, dashes: str = "-") -> None:
+    """One curve over time, drawn with no more points than can be seen."""
+    x, values = thin(t, y)
+    axes.plot(x, values, dashes, color=color, linewidth=WIDTH, label=name, solid_joinstyle="round")
+
+
+def note(axes: Axes, text: str) -> None:
+    """A sentence in the middle of axes that have nothing to show."""
+    axes.yaxis.set_major_locator(NullLocator())
+    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", fontsize=TEXT, color=GREY)
+
+
+def save(made: Figure, path: str | Path) -> Path:
+    """Write a PNG file."""
+    path = Path(path)
+    # Level 3 costs half the time of zlib's default and a few per cent of size.
+    made.savefig(path, dpi=DPI, pil_kwargs={"compress_level": 3})
+    return path

@@ -1,0 +1,90 @@
+"""One case from its scenario to its files: both runs, their folders, the paper's figures, the playback."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from nmm.errors import RunError
+from nmm.paper.cases import CASES, DT, RESOLVERS, Case
+from nmm.paper.claims import claims
+from nmm.paper.numbers import smallest_determinant, table
+from nmm.paper.results import CaseResult
+from nmm.trajectory import Outcome, Trajectory
+
+if TYPE_CHECKING:
+    from nmm.scenario import Scenario
+
+Progress = Callable[[float], None]
+
+
+def run_case(number: int, folder: Path, progress: Progress) -> CaseResult:
+    """Run a case with RG and PG, and write its files into `folder`, which exists.
+
+    Raises
+    ------
+    RunError : a run did not reach its end
+    KeyboardInterrupt : a run was interrupted
+    """
+    began = time.perf_counter()
+    case = CASES[number - 1]
+
+    def running(fraction: float) -> None:
+        progress(0.3 * fraction)
+
+    rg, pg = _runs(case, running)
+    determinant = smallest_determinant(rg, _scenario(case, "rg").controller())
+    rows, found = table(rg, pg, determinant), claims(case, rg, pg, determinant)
+    own = folder / case.folder
+    own.mkdir()
+    for k, trajectory in enumerate((rg, pg)):
+        trajectory.save(own / trajectory.resolver, html=False)
+        progress(0.4 + 0.15 * k)
+    _write_figures(case, rg, pg, folder)
+    progress(0.7)
+    _write_playback(case, [rg, pg], own / "playback.html")
+    progress(1.0)
+    return CaseResult(number, tuple(rows), tuple(found), len(rg), time.perf_counter() - began)
+
+
+def _scenario(case: Case, resolver: str) -> Scenario:
+    from nmm.scenario import Scenario
+
+    return Scenario.load(case.scenario, {"dt": DT}).with_resolver(resolver)
+
+
+def _runs(case: Case, progress: Progress) -> list[Trajectory]:
+    found: list[Trajectory] = []
+    for resolver in RESOLVERS:
+
+        def advance(fraction: float) -> None:
+            progress((len(found) + fraction) / len(RESOLVERS))
+
+        trajectory = _scenario(case, resolver).run(progress=advance)
+        if trajectory.outcome is Outcome.INTERRUPTED:
+            raise KeyboardInterrupt
+        if not trajectory.complete:
+            raise RunError(f"case {case.number} with {resolver.upper()}: {trajectory.message}")
+        found.append(trajectory)
+    return found
+
+
+def _write_figures(case: Case, rg: Trajectory, pg: Trajectory, folder: Path) -> None:
+    """The paper's two figures of the case, fig03.png to fig10.png."""
+    from nmm.figures import objective_comparison, stroboscopic, tracking
+    from nmm.figures.style import save
+
+    (motion, _), (objective, _) = case.figures
+    shown = tracking(rg) if case.number == 4 else stroboscopic(rg)
+    save(shown, folder / f"fig{motion:02d}.png")
+    compared = objective_comparison([rg, pg], zoom=(0.0, case.zoom), symbol=case.symbol)
+    save(compared, folder / f"fig{objective:02d}.png")
+
+
+def _write_playback(case: Case, runs: list[Trajectory], path: Path) -> None:
+    from nmm.playback import write_html
+
+    title = f"Case {case.number}: {case.title}"
+    write_html([run.motion() for run in runs], path, title=title)

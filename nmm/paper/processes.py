@@ -1,0 +1,160 @@
+"""Work shared out over processes that end with the one that started them.
+
+`ProcessPoolExecutor` leaves its children working after Ctrl-C until their jobs are done, and
+`multiprocessing.Pool` waits for ever for a child that was killed; hence these few lines.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from multiprocessing import resource_tracker
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import SpawnProcess
+from typing import Any, Protocol, TypeVar
+
+from nmm.errors import NmmError, RunError
+
+Result = TypeVar("Result", covariant=True)
+#: How long a child may take to end when it is told to, s.
+PATIENCE = 5.0
+
+
+class Job(Protocol[Result]):
+    """Something to do, by number, that reports the fraction done."""
+
+    def __call__(self, number: int, progress: Callable[[float], None], /) -> Result: ...
+
+
+@dataclass(frozen=True)
+class _Message:
+    """What a child says: "progress" with a fraction, "result", or "error" with an exception."""
+
+    kind: str
+    number: int
+    content: Any
+
+
+def share_out(
+    job: Job[Result], numbers: Sequence[int], processes: int, progress: Callable[[int, float], None]
+) -> dict[int, Result]:
+    """job(number, report) for each number, over so many processes; in this one when that is 1.
+
+    Parameters
+    ----------
+    job : picklable, as are its results
+    numbers : the jobs
+    processes : at least 1
+    progress : called with a job's number and the fraction done of it
+
+    Raises
+    ------
+    RunError : a process ended without an answer
+    NmmError : what a job raised; the other jobs end with it
+    """
+    if processes == 1 or len(numbers) == 1:
+        return {number: job(number, partial(progress, number)) for number in numbers}
+    waiting = list(numbers)
+    found: dict[int, Result] = {}
+    with _children(job, min(processes, len(numbers))) as children:
+        for connection in children:
+            connection.send(waiting.pop(0))
+        while len(found) < len(numbers):
+            for connection in children:
+                if not connection.poll():
+                    continue
+                message = _receive(connection, children[connection])
+                if message.kind == "progress":
+                    progress(message.number, message.content)
+                elif message.kind == "error":
+                    raise message.content
+                else:
+                    found[message.number] = message.content
+                    if waiting:
+                        connection.send(waiting.pop(0))
+            if len(found) < len(numbers):
+                wait(list(children))
+    return found
+
+
+def _receive(connection: Connection, process: SpawnProcess) -> _Message:
+    try:
+        message: _Message = connection.recv()
+    except (EOFError, ConnectionResetError):
+        process.join(PATIENCE)
+        raise RunError(
+            f"a process that computed a part ended with exit status {process.exitcode}; a script that "
+            'shares work out over processes has to begin with if __name__ == "__main__":'
+        ) from None
+    return message
+
+
+@contextmanager
+def _children(job: Job[Any], count: int) -> Iterator[dict[Connection, SpawnProcess]]:
+    """Children that wait for jobs, each behind its connection; they end with the block."""
+    # Spawned, not forked: a fork of a process with threads (numba's, BLAS's) may hang.
+    context = multiprocessing.get_context("spawn")
+    children: dict[Connection, SpawnProcess] = {}
+    try:
+        with _interrupts_wait():
+            for _ in range(count):
+                ours, theirs = context.Pipe()
+                process = context.Process(target=_serve, args=(theirs, job), daemon=True)
+                process.start()
+                # The child's end lives on in the child alone, so that we hear of its death.
+                theirs.close()
+                children[ours] = process
+        yield children
+    finally:
+        for connection, process in children.items():
+            process.terminate()
+            connection.close()
+        for process in children.values():
+            process.join(PATIENCE)
+            if process.is_alive():
+                process.kill()
+                process.join()
+
+
+@contextmanager
+def _interrupts_wait() -> Iterator[None]:
+    """Ctrl-C waits until the block has ended; processes started in it never hear of it.
+
+    A terminal sends it to them too, and they are to end when they are told. They inherit the mask, which
+    holds from their first instruction on; a handler of their own would come too late.
+    """
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    # Starting the tracker clears the mask, so it has to run already.
+    resource_tracker.ensure_running()
+    earlier = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, earlier)
+
+
+def _serve(connection: Connection, job: Job[Any]) -> None:
+    """In a child: do the jobs that come, until nobody asks any more."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        while True:
+            number = connection.recv()
+            connection.send(_answer(connection, job, number))
+    except (EOFError, BrokenPipeError, ConnectionResetError):  # the parent is gone
+        return
+
+
+def _answer(connection: Connection, job: Job[Any], number: int) -> _Message:
+    def report(fraction: float) -> None:
+        connection.send(_Message("progress", number, fraction))
+
+    try:
+        return _Message("result", number, job(number, report))
+    except NmmError as error:
+        return _Message("error", number, error)

@@ -1,0 +1,109 @@
+"""The paper's folder: written whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+
+from nmm import __version__
+from nmm.errors import InputError
+from nmm.paper.cases import CASES
+from nmm.paper.processes import share_out
+from nmm.paper.results import CaseResult, Claim
+from nmm.storage import replaced_folder
+
+#: Marks a folder as one of ours.
+FORMAT = "nmm paper 1"
+_MARKER = "paper.json"
+
+
+@dataclass(frozen=True)
+class PaperReport:
+    """What `write_paper` wrote.
+
+    Attributes
+    ----------
+    folder, index : the folder, and the page in it
+    cases : the numbers of each case
+    seconds : that it took
+    """
+
+    folder: Path
+    index: Path
+    cases: tuple[CaseResult, ...]
+    seconds: float
+
+    @property
+    def claims(self) -> tuple[Claim, ...]:
+        """The claims of all cases, in order."""
+        return tuple(claim for case in self.cases for claim in case.claims)
+
+    @property
+    def holds(self) -> bool:
+        """Whether every claim holds."""
+        return all(claim.holds for claim in self.claims)
+
+
+def write_paper(
+    folder: str | Path, progress: Callable[[float], None] | None = None, jobs: int = 2
+) -> PaperReport:
+    """Run the paper's four cases with RG and PG, and write figures, numbers, playback and index.html.
+
+    Parameters
+    ----------
+    folder : a new folder, or one that an earlier call wrote, which is replaced
+    progress : called with the fraction done
+    jobs : over how many processes the cases are shared out; with more than 1, a script needs
+        `if __name__ == "__main__":`
+
+    Raises
+    ------
+    InputError : jobs below 1; the folder exists and is not ours, or cannot be written
+    RunError : a run did not reach its end
+    """
+    if jobs < 1:
+        raise InputError(f"jobs: expected at least 1, got {jobs}")
+    began = time.perf_counter()
+    done = dict.fromkeys((case.number for case in CASES), 0.0)
+
+    def advance(number: int, fraction: float) -> None:
+        done[number] = max(done[number], fraction)
+        if progress is not None:
+            progress(sum(done.values()) / len(done))
+
+    with replaced_folder(folder, is_paper) as temporary:
+        found = share_out(partial(_case, folder=temporary), list(done), jobs, advance)
+        results = tuple(found[number] for number in sorted(found))
+        from nmm.paper.page import render
+
+        (temporary / "index.html").write_text(render(results), encoding="utf-8")
+        content = {
+            "format": FORMAT,
+            "nmm": __version__,
+            "holds": all(claim.holds for result in results for claim in result.claims),
+            "cases": [asdict(result) for result in results],
+        }
+        text = json.dumps(content, indent=2, ensure_ascii=False)
+        (temporary / _MARKER).write_text(text + "\n", encoding="utf-8")
+    folder = Path(folder)
+    return PaperReport(folder, folder / "index.html", results, time.perf_counter() - began)
+
+
+def is_paper(folder: Path) -> bool:
+    """Whether a folder was written by `write_paper`."""
+    try:
+        content = json.loads((folder / _MARKER).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return isinstance(content, dict) and content.get("format") == FORMAT
+
+
+def _case(number: int, progress: Callable[[float], None], folder: Path) -> CaseResult:
+    # Imported where it is done: a process that only shares the cases out needs none of it.
+    from nmm.paper.case_run import run_case
+
+    return run_case(number, folder, progress)

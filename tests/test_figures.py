@@ -1,0 +1,296 @@
+"""Figures: what they show is the robot's, everything is inside, labelled and legible; no global state."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import sysconfig
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+
+from nmm import figures
+from nmm.controller import Controller
+from nmm.errors import InputError
+from nmm.figures import style
+from nmm.loading import load
+from nmm.resolvers import ProjectedGradient
+from nmm.robot import Robot
+from nmm.scenario import Scenario
+from nmm.simulation import simulate
+from nmm.tasks import Coordinates, Heading, Position, Task
+from nmm.trajectory import Trajectory
+
+#: Where the packages of example-robot-data are.
+SHARE = Path(sysconfig.get_paths()["purelib"]) / "cmeel.prefix" / "share"
+PAPER = ["unicycle_2r_position", "unicycle_2r_pointing", "unicycle_2r_link_pointing", "unicycle_3r_position"]
+
+
+@cache
+def run(name: str, resolver: str = "rg", **settings: object) -> Trajectory:
+    given = {key.replace("__", "."): value for key, value in settings.items()}
+    return Scenario.load(name, {"dt": 0.02, **given}).with_resolver(resolver).run()
+
+
+def two(trajectory: Trajectory) -> list[Trajectory]:
+    """A trajectory and the same by another name."""
+    return [trajectory, replace(trajectory, resolver="pg")]
+
+
+#: Every figure of one run, by name.
+KINDS: dict[str, Callable[[Trajectory], Figure]] = {
+    "stroboscopic": figures.stroboscopic,
+    "errors": figures.errors,
+    "tracking": figures.tracking,
+    "inputs": figures.inputs,
+    "coordinates": figures.coordinates,
+    "singular_values": figures.singular_values,
+    "objective": lambda trajectory: figures.objective_comparison(two(trajectory)),
+    "overview": figures.overview,
+    "comparison": lambda trajectory: figures.comparison(two(trajectory)),
+}
+
+
+def check_legible(made: Figure) -> None:
+    """Nothing is clipped, no legend lies over curves, every axis that has numbers says what they are."""
+    made.canvas.draw()
+    renderer = made.canvas.get_renderer()  # type: ignore[attr-defined]  # Agg's, which every canvas here is
+    width, height = made.get_size_inches()
+    box = made.get_tightbbox(renderer)
+    assert box.x0 >= 0.0
+    assert box.y0 >= 0.0
+    assert box.x1 <= width
+    assert box.y1 <= height
+    for axes in made.axes:
+        numbered = [label for label in axes.get_yticklabels() if label.get_visible() and label.get_text()]
+        shares = [other for other in made.axes if other.get_ylabel() and same_row(axes, other)]
+        assert not numbered or shares
+        shown = axes.get_legend()
+        if shown is not None:
+            assert shown.get_window_extent(renderer).y0 >= axes.get_window_extent(renderer).y1 - 1.0
+    assert any("[s]" in axes.get_xlabel() or "[m]" in axes.get_xlabel() for axes in made.axes)
+
+
+def same_row(a: Axes, b: Axes) -> bool:
+    return abs(a.get_position().y0 - b.get_position().y0) < 1e-9
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", PAPER)
+def test_figures_of_the_paper_are_legible(name: str, kind: str) -> None:
+    check_legible(KINDS[kind](run(name)))
+
+
+def drawn_points(axes: Axes) -> np.ndarray:
+    """Every vertex drawn in data coordinates: robots, paths, marks."""
+    points = [line.get_xydata() for line in axes.lines]
+    for collection in axes.collections:
+        assert isinstance(collection, LineCollection | PolyCollection)
+        points += [path.vertices for path in collection.get_paths()]
+    return np.vstack([np.asarray(part) for part in points])
+
+
+@pytest.mark.parametrize("name", PAPER)
+def test_robot_and_paths_are_inside_the_axes(name: str) -> None:
+    made = figures.stroboscopic(run(name))
+    assert len(made.axes) == (2 if name == "unicycle_3r_position" else 1)
+    for axes in made.axes:
+        points = drawn_points(axes)
+        (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+        assert np.all((points[:, 0] > left) & (points[:, 0] < right))
+        assert np.all((points[:, 1] > low) & (points[:, 1] < high))
+        # A metre is as long up the page as across it.
+        box = axes.get_position().transformed(made.transSubfigure)
+        assert box.width / (right - left) == pytest.approx(box.height / (high - low), rel=1e-6)
+
+
+def test_no_pyplot_and_no_global_state() -> None:
+    before = dict(matplotlib.rcParams)
+    KINDS["overview"](run(PAPER[0])).canvas.draw()
+    assert dict(matplotlib.rcParams) == before
+    found = subprocess.run(
+        [sys.executable, "-c", "import sys, nmm.figures; print('matplotlib.pyplot' in sys.modules)"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert found.stdout.strip() == "False"
+
+
+def test_figures_drawn_in_threads_are_the_same(tmp_path: Path) -> None:
+    trajectory = run(PAPER[0])
+
+    def draw(name: str) -> bytes:
+        folder = tmp_path / name
+        folder.mkdir()
+        figures.write_run_figures(trajectory, folder)
+        return b"".join(path.read_bytes() for path in sorted(folder.iterdir()))
+
+    alone = draw("alone")
+    with ThreadPoolExecutor(3) as pool:
+        assert set(pool.map(draw, "abc")) == {alone}
+
+
+def test_run_folder_gets_its_figures(tmp_path: Path) -> None:
+    written = figures.write_run_figures(run(PAPER[1]), tmp_path)
+    assert {path.name for path in written} == {"motion.png", "errors.png", "inputs.png", "objective.png"}
+    for path in written:
+        assert path.read_bytes().startswith(b"\x89PNG")
+
+
+def bare_run(robot: Robot, task: Task, *more: Task) -> Trajectory:
+    controller = Controller(robot, [task, *more], ProjectedGradient())
+    return simulate(controller, robot.q({"q1": 0.3, "q2": 0.4}), 1.0, 0.01)
+
+
+def test_run_without_position_task_and_objective(robot_2r: Robot, tmp_path: Path) -> None:
+    trajectory = bare_run(robot_2r, Task(Heading("link1"), 1.0))
+    assert trajectory.path is None
+    for kind, make in KINDS.items():
+        if kind != "objective":
+            check_legible(make(trajectory))
+    written = figures.write_run_figures(trajectory, tmp_path)
+    assert {path.name for path in written} == {"motion.png", "errors.png", "inputs.png"}
+
+
+def test_run_with_as_many_rows_as_inputs(robot_2r: Robot) -> None:
+    trajectory = bare_run(
+        robot_2r, Task(Position("ee", "xy"), [1.5, 0.2]), Task(Coordinates("q1", "q2"), [0.5, 0.1])
+    )
+    assert trajectory.complete
+    for make in KINDS.values():
+        check_legible(make(trajectory))
+
+
+def cut(trajectory: Trajectory, count: int) -> Trajectory:
+    arrays = ("t", "q", "u", "r", "r_d", "error", "objective", "sigma_min", "partition", "residual")
+    names = (*arrays, "path", "desired")
+    return replace(trajectory, **{name: getattr(trajectory, name)[:count] for name in names})
+
+
+@pytest.mark.parametrize("count", [1, 2, 40])
+@pytest.mark.parametrize("name", [PAPER[0], PAPER[3]])
+def test_incomplete_runs(name: str, count: int) -> None:
+    for make in KINDS.values():
+        check_legible(make(cut(run(name), count)))
+
+
+def test_runs_without_a_sample_are_refused() -> None:
+    empty = cut(run(PAPER[0]), 0)
+    for make in (KINDS["stroboscopic"], KINDS["objective"], KINDS["overview"], KINDS["comparison"]):
+        with pytest.raises(InputError, match="at least one sample"):
+            make(empty)
+
+
+def test_diverged_run() -> None:
+    trajectory = run(PAPER[0], method="euler", resolver__alpha=900)
+    assert not trajectory.complete
+    for make in KINDS.values():
+        check_legible(make(trajectory))
+    texts = {text.get_text() for axes in figures.overview(trajectory).axes for text in axes.texts}
+    assert "run diverged" in texts
+
+
+def test_long_run_is_drawn_with_few_points() -> None:
+    run_ = run(PAPER[0])
+    many = np.tile(np.arange(len(run_)), 40)
+    arrays = {name: getattr(run_, name)[many] for name in ("q", "u", "error", "objective", "path", "desired")}
+    long = replace(run_, t=np.arange(len(many)) * run_.dt, **arrays)
+    for make in (figures.errors, figures.inputs, figures.stroboscopic):
+        lines = [line for axes in make(long).axes for line in axes.lines]
+        assert max(len(line.get_xdata()) for line in lines) < 3500
+
+
+def test_instants() -> None:
+    trajectory = run(PAPER[0])
+    at = [0.0, 3.0, 25.0]
+    labels = {text.get_text() for text in figures.stroboscopic(trajectory, at).axes[0].texts}
+    assert labels == {"0 s", "3 s", "25 s"}
+    assert len(figures.stroboscopic(trajectory, 5).axes[0].texts) == 5
+    for wrong in ([26.0], [-1.0], [], [np.nan]):
+        with pytest.raises(InputError, match=r"instants: expected times from 0 s to 25 s"):
+            figures.stroboscopic(trajectory, wrong)
+    with pytest.raises(InputError, match="at least 1"):
+        figures.stroboscopic(trajectory, 0)
+
+
+def test_slow_robots_are_drawn_fewer_times() -> None:
+    """A platform that hardly moves is not drawn eleven times over itself."""
+    few = figures.stroboscopic(run("unicycle_2r_manipulability")).axes[0].texts
+    many = figures.stroboscopic(run(PAPER[0])).axes[0].texts
+    assert len(few) < len(many) == 11
+
+
+def test_switches_of_partition_are_marked() -> None:
+    trajectory = run("unicycle_2r_switching")
+    assert trajectory.switches > 0
+    axes, band = figures.singular_values(trajectory).axes
+    marks = [line for line in axes.lines if len(set(line.get_xdata())) == 1]
+    switched = np.flatnonzero(np.any(np.diff(trajectory.partition, axis=0) != 0, axis=1)) + 1
+    np.testing.assert_allclose([line.get_xdata()[0] for line in marks], trajectory.t[switched])
+    assert len(band.patches) == trajectory.switches + 1
+
+
+def test_objective_below_zero_has_no_logarithmic_axis() -> None:
+    trajectory = run("unicycle_2r_manipulability")
+    assert trajectory.objective.min() < 0.0
+    made = figures.objective_comparison([trajectory])
+    assert [axes.get_yscale() for axes in made.axes] == ["linear"]
+
+
+def test_objective_falls_and_is_enlarged_where_no_curve_is() -> None:
+    pair = [run(PAPER[0]), run(PAPER[0], "pg")]
+    upper, lower = figures.objective_comparison(pair, zoom=(0.0, 2.0)).axes
+    assert (upper.get_yscale(), lower.get_yscale()) == ("linear", "log")
+    (inset,) = upper.child_axes
+    assert inset.get_xlim() == (0.0, 2.0)
+    assert [line.get_label() for line in upper.lines] == ["RG", "PG"]
+    rising = replace(pair[0], objective=pair[0].t.copy())
+    assert not figures.objective_comparison([rising]).axes[0].child_axes
+
+
+def test_guide_shows_the_scenarios_gain_or_the_rate_fitted() -> None:
+    trajectory = run(PAPER[0], task__0__gain=2.5, duration=4)
+
+    def guide(given: Trajectory, gain: float | None = None) -> str:
+        return str(figures.errors(given, gain).axes[-1].lines[-1].get_label())
+
+    assert "K = 2.5 1/s" in guide(trajectory)
+    assert "K = 2.5 1/s (fitted)" in guide(replace(trajectory, scenario=None))
+    assert "K = 3 1/s" in guide(trajectory, 3.0)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.0, "0"), (-2.5, "−2.5"), (0.25, "0.25"), (1e-4, "10⁻⁴"), (2.5e-7, "2.5·10⁻⁷"), (-3e8, "−3·10⁸")],
+)
+def test_numbers_at_ticks(value: float, text: str) -> None:
+    assert style.number(value) == text
+
+
+def test_any_robot_can_be_drawn() -> None:
+    """A TIAGo of meshes, with a lifting torso and a head beside the arm."""
+    robot = load(
+        SHARE / "example-robot-data" / "robots" / "tiago_description" / "robots" / "tiago_no_hand.urdf",
+        package_dirs=[SHARE],
+    )
+    trajectory = bare_run_of(robot)
+    made = figures.stroboscopic(trajectory)
+    assert len(made.axes) == 2  # its head is far above its wheels
+    check_legible(figures.overview(trajectory))
+    check_legible(figures.inputs(trajectory))
+
+
+def bare_run_of(robot: Robot) -> Trajectory:
+    q0 = robot.q({"arm_2_joint": -0.5, "arm_4_joint": 1.2})
+    task = Task(Position("arm_tool_link"), [1.2, 0.4, 0.9])
+    return simulate(Controller(robot, task, ProjectedGradient()), q0, 2.0, 0.02)
