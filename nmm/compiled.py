@@ -134,21 +134,21 @@ def kernel(signature: Any) -> Callable[[Plain], Kernel]:
     return decorate
 
 
-def view(memory, first, shape):  # type: ignore[no-untyped-def]  # numba wants it bare
+def view(memory: Any, first: int, shape: tuple[int, ...]) -> Any:
     """A view of contiguous `memory` from its element `first` on, of the given shape.
 
-    Compiled, it is four machine words and no more: no bounds are checked and no references
-    counted, which slices and `reshape` do, at half the cost of a control step. Whoever calls the
+    Compiled, it is a pointer, a shape and strides, and no more: no bounds are checked and no
+    references counted, which slices and `reshape` do, at half the cost of a control step. Whoever calls the
     compiled code holds the memory while it runs.
     """
     return memory.reshape(-1)[first : first + math.prod(shape)].reshape(shape)
 
 
 @intrinsic
-def _view_compiled(context, memory, first, shape):  # type: ignore[no-untyped-def]
+def _view_compiled(context: Any, memory: Any, first: Any, shape: Any) -> Any:
     result = types.Array(memory.dtype, len(shape), "C")
 
-    def generate(context, builder, signature, values):  # type: ignore[no-untyped-def]
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         owner = context.make_array(signature.args[0])(context, builder, values[0])
         extents = cgutils.unpack_tuple(builder, values[2])
         size = context.get_abi_sizeof(context.get_data_type(memory.dtype))
@@ -172,8 +172,8 @@ def _view_compiled(context, memory, first, shape):  # type: ignore[no-untyped-de
 
 
 @overload(view)
-def _view_overload(memory, first, shape):  # type: ignore[no-untyped-def]
-    def through(memory, first, shape):  # type: ignore[no-untyped-def]
+def _view_overload(memory: Any, first: Any, shape: Any) -> Any:
+    def through(memory: Any, first: Any, shape: Any) -> Any:
         return _view_compiled(memory, first, shape)
 
     return through
@@ -182,12 +182,12 @@ def _view_overload(memory, first, shape):  # type: ignore[no-untyped-def]
 def _caller(signature: Any) -> Callable[..., None]:
     """A function `call(address, *arguments)` for kernels of one signature, plain and compiled."""
 
-    def call(address, *arguments):  # type: ignore[no-untyped-def]  # numba wants it bare
+    def call(address: int, *arguments: Any) -> None:
         _plain_by_address[address](*arguments)
 
     @intrinsic
-    def through_pointer(context, address, arguments):  # type: ignore[no-untyped-def]
-        def generate(context, builder, signature_here, values):  # type: ignore[no-untyped-def]
+    def through_pointer(context: Any, address: Any, arguments: Any) -> Any:
+        def generate(context: Any, builder: Any, signature_here: Any, values: Any) -> Any:
             convention = context.call_conv
             pointer_type = convention.get_function_type(types.none, signature.args).as_pointer()
             function = builder.inttoptr(values[0], pointer_type)
@@ -200,8 +200,8 @@ def _caller(signature: Any) -> Callable[..., None]:
         return types.void(types.int64, types.Tuple(signature.args)), generate
 
     @overload(call)
-    def call_compiled(address, *arguments):  # type: ignore[no-untyped-def]
-        def through(address, *arguments):  # type: ignore[no-untyped-def]
+    def call_compiled(address: Any, *arguments: Any) -> Any:
+        def through(address: Any, *arguments: Any) -> None:
             through_pointer(address, arguments)
 
         return through
