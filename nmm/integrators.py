@@ -42,16 +42,17 @@ class RungeKutta:
     def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
         slopes = [q_dot]
         for node, row in zip(self.nodes, self.matrix, strict=True):
-            stage = q.copy()
-            for weight, slope in zip(row, slopes, strict=True):
-                if weight:
-                    stage += (dt * weight) * slope
-            slopes.append(velocity(t + node * dt, stage))
-        ahead = q.copy()
-        for weight, slope in zip(self.weights, slopes, strict=True):
-            if weight:
-                ahead += (dt * weight) * slope
-        return ahead
+            slopes.append(velocity(t + node * dt, q + dt * _combined(row, slopes)))
+        return q + dt * _combined(self.weights, slopes)
+
+
+def _combined(weights: tuple[float, ...], slopes: list[Array]) -> Array:
+    """Σ weight slope, summed before it is added to q, so that q is rounded once a step."""
+    total = np.zeros_like(slopes[0])
+    for weight, slope in zip(weights, slopes, strict=True):
+        if weight:
+            total += weight * slope
+    return total
 
 
 EULER = RungeKutta((), (), (1.0,), (1.0, 1.0))
