@@ -40,19 +40,12 @@ class RungeKutta:
     stability: tuple[float, ...]
 
     def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
-        slopes = [q_dot]
-        for node, row in zip(self.nodes, self.matrix, strict=True):
-            slopes.append(velocity(t + node * dt, q + dt * _combined(row, slopes)))
-        return q + dt * _combined(self.weights, slopes)
-
-
-def _combined(weights: tuple[float, ...], slopes: list[Array]) -> Array:
-    """Σ weight slope, summed before it is added to q, so that q is rounded once a step."""
-    total = np.zeros_like(slopes[0])
-    for weight, slope in zip(weights, slopes, strict=True):
-        if weight:
-            total += weight * slope
-    return total
+        slopes = np.empty((len(self.weights), q.size))
+        slopes[0] = q_dot
+        for k, (node, row) in enumerate(zip(self.nodes, self.matrix, strict=True), start=1):
+            slopes[k] = velocity(t + node * dt, q + dt * np.dot(row, slopes[:k]))
+        ahead: Array = q + dt * np.dot(self.weights, slopes)  # summed first: q is rounded once a step
+        return ahead
 
 
 EULER = RungeKutta((), (), (1.0,), (1.0, 1.0))

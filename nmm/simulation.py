@@ -15,7 +15,7 @@ from nmm.integrators import Integrator, integrator
 from nmm.stability import Instability, find_instability
 from nmm.trajectory import Outcome, Recorder, Trajectory
 
-#: A coordinate or an input beyond this has diverged, m, rad, m/s or rad/s.
+#: Coordinates or inputs whose norm is beyond this have diverged, m, rad, m/s or rad/s.
 BOUND = 1e6
 #: At how many instants of a run the integrator's stability is examined.
 EXAMINED = 20
@@ -106,12 +106,12 @@ def simulate(
 
 
 def _sample(controller: Controller, t: float, q: Array) -> Step:
-    if not np.all(np.abs(q) < BOUND):  # a NaN compares false
-        raise DivergedError(f"at t = {t:g} s the motion has diverged: a coordinate is beyond {BOUND:g}")
+    if not q.dot(q) < BOUND**2:  # a NaN compares false
+        raise DivergedError(f"at t = {t:g} s the motion has diverged: the coordinates are beyond {BOUND:g}")
     controller(t, q)
     sample = controller.last(t, q)
-    if not np.all(np.abs(sample.u) < BOUND):
-        raise DivergedError(f"at t = {t:g} s the motion has diverged: an input is beyond {BOUND:g}")
+    if not sample.u.dot(sample.u) < BOUND**2:
+        raise DivergedError(f"at t = {t:g} s the motion has diverged: the inputs are beyond {BOUND:g}")
     return sample
 
 
