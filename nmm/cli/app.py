@@ -1,0 +1,307 @@
+"""The commands of `nmm`, with their help, and how every error becomes one line and an exit status."""
+
+from __future__ import annotations
+
+import gc
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, NoReturn
+
+import typer
+
+from nmm.cli.output import complain
+from nmm.errors import InputError, NmmError
+
+#: What typer raises for wrong usage: options that do not exist, arguments that are missing.
+_USAGE_ERROR: type[Exception] = typer.BadParameter.mro()[2]
+
+OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+app = typer.Typer(
+    name="nmm",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
+
+ScenarioArgument = Annotated[
+    str, typer.Argument(metavar="SCENARIO", help="A bundled name (see `nmm scenarios`) or a YAML file.")
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Change a key of the scenario, by its dotted path; lists count from 0. Numbers may be "
+        "arithmetic with pi, lists and mappings are written as in YAML. May be repeated.",
+    ),
+]
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from nmm import __version__
+
+        print(f"nmm {__version__}")
+        raise typer.Exit
+
+
+@app.callback(invoke_without_command=True)
+def nmm(
+    context: typer.Context,
+    version: Annotated[
+        bool, typer.Option("--version", help="Show the version and exit.", callback=_version, is_eager=True)
+    ] = False,
+) -> None:
+    """Motion generation for nonholonomic mobile manipulators: a manipulator on a wheeled platform.
+
+    \b
+    nmm scenarios                             what there is to run
+    nmm run unicycle_2r_position              run it: figures and numbers in runs/
+    nmm run unicycle_2r_position --play       and watch it in the browser
+    nmm compare unicycle_2r_position          reduced against projected gradient
+    nmm paper                                 the paper's four cases and figures
+
+    Units are metres, radians and seconds. Exit status: 0; 1 when a run failed (what there is of it is
+    written); 2 for bad input, with one line on standard error that says what was expected.
+    """
+    if context.invoked_subcommand is None:
+        print(context.get_help())
+
+
+@app.command()
+def run(
+    scenario: ScenarioArgument,
+    resolver: Annotated[
+        str | None,
+        typer.Option(
+            metavar="rg|pg|ej",
+            help="Resolve the redundancy with the reduced gradient (rg), the projected gradient (pg) or the "
+            "extended Jacobian (ej), with those of the scenario's settings that it knows.",
+        ),
+    ] = None,
+    settings: SetOption = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Where to write. A folder that nmm wrote is replaced; any other that exists is refused.",
+            show_default="runs/<scenario>-<resolver>",
+        ),
+    ] = None,
+    html: Annotated[
+        bool,
+        typer.Option("--html", help="Write playback.html too: the motion in 3D, one file, works offline."),
+    ] = False,
+    play: Annotated[
+        bool, typer.Option("--play", help="Play the motion in the browser afterwards; Ctrl-C ends it.")
+    ] = False,
+) -> int:
+    """Run a scenario and write what happened.
+
+    \b
+    nmm run unicycle_2r_position --resolver pg
+    nmm run unicycle_2r_position --set dt=0.001 --set resolver.alpha=5
+    nmm run unicycle_2r_position --set task.0.reference.radius=2 --set robot.arguments.d=0.5
+    nmm run unicycle_3r_spline --set 'q0={x: 0.2, q2: pi/3}' --html --out here
+
+    The folder holds trajectory.npz and trajectory.csv (times, coordinates, inputs, errors, objective),
+    summary.json (the numbers of the table), scenario.yaml (every key, to be run again) and figures as PNG.
+    Ctrl-C ends the run and writes the part that was computed, marked incomplete.
+    """
+    from nmm.cli.runs import run_scenario
+
+    return run_scenario(scenario, resolver, _settings(settings), out, html=html, play=play)
+
+
+@app.command()
+def compare(
+    scenario: ScenarioArgument,
+    resolvers: Annotated[
+        str, typer.Option(metavar="KIND,KIND,...", help="The resolvers: some of rg, pg, ej.")
+    ] = "rg,pg",
+    settings: SetOption = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="Where to write, as for `nmm run`.", show_default="runs/<scenario>-compare"
+        ),
+    ] = None,
+) -> int:
+    """Run a scenario with several resolvers.
+
+    One table, one figure, one playback.
+
+    \b
+    nmm compare unicycle_2r_position
+    nmm compare unicycle_2r_pointing --resolvers rg,pg,ej --set resolver.alpha=5
+
+    The folder holds comparison.png, playback.html (all robots in one scene), summary.json and, for each
+    resolver, a folder with its run.
+    """
+    from nmm.cli.runs import compare_resolvers
+
+    kinds = list(dict.fromkeys(kind.strip() for kind in resolvers.split(",") if kind.strip()))
+    if not kinds:
+        raise InputError("--resolvers: expected kinds with commas between them, as in rg,pg")
+    return compare_resolvers(scenario, kinds, _settings(settings), out)
+
+
+@app.command()
+def paper(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Where to write, as for `nmm run`.")] = Path(
+        "paper"
+    ),
+) -> int:
+    """Redo the paper's cases and figures.
+
+    Section VI: the four cases with RG and PG, figures 3 to 10, and the numbers that the paper claims.
+    Open index.html in the folder: it shows all of it, with the motions to play. Takes less than a minute.
+    """
+    from nmm.cli.runs import write_the_paper
+
+    return write_the_paper(out)
+
+
+@app.command()
+def play(
+    folder: Annotated[
+        Path, typer.Argument(metavar="RUN_DIR", help="A folder of `nmm run` or `nmm compare`.")
+    ],
+    port: Annotated[
+        int | None, typer.Option(metavar="N", help="Port on this machine.", show_default="a free one")
+    ] = None,
+    no_open: Annotated[bool, typer.Option("--no-open", help="Print the address, open no browser.")] = False,
+) -> int:
+    """Play a run in the browser.
+
+    In 3D, with MeshCat; only this machine can reach it. Ctrl-C ends it.
+    """
+    from nmm.cli.runs import play_folder
+
+    return play_folder(folder, port, open_browser=not no_open)
+
+
+@app.command()
+def info(
+    robot: Annotated[
+        str,
+        typer.Argument(metavar="ROBOT", help="A bundled name (see `nmm robots`) or a .urdf or .xacro file."),
+    ],
+    platform: Annotated[
+        str | None, typer.Option(metavar="NAME", help="How the base moves.", show_default="unicycle")
+    ] = None,
+    scenario: Annotated[
+        str | None, typer.Option(metavar="SCENARIO", help="Show the redundancy for this scenario's task.")
+    ] = None,
+) -> int:
+    """Describe a robot.
+
+    Coordinates, inputs and limits with their units, frames that a task may speak of, wheels, and the
+    degree of redundancy for tasks of 2, 3 and 6 rows, or for a scenario's task.
+
+    \b
+    nmm info unicycle_2r
+    nmm info my_robot.urdf
+    nmm info unicycle_3r --scenario unicycle_3r_position
+    """
+    from nmm.cli.descriptions import describe_robot
+
+    return describe_robot(robot, platform, scenario)
+
+
+@app.command()
+def scenarios(
+    keys: Annotated[bool, typer.Option("--keys", help="List the keys of a scenario file instead.")] = False,
+) -> int:
+    """List the bundled scenarios.
+
+    They are YAML files; to make your own, start from the scenario.yaml that a run writes.
+    """
+    from nmm.cli.descriptions import list_keys, list_scenarios
+
+    return list_keys() if keys else list_scenarios()
+
+
+@app.command()
+def robots() -> int:
+    """List the bundled robots."""
+    from nmm.cli.descriptions import list_robots
+
+    return list_robots()
+
+
+def _settings(given: Sequence[str] | None) -> dict[str, object]:
+    """The `--set` options as a mapping."""
+    settings: dict[str, object] = {}
+    for text in given or ():
+        key, equals, value = text.partition("=")
+        if not equals or not key.strip():
+            raise InputError(f"--set: expected KEY=VALUE, as in resolver.alpha=5, got {text!r}")
+        settings[key.strip()] = value
+    return settings
+
+
+def status_of(arguments: Sequence[str]) -> int:
+    """Run the command line; every error that a user can cause is one line on standard error.
+
+    Returns
+    -------
+    0; 1 for a run that failed; 2 for bad input; 130 for Ctrl-C where there is nothing to write
+    """
+    prefix = "nmm"
+    if arguments and arguments[0] in _commands():
+        prefix = f"nmm {arguments[0]}"
+    try:
+        result = app(args=list(arguments), prog_name="nmm", standalone_mode=False)
+        sys.stdout.flush()
+        return result if isinstance(result, int) else OK
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except BrokenPipeError:
+        _discard_output()
+        return FAILED
+    except InputError as error:
+        return _complain(prefix, str(error), BAD_INPUT)
+    except NmmError as error:
+        return _complain(prefix, str(error), FAILED)
+    except typer.Abort:
+        return INTERRUPTED
+    except _USAGE_ERROR as error:
+        message = error.format_message() if hasattr(error, "format_message") else str(error)
+        return _complain(prefix, f"{message} (see {prefix} --help)", BAD_INPUT)
+    except OSError as error:
+        return _complain(prefix, str(error), FAILED)
+
+
+def _commands() -> list[str]:
+    return [command.callback.__name__ for command in app.registered_commands if command.callback is not None]
+
+
+def _complain(prefix: str, text: str, status: int) -> int:
+    complain(prefix, text)
+    return status
+
+
+def _discard_output() -> None:
+    """The reader of our output has gone (`nmm info | head -1`): write the rest to nowhere."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def main() -> NoReturn:
+    """Entry point of `nmm` and `python -m nmm`."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")  # a terminal that knows no Greek gets "?"
+    # The libraries' objects stay: looking through them for garbage, again and again and once more at the
+    # end, is a fifth of a short run's time.
+    gc.set_threshold(100_000, 50, 50)
+    # A run that is told to end writes what it has, whether by Ctrl-C or by the system.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    status = status_of(sys.argv[1:])
+    gc.freeze()
+    sys.exit(status)

@@ -1,0 +1,80 @@
+"""What the commands print: tables by rich, warnings, and progress; plain text in a pipe."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+
+from rich.console import Console, JustifyMethod
+from rich.table import Table
+
+#: A pipe has no width of its own: lines end where the text does.
+WIDTH_OF_A_PIPE = 500
+
+
+def console() -> Console:
+    """Standard output; in a pipe without colours and without breaking lines."""
+    piped = not sys.stdout.isatty() and "COLUMNS" not in os.environ
+    return Console(markup=False, highlight=False, emoji=False, width=WIDTH_OF_A_PIPE if piped else None)
+
+
+def show_table(
+    columns: Sequence[str], rows: Iterable[Sequence[str]], *, title: str = "", numeric: Sequence[str] = ()
+) -> None:
+    """Print a table; columns named in `numeric` are aligned to the right. All but the first column fold."""
+    out = console()
+    table = Table(
+        box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold", show_header=any(columns)
+    )
+    for i, name in enumerate(columns):
+        side: JustifyMethod = "right" if name in numeric else "left"
+        table.add_column(name, justify=side, overflow="fold", no_wrap=i == 0)
+    for row in rows:
+        table.add_row(*row)
+    if title:
+        out.print(title, style="bold")
+    if out.is_terminal:
+        out.print(table)
+        return
+    with out.capture() as capture:
+        out.print(table)
+    for line in capture.get().splitlines():
+        out.print(line.rstrip(), soft_wrap=True)
+
+
+def show_text(text: str = "") -> None:
+    """Print text that wraps on a terminal."""
+    console().print(text)
+
+
+def warn(text: str) -> None:
+    """One line on standard error."""
+    print(f"warning: {' '.join(text.split())}", file=sys.stderr)
+
+
+def complain(prefix: str, text: str) -> None:
+    """One line on standard error: why the exit status is not 0."""
+    print(f"{prefix}: {' '.join(text.split())}", file=sys.stderr)
+
+
+@contextmanager
+def progress(label: str) -> Iterator[Callable[[float], None] | None]:
+    """A function that shows the fraction done, on a terminal; None where there is none."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    bar = Progress(
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    )
+    with bar:
+        task = bar.add_task(label, total=1.0)
+        yield lambda fraction: bar.update(task, completed=fraction)

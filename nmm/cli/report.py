@@ -1,0 +1,53 @@
+"""A run in a few lines: what `nmm run` prints, and a column of what `nmm compare` prints."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nmm.cli.output import show_table, warn
+
+if TYPE_CHECKING:
+    from nmm.trajectory import Trajectory
+
+
+def show_run(trajectory: Trajectory, folder: Path) -> None:
+    """Print the table of a run that was saved in `folder`, and its warnings."""
+    scenario = trajectory.scenario or {}
+    title = f"{scenario.get('name', '')}: {scenario.get('title', '')}".strip(": ")
+    rows = describe(trajectory, folder)
+    show_table(["", ""], [*rows, ("files in", str(folder))], title=title)
+
+
+def describe(trajectory: Trajectory, folder: Path) -> list[tuple[str, str]]:
+    """Labels and values of the numbers of a run that was saved in `folder`; warnings go to standard error."""
+    numbers = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    for warning in numbers["warnings"]:
+        warn(f"{trajectory.resolver.upper()}: {warning}")
+    return list(_rows(trajectory, numbers))
+
+
+def _rows(trajectory: Trajectory, numbers: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    method = f"{trajectory.resolver.upper()}, {trajectory.method}, dt {trajectory.dt:g} s"
+    yield "resolver", method
+    outcome = str(trajectory.outcome)
+    if len(trajectory):
+        outcome += f", {trajectory.t[-1]:g} s in {len(trajectory)} samples"
+    yield "outcome", outcome
+    redundancy = numbers["redundancy"]
+    left = redundancy["kinematic"] or "none left"
+    yield "redundancy", f"kinematic {left}, static {redundancy['static']}"
+    if not len(trajectory):
+        return
+    for row, (name, unit) in enumerate(zip(trajectory.r_names, trajectory.r_units, strict=True)):
+        first, last = trajectory.error[0, row], trajectory.error[-1, row]
+        yield f"error of {name}", f"{first:.3g} → {last:.3g} {unit}"
+    if (trajectory.scenario or {}).get("objective"):
+        yield "objective H", f"{trajectory.objective[0]:.4g} → {trajectory.objective[-1]:.4g}"
+        yield "mean H, second half", f"{numbers['objective_mean_second_half']:.4g}"
+    yield "smallest σ_min", f"{numbers['sigma_min']:.3g}"
+    if trajectory.resolver == "rg":
+        yield "switches of partition", str(numbers["partition_switches"])
+    yield "lateral slip", f"{numbers['lateral_slip_max']:.1g} m/s at most"

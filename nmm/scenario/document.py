@@ -1,0 +1,236 @@
+"""A scenario's text as plain data: strict YAML, the line of every key, and settings applied to it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from nmm.errors import ScenarioError
+from nmm.scenario.numbers import shown
+
+#: Where a value stands: mapping keys and list indices, from the top.
+Place = tuple[str | int, ...]
+
+MOST_NODES = 200_000
+_NULL = ("", "~", "null", "Null", "NULL")
+_TRUE = ("true", "True", "TRUE")
+_FALSE = ("false", "False", "FALSE")
+#: Keys that may hold one name in place of a mapping, and which key of the mapping the name is.
+_SHORTHANDS: dict[Place, str] = {("robot",): "source"}
+
+
+@dataclass
+class Document:
+    """Plain data (mappings, lists, strings, booleans, None) and where each part of it was written.
+
+    Numbers stay strings, to be read as arithmetic: YAML 1.1 has its own mind about `1e-3` and `010`.
+
+    Attributes
+    ----------
+    name : the file, as errors name it
+    data : the top mapping
+    lines : line of each key and item, from 1
+    folder : where the file is
+    settings : the places that were set since, and the working folder at that time
+    """
+
+    name: str
+    data: dict[str, Any]
+    lines: dict[Place, int] = field(default_factory=dict)
+    folder: Path = field(default_factory=Path.cwd)
+    settings: dict[Place, Path] = field(default_factory=dict)
+
+    def where(self, path: Place) -> str:
+        """How errors name a place: "file.yaml:12: task.0.gain", "file.yaml: set resolver.alpha"."""
+        key = dotted(path)
+        if self._setting_of(path) is not None:
+            return f"{self.name}: set {key}"
+        below = [dotted(place) for place in self.settings if place[: len(path)] == path]
+        if path and below:  # it may be their doing
+            key = f"{key}, with {', '.join(below)} set"
+        line = next((self.lines[path[:k]] for k in range(len(path), -1, -1) if path[:k] in self.lines), None)
+        place = self.name if line is None else f"{self.name}:{line}"
+        return f"{place}: {key}" if key else place
+
+    def absolute(self, file: str, path: Place) -> Path:
+        """A file named at a place: relative to the scenario or, if it was set, to the working folder."""
+        setting = self._setting_of(path)
+        folder = self.folder if setting is None else self.settings[setting]
+        return (folder / Path(file).expanduser()).resolve()
+
+    def _setting_of(self, path: Place) -> Place | None:
+        return next((place for place in self.settings if path[: len(place)] == place), None)
+
+    def with_setting(self, key: str, value: object) -> Document:
+        """A copy in which the value at a dotted path is another.
+
+        Parameters
+        ----------
+        key : as "resolver.alpha" or "task.0.gain"; counting begins at 0
+        value : text, read as in the file ("5/4*pi", "[v, q1]", "{x: 1}"), or plain data
+
+        Raises
+        ------
+        ScenarioError : the path leads nowhere, or the text is not YAML
+        """
+        copy = Document(self.name, _copied(self.data), self.lines, self.folder, dict(self.settings))
+        path = _parsed(key, copy)
+        place: Any = copy.data
+        for depth, step in enumerate(path[:-1]):
+            if isinstance(place, dict):
+                inner = place.setdefault(step, {})
+                if isinstance(inner, str) and path[: depth + 1] in _SHORTHANDS:
+                    inner = place[step] = {_SHORTHANDS[path[: depth + 1]]: inner}
+                place = inner
+            else:
+                place = place[step]
+        if isinstance(value, str):
+            value = read_text(value, f"{self.name}: set {key}", lines=False).data["value"]
+        place[path[-1]] = _copied(value)
+        copy.settings[path] = Path.cwd()
+        return copy
+
+
+def dotted(path: Place) -> str:
+    """A path as people write it: "task.0.gain"."""
+    return ".".join(str(step) for step in path)
+
+
+def _parsed(key: str, document: Document) -> Place:
+    """The path of a dotted key, with indices where there are lists; `ScenarioError` when it leads nowhere."""
+    path: Place = ()
+    place: Any = document.data
+    for step in key.split("."):
+        where = f"{document.name}: set {key}"
+        if not step:
+            raise ScenarioError(f"{where}: expected a dotted key such as resolver.alpha or task.0.gain")
+        if isinstance(place, list):
+            if not step.isdecimal() or int(step) >= len(place):
+                last = len(place) - 1
+                raise ScenarioError(
+                    f"{where}: {dotted(path)} is a list; expected an index from 0 to {last}, got {step!r}"
+                )
+            path = (*path, int(step))
+            place = place[int(step)]
+        elif isinstance(place, dict):
+            path = (*path, step)
+            place = place.get(step, {})
+        elif isinstance(place, str) and path in _SHORTHANDS:
+            path = (*path, step)
+            place = place if step == _SHORTHANDS[path[:-1]] else {}
+        else:
+            raise ScenarioError(f"{where}: {dotted(path)} is {shown(place)}, which has no keys")
+    return path
+
+
+def _copied(value: Any) -> Any:
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {str(key): _copied(item) for key, item in value.items()}
+    return [_copied(item) for item in value] if isinstance(value, list | tuple) else value
+
+
+def read_file(path: Path) -> Document:
+    """Read a scenario file; `ScenarioError` names file and line of what is wrong with it."""
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise ScenarioError(f"{path}: expected UTF-8 text") from None
+    except OSError as error:
+        raise ScenarioError(f"{path}: cannot be read ({error.strerror})") from None
+    document = read_text(text, str(path))
+    data = document.data["value"]
+    if not isinstance(data, dict):
+        raise ScenarioError(f"{path}: expected a mapping (key: value), got {shown(data)}")
+    lines = {place[1:]: line for place, line in document.lines.items() if len(place) > 1}
+    return Document(str(path), data, lines, path.resolve().parent)
+
+
+def read_text(text: str, name: str, *, lines: bool = True) -> Document:
+    """Read YAML of any shape; what it holds is under the key `value`. `lines`: errors name the line."""
+    try:
+        _check_events(text, name)
+        root = yaml.compose(text, yaml.SafeLoader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        place = name if mark is None or not lines else f"{name}:{mark.line + 1}"
+        raise ScenarioError(f"{place}: not valid YAML: {error.problem or error.context}") from None
+    except yaml.YAMLError as error:
+        raise ScenarioError(f"{name}: not valid YAML: {' '.join(str(error).split())}") from None
+    except RecursionError:
+        raise ScenarioError(f"{name}: not valid YAML: nested too deeply") from None
+    reader = _Reader(name)
+    return Document(name, {"value": None if root is None else reader.plain(root, ("value",))}, reader.lines)
+
+
+def _check_events(text: str, name: str) -> None:
+    """Refuse tags and a second document, which a node graph no longer shows."""
+    documents = 0
+    for event in yaml.parse(text, yaml.SafeLoader):
+        line = 1 if event.start_mark is None else event.start_mark.line + 1
+        if isinstance(event, yaml.DocumentStartEvent):
+            documents += 1
+            if documents > 1:
+                raise ScenarioError(f"{name}:{line}: expected one YAML document, got a second")
+        tag = getattr(event, "tag", None)
+        if tag is not None:
+            shown_tag = str(tag).replace("tag:yaml.org,2002:", "!!")
+            raise ScenarioError(f"{name}:{line}: expected plain YAML, got the tag {shown_tag}")
+
+
+class _Reader:
+    """From YAML nodes to plain data."""
+
+    def __init__(self, name: str) -> None:
+        self.lines: dict[Place, int] = {}
+        self._name = name
+        self._open: set[int] = set()
+        self._count = 0
+
+    def plain(self, node: yaml.Node, path: Place) -> Any:
+        line = node.start_mark.line + 1
+        self.lines.setdefault(path, line)
+        self._count += 1
+        if self._count > MOST_NODES:  # aliases of aliases multiply
+            raise ScenarioError(f"{self._name}:{line}: expected at most {MOST_NODES} values")
+        if id(node) in self._open:
+            raise ScenarioError(f"{self._name}:{line}: an alias (*) that holds itself")
+        if isinstance(node, yaml.ScalarNode):
+            return self._scalar(node)
+        self._open.add(id(node))
+        try:
+            if isinstance(node, yaml.SequenceNode):
+                return [self.plain(item, (*path, i)) for i, item in enumerate(node.value)]
+            return self._mapping(node, path)
+        except RecursionError:
+            raise ScenarioError(f"{self._name}:{line}: not valid YAML: nested too deeply") from None
+        finally:
+            self._open.discard(id(node))
+
+    def _mapping(self, node: yaml.Node, path: Place) -> dict[str, Any]:
+        result: dict[str, Any] = {}
+        for key_node, value_node in node.value:
+            line = key_node.start_mark.line + 1
+            if not isinstance(key_node, yaml.ScalarNode):
+                raise ScenarioError(f"{self._name}:{line}: expected a name as key, got a list or a mapping")
+            key = key_node.value
+            if key in result:
+                where = f"{self._name}:{line}: {dotted((*path[1:], key))}"
+                raise ScenarioError(f"{where}: expected every key once, this is the second")
+            self.lines[(*path, key)] = line
+            result[key] = self.plain(value_node, (*path, key))
+        return result
+
+    @staticmethod
+    def _scalar(node: yaml.ScalarNode) -> str | bool | None:
+        text = str(node.value)
+        if node.style is not None:  # quoted or block text
+            return text
+        if text in _NULL:
+            return None
+        return text if text not in _TRUE + _FALSE else text in _TRUE

@@ -1,0 +1,181 @@
+"""`Scenario`: a YAML file read, changed, and run."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import ValidationError
+
+from nmm.errors import ScenarioError, unknown
+from nmm.scenario.document import Document, read_file
+from nmm.scenario.keys import KeyedError, as_written, at, first_error
+from nmm.scenario.resolvers import PARTS
+from nmm.scenario.schema import ScenarioPart
+
+if TYPE_CHECKING:
+    from nmm.controller import Controller
+    from nmm.robot import Robot
+    from nmm.trajectory import Trajectory
+
+SUFFIXES = (".yaml", ".yml")
+
+
+class Scenario:
+    """A robot, a start, a task, an objective and a resolver, as a YAML file says them.
+
+    Made by `Scenario.load`; nothing in it changes afterwards: `override` and `with_resolver` return
+    another. `nmm scenarios --keys` lists the keys of the file.
+
+    Attributes
+    ----------
+    name, title : of the scenario
+    path : the file that it was read from
+    parts : its keys, checked
+    """
+
+    def __init__(self, document: Document) -> None:
+        self._document = document
+        self.path = Path(document.name)
+        own_name = re.sub(r"[^\w.-]", "_", self.path.name.split(".", 1)[0]) or "scenario"
+        data = {"name": own_name, **document.data}
+        try:
+            self.parts = ScenarioPart.model_validate(data)
+        except ValidationError as error:
+            raise self._located(first_error(error, data)) from None
+        self.name = self.parts.name
+        self.title = self.parts.title
+        self._robot: Robot | None = None
+
+    @classmethod
+    def load(cls, name_or_path: str | Path, overrides: Mapping[str, object] | None = None) -> Scenario:
+        """Read a scenario.
+
+        Parameters
+        ----------
+        name_or_path : a bundled scenario's name, or a YAML file
+        overrides : values by dotted key, as for `override`
+
+        Raises
+        ------
+        ScenarioError : no such scenario; or the file, the line, the key and what was expected there
+        """
+        return cls(_with_settings(read_file(_find(name_or_path)), overrides or {}))
+
+    def override(self, key: str, value: object) -> Scenario:
+        """This scenario with another value at a dotted key.
+
+        Parameters
+        ----------
+        key : as "dt", "resolver.alpha", "task.0.gain", "robot.arguments.d"; lists count from 0.
+            A new "resolver.kind" keeps those keys of the resolver that the kind knows
+        value : text as it stands in a file ("0.001", "5/4*pi", "[[v, q1]]"), or numbers, lists, mappings
+
+        Raises
+        ------
+        ScenarioError : the key leads nowhere, or the value is not what is expected there
+        """
+        derived = Scenario(_with_settings(self._document, {key: value}))
+        if (derived._source(), derived.parts.robot) == (self._source(), self.parts.robot):
+            derived._robot = self._robot
+        return derived
+
+    def with_resolver(self, kind: str) -> Scenario:
+        """This scenario with another kind of resolver, which keeps those keys that the kind knows."""
+        return self if kind == self.parts.resolver.kind else self.override("resolver.kind", kind)
+
+    def robot(self) -> Robot:
+        """The robot, loaded once."""
+        if self._robot is None:
+            try:
+                with at("robot"):
+                    self._robot = self.parts.robot.build(self._source(), self._package_dirs())
+            except KeyedError as error:
+                raise self._located(error) from None
+        return self._robot
+
+    def controller(self) -> Controller:
+        """A new controller; with it, every key has been checked.
+
+        Raises
+        ------
+        ScenarioError : what the robot does not have, or what does not fit together
+        """
+        robot = self.robot()
+        try:
+            return self.parts.build(robot)
+        except KeyedError as error:
+            raise self._located(error) from None
+
+    def run(self, progress: Callable[[float], None] | None = None) -> Trajectory:
+        """Run it; a run that fails or is interrupted (Ctrl-C) returns what it has, and says so.
+
+        Parameters
+        ----------
+        progress : called with the fraction done, about a hundred times
+        """
+        from nmm.simulation import simulate
+
+        controller, parts = self.controller(), self.parts
+        try:
+            with at(), parts.own_keys():
+                trajectory = simulate(
+                    controller,
+                    parts.q0,
+                    parts.duration,
+                    parts.dt,
+                    parts.method,
+                    tolerance=parts.tolerance,
+                    progress=progress,
+                )
+        except KeyedError as error:
+            raise self._located(error) from None
+        return trajectory.with_scenario(self.resolved())
+
+    def resolved(self) -> dict[str, Any]:
+        """Every key as plain data, defaults included, numbers evaluated, files with absolute paths.
+
+        Written to a YAML file, it gives the same run to the last bit.
+        """
+        data = self.parts.explicit()
+        data["robot"] |= {"source": self._source(), "package_dirs": self._package_dirs()}
+        return data
+
+    def _source(self) -> str:
+        """The robot's bundled name, or the absolute path of its file (as `nmm.load` tells them apart)."""
+        source = self.parts.robot.source
+        if not Path(source).suffix and len(Path(source).parts) == 1:
+            return source
+        return str(self._document.absolute(source, ("robot", "source")))
+
+    def _package_dirs(self) -> list[str]:
+        place = ("robot", "package_dirs")
+        return [str(self._document.absolute(given, place)) for given in self.parts.robot.package_dirs]
+
+    def _located(self, error: KeyedError) -> ScenarioError:
+        place = as_written(error.place, self._document.data)
+        return ScenarioError(f"{self._document.where(place)}: {' '.join(error.text.split())}")
+
+
+def _with_settings(document: Document, settings: Mapping[str, object]) -> Document:
+    for key, value in settings.items():
+        document = document.with_setting(key, value)
+        if key == "resolver.kind" and isinstance(value, str) and value in PARTS:
+            resolver, known = document.data["resolver"], PARTS[value].model_fields
+            document.data["resolver"] = {name: item for name, item in resolver.items() if name in known}
+    return document
+
+
+def _find(name_or_path: str | Path) -> Path:
+    """The file of a bundled name or a path."""
+    from nmm.loading.bundled import bundled_scenarios
+
+    path = Path(name_or_path).expanduser()
+    bundled = bundled_scenarios()
+    if isinstance(name_or_path, str) and name_or_path in bundled:
+        return bundled[name_or_path]
+    if path.is_file() or path.suffix in SUFFIXES or len(path.parts) > 1:
+        return path
+    raise ScenarioError(unknown("scenario", str(name_or_path), bundled))

@@ -1,0 +1,204 @@
+"""The keys of a scenario, from the top."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field
+
+from nmm.errors import InputError
+from nmm.scenario.functions import ConstantPart
+from nmm.scenario.keys import Part, at
+from nmm.scenario.numbers import Nested, Number, Positive, number, numbers, shown
+from nmm.scenario.objectives import ObjectiveList, QuadraticPart, build_objective
+from nmm.scenario.resolvers import ExtendedJacobianPart, ResolverKind
+from nmm.scenario.tasks import CoordinatesTask, TaskList, build_tasks, listed
+
+if TYPE_CHECKING:
+    from nmm.controller import Controller
+    from nmm.robot import Robot
+
+
+def _argument(value: object) -> str:
+    """A xacro argument as the text that xacro reads."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str | int | float):
+        return str(value)
+    raise ValueError(f"expected a number or text, got {shown(value)}")
+
+
+def _coordinates(value: object) -> dict[str, float] | list[Nested]:
+    """Numbers by name, or a list of them."""
+    if not isinstance(value, Mapping):
+        return numbers(value)
+    result = {}
+    for name, item in value.items():
+        try:
+            result[str(name)] = number(item)
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from None
+    return result
+
+
+def _wheels(value: object) -> object:
+    """Names, or radii by name."""
+    if isinstance(value, Mapping):
+        return {str(name): number(radius) for name, radius in value.items()}
+    if value is None or isinstance(value, list | tuple):
+        return value
+    raise ValueError(f"expected a list of joints, or a radius for each, got {shown(value)}")
+
+
+def _file_name(value: object) -> object:
+    """A name or path that a file system can look up."""
+    if isinstance(value, str) and (not value.strip() or "\0" in value):
+        raise ValueError(f"expected a name or a path, got {shown(value)}")
+    return value
+
+
+FileName = Annotated[str, BeforeValidator(_file_name)]
+
+
+class RobotPart(Part):
+    """Which robot. A bare name or path in its place is its source."""
+
+    source: FileName = Field(
+        description="a bundled name (see `nmm robots`), or a .urdf or .xacro file, relative to the scenario"
+    )
+    arguments: dict[str, Annotated[str, BeforeValidator(_argument)]] = Field(
+        default_factory=dict, description="xacro arguments, as {d: 0.5, l1: 0.6}"
+    )
+    platform: str | None = Field(None, description="how the base moves; when not given, the loader chooses")
+    package_dirs: list[FileName] = Field(
+        default_factory=list,
+        description="folders that hold the packages of package:// names, relative to the scenario",
+    )
+    wheels: Annotated[list[str] | dict[str, float] | None, BeforeValidator(_wheels)] = Field(
+        None,
+        description="joints that only roll, as a list, or with their radius, m, as {wheel_left: 0.1}; "
+        "when not given, the loader finds them",
+    )
+    locked: dict[str, Number] = Field(
+        default_factory=dict, description="joints to fix, and their values, rad or m, as {torso: 0.2}"
+    )
+
+    def build(self, source: str, package_dirs: list[str]) -> Robot:
+        """The robot, from a name or an absolute path."""
+        from nmm.loading import load
+
+        return load(
+            source,
+            arguments=self.arguments,
+            platform=self.platform,
+            package_dirs=package_dirs,
+            wheels=self.wheels,
+            locked=self.locked,
+        )
+
+
+class ScenarioPart(Part):
+    """A scenario: robot, start, time, task, objective, resolver."""
+
+    name: str = Field(
+        "", description="letters, digits and _ . - only; the file's when not given", pattern=r"^\w[\w.-]*$"
+    )
+    title: str = Field("", description="a line that says what it shows")
+    robot: Annotated[
+        RobotPart, BeforeValidator(lambda value: {"source": value} if isinstance(value, str) else value)
+    ] = Field(description="a name, a path, or a mapping with source")
+    q0: Annotated[dict[str, float] | list[Nested], BeforeValidator(_coordinates)] = Field(
+        description="configuration at t = 0, m and rad: by name (0 for the rest), or a list in q's order"
+    )
+    duration: Positive = Field(description="s, above 0")
+    dt: Positive = Field(0.005, description="time between samples and step of the fixed-step methods, s")
+    method: Literal["rk4", "midpoint", "euler", "zoh", "adaptive"] = Field(
+        "rk4", description="rk4, midpoint, euler, zoh (inputs constant over dt, as on a robot), adaptive"
+    )
+    tolerance: Positive = Field(1e-9, description="local error of the adaptive method, m and rad")
+    task: Annotated[TaskList, BeforeValidator(listed), Field(min_length=1)] = Field(
+        description="a task, or a list of tasks done together"
+    )
+    objective: ObjectiveList = Field(
+        default_factory=list,
+        description="what to minimise with the redundancy: one, a list that is added up, or none",
+    )
+    resolver: ResolverKind = Field(
+        description="how the redundancy is resolved: kind rg, pg or ej, with its keys"
+    )
+
+    def build(self, robot: Robot) -> Controller:
+        """The controller, after a check of q0; errors know their key."""
+        from nmm.controller import Controller
+
+        with at("q0"):
+            for name in self.q0 if isinstance(self.q0, dict) else ():
+                with at(name):
+                    robot.coordinate(name)
+            robot.q(self.q0)
+        with at("task"):
+            task = build_tasks(self.task, robot)
+            s = sum(len(item.rows(robot)) for item in task)
+            if s > robot.n_u:
+                names = ", ".join(robot.u_names)
+                raise InputError(f"expected at most {robot.n_u} rows, as many as inputs ({names}), got {s}")
+        with at("objective"):
+            objective = build_objective(self.objective, robot)
+        with at("resolver"):
+            resolver = self.resolver.build()
+            constraint = None
+            if isinstance(self.resolver, ExtendedJacobianPart):
+                with at("constraint"):
+                    constraint = build_tasks(self._constraint(), robot)
+                    self._check_constraint(sum(len(item.rows(robot)) for item in constraint), robot.n_u - s)
+            with self.resolver.own_keys():
+                return Controller(robot, task, resolver, objective, constraint)
+
+    def _constraint(self) -> list[Any]:
+        """The constraint of the extended Jacobian: as given, or the objective's terms at their targets."""
+        resolver = self.resolver
+        if not isinstance(resolver, ExtendedJacobianPart):
+            return []
+        if resolver.constraint is not None:
+            return resolver.constraint
+        squares = [part for part in self.objective if isinstance(part, QuadraticPart) and not part.maximise]
+        if len(squares) < len(self.objective):
+            return []
+        return [
+            CoordinatesTask(
+                kind="coordinates",
+                of=[term.of],
+                reference=ConstantPart(kind="constant", value=term.target, unit=None),
+                gain=resolver.gain,
+            )
+            for part in squares
+            for term in part.terms
+        ]
+
+    def _check_constraint(self, rows: int, redundancy: int) -> None:
+        if rows == redundancy:
+            return
+        resolver = self.resolver
+        given = isinstance(resolver, ExtendedJacobianPart) and resolver.constraint is not None
+        came = f"got {rows}" if given else f"none is given and the objective has {rows} quadratic terms"
+        raise InputError(f"expected {redundancy} rows (the inputs less the rows of the task), {came}")
+
+    def explicit(self) -> dict[str, Any]:
+        """Every key as plain data, with what the library chooses where the file leaves it open."""
+        data = self.model_dump()
+        data["resolver"] = self.resolver.explicit()
+        if isinstance(self.resolver, ExtendedJacobianPart):
+            data["resolver"]["constraint"] = [part.model_dump() for part in self._constraint()] or None
+        for key in ("task", "objective"):
+            if len(data[key]) == 1:
+                data[key] = data[key][0]
+        return {key: _kind_first(value) for key, value in data.items()}
+
+
+def _kind_first(value: Any) -> Any:
+    """The same data with `kind` as the first key of every mapping, as people write it."""
+    if isinstance(value, dict):
+        ordered = sorted(value.items(), key=lambda item: item[0] != "kind")
+        return {key: _kind_first(item) for key, item in ordered}
+    return [_kind_first(item) for item in value] if isinstance(value, list) else value

@@ -1,0 +1,78 @@
+"""Command lines run in this process, in a process of their own, and on a terminal."""
+
+from __future__ import annotations
+
+import os
+import pty
+import subprocess
+import sys
+from pathlib import Path
+
+NMM = [sys.executable, "-m", "nmm"]
+
+
+class Result:
+    """What a command line printed, and its exit status."""
+
+    def __init__(self, status: int, out: str, err: str) -> None:
+        self.status, self.out, self.err = status, out, err
+
+    def value(self, label: str) -> str:
+        """The text beside a label of a table."""
+        line = next(line for line in self.out.splitlines() if line.startswith(label))
+        return line[len(label) :].strip()
+
+
+def process(folder: Path, *arguments: str, **environment: str) -> subprocess.Popen[str]:
+    """Start a command line in a process of its own."""
+    return subprocess.Popen(
+        [*NMM, *arguments],
+        cwd=folder,
+        env=os.environ | environment,
+        text=True,
+        encoding="utf-8",
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+    )
+
+
+class Terminal:
+    """A command line on a terminal of that width."""
+
+    def __init__(self, folder: Path, width: int, *arguments: str) -> None:
+        self._ours, theirs = pty.openpty()
+        environment = {
+            key: value for key, value in os.environ.items() if key not in ("NO_COLOR", "FORCE_COLOR")
+        }
+        environment |= {"COLUMNS": str(width), "TERM": "xterm-256color"}
+        self.process = subprocess.Popen(
+            [*NMM, *arguments],
+            cwd=folder,
+            env=environment,
+            stdout=theirs,
+            stderr=theirs,
+            start_new_session=True,
+        )
+        os.close(theirs)
+
+    def read_until(self, text: str | None) -> str:
+        """What is shown until a text comes, or to the end."""
+        shown = b""
+        while text is None or text.encode() not in shown:
+            try:
+                part = os.read(self._ours, 65536)
+            except OSError:  # how Linux says that the other end is closed
+                part = b""
+            if not part:
+                os.close(self._ours)
+                break
+            shown += part
+        return shown.decode()
+
+
+def imported(folder: Path, *arguments: str) -> set[str]:
+    """The modules that a command line imports."""
+    command = [sys.executable, "-X", "importtime", "-m", "nmm", *arguments]
+    report = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stderr
+    return {line.split("|")[-1].strip() for line in report.splitlines() if line.startswith("import time:")}

@@ -1,0 +1,111 @@
+"""The bundled scenarios: the paper's are the paper's, and each shows what it says."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import paper_cases
+import pytest
+
+import nmm
+import nmm.objectives
+import nmm.references
+import nmm.resolvers
+import nmm.tasks
+from nmm import Scenario
+from nmm.loading import bundled_scenarios
+
+PI = math.pi
+PAPER = ("unicycle_2r_position", "unicycle_2r_pointing", "unicycle_2r_link_pointing", "unicycle_3r_position")
+
+
+@pytest.mark.parametrize(("name", "case"), list(zip(PAPER, paper_cases.CASES, strict=True)))
+def test_the_papers_scenarios_are_the_papers(name: str, case: paper_cases.Case) -> None:
+    """The same inputs as the case put together by hand, on the way and off it."""
+    given = Scenario.load(name)
+    assert given.parts.robot.source == case.robot
+    robot = given.robot()
+    assert np.array_equal(robot.q(given.parts.q0), case.q0)
+    assert (given.parts.duration, given.parts.dt, given.parts.resolver.kind) == (25.0, 0.005, "rg")
+    assert given.parts.resolver.alpha == 10.0
+    ours, theirs = given.with_resolver("pg").controller(), case.controller(robot)
+    rng = np.random.default_rng(3)
+    for t in (0.0, 7.3):
+        q = case.q0 + rng.uniform(-0.5, 0.5, robot.n)
+        assert np.array_equal(ours(t, q), theirs(t, q))
+    u = given.controller()(0.0, case.q0)
+    assert np.abs(u - case.controller(robot, case.rg())(0.0, case.q0)).max() < 1e-12
+
+
+@pytest.fixture(scope="module")
+def runs() -> dict[str, nmm.Trajectory]:
+    """Every bundled scenario, run as it is."""
+    return {name: Scenario.load(name).run() for name in bundled_scenarios()}
+
+
+def test_every_bundled_scenario_runs_to_its_end(runs: dict[str, nmm.Trajectory]) -> None:
+    assert set(PAPER) <= set(runs)
+    for name, run in runs.items():
+        assert run.outcome == "completed", name
+        assert run.warnings == (), name
+        assert run.scenario is not None
+        assert run.scenario["title"], name
+        # Feedback with K = 1 1/s: what is left of the initial error, and what the integrator adds.
+        expected = run.error_norm[0] * np.exp(-run.t[-1])
+        assert run.error_norm[-1] <= 1.1 * expected + (1e-11 if run.method == "rk4" else 1e-5), name
+        assert run.residual.max() < 1e-10, name
+        assert run.summary()["lateral_slip_max"] <= 1e-12, name
+        assert run.sigma_min.min() > 0.1, name
+
+
+def test_switching_switches_by_both_rules_and_tracks_through_it(runs: dict[str, nmm.Trajectory]) -> None:
+    automatic = Scenario.load("unicycle_2r_switching", {"resolver.partitions": "automatic"}).run()
+    papers_threshold = Scenario.load("unicycle_2r_switching", {"resolver.threshold": 0.01}).run()
+    for run in (runs["unicycle_2r_switching"], automatic, papers_threshold):
+        assert run.switches >= 1
+        assert run.error_norm.max() < 1e-6  # there is no initial error to recover
+        assert run.objective[-1] < 1e-3 * run.objective[0]
+    u = runs["unicycle_2r_switching"].u
+    assert np.abs(u).max() < 1.5
+
+
+def test_without_a_second_partition_the_switching_scenario_goes_wrong() -> None:
+    """[v, omega] alone: its minor passes through zero."""
+    run = Scenario.load("unicycle_2r_switching", {"resolver.partitions": "[[v, omega]]"}).run()
+    assert not run.complete or np.abs(run.u).max() > 50
+
+
+def test_manipulability_is_improved_tenfold(runs: dict[str, nmm.Trajectory]) -> None:
+    run = runs["unicycle_2r_manipulability"]
+    w = 0.5 * 0.3 * np.abs(np.sin(run.q[:, 4]))  # l1 l2 |sin q2|
+    assert np.abs(run.objective + w).max() < 1e-12
+    assert w[0] < 0.0151
+    assert w[run.t > 2].min() > 0.149
+    without = Scenario.load("unicycle_2r_manipulability", {"objective": "null"}).run()
+    assert np.abs(np.sin(without.q[:, 4])).max() < 0.11
+
+
+def test_the_extended_jacobian_holds_its_constraints(runs: dict[str, nmm.Trajectory]) -> None:
+    run = runs["unicycle_2r_extended_jacobian"]
+    assert abs(run.q[-1, 3] - PI / 4) < 1e-9
+    towards = np.array([6.0, 2.0]) - run.r_d[-1]
+    delta = run.q[-1, 2:5].sum() - math.atan2(towards[1], towards[0])
+    assert abs(math.remainder(delta, 2 * PI)) < 1e-9
+
+
+def test_the_spline_passes_its_waypoints(runs: dict[str, nmm.Trajectory]) -> None:
+    run = runs["unicycle_3r_spline"]
+    points = [[1.1, 0, 0.7], [2, 0.5, 1.2], [3, 0, 0.5], [4, -0.5, 1.2], [5, 0, 0.7]]
+    for t, point in zip((0, 5, 10, 15, 20), points, strict=True):
+        k = int(np.argmin(np.abs(run.t - t)))
+        assert np.abs(run.r_d[k] - point).max() < 1e-9
+        assert np.abs(run.r[k] - point).max() < 1.1 * run.error_norm[0] * math.exp(-t) + 1e-9
+    assert abs(run.q[-1, 3]) < 0.01  # joint_range brings q1 to the middle
+
+
+def test_the_sampled_controller_leaves_micrometres(runs: dict[str, nmm.Trajectory]) -> None:
+    run = runs["unicycle_2r_sampled"]
+    assert (run.method, run.dt) == ("zoh", 0.02)
+    steady = run.error_norm[run.t > 20]
+    assert 1e-7 < steady.max() < 1e-4

@@ -1,0 +1,268 @@
+"""run, compare, paper and play: what they print and write, and their exit status."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import yaml
+from command_line import Result, Terminal, process
+
+import nmm
+from nmm.cli.app import status_of
+
+SHORT = ("--set", "duration=0.5")
+Command = Callable[..., Result]
+
+
+@pytest.fixture
+def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Command:
+    """Run a command line in an empty folder, in this process."""
+    monkeypatch.chdir(tmp_path)
+    return lambda *arguments: Result(status_of(arguments), *capfd.readouterr())
+
+
+# run
+
+
+def test_run_writes_its_folder_and_prints_its_numbers(run: Command) -> None:
+    result = run("run", "unicycle_2r_position", *SHORT)
+    assert (result.status, result.err) == (0, "")
+    assert result.value("outcome") == "completed, 0.5 s in 101 samples"
+    assert result.value("resolver") == "RG, rk4, dt 0.005 s"
+    assert result.value("redundancy") == "kinematic 2, static 3"
+    assert result.value("switches of partition") == "0"
+    folder = Path(result.value("files in"))
+    assert folder == Path("runs/unicycle_2r_position-rg")
+    files = {path.name for path in folder.iterdir()}
+    assert {"trajectory.npz", "trajectory.csv", "summary.json", "scenario.yaml"} <= files
+    assert any(name.endswith(".png") for name in files)
+    assert "playback.html" not in files
+    numbers = json.loads((folder / "summary.json").read_text())
+    first, last = map(float, result.value("error of ee.x").removesuffix(" m").split(" → "))
+    with np.load(folder / "trajectory.npz") as file:
+        error = file["error"]
+    assert (first, last) == pytest.approx((error[0, 0], error[-1, 0]), rel=5e-3)
+    assert float(result.value("smallest σ_min")) == pytest.approx(numbers["sigma_min"], rel=5e-3)
+    assert numbers["lateral_slip_max"] <= 1e-12
+
+
+def test_run_takes_resolver_settings_folder_and_html(run: Command) -> None:
+    result = run(
+        "run", "unicycle_2r_position", *SHORT, "--resolver", "pg", "--set", "dt=1/100",
+        "--set", "resolver.alpha=5", "--set", "resolver.weights={v: 2}", "--out", "here/there", "--html",
+    )  # fmt: skip
+    assert (result.status, result.err) == (0, "")
+    assert result.value("resolver") == "PG, rk4, dt 0.01 s"
+    assert result.value("files in") == "here/there"
+    written = yaml.safe_load(Path("here/there/scenario.yaml").read_text())
+    assert written["resolver"] == {"kind": "pg", "tolerance": 1e-10, "alpha": 5.0, "weights": {"v": 2.0}}
+    assert Path("here/there/playback.html").stat().st_size > 100_000
+
+
+def test_a_run_can_be_run_again_from_its_folder(run: Command) -> None:
+    assert run("run", "unicycle_2r_switching", *SHORT, "--out", "first").status == 0
+    assert run("run", "first/scenario.yaml", "--out", "second").status == 0
+    with np.load("first/trajectory.npz") as first, np.load("second/trajectory.npz") as second:
+        for name in first.files:
+            assert np.array_equal(first[name], second[name]), name
+
+
+def test_our_folder_is_replaced(run: Command) -> None:
+    assert run("run", "unicycle_2r_position", *SHORT, "--out", "here").status == 0
+    Path("here/left over").touch()
+    assert run("run", "unicycle_2r_position", *SHORT, "--out", "here", "--set", "dt=0.01").status == 0
+    assert not Path("here/left over").exists()
+    assert json.loads(Path("here/summary.json").read_text())["dt"] == 0.01
+    assert [path.name for path in Path().iterdir()] == ["here"]
+
+
+def test_no_redundancy_left_is_legal_and_said(run: Command) -> None:
+    task = (
+        "task=[{kind: position, frame: ee, axes: xy, reference: [0.9, 0.3]}, "
+        "{kind: coordinates, of: [q1, q2], reference: [0.4, 0.5]}]"
+    )
+    result = run(
+        "run", "unicycle_2r_position", *SHORT, "--set", task, "--resolver", "pg", "--set", "q0={q2: 0.2}"
+    )
+    assert result.status == 0
+    assert result.value("redundancy") == "kinematic none left, static 1"
+    assert result.err.count("\n") == 1
+    assert "no redundancy is left" in result.err
+
+
+def test_a_singular_run_ends_with_what_it_has(run: Command) -> None:
+    """With the arm's base on the wheels' axle J loses rank at q1 = π/2, q2 = 0: where the objective leads."""
+    result = run(
+        "run", "unicycle_2r_position", "--resolver", "pg", "--set", "robot.arguments.d=0",
+        "--set", "q0={q1: 1, q2: 0.3}", "--set", "task.0.reference=[0.35, 0.7]", "--set", "task.0.gain=null",
+        "--set", "objective={kind: quadratic, terms: [{of: q1, target: pi/2}, {of: q2}]}",
+    )  # fmt: skip
+    assert result.status == 1
+    assert result.err.count("\n") == 1
+    assert re.match(
+        r"nmm run: PG singular: at t = [1-9].*J lost rank.*runs/unicycle_2r_position-pg", result.err
+    )
+    folder = Path("runs/unicycle_2r_position-pg")
+    numbers = json.loads((folder / "summary.json").read_text())
+    assert not numbers["complete"]
+    assert numbers["samples"] > 1
+    trajectory = nmm.Trajectory.load(folder)
+    assert len(trajectory) == numbers["samples"]
+    assert trajectory.message
+
+
+def test_a_run_singular_from_the_start_is_written_too(run: Command) -> None:
+    result = run(
+        "run", "unicycle_2r_position", "--set", "robot.arguments.d=0", "--set", "q0={q1: pi/2}",
+        "--set", "resolver.partitions=[[v, q1], [v, omega]]", "--set", "task.0.axes=xy", "--html",
+    )  # fmt: skip
+    assert result.status == 1
+    assert result.err.count("\n") == 1
+    assert re.search(r"nmm run: RG singular: at t = 0 s", result.err)
+    assert result.value("outcome") == "singular"
+    assert json.loads(Path("runs/unicycle_2r_position-rg/summary.json").read_text())["samples"] == 0
+
+
+def test_a_run_whose_step_is_too_long_says_so(run: Command) -> None:
+    result = run("run", "unicycle_2r_pointing", "--set", "resolver.alpha=1000", "--set", "duration=2")
+    assert result.status == 1
+    assert result.err.count("\n") == 1
+    assert re.match(r"nmm run: RG (diverged|unstable|singular): ", result.err)
+    assert "too large" in result.err
+    assert not json.loads(Path("runs/unicycle_2r_pointing-rg/summary.json").read_text())["complete"]
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_an_interrupted_run_leaves_its_part(tmp_path: Path, name: str) -> None:
+    terminal = Terminal(
+        tmp_path, 200, "run", "unicycle_2r_position", "--set", "duration=3000", "--out", "part"
+    )
+    terminal.read_until(" 1%")  # of the progress bar: the run is under way
+    terminal.process.send_signal(getattr(signal, name))
+    shown = terminal.read_until(None)
+    assert terminal.process.wait(timeout=30) == 1, shown
+    line = r"nmm run: RG interrupted: interrupted after .* s of 3000 s; the part .* is in part\r\n"
+    assert re.search(line, shown)
+    assert "Traceback" not in shown
+    numbers = json.loads((tmp_path / "part" / "summary.json").read_text())
+    assert (numbers["outcome"], numbers["complete"]) == ("interrupted", False)
+    trajectory = nmm.Trajectory.load(tmp_path / "part")
+    assert 1 < len(trajectory) < 600_001
+    assert np.all(np.isfinite(trajectory.q))
+    assert [path.name for path in tmp_path.iterdir()] == ["part"]
+
+
+def test_ctrl_c_where_there_is_nothing_to_write(tmp_path: Path) -> None:
+    """While the libraries are still being imported."""
+    running = process(tmp_path, "run", "unicycle_2r_position", "--set", "duration=100000")
+    time.sleep(0.35)
+    running.send_signal(signal.SIGINT)
+    out, err = running.communicate(timeout=30)
+    assert (running.returncode, out) in {
+        (130, ""),
+        (-signal.SIGINT, ""),
+    }  # the latter before Python came to us
+    if running.returncode == 130:
+        assert err == ""
+        assert list(tmp_path.iterdir()) == []
+
+
+# compare
+
+
+def test_compare_makes_one_table_one_figure_one_playback(run: Command) -> None:
+    result = run("compare", "unicycle_2r_pointing", "--resolvers", "rg, pg,ej,rg", *SHORT)
+    assert (result.status, result.err) == (0, "")
+    assert result.out.splitlines()[1].split() == ["RG", "PG", "EJ"]
+    folder = Path(result.value("files in"))
+    assert folder == Path("runs/unicycle_2r_pointing-compare")
+    assert {path.name for path in folder.iterdir()} == {
+        "comparison.png", "playback.html", "summary.json", "rg", "pg", "ej",
+    }  # fmt: skip
+    numbers = json.loads((folder / "summary.json").read_text())
+    assert numbers["complete"]
+    for kind in ("rg", "pg", "ej"):
+        trajectory = nmm.Trajectory.load(folder / kind)
+        assert trajectory.resolver == kind
+        assert numbers["runs"][kind]["objective_final"] == trajectory.objective[-1]
+    assert (folder / "comparison.png").read_bytes()[:4] == b"\x89PNG"
+    # A comparison is ours too: it may be replaced.
+    assert run("compare", "unicycle_2r_pointing", "--resolvers", "rg", *SHORT).status == 0
+
+
+def test_a_comparison_with_a_failed_run_says_so(run: Command) -> None:
+    result = run(
+        "compare", "unicycle_2r_switching", "--resolvers", "pg,rg", "--set", "resolver.alpha=2000", *SHORT
+    )
+    assert result.status == 1
+    assert len(result.err.splitlines()) == 2
+    assert all(line.startswith("nmm compare: ") for line in result.err.splitlines())
+    assert not json.loads(Path("runs/unicycle_2r_switching-compare/summary.json").read_text())["complete"]
+
+
+# paper
+
+
+def test_paper_hands_over_the_folder_and_prints_the_claims(
+    run: Command,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """`write_paper` has its own tests; here it is what the command makes of its report."""
+    import nmm.paper
+
+    for holds, status in ((True, 0), (False, 1)):
+        case = SimpleNamespace(number=1, claims=[SimpleNamespace(statement="RG is faster", holds=holds)])
+        report = SimpleNamespace(cases=[case], holds=holds, index=Path("here/index.html"))
+        asked: list[object] = []
+
+        def write_paper(
+            folder: Path,
+            progress: object = None,
+            report: SimpleNamespace = report,
+            asked: list[object] = asked,
+        ) -> SimpleNamespace:
+            asked += [folder, progress]
+            return report
+
+        monkeypatch.setattr(nmm.paper, "write_paper", write_paper)
+        result = run("paper", "--out", "here")
+        assert result.status == status
+        assert result.value("1").split() == ["RG", "is", "faster", "yes" if holds else "NO"]
+        assert result.value("open") == "here/index.html"
+        assert len(result.err.splitlines()) == status
+        assert asked == [Path("here"), None]
+
+
+# play
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_play_ends_cleanly(run: Command, tmp_path: Path, name: str) -> None:
+    assert run("run", "unicycle_2r_position", "--set", "duration=0.1", "--out", "short").status == 0
+    playing = process(tmp_path, "play", "short", "--no-open")
+    assert playing.stdout is not None
+    line = playing.stdout.readline()
+    assert re.search(r"http://127\.0\.0\.1:\d+", line), line
+    playing.send_signal(getattr(signal, name))
+    _, err = playing.communicate(timeout=15)
+    assert (playing.returncode, err) == (0, "")
+
+
+def test_play_shows_a_comparison(run: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    import nmm.playback
+
+    assert run("compare", "unicycle_2r_position", "--set", "duration=0.1", "--out", "two").status == 0
+    shown = []
+    monkeypatch.setattr(nmm.playback, "play", lambda motions, **options: shown.append((motions, options)))
+    assert run("play", "two", "--port", "7123", "--no-open").status == 0
+    ((motions, options),) = shown
+    assert [motion.label for motion in motions] == ["RG", "PG"]
+    assert options == {"port": 7123, "open_browser": False}

@@ -1,0 +1,304 @@
+"""Scenario files: numbers, strict YAML, settings, and runs that come out again."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from short_scenario import MINIMAL, scenario
+
+from nmm import Scenario, ScenarioError
+from nmm.loading import bundled_scenarios
+from nmm.scenario.numbers import evaluate, number
+
+# Numbers
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("5/4*pi", 5 / 4 * math.pi),
+        ("-pi", -math.pi),
+        ("0.08*pi", 0.08 * math.pi),
+        ("1e-3", 1e-3),
+        ("1e5", 1e5),
+        (".5", 0.5),
+        ("+2.", 2.0),
+        ("2**-2", 0.25),
+        ("2 * (3 - 1) / 8", 0.5),
+        ("sqrt(2)/2", math.sqrt(2) / 2),
+        ("pi**2", math.pi**2),
+    ],
+)
+def test_arithmetic_is_pythons(text: str, value: float) -> None:
+    assert evaluate(text) == value
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "", "pie", "x", "1,2", "1;2", "1\n2", "[1]", "(1,)", "'a'", "True", "None", "1j", "1 == 1",
+        "a=1", "a:=1", "1 if 1 else 2", "lambda: 1", "abs(1)", "sqrt", "sqrt(-1)", "sqrt()", "sqrt(x=1)",
+        "pi.real", "().__class__", "(-1)**0.5", "10**400", "9**9**9**9", "1/0", "1//2", "7%2",
+        "__import__('os')", "1<<3", "010", "nan", ".nan", "inf", "-.inf", "Infinity", "1e999", "1e308*10",
+        "90 deg", "1:30", "(" * 101 + "1" + ")" * 101, "1+" * 200 + "1", "-" * 190 + "x",
+    ],
+)  # fmt: skip
+def test_what_is_no_finite_number_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match=r"expected a (finite )?number") as caught:
+        number(text)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("value", [True, None, [1], {"a": 1}, math.nan, -math.inf, 1j, b"1"])
+def test_data_that_is_no_finite_number_is_refused(value: object) -> None:
+    with pytest.raises(ValueError, match=r"expected a (finite )?number"):
+        number(value)
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    assert number(np.float64(0.1)) == 0.1
+    assert number(np.int64(3)) == 3.0
+
+
+# YAML
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", r"given\.yaml: expected a mapping \(key: value\), got nothing"),
+        ("- a\n- b", r"given\.yaml: expected a mapping"),
+        ("just text", r"given\.yaml: expected a mapping .* got 'just text'"),
+        ("q0: !!python/object/apply:os.system [ls]", r"given\.yaml:1: expected plain YAML, got the tag !!py"),
+        ("robot: a\ndt: !!float 1", r"given\.yaml:2: expected plain YAML, got the tag !!float"),
+        ("robot: a\ndt: !mine 1", r"given\.yaml:2: expected plain YAML, got the tag !mine"),
+        ("dt: 1\nq0: {}\ndt: 2", r"given\.yaml:3: dt: expected every key once"),
+        ("q0: {x: 1,\n x: 2}", r"given\.yaml:2: q0\.x: expected every key once"),
+        ("dt: 1\n---\ndt: 2", r"given\.yaml:2: expected one YAML document"),
+        ("dt: [1\nq0: {", r"given\.yaml:2: not valid YAML"),
+        ("dt:\n\t1", r"given\.yaml:2: not valid YAML"),
+        ("dt: *nobody", r"given\.yaml:1: not valid YAML: found undefined alias"),
+        ("dt: &a [*a]", r"given\.yaml:1: an alias"),
+        ("? [a, b]\n: 1", r"given\.yaml:1: expected a name as key"),
+        ("dt: " + "[" * 1200 + "]" * 1200, r"given\.yaml: not valid YAML: nested too deeply"),
+        ("dt: \x00", r"given\.yaml: not valid YAML"),
+        (
+            "a: &a [x,x,x,x,x,x,x,x,x]\n"
+            + "".join(
+                f"{b}: &{b} [{','.join([f'*{a}'] * 9)}]\n" for a, b in zip("abcdefg", "bcdefgh", strict=True)
+            ),
+            r"given\.yaml:1: expected at most \d+ values",
+        ),
+    ],
+)  # fmt: skip
+def test_yaml_is_read_strictly(text: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match=message) as caught:
+        scenario(tmp_path, text)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_is_not_text_or_not_there(tmp_path: Path) -> None:
+    (tmp_path / "a.yaml").write_bytes(b"robot: \xff\xfe")
+    with pytest.raises(ScenarioError, match=r"a\.yaml: expected UTF-8 text"):
+        Scenario.load(tmp_path / "a.yaml")
+    with pytest.raises(ScenarioError, match=r"b\.yaml: cannot be read \(No such file"):
+        Scenario.load(tmp_path / "b.yaml")
+    with pytest.raises(ScenarioError, match=r"cannot be read \(Is a directory"):
+        Scenario.load(tmp_path)
+
+
+def test_anchors_may_be_used(tmp_path: Path) -> None:
+    text = MINIMAL.replace("reference: [1, 0.5]", "reference: &here [1, 0.5]") + "title: x\n"
+    given = scenario(tmp_path, text.replace("q0: {q1: 0.3, q2: 0.4}", "q0: {q1: &a 0.3, q2: *a}"))
+    assert given.parts.q0 == {"q1": 0.3, "q2": 0.3}
+
+
+def test_words_that_yaml_reads_as_booleans_are_words(tmp_path: Path) -> None:
+    assert scenario(tmp_path, MINIMAL + "title: no\n").title == "no"
+
+
+# Settings
+
+
+def test_settings_reach_every_level(tmp_path: Path) -> None:
+    given = scenario(
+        tmp_path, dt="1e-3", resolver__alpha="5", task__gain="2", q0__x="-pi", robot__arguments__d="0.7"
+    )
+    assert (given.parts.dt, given.parts.task[0].gain, given.parts.q0["x"]) == (1e-3, 2.0, -math.pi)
+    assert given.parts.resolver.alpha == 5.0
+    assert given.robot().arguments["d"] == "0.7"
+    assert given.override("robot.arguments", {"d": 0.7}).robot().arguments["d"] == "0.7"
+    mass = given.robot().model.inertias[3].mass
+    assert mass > 0  # the robot with the other geometry is loaded, not the paper's
+    base = given.robot().model.jointPlacements[4].translation[0]
+    assert base == pytest.approx(0.7)
+
+
+def test_settings_of_lists_count_from_zero() -> None:
+    given = Scenario.load("unicycle_2r_pointing").override("task.1.gain", "7")
+    assert [part.gain for part in given.parts.task] == [1.0, 7.0]
+    with pytest.raises(ScenarioError, match="task is a list; expected an index from 0 to 1, got '2'"):
+        given.override("task.2.gain", "7")
+    with pytest.raises(ScenarioError, match="task is a list; expected an index from 0 to 1, got 'gain'"):
+        given.override("task.gain", "7")
+
+
+@pytest.mark.parametrize(
+    ("key", "message"),
+    [
+        (
+            "resolver.alfa",
+            r"set resolver\.alfa: unknown key 'alfa' \(did you mean 'alpha'\?\); available: .*threshold",
+        ),
+        (
+            "resolvr.alpha",
+            r"unknown key 'resolvr' \(did you mean 'resolver'\?\); available: name, title, robot",
+        ),
+        ("dt.x", r"set dt\.x: dt is '0.005', which has no keys"),
+        ("a..b", r"set a\.\.b: expected a dotted key"),
+        ("", r"set : expected a dotted key"),
+    ],
+)
+def test_settings_that_lead_nowhere(key: str, message: str) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        Scenario.load("unicycle_2r_position", {key: "5"})
+
+
+GARBAGE = (
+    "", "true", "x", "-1", "[]", "{}", "[x]", "[[1]]", "[null]", "{a: 1}", "{kind: [1]}", "{kind: position}",
+    "1e999", "[1, 2, 3]", "[v, q1]", '"a\\0b.urdf"', '"a\\nb"', math.nan, b"x", object(), [{}],
+    {"a": object()},
+)  # fmt: skip
+
+
+def places(value: object, path: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
+    """The path of everything in nested data."""
+    inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    return [path] * bool(path) + [place for key, item in inner for place in places(item, (*path, str(key)))]
+
+
+@pytest.mark.parametrize(
+    "name", ["unicycle_2r_link_pointing", "unicycle_2r_extended_jacobian", "unicycle_3r_spline"]
+)
+def test_garbage_at_any_key_is_taken_or_refused_in_one_line(name: str) -> None:
+    given = Scenario.load(name)
+    given.robot()
+    keys = {
+        ".".join(place) for place in places(yaml.safe_load(given.path.read_text())) + places(given.resolved())
+    }
+    for key in keys:
+        for value in GARBAGE:
+            try:
+                given.override(key, value).controller()
+            except ScenarioError as error:
+                text = str(error)
+                assert text.startswith(str(given.path)), (key, value)
+                assert "\n" not in text, (key, value)
+
+
+def test_settings_change_nothing_but_the_copy() -> None:
+    given = Scenario.load("unicycle_2r_position")
+    before = given.resolved()
+    other = given.override("task.0.reference.radius", 2)
+    assert given.resolved() == before
+    assert other.resolved()["task"]["reference"]["radius"] == 2.0
+
+
+def test_settings_take_data_and_arrays() -> None:
+    given = Scenario.load("unicycle_2r_position", {"q0": np.arange(5.0), "task.0.gain": np.eye(2) * 3})
+    assert given.parts.q0 == [0.0, 1.0, 2.0, 3.0, 4.0]
+    assert given.parts.task[0].gain == [[3.0, 0.0], [0.0, 3.0]]
+
+
+def test_another_resolver_keeps_what_it_knows() -> None:
+    given = Scenario.load("unicycle_2r_position", {"resolver.alpha": 4})
+    assert given.with_resolver("rg") is given
+    pg = given.with_resolver("pg")
+    assert pg.parts.resolver.model_dump() == {"kind": "pg", "tolerance": 1e-10, "alpha": 4.0, "weights": None}
+    assert given.with_resolver("ej").parts.resolver.kind == "ej"
+    with pytest.raises(ScenarioError, match=r"set resolver\.kind: unknown kind 'sqp'; available: rg, pg, ej"):
+        given.with_resolver("sqp")
+
+
+def test_the_robot_is_loaded_once_and_shared() -> None:
+    given = Scenario.load("unicycle_2r_position")
+    assert given.robot() is given.robot()
+    assert given.with_resolver("pg").robot() is given.robot()
+    assert given.override("robot.arguments.d", "0.4").robot() is not given.robot()
+
+
+def test_robot_files_are_relative_to_the_scenario(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    robots, elsewhere = tmp_path / "robots", tmp_path / "elsewhere"
+    robots.mkdir()
+    elsewhere.mkdir()
+    arm = (
+        '<robot name="arm"><link name="base"/><link name="ee"/><joint name="q1" type="continuous">'
+        '<parent link="base"/><child link="ee"/><origin xyz="1 0 0"/><axis xyz="0 0 1"/></joint></robot>'
+    )
+    (robots / "arm.urdf").write_text(arm)
+    monkeypatch.chdir(elsewhere)
+    text = MINIMAL.replace("q0: {q1: 0.3, q2: 0.4}", "q0: {q1: 0.3}")
+    given = scenario(tmp_path, text.replace("unicycle_2r", "robots/arm.urdf"))
+    assert given.robot().q_names == ("x", "y", "theta", "q1")
+    assert given.resolved()["robot"]["source"] == str(robots / "arm.urdf")
+    # A path that is set is relative to the working folder.
+    assert scenario(tmp_path, text, robot="../robots/arm.urdf").robot().q_names[-1] == "q1"
+    with pytest.raises(ScenarioError, match=r"set robot: .*elsewhere/robots/arm\.urdf: no such file"):
+        scenario(tmp_path, text, robot="robots/arm.urdf").robot()
+
+
+# Runs that come out again
+
+
+#: Their objectives are not quadratic, so that they make no constraint for the extended Jacobian.
+NOT_QUADRATIC = ("unicycle_2r_manipulability", "unicycle_3r_spline")
+
+
+@pytest.mark.parametrize(
+    ("name", "resolver"),
+    [
+        (name, resolver)
+        for name in bundled_scenarios()
+        for resolver in ("rg", "pg", "ej")
+        if not (resolver == "ej" and name in NOT_QUADRATIC)
+    ],
+)
+def test_a_resolved_scenario_gives_the_same_run(name: str, resolver: str, tmp_path: Path) -> None:
+    given = Scenario.load(name, {"duration": 0.2}).with_resolver(resolver)
+    first = given.run()
+    assert first.scenario == given.resolved()
+    (tmp_path / "again.yaml").write_text(yaml.safe_dump(first.scenario, sort_keys=False))
+    again = Scenario.load(tmp_path / "again.yaml")
+    second = again.run()
+    assert again.resolved() == first.scenario
+    for array in ("t", "q", "u", "r", "r_d", "error", "objective", "sigma_min", "partition"):
+        assert np.array_equal(getattr(first, array), getattr(second, array)), array
+
+
+def test_resolved_holds_every_default_as_plain_data() -> None:
+    data = Scenario.load("unicycle_2r_pointing", {"resolver.kind": "rg"}).resolved()
+    assert (data["dt"], data["method"], data["tolerance"]) == (0.005, "rk4", 1e-9)
+    assert data["resolver"]["threshold"] == 0.01
+    assert data["robot"] == {
+        "source": "unicycle_2r",
+        "arguments": {},
+        "platform": None,
+        "package_dirs": [],
+        "wheels": None,
+        "locked": {},
+    }
+
+    def plain(value: object) -> bool:
+        if isinstance(value, dict):
+            return all(type(key) is str and plain(item) for key, item in value.items())
+        return (
+            all(map(plain, value))
+            if isinstance(value, list)
+            else type(value) in (str, float, int, bool, type(None))
+        )
+
+    assert plain(data)
