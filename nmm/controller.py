@@ -15,6 +15,7 @@ from nmm.function import Row
 from nmm.objectives.base import Objective
 from nmm.program import Program
 from nmm.resolvers.base import REPORT, Resolver, Shape, Status
+from nmm.resolvers.reduced_gradient import FREE, HELD, OVERDUE
 from nmm.robot import Robot
 from nmm.tasks.task import Stack, Task
 
@@ -209,7 +210,12 @@ class Controller:
 
     def hold_partition(self, hold: bool) -> None:
         """Keep the partition through the calls that follow (the stages of an integration step), or not."""
-        self._state[0] = int(hold)
+        self._state[0] = HELD if hold else FREE
+
+    @property
+    def partition_overdue(self) -> bool:
+        """Whether a call since `hold_partition(True)` kept a partition that is below its threshold."""
+        return bool(self._state[0] == OVERDUE)
 
 
 def _expect(given: object, kind: type, name: str) -> None:

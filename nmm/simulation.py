@@ -36,7 +36,8 @@ def simulate(
     """Integrate q_dot = S(q) u(t, q) from q0 over `duration`, sampled every dt.
 
     The partition of the reduced gradient is decided at the samples and kept between them, as a
-    sampled controller does, so that an integration step sees one smooth right-hand side.
+    sampled controller does, so that an integration step sees one smooth right-hand side. A step on
+    which the partition falls below its threshold is taken again, with the best one at its beginning.
 
     Parameters
     ----------
@@ -77,7 +78,14 @@ def simulate(
             sample = _sample(controller, float(t), q)
             recorder.add(sample)
             if k < steps:
-                q = _advance(controller, advance, sample, float(times[k + 1] - t))
+                dt_k = float(times[k + 1] - t)
+                q, overdue = _advance(controller, advance, sample, dt_k)
+                if overdue:
+                    # The step ran into a singular Ja: take it again with the best partition at its beginning.
+                    controller.reset()
+                    sample = _sample(controller, float(t), sample.q)
+                    recorder.replace_last(sample)
+                    q, _ = _advance(controller, advance, sample, dt_k)
             if progress is not None and k % max(1, steps // 100) == 0:
                 progress(k / steps)
     except SingularError as error:
@@ -92,7 +100,10 @@ def simulate(
         controller.hold_partition(False)
     if progress is not None and outcome is Outcome.COMPLETED:
         progress(1.0)
-    unstable, examined = _examine(controller, recorder, advance, dt)
+    try:
+        unstable, examined = _examine(controller, recorder, advance, dt)
+    except KeyboardInterrupt:  # the motion is there; what is lost is advice
+        unstable, examined = [], 0
     if unstable:
         worst = max(unstable, key=lambda found: found.rate)
         advice = worst.describe(method, dt)
@@ -115,10 +126,16 @@ def _sample(controller: Controller, t: float, q: Array) -> Step:
     return sample
 
 
-def _advance(controller: Controller, advance: Integrator, sample: Step, dt: float) -> Array:
+def _advance(controller: Controller, advance: Integrator, sample: Step, dt: float) -> tuple[Array, bool]:
+    """The next q, and whether the partition held through the step fell below its threshold on the way."""
     controller.hold_partition(True)
     try:
-        return advance.advance(controller.velocity, sample.t, sample.q, sample.q_dot, sample.u, dt)
+        ahead = advance.advance(controller.velocity, sample.t, sample.q, sample.q_dot, sample.u, dt)
+        return ahead, controller.partition_overdue
+    except SingularError:
+        if not controller.partition_overdue:
+            raise
+        return sample.q, True
     finally:
         controller.hold_partition(False)
 

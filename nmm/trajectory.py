@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from nmm.playback import Motion
 
 
+#: Below this ratio of smallest to largest singular value a run is warned about.
+NEARLY_SINGULAR = 1e-3
+
+
 class Outcome(StrEnum):
     """How a run ended."""
 
@@ -198,7 +202,14 @@ class Recorder:
 
     def add(self, sample: Step) -> None:
         """Record one sample."""
-        k = self._count
+        self._write(self._count, sample)
+        self._count += 1
+
+    def replace_last(self, sample: Step) -> None:
+        """Record a sample in the place of the last one."""
+        self._write(self._count - 1, sample)
+
+    def _write(self, k: int, sample: Step) -> None:
         self.q[k] = sample.q
         self._u[k] = sample.u
         self._q_dot[k] = sample.q_dot
@@ -209,13 +220,26 @@ class Recorder:
         self._scalars[1, k] = sample.residual
         self._J[k] = sample.J
         self._partition[k] = sample.partition
-        self._count = k + 1
+
+    def _warn_of_singularities(self, singular_values: Array) -> None:
+        if not len(singular_values):
+            return
+        ratio = singular_values[:, -1] / singular_values[:, 0]
+        worst = int(np.argmin(ratio))
+        if ratio[worst] < NEARLY_SINGULAR:
+            self.warnings.append(
+                f"at t = {self._times[worst]:.3g} s the task Jacobian is nearly singular (condition "
+                f"number {1.0 / max(ratio[worst], 1e-300):.2g}); inputs reach "
+                f"{np.abs(self._u[: self._count]).max():.3g}"
+            )
 
     def trajectory(self, outcome: Outcome, message: str, dt: float, method: str) -> Trajectory:
         """What was recorded."""
         count, controller = self._count, self._controller
         robot, rows = controller.robot, controller.rows
         singular_values = np.linalg.svd(self._J[:count], compute_uv=False).astype(np.float64)
+        if outcome is not Outcome.SINGULAR:  # which says so itself
+            self._warn_of_singularities(singular_values)
         frame, columns, target = _shown(controller)
         path, desired = None, None
         if frame is not None:

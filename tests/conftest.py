@@ -27,3 +27,9 @@ def robots(robot_2r: Robot, robot_3r: Robot) -> dict[str, Robot]:
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(2006)
+
+
+@pytest.fixture(autouse=True)
+def _no_width_from_outside(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever runs the tests may have said how wide a line is (pytest-xdist does)."""
+    monkeypatch.delenv("COLUMNS", raising=False)

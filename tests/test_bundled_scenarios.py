@@ -14,7 +14,7 @@ import nmm.references
 import nmm.resolvers
 import nmm.tasks
 from nmm import Scenario
-from nmm.loading import bundled_scenarios
+from nmm.bundled import bundled_scenarios
 
 PI = math.pi
 PAPER = ("unicycle_2r_position", "unicycle_2r_pointing", "unicycle_2r_link_pointing", "unicycle_3r_position")

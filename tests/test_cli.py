@@ -12,8 +12,8 @@ import pytest
 from command_line import Result, Terminal, imported, process
 
 import nmm
+from nmm.bundled import bundled_robots, bundled_scenarios
 from nmm.cli.app import status_of
-from nmm.loading import bundled_robots, bundled_scenarios
 
 Command = Callable[..., Result]
 

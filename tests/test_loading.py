@@ -18,9 +18,10 @@ import yourdfpy
 from numpy.typing import NDArray
 from urdf_parts import AXIS, LIMIT, inertial, joint, link, random_tree, robot, shape, write
 
-import nmm.loading.bundled as bundled
+import nmm.bundled as bundled
+from nmm.bundled import bundled_robots, bundled_scenarios
 from nmm.errors import InputError, NmmError, RobotError
-from nmm.loading import bundled_robots, bundled_scenarios, load
+from nmm.loading import load
 from nmm.platforms import Unicycle
 from nmm.robot import Robot
 

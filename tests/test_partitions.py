@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from nmm.errors import InputError
 from nmm.resolvers import ExtendedJacobian, ProjectedGradient, ReducedGradient, Status
 from nmm.resolvers.base import Shape
+from nmm.resolvers.reduced_gradient import FREE, HELD, OVERDUE
 
 Array = NDArray[np.float64]
 
@@ -39,7 +40,8 @@ def test_measures_lie_between_0_and_1_and_their_squares_add_up_to_1(
     for basic, expected in measures(J).items():
         held = np.array([1, *basic])
         found = rg.resolve(J, np.zeros(s), np.zeros(m), state=held)
-        assert tuple(found.state) == (1, *basic)
+        below = found.measure < rg.threshold
+        assert tuple(found.state) == (OVERDUE if below else HELD, *basic)
         assert 0.0 <= found.measure <= 1.0 + 1e-12
         assert found.measure == pytest.approx(expected, rel=1e-9, abs=1e-12)
         total += found.measure**2
@@ -150,11 +152,14 @@ def test_the_papers_rule_on_the_paper_robot(rng: np.random.Generator) -> None:
 def test_a_held_partition_stays() -> None:
     """state[0] = 1 is how an integrator keeps one right-hand side through a step."""
     _, state = chosen(planar(0.5, 0.4))
-    state[0] = 1
-    basic, held = chosen(planar(0.001, 0.4), state)
+    state[0] = HELD
+    basic, held = chosen(planar(0.5, 0.4), state)
     assert basic == (0, 2)
-    assert held[0] == 1
-    held[0] = 0
+    assert held[0] == HELD
+    basic, held = chosen(planar(0.001, 0.4), held)
+    assert basic == (0, 2)
+    assert held[0] == OVERDUE
+    held[0] = FREE
     assert chosen(planar(0.001, 0.4), held)[0] == (0, 1)
     # One that is held may become singular; that is reported, not evaded.
     found = ReducedGradient().resolve(np.eye(4)[:2], [1, 1], np.zeros(4), state=np.array([1, 2, 3]))

@@ -11,7 +11,7 @@ import yaml
 from short_scenario import MINIMAL, scenario
 
 from nmm import Scenario, ScenarioError
-from nmm.loading import bundled_scenarios
+from nmm.bundled import bundled_scenarios
 from nmm.scenario.numbers import evaluate, number
 
 # Numbers

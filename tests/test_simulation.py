@@ -113,6 +113,28 @@ def test_a_singular_run_keeps_what_it_has() -> None:
     assert len(run) == 0
 
 
+def test_a_step_into_a_singular_partition_is_taken_again() -> None:
+    """With the paper's threshold and a fast objective the minor of [v, omega] passes zero within one step."""
+    scenario = nmm.Scenario.load("unicycle_2r_switching").override("resolver.threshold", 0.01)
+    run = scenario.override("resolver.alpha", 10).run()
+    assert run.complete
+    assert run.switches == 1
+    # Without taking the step again the minor's sign changes unseen, and omega reaches 1000 rad/s.
+    assert np.abs(run.u).max() < 100.0
+    assert np.all(run.residual < 1e-10)
+    assert run.error_norm[-1] < 1e-6
+
+
+def test_a_target_out_of_reach_is_warned_about(robot_3r: Robot) -> None:
+    """Above the arm's reach J becomes singular in the limit: the run completes, and says so."""
+    out_of_reach = nmm.Task(nmm.Position("ee"), [0.3, 0.0, 1.7])
+    controller = nmm.Controller(robot_3r, out_of_reach, nmm.ProjectedGradient())
+    run = nmm.simulate(controller, {"q2": 0.5, "q3": 0.2}, 5.0)
+    assert any("nearly singular" in warning for warning in run.warnings)
+    within = nmm.simulate(case_1(nmm.load("unicycle_2r")), START, 1.0)
+    assert within.warnings == ()
+
+
 def test_an_interrupted_run_keeps_what_it_has(robot_2r: Robot) -> None:
     def interrupt(fraction: float) -> None:
         if fraction > 0.5:

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from math import isfinite
 from typing import TYPE_CHECKING
 
+from nmm.bundled import bundled_robots, bundled_scenarios
 from nmm.cli.output import show_table, show_text
-from nmm.loading.bundled import bundled_robots, bundled_scenarios
 
 if TYPE_CHECKING:
     from nmm.robot import Robot

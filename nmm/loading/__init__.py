@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from nmm.loading.bundled import bundled_robots, bundled_scenarios
 from nmm.loading.check import Problem, find_problems
 from nmm.loading.load import load
 
-__all__ = ["Problem", "bundled_robots", "bundled_scenarios", "find_problems", "load"]
+__all__ = ["Problem", "find_problems", "load"]

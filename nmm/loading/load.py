@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pinocchio as pin
 
+from nmm.bundled import bundled_robots
 from nmm.errors import InputError, RobotError, unknown
-from nmm.loading.bundled import bundled_robots
 from nmm.loading.chain import CHAIN
 from nmm.loading.check import check
 from nmm.loading.description import SUFFIXES, describe

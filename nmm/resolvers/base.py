@@ -59,7 +59,11 @@ class Shape(NamedTuple):
 
 
 class Setup(NamedTuple):
-    """The numbers that a resolver's kernel reads, and its state at the start (state[0] locks it)."""
+    """The numbers that a resolver's kernel reads, and its state at the start.
+
+    state[0] other than 0 holds what follows (RG's partition); the kernel sets it to 2 where it
+    would have liked to change it.
+    """
 
     parameters: Array
     options: Integers

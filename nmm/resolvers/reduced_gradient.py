@@ -20,6 +20,9 @@ Partition = Sequence[str | int]
 
 MOST_CANDIDATES = 20_000
 
+#: state[0]: the partition may change; it is kept; it was kept although its measure fell below the threshold.
+FREE, HELD, OVERDUE = 0, 1, 2
+
 
 @compiled
 def solve_partition(J: Array, rate: Array, columns: Array, M: Array) -> tuple[float, float]:
@@ -73,7 +76,7 @@ def reduced_gradient(
     """ub = -α (hb - (Ja⁻¹ Jb)ᵀ ha), ua = Ja⁻¹ (rate - Jb ub).
 
     parameters = [α, threshold, tolerance], options = [normalised, candidates...],
-    state = [locked, the s basic columns (-1 before the first call)].
+    state = [FREE, HELD or OVERDUE, the s basic columns (-1 before the first call)].
     """
     s, m = J.shape
     alpha = parameters[0]
@@ -90,9 +93,12 @@ def reduced_gradient(
         best_partition(J, candidates, columns)
     M = np.empty((s, s + m + 1))
     determinant, ratio = solve_partition(J, rate, columns, M)
-    if abs(determinant) < parameters[1] * scale and state[0] == 0:
-        best_partition(J, candidates, columns)
-        determinant, ratio = solve_partition(J, rate, columns, M)
+    if abs(determinant) < parameters[1] * scale:
+        if state[0] == 0:
+            best_partition(J, candidates, columns)
+            determinant, ratio = solve_partition(J, rate, columns, M)
+        else:
+            state[0] = OVERDUE
     report[2] = abs(determinant) / scale
     if ratio <= tolerance:
         report[0] = 1.0 if volume(J, tolerance) == 0.0 else 2.0

@@ -170,7 +170,7 @@ def _with_settings(document: Document, settings: Mapping[str, object]) -> Docume
 
 def _find(name_or_path: str | Path) -> Path:
     """The file of a bundled name or a path."""
-    from nmm.loading.bundled import bundled_scenarios
+    from nmm.bundled import bundled_scenarios
 
     path = Path(name_or_path).expanduser()
     bundled = bundled_scenarios()

@@ -15,11 +15,10 @@ from nmm.references.polynomial import Constant
 from nmm.robot import Robot
 
 
-@dataclass(frozen=True, eq=False)
 class Task:
     """f(q) follows g(t, q): J_bar u = ∂g/∂t + K e, J_bar = (∂f/∂q - ∂g/∂q) S, e = g - f (paper, eq. 13).
 
-    Attributes
+    Parameters
     ----------
     function : f, with s rows
     reference : g, with as many rows: a function of time, of the configuration, or of both;
@@ -28,17 +27,14 @@ class Task:
         part; None for planning mode, without feedback
     """
 
-    function: Function
-    reference: Function
-    gain: ArrayLike | None = 1.0
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.function, Function):
-            raise InputError(
-                f"task: expected a function of the robot, as Position('ee'), got {self.function!r}"
-            )
-        if not isinstance(self.reference, Function):
-            object.__setattr__(self, "reference", Constant(np.atleast_1d(self.reference)))
+    def __init__(
+        self, function: Function, reference: Function | ArrayLike, gain: ArrayLike | None = 1.0
+    ) -> None:
+        if not isinstance(function, Function):
+            raise InputError(f"task: expected a function of the robot, as Position('ee'), got {function!r}")
+        self.function = function
+        self.reference = reference if isinstance(reference, Function) else Constant(np.atleast_1d(reference))
+        self.gain = gain
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         """The rows of f; `InputError` when g has another number of them."""

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from nmm.errors import NmmError
 
-_PACKAGE = Path(__file__).resolve().parent.parent
+_PACKAGE = Path(__file__).resolve().parent
 
 
 def bundled_robots() -> dict[str, Path]:

@@ -1,0 +1,62 @@
+"""The documentation says what the code does."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+from pathlib import Path
+
+import pytest
+
+import nmm
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def test_the_page_of_scenario_keys_is_the_schemas() -> None:
+    path = ROOT / "docs" / "make_scenario_keys.py"
+    spec = importlib.util.spec_from_file_location("make_scenario_keys", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    expected = (ROOT / "docs" / "scenarios.md").read_text(encoding="utf-8")
+    assert module.page() == expected, "run python docs/make_scenario_keys.py"
+
+
+def test_the_readmes_python_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All but the line that opens a browser."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    assert "trajectory.play()" in code
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    exec(code.replace("trajectory.play()", ""), names)
+    trajectory = names["trajectory"]
+    assert isinstance(trajectory, nmm.Trajectory)
+    assert trajectory.complete
+    assert trajectory.error_norm[-1] < 1e-10
+    assert (tmp_path / "runs" / "first" / "motion.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    "page", ["README.md", "docs/architecture.md", "docs/notation.md", "docs/scenarios.md"]
+)
+def test_links_between_files_lead_somewhere(page: str) -> None:
+    text = (ROOT / page).read_text(encoding="utf-8")
+    for target in re.findall(r"\]\((?!http)([^)#]+)\)", text):
+        assert ((ROOT / page).parent / target).exists(), target
+
+
+def test_every_public_name_is_documented() -> None:
+    for name in nmm.__all__:
+        thing = getattr(nmm, name)
+        if callable(thing):
+            assert thing.__doc__, name
+
+
+def test_the_errors_have_one_root() -> None:
+    for name in nmm.__all__:
+        thing = getattr(nmm, name)
+        if isinstance(thing, type) and issubclass(thing, Exception):
+            assert issubclass(thing, nmm.NmmError), name
