@@ -14,8 +14,7 @@ from nmm.errors import InputError, SingularError
 from nmm.function import Row
 from nmm.objectives.base import Objective
 from nmm.program import Program
-from nmm.resolvers.base import REPORT, Resolver, Shape, Status
-from nmm.resolvers.reduced_gradient import FREE, HELD, OVERDUE
+from nmm.resolvers.base import FREE, HELD, OVERDUE, REPORT, Resolver, Shape, Status
 from nmm.robot import Robot
 from nmm.tasks.task import Stack, Task
 

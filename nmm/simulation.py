@@ -12,8 +12,9 @@ from nmm.arrays import Array, positive
 from nmm.controller import Controller, Step
 from nmm.errors import DivergedError, InputError, RunError, SingularError
 from nmm.integrators import Integrator, integrator
+from nmm.recording import Recorder
 from nmm.stability import Instability, find_instability
-from nmm.trajectory import Outcome, Recorder, Trajectory
+from nmm.trajectory import Outcome, Trajectory
 
 #: Coordinates or inputs whose norm is beyond this have diverged, m, rad, m/s or rad/s.
 BOUND = 1e6
@@ -74,20 +75,7 @@ def simulate(
     outcome, message = Outcome.COMPLETED, ""
     controller.reset()
     try:
-        for k, t in enumerate(times):
-            sample = _sample(controller, float(t), q)
-            recorder.add(sample)
-            if k < steps:
-                dt_k = float(times[k + 1] - t)
-                q, overdue = _advance(controller, advance, sample, dt_k)
-                if overdue:
-                    # The step ran into a singular Ja: take it again with the best partition at its beginning.
-                    controller.reset()
-                    sample = _sample(controller, float(t), sample.q)
-                    recorder.replace_last(sample)
-                    q, _ = _advance(controller, advance, sample, dt_k)
-            if progress is not None and k % max(1, steps // 100) == 0:
-                progress(k / steps)
+        _integrate(controller, advance, recorder, times, q, progress)
     except SingularError as error:
         outcome, message = Outcome.SINGULAR, str(error)
     except DivergedError as error:
@@ -98,8 +86,6 @@ def simulate(
         outcome, message = Outcome.INTERRUPTED, f"interrupted after {recorder.reached:g} s of {duration:g} s"
     finally:
         controller.hold_partition(False)
-    if progress is not None and outcome is Outcome.COMPLETED:
-        progress(1.0)
     try:
         unstable, examined = _examine(controller, recorder, advance, dt)
     except KeyboardInterrupt:  # the motion is there; what is lost is advice
@@ -114,6 +100,34 @@ def simulate(
         else:
             message = f"{message}; {advice}"
     return recorder.trajectory(outcome, message, dt, method)
+
+
+def _integrate(
+    controller: Controller,
+    advance: Integrator,
+    recorder: Recorder,
+    times: Array,
+    q: Array,
+    progress: Callable[[float], None] | None,
+) -> None:
+    """From sample to sample, recording each."""
+    steps = len(times) - 1
+    for k, t in enumerate(times):
+        sample = _sample(controller, float(t), q)
+        recorder.add(sample)
+        if k < steps:
+            dt = float(times[k + 1] - t)
+            q, overdue = _advance(controller, advance, sample, dt)
+            if overdue:
+                # The step ran into a singular Ja: take it again with the best partition at its beginning.
+                controller.reset()
+                sample = _sample(controller, float(t), sample.q)
+                recorder.replace_last(sample)
+                q, _ = _advance(controller, advance, sample, dt)
+        if progress is not None and k % max(1, steps // 100) == 0:
+            progress(k / steps)
+    if progress is not None:
+        progress(1.0)
 
 
 def _sample(controller: Controller, t: float, q: Array) -> Step:

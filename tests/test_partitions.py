@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from nmm.errors import InputError
 from nmm.resolvers import ExtendedJacobian, ProjectedGradient, ReducedGradient, Status
-from nmm.resolvers.base import Shape
-from nmm.resolvers.reduced_gradient import FREE, HELD, OVERDUE
+from nmm.resolvers.base import FREE, HELD, OVERDUE, Shape
 
 Array = NDArray[np.float64]
 

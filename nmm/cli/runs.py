@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+import signal
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -36,12 +38,24 @@ def run_scenario(
     folder = out or Path("runs") / f"{scenario.name}-{scenario.parts.resolver.kind}"
     check_folder(folder, is_run)
     trajectory = _run(scenario)
-    trajectory.save(folder, html=html)
+    with _shielded():
+        trajectory.save(folder, html=html)
     show_run(trajectory, folder)
     status = _status("nmm run", [trajectory], folder)
     if play and len(trajectory):
         trajectory.play()
     return status
+
+
+@contextmanager
+def _shielded() -> Iterator[None]:
+    """Whoever presses Ctrl-C twice wants the run to end, not to lose what there is of it."""
+    before = {number: signal.signal(number, signal.SIG_IGN) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def compare_resolvers(
@@ -58,7 +72,8 @@ def compare_resolvers(
         trajectories.append(_run(scenario))
         if trajectories[-1].outcome == "interrupted":
             break
-    _write_comparison(scenarios[0].name, trajectories, folder)
+    with _shielded():
+        _write_comparison(scenarios[0].name, trajectories, folder)
     table = [dict(describe(trajectory, folder / trajectory.resolver)) for trajectory in trajectories]
     labels = list(dict.fromkeys(label for column in table for label in column))
     show_table(

@@ -41,6 +41,10 @@ _MEANINGS = {
     Status.NOT_FINITE: "an input is not finite: the task, its reference or the objective is undefined here",
 }
 
+#: state[0]: what the kernel chose (RG's partition) may change; it is kept; it was kept although it fell below
+#: its threshold.
+FREE, HELD, OVERDUE = 0, 1, 2
+
 #: report = [status, ‖J u - rate‖, measure of the matrix inverted]
 REPORT = 3
 
@@ -61,8 +65,7 @@ class Shape(NamedTuple):
 class Setup(NamedTuple):
     """The numbers that a resolver's kernel reads, and its state at the start.
 
-    state[0] other than 0 holds what follows (RG's partition); the kernel sets it to 2 where it
-    would have liked to change it.
+    state[0] is FREE, HELD or OVERDUE; what follows is the kernel's own (RG: the columns of Ja).
     """
 
     parameters: Array

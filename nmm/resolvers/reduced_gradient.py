@@ -13,15 +13,12 @@ from nmm.arrays import Array, positive
 from nmm.compiled import RESOLVER, Kernel, compiled, kernel
 from nmm.errors import InputError, unknown
 from nmm.linear_algebra import eliminate, orthonormal_rows, residual_norm
-from nmm.resolvers.base import Resolver, Setup, Shape
+from nmm.resolvers.base import FREE, OVERDUE, Resolver, Setup, Shape
 
 #: A partition: the inputs whose columns form Ja, by name or by index.
 Partition = Sequence[str | int]
 
 MOST_CANDIDATES = 20_000
-
-#: state[0]: the partition may change; it is kept; it was kept although its measure fell below the threshold.
-FREE, HELD, OVERDUE = 0, 1, 2
 
 
 @compiled
@@ -94,7 +91,7 @@ def reduced_gradient(
     M = np.empty((s, s + m + 1))
     determinant, ratio = solve_partition(J, rate, columns, M)
     if abs(determinant) < parameters[1] * scale:
-        if state[0] == 0:
+        if state[0] == FREE:
             best_partition(J, candidates, columns)
             determinant, ratio = solve_partition(J, rate, columns, M)
         else:
