@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -266,3 +269,21 @@ def test_play_shows_a_comparison(run: Command, monkeypatch: pytest.MonkeyPatch) 
     ((motions, options),) = shown
     assert [motion.label for motion in motions] == ["RG", "PG"]
     assert options == {"port": 7123, "open_browser": False}
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_playback_in_a_scripts_background_ends_when_told_to(
+    run: Command, tmp_path: Path, number: signal.Signals
+) -> None:
+    """A shell without job control starts what comes before "&" with SIGINT ignored."""
+    run("run", "unicycle_2r_position", *SHORT, "--out", "short")
+    line = f"{sys.executable} -u -m nmm play short --no-open & echo $!; wait $!"
+    shell = subprocess.Popen(["bash", "-c", line], cwd=tmp_path, text=True, stdout=subprocess.PIPE)
+    assert shell.stdout is not None
+    player = int(shell.stdout.readline())
+    assert "http://127.0.0.1:" in shell.stdout.readline()
+    os.kill(player, number)
+    assert shell.wait(30) == 0
+    shell.stdout.close()
+    with pytest.raises(ProcessLookupError):
+        os.kill(player, 0)

@@ -300,8 +300,10 @@ def main() -> NoReturn:
     # The libraries' objects stay: looking through them for garbage, again and again and once more at the
     # end, is a fifth of a short run's time.
     gc.set_threshold(100_000, 50, 50)
-    # A run that is told to end writes what it has, whether by Ctrl-C or by the system.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    # A run that is told to end writes what it has, whether by Ctrl-C, by the system, or by a script that
+    # started it with "&" (for which the shell has set SIGINT to be ignored).
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
     status = status_of(sys.argv[1:])
     gc.freeze()
     sys.exit(status)
