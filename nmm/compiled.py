@@ -16,8 +16,7 @@ import hashlib
 import math
 import shutil
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -52,19 +51,32 @@ RESOLVER = types.void(
 )
 
 
-@dataclass(frozen=True, eq=False)
 class Kernel:
-    """A function in its two forms: `plain` Python and compiled, reachable by `address`.
+    """A function in its two forms: `plain` Python, and `compiled`, which calling the kernel calls.
 
-    Calling the kernel calls the compiled form.
+    It is compiled (or its compiled form read from the cache) when first called or when its
+    `address` is first asked for: a run pays for the kernels that it uses.
     """
 
-    plain: Plain
-    compiled: Plain
-    address: int
+    def __init__(self, plain: Plain, signature: Any) -> None:
+        self.plain = plain
+        self.compiled = compiled(plain)
+        self._signature = signature
 
     def __call__(self, *arguments: Any) -> None:
         self.compiled(*arguments)
+
+    @cached_property
+    def address(self) -> int:
+        """Where the machine code of the compiled form begins: what compiled programs call it by."""
+        if isinstance(self.compiled, Dispatcher):
+            self.compiled.compile(self._signature.args)
+            result = self.compiled.overloads[self._signature.args]
+            address = int(result.library.get_pointer_to_function(result.fndesc.llvm_func_name))
+        else:  # NUMBA_DISABLE_JIT=1: run as it stands
+            address = id(self.plain)
+        _plain_by_address[address] = self.plain
+        return address
 
 
 #: How many folders of compiled kernels are kept.
@@ -118,18 +130,10 @@ inlined = numba.extending.register_jitable
 
 
 def kernel(signature: Any) -> Callable[[Plain], Kernel]:
-    """Decorator: compile a function of one of this module's signatures into a `Kernel`."""
+    """Decorator: make a function of one of this module's signatures a `Kernel`."""
 
     def decorate(function: Plain) -> Kernel:
-        dispatcher = compiled(function)
-        if not isinstance(dispatcher, Dispatcher):  # NUMBA_DISABLE_JIT=1: run as it stands
-            address = id(function)
-        else:
-            dispatcher.compile(signature.args)
-            result = dispatcher.overloads[signature.args]
-            address = result.library.get_pointer_to_function(result.fndesc.llvm_func_name)
-        _plain_by_address[address] = function
-        return Kernel(function, dispatcher, address)
+        return Kernel(function, signature)
 
     return decorate
 
@@ -138,8 +142,8 @@ def view(memory: Any, first: int, shape: tuple[int, ...]) -> Any:
     """A view of contiguous `memory` from its element `first` on, of the given shape.
 
     Compiled, it is a pointer, a shape and strides, and no more: no bounds are checked and no
-    references counted, which slices and `reshape` do, at half the cost of a control step. Whoever calls the
-    compiled code holds the memory while it runs.
+    references counted, which slices and `reshape` do, at half the cost of a control step. Whoever
+    calls the compiled code holds the memory while it runs.
     """
     return memory.reshape(-1)[first : first + math.prod(shape)].reshape(shape)
 

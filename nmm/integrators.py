@@ -6,7 +6,6 @@ Methods are data: an explicit Runge-Kutta method is its tableau and its stabilit
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -30,21 +29,38 @@ class Integrator(Protocol):
         """q at t + dt, from q, q_dot and u at t."""
 
 
-@dataclass(frozen=True)
-class RungeKutta:
-    """An explicit method: nodes c, rows of the matrix A, weights b."""
+@compiled
+def combined(q: Array, dt: float, weights: Array, slopes: Array) -> Array:
+    """q + dt Σ weights[k] slopes[k]; the slopes are summed first, so that q is rounded once."""
+    ahead = np.empty_like(q)
+    for i in range(q.shape[0]):
+        total = 0.0
+        for k in range(weights.shape[0]):
+            total += weights[k] * slopes[k, i]
+        ahead[i] = q[i] + dt * total
+    return ahead
 
-    nodes: tuple[float, ...]
-    matrix: tuple[tuple[float, ...], ...]
-    weights: tuple[float, ...]
-    stability: tuple[float, ...]
+
+class RungeKutta:
+    """An explicit method: nodes c, rows of the matrix A, weights b, stability polynomial."""
+
+    def __init__(
+        self,
+        nodes: tuple[float, ...],
+        matrix: tuple[tuple[float, ...], ...],
+        weights: tuple[float, ...],
+        stability: tuple[float, ...],
+    ) -> None:
+        self.stability = stability
+        self._stages = [(node, np.array(row)) for node, row in zip(nodes, matrix, strict=True)]
+        self._weights = np.array(weights)
 
     def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
-        slopes = np.empty((len(self.weights), q.size))
+        slopes = np.empty((self._weights.size, q.size))
         slopes[0] = q_dot
-        for k, (node, row) in enumerate(zip(self.nodes, self.matrix, strict=True), start=1):
-            slopes[k] = velocity(t + node * dt, q + dt * np.dot(row, slopes[:k]))
-        ahead: Array = q + dt * np.dot(self.weights, slopes)  # summed first: q is rounded once a step
+        for k, (node, row) in enumerate(self._stages, start=1):
+            slopes[k] = velocity(t + node * dt, combined(q, dt, row, slopes))
+        ahead: Array = combined(q, dt, self._weights, slopes)
         return ahead
 
 
