@@ -194,7 +194,7 @@ class Controller:
             q_dot=found.q_dot.copy(),
             residual=float(found.report[1]),
             status=Status(int(found.report[0])),
-            measure=float(found.report[2]),
+            measure=abs(float(found.report[2])),
             partition=self._state[1:].copy(),
         )
 
@@ -210,6 +210,12 @@ class Controller:
     def hold_partition(self, hold: bool) -> None:
         """Keep the partition through the calls that follow (the stages of an integration step), or not."""
         self._state[0] = HELD if hold else FREE
+
+    @property
+    def partition_sign(self) -> int:
+        """Sign of det Ja in the last call (0 without a partition): between two signs Ja is singular."""
+        determinant = self._results.report[2] if self._state[1] >= 0 else 0.0
+        return int(determinant > 0.0) - int(determinant < 0.0)
 
     @property
     def partition_overdue(self) -> bool:

@@ -141,11 +141,19 @@ def _sample(controller: Controller, t: float, q: Array) -> Step:
 
 
 def _advance(controller: Controller, advance: Integrator, sample: Step, dt: float) -> tuple[Array, bool]:
-    """The next q, and whether the partition held through the step fell below its threshold on the way."""
+    """The next q, and whether the partition held through the step became singular on the way.
+
+    It did where it fell below its threshold at a stage, or where det Ja changed its sign.
+    """
+    sign = controller.partition_sign
     controller.hold_partition(True)
     try:
         ahead = advance.advance(controller.velocity, sample.t, sample.q, sample.q_dot, sample.u, dt)
-        return ahead, controller.partition_overdue
+        overdue = controller.partition_overdue
+        if sign and not overdue:
+            controller.velocity(sample.t + dt, ahead)
+            overdue = controller.partition_sign == -sign
+        return ahead, overdue
     except SingularError:
         if not controller.partition_overdue:
             raise

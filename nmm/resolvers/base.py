@@ -45,7 +45,7 @@ _MEANINGS = {
 #: its threshold.
 FREE, HELD, OVERDUE = 0, 1, 2
 
-#: report = [status, ‖J u - rate‖, measure of the matrix inverted]
+#: report = [status, ‖J u - rate‖, measure of the matrix inverted, with a sign where it is a determinant's]
 REPORT = 3
 
 
@@ -175,4 +175,4 @@ class Resolver(ABC):
         rate, h = vector(rate, s, "rate"), vector(h, m, "h")
         self.kernel(J, rate, Jc, rate_c, h, setup.parameters, setup.options, state, u, report)
         self.finish(J, rate, h, u, report)
-        return Resolution(u, float(report[1]), Status(int(report[0])), float(report[2]), state)
+        return Resolution(u, float(report[1]), Status(int(report[0])), abs(float(report[2])), state)

@@ -96,7 +96,7 @@ def reduced_gradient(
             determinant, ratio = solve_partition(J, rate, columns, M)
         else:
             state[0] = OVERDUE
-    report[2] = abs(determinant) / scale
+    report[2] = determinant / scale
     if ratio <= tolerance:
         report[0] = 1.0 if volume(J, tolerance) == 0.0 else 2.0
         return
