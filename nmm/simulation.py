@@ -110,20 +110,30 @@ def _integrate(
     q: Array,
     progress: Callable[[float], None] | None,
 ) -> None:
-    """From sample to sample, recording each."""
+    """From sample to sample, recording each.
+
+    A step on which the partition became singular is taken again with the best one at its beginning:
+    one that fell below its threshold at a stage, or whose determinant has another sign after it.
+    """
     steps = len(times) - 1
-    for k, t in enumerate(times):
-        sample = _sample(controller, float(t), q)
+    sample, sign = _sample(controller, float(times[0]), q), controller.partition_sign
+    recorder.add(sample)
+    for k in range(steps):
+        t, dt = float(times[k + 1]), float(times[k + 1] - times[k])
+        q, singular = _advance(controller, advance, sample, dt)
+        if not singular:
+            ahead = _sample(controller, t, q)
+            singular = sign * controller.partition_sign < 0 and np.array_equal(
+                ahead.partition, sample.partition
+            )
+        if singular:
+            controller.reset()
+            sample = _sample(controller, sample.t, sample.q)
+            recorder.replace_last(sample)
+            q, _ = _advance(controller, advance, sample, dt)
+            ahead = _sample(controller, t, q)
+        sample, sign = ahead, controller.partition_sign
         recorder.add(sample)
-        if k < steps:
-            dt = float(times[k + 1] - t)
-            q, overdue = _advance(controller, advance, sample, dt)
-            if overdue:
-                # The step ran into a singular Ja: take it again with the best partition at its beginning.
-                controller.reset()
-                sample = _sample(controller, float(t), sample.q)
-                recorder.replace_last(sample)
-                q, _ = _advance(controller, advance, sample, dt)
         if progress is not None and k % max(1, steps // 100) == 0:
             progress(k / steps)
     if progress is not None:
@@ -141,19 +151,11 @@ def _sample(controller: Controller, t: float, q: Array) -> Step:
 
 
 def _advance(controller: Controller, advance: Integrator, sample: Step, dt: float) -> tuple[Array, bool]:
-    """The next q, and whether the partition held through the step became singular on the way.
-
-    It did where it fell below its threshold at a stage, or where det Ja changed its sign.
-    """
-    sign = controller.partition_sign
+    """The next q, and whether the partition held through the step fell below its threshold at a stage."""
     controller.hold_partition(True)
     try:
         ahead = advance.advance(controller.velocity, sample.t, sample.q, sample.q_dot, sample.u, dt)
-        overdue = controller.partition_overdue
-        if sign and not overdue:
-            controller.velocity(sample.t + dt, ahead)
-            overdue = controller.partition_sign == -sign
-        return ahead, overdue
+        return ahead, controller.partition_overdue
     except SingularError:
         if not controller.partition_overdue:
             raise

@@ -299,7 +299,7 @@ def main() -> NoReturn:
             stream.reconfigure(errors="replace")  # a terminal that knows no Greek gets "?"
     # The libraries' objects stay: looking through them for garbage, again and again and once more at the
     # end, is a fifth of a short run's time.
-    gc.set_threshold(100_000, 50, 50)
+    gc.set_threshold(1_000_000, 50, 50)
     # A run that is told to end writes what it has, whether by Ctrl-C, by the system, or by a script that
     # started it with "&" (for which the shell has set SIGINT to be ignored).
     for number in (signal.SIGINT, signal.SIGTERM):
