@@ -75,6 +75,13 @@ class Recorder:
         self._J[k] = sample.J
         self._partition[k] = sample.partition
 
+    def warn_of_partition(self, sample: Step) -> None:
+        """Ja became singular after this sample, and no candidate was better: said once a run."""
+        names = ", ".join(self._controller.robot.u_names[column] for column in sample.partition)
+        warning = f"the block Ja of [{names}] became singular and no other candidate was better"
+        if not any(warning in said for said in self.warnings):
+            self.warnings.append(f"at t = {sample.t:.3g} s {warning}: give more partitions")
+
     def _warn_of_singularities(self, singular_values: Array) -> None:
         if not len(singular_values):
             return

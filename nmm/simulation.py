@@ -128,10 +128,12 @@ def _integrate(
             )
         if singular:
             controller.reset()
-            sample = _sample(controller, sample.t, sample.q)
+            sample, sign = _sample(controller, sample.t, sample.q), controller.partition_sign
             recorder.replace_last(sample)
             q, _ = _advance(controller, advance, sample, dt)
             ahead = _sample(controller, t, q)
+            if sign * controller.partition_sign < 0 and np.array_equal(ahead.partition, sample.partition):
+                recorder.warn_of_partition(sample)
         sample, sign = ahead, controller.partition_sign
         recorder.add(sample)
         if progress is not None and k % max(1, steps // 100) == 0:

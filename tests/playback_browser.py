@@ -90,7 +90,7 @@ def small_robot(tmp_path_factory: pytest.TempPathFactory) -> Robot:
 
 
 def file_url(motions: list[Motion], folder: Path, **options: object) -> str:
-    return write_html(motions, folder / "playback.html", **options).as_uri()  # type: ignore[arg-type]
+    return write_html(motions, folder / "playback.html", **options).as_uri()  # type: ignore[arg-type]  # each test gives its own
 
 
 def drawn_visuals(page: Page, motion: int = 0) -> dict[str, np.ndarray]:

@@ -80,15 +80,20 @@ def test_names_and_S(name: str, robots: dict[str, Robot], rng: np.random.Generat
         close(configuration.S, twin.S(configuration.q), 1e-15)
 
 
-def test_planar_position(planar: tuple[Robot, twin.Planar], rng: np.random.Generator) -> None:
-    robot, paper = planar
-    tip = Position("ee", "xy")
+def check_position(
+    robot: Robot, paper: twin.Planar | twin.Elbow, tip: Position, rng: np.random.Generator
+) -> None:
+    """f, J and every minor."""
     for configuration in configurations(robot, rng):
         q = configuration.q
         close(tip.evaluate(0.0, configuration).value, paper.f(q))
         J = jacobian(configuration, tip)
         close(J, paper.J(q))
         assert_minors(J, paper.minors(q))
+
+
+def test_planar_position(planar: tuple[Robot, twin.Planar], rng: np.random.Generator) -> None:
+    check_position(*planar, Position("ee", "xy"), rng)
 
 
 def test_planar_with_orientation(planar: tuple[Robot, twin.Planar], rng: np.random.Generator) -> None:
@@ -121,14 +126,7 @@ def test_planar_configuration_dependent(planar: tuple[Robot, twin.Planar], rng: 
 
 
 def test_elbow_position(elbow: tuple[Robot, twin.Elbow], rng: np.random.Generator) -> None:
-    robot, paper = elbow
-    tip = Position("ee", "xyz")
-    for configuration in configurations(robot, rng):
-        q = configuration.q
-        close(tip.evaluate(0.0, configuration).value, paper.f(q))
-        J = jacobian(configuration, tip)
-        close(J, paper.J(q))
-        assert_minors(J, paper.minors(q))
+    check_position(*elbow, Position("ee", "xyz"), rng)
 
 
 @pytest.mark.parametrize("case", CASES, ids=[case.name for case in CASES])

@@ -128,6 +128,15 @@ def test_a_step_into_a_singular_partition_is_taken_again(dt: float) -> None:
     assert run.error_norm[-1] < 1e-6
 
 
+def test_a_singular_partition_without_an_alternative_is_warned_about() -> None:
+    changes = {"resolver.partitions": [["v", "omega"]], "resolver.alpha": 10, "dt": 0.01}
+    run = nmm.Scenario.load("unicycle_2r_switching", changes).run()
+    (warning,) = (text for text in run.warnings if "block Ja" in text)
+    assert "[v, omega]" in warning
+    assert run.switches == 0
+    assert nmm.Scenario.load("unicycle_2r_switching").run().warnings == ()
+
+
 def test_a_target_out_of_reach_is_warned_about(robot_3r: Robot) -> None:
     """Above the arm's reach J becomes singular in the limit: the run completes, and says so."""
     out_of_reach = nmm.Task(nmm.Position("ee"), [0.3, 0.0, 1.7])

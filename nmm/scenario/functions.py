@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
 from nmm.scenario.keys import KeyedError, Part, at, kind_of
-from nmm.scenario.numbers import Number, NumberList, Numbers, Positive, Whole, nested, number, shown
+from nmm.scenario.numbers import (
+    Number,
+    NumberList,
+    Numbers,
+    Positive,
+    Whole,
+    nested,
+    numbers_by_name,
+    shown,
+)
 
 if TYPE_CHECKING:
     from nmm.function import Function
@@ -22,13 +32,7 @@ def combination(value: object) -> str | dict[str, float]:
     if isinstance(value, str):
         return value
     if isinstance(value, Mapping) and value:
-        result = {}
-        for name, coefficient in value.items():
-            try:
-                result[str(name)] = number(coefficient)
-            except ValueError as error:
-                raise ValueError(f"coefficient of {name}: {error}") from None
-        return result
+        return numbers_by_name(value, "coefficient of ")
     raise ValueError(
         f"expected a coordinate's name, or coefficients by name ({{theta: 1, q1: 1}}), got {shown(value)}"
     )
@@ -46,9 +50,9 @@ def check_combination(combination: str | dict[str, float], robot: Robot) -> None
 class FunctionPart(Part):
     """A function phi(t, q) of the library."""
 
+    @abstractmethod
     def make(self, robot: Robot, unit: str) -> Function:
         """The function; `unit` is that of values whose unit the file leaves open."""
-        raise NotImplementedError
 
     def build(self, robot: Robot, unit: str = "m") -> Function:
         """`make`, with the robot's word on it: errors know their key."""

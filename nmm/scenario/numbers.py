@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import math
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from numbers import Real
 from typing import Annotated, Any
 
@@ -129,3 +129,14 @@ Whole = Annotated[int, BeforeValidator(integer)]
 Numbers = Annotated[Nested, BeforeValidator(nested)]
 #: A list of numbers (a vector) or of lists of them (a matrix).
 NumberList = Annotated[list[Nested], BeforeValidator(numbers)]
+
+
+def numbers_by_name(value: Mapping[Any, object], what: str = "") -> dict[str, float]:
+    """Numbers by name; `ValueError` names the one that is none, after `what` ("coefficient of ")."""
+    result = {}
+    for name, item in value.items():
+        try:
+            result[str(name)] = number(item)
+        except ValueError as error:
+            raise ValueError(f"{what}{name}: {error}") from None
+    return result

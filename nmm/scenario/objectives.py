@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
@@ -21,9 +22,9 @@ class ObjectivePart(Part):
     weight: Positive = Field(1.0, description="factor on this objective in the sum, above 0")
     maximise: bool = Field(False, description="whether to maximise it: its negative is minimised")
 
+    @abstractmethod
     def make(self, robot: Robot) -> Objective:
         """The library's object, without weight and sign."""
-        raise NotImplementedError
 
     def build(self, robot: Robot) -> Objective:
         """The weighted objective; errors know their key."""

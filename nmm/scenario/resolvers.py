@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -23,9 +24,9 @@ class ResolverPart(Part):
         1e-10, description="a matrix counts as singular below this ratio of smallest to largest pivot"
     )
 
+    @abstractmethod
     def make(self) -> Resolver:
         """The library's object."""
-        raise NotImplementedError
 
     def build(self) -> Resolver:
         """`make`; errors know their key."""

@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field
 from nmm.errors import InputError
 from nmm.scenario.functions import ConstantPart
 from nmm.scenario.keys import Part, at
-from nmm.scenario.numbers import Nested, Number, Positive, number, numbers, shown
+from nmm.scenario.numbers import Nested, Number, Positive, numbers, numbers_by_name, shown
 from nmm.scenario.objectives import ObjectiveList, QuadraticPart, build_objective
 from nmm.scenario.resolvers import ExtendedJacobianPart, ResolverKind
 from nmm.scenario.tasks import CoordinatesTask, TaskList, build_tasks, listed
@@ -31,21 +31,13 @@ def _argument(value: object) -> str:
 
 def _coordinates(value: object) -> dict[str, float] | list[Nested]:
     """Numbers by name, or a list of them."""
-    if not isinstance(value, Mapping):
-        return numbers(value)
-    result = {}
-    for name, item in value.items():
-        try:
-            result[str(name)] = number(item)
-        except ValueError as error:
-            raise ValueError(f"{name}: {error}") from None
-    return result
+    return numbers_by_name(value) if isinstance(value, Mapping) else numbers(value)
 
 
 def _wheels(value: object) -> object:
     """Names, or radii by name."""
     if isinstance(value, Mapping):
-        return {str(name): number(radius) for name, radius in value.items()}
+        return numbers_by_name(value)
     if value is None or isinstance(value, list | tuple):
         return value
     raise ValueError(f"expected a list of joints, or a radius for each, got {shown(value)}")
