@@ -10,7 +10,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from nmm.errors import NmmError
-from nmm.robot import Robot
+from nmm.robot import CENTER_OF_MASS, Robot
 
 Array = NDArray[np.float64]
 
@@ -56,6 +56,12 @@ class Configuration:
             pin.getFrameJacobian(self.robot.model, self._data, frame_id, JACOBIAN_FRAME), order="C"
         )
 
+    def center_of_mass(self) -> tuple[Array, Array]:
+        """Centre of mass (3,) in the world, m, and its Jacobian in the coordinates, (3, n)."""
+        model, data = self.robot.model, self.robot.model.createData()
+        jacobian = np.array(pin.jacobianCenterOfMass(model, data, self.q, False), order="C")
+        return np.array(data.com[0]), jacobian
+
     def hessian(self, frame: str) -> Array:
         """H[i, j, k] = d jacobian[i, j] / dq[k], shape (6, n, n).
 
@@ -82,8 +88,10 @@ def kinematics_updater(
 
     The function returned, `update(t, q)`, computes the kinematics of k frames at q (n,), float64,
     in world axes: `placements` (k, 3, 4) = [R | p], `jacobians` (k, 6, n) and, if it is not empty,
-    `hessians` (k, 6, n, n). The time is not read.
+    `hessians` (k, 6, n, n). The time is not read. The frame `CENTER_OF_MASS` is the point, with world axes.
     """
+    if CENTER_OF_MASS in frames:
+        return _with_center_of_mass(robot, frames, placements, jacobians, hessians)
     model, data = robot.model, robot.model.createData()
     compute_jacobians, update_placement = pin.computeJointJacobians, pin.updateFramePlacement
     frame_jacobian, axes = pin.getFrameJacobian, JACOBIAN_FRAME
@@ -108,6 +116,30 @@ def kinematics_updater(
             hessian[...] = frame_hessian(pin.getFrameKinematicHessian(model, data, frame_id, axes))
 
     return update_with_hessians if hessians.size else update
+
+
+def _with_center_of_mass(
+    robot: Robot, frames: tuple[str, ...], placements: Array, jacobians: Array, hessians: Array
+) -> Callable[[float, Array], None]:
+    """`kinematics_updater` for frames among which the centre of mass is: that one's slot apart."""
+    if hessians.size:
+        raise NmmError("the centre of mass has no Hessian here: no objective may ask for one beside it")
+    slot = frames.index(CENTER_OF_MASS)
+    others = [k for k in range(len(frames)) if k != slot]
+    other_placements, other_jacobians = placements[others], jacobians[others]
+    update_others = kinematics_updater(
+        robot, tuple(frames[k] for k in others), other_placements, other_jacobians, hessians
+    )
+    model, data = robot.model, robot.model.createData()
+    placements[slot, :, :3] = np.eye(3)
+
+    def update(t: float, q: Array) -> None:
+        update_others(t, q)
+        placements[others], jacobians[others] = other_placements, other_jacobians
+        jacobians[slot, :3] = pin.jacobianCenterOfMass(model, data, q, False)
+        placements[slot, :, 3] = data.com[0]
+
+    return update
 
 
 def _matrix_view(placement: pin.SE3) -> Array:

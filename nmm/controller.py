@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, Integers
-from nmm.equations import Results, drive, results, step
+from nmm.equations import PLAIN, WRAPPED, Results, drive, results, step
 from nmm.errors import InputError, SingularError
 from nmm.function import Row
 from nmm.objectives.base import Objective
 from nmm.program import Program
 from nmm.resolvers.base import FREE, HELD, OVERDUE, REPORT, Resolver, Shape, Status
 from nmm.robot import Robot
+from nmm.tasks.comparison import Comparison
 from nmm.tasks.task import Stack, Task
 
 FLOAT64 = np.dtype(np.float64)
@@ -88,18 +89,18 @@ class Controller:
 
         every = (*self.task, *self.constraint)
         weighted = () if objective is None else objective.terms_on(robot)
-        functions = [f for task in every for f in (task.function, task.reference)]
+        functions = [f for task in every for f in (task.function, task.reference, Comparison(task))]
         program = Program(robot, [*functions, *(function for _, function in weighted)])
         first = program.first_rows
         table = [
-            (first[2 * i] + j, first[2 * i + 1] + j, int(row.angular))
+            (first[3 * i] + j, first[3 * i + 1] + j, _error_row(task, first[3 * i + 2], j, row))
             for i, task in enumerate(every)
             for j, row in enumerate(task.rows(robot))
         ]
         s, k, m = len(self.rows), len(constraint_rows), robot.n_u
-        setup = resolver.setup(Shape(s, k, robot.u_names))
+        setup = resolver.setup(Shape(s, k, robot.u_names, robot.groups))
         program.pack(
-            [[s, k, m, resolver.kernel.address], table, first[2 * len(every) :], setup.options],
+            [[s, k, m, resolver.kernel.address], table, first[3 * len(every) :], setup.options],
             [
                 _gains(self.task, robot),
                 _gains(self.constraint, robot),
@@ -226,6 +227,12 @@ class Controller:
 def _expect(given: object, kind: type, name: str) -> None:
     if not isinstance(given, kind):
         raise InputError(f"controller: expected a {kind.__name__} as {name}, got {given!r}")
+
+
+def _error_row(task: Task, computed: int, component: int, row: Row) -> int:
+    if task.function.comparison is not None:
+        return computed + component
+    return WRAPPED if row.angular else PLAIN
 
 
 def _gains(stack: Stack, robot: Robot) -> Array:

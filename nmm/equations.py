@@ -52,6 +52,9 @@ SHAPE, ROWS, TERMS, OPTIONS = TABLES, TABLES + 1, TABLES + 2, TABLES + 3
 GAINS, CONSTRAINT_GAINS, WEIGHTS, RESOLVER = NUMBERS, NUMBERS + 1, NUMBERS + 2, NUMBERS + 3
 BLOCK = MEMORY
 
+#: Instead of the row of an error that is computed: the error is target - value; an angle's, wrapped.
+PLAIN, WRAPPED = -1, -2
+
 
 @inlined
 def equation_views(s: int, m: int, memory: Array, first: int) -> Equation:
@@ -111,16 +114,28 @@ def drive(u: Array, G: Array, q_dot: Array) -> None:
 
 @compiled
 def write_equation(rows: Array, gain: Array, b: Buffers, e: Equation) -> None:
-    """rate = ∂g/∂t + K e, J_bar = (∂f/∂q - ∂g/∂q) S; a row is [row of f, row of g, is an angle]."""
+    """rate = ∂g/∂t + K e, J_bar = (∂f/∂q - ∂g/∂q) S; a row is [row of f, row of g, row of e].
+
+    The row of e is PLAIN or WRAPPED where e = g - f, which then is not computed elsewhere. Where it is,
+    rate = ∂e/∂t + K e and J_bar = -∂e/∂q S: the same equation for any e.
+    """
     s = e.r.shape[0]
     n = b.value_q.shape[1]
     for i in range(s):
         f = rows[3 * i]
         g = rows[3 * i + 1]
+        compared = rows[3 * i + 2]
         e.r[i] = b.value[f]
         e.target[i] = b.value[g]
+        if compared >= 0:
+            e.error[i] = b.value[compared]
+            e.rate[i] = b.value_t[compared]
+            for j in range(n):
+                b.value_q[compared, j] = -b.value_q[compared, j]
+            times_S(b.value_q, compared, b.G, e.J[i])
+            continue
         error = b.value[g] - b.value[f]
-        if rows[3 * i + 2] == 1:  # to (-π, π]
+        if compared == WRAPPED:  # to (-π, π]
             error = math.pi - (math.pi - error) % (2.0 * math.pi)
         e.error[i] = error
         e.rate[i] = b.value_t[g] - b.value_t[f]

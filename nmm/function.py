@@ -52,6 +52,7 @@ class Stage:
     ----------
     kernel : of signature `compiled.FUNCTION`
     rows : how many rows it reads or writes
+    before : how many of the rows that come before the function's own it sees too, above them
     frames : names of the frames whose placement and Jacobian it reads
     parameters : the numbers that it reads
     hessians : whether it reads the frames' kinematic Hessians
@@ -64,6 +65,7 @@ class Stage:
     parameters: Array = field(default_factory=lambda: np.zeros(0))
     hessians: bool = False
     callback: Callback | None = None
+    before: int = 0
 
 
 class Function(ABC):
@@ -72,7 +74,13 @@ class Function(ABC):
     1. `rows(robot)`: names, units and angularity of the components; raises `InputError` for
        what the robot does not have;
     2. `stages(robot)`: the kernels that compute value, time derivative and Jacobian.
+
+    `comparison` is for values that cannot be subtracted (orientations, poses): a kernel of signature
+    `compiled.FUNCTION` that sees the rows [value, target, error], s of each, with their derivatives, and
+    writes those of the error. Without it the error is target - value, wrapped where a row is an angle.
     """
+
+    comparison: Kernel | None = None
 
     @abstractmethod
     def rows(self, robot: Robot) -> tuple[Row, ...]:

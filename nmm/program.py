@@ -144,7 +144,7 @@ class Program:
             begin = sum(len(block) for block in self._parameters)
             end = begin + stage.parameters.size
             slots = len(self._slots)
-            self._stages += [stage.kernel.address, first, first + stage.rows]
+            self._stages += [stage.kernel.address, first - stage.before, first + stage.rows]
             self._stages += [slots, slots + len(stage.frames), begin, end]
             self._slots += [self._frames.index(frame) for frame in stage.frames]
             self._parameters.append(stage.parameters)

@@ -17,22 +17,37 @@ from nmm.platforms.base import Platform
 Array = NDArray[np.float64]
 
 
+#: Stands for the robot's centre of mass where a function names a frame (`tasks.CenterOfMass`).
+CENTER_OF_MASS = "<center of mass>"
+
+
 @dataclass(frozen=True, eq=False)
 class Wheel:
     """A wheel that only rolls: not a coordinate (its angle follows from the motion), turned in playback.
 
+    A wheel may hang on a swivel, an upright joint that is no coordinate either: a caster's, or that of a
+    steered wheel whose angle follows from that of others (Ackermann).
+
     Attributes
     ----------
     joint : name of its joint in the display model
-    center : (3,) wheel centre in the root link's frame, m
-    axis : (3,) unit spin axis in the root link's frame, horizontal
+    center : (3,) wheel centre in the carrier's frame with the swivel at zero, m
+    axis : (3,) unit spin axis in the carrier's frame with the swivel at zero, level
     radius : m
+    carrier : name of the movable joint of `model` that carries it; "theta" for the root link's body
+    swivel : name of the swivel's joint in the display model, or "" without
+    pivot : (3,) a point of the swivel's axis in the carrier's frame, m
+    roller : angle γ of its rollers, rad (see `Platform.roller`)
     """
 
     joint: str
     center: Array
     axis: Array
     radius: float
+    carrier: str = "theta"
+    swivel: str = ""
+    pivot: Array = field(default_factory=lambda: np.zeros(3))
+    roller: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +66,7 @@ class Robot:
     source : the file, the bundled name, or "pin.Model"
     arguments : the xacro arguments that the file was read with
     notes : what loading did to the file, a sentence each
+    arms : the joints of each arm by the arm's name, when several were mounted or one was named
     """
 
     name: str
@@ -63,6 +79,7 @@ class Robot:
     source: str = ""
     arguments: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    arms: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.model.nq != self.model.nv:
@@ -105,6 +122,30 @@ class Robot:
         """Unit of each input."""
         return self.platform.input_units + tuple(f"{unit}/s" for unit in self.q_units[self.platform.n_p :])
 
+    @cached_property
+    def q_limits(self) -> Array:
+        """Lower and upper limit of each coordinate, (n, 2), m or rad; infinite where there is none."""
+        limits = np.column_stack([self.model.lowerPositionLimit, self.model.upperPositionLimit])
+        own = self.platform.coordinate_limits
+        limits[: len(own), 0] = np.maximum(limits[: len(own), 0], own[:, 0])
+        limits[: len(own), 1] = np.minimum(limits[: len(own), 1], own[:, 1])
+        limits.flags.writeable = False
+        return limits
+
+    @cached_property
+    def u_limits(self) -> Array:
+        """Largest absolute value of each input, (n_u,): the platform's, then the joints' velocity limits."""
+        arm = np.array(self.model.velocityLimit[self.platform.n_p :])
+        limits = np.concatenate([self.platform.input_limits, np.where(arm > 0.0, arm, np.inf)])
+        limits.flags.writeable = False
+        return limits
+
+    @cached_property
+    def groups(self) -> Mapping[str, tuple[str, ...]]:
+        """Inputs that are spoken of together: "platform", "arm" (all joints), and each arm by its name."""
+        p = self.platform.p
+        return {"platform": self.u_names[:p], "arm": self.u_names[p:], **self.arms}
+
     @property
     def n(self) -> int:
         """Number of coordinates."""
@@ -129,6 +170,23 @@ class Robot:
         if name == "universe" or not self.model.existFrame(name):
             raise InputError(unknown("frame", name, self.frames, f"robot {self.name}"))
         return int(self.model.getFrameId(name))
+
+    def check_limits(self, q: ArrayLike) -> None:
+        """`InputError` names every coordinate of q (n,) that is outside its limits, and what they are."""
+        q = self.q(q)
+        slack = 1e-9
+        outside = [
+            f"{name} = {value:g} {unit} (from {lower:g} to {upper:g})"
+            for name, value, unit, (lower, upper) in zip(
+                self.q_names, q, self.q_units, self.q_limits, strict=True
+            )
+            if not lower - slack <= value <= upper + slack
+        ]
+        if outside:
+            raise InputError(f"{self.name}: outside its limits: {', '.join(outside)}")
+        problem = self.platform.problem(q[: self.platform.n_p])
+        if problem is not None:
+            raise InputError(f"{self.name}: {problem}")
 
     def coordinate(self, name: str) -> int:
         """Index of a coordinate in q; `InputError` lists the names."""

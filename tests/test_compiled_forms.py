@@ -14,6 +14,7 @@ from function_grid import ENTRIES, TIMES, Entry, evaluate, modules, random_confi
 from numba.core.dispatcher import Dispatcher
 from numpy.typing import NDArray
 from paper_cases import CASES, TIP
+from platform_grid import EXAMPLES
 
 from nmm.compiled import Kernel
 from nmm.configuration import Configuration
@@ -21,7 +22,6 @@ from nmm.controller import Controller
 from nmm.function import Stage
 from nmm.loading import load
 from nmm.objectives import Sum
-from nmm.platforms import PLATFORMS
 from nmm.resolvers import CallableResolver, ExtendedJacobian, ProjectedGradient, ReducedGradient, Resolver
 from nmm.resolvers.base import REPORT, Shape
 from nmm.robot import Robot
@@ -94,9 +94,9 @@ def test_function_kernels(entry: Entry, robots: dict[str, Robot], rng: np.random
             assert_same(plain[:count], found)
 
 
-@pytest.mark.parametrize("name", PLATFORMS)
+@pytest.mark.parametrize("name", EXAMPLES)
 def test_platform_kernels(name: str, rng: np.random.Generator) -> None:
-    platform = PLATFORMS[name]()
+    platform = EXAMPLES[name]
     for qp in rng.uniform(-5, 5, (20, platform.n_p)):
         both = []
         for form in (platform.velocity_map.plain, platform.velocity_map):
@@ -132,7 +132,7 @@ def test_resolver_kernels(resolver: Resolver, rng: np.random.Generator) -> None:
 
 def test_no_kernel_is_left_out(robots: dict[str, Robot]) -> None:
     run = {resolver.kernel for resolver in RESOLVERS}
-    run |= {PLATFORMS[name]().velocity_map for name in PLATFORMS}
+    run |= {EXAMPLES[name].velocity_map for name in EXAMPLES}
     for entry in SINGLE:
         run |= {stage.kernel for stage in entry.function.stages(robots[entry.robots[0]])}
     assert not {name for name, kernel in kernels().items() if kernel not in run}

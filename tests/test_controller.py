@@ -9,10 +9,10 @@ from function_grid import random_configuration
 from numpy import pi
 from numpy.typing import NDArray
 from paper_cases import CASES, CIRCLE, TIP, Case
+from platform_grid import EXAMPLES
 
 from nmm.controller import Controller
 from nmm.objectives import Objective, Quadratic, Square
-from nmm.platforms import PLATFORMS
 from nmm.references import Bearing, Circle, Constant, Line
 from nmm.resolvers import ExtendedJacobian, ProjectedGradient, ReducedGradient, Resolver, Status
 from nmm.robot import Robot
@@ -39,9 +39,9 @@ def close(found: Array, expected: Array, tolerance: float) -> None:
     np.testing.assert_allclose(found, expected, rtol=0, atol=tolerance * scale)
 
 
-@pytest.mark.parametrize("name", PLATFORMS)
+@pytest.mark.parametrize("name", EXAMPLES)
 def test_A_G_is_zero(name: str, rng: np.random.Generator) -> None:
-    platform = PLATFORMS[name]()
+    platform = EXAMPLES[name]
     for qp in rng.uniform(-10, 10, (100, platform.n_p)):
         A, G = platform.A(qp), platform.G(qp)
         np.testing.assert_allclose(A @ G, 0.0, rtol=0, atol=1e-15)

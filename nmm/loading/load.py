@@ -16,7 +16,7 @@ from nmm.loading.description import SUFFIXES, describe
 from nmm.loading.models import Models, pinocchio_models, robot_models
 from nmm.loading.text import printable
 from nmm.loading.urdf_text import urdf_text
-from nmm.platforms import Platform, Unicycle, platform_by_name
+from nmm.platforms import Layout, Platform, Unicycle, platform_by_name
 from nmm.robot import Robot
 
 
@@ -150,7 +150,7 @@ def _platform(platform: Platform | str | None) -> Platform:
     if platform is None:
         return Unicycle()
     if isinstance(platform, str):
-        return platform_by_name(platform)
+        return platform_by_name(platform).fit(Layout(""))
     if not isinstance(platform, Platform):
         raise InputError(f"platform: expected a Platform or its name, got {platform!r}")
     return platform

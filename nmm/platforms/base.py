@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar
+from collections.abc import Mapping
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nmm.arrays import vector
+from nmm.arrays import positive, vector
 from nmm.compiled import Kernel
+from nmm.errors import InputError, unknown
+from nmm.platforms.layout import Layout
 
 Array = NDArray[np.float64]
 
@@ -17,23 +20,48 @@ Array = NDArray[np.float64]
 class Platform(ABC):
     """A driftless platform. To add one, write a subclass in a file of its own that:
 
-    1. sets the class attributes `coordinates` (the first three are always x, y, theta), `inputs`
-       and `input_units`;
+    1. sets `name`, `coordinates` (none, or x, y, theta first), `inputs` and `input_units`, as class
+       attributes or, when they depend on the platform's parameters, in `__init__`;
     2. implements `velocity_map`, a kernel of signature `compiled.PLATFORM`;
     3. implements `pfaffian`, the constraint rows with `A(qp) G(qp) = 0`, written independently
        of G (from the rolling of the wheels): the tests check the one against the other.
 
+    It may say more: `parameters` (the numbers that the kernel reads), `fit` (how to measure them in a robot's
+    file), `coordinate_limits`, `problem` (where its wheels cannot roll, and why), `roller`.
+
+    Parameters
+    ----------
+    limits : largest absolute value of each input, by name, in its unit; those not named have none
+
     Attributes
     ----------
     coordinates : names of qp, length n_p (m and rad)
-    inputs : names of the pseudovelocities up, length p < n_p
+    inputs : names of the pseudovelocities up, length p <= n_p
     input_units : their units
     """
 
-    name: ClassVar[str]
-    coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "theta")
-    inputs: ClassVar[tuple[str, ...]]
-    input_units: ClassVar[tuple[str, ...]]
+    name: str
+    coordinates: tuple[str, ...] = ("x", "y", "theta")
+    inputs: tuple[str, ...]
+    input_units: tuple[str, ...]
+    _limits: Mapping[str, float] = {}
+
+    def __init__(self, *, limits: Mapping[str, float] | None = None) -> None:
+        for name, value in (limits or {}).items():
+            if name not in self.inputs:
+                raise InputError(unknown("input", name, self.inputs, f"limits of platform {self.name}"))
+            positive(value, f"limit of {name}")
+        self._limits = {name: float(value) for name, value in (limits or {}).items()}
+
+    @classmethod
+    def fit(cls, layout: Layout) -> Self:
+        """The platform with its parameters measured in a robot's file; without parameters, the platform.
+
+        Raises
+        ------
+        InputError : the file lacks what the platform needs (a steering joint, two wheels on one axle, ...)
+        """
+        return cls()
 
     @property
     @abstractmethod
@@ -51,6 +79,26 @@ class Platform(ABC):
     def parameters(self) -> Array:
         """The numbers that `velocity_map` reads (lengths in m, angles in rad); none by default."""
         return np.zeros(0)
+
+    @property
+    def input_limits(self) -> Array:
+        """Largest absolute value of each input, (p,), infinite where there is none."""
+        return np.array([self._limits.get(name, np.inf) for name in self.inputs])
+
+    @property
+    def coordinate_limits(self) -> Array:
+        """Lower and upper limit of each coordinate, (n_p, 2); infinite by default."""
+        return np.tile([-np.inf, np.inf], (self.n_p, 1))
+
+    def problem(self, qp: ArrayLike) -> str | None:
+        """Why the wheels cannot roll at qp (a steering angle of 90 degrees, say), or None when they can."""
+        return None
+
+    def roller(self, x: float, y: float) -> float:
+        """Angle γ of the rollers of the wheel at (x, y) m on the root's body: the wheel grips along the
+        direction in which it rolls, turned by γ (rad) about z. 0 for a wheel without rollers and for one
+        whose rollers turn about its rolling direction; ±π/4 for a mecanum wheel."""
+        return 0.0
 
     @property
     def n_p(self) -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar
 
 import numpy as np
 
@@ -29,9 +28,9 @@ class Unicycle(Platform):
     x, y is the midpoint of the wheels' axle, theta its heading from the world's x axis.
     """
 
-    name: ClassVar[str] = "unicycle"
-    inputs: ClassVar[tuple[str, ...]] = ("v", "omega")
-    input_units: ClassVar[tuple[str, ...]] = ("m/s", "rad/s")
+    name = "unicycle"
+    inputs = ("v", "omega")
+    input_units = ("m/s", "rad/s")
 
     @property
     def velocity_map(self) -> Kernel:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import ClassVar, NamedTuple
@@ -50,11 +50,15 @@ REPORT = 3
 
 
 class Shape(NamedTuple):
-    """What a resolver must know of a problem: rows of task and constraint, names of the inputs."""
+    """What a resolver must know of a problem: rows of task and constraint, names of the inputs.
+
+    groups : inputs that are spoken of together, by the group's name ("platform", "arm")
+    """
 
     s: int
     k: int
     inputs: tuple[str, ...]
+    groups: Mapping[str, tuple[str, ...]] = {}
 
     @property
     def m(self) -> int:

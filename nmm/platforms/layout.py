@@ -1,0 +1,56 @@
+"""What a robot's file says about its wheels and vertical joints: enough to measure a platform from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Pivot:
+    """A joint that turns about an upright axis: a steering column, a hitch, a caster's swivel.
+
+    Attributes
+    ----------
+    joint : its name
+    carrier : name of the movable joint that carries it; "theta" for the root link's body
+    x, y : its axis in the carrier's frame, at zero, m
+    lower, upper : its limits, rad (infinite without)
+    """
+
+    joint: str
+    carrier: str
+    x: float
+    y: float
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True)
+class RollingJoint:
+    """A wheel's joint: it turns about a level axis, with nothing that moves below it.
+
+    Attributes
+    ----------
+    joint : its name
+    carrier : name of the movable joint that carries it; "theta" for the root link's body
+    x, y : the wheel's centre in the carrier's frame, at zero, m
+    heading : direction in which it rolls when it turns in the positive sense, from the carrier's x axis, rad
+    radius : m
+    """
+
+    joint: str
+    carrier: str
+    x: float
+    y: float
+    heading: float
+    radius: float
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The pivots and wheels of a robot. x and y count from the platform's reference point (see `load`'s
+    `axle`) on the body that "theta" carries, and from the joint's own frame on any other."""
+
+    robot: str
+    pivots: tuple[Pivot, ...] = ()
+    wheels: tuple[RollingJoint, ...] = ()

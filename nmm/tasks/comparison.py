@@ -1,0 +1,28 @@
+"""The error of a task whose values cannot be subtracted, as rows of a function."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from nmm.function import Function, Row, Stage
+from nmm.robot import Robot
+
+if TYPE_CHECKING:
+    from nmm.tasks.task import Task
+
+
+class Comparison(Function):
+    """The error e(t, q) of a task by its function's `comparison`; no rows when it has none.
+
+    Its stage sees the 2 s rows before its own: it has to come right after the task's function and reference.
+    """
+
+    def __init__(self, task: Task) -> None:
+        self.task = task
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        return () if self.task.function.comparison is None else self.task.rows(robot)
+
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        kernel, s = self.task.function.comparison, len(self.task.rows(robot))
+        return () if kernel is None else (Stage(kernel, s, before=2 * s),)
