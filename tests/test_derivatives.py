@@ -19,6 +19,7 @@ from nmm.objectives import Objective, Sum
 from nmm.program import Program
 from nmm.references import CallableReference
 from nmm.robot import Robot
+from nmm.tasks.comparison import Comparison
 
 Array = NDArray[np.float64]
 
