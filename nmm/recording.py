@@ -6,6 +6,7 @@ import numpy as np
 
 from nmm.arrays import Array
 from nmm.controller import Controller, Step
+from nmm.excesses import excesses
 from nmm.program import Program
 from nmm.references.bearing import Bearing
 from nmm.robot import Robot
@@ -101,6 +102,7 @@ class Recorder:
         singular_values = np.linalg.svd(self._J[:count], compute_uv=False).astype(np.float64)
         if outcome is not Outcome.SINGULAR:  # which says so itself
             self._warn_of_singularities(singular_values)
+        self.warnings += excesses(robot, self.t, self.q[:count], self._u[:count])
         frame, columns, target = _shown(controller)
         path, desired = None, None
         if frame is not None:

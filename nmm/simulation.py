@@ -57,10 +57,11 @@ def simulate(
 
     Raises
     ------
-    InputError : wrong q0, duration, dt, method
+    InputError : wrong q0 (also one outside the robot's limits), duration, dt, method
     """
     robot = controller.robot
     q = robot.q(q0)
+    robot.check_limits(q)
     duration = positive(duration, "duration")
     dt = positive(dt, "dt")
     steps = max(1, math.ceil(duration / dt - 1e-9))

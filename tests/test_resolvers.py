@@ -20,6 +20,7 @@ from nmm.resolvers import (
     ReducedGradient,
     Resolution,
     Resolver,
+    Shape,
     Status,
 )
 
@@ -284,3 +285,58 @@ def test_callable_resolver(rng: np.random.Generator) -> None:
     assert problem.given(nowhere).status is Status.NOT_FINITE
     with pytest.raises(InputError, match=r"expected u of shape \(4,\), got \(3,\)"):
         problem.given(CallableResolver(lambda J, rate, h: np.zeros(3)))
+
+
+@redundant
+def test_weighted_reduced_gradient_is_the_method_in_scaled_inputs(
+    shape: tuple[int, int], rng: np.random.Generator
+) -> None:
+    """ũ = sqrt(w) u: the paper's reduced gradient on J diag(1/sqrt w), for every way to give the weights."""
+    problem = Problem(shape, rng)
+    s, m = shape
+    w = rng.uniform(0.1, 10, m)
+    C = np.diag(1 / np.sqrt(w))
+    names = [f"u{i}" for i in range(m)]
+    for choice in ({}, {"partitions": [tuple(range(s))]}):
+        plain = problem.given(ReducedGradient(2.0, **choice), J=problem.J @ C, h=C @ problem.h)
+        for weights in (w, np.diag(w), dict(zip(names, w, strict=True))):
+            found = problem.given(ReducedGradient(2.0, weights=weights, **choice), inputs=names)
+            close(found.u, C @ plain.u)
+            np.testing.assert_array_equal(found.state, plain.state)
+            close(problem.J @ found.u, problem.rate)
+        # Without a rate, weights or not, the objective does not grow.
+        free = problem.given(ReducedGradient(2.0, weights=w, **choice), rate=np.zeros(s)).u
+        assert problem.h @ free <= 1e-12
+    ones = problem.given(ReducedGradient(3.0, weights=np.ones(m)))
+    close(ones.u, problem.given(ReducedGradient(3.0)).u)
+
+
+@pytest.mark.parametrize("kind", [ProjectedGradient, ReducedGradient])
+def test_weights_spare_a_group(kind: type[Resolver], rng: np.random.Generator) -> None:
+    """The heavier the platform, the less of the motion it does; a name within the group has the last word."""
+    groups = {"platform": ("v", "omega"), "arm": ("q1", "q2", "q3")}
+    shape = Shape(2, 0, ("v", "omega", "q1", "q2", "q3"), groups)
+    problem = Problem((2, 5), rng)
+
+    def u(**weights: float) -> Array:
+        resolver = kind(1.0, weights=weights)
+        setup = resolver.setup(shape)
+        u, report = np.zeros(5), np.zeros(3)
+        empty = np.zeros((0, 5)), np.zeros(0)
+        numbers = (np.zeros(5), setup.parameters, setup.options, setup.state.copy(), u, report)
+        resolver.kernel(problem.J, problem.rate, *empty, *numbers)
+        close(problem.J @ u, problem.rate)
+        return u
+
+    assert np.linalg.norm(u(platform=1e8)[:2]) < 1e-6
+    assert np.linalg.norm(u(arm=1e8)[2:]) < 1e-6
+    spared = u(arm=1e8, q1=1e-8)
+    assert np.linalg.norm(spared[3:]) < 1e-6 * abs(spared[2])
+    with pytest.raises(InputError, match=r"unknown input or group 'base'.*q3, platform, arm"):
+        u(base=2.0)
+
+
+def test_weights_that_couple_inputs_are_for_pg(rng: np.random.Generator) -> None:
+    problem = Problem((2, 4), rng)
+    with pytest.raises(InputError, match=r"a number for each input .*couples inputs is for pg"):
+        problem.given(ReducedGradient(weights=np.eye(4) + 0.1))

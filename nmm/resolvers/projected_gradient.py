@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, array, positive, scalar
+from nmm.arrays import Array, positive
 from nmm.compiled import RESOLVER, Kernel, kernel
-from nmm.errors import InputError, unknown
 from nmm.linear_algebra import closest_solution, orthonormal_rows, residual_norm
 from nmm.resolvers.base import Resolver, Setup, Shape
+from nmm.resolvers.weights import Weights, weight_matrix
 
 
 @kernel(RESOLVER)
@@ -71,8 +69,9 @@ class ProjectedGradient(Resolver):
     Parameters
     ----------
     alpha : step size α > 0, 1/s times the unit of H's curvature
-    weights : None; m positive numbers; a mapping from input names (1 for the rest): a large weight
-        spares the input; or a symmetric positive definite (m, m) matrix
+    weights : None; m positive numbers; a mapping from names of inputs or of their groups ("platform",
+        "arm"), 1 for the rest: a large weight spares the input; or a symmetric positive definite
+        (m, m) matrix
     tolerance : J counts as singular below this ratio of smallest to largest pivot, whatever the
         rows' units: rows of very different size want to be scaled first
     """
@@ -82,7 +81,7 @@ class ProjectedGradient(Resolver):
     def __init__(
         self,
         alpha: float = 10.0,
-        weights: ArrayLike | Mapping[str, float] | None = None,
+        weights: Weights | None = None,
         tolerance: float = 1e-10,
     ) -> None:
         self.alpha = positive(alpha, "alpha")
@@ -99,24 +98,5 @@ class ProjectedGradient(Resolver):
         head = np.array([self.alpha, self.tolerance])
         if self.weights is None:
             return Setup(head, np.zeros(1, dtype=np.int64), state)
-        C = np.linalg.inv(np.linalg.cholesky(self._matrix(self.weights, shape))).T
+        C = np.linalg.inv(np.linalg.cholesky(weight_matrix(self.weights, shape))).T
         return Setup(np.concatenate([head, C.ravel()]), np.ones(1, dtype=np.int64), state)
-
-    def _matrix(self, weights: ArrayLike | Mapping[str, float], shape: Shape) -> Array:
-        if isinstance(weights, Mapping):
-            diagonal = np.ones(shape.m)
-            for name, value in weights.items():
-                if name not in shape.inputs:
-                    raise InputError(unknown("input", name, shape.inputs, "weights"))
-                diagonal[shape.inputs.index(name)] = scalar(value, f"weight of {name}")
-            W = np.diag(diagonal)
-        else:
-            given = array(weights, "weights")
-            W = np.diag(given) if given.ndim == 1 else given
-        if W.shape != (shape.m, shape.m):
-            raise InputError(
-                f"weights: expected {shape.m} numbers or a {shape.m} x {shape.m} matrix, got {W.shape}"
-            )
-        if not np.array_equal(W, W.T) or np.linalg.eigvalsh(W).min() <= 0.0:
-            raise InputError("weights: expected numbers above 0, or a symmetric positive definite matrix")
-        return W

@@ -14,6 +14,7 @@ from nmm.compiled import RESOLVER, Kernel, compiled, kernel
 from nmm.errors import InputError, unknown
 from nmm.linear_algebra import eliminate, orthonormal_rows, residual_norm
 from nmm.resolvers.base import FREE, OVERDUE, Resolver, Setup, Shape
+from nmm.resolvers.weights import Weights, weight_diagonal
 
 #: A partition: the inputs whose columns form Ja, by name or by index.
 Partition = Sequence[str | int]
@@ -65,6 +66,19 @@ def volume(J: Array, tolerance: float) -> float:
     return product
 
 
+@compiled
+def scaled(J: Array, h: Array, c: Array) -> tuple[Array, Array]:
+    """J diag(c) and diag(c) h."""
+    s, m = J.shape
+    scaled_J = np.empty((s, m))
+    scaled_h = np.empty(m)
+    for j in range(m):
+        scaled_h[j] = c[j] * h[j]
+        for i in range(s):
+            scaled_J[i, j] = J[i, j] * c[j]
+    return scaled_J, scaled_h
+
+
 @kernel(RESOLVER)
 def reduced_gradient(
     J: Array, rate: Array, Jc: Array, rate_c: Array, h: Array,
@@ -72,13 +86,17 @@ def reduced_gradient(
 ) -> None:  # fmt: skip
     """ub = -α (hb - (Ja⁻¹ Jb)ᵀ ha), ua = Ja⁻¹ (rate - Jb ub).
 
-    parameters = [α, threshold, tolerance], options = [normalised, candidates...],
+    With weights, in the inputs ũ = u / c in which the weighted norm is the Euclidean one, c = W^(-1/2).
+    parameters = [α, threshold, tolerance, c...], options = [normalised, weighted, candidates...],
     state = [FREE, HELD or OVERDUE, the s basic columns (-1 before the first call)].
     """
+    given_J = J
+    if options[1] == 1:
+        J, h = scaled(J, h, parameters[3:])
     s, m = J.shape
     alpha = parameters[0]
     tolerance = parameters[2]
-    candidates = options[1:]
+    candidates = options[2:]
     columns = state[1:]
     scale = 1.0
     if options[0] == 1:
@@ -115,7 +133,10 @@ def reduced_gradient(
         M[i, 0] = ua
     for i in range(s):
         u[columns[i]] = M[i, 0]
-    report[1] = residual_norm(J, u, rate)
+    if options[1] == 1:
+        for j in range(m):
+            u[j] *= parameters[3 + j]
+    report[1] = residual_norm(given_J, u, rate)
     report[0] = 0.0 if math.isfinite(report[1]) else 4.0
 
 
@@ -139,6 +160,10 @@ class ReducedGradient(Resolver):
         [("v", "q1"), ("v", "omega")] in case 1; the arm's joints when n_m = s)
     threshold : Θ; 0.01 for given candidates (the paper's), 0.05 for automatic ones
     tolerance : Ja or J counts as singular below this ratio of smallest to largest pivot
+    weights : None; m positive numbers; or a mapping from names of inputs or of their groups
+        ("platform", "arm"), 1 for the rest. The counterpart of the weighted pseudoinverse: the method
+        in the inputs sqrt(w) u. A heavy input is less often among those that do the task (its column
+        counts for less in |det Ja|, weighted from here on), and descends H more slowly (α / w)
     """
 
     name: ClassVar[str] = "rg"
@@ -149,8 +174,10 @@ class ReducedGradient(Resolver):
         partitions: Literal["automatic"] | Sequence[Partition] = "automatic",
         threshold: float | None = None,
         tolerance: float = 1e-10,
+        weights: Weights | None = None,
     ) -> None:
         self.alpha = positive(alpha, "alpha")
+        self.weights = weights
         self.automatic = isinstance(partitions, str)
         if self.automatic and partitions != "automatic":
             raise InputError(f"partitions: expected 'automatic' or lists of inputs, got {partitions!r}")
@@ -179,10 +206,12 @@ class ReducedGradient(Resolver):
             candidates = list(itertools.combinations(range(shape.m), shape.s))
         else:
             candidates = [self._columns(partition, shape) for partition in self.partitions]
-        options = np.array([int(self.automatic), *itertools.chain.from_iterable(candidates)], dtype=np.int64)
+        flags = [int(self.automatic), int(self.weights is not None)]
+        options = np.array([*flags, *itertools.chain.from_iterable(candidates)], dtype=np.int64)
         state = np.full(1 + shape.s, -1, dtype=np.int64)
         state[0] = 0
-        return Setup(np.array([self.alpha, self.threshold, self.tolerance]), options, state)
+        c = [] if self.weights is None else 1.0 / np.sqrt(weight_diagonal(self.weights, shape))
+        return Setup(np.array([self.alpha, self.threshold, self.tolerance, *c]), options, state)
 
     @staticmethod
     def _columns(partition: Sequence[str | int], shape: Shape) -> tuple[int, ...]:

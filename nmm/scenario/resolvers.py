@@ -74,11 +74,18 @@ class ReducedGradientPart(ResolverPart):
         "partitions (0.01 when not given), of |det Ja| / sqrt(det J Jᵀ) for automatic ones (0.05)",
     )
 
+    weights: Annotated[dict[str, float] | list[Nested] | None, BeforeValidator(_weights)] = Field(
+        None,
+        description="what each input costs: by name or group ({platform: 10, q1: 2}; 1 for the rest), or a "
+        "number an input: a heavy one does the task less often and descends the objective more slowly",
+    )
+
     def make(self) -> Resolver:
         from nmm.resolvers import ReducedGradient
 
         partitions: Any = self.partitions
-        return ReducedGradient(self.alpha, partitions, self.threshold, self.tolerance)
+        weights: Any = self.weights
+        return ReducedGradient(self.alpha, partitions, self.threshold, self.tolerance, weights)
 
     def explicit(self) -> dict[str, Any]:
         from nmm.resolvers import ReducedGradient
@@ -95,8 +102,8 @@ class ProjectedGradientPart(ResolverPart):
     alpha: Positive = Field(10.0, description="step size α, above 0")
     weights: Annotated[dict[str, float] | list[Nested] | None, BeforeValidator(_weights)] = Field(
         None,
-        description="what each input costs in the norm: by name ({v: 2}; 1 for the rest), a number an input, "
-        "or a symmetric positive definite matrix",
+        description="what each input costs in the norm: by name or group ({platform: 10, q1: 2}; 1 for the "
+        "rest), a number an input, or a symmetric positive definite matrix",
     )
 
     def make(self) -> Resolver:

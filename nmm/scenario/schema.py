@@ -128,7 +128,7 @@ class ScenarioPart(Part):
             for name in self.q0 if isinstance(self.q0, dict) else ():
                 with at(name):
                     robot.coordinate(name)
-            robot.q(self.q0)
+            robot.check_limits(robot.q(self.q0))
         with at("task"):
             task = build_tasks(self.task, robot)
             s = sum(len(item.rows(robot)) for item in task)
