@@ -60,7 +60,7 @@ REFUSED: list[tuple[Callable[[Robot], Any], str]] = [
     (made(TIP, PG, JointRange(["q1"], [1.0], [1.0])), "expected lower below upper for q1, got 1 and 1"),
     (made(TIP, PG, JointRange(["q1"], [1.0, 2.0], [3.0, 4.0])), "joint range: lower: expected 1 numbers"),
     (made(TIP, ReducedGradient(partitions=[("v", "w")])), "partitions: unknown input 'w'.*v, omega, q1, q2"),
-    (made(TIP, ProjectedGradient(weights={"x": 1.0})), "weights: unknown input or group 'x'.*v, omega, q1, q2"),
+    (made(TIP, ProjectedGradient(weights={"x": 1.0})), "weights: unknown input or group 'x'.*v, omega, q1"),
     (made(Task(Position("ee", "xyz"), CIRCLE)), "expected a reference with 3 components, got Circle with 2"),
     (made(Task(Heading("link1"), CIRCLE)), "task link1.heading: .*with 1 components, got Circle with 2"),
     (made(TOO_MANY), r"5 rows for 4 inputs \(v, omega, q1, q2\); expected at most 4"),

@@ -210,7 +210,7 @@ REFUSED: list[tuple[Callable[[], Any], str]] = [
     (resolved(ProjectedGradient(weights=[1, 2, -1, 3])), "weights: expected numbers above 0"),
     (resolved(ProjectedGradient(weights=np.tri(4))), "symmetric positive definite"),
     (resolved(ProjectedGradient(weights=np.ones((4, 4)))), "symmetric positive definite"),
-    (resolved(ProjectedGradient(weights={"w": 2.0}), inputs=NAMES), "weights: unknown input or group 'w'.*: v, omega"),
+    (resolved(ProjectedGradient(weights={"w": 2.0}), inputs=NAMES), "weights: unknown input or group 'w'.*v"),
     (resolved(ProjectedGradient(weights={"v": np.nan}), inputs=NAMES), "weight of v: expected finite"),
     (resolved(ReducedGradient(partitions=[("v", "q7")]), inputs=NAMES), "partitions: unknown input 'q7'.*q1"),
     (resolved(ReducedGradient(partitions=[(0, 4)])), "partitions: expected an index from 0 to 3, got 4"),
