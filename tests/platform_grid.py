@@ -5,9 +5,57 @@ A new platform is tested by a new entry in `EXAMPLES`; `test_platforms.py` notic
 
 from __future__ import annotations
 
-from nmm.platforms import Platform, Unicycle
+import numpy as np
+from numpy.typing import NDArray
+
+from nmm.platforms import (
+    Car,
+    DifferentialDrive,
+    Fixed,
+    FrontDriveCar,
+    Mecanum,
+    Omnidirectional,
+    Platform,
+    Tractor,
+    Trailer,
+    Unicycle,
+)
+
+Array = NDArray[np.float64]
 
 #: Examples by a name for the test's id.
 EXAMPLES: dict[str, Platform] = {
     "unicycle": Unicycle(),
+    "differential": DifferentialDrive(0.1, 0.5),
+    "differential_of_a_truck": DifferentialDrive(0.45, 2.2, limits={"omega_left": 20.0}),
+    "car": Car(0.4, max_steering=0.6),
+    "car_without_limit": Car(2.7, steering="front_wheel"),
+    "front_drive_car": FrontDriveCar(0.4, max_steering=np.pi),
+    "front_drive_car_without_limit": FrontDriveCar(2.7, steering="front_wheel"),
+    "tractor_on_axle": Tractor([Trailer(0.8)]),
+    "tractor_off_axle": Tractor([Trailer(0.8, 0.3, max_angle=1.4)]),
+    "tractor_two": Tractor([Trailer(0.6, 0.2), Trailer(0.9, 0.0, "hitch2")]),
+    "tractor_three": Tractor(
+        [Trailer(0.5, -0.1, "a"), Trailer(0.7, 0.3, "b", max_angle=2.0), Trailer(0.4, 0.2, "c")]
+    ),
+    "omnidirectional": Omnidirectional(),
+    "mecanum": Mecanum(0.05, 0.3, 0.2),
+    "mecanum_wide": Mecanum(0.2, 0.5, 1.1),
+    "fixed": Fixed(),
 }
+
+#: Entries of G beyond this are near where the wheels cannot roll (a rear-driven car steered to 90 degrees).
+LARGEST = 10.0
+
+
+def random_qp(platform: Platform, rng: np.random.Generator, size: float) -> Array:
+    """Coordinates within ±size (m, rad) and the platform's limits, where G is not too large.
+
+    Near a singular steering angle G and its derivatives grow without bound, and so do the differences that
+    they are compared with.
+    """
+    lower, upper = np.clip(platform.coordinate_limits.T, -size, size)
+    while True:
+        qp = rng.uniform(lower, upper)
+        if np.abs(platform.G(qp)).max(initial=0.0) <= LARGEST:
+            return qp

@@ -9,7 +9,7 @@ from function_grid import random_configuration
 from numpy import pi
 from numpy.typing import NDArray
 from paper_cases import CASES, CIRCLE, TIP, Case
-from platform_grid import EXAMPLES
+from platform_grid import EXAMPLES, random_qp
 
 from nmm.controller import Controller
 from nmm.objectives import Objective, Quadratic, Square
@@ -42,9 +42,12 @@ def close(found: Array, expected: Array, tolerance: float) -> None:
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_A_G_is_zero(name: str, rng: np.random.Generator) -> None:
     platform = EXAMPLES[name]
-    for qp in rng.uniform(-10, 10, (100, platform.n_p)):
+    for _ in range(100):
+        qp = random_qp(platform, rng, 10.0)
         A, G = platform.A(qp), platform.G(qp)
-        np.testing.assert_allclose(A @ G, 0.0, rtol=0, atol=1e-15)
+        # Products of larger numbers are rounded by as much more.
+        scale = (np.abs(A) @ np.abs(G)).max(initial=1.0)
+        np.testing.assert_allclose(A @ G, 0.0, rtol=0, atol=1e-15 * scale)
         # Together they span all velocities: G has every motion that A admits.
         assert np.linalg.matrix_rank(np.hstack([A.T, G])) == platform.n_p
 

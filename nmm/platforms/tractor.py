@@ -1,0 +1,185 @@
+"""The tractor with trailers: a unicycle that pulls N >= 1 of them, each hitched on an axle or off it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.arrays import positive, scalar
+from nmm.compiled import PLATFORM, Kernel, kernel
+from nmm.errors import InputError
+from nmm.platforms.base import Array, Platform
+from nmm.platforms.layout import Layout
+from nmm.platforms.own_joints import coordinates_with
+from nmm.platforms.trailer_layout import measure_trailers
+
+#: Beyond its limit a hitch is folded by more than this, rad.
+_SLACK = 1e-9
+
+
+@kernel(PLATFORM)
+def tractor(qp: Array, parameters: Array, G: Array, G_q: Array) -> None:
+    """From body to body, with (v, ω) of the axle in front, hitch angle b, hitch h and length l:
+
+    ω' = -(v sin b + h ω cos b) / l,  v' = v cos b - h ω sin b,  b_dot = ω' - ω;
+
+    parameters = [h_1, l_1, h_2, l_2, ...]. The derivatives in b_1, b_2, ... run along with them.
+    """
+    trailers = parameters.shape[0] // 2
+    cosine = math.cos(qp[2])
+    sine = math.sin(qp[2])
+    G[0, 0] = cosine
+    G[1, 0] = sine
+    G[2, 1] = 1.0
+    G_q[0, 0, 2] = -sine
+    G_q[1, 0, 2] = cosine
+    v_b = np.empty(trailers)
+    w_b = np.empty(trailers)
+    for j in range(2):
+        v = 1.0 - j
+        w = 1.0 * j
+        for i in range(trailers):
+            h = parameters[2 * i]
+            length = parameters[2 * i + 1]
+            cosine = math.cos(qp[3 + i])
+            sine = math.sin(qp[3 + i])
+            v_next = v * cosine - h * w * sine
+            w_next = -(v * sine + h * w * cosine) / length
+            G[3 + i, j] = w_next - w
+            for k in range(i):
+                v_k = v_b[k] * cosine - h * w_b[k] * sine
+                w_k = -(v_b[k] * sine + h * w_b[k] * cosine) / length
+                G_q[3 + i, j, 3 + k] = w_k - w_b[k]
+                v_b[k] = v_k
+                w_b[k] = w_k
+            v_b[i] = -v * sine - h * w * cosine
+            w_b[i] = -v_next / length
+            G_q[3 + i, j, 3 + i] = w_b[i]
+            v = v_next
+            w = w_next
+
+
+@dataclass(frozen=True)
+class Trailer:
+    """One trailer. Its link's frame is at the hitch, x forward; its axle is at x = -length.
+
+    Attributes
+    ----------
+    length : from the hitch to the trailer's axle, m
+    hitch : of the hitch behind the axle of the body in front, m; 0 on the axle, negative ahead of it
+    joint : name of the hitch's joint and coordinate: the trailer's angle from the body in front, rad
+    max_angle : largest angle to either side, rad; None without
+
+    Raises
+    ------
+    InputError : a length or max_angle that is not above zero
+    """
+
+    length: float
+    hitch: float = 0.0
+    joint: str = "hitch1"
+    max_angle: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "length", positive(self.length, f"length of trailer {self.joint}"))
+        object.__setattr__(self, "hitch", scalar(self.hitch, f"hitch of trailer {self.joint}"))
+        if self.max_angle is not None:
+            limit = positive(self.max_angle, f"max_angle of trailer {self.joint}")
+            object.__setattr__(self, "max_angle", limit)
+
+
+class Tractor(Platform):
+    """qp = [x, y, theta, hitch1, ...] (m, m, rad, rad, ...), up = [v, omega] (m/s, rad/s) of the tractor.
+
+    x, y is the midpoint of the tractor's axle, theta its heading from the world's x axis; each hitch's angle
+    counts from the body in front, counter-clockwise.
+
+    Parameters
+    ----------
+    trailers : from the tractor backwards
+    limits : largest absolute value of each input by name, m/s and rad/s
+
+    Raises
+    ------
+    InputError : no trailers, or things that are none; joints named twice or x, y or theta; a limit of an
+        input that does not exist
+    """
+
+    name = "tractor"
+    inputs = ("v", "omega")
+    input_units = ("m/s", "rad/s")
+
+    def __init__(self, trailers: Sequence[Trailer], *, limits: Mapping[str, float] | None = None) -> None:
+        try:
+            self.trailers = tuple(trailers)
+        except TypeError:
+            raise InputError(f"{self.name}: trailers: expected a list of Trailer, got {trailers!r}") from None
+        if not self.trailers:
+            raise InputError(f"{self.name}: trailers: expected at least one Trailer, got none")
+        for trailer in self.trailers:
+            if not isinstance(trailer, Trailer):
+                raise InputError(f"{self.name}: trailers: expected a list of Trailer, got {trailer!r} in it")
+        self.coordinates = coordinates_with(self.name, [trailer.joint for trailer in self.trailers])
+        super().__init__(limits=limits)
+
+    @classmethod
+    def fit(cls, layout: Layout) -> Self:
+        """The trailers of the file: the upright joints, one on another from the root's body on, whose names
+        hold "hitch" or "trailer", each with wheels on one axle behind it.
+
+        Raises
+        ------
+        InputError : no such joint, or two on one body, or one off the x axis; a trailer without wheels, or
+            with wheels on several axles or ahead of its hitch
+        """
+        measured = measure_trailers(layout, cls.name)
+        return cls([Trailer(one.length, one.hitch, one.joint, one.max_angle) for one in measured])
+
+    @property
+    def parameters(self) -> Array:
+        return np.array([[trailer.hitch, trailer.length] for trailer in self.trailers]).ravel()
+
+    @property
+    def coordinate_limits(self) -> Array:
+        """Those of each hitch are ±max_angle, if given."""
+        limits = super().coordinate_limits
+        for row, trailer in enumerate(self.trailers, 3):
+            if trailer.max_angle is not None:
+                limits[row] = [-trailer.max_angle, trailer.max_angle]
+        return limits
+
+    @property
+    def velocity_map(self) -> Kernel:
+        return tractor
+
+    def pfaffian(self, qp: Array) -> Array:
+        """No axle slides along itself, the tractor's first.
+
+        The axle of body i is at p_i = (x, y) - Σ_k a_k e_k, with e_k the direction of body k <= i and a_k the
+        length along it between (x, y) and p_i: from its own hitch (for the tractor, its axle) to the next
+        hitch, or to p_i. The row is n_i·p_i_dot = 0 with n_i across e_i.
+        """
+        # Directions as complex numbers: e_k = exp(j (θ + b_1 + ... + b_k)), without adding the angles.
+        e = np.cumprod(np.exp(1j * qp[2:]))
+        A = np.zeros((len(e), self.n_p))
+        for i in range(len(e)):
+            A[i, 0], A[i, 1] = -e[i].imag, e[i].real
+            for k in range(i + 1):
+                part = self.trailers[k - 1].length if k > 0 else 0.0
+                part += self.trailers[k].hitch if k < i else 0.0
+                # e_k_dot = n_k (θ_dot + b_1_dot + ... + b_k_dot)
+                A[i, 2 : 3 + k] -= part * (e[i] * e[k].conjugate()).real
+        return A
+
+    def problem(self, qp: ArrayLike) -> str | None:
+        """The first hitch that is folded beyond its limit."""
+        for trailer, angle in zip(self.trailers, np.asarray(qp)[3:], strict=True):
+            if trailer.max_angle is not None and abs(angle) > trailer.max_angle + _SLACK:
+                folded, limit = math.degrees(abs(angle)), math.degrees(trailer.max_angle)
+                return f"{trailer.joint} is folded to {folded:.4g} degrees, beyond its limit of {limit:.4g}"
+        return None

@@ -1,0 +1,124 @@
+"""What users give to platforms, parameters, limits and angles: each error names what is wrong."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy import pi
+
+from nmm.errors import InputError
+from nmm.platforms import (
+    Car,
+    DifferentialDrive,
+    Fixed,
+    FrontDriveCar,
+    Mecanum,
+    Omnidirectional,
+    Platform,
+    Tractor,
+    Trailer,
+    Unicycle,
+)
+
+NOT_POSITIVE = "expected a number above 0, got"
+NOT_A_JOINT = "expected a joint's name other than x, y, theta, got"
+
+BAD: dict[str, tuple[Callable[[], object], str]] = {
+    "radius 0": (lambda: DifferentialDrive(0.0, 0.5), f"differential: radius: {NOT_POSITIVE} 0"),
+    "track": (lambda: DifferentialDrive(0.1, -0.5), f"differential: track: {NOT_POSITIVE} -0.5"),
+    "no number": (lambda: DifferentialDrive("wide", 0.5), "radius: expected numbers, got 'wide'"),
+    "wheelbase": (lambda: Car(-1.0), f"car: wheelbase: {NOT_POSITIVE} -1"),
+    "infinite": (
+        lambda: FrontDriveCar(math.inf),
+        "front_drive_car: wheelbase: expected finite numbers, got inf",
+    ),
+    "steering": (lambda: Car(1.0, steering="theta"), f"car: {NOT_A_JOINT} 'theta'"),
+    "no name": (lambda: Car(1.0, steering=""), "car: expected the name of a joint, got ''"),
+    "rear to 90": (
+        lambda: Car(1.0, max_steering=pi / 2),
+        "car: max_steering: expected at most 89.9999 degrees, got 90 (1.5708 rad)",
+    ),
+    "left only": (lambda: Car(1.0, max_steering=-0.5), f"car: max_steering: {NOT_POSITIVE} -0.5"),
+    "front to 190": (
+        lambda: FrontDriveCar(1.0, max_steering=math.radians(190)),
+        "front_drive_car: max_steering: expected at most 180 degrees, got 190",
+    ),
+    "length": (lambda: Trailer(0.0), f"length of trailer hitch1: {NOT_POSITIVE} 0"),
+    "hitch": (lambda: Trailer(1.0, math.nan), "hitch of trailer hitch1: expected finite numbers, got nan"),
+    "max_angle": (lambda: Trailer(1.0, max_angle=0.0), f"max_angle of trailer hitch1: {NOT_POSITIVE} 0"),
+    "no trailers": (lambda: Tractor([]), "tractor: trailers: expected at least one Trailer, got none"),
+    "no list": (lambda: Tractor(Trailer(1.0)), "trailers: expected a list of Trailer, got Trailer("),
+    "lengths": (lambda: Tractor([1.0]), "trailers: expected a list of Trailer, got 1.0 in it"),
+    "twice": (lambda: Tractor([Trailer(1.0), Trailer(1.0)]), "tractor: two joints are named 'hitch1'"),
+    "x": (lambda: Tractor([Trailer(1.0, joint="x")]), f"tractor: {NOT_A_JOINT} 'x'"),
+    "mecanum": (lambda: Mecanum(0.1, 0.5, 0.0), f"mecanum: width: {NOT_POSITIVE} 0"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_parameters_are_named(case: str) -> None:
+    make, message = BAD[case]
+    with pytest.raises(InputError, match=re.escape(message)):
+        make()
+
+
+KINDS: dict[str, Callable[..., Platform]] = {
+    "unicycle": Unicycle,
+    "differential": lambda **options: DifferentialDrive(0.1, 0.5, **options),
+    "car": lambda **options: Car(1.0, **options),
+    "front_drive_car": lambda **options: FrontDriveCar(1.0, **options),
+    "tractor": lambda **options: Tractor([Trailer(1.0)], **options),
+    "omnidirectional": Omnidirectional,
+    "mecanum": lambda **options: Mecanum(0.1, 0.5, 0.4, **options),
+    "fixed": Fixed,
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_input_limits(kind: str) -> None:
+    free = KINDS[kind]()
+    assert np.all(free.input_limits == np.inf)
+    for k, name in enumerate(free.inputs):
+        limited = KINDS[kind](limits={name: 1.5})
+        expected = np.full(free.p, np.inf)
+        expected[k] = 1.5
+        np.testing.assert_array_equal(limited.input_limits, expected)
+        with pytest.raises(InputError, match=f"limit of {name}: expected a number above 0, got 0"):
+            KINDS[kind](limits={name: 0})
+    available = ", ".join(free.inputs) or "none"
+    with pytest.raises(InputError, match=f"platform {kind}: unknown input 'warp'.*available: {available}"):
+        KINDS[kind](limits={"warp": 1.0})
+
+
+def test_coordinate_limits() -> None:
+    limits = Car(1.0, max_steering=0.6).coordinate_limits
+    np.testing.assert_array_equal(limits, [[-np.inf, np.inf]] * 3 + [[-0.6, 0.6]])
+    assert np.all(np.isinf(Car(1.0).coordinate_limits))
+    assert FrontDriveCar(1.0, max_steering=pi).coordinate_limits[3, 1] == pi
+    tractor = Tractor([Trailer(1.0), Trailer(1.0, joint="hitch2", max_angle=1.2)])
+    np.testing.assert_array_equal(tractor.coordinate_limits, [[-np.inf, np.inf]] * 4 + [[-1.2, 1.2]])
+
+
+@pytest.mark.parametrize("angle", [pi / 2, -pi / 2, 3 * pi / 2])
+def test_a_rear_driven_car_cannot_steer_across(angle: float) -> None:
+    car = Car(1.0, steering="wheel")
+    qp = np.array([1.0, 2.0, 0.3, angle])
+    degrees = f"{math.degrees(angle):g}"
+    assert f"wheel is at {degrees} degrees, where the wheels' axes contradict v" in str(car.problem(qp))
+    assert car.problem(qp - [0, 0, 0, 1e-3]) is None
+    # What the message says: with v at 1 the rear axle's midpoint moves, and the steered wheel forbids it.
+    forward = np.array([np.cos(0.3), np.sin(0.3), 0.0, 0.0])
+    assert np.abs(car.A(qp) @ forward).max() == pytest.approx(1.0)
+    assert np.linalg.matrix_rank(np.vstack([car.A(qp), np.eye(4)[:2]]), tol=1e-9) == 2
+
+
+def test_a_hitch_folded_beyond_its_limit() -> None:
+    tractor = Tractor([Trailer(1.0, max_angle=0.5), Trailer(1.0, joint="hitch2", max_angle=pi / 2)])
+    assert tractor.problem([0, 0, 9, 0.5, -pi / 2]) is None
+    found = tractor.problem([0, 0, 9, 0.2, -math.radians(100)])
+    assert found == "hitch2 is folded to 100 degrees, beyond its limit of 90"
+    assert "hitch1 is folded to 30 degrees" in str(tractor.problem([0, 0, 9, math.radians(30), 3.0]))
