@@ -122,13 +122,12 @@ def _with_center_of_mass(
     robot: Robot, frames: tuple[str, ...], placements: Array, jacobians: Array, hessians: Array
 ) -> Callable[[float, Array], None]:
     """`kinematics_updater` for frames among which the centre of mass is: that one's slot apart."""
-    if hessians.size:
-        raise NmmError("the centre of mass has no Hessian here: no objective may ask for one beside it")
     slot = frames.index(CENTER_OF_MASS)
     others = [k for k in range(len(frames)) if k != slot]
     other_placements, other_jacobians = placements[others], jacobians[others]
+    other_hessians = hessians[others] if hessians.size else hessians
     update_others = kinematics_updater(
-        robot, tuple(frames[k] for k in others), other_placements, other_jacobians, hessians
+        robot, tuple(frames[k] for k in others), other_placements, other_jacobians, other_hessians
     )
     model, data = robot.model, robot.model.createData()
     placements[slot, :, :3] = np.eye(3)
@@ -136,6 +135,8 @@ def _with_center_of_mass(
     def update(t: float, q: Array) -> None:
         update_others(t, q)
         placements[others], jacobians[others] = other_placements, other_jacobians
+        if hessians.size:
+            hessians[others] = other_hessians  # no function asks for that of the centre of mass
         jacobians[slot, :3] = pin.jacobianCenterOfMass(model, data, q, False)
         placements[slot, :, 3] = data.com[0]
 

@@ -9,7 +9,11 @@ from nmm.controller import Controller, Step
 from nmm.excesses import excesses
 from nmm.program import Program
 from nmm.references.bearing import Bearing
+from nmm.references.polynomial import Constant
 from nmm.robot import Robot
+from nmm.tasks.orientation import Orientation
+from nmm.tasks.pointing import Pointing
+from nmm.tasks.pose import Pose
 from nmm.tasks.position import AXES, Position
 from nmm.trajectory import Outcome, Trajectory
 
@@ -110,6 +114,7 @@ class Recorder:
             desired = path.copy()
             for axis, column in columns.items():
                 desired[:, axis] = self._rows[1, :count, column]
+            desired = desired if columns else None
         if target is not None and path is not None and len(path) and target.size == 2:
             target = np.array([*target, path[0, 2]])
         return Trajectory(
@@ -141,19 +146,30 @@ class Recorder:
 
 
 def _shown(controller: Controller) -> tuple[str | None, dict[int, int], Array | None]:
-    """The positioned frame, for each world axis the task's row that holds it, and the target looked at."""
+    """The positioned frame, for each world axis the task's row that holds it, and the target looked at.
+
+    Where no task positions a frame, the one that a task turns.
+    """
     frame: str | None = None
+    turned: str | None = None
     columns: dict[int, int] = {}
     target: Array | None = None
     row = 0
     for task in controller.task:
-        if isinstance(task.function, Position) and frame in (None, task.function.frame):
-            frame = task.function.frame
-            columns |= {AXES[axis]: row + i for i, axis in enumerate(task.function.axes)}
+        function = task.function
+        if isinstance(function, Position | Pose) and function.relative_to is None:
+            if frame in (None, function.frame):
+                frame = function.frame
+                axes = function.axes if isinstance(function, Position) else tuple(AXES)
+                columns |= {AXES[axis]: row + i for i, axis in enumerate(axes)}
+        elif isinstance(function, Orientation | Pointing):
+            turned = turned or function.frame
         if isinstance(task.reference, Bearing):
             target = task.reference.towards
+        if isinstance(function, Pointing) and isinstance(function.at, Constant):
+            target = function.at.value
         row += len(task.rows(controller.robot))
-    return frame, columns, target
+    return frame or turned, columns, target
 
 
 def _frame_path(robot: Robot, frame: str, q: Array) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -67,6 +68,7 @@ class Robot:
     arguments : the xacro arguments that the file was read with
     notes : what loading did to the file, a sentence each
     arms : the joints of each arm by the arm's name, when several were mounted or one was named
+    parts : what loading keeps for mounting and for reports (`nmm.loading.provenance.Parts`)
     """
 
     name: str
@@ -80,6 +82,7 @@ class Robot:
     arguments: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     arms: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    parts: Any = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if self.model.nq != self.model.nv:

@@ -30,10 +30,24 @@ from nmm.references import (
     Line,
     PiecewisePolynomial,
     Polynomial,
+    PoseReference,
+    Slerp,
     Spline,
+    Turn,
 )
 from nmm.robot import Robot
-from nmm.tasks import CallableFunction, Coordinates, Heading, Position
+from nmm.tasks import (
+    CallableFunction,
+    CenterOfMass,
+    Coordinates,
+    Distance,
+    Heading,
+    Orientation,
+    Pointing,
+    Pose,
+    Position,
+    Posture,
+)
 
 Array = NDArray[np.float64]
 
@@ -105,9 +119,34 @@ def _tasks() -> Iterator[Entry]:
     yield Entry("heading of link1", Heading("link1"))
     yield Entry("coordinate", Coordinates("q2"))
     yield Entry("combinations", Coordinates("y", {"theta": 1, "q1": 1, "q2": -2.5}, {"x": 3.0}))
+    yield Entry("posture", Posture())
+    yield Entry("posture of two", Posture("q2", "x"))
     yield Entry("callable function", CallableFunction(_hand, ["a", "b"]))
     yield Entry("callable function, jacobian", CallableFunction(_hand, ["a", "b"], jacobian=_hand_jacobian))
     yield Entry("callable angle", CallableFunction(lambda c: c.q[2] + c.q[3], ["a"], angular=[True]))
+
+
+def _spatial_tasks() -> Iterator[Entry]:
+    """What the other entries leave out: frames that another frame sees, orientations, points in space."""
+    for frame, other in (("ee", "link1"), ("link1", "ee")):
+        yield Entry(f"position of {frame} in {other}", Position(frame, "zxy", other))
+        yield Entry(f"orientation of {frame} in {other}", Orientation(frame, other))
+        yield Entry(f"pose of {frame} in {other}", Pose(frame, other))
+    yield Entry("orientation", Orientation("ee"))
+    yield Entry("pose", Pose("ee"))
+    moving = Circle([2, -1, 0.5], 0.7, -1.3, 0.4, "yz")
+    callback = CallableReference(lambda t, c: [*_moving(t, c), 2.0 + t], 3, of_configuration=True)
+    for axis in ("x", "y", "z", (0.6, -0.3, 0.7), (-1, 0, 0)):
+        yield Entry(f"pointing of {axis} at a point", Pointing("ee", [6, 2, 1], axis))
+    yield Entry("pointing at a moving point", Pointing("ee", moving))
+    yield Entry("pointing at a frame", Pointing("link1", "ee", "x"))
+    yield Entry("pointing at the centre of mass", Pointing("ee", CenterOfMass(), (0.1, 1, 1)))
+    yield Entry("pointing at a callable", Pointing("ee", callback))
+    yield Entry("distance from a point", Distance("ee", [1, 2, 3]))
+    yield Entry("distance from a moving point", Distance("ee", moving))
+    yield Entry("distance between frames", Distance("base_footprint", "ee"))
+    for axes in ("xyz", "zx"):
+        yield Entry(f"centre of mass {axes}", CenterOfMass(axes))
 
 
 def _references() -> Iterator[Entry]:
@@ -144,6 +183,18 @@ def _references() -> Iterator[Entry]:
     )
 
 
+def _pose_references() -> Iterator[Entry]:
+    yield Entry("turn", Turn([0.2, -0.3, 0.9], 0.4, [0.3, 0.1, -0.5]))
+    for profile in ("constant", "smooth"):
+        yield Entry(f"slerp, {profile}", Slerp([0.1, -0.4, 0.3], [-1.2, 0.8, 1.1], 3.5, profile))
+    circle = Circle([2, -1, 0.5], 0.7, -1.3, 0.4)
+    yield Entry("pose at rest", PoseReference([1, 2, 3], [0.1, -0.2, 0.3]))
+    yield Entry("pose that moves", PoseReference(circle, Turn([0, 1, 1], 0.3)))
+    yield Entry("pose of a frame", PoseReference(Position("link1"), Orientation("link1")))
+    held = PoseReference([1, 2, 3], CallableReference(lambda t: [np.sin(t), 0.2, t / 9], 3, unit="rad"))
+    yield Entry("pose of a callable", held)
+
+
 def _objectives() -> Iterator[Entry]:
     h1 = Quadratic(Square({"theta": 1, "q1": 1, "q2": 1}, pi / 2), Square("q1", pi / 4))
     yield Entry("quadratic", h1)
@@ -175,7 +226,7 @@ def _objectives() -> Iterator[Entry]:
     yield Entry("difference", 2.0 * h1 - Manipulability("ee", "xy") * 0.3)
 
 
-ENTRIES = (*_tasks(), *_references(), *_objectives())
+ENTRIES = (*_tasks(), *_spatial_tasks(), *_references(), *_pose_references(), *_objectives())
 
 
 def evaluate(function: Function, t: float, configuration: Configuration) -> Evaluation:

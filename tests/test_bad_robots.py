@@ -335,6 +335,13 @@ def test_long_lists_of_problems_are_cut(tmp_path: Path) -> None:
     assert len(find_problems(text)) == 51
 
 
+def test_problems_with_joints_locked() -> None:
+    text = robot(LINKS, link("c"), joint(), joint("k", "b", "c", body=AXIS + LIMIT + '<mimic joint="j"/>'))
+    (problem,) = find_problems(text)
+    assert "locked, lock={'j': 0.0}: 'k' (follows 'j')" in problem.message
+    assert find_problems(text, lock=["j"]) == find_problems(text, lock=["k"]) == []
+
+
 def test_problems_without_a_file() -> None:
     assert find_problems(robot(LINKS, joint())) == []
     # Whether a mesh exists is asked only where one says how to find it.

@@ -14,7 +14,7 @@ from function_grid import ENTRIES, TIMES, Entry, evaluate, modules, random_confi
 from numba.core.dispatcher import Dispatcher
 from numpy.typing import NDArray
 from paper_cases import CASES, TIP
-from platform_grid import EXAMPLES
+from platform_grid import EXAMPLES, random_qp
 
 from nmm.compiled import Kernel
 from nmm.configuration import Configuration
@@ -22,10 +22,12 @@ from nmm.controller import Controller
 from nmm.function import Stage
 from nmm.loading import load
 from nmm.objectives import Sum
+from nmm.program import Program
 from nmm.resolvers import CallableResolver, ExtendedJacobian, ProjectedGradient, ReducedGradient, Resolver
 from nmm.resolvers.base import REPORT, Shape
-from nmm.robot import Robot
+from nmm.robot import CENTER_OF_MASS, Robot
 from nmm.tasks import Coordinates, Task
+from nmm.tasks.comparison import Comparison
 
 Array = NDArray[np.float64]
 
@@ -47,12 +49,21 @@ def kernels() -> dict[str, Kernel]:
     return found
 
 
+def kinematics(frame: str, configuration: Configuration) -> tuple[Array, Array, Array]:
+    """Placement (3, 4), Jacobian (6, n) and Hessian (6, n, n) of a frame; a mere point has no Hessian."""
+    n = configuration.robot.n
+    if frame == CENTER_OF_MASS:
+        point, jacobian = configuration.center_of_mass()
+        return np.c_[np.eye(3), point], np.vstack([jacobian, np.zeros((3, n))]), np.zeros((6, n, n))
+    pose = configuration.placement(frame)
+    placement = np.c_[pose.rotation, pose.translation]
+    return placement, configuration.jacobian(frame), configuration.hessian(frame)
+
+
 def stage_arguments(stage: Stage, t: float, configuration: Configuration) -> list[Array]:
     """What the stage's kernel reads at (t, q), computed here without nmm's program."""
     robot = configuration.robot
-    poses = [configuration.placement(frame) for frame in stage.frames]
-    placements = [np.c_[pose.rotation, pose.translation] for pose in poses]
-    hessians = [configuration.hessian(f) for f in stage.frames]
+    frames = [kinematics(frame, configuration) for frame in stage.frames]
     qp = configuration.q[: robot.platform.n_p]
     G_q = np.stack([robot.platform.G_dot(qp, e) for e in np.eye(len(qp))], axis=-1)
     parameters = stage.parameters
@@ -60,9 +71,9 @@ def stage_arguments(stage: Stage, t: float, configuration: Configuration) -> lis
         parameters = np.concatenate([part.ravel() for part in stage.callback(t, configuration)])
     k, n = len(stage.frames), robot.n
     return [
-        np.array(placements).reshape(k, 3, 4),
-        np.array([configuration.jacobian(f) for f in stage.frames]).reshape(k, 6, n),
-        np.array(hessians).reshape(k, 6, n, n),
+        np.array([placement for placement, _, _ in frames]).reshape(k, 3, 4),
+        np.array([jacobian for _, jacobian, _ in frames]).reshape(k, 6, n),
+        np.array([hessian for _, _, hessian in frames]).reshape(k, 6, n, n),
         robot.platform.G(qp),
         np.ascontiguousarray(G_q),
         np.arange(k),
@@ -94,10 +105,32 @@ def test_function_kernels(entry: Entry, robots: dict[str, Robot], rng: np.random
             assert_same(plain[:count], found)
 
 
+COMPARED = {type(e.function): e for e in SINGLE if e.function.comparison is not None}.values()
+
+
+@pytest.mark.parametrize("entry", COMPARED, ids=[entry.name for entry in COMPARED])
+def test_comparison_kernels(entry: Entry, robots: dict[str, Robot], rng: np.random.Generator) -> None:
+    """On values, targets and derivatives of any kind: a comparison is algebra on its rows."""
+    robot, kernel = robots[entry.robots[0]], entry.function.comparison
+    assert kernel is not None
+    s, q = len(entry.function.rows(robot)), np.zeros(robot.n)
+    nothing = stage_arguments(Stage(kernel, s), 0.0, Configuration(robot, q))
+    for _ in range(20):
+        given = [rng.normal(size=shape) for shape in (3 * s, 3 * s, (3 * s, robot.n))]
+        outcomes = [[part.copy() for part in given] for _ in range(2)]
+        for form, outcome in zip((kernel.plain, kernel), outcomes, strict=True):
+            form(0.0, q, *nothing, *outcome)
+        for plain, compiled, before in zip(*outcomes, given, strict=True):
+            assert_same(plain, compiled)
+            assert np.array_equal(plain[: 2 * s], before[: 2 * s])
+            assert np.all(plain[2 * s :] != before[2 * s :])
+
+
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_platform_kernels(name: str, rng: np.random.Generator) -> None:
     platform = EXAMPLES[name]
-    for qp in rng.uniform(-5, 5, (20, platform.n_p)):
+    for _ in range(20):
+        qp = random_qp(platform, rng, 5.0)
         both = []
         for form in (platform.velocity_map.plain, platform.velocity_map):
             G, G_q = np.zeros((platform.n_p, platform.p)), np.zeros((platform.n_p, platform.p, platform.n_p))
@@ -135,6 +168,7 @@ def test_no_kernel_is_left_out(robots: dict[str, Robot]) -> None:
     run |= {EXAMPLES[name].velocity_map for name in EXAMPLES}
     for entry in SINGLE:
         run |= {stage.kernel for stage in entry.function.stages(robots[entry.robots[0]])}
+    run |= {entry.function.comparison for entry in COMPARED}
     assert not {name for name, kernel in kernels().items() if kernel not in run}
 
 
@@ -142,7 +176,7 @@ def test_no_kernel_is_left_out(robots: dict[str, Robot]) -> None:
 
 
 def answers() -> dict[str, Array]:
-    """Everything the two forms are compared by: the grid's functions, and the inputs of the cases."""
+    """Everything the two forms are compared by: functions, errors, platforms, and the inputs of the cases."""
     found = {}
     rng = np.random.default_rng(7)
     robots = {name: load(name) for name in ("unicycle_2r", "unicycle_3r")}
@@ -151,6 +185,15 @@ def answers() -> dict[str, Array]:
         configuration = Configuration(robot, random_configuration(robot, rng))
         parts = evaluate(entry.function, 0.37, configuration)
         found[entry.name] = np.concatenate([part.ravel() for part in parts])
+    for name, platform in EXAMPLES.items():
+        found[f"platform {name}"] = platform.G(random_qp(platform, rng, 3.0)).ravel()
+    for entry in COMPARED:
+        robot = robots[entry.robots[-1]]
+        task = Task(entry.function, rng.normal(size=len(entry.function.rows(robot))))
+        program = Program(robot, [task.function, task.reference, Comparison(task)])
+        program.pack()
+        parts = program.evaluate(0.0, random_configuration(robot, rng))[2]
+        found[f"error of {entry.name}"] = np.concatenate([part.ravel() for part in parts])
     for case in CASES:
         robot = robots[case.robot]
         s = 2 if case.name == "case 1" else 3

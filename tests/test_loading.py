@@ -22,7 +22,7 @@ import nmm.bundled as bundled
 from nmm.bundled import bundled_robots, bundled_scenarios
 from nmm.errors import InputError, NmmError, RobotError
 from nmm.loading import load
-from nmm.platforms import Unicycle
+from nmm.platforms import PLATFORMS, Layout, Unicycle
 from nmm.robot import Robot
 
 Array = NDArray[np.float64]
@@ -119,6 +119,40 @@ def test_kinematics_of_other_robots(
     assert loaded.display_model.nq == loaded.display_model.nv == loaded.model.nq + len(wheels)
     assert_kinematics_as_yourdfpy(loaded, text, rng)
     assert capfd.readouterr() == ("", "")
+
+
+#: Robots of example-robot-data, and what is locked to load them.
+PUBLIC: dict[str, tuple[str, dict[str, float]]] = {
+    "ur5": ("ur_description/urdf/ur5_robot.urdf", {}),
+    "ur10": ("ur_description/urdf/ur10_robot.urdf", {}),
+    "panda": ("panda_description/urdf/panda.urdf", {"panda_finger_joint1": 0.015}),
+    "kinova": ("kinova_description/robots/kinova.urdf", {}),
+    "tiago_no_hand": (
+        "tiago_description/robots/tiago_no_hand.urdf",
+        {"head_1_joint": 0.3, "head_2_joint": -0.2},
+    ),
+    "z1": ("z1_description/urdf/z1.urdf", {}),
+}
+
+
+@pytest.mark.parametrize("name", list(PUBLIC))
+def test_public_robots_as_yourdfpy_has_them(name: str, rng: np.random.Generator) -> None:
+    """Every link on 100 configurations; joints that follow locked ones stand where yourdfpy puts them."""
+    file, lock = PUBLIC[name]
+    loaded = load(f"package://example-robot-data/robots/{file}", lock=lock)
+    twin = yourdfpy.URDF.load(str(DATA / file), load_meshes=False, build_scene_graph=True)
+    model = loaded.display_model
+    for _ in range(100):
+        q = random_q(rng, model)
+        values = by_name(model, q) | lock
+        twin.update_cfg({joint: values[joint] for joint in twin.actuated_joint_names})
+        pose, found = platform_pose(q), placements(model, q)
+        assert set(found) == set(twin.link_map)
+        graph = twin.scene.graph
+        for link_name, placement in found.items():
+            expected = pose @ graph.get(link_name, twin.base_link)[0]
+            assert np.abs(placement - expected).max() < 1e-10, link_name
+    assert loaded.parts.provenance.locked == lock
 
 
 @pytest.fixture(params=[3, 8, 20])
@@ -327,6 +361,52 @@ def test_mesh_in_a_package(scheme: str, tmp_path: Path, monkeypatch: pytest.Monk
         assert Path(part.meshPath) == mesh
     monkeypatch.setenv("ROS_PACKAGE_PATH", f"/nowhere:{package.parent}")
     assert load(path).visual_model.ngeoms == 1
+
+
+def test_source_in_a_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "my_robots" / "urdf"
+    folder.mkdir(parents=True)
+    write_box(folder / "part.stl")
+    as_file(folder, mesh_robot("package://my_robots/urdf/part.stl"))
+    name = "package://my_robots/urdf/r.urdf"
+    loaded = load(name, package_dirs=[tmp_path])
+    assert (loaded.source, loaded.q_names[3:]) == (name, ("j",))
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
+    assert load(name).parts.provenance.meshes == {"package://my_robots/urdf/part.stl": folder / "part.stl"}
+    assert load(name).parts.provenance.packages == {"my_robots": tmp_path / "my_robots"}
+    assert tmp_path in load(name).parts.provenance.searched
+    for wrong, cause in (
+        ("package://others/urdf/r.urdf", "package 'others' not found .*; searched: .*example|searched: "),
+        ("package://my_robots/r.urdf", "package://my_robots/r.urdf: no such file in the package"),
+        ("package://my_robots/urdf/part.stl", "expected a name that ends in .urdf or .xacro"),
+        ("package://", "package '' not found"),
+    ):
+        with pytest.raises(RobotError, match=cause):
+            load(wrong)
+
+
+def test_missing_meshes_may_be_left_out(tmp_path: Path) -> None:
+    """The shape is gone, the link and its other shapes stay, a note says so; other faults are faults."""
+    mesh = shape('<mesh filename="package://nowhere/no.stl"/>')
+    solid = shape('<sphere radius="0.1"/>')
+    text = robot(link("a", mesh + solid), link("b", mesh.replace("visual", "collision")), joint())
+    path = as_file(tmp_path, text)
+    with pytest.raises(RobotError, match="package 'nowhere' not found"):
+        load(path)
+    loaded = load(path, missing_meshes="skip")
+    assert [part.name for part in loaded.visual_model.geometryObjects] == ["a_0"]
+    assert loaded.collision_model.ngeoms == 0
+    assert any(
+        "left out, their meshes are missing: package://nowhere/no.stl" in note for note in loaded.notes
+    )
+    assert loaded.parts.provenance.meshes == {"package://nowhere/no.stl": None}
+    assert loaded.parts.provenance.packages == {"nowhere": None}
+    write(tmp_path / "part.step", "")
+    unknown = as_file(tmp_path, mesh_robot("part.step"))
+    with pytest.raises(RobotError, match="unknown format"):
+        load(unknown, missing_meshes="skip")
+    with pytest.raises(RobotError, match="unknown missing_meshes 'ignore'; available: error, skip"):
+        load(path, missing_meshes="ignore")  # type: ignore[arg-type]  # wrong on purpose
 
 
 # ------------------------------------------------------------------------------------------------ wheels
@@ -566,6 +646,37 @@ def test_model_that_has_the_chain_is_kept(rng: np.random.Generator) -> None:
     )
 
 
+def test_limits_of_a_chain_are_kept() -> None:
+    """Velocity and effort limits of x, y and theta, and where they may be."""
+    model, parent = pin.Model(), 0
+    for i, (name, kind) in enumerate(
+        (("x", pin.JointModelPX()), ("y", pin.JointModelPY()), ("theta", pin.JointModelRZ()))
+    ):
+        bounds = [np.full(1, value + i) for value in (-5.0, 5.0, -1.0, 1.0, -30.0, 30.0, 0.1, 0.1, 0.2)]
+        parent = model.addJoint(parent, kind, pin.SE3.Identity(), name, *bounds)
+    model.addJoint(parent, pin.JointModelRX(), pin.SE3.Random(), "arm")
+    loaded = load(model)
+    np.testing.assert_array_equal(loaded.model.velocityLimit[:3], [1, 2, 3])
+    np.testing.assert_array_equal(loaded.model.upperEffortLimit[:3], [5, 6, 7])
+    np.testing.assert_array_equal(loaded.model.lowerPositionLimit[:3], [-30, -29, -28])
+    np.testing.assert_array_equal(loaded.model.damping[:3], [0.2, 1.2, 2.2])
+    np.testing.assert_array_equal(loaded.q_limits[:3, 1], [30, 31, 32])
+
+
+@pytest.mark.parametrize("root", list(ROOTS))
+def test_reference_configurations_go_along(root: str, rng: np.random.Generator) -> None:
+    """Those of an SRDF, by joint: continuous ones as an angle, x, y, theta at 0, locked ones left out."""
+    text, joint_model = arm_text(), ROOTS[root]
+    model = pin.buildModelFromXML(text) if joint_model is None else pin.buildModelFromXML(text, joint_model)
+    values = {"first": 0.3, "second": -2.5, "third": 0.7}
+    model.referenceConfigurations["home"] = full(model, values)
+    for lock in ({}, {"third": 0.1}):
+        loaded = load(model, lock=lock)
+        kept = {entry.key(): np.array(entry.data()) for entry in loaded.model.referenceConfigurations}
+        expected = [0, 0, 0, *(values[name] for name in loaded.q_names[3:])]
+        np.testing.assert_allclose(kept["home"], expected, atol=1e-15)
+
+
 def test_root_joint_that_is_not_at_the_origin(rng: np.random.Generator) -> None:
     """The chain starts where the planar joint did; what stands in the world stays there."""
     model, place = pin.Model(), pin.SE3.Random()
@@ -673,12 +784,12 @@ def test_shapes_on_a_joint_that_is_not_there() -> None:
         load(large.model, collision_model="shapes")  # type: ignore[arg-type]  # wrong on purpose
 
 
-# -------------------------------------------------------------------------------------- locked, platform
+# ---------------------------------------------------------------------------------------- locked joints
 
 
 def test_locked_joints(tmp_path: Path, rng: np.random.Generator) -> None:
     path = write(tmp_path / "arm.urdf", arm_text())
-    whole, part = load(path), load(path, locked={"second": 0.7, "third": -0.2})
+    whole, part = load(path), load(path, lock={"second": 0.7, "third": -0.2})
     assert part.q_names == ("x", "y", "theta", "first")
     assert any("second at 0.7, third at -0.2" in note for note in part.notes)
     q = random_q(rng, part.model)
@@ -687,23 +798,241 @@ def test_locked_joints(tmp_path: Path, rng: np.random.Generator) -> None:
         np.testing.assert_allclose(placement, expected[name], atol=1e-12)
     for wrong, cause in (({"arm": 1.0}, "unknown joint to lock 'arm'"), ({"second": np.nan}, "finite")):
         with pytest.raises(RobotError, match=cause):
-            load(path, locked=wrong)
+            load(path, lock=wrong)
     with pytest.raises(RobotError, match="expected a value for each joint's name"):
-        load(path, locked=["second"])  # type: ignore[arg-type]  # wrong on purpose
+        load(path, lock=["second"])  # type: ignore[arg-type]  # wrong on purpose
 
 
-def test_locked_joint_may_mimic(tmp_path: Path) -> None:
-    text = robot(
+def mimicking(*mimics: str, leader: str = "revolute") -> str:
+    """Joint j moves b, and each further joint k, l... the link c, d... with the <mimic> given."""
+    names = "klmn"[: len(mimics)]
+    followers = [
+        joint(name, "b", f"of_{name}", body=AXIS + LIMIT + mimic)
+        for name, mimic in zip(names, mimics, strict=True)
+    ]
+    body = AXIS + (LIMIT if leader != "fixed" else "")
+    return robot(
         link("a"),
         link("b"),
-        link("c"),
-        joint(),
-        joint("k", "b", "c", body=AXIS + LIMIT + '<mimic joint="j"/>'),
+        *(link(f"of_{name}") for name in names),
+        joint(kind=leader, body=body),
+        *followers,
     )
-    path = as_file(tmp_path, text)
-    with pytest.raises(RobotError, match=r"mimic joints are refused.*'k'"):
+
+
+def test_mimic_joints_follow_locked_ones(tmp_path: Path) -> None:
+    """At multiplier * value + offset, through each other, in any order in the file."""
+    path = as_file(
+        tmp_path,
+        mimicking(
+            '<mimic joint="l" multiplier="-0.5"/>',
+            '<mimic joint="j" multiplier="2" offset="0.1"/>',
+            '<mimic joint="j"/>',
+        ),
+    )
+    with pytest.raises(
+        RobotError, match=r"refused unless .* lock=\{'j': 0\.0\}: 'k' \(follows 'j'\), 'l' .*, 'm'"
+    ):
         load(path)
-    assert load(path, locked={"k": 0.5}).q_names == ("x", "y", "theta", "j")
+    loaded = load(path, lock={"j": 0.2})
+    assert loaded.n == 3
+    assert loaded.parts.provenance.mimicked == {
+        "l": ("j", 0.5),
+        "m": ("j", 0.2),
+        "k": ("l", -0.25),
+    }
+    assert any(
+        "l at 0.5 (follows j), m at 0.2 (follows j), k at -0.25 (follows l)" in n for n in loaded.notes
+    )
+    by_hand = load(path, lock={"j": 0.2, "k": -0.25, "l": 0.5, "m": 0.2})
+    for name, placement in placements(by_hand.model, np.zeros(3)).items():
+        np.testing.assert_allclose(placements(loaded.model, np.zeros(3))[name], placement, atol=1e-15)
+    # A follower that is locked itself follows nobody; those behind it follow it.
+    assert load(path, lock={"l": 0.4, "m": 0.0}).q_names == ("x", "y", "theta", "j")
+    assert load(path, lock={"l": 0.4, "m": 0.0}).parts.provenance.mimicked == {"k": ("l", -0.2)}
+    with pytest.raises(
+        RobotError, match=r"lock: l, which follows j: 1\.1 is outside its limits, from -1 to 1"
+    ):
+        load(path, lock={"j": 0.5})
+
+
+def test_mimic_of_a_fixed_joint(tmp_path: Path) -> None:
+    path = as_file(tmp_path, mimicking('<mimic joint="j" offset="0.3"/>', leader="fixed"))
+    assert load(path).parts.provenance.mimicked == {"k": ("j", 0.3)}
+
+
+@pytest.mark.parametrize(
+    ("mimic", "cause"),
+    [
+        ('<mimic joint="jj"/>', "joint 'k': unknown joint to follow 'jj' \\(did you mean 'j'"),
+        ("<mimic/>", "joint 'k': <mimic> has no joint"),
+        ('<mimic joint="j" multiplier="two"/>', "joint 'k': <mimic> multiplier: expected a finite number"),
+        ('<mimic joint="k"/>', "joint 'k': <mimic> follows itself: k -> k"),
+    ],
+)
+def test_mimics_that_are_wrong(mimic: str, cause: str, tmp_path: Path) -> None:
+    with pytest.raises(RobotError, match=cause):
+        load(as_file(tmp_path, mimicking(mimic)), lock={"j": 0.0})
+
+
+def test_lock_that_is_suggested_is_allowed(tmp_path: Path) -> None:
+    text = mimicking('<mimic joint="j"/>').replace(LIMIT, LIMIT.replace('lower="-1"', 'lower="0.25"'), 1)
+    with pytest.raises(RobotError, match=r"lock=\{'j': 0\.25\}"):
+        load(as_file(tmp_path, text))
+    assert load(as_file(tmp_path, text), lock={"j": 0.25}).n == 3
+
+
+@pytest.mark.parametrize("value", [1.01, -2, 1e9])
+def test_locked_outside_the_limits(value: float, tmp_path: Path) -> None:
+    path = as_file(tmp_path, robot(link("a"), link("b"), joint()))
+    with pytest.raises(
+        RobotError, match=rf"lock: j: {value:g} is outside its limits, from -1 to 1".replace("+", r"\+")
+    ):
+        load(path, lock={"j": value})
+    assert load(path, lock={"j": 1.0}).n == 3
+    turning = as_file(tmp_path, robot(link("a"), link("b"), joint(kind="continuous", body=AXIS)))
+    assert load(turning, lock={"j": value}).n == 3
+
+
+# ------------------------------------------------------------------------------------------ axle, platform
+
+
+def axled() -> str:
+    """A root link over whose rear, turned by a quarter, the axle is; a tilted frame and an arm."""
+    parts = [
+        ("axle", '<origin xyz="-0.4 0.1 -0.2" rpy="0 0 1.5707963267948966"/>'),
+        ("oblique", '<origin xyz="-0.4 0 0" rpy="0.1 0 0"/>'),
+    ]
+    wheel = joint(
+        "wheel_joint",
+        "base",
+        "wheel",
+        "continuous",
+        '<axis xyz="1 0 0"/>',
+        '<origin xyz="-0.4 0.4 -0.1"/>',
+    )
+    return robot(
+        link(
+            "base", inertial(2.0) + shape('<box size="1 1 1"/>') + shape('<box size="1 1 1"/>', "collision")
+        ),
+        *(link(name) + joint(f"{name}_joint", "base", name, "fixed", "", origin) for name, origin in parts),
+        link("wheel", shape('<cylinder radius="0.1" length="0.1"/>', "collision")),
+        wheel,
+        link("arm", inertial() + shape('<sphere radius="0.1"/>', "collision")),
+        joint("j", "base", "arm"),
+    )
+
+
+AXLE = pin.SE3(np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]]), np.array([-0.4, 0.1, -0.2]))
+AXLES: list[tuple[object, pin.SE3]] = [
+    ("axle", AXLE),
+    ((-0.4, 0.1, -0.2), pin.SE3(np.eye(3), AXLE.translation)),
+    ([-0.4, 0.1], pin.SE3(np.eye(3), np.array([-0.4, 0.1, 0]))),
+    (np.array([-0.4, 0.1]), pin.SE3(np.eye(3), np.array([-0.4, 0.1, 0]))),
+]
+
+
+@pytest.mark.parametrize(("axle", "place"), AXLES)
+def test_axle(axle: object, place: pin.SE3, tmp_path: Path, rng: np.random.Generator) -> None:
+    """Everything moves by the inverse of the axle's placement; the chain turns about it."""
+    path = as_file(tmp_path, axled())
+    plain, moved = load(path), load(path, axle=axle)  # type: ignore[arg-type]  # of several types
+    for _ in range(5):
+        q = random_q(rng, moved.model)
+        still = np.concatenate([np.zeros(3), q[3:]])
+        motion = platform_pose(q) @ place.inverse().homogeneous
+        before, after = placements(plain.model, still), placements(moved.model, q)
+        for name in before:
+            np.testing.assert_allclose(after[name], motion @ before[name], atol=1e-12, err_msg=name)
+        masses, solids = [], []
+        for one, at in ((plain, still), (moved, q)):
+            masses.append(pin.centerOfMass(one.model, one.model.createData(), at))
+            placed = one.collision_model.createData()
+            pin.updateGeometryPlacements(one.model, one.model.createData(), one.collision_model, placed, at)
+            solids.append([pose.homogeneous for pose in placed.oMg])
+        np.testing.assert_allclose(masses[1], (motion @ [*masses[0], 1])[:3], atol=1e-12)
+        for here, there in zip(*solids, strict=True):
+            np.testing.assert_allclose(there, motion @ here, atol=1e-12)
+    assert_frames_are_a_tree(moved.model)
+    assert any("the platform's reference point is at (-0.4, 0.1" in note for note in moved.notes)
+    (wheel,) = moved.wheels
+    np.testing.assert_allclose(wheel.center, place.actInv(np.array([-0.4, 0.4, -0.1])), atol=1e-12)
+    np.testing.assert_allclose(wheel.axis, place.rotation.T @ [1, 0, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("axle", "cause"),
+    [
+        ("nowhere", "axle: unknown frame 'nowhere'.*available: theta, base, axle_joint"),
+        ("oblique", "axle: frame 'oblique' is tilted"),
+        ("arm", "axle: frame 'arm' is not on the root link's body: joint j moves it"),
+        ((1.0,), "axle: expected a frame, x and y, or x, y and z"),
+        ((1.0, np.nan), "axle: expected finite numbers"),
+        (3.0, "axle: expected a frame"),
+    ],
+)
+def test_axles_that_are_none(axle: object, cause: str, tmp_path: Path) -> None:
+    path = as_file(tmp_path, axled())
+    with pytest.raises(RobotError, match=cause) as caught:
+        load(path, axle=axle)  # type: ignore[arg-type]  # wrong on purpose
+    assert str(path) in str(caught.value)
+
+
+def test_axle_of_a_locked_part(tmp_path: Path) -> None:
+    """What stands still on the root link is part of it."""
+    text = axled().replace('rpy="0.1 0.2 0.3"', 'rpy="0 0 0"')
+    moved = load(as_file(tmp_path, text), axle="arm", lock={"j": 0.5})
+    np.testing.assert_allclose(placements(moved.model, np.zeros(3))["arm"], np.eye(4), atol=1e-12)
+
+
+def test_declared_platform(tmp_path: Path) -> None:
+    for platform in ("unicycle", "fixed"):
+        path = as_file(tmp_path, robot(f'<nmm platform="{platform}"/>', link("a"), link("b"), joint()))
+        assert load(path).platform.name == platform
+        assert load(path).parts.provenance.platform == "file"
+        assert load(path, platform="unicycle").platform.name == "unicycle"
+    assert load(path, platform="unicycle").parts.provenance.platform == "given"
+    plain = load(as_file(tmp_path, robot(link("a"), link("b"), joint())))
+    assert (plain.platform.name, plain.parts.provenance.platform) == ("unicycle", "default")
+    expanded = robot('<nmm platform="fixed"/>', link("a"), attributes=f'name="r" {XACRO}')
+    assert load(write(tmp_path / "r.xacro", expanded)).n == 0
+    for declared, cause in (
+        ('<nmm platform="fixd"/>', "line 1: <nmm>: unknown platform 'fixd' .did you mean 'fixed'"),
+        ("<nmm/>", "<nmm> has no platform"),
+        ('<nmm platform="fixed" wheelbase="1"/>', "<nmm>: unknown attribute 'wheelbase'"),
+        ('<nmm platform="fixed"/>' * 2, "a second <nmm>"),
+    ):
+        with pytest.raises(RobotError, match=cause):
+            load(as_file(tmp_path, robot(declared, link("a"))))
+
+
+class Measured(Unicycle):
+    """A platform that measures what it is given, and needs two wheels."""
+
+    name = "measured"
+    seen: object = None
+
+    @classmethod
+    def fit(cls, layout: Layout) -> Measured:
+        cls.seen = layout
+        if len(layout.wheels) != 2:
+            raise InputError(f"platform measured: expected two wheels, found {len(layout.wheels)}")
+        return cls()
+
+
+def test_platform_is_measured_in_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From the axle, with locked joints standing still; what it lacks is said with the file's name."""
+    monkeypatch.setitem(PLATFORMS, "measured", Measured)
+    loaded = load("unicycle_2r", platform="measured", axle=(0.1, 0.0))
+    assert isinstance(loaded.platform, Measured)
+    layout = Measured.seen
+    assert isinstance(layout, Layout)
+    assert [(wheel.joint, round(wheel.x, 12)) for wheel in layout.wheels] == [
+        ("left_wheel_joint", -0.1),
+        ("right_wheel_joint", -0.1),
+    ]
+    with pytest.raises(RobotError, match="unicycle_2r: platform measured: expected two wheels, found 1"):
+        load("unicycle_2r", platform="measured", lock={"left_wheel_joint": 0.0})
 
 
 class Steered(Unicycle):
@@ -726,7 +1055,7 @@ def test_platforms_own_joints_come_first(tmp_path: Path) -> None:
     with pytest.raises(RobotError, match="unknown platform joint 'steer'"):
         load("unicycle_2r", platform=Steered())
     with pytest.raises(RobotError, match="unknown joint to lock 'steer'"):
-        load(path, platform=Steered(), locked={"steer": 0.0})
+        load(path, platform=Steered(), lock={"steer": 0.0})
 
 
 def test_platform_by_name() -> None:

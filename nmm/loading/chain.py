@@ -8,14 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from nmm.errors import RobotError
-from nmm.loading.joint_kinds import is_continuous, is_simple, kind, one_number
+from nmm.loading.joint_kinds import is_continuous, is_simple, kind, one_number, value_at
+
+Head = Sequence[tuple[str, Any]]
 
 CHAIN = ("x", "y", "theta")
+#: The platform's chain: names and joints.
+CHAIN_JOINTS: Head = tuple(
+    zip(CHAIN, (pin.JointModelPX(), pin.JointModelPY(), pin.JointModelRZ()), strict=True)
+)
 # The kinds of the chain's joints, in a model that has them already.
 _CHAIN_KINDS = (("PX",), ("PY",), ("RZ", "RUBZ"))
 # Pinocchio's "no limit" is the largest number there is.
@@ -38,8 +46,13 @@ class Rebuilt:
     notes: tuple[str, ...]
 
 
-def with_chain(
-    source: pin.Model, geometries: Sequence[pin.GeometryModel], where: str, first: Sequence[str] = ()
+def rebuild(
+    source: pin.Model,
+    geometries: Sequence[pin.GeometryModel],
+    where: str,
+    first: Sequence[str] = (),
+    root: pin.SE3 | None = None,
+    head: Head = CHAIN_JOINTS,
 ) -> Rebuilt:
     """The same robot on the chain x, y (prismatic, m) and theta (revolute, rad), at zero where it was.
 
@@ -49,26 +62,53 @@ def with_chain(
         flyer (the chain replaces it, with z, roll and pitch at zero), or one that begins with the chain
     geometries : its geometry models
     where : what messages call the model
-    first : joints that come before their siblings (the platform's own)
+    first : joints that come before their siblings (the platform's own), in this order
+    root : placement of the root link in the last joint of the chain (in the world without a chain)
+    head : names and joints in the chain's place: another root joint, or none for a fixed base
 
     Raises
     ------
     RobotError : a joint with more than one degree of freedom, or a name that clashes with the chain's
     """
-    head = _head(source)
-    _check(source, head, where)
+    plan = _Plan(source, replaced_joints(source), tuple(head), pin.SE3.Identity() if root is None else root)
+    _check(plan, where)
     model = pin.Model()
     model.name, model.gravity = source.name, source.gravity
-    joints = _add_joints(model, source, head, first)
+    joints = _add_joints(model, plan, first)
     for joint, image in joints.items():
-        model.appendBodyToJoint(image, source.inertias[joint], pin.SE3.Identity())
-    frames = _add_frames(model, source, head, joints)
-    copies = tuple(_geometry(model, geometry, joints, frames) for geometry in geometries)
-    return Rebuilt(model, copies, tuple(_notes(source, head)))
+        model.appendBodyToJoint(image, source.inertias[joint], plan.moved(joint, pin.SE3.Identity()))
+    frames = _add_frames(model, plan, joints)
+    copies = tuple(_geometry(model, plan, geometry, joints, frames) for geometry in geometries)
+    _add_references(model, plan, joints)
+    return Rebuilt(model, copies, tuple(_notes(plan)))
 
 
-def _head(source: pin.Model) -> int:
-    """How many of the source's first joints the chain stands for: 3 (the chain itself), 1 (a root), or 0."""
+@dataclass(frozen=True)
+class _Plan:
+    """What is built from what: `count` of the source's first joints give way to those of `head`."""
+
+    source: pin.Model
+    count: int
+    head: tuple[tuple[str, Any], ...]
+    root: pin.SE3
+
+    @property
+    def is_chain(self) -> bool:
+        """Whether the head is the platform's chain."""
+        return tuple(name for name, _ in self.head) == CHAIN
+
+    @property
+    def keeps_chain(self) -> bool:
+        """Whether the source has the very joints that are asked for."""
+        return self.count == 3 and self.is_chain
+
+    def moved(self, joint: int, placement: pin.SE3) -> pin.SE3:
+        """The placement of something on a joint's body: what is on the root's body moves with the root."""
+        return self.root * placement if joint == self.count else placement
+
+
+def replaced_joints(source: pin.Model) -> int:
+    """How many first joints the chain stands for: 3 (the chain itself), 1 (a planar or free root), or 0."""
     kinds = [kind(joint) for joint in source.joints]
     if (
         tuple(source.names)[1:4] == CHAIN
@@ -80,10 +120,11 @@ def _head(source: pin.Model) -> int:
     return 1 if source.njoints > 1 and kinds[1] in ("FreeFlyer", "Planar") else 0
 
 
-def _check(source: pin.Model, head: int, where: str) -> None:
+def _check(plan: _Plan, where: str) -> None:
+    source = plan.source
     bad = [
         f"{source.names[i]} ({kind(source.joints[i])})"
-        for i in range(head + 1, source.njoints)
+        for i in range(plan.count + 1, source.njoints)
         if not is_simple(source.joints[i])
     ]
     if bad:
@@ -93,34 +134,34 @@ def _check(source: pin.Model, head: int, where: str) -> None:
         )
     names = {*source.names, *(frame.name for frame in source.frames)}
     clashes = [name for name in CHAIN if name in names]
-    if clashes and head != 3:
+    if clashes and plan.count != 3:
         raise RobotError(f"{where}: joints or frames have the coordinates' names {', '.join(clashes)}")
 
 
-def _add_joints(model: pin.Model, source: pin.Model, head: int, first: Sequence[str]) -> dict[int, int]:
+def _add_joints(model: pin.Model, plan: _Plan, first: Sequence[str]) -> dict[int, int]:
     """Add the chain and the source's joints; returns the new index of each of the source's joints."""
+    source, count = plan.source, plan.count
     # A root joint that is not at the world's origin keeps its place: x and y count from there.
-    placement = source.jointPlacements[1] if head else pin.SE3.Identity()
-    nothing, infinite = np.zeros(1), np.full(1, np.inf)
+    placement = source.jointPlacements[1] if count and plan.head else pin.SE3.Identity()
     parent = 0
-    for name, joint in zip(CHAIN, (pin.JointModelPX(), pin.JointModelPY(), pin.JointModelRZ()), strict=True):
-        limits = (-infinite, infinite) * 3
-        parent = model.addJoint(parent, joint, placement, name, *limits, nothing, nothing, nothing)
+    for name, joint in plan.head:
+        limits = _limits(source, parent + 1) if plan.keeps_chain else _no_limits(joint)
+        parent = model.addJoint(parent, joint, placement, name, *limits)
         placement = pin.SE3.Identity()
-    # What hung on the universe of a fixed base moves with theta.
-    joints = {0: 0 if head else parent}
-    joints |= {joint: joint if head == 3 else parent for joint in range(1, head + 1)}
+    # What hung on the universe of a fixed base moves with the root.
+    joints = {0: 0 if count else parent}
+    joints |= {joint: joint if plan.keeps_chain else parent for joint in range(1, count + 1)}
     neutral = pin.neutral(source)
-    for joint in _order(source, head, first):
+    for joint in _order(source, count, first):
         joints[joint] = model.addJoint(
             joints[source.parents[joint]],
             one_number(source.joints[joint], neutral),
-            source.jointPlacements[joint],
+            plan.moved(source.parents[joint], source.jointPlacements[joint]),
             source.names[joint],
             *_limits(source, joint),
         )
     # Of a replaced root there is nothing to copy, of a kept chain there is.
-    for joint in range(head + 1 if head == 1 else 1, source.njoints):
+    for joint in range(1 if plan.keeps_chain else count + 1, source.njoints):
         new, old = model.joints[joints[joint]].idx_v, source.joints[joint].idx_v
         model.armature[new] = source.armature[old]
         model.rotorInertia[new] = source.rotorInertia[old]
@@ -128,22 +169,35 @@ def _add_joints(model: pin.Model, source: pin.Model, head: int, first: Sequence[
     return joints
 
 
-def _order(source: pin.Model, head: int, first: Sequence[str]) -> list[int]:
+def _order(source: pin.Model, count: int, first: Sequence[str]) -> list[int]:
     """The joints after the chain, depth first (Pinocchio's algorithms rely on it), `first` before others."""
     children: dict[int, list[int]] = {joint: [] for joint in range(source.njoints)}
-    for joint in range(head + 1, source.njoints):
+    for joint in range(count + 1, source.njoints):
         children[source.parents[joint]].append(joint)
+    rank = {name: i for i, name in enumerate(first)}
     order: list[int] = []
-    stack = list(range(head + 1))
+    stack = list(range(count + 1))
     while stack:
         joint = stack.pop()
-        if joint > head:
+        if joint > count:
             order.append(joint)
-        stack.extend(sorted(children[joint], key=lambda i: (source.names[i] not in first, i), reverse=True))
+        key = [(rank.get(source.names[i], len(rank)), i) for i in children[joint]]
+        stack.extend(i for _, i in sorted(key, reverse=True))
     return order
 
 
-def _limits(source: pin.Model, joint: int) -> tuple[np.ndarray, ...]:
+def _no_limits(joint: Any) -> tuple[NDArray[np.float64], ...]:
+    nq, nv = joint.nq, joint.nv
+    nothing = np.zeros(nv)
+    lower, upper = np.full(nq, -np.inf), np.full(nq, np.inf)
+    # Cosine and sine, or a quaternion, as Pinocchio bounds them.
+    angles = {4: slice(2, 4), 7: slice(3, 7)}.get(nq, slice(0, 0))
+    lower[angles], upper[angles] = -1.01, 1.01
+    infinite = np.full(nv, np.inf)
+    return (-infinite, infinite, -infinite, infinite, lower, upper, nothing, nothing, nothing)
+
+
+def _limits(source: pin.Model, joint: int) -> tuple[NDArray[np.float64], ...]:
     """Limits of effort, velocity, position and friction (lower, upper), and damping; infinite where none."""
     v, q = source.joints[joint].idx_v, source.joints[joint].idx_q
     velocity = source.velocityLimit[v : v + 1]  # `lowerVelocityLimit` comes back with the wrong sign
@@ -161,23 +215,32 @@ def _limits(source: pin.Model, joint: int) -> tuple[np.ndarray, ...]:
     )
 
 
-def _add_frames(model: pin.Model, source: pin.Model, head: int, joints: Mapping[int, int]) -> dict[int, int]:
-    """Add the chain's and the source's frames; returns the new index of each of the source's frames."""
-    if head != 3:
-        for joint, name in enumerate(CHAIN, start=1):
+def _add_frames(model: pin.Model, plan: _Plan, joints: Mapping[int, int]) -> dict[int, int]:
+    """Add the head's and the source's frames; returns the new index of each of the source's frames."""
+    source, count = plan.source, plan.count
+    if not plan.keeps_chain:
+        for joint, (name, _) in enumerate(plan.head, start=1):
             model.addFrame(pin.Frame(name, joint, joint - 1, pin.SE3.Identity(), pin.FrameType.JOINT))
-    theta = 0 if head == 3 else model.getFrameId("theta")
-    frames = {0: 0 if head else theta}
-    for index, frame in enumerate(source.frames):
-        if index == 0:
+    top = len(plan.head) if not plan.keeps_chain else 0
+    names = {name for name, _ in plan.head}
+    frames = {0: 0 if count else top}
+    # In the joints' new order: Pinocchio's reduction adds a joint's frame when it comes to the joint, and
+    # loses its place (an error, or a crash) where one that it has not seen comes before.
+    for index in sorted(range(1, source.nframes), key=lambda i: joints[source.frames[i].parentJoint]):
+        frame = source.frames[index]
+        of_head = 1 <= frame.parentJoint <= count and frame.type == pin.FrameType.JOINT
+        of_chain = of_head and count == 3 and not plan.keeps_chain
+        if of_chain or (frame.name in names and frame.type == pin.FrameType.FIXED_JOINT):
+            frames[index] = top  # the chain's own frames go with the chain, a former root's give way
             continue
-        of_root = head == 1 and frame.parentJoint == 1 and frame.type == pin.FrameType.JOINT
+        kept = of_head and plan.keeps_chain
+        of_root = of_head and not kept
         frames[index] = model.addFrame(
             pin.Frame(
                 frame.name,
                 joints[frame.parentJoint],
-                theta if of_root else frames[frame.parentFrame],
-                frame.placement,
+                top if of_root else frames[frame.parentFrame],
+                frame.placement if kept else plan.moved(frame.parentJoint, frame.placement),
                 # The root's joint is gone; its frame stays, as Pinocchio keeps those of locked joints.
                 pin.FrameType.FIXED_JOINT if of_root else frame.type,
                 frame.inertia,
@@ -195,11 +258,16 @@ def _add_frames(model: pin.Model, source: pin.Model, head: int, joints: Mapping[
 
 
 def _geometry(
-    model: pin.Model, source: pin.GeometryModel, joints: Mapping[int, int], frames: Mapping[int, int]
+    model: pin.Model,
+    plan: _Plan,
+    source: pin.GeometryModel,
+    joints: Mapping[int, int],
+    frames: Mapping[int, int],
 ) -> pin.GeometryModel:
     geometry = pin.GeometryModel()
     for shape in source.geometryObjects:
         copied = pin.GeometryObject(shape)
+        copied.placement = plan.moved(shape.parentJoint, shape.placement)
         joint = copied.parentJoint = joints[shape.parentJoint]
         # A shape made by hand may name no frame: its joint's will do.
         own = model.getFrameId(model.names[joint], pin.FrameType.JOINT) if joint else 0
@@ -210,11 +278,25 @@ def _geometry(
     return geometry
 
 
-def _notes(source: pin.Model, head: int) -> list[str]:
-    notes = []
-    if head == 1:
+def _add_references(model: pin.Model, plan: _Plan, joints: Mapping[int, int]) -> None:
+    """The source's named configurations (of an SRDF); a replaced root stands at zero in them."""
+    source = plan.source
+    for entry in source.referenceConfigurations:
+        old, q = np.asarray(entry.data()), pin.neutral(model)
+        if old.shape != (source.nq,):
+            continue
+        for joint in range(1 if plan.keeps_chain else plan.count + 1, source.njoints):
+            q[model.joints[joints[joint]].idx_q] = value_at(source.joints[joint], old)
+        model.referenceConfigurations[entry.key()] = q
+
+
+def _notes(plan: _Plan) -> list[str]:
+    source, count, notes = plan.source, plan.count, []
+    if count == 1 and plan.is_chain:
         notes.append(f"root joint {source.names[1]} ({kind(source.joints[1])}) replaced by x, y, theta")
-    continuous = [source.names[i] for i in range(head + 1, source.njoints) if is_continuous(source.joints[i])]
+    continuous = [
+        source.names[i] for i in range(count + 1, source.njoints) if is_continuous(source.joints[i])
+    ]
     if continuous:
         notes.append(f"continuous joints as one unbounded angle each: {', '.join(continuous)}")
     return notes

@@ -11,12 +11,14 @@ from collections.abc import Container
 from dataclasses import dataclass
 from pathlib import Path
 
-from nmm.errors import RobotError
-from nmm.loading.check_joints import check_joint, check_mimics
+from nmm.errors import RobotError, unknown
+from nmm.loading.check_joints import check_joint
 from nmm.loading.check_links import FindMesh, check_link, check_material
+from nmm.loading.check_mimics import Mimic, check_mimics
 from nmm.loading.check_tree import check_names, check_tree
 from nmm.loading.findings import Findings, Problem, children
 from nmm.loading.xml_tree import Element, XmlError, parse
+from nmm.platforms import PLATFORMS
 
 _SHOWN = 12
 _VERSION = re.compile(r"1\.[012]")
@@ -33,40 +35,44 @@ class CheckedUrdf:
     root : its <robot> element
     name : the robot's name
     meshes : files of its meshes, by the name in the description
+    mimics : joints that follow others which do not move
+    platform : the kind of platform that it declares, if it does
     """
 
     root: Element
     name: str
     meshes: dict[str, Path]
+    mimics: tuple[Mimic, ...]
+    platform: str | None
 
 
 def find_problems(
-    xml_text: str, find_mesh: FindMesh | None = None, locked: Container[str] = ()
+    xml_text: str, find_mesh: FindMesh | None = None, lock: Container[str] = ()
 ) -> list[Problem]:
     """All that is wrong with a URDF.
 
     Parameters
     ----------
     xml_text : the expanded description
-    find_mesh : the path of a mesh by its name in the file, or a sentence that says why there is none;
-        without it, mesh files are taken to exist
-    locked : names of joints that will not move, so that they may mimic others
+    find_mesh : the path of a mesh by its name in the file, a sentence that says why there is none, or None
+        to leave its shape out; without it, mesh files are taken to exist
+    lock : names of joints that will not move, so that they may mimic others, and others them
     """
-    return _inspect(xml_text, find_mesh or Path, locked)[1]
+    return _inspect(xml_text, find_mesh or Path, lock)[1]
 
 
 def check(
     xml_text: str,
     where: str,
     find_mesh: FindMesh | None = None,
-    locked: Container[str] = (),
+    lock: Container[str] = (),
     lines: bool = True,
 ) -> CheckedUrdf:
     """The description, if nothing is wrong with it.
 
     Parameters
     ----------
-    xml_text, find_mesh, locked : as for `find_problems`
+    xml_text, find_mesh, lock : as for `find_problems`
     where : the file, for the message
     lines : whether the text's lines are those of the file
 
@@ -74,7 +80,7 @@ def check(
     ------
     RobotError : names the file and every problem in one line
     """
-    checked, problems = _inspect(xml_text, find_mesh or Path, locked)
+    checked, problems = _inspect(xml_text, find_mesh or Path, lock)
     if checked is not None and not problems:
         return checked
     shown = [str(problem) if lines else problem.message for problem in problems[:_SHOWN]]
@@ -83,7 +89,7 @@ def check(
 
 
 def _inspect(
-    text: str, find_mesh: FindMesh, locked: Container[str]
+    text: str, find_mesh: FindMesh, lock: Container[str]
 ) -> tuple[CheckedUrdf | None, list[Problem]]:
     try:
         root = parse(text)
@@ -97,13 +103,11 @@ def _inspect(
             message = f"holds xacro (<{element.tag}>): name the file .xacro, so that it is expanded"
             return None, [Problem(message, element.line)]
     findings = Findings()
-    meshes = _check_robot(root, findings, find_mesh, locked)
-    return CheckedUrdf(root, root.get("name") or "", meshes), findings.problems
+    checked = _check_robot(root, findings, find_mesh, lock)
+    return checked, findings.problems
 
 
-def _check_robot(
-    root: Element, findings: Findings, find_mesh: FindMesh, locked: Container[str]
-) -> dict[str, Path]:
+def _check_robot(root: Element, findings: Findings, find_mesh: FindMesh, lock: Container[str]) -> CheckedUrdf:
     if not root.get("name"):
         findings.add(root, "<robot> has no name")
     version = root.get("version", "1.0")
@@ -125,5 +129,19 @@ def _check_robot(
         meshes |= check_link(link, findings, find_mesh)
     for joint in joints:
         check_joint(joint, findings)
-    check_mimics(joints, findings, locked)
-    return meshes
+    mimics = check_mimics(joints, findings, lock)
+    return CheckedUrdf(root, root.get("name") or "", meshes, mimics, _declared_platform(root, findings))
+
+
+def _declared_platform(root: Element, findings: Findings) -> str | None:
+    """The platform of `<nmm platform="car"/>` below <robot>: other tools do not look at it."""
+    platform: str | None = None
+    for element in children(root, "nmm"):
+        for attribute in sorted(set(element.keys()) - {"platform"}):
+            findings.add(element, unknown("attribute", attribute, ["platform"], "<nmm>"))
+        name = findings.text(element, "platform", "robot")
+        if name is not None and platform is not None:
+            findings.add(element, "robot: a second <nmm>, expected one")
+        elif name is not None and findings.choice(element, name, tuple(PLATFORMS), "platform", "<nmm>"):
+            platform = name
+    return platform

@@ -1,9 +1,8 @@
-"""What is wrong inside joints: type, links, axis, limits, dynamics, mimicry."""
+"""What is wrong inside joints: type, links, axis, limits, dynamics."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Container
 
 from nmm.loading.findings import Findings, child
 from nmm.loading.xml_tree import Element
@@ -28,21 +27,6 @@ def check_joint(joint: Element, findings: Findings) -> None:
         _check_axis(joint, owner, findings)
         _check_limit(joint, kind, owner, findings)
         _check_dynamics(joint, owner, findings)
-
-
-def check_mimics(joints: list[Element], findings: Findings, locked: Container[str] = ()) -> None:
-    """Add the joints that follow others; `locked` ones may, since they do not move."""
-    mimics = [
-        joint
-        for joint in joints
-        if child(joint, "mimic") is not None
-        and joint.get("type") != "fixed"
-        and joint.get("name", "") not in locked
-    ]
-    if mimics:
-        names = ", ".join(repr(joint.get("name")) for joint in mimics)
-        hint = f"make them fixed, or lock them: locked={{{mimics[0].get('name')!r}: 0.0}}"
-        findings.add(mimics[0], f"mimic joints are refused ({hint}): {names}")
 
 
 def _check_axis(joint: Element, owner: str, findings: Findings) -> None:

@@ -11,7 +11,8 @@ from pathlib import Path
 from nmm.loading.findings import Findings, child, children
 from nmm.loading.xml_tree import Element
 
-FindMesh = Callable[[str], Path | str]
+# The file of a mesh by its name, a sentence that says why there is none, or None to leave the shape out.
+FindMesh = Callable[[str], Path | str | None]
 
 # Formats that both coal (shapes) and trimesh (playback) read.
 MESH_SUFFIXES = (".3mf", ".dae", ".glb", ".gltf", ".obj", ".off", ".ply", ".stl")
@@ -96,6 +97,8 @@ def _check_mesh(mesh: Element, owner: str, findings: Findings, find_mesh: FindMe
     if name is None:
         return {}
     found = find_mesh(name)
+    if found is None:
+        return {}
     if isinstance(found, str):
         findings.add(mesh, f"{owner}: mesh {name!r}: {found}")
         return {}

@@ -47,6 +47,13 @@ def axis(joint: Any, q: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array(data.S, dtype=np.float64).reshape(6)[3:]
 
 
+def value_at(joint: Any, q: NDArray[np.float64]) -> float:
+    """The joint's one number in a configuration of its model; of a continuous one, its angle in (-π, π]."""
+    if is_continuous(joint):
+        return float(np.arctan2(q[joint.idx_q + 1], q[joint.idx_q]))
+    return float(q[joint.idx_q])
+
+
 def one_number(joint: Any, q: NDArray[np.float64]) -> Any:
     """The joint itself, or the one-number form of a continuous one."""
     if not is_continuous(joint):

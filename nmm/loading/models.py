@@ -1,127 +1,174 @@
-"""The four Pinocchio objects of a robot, from a checked description or from a model."""
+"""From what was read to a `Robot`: joints locked, reference point, platform, wheels, in this order."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
-from nmm.arrays import scalar
 from nmm.errors import InputError, RobotError, unknown
-from nmm.loading.chain import CHAIN, Rebuilt, with_chain
-from nmm.loading.text import one_line
+from nmm.loading.axle import axle_placement, told
+from nmm.loading.chain import CHAIN, Rebuilt, rebuild
+from nmm.loading.collision_pairs import add_pairs
+from nmm.loading.layout import measure_layout
+from nmm.loading.locking import with_locked
+from nmm.loading.provenance import Parts
+from nmm.loading.reduction import reduced
+from nmm.loading.source import Source
 from nmm.loading.wheels import find_wheels
-from nmm.robot import Wheel
+from nmm.platforms import Layout, Platform, Unicycle, platform_by_name
+from nmm.robot import Robot, Wheel
+
+#: Adds its pairs to the collision shapes on a model.
+AddPairs = Callable[[pin.Model, pin.GeometryModel], None]
 
 
 @dataclass(frozen=True)
-class Models:
-    """What Robot is made of; see there."""
+class Options:
+    """What `load` was asked for, of any source."""
 
-    model: pin.Model
-    collision_model: pin.GeometryModel
-    display_model: pin.Model
-    visual_model: pin.GeometryModel
-    wheels: tuple[Wheel, ...]
-    notes: tuple[str, ...]
+    platform: Platform | str | None = None
+    wheels: Sequence[str] | Mapping[str, float] | None = None
+    lock: Mapping[str, float] = field(default_factory=dict)
+    axle: str | ArrayLike | None = None
+    name: str | None = None
+    add_pairs: AddPairs | None = None
 
 
-def pinocchio_models(urdf: str, where: str) -> tuple[pin.Model, pin.GeometryModel, pin.GeometryModel]:
-    """Fixed-base model, visual and collision shapes of a checked URDF text.
+def robot_from(source: Source, options: Options) -> Robot:
+    """The robot that a source makes.
 
     Raises
     ------
-    RobotError : Pinocchio refuses it (a mesh file that cannot be read, for one)
+    RobotError : a joint that we cannot take, a name that is no joint or frame, a platform that does not fit
     """
+    where = source.where
+    rebuilt = rebuild(source.model, (source.visual_model, source.collision_model), where)
+    rebuilt.model.name = options.name or source.name
+    stated = options.platform.coordinates[len(CHAIN) :] if isinstance(options.platform, Platform) else ()
+    locked = with_locked(rebuilt, options.lock, source.mimics, where, stated)
+    rebuilt = locked.rebuilt
+    if options.axle is not None:
+        placement = axle_placement(rebuilt.model, options.axle, where)
+        moved = rebuild(rebuilt.model, rebuilt.geometries, where, root=placement.inverse())
+        rebuilt = replace(moved, notes=(*rebuilt.notes, told(placement)))
+    platform, origin = _platform(rebuilt, source, options)
+    own = _own_joints(platform, rebuilt.model, locked.values, where)
+    display = _on_platform(rebuilt, platform, own, where)
+    if not platform.coordinates and options.wheels:
+        display = _with_held_wheels(display, options.wheels, where)
+    notes = (*source.notes, *display.notes)
+    provenance = replace(source.provenance, locked=locked.values, mimicked=locked.followers, platform=origin)
+    return _without_wheels(
+        display, platform, own, source, options, Parts(display.geometries[1], notes, provenance)
+    )
+
+
+def _platform(rebuilt: Rebuilt, source: Source, options: Options) -> tuple[Platform, str]:
+    """The platform, and who chose its kind."""
+    given = options.platform
+    if isinstance(given, Platform):
+        return given, "given"
+    name, origin = (source.platform, "file") if given is None else (given, "given")
+    if name is None:
+        return Unicycle(), "default"
+    kind = platform_by_name(name)
+    if not kind.coordinates:
+        return kind.fit(Layout(source.name)), origin  # there is nothing to measure for a fixed base
+    visual, collision = rebuilt.geometries
+    layout = measure_layout(rebuilt.model, (collision, visual), options.wheels, source.where)
     try:
-        model = pin.buildModelFromXML(urdf)
-        return (
-            model,
-            pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.VISUAL),
-            pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.COLLISION),
-        )
-    except (ValueError, RuntimeError) as error:
-        # coal puts the place in its own source before the message.
-        cause = one_line(str(error).split("message:", 1)[-1])
-        raise RobotError(f"{where}: Pinocchio cannot read it: {cause}") from None
+        return kind.fit(layout), origin
+    except InputError as error:
+        raise RobotError(f"{source.where}: {error}") from None
 
 
-def robot_models(
-    source: pin.Model,
-    visual: pin.GeometryModel,
-    collision: pin.GeometryModel,
-    where: str,
-    own: Sequence[str],
-    wheels: Sequence[str] | Mapping[str, float] | None,
-    locked: Mapping[str, float],
-) -> Models:
-    """The models with the platform's chain, the locked joints fixed, the wheels on the display model only.
-
-    Parameters
-    ----------
-    source, visual, collision : Pinocchio's, left as they are
-    where : what messages call the robot
-    own : the platform's own joints, which come right after theta
-    wheels : as for `find_wheels`
-    locked : joints to fix, and at which value (rad or m)
-
-    Raises
-    ------
-    RobotError : a joint that we cannot take, or a name that is no joint
-    """
-    rebuilt = with_chain(source, (visual, collision), where, own)
-    joints = [str(name) for name in rebuilt.model.names][len(CHAIN) + 1 :]
+def _own_joints(
+    platform: Platform, model: pin.Model, lock: Mapping[str, float], where: str
+) -> tuple[str, ...]:
+    """The platform's own joints: its coordinates after x, y, theta."""
+    own = platform.coordinates[len(CHAIN) :]
+    joints = [str(name) for name in model.names][len(CHAIN) + 1 :]
     for name in own:
+        if name in lock:
+            raise RobotError(f"{where}: lock: {name} is a coordinate of the {platform.name} platform")
         if name not in joints:
             raise RobotError(unknown("platform joint", name, joints, where))
-    if locked:
-        rebuilt = _lock(rebuilt, locked, joints, where, own)
-    display, (shown, solid) = rebuilt.model, rebuilt.geometries
-    found, wheel_notes = find_wheels(display, (solid, shown), wheels, where, own)
-    notes = [*rebuilt.notes, *wheel_notes]
-    model = display
-    if found:
-        names = [wheel.joint for wheel in found]
-        notes.append(f"wheels that only roll, left out of q: {', '.join(names)}")
-        ids = [display.getJointId(name) for name in names]
-        model, (solid,) = _reduced(display, [solid], ids, np.zeros(display.nq))
-    if model.njoints == 1 + len(CHAIN) + len(own):
-        notes.append("no arm: the platform is all that moves")
-    return Models(model, solid, display, shown, found, tuple(notes))
+    return own
 
 
-def _lock(
-    rebuilt: Rebuilt, locked: Mapping[str, float], joints: Sequence[str], where: str, own: Sequence[str]
-) -> Rebuilt:
+def _on_platform(rebuilt: Rebuilt, platform: Platform, own: Sequence[str], where: str) -> Rebuilt:
+    """The model with the platform's own joints first; without x, y, theta where the base is fixed."""
     model = rebuilt.model
-    q = np.zeros(model.nq)
-    free = [name for name in joints if name not in own]
-    for name, value in locked.items():
-        if name not in free:
-            raise RobotError(unknown("joint to lock", name, free, where))
-        try:
-            q[model.joints[model.getJointId(name)].idx_q] = scalar(value, f"locked: {name}")
-        except InputError as error:
-            raise RobotError(f"{where}: {error}") from None
-    ids = [model.getJointId(name) for name in locked]
-    model, geometries = _reduced(model, list(rebuilt.geometries), ids, q)
-    values = ", ".join(f"{name} at {value:g}" for name, value in locked.items())
-    return Rebuilt(model, tuple(geometries), (*rebuilt.notes, f"locked joints: {values}"))
+    if not platform.coordinates:
+        made = rebuild(model, rebuilt.geometries, where, root=model.jointPlacements[1], head=())
+    else:
+        made = rebuild(model, rebuilt.geometries, where, first=own) if own else rebuilt
+    return replace(made, notes=rebuilt.notes)
 
 
-def _reduced(
-    model: pin.Model, geometries: list[pin.GeometryModel], joints: list[int], q: NDArray[np.float64]
-) -> tuple[pin.Model, list[pin.GeometryModel]]:
-    """The models with some joints fixed at their values in q; frames in the same order."""
-    reduced, shapes = pin.buildReducedModel(model, geometries, joints, q)
-    # Pinocchio makes the frame of a fixed joint its own parent (whoever climbs up from it never arrives), and
-    # does not find it again as the frame of a shape.
-    for frame, original in zip(reduced.frames, model.frames, strict=True):
-        frame.parentFrame = original.parentFrame
-    for geometry, before in zip(shapes, geometries, strict=True):
-        for shape, original in zip(geometry.geometryObjects, before.geometryObjects, strict=True):
-            shape.parentFrame = original.parentFrame
-    return reduced, list(shapes)
+def _without_wheels(
+    display: Rebuilt, platform: Platform, own: Sequence[str], source: Source, options: Options, parts: Parts
+) -> Robot:
+    """The robot, with its wheels on the display model only."""
+    whole, (shown, solid) = display.model, display.geometries
+    wheels, notes = _wheels(display, platform, own, source.where, options.wheels)
+    names = list(dict.fromkeys(name for wheel in wheels for name in (wheel.swivel, wheel.joint) if name))
+    model = whole
+    if names:
+        notes.append(f"wheels that only roll, left out of q: {', '.join(names)}")
+        ids = [whole.getJointId(name) for name in names]
+        model, (solid,) = reduced(whole, (solid,), ids, np.zeros(whole.nq))
+    elif source.all_pairs or options.add_pairs:
+        solid = solid.copy()
+    if model.nq == platform.n_p:
+        notes.append("no arm: the platform is all that moves" if model.nq else "nothing moves")
+    add = options.add_pairs or (add_pairs if source.all_pairs else None)
+    if add is not None:
+        add(model, solid)
+        if len(solid.collisionPairs):
+            notes.append(
+                f"{len(solid.collisionPairs)} collision pairs: none within a body or across one joint"
+            )
+    model.name = whole.name = options.name or source.name
+    return Robot(
+        name=model.name,
+        model=model,
+        collision_model=solid,
+        display_model=whole,
+        visual_model=shown,
+        platform=platform,
+        wheels=wheels,
+        source=source.label,
+        arguments=dict(source.arguments),
+        notes=(*parts.notes, *notes),
+        parts=replace(parts, provenance=replace(parts.provenance, reduced=tuple(names))),
+    )
+
+
+def _with_held_wheels(display: Rebuilt, asked: Sequence[str] | Mapping[str, float], where: str) -> Rebuilt:
+    """The model of a base that does not move, with the wheels that the caller names fixed."""
+    shown, solid = display.geometries
+    wheels, _ = find_wheels(display.model, (solid, shown), asked, where)
+    names = list(dict.fromkeys(name for wheel in wheels for name in (wheel.swivel, wheel.joint) if name))
+    ids = [display.model.getJointId(name) for name in names]
+    model, geometries = reduced(display.model, display.geometries, ids, np.zeros(display.model.nq))
+    note = f"wheels of a fixed base, which stand still: {', '.join(names)}"
+    return Rebuilt(model, geometries, (*display.notes, note))
+
+
+def _wheels(
+    display: Rebuilt,
+    platform: Platform,
+    own: Sequence[str],
+    where: str,
+    asked: Sequence[str] | Mapping[str, float] | None,
+) -> tuple[tuple[Wheel, ...], list[str]]:
+    if not platform.coordinates:
+        return (), []
+    shown, solid = display.geometries
+    wheels, notes = find_wheels(display.model, (solid, shown), asked, where, own, platform.roller)
+    return wheels, list(notes)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -14,7 +14,7 @@ from nmm.errors import RobotError
 
 
 class Packages:
-    """Finds packages and meshes for one description file.
+    """Finds packages and meshes for one description file, and remembers what it was asked for.
 
     Searched in this order: the caller's folders, ROS_PACKAGE_PATH, AMENT_PREFIX_PATH, the share folder of
     example-robot-data, and the folders above the file. Each may be a package or hold packages.
@@ -23,6 +23,11 @@ class Packages:
     ----------
     file : the description file; relative mesh names start in its folder
     folders : the caller's folders
+
+    Attributes
+    ----------
+    found : the folder of each package that was asked for, or None
+    searched : the folders in which packages are looked for
 
     Raises
     ------
@@ -37,10 +42,12 @@ class Packages:
                 raise RobotError(f"package_dirs: expected a folder, {folder} is none")
         self.file = file.absolute()
         self.folders = (*given, *_environment_folders(), *_share_folders())
+        self.searched = (*self.folders, *self.file.parents)
+        self.found: dict[str, Path | None] = {}
 
     def find(self, package: str) -> Path | None:
         """The folder of a package, or None."""
-        return next(self._candidates(package), None)
+        return next(iter(self._candidates(package)), None)
 
     def mesh(self, name: str) -> Path | str:
         """The absolute path of a mesh file, or a sentence that says why there is none.
@@ -55,7 +62,7 @@ class Packages:
         if scheme in ("package", "model"):
             # Some files have three slashes.
             package, _, inside = rest.lstrip("/").partition("/")
-            folders = list(self._candidates(package))
+            folders = self._candidates(package)
             if not folders:
                 return f"package {package!r} not found (give its folder in package_dirs)"
             return _first_file(folder / inside for folder in folders) or "no such file in the package"
@@ -68,17 +75,19 @@ class Packages:
         folders = (self.file.parent, *self.folders)
         return _first_file(folder / name for folder in folders) or "no such file"
 
-    def _candidates(self, package: str) -> Iterator[Path]:
-        if package in ("", ".", "..") or "/" in package:
-            return
-        for folder in (*self.folders, *self.file.parents):
-            if folder.name == package:
-                yield folder
-            if os.path.isdir(folder / package):
-                yield folder / package
+    def _candidates(self, package: str) -> list[Path]:
+        folders: list[Path] = []
+        if package not in ("", ".", "..") and "/" not in package:
+            for folder in self.searched:
+                if folder.name == package:
+                    folders.append(folder)
+                if os.path.isdir(folder / package):
+                    folders.append(folder / package)
+        self.found[package] = folders[0] if folders else None
+        return folders
 
 
-def _first_file(paths: Iterator[Path] | tuple[Path, ...]) -> Path | None:
+def _first_file(paths: Iterable[Path]) -> Path | None:
     return next((path.absolute() for path in paths if os.path.isfile(path)), None)
 
 
@@ -87,6 +96,26 @@ def _environment_folders() -> list[Path]:
         return [Path(entry) for entry in os.environ.get(variable, "").split(os.pathsep) if entry]
 
     return split("ROS_PACKAGE_PATH") + [prefix / "share" for prefix in split("AMENT_PREFIX_PATH")]
+
+
+def package_file(name: str, folders: Sequence[str | Path] = ()) -> Path:
+    """The file that a name package://PACKAGE/PATH stands for.
+
+    Parameters
+    ----------
+    name : the name
+    folders : the caller's folders
+
+    Raises
+    ------
+    RobotError : no such package or file; lists the folders that were searched
+    """
+    packages = Packages(Path(os.sep), folders)  # there is no file yet beside which to search
+    found = packages.mesh(name)
+    if isinstance(found, str):
+        searched = ", ".join(map(str, packages.searched)) or "none"
+        raise RobotError(f"{name}: {found}; searched: {searched}")
+    return found
 
 
 @cache

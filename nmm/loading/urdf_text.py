@@ -25,7 +25,8 @@ def urdf_text(checked: CheckedUrdf, name: str) -> str:
     for link in children(checked.root, "link"):
         copied = ElementTree.SubElement(root, "link", name=link.get("name", ""))
         for tag in _LINK_PARTS:
-            copied.extend(_with_paths(part, checked) for part in children(link, tag))
+            parts = (_with_paths(part, checked) for part in children(link, tag))
+            copied.extend(part for part in parts if part is not None)
     for joint in children(checked.root, "joint"):
         kind = joint.get("type", "")
         copied = ElementTree.SubElement(root, "joint", name=joint.get("name", ""), type=kind)
@@ -36,12 +37,14 @@ def urdf_text(checked: CheckedUrdf, name: str) -> str:
     return ElementTree.tostring(root, encoding="unicode")
 
 
-def _with_paths(part: Element, checked: CheckedUrdf) -> ElementTree.Element:
-    """The part of a link; a copy with absolute mesh paths if it has a mesh."""
-    mesh = part.find("geometry/mesh")
-    if mesh is None:
+def _with_paths(part: Element, checked: CheckedUrdf) -> ElementTree.Element | None:
+    """The part of a link; a copy with absolute mesh paths if it has a mesh, None if the mesh is left out."""
+    if part.find("geometry/mesh") is None:
         return part
     copied = ElementTree.fromstring(ElementTree.tostring(part))
     for mesh in copied.iterfind("geometry/mesh"):
-        mesh.set("filename", str(checked.meshes.get(mesh.get("filename", ""), mesh.get("filename", ""))))
+        file = checked.meshes.get(mesh.get("filename", ""))
+        if file is None:
+            return None
+        mesh.set("filename", str(file))
     return copied

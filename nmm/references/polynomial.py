@@ -95,7 +95,7 @@ class Constant(PiecewisePolynomial):
     """A target that does not move: `value`, s numbers."""
 
     def __init__(self, value: ArrayLike, unit: str = "m") -> None:
-        value = vector(np.atleast_1d(array(value, "value")), None, "value")
+        self.value = value = vector(np.atleast_1d(array(value, "value")), None, "value")
         super().__init__([0.0, 1.0], value[None, None, :], unit)
 
 

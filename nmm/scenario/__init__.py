@@ -3,7 +3,8 @@
     numbers    numbers and arithmetic with pi, as written in a file or after `--set`
     document   YAML read strictly, with the line of every key, and `--set` applied to it
     keys       what a part of a scenario is, and errors that know their key
-    functions, tasks, objectives, resolvers, schema    the keys, and the objects that they make
+    function_part, robot_functions, motions, functions    the keys of functions: of the robot, of time, all
+    robot, tasks, objectives, resolvers, schema    the other keys, and the objects that they make
     reference  the keys as text
     scenario   `Scenario`: load, override, run
 

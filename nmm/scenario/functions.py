@@ -1,221 +1,47 @@
-"""The functions of a scenario: what tasks position, and the references that they follow."""
+"""The functions of a scenario that are made of others, and the choice of a reference."""
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field
 
-from nmm.scenario.keys import KeyedError, Part, at, kind_of
-from nmm.scenario.numbers import (
-    Number,
-    NumberList,
-    Numbers,
-    Positive,
-    Whole,
-    nested,
-    numbers_by_name,
-    shown,
+from nmm.scenario.function_part import Combination as Combination
+from nmm.scenario.function_part import FunctionPart
+from nmm.scenario.function_part import check_combination as check_combination
+from nmm.scenario.keys import Part, at, kind_of
+from nmm.scenario.motions import (
+    CirclePart,
+    ConstantPart,
+    LinePart,
+    PolynomialPart,
+    RotationPart,
+    SlerpPart,
+    SplinePart,
+    TurnPart,
+    checked_orientation,
+    is_orientation,
+)
+from nmm.scenario.numbers import NumberList
+from nmm.scenario.robot_functions import (
+    CenterOfMassPart,
+    CoordinatesPart,
+    Direction,
+    HeadingPart,
+    OrientationPart,
+    PositionPart,
+    check_frames,
 )
 
 if TYPE_CHECKING:
     from nmm.function import Function
     from nmm.robot import Robot
 
-Unit = Literal["m", "rad", "1"]
-
-
-def combination(value: object) -> str | dict[str, float]:
-    """A coordinate's name, or coefficients by name."""
-    if isinstance(value, str):
-        return value
-    if isinstance(value, Mapping) and value:
-        return numbers_by_name(value, "coefficient of ")
-    raise ValueError(
-        f"expected a coordinate's name, or coefficients by name ({{theta: 1, q1: 1}}), got {shown(value)}"
-    )
-
-
-Combination = Annotated[str | dict[str, float], BeforeValidator(combination)]
-
-
-def check_combination(combination: str | dict[str, float], robot: Robot) -> None:
-    """`InputError` for a coordinate that the robot does not have."""
-    for name in [combination] if isinstance(combination, str) else combination:
-        robot.coordinate(name)
-
-
-class FunctionPart(Part):
-    """A function phi(t, q) of the library."""
-
-    @abstractmethod
-    def make(self, robot: Robot, unit: str) -> Function:
-        """The function; `unit` is that of values whose unit the file leaves open."""
-
-    def build(self, robot: Robot, unit: str = "m") -> Function:
-        """`make`, with the robot's word on it: errors know their key."""
-        with self.own_keys():
-            function = self.make(robot, unit)
-            function.rows(robot)
-            function.stages(robot)
-        return function
-
-
-class PositionPart(FunctionPart):
-    """Position of a frame's origin along world axes, m."""
-
-    kind: Literal["position"]
-    frame: str = Field(description="a frame of the robot (`nmm info ROBOT` lists them)")
-    axes: str = Field("xyz", description="some of x, y, z in the order wanted, as xy")
-
-    def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.tasks.position import Position
-
-        with at("frame"):
-            robot.frame_id(self.frame)
-        return Position(self.frame, self.axes)
-
-
-class HeadingPart(FunctionPart):
-    """Absolute angle of a direction fixed in a frame, about a world axis, rad; differences wrap."""
-
-    kind: Literal["heading"]
-    frame: str = Field(description="a frame of the robot")
-    direction: Annotated[
-        str | list[float], BeforeValidator(lambda v: v if isinstance(v, str) else nested(v))
-    ] = Field("x", description="whose angle is taken: x, y, z or three numbers, in the frame's axes")
-    about: str = Field("z", description="world axis x, y or z about which the angle is measured")
-
-    def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.tasks.heading import Heading
-
-        with at("frame"):
-            robot.frame_id(self.frame)
-        return Heading(self.frame, self.direction, self.about)
-
-
-class CoordinatesPart(FunctionPart):
-    """Linear combinations of coordinates, a row each; angles are not wrapped."""
-
-    kind: Literal["coordinates"]
-    of: Annotated[list[Combination], BeforeValidator(lambda v: v if isinstance(v, list | tuple) else [v])] = (
-        Field(
-            description="a coordinate (q2), a combination ({theta: 1, q1: 1}), or a list of such",
-            min_length=1,
-        )
-    )
-
-    def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.tasks.coordinates import Coordinates
-
-        with at("of"):
-            for item in self.of:
-                check_combination(item, robot)
-        return Coordinates(*self.of)
-
-
-class CirclePart(FunctionPart):
-    """A circle driven at constant speed: center + radius (cos φ, sin φ), φ = phase + rate t."""
-
-    kind: Literal["circle"]
-    center: NumberList = Field(description="2 numbers in the plane or 3 in space, m")
-    radius: Positive = Field(description="m, above 0")
-    rate: Number = Field(description="angular speed, rad/s; negative runs clockwise")
-    phase: Number = Field(0.0, description="φ at t = 0, rad")
-    plane: Literal["xy", "yz", "zx"] = Field("xy", description="for a center in space: xy, yz or zx")
-
-    def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.references.circle import Circle
-
-        return Circle(self.center, self.radius, self.rate, self.phase, self.plane)
-
-
-class _WithUnit(FunctionPart):
-    unit: Unit | None = Field(None, description="m, rad or 1; when not given, that of the task")
-
-
-class LinePart(_WithUnit):
-    """A straight line from start to end, then at rest."""
-
-    kind: Literal["line"]
-    start: NumberList = Field(description="where it begins, a number a row of the task")
-    end: NumberList = Field(description="where it ends")
-    duration: Positive = Field(description="s, above 0")
-    profile: Literal["constant", "smooth"] = Field(
-        "constant", description="constant speed, or smooth: starts and stops at rest (fifth degree)"
-    )
-
-    def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.references.polynomial import Line
-
-        return Line(self.start, self.end, self.duration, self.profile, self.unit or unit)
-
-
-class ConstantPart(_WithUnit):
-    """A target that does not move. A bare number or list in place of a reference is one too."""
-
-    kind: Literal["constant"]
-    value: Numbers = Field(description="a number a row of the task")
-
-    def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.references.polynomial import Constant
-
-        return Constant(self.value, self.unit or unit)
-
-
-class PolynomialPart(_WithUnit):
-    """A polynomial of time, given by its coefficients or through waypoints; then at rest."""
-
-    kind: Literal["polynomial"]
-    coefficients: NumberList | None = Field(
-        None, description="a list a power of t, lowest first: [[x0, y0], [vx, vy], ...]; with duration"
-    )
-    duration: Positive | None = Field(None, description="s, above 0; with coefficients")
-    times: NumberList | None = Field(None, description="s, increasing, the first 0; with points")
-    points: NumberList | None = Field(
-        None, description="a point a time; the polynomial has the lowest degree that fits"
-    )
-
-    @model_validator(mode="after")
-    def _one_form(self) -> PolynomialPart:
-        given = {
-            name
-            for name in ("coefficients", "duration", "times", "points")
-            if getattr(self, name) is not None
-        }
-        if given not in ({"coefficients", "duration"}, {"times", "points"}):
-            came = ", ".join(sorted(given)) or "none of them"
-            raise ValueError(f"expected coefficients and duration, or times and points; got {came}")
-        return self
-
-    def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.references.polynomial import Polynomial
-
-        if self.times is not None and self.points is not None:
-            return Polynomial.through(self.times, self.points, self.unit or unit)
-        if self.coefficients is None or self.duration is None:
-            raise KeyedError((), "expected coefficients and duration, or times and points")
-        return Polynomial(self.coefficients, self.duration, self.unit or unit)
-
-
-class SplinePart(_WithUnit):
-    """A spline through waypoints; before the first and after the last it rests."""
-
-    kind: Literal["spline"]
-    times: NumberList = Field(description="s, increasing")
-    points: NumberList = Field(description="a point a time")
-    degree: Whole = Field(3, description="3, twice continuously differentiable, or 5, four times")
-    ends: Literal["rest", "natural", "periodic"] = Field(
-        "rest",
-        description="rest (velocity zero), natural (free), or periodic (degree 3, last point = first)",
-    )
-
-    def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.references.polynomial import Spline
-
-        return Spline(self.times, self.points, self.degree, self.ends, self.unit or unit)
+POINT = (
+    "three numbers, m, or a mapping with a kind: of time (circle, spline...), or a point of the robot "
+    "(position, center_of_mass)"
+)
 
 
 class BearingPart(FunctionPart):
@@ -236,8 +62,64 @@ class BearingPart(FunctionPart):
         return Bearing(of, self.towards)
 
 
-def _constant(value: object) -> object:
-    """A bare number or list stands for a constant."""
+class PointingPart(FunctionPart):
+    """How far an axis of a frame points past a point: two rows, rad, both 0 when it points at it. The turn
+    about the axis is free."""
+
+    kind: Literal["pointing"]
+    frame: str = Field(description="a frame of the robot")
+    at: Reference = Field(description=f"the point: {POINT}")
+    axis: Direction = Field("z", description="x, y, z or three numbers, in the frame's axes")
+
+    def make(self, robot: Robot, unit: str) -> Function:
+        from nmm.tasks.pointing import Pointing
+
+        check_frames(self, robot)
+        with at("at"):
+            point = self.at.build(robot, "m")
+        return Pointing(self.frame, point, self.axis)
+
+
+class DistancePart(FunctionPart):
+    """Distance of a frame's origin from a point, m."""
+
+    kind: Literal["distance"]
+    frame: str = Field(description="a frame of the robot")
+    to: Reference = Field(description=f"the point: {POINT}")
+
+    def make(self, robot: Robot, unit: str) -> Function:
+        from nmm.tasks.distance import Distance
+
+        check_frames(self, robot)
+        with at("to"):
+            point = self.to.build(robot, "m")
+        return Distance(self.frame, point)
+
+
+class PoseReferencePart(FunctionPart):
+    """A position over an orientation: the target of a pose."""
+
+    kind: Literal["pose"]
+    position: Reference = Field(description="three numbers, m, or a mapping with a kind of reference")
+    orientation: Reference = Field(
+        description="a rotation vector, rad; {rpy: [...]}; {quaternion: [x, y, z, w]}; or a mapping with a "
+        "kind of reference, read as a rotation vector (slerp, turn, orientation of another frame...)"
+    )
+
+    def make(self, robot: Robot, unit: str) -> Function:
+        from nmm.references.pose import PoseReference
+
+        with at("position"):
+            position = self.position.build(robot, "m")
+        with at("orientation"):
+            orientation = self.orientation.build(robot, "rad")
+        return PoseReference(position, orientation)
+
+
+def _short(value: object) -> object:
+    """A bare number or list stands for a constant, {rpy: ...} and {quaternion: ...} for an orientation."""
+    if is_orientation(value):
+        return checked_orientation(value)
     return value if isinstance(value, Mapping | Part) else {"kind": "constant", "value": value}
 
 
@@ -248,8 +130,15 @@ REFERENCES: tuple[type[FunctionPart], ...] = (
     PolynomialPart,
     SplinePart,
     BearingPart,
+    RotationPart,
+    SlerpPart,
+    TurnPart,
+    PoseReferencePart,
     PositionPart,
+    OrientationPart,
     HeadingPart,
+    DistancePart,
+    CenterOfMassPart,
     CoordinatesPart,
 )
 Reference = Annotated[
@@ -260,12 +149,20 @@ Reference = Annotated[
         | PolynomialPart
         | SplinePart
         | BearingPart
+        | RotationPart
+        | SlerpPart
+        | TurnPart
+        | PoseReferencePart
         | PositionPart
+        | OrientationPart
         | HeadingPart
+        | DistancePart
+        | CenterOfMassPart
         | CoordinatesPart,
         Field(discriminator="kind"),
     ],
     kind_of(*REFERENCES),
-    BeforeValidator(_constant),
+    BeforeValidator(_short),
 ]
-BearingPart.model_rebuild()
+for recursive in (BearingPart, PointingPart, DistancePart, PoseReferencePart):
+    recursive.model_rebuild()

@@ -11,7 +11,8 @@ from nmm.scenario.functions import REFERENCES
 from nmm.scenario.keys import Part
 from nmm.scenario.objectives import OBJECTIVES, TermPart
 from nmm.scenario.resolvers import PARTS
-from nmm.scenario.schema import RobotPart, ScenarioPart
+from nmm.scenario.robot import ArmPart, MountedPart, RobotPart
+from nmm.scenario.schema import ScenarioPart
 from nmm.scenario.tasks import TASKS
 
 
@@ -27,11 +28,12 @@ def sections() -> Iterator[Section]:
     """The parts of a scenario, from the top; a reference that is a task's function too is told once."""
     yield _section("the file", ScenarioPart)
     yield _section("robot", RobotPart)
+    yield _section("robot, with arms mounted", MountedPart)
+    yield _section("robot.arms", ArmPart)
     for task in TASKS:
         yield _section(f"task, kind: {_kind(task)}", task)
-    functions = {_kind(task) for task in TASKS}
     for reference in REFERENCES:
-        if _kind(reference) not in functions:
+        if not any(issubclass(task, reference) for task in TASKS):
             yield _section(f"reference, kind: {_kind(reference)}", reference)
     for objective in OBJECTIVES:
         yield _section(f"objective, kind: {_kind(objective)}", objective)

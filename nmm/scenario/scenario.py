@@ -78,7 +78,7 @@ class Scenario:
         ScenarioError : the key leads nowhere, or the value is not what is expected there
         """
         derived = Scenario(_with_settings(self._document, {key: value}))
-        if (derived._source(), derived.parts.robot) == (self._source(), self.parts.robot):
+        if derived._explicit_robot() == self._explicit_robot():
             derived._robot = self._robot
         return derived
 
@@ -91,7 +91,7 @@ class Scenario:
         if self._robot is None:
             try:
                 with at("robot"):
-                    self._robot = self.parts.robot.build(self._source(), self._package_dirs())
+                    self._robot = self.parts.robot.build(self._document.absolute, ("robot",))
             except KeyedError as error:
                 raise self._located(error) from None
         return self._robot
@@ -140,19 +140,11 @@ class Scenario:
         Written to a YAML file, it gives the same run to the last bit.
         """
         data = self.parts.explicit()
-        data["robot"] |= {"source": self._source(), "package_dirs": self._package_dirs()}
+        data["robot"] = self._explicit_robot()
         return data
 
-    def _source(self) -> str:
-        """The robot's bundled name, or the absolute path of its file (as `nmm.load` tells them apart)."""
-        source = self.parts.robot.source
-        if not Path(source).suffix and len(Path(source).parts) == 1:
-            return source
-        return str(self._document.absolute(source, ("robot", "source")))
-
-    def _package_dirs(self) -> list[str]:
-        place = ("robot", "package_dirs")
-        return [str(self._document.absolute(given, place)) for given in self.parts.robot.package_dirs]
+    def _explicit_robot(self) -> dict[str, Any]:
+        return self.parts.robot.explicit(self._document.absolute, ("robot",))
 
     def _located(self, error: KeyedError) -> ScenarioError:
         place = as_written(error.place, self._document.data)

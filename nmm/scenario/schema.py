@@ -10,9 +10,10 @@ from pydantic import BeforeValidator, Field
 from nmm.errors import InputError
 from nmm.scenario.functions import ConstantPart
 from nmm.scenario.keys import Part, at
-from nmm.scenario.numbers import Nested, Number, Positive, numbers, numbers_by_name, shown
+from nmm.scenario.numbers import Nested, Positive, numbers, numbers_by_name
 from nmm.scenario.objectives import ObjectiveList, QuadraticPart, build_objective
 from nmm.scenario.resolvers import ExtendedJacobianPart, ResolverKind
+from nmm.scenario.robot import RobotChoice
 from nmm.scenario.tasks import CoordinatesTask, TaskList, build_tasks, listed
 
 if TYPE_CHECKING:
@@ -20,74 +21,9 @@ if TYPE_CHECKING:
     from nmm.robot import Robot
 
 
-def _argument(value: object) -> str:
-    """A xacro argument as the text that xacro reads."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str | int | float):
-        return str(value)
-    raise ValueError(f"expected a number or text, got {shown(value)}")
-
-
 def _coordinates(value: object) -> dict[str, float] | list[Nested]:
     """Numbers by name, or a list of them."""
     return numbers_by_name(value) if isinstance(value, Mapping) else numbers(value)
-
-
-def _wheels(value: object) -> object:
-    """Names, or radii by name."""
-    if isinstance(value, Mapping):
-        return numbers_by_name(value)
-    if value is None or isinstance(value, list | tuple):
-        return value
-    raise ValueError(f"expected a list of joints, or a radius for each, got {shown(value)}")
-
-
-def _file_name(value: object) -> object:
-    """A name or path that a file system can look up."""
-    if isinstance(value, str) and (not value.strip() or "\0" in value):
-        raise ValueError(f"expected a name or a path, got {shown(value)}")
-    return value
-
-
-FileName = Annotated[str, BeforeValidator(_file_name)]
-
-
-class RobotPart(Part):
-    """Which robot. A bare name or path in its place is its source."""
-
-    source: FileName = Field(
-        description="a bundled name (see `nmm robots`), or a .urdf or .xacro file, relative to the scenario"
-    )
-    arguments: dict[str, Annotated[str, BeforeValidator(_argument)]] = Field(
-        default_factory=dict, description="xacro arguments, as {d: 0.5, l1: 0.6}"
-    )
-    platform: str | None = Field(None, description="how the base moves; when not given, the loader chooses")
-    package_dirs: list[FileName] = Field(
-        default_factory=list,
-        description="folders that hold the packages of package:// names, relative to the scenario",
-    )
-    wheels: Annotated[list[str] | dict[str, float] | None, BeforeValidator(_wheels)] = Field(
-        None,
-        description="joints that only roll, as a list, or with their radius, m, as {wheel_left: 0.1}; "
-        "when not given, the loader finds them",
-    )
-    locked: dict[str, Number] = Field(
-        default_factory=dict, description="joints to fix, and their values, rad or m, as {torso: 0.2}"
-    )
-
-    def build(self, source: str, package_dirs: list[str]) -> Robot:
-        """The robot, from a name or an absolute path."""
-        from nmm.loading import load
-
-        return load(
-            source,
-            arguments=self.arguments,
-            platform=self.platform,
-            package_dirs=package_dirs,
-            wheels=self.wheels,
-            locked=self.locked,
-        )
 
 
 class ScenarioPart(Part):
@@ -97,9 +33,9 @@ class ScenarioPart(Part):
         "", description="letters, digits and _ . - only; the file's when not given", pattern=r"^\w[\w.-]*$"
     )
     title: str = Field("", description="a line that says what it shows")
-    robot: Annotated[
-        RobotPart, BeforeValidator(lambda value: {"source": value} if isinstance(value, str) else value)
-    ] = Field(description="a name, a path, or a mapping with source")
+    robot: RobotChoice = Field(
+        description="a name, a path, a mapping with source, or one with platform and arm (or arms), mounted"
+    )
     q0: Annotated[dict[str, float] | list[Nested], BeforeValidator(_coordinates)] = Field(
         description="configuration at t = 0, m and rad: by name (0 for the rest), or a list in q's order"
     )

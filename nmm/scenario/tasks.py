@@ -7,9 +7,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import Field
 
 from nmm.errors import InputError
-from nmm.scenario.functions import CoordinatesPart, FunctionPart, HeadingPart, PositionPart, Reference
+from nmm.scenario.function_part import FunctionPart
+from nmm.scenario.functions import DistancePart, PointingPart, Reference
 from nmm.scenario.keys import KeyedError, at, kind_of
 from nmm.scenario.numbers import Numbers, shown
+from nmm.scenario.robot_functions import (
+    CenterOfMassPart,
+    CoordinatesPart,
+    HeadingPart,
+    OrientationPart,
+    PosePart,
+    PositionPart,
+    PosturePart,
+)
 
 if TYPE_CHECKING:
     from nmm.function import Row
@@ -60,15 +70,42 @@ def _check_rows(rows: tuple[Row, ...], targets: tuple[Row, ...]) -> None:
 
 
 class PositionTask(TaskPart, PositionPart):
-    """Position of a frame's origin along world axes, m."""
+    """Position of a frame's origin along world axes, or along another frame's, m."""
+
+
+class OrientationTask(TaskPart, OrientationPart):
+    """Orientation of a frame as its rotation vector (axis times angle), three rows, rad. Its error is the
+    rotation vector of the turn that is left, in the frame's own axes."""
+
+
+class PoseTask(TaskPart, PosePart):
+    """Pose of a frame, six rows: position, m, over rotation vector, rad. Its error is the motion that is left
+    (the logarithm of SE(3), in the frame's own axes), so that the frame moves along a screw."""
+
+
+class PointingTask(TaskPart, PointingPart):
+    """How far an axis of a frame points past a point: two rows, rad, both 0 when it points at it. The turn
+    about the axis is free."""
 
 
 class HeadingTask(TaskPart, HeadingPart):
     """Absolute angle of a direction fixed in a frame, about a world axis, rad; differences wrap."""
 
 
+class DistanceTask(TaskPart, DistancePart):
+    """Distance of a frame's origin from a point, m."""
+
+
+class CenterOfMassTask(TaskPart, CenterOfMassPart):
+    """Position of the whole robot's centre of mass along world axes, m."""
+
+
 class CoordinatesTask(TaskPart, CoordinatesPart):
-    """Linear combinations of coordinates, a row each; angles are not wrapped."""
+    """Linear combinations of coordinates, a row each (a joint coupling is one); angles are not wrapped."""
+
+
+class PostureTask(TaskPart, PosturePart):
+    """Coordinates as they are, a row each; angles are not wrapped."""
 
 
 def listed(value: object) -> object:
@@ -80,11 +117,32 @@ def listed(value: object) -> object:
     raise ValueError(f"expected a mapping with a kind, or a list of such, got {shown(value)}")
 
 
-TASKS: tuple[type[TaskPart], ...] = (PositionTask, HeadingTask, CoordinatesTask)
+TASKS: tuple[type[TaskPart], ...] = (
+    PositionTask,
+    OrientationTask,
+    PoseTask,
+    PointingTask,
+    HeadingTask,
+    DistanceTask,
+    CenterOfMassTask,
+    CoordinatesTask,
+    PostureTask,
+)
 #: One task, or several done together, one above the other.
 TaskList = list[
     Annotated[
-        Annotated[PositionTask | HeadingTask | CoordinatesTask, Field(discriminator="kind")],
+        Annotated[
+            PositionTask
+            | OrientationTask
+            | PoseTask
+            | PointingTask
+            | HeadingTask
+            | DistanceTask
+            | CenterOfMassTask
+            | CoordinatesTask
+            | PostureTask,
+            Field(discriminator="kind"),
+        ],
         kind_of(*TASKS),
     ]
 ]

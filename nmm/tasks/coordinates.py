@@ -1,4 +1,4 @@
-"""Linear combinations of the coordinates: postures, couplings of joints, and EJ's y = h(q)."""
+"""Linear combinations of the coordinates: couplings of joints, absolute angles, and EJ's y = h(q)."""
 
 from __future__ import annotations
 
@@ -54,6 +54,9 @@ def label(combination: Combination) -> str:
 
 class Coordinates(Function):
     """y = A q, a row a combination; angles are not wrapped.
+
+    A joint coupling is such a task: `Task(Coordinates({"q1": 1, "q2": -2}), 0)` keeps q1 = 2 q2. For
+    coordinates as they are, see `Posture`.
 
     Parameters
     ----------

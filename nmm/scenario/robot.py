@@ -1,0 +1,279 @@
+"""The robot of a scenario: from one file, or a platform with arms mounted on it."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, WrapValidator, model_validator
+
+from nmm.errors import InputError, unknown
+from nmm.scenario.document import Place
+from nmm.scenario.keys import KeyedError, Part, at, at_key
+from nmm.scenario.numbers import Number, number, numbers, numbers_by_name, shown
+
+if TYPE_CHECKING:
+    from nmm.platforms import Platform
+    from nmm.robot import Robot
+
+#: The absolute path of a file that is named at a place of the scenario.
+Absolute = Callable[[str, Place], Path]
+
+PACKAGE = "package://"
+
+
+def _argument(value: object) -> str:
+    """A xacro argument as the text that xacro reads."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str | int | float):
+        return str(value)
+    raise ValueError(f"expected a number or text, got {shown(value)}")
+
+
+def _wheels(value: object) -> object:
+    """Names, or radii by name."""
+    if isinstance(value, Mapping):
+        return numbers_by_name(value)
+    if value is None or isinstance(value, list | tuple):
+        return value
+    raise ValueError(f"expected a list of joints, or a radius for each, got {shown(value)}")
+
+
+def _file_name(value: object) -> object:
+    """A name or path that a file system can look up."""
+    if isinstance(value, str) and (not value.strip() or "\0" in value):
+        raise ValueError(f"expected a name or a path, got {shown(value)}")
+    return value
+
+
+def _axle(value: object) -> object:
+    """A frame's name, or two or three numbers."""
+    if value is None or isinstance(value, str):
+        return value
+    point = numbers(value)
+    if len(point) not in (2, 3) or not all(isinstance(item, float) for item in point):
+        raise ValueError(f"expected a frame, [x, y] or [x, y, z], got {shown(value)}")
+    return point
+
+
+def _three(value: object) -> object:
+    point = numbers(value)
+    if len(point) != 3 or not all(isinstance(item, float) for item in point):
+        raise ValueError(f"expected 3 numbers, got {shown(value)}")
+    return point
+
+
+def _kind_of_platform(value: object) -> object:
+    """A name, or a mapping from `kind` and the keywords of the platform's constructor."""
+    if isinstance(value, Mapping):
+        if not isinstance(value.get("kind"), str):
+            raise at_key("kind", "expected the kind of platform")
+        return {str(key): item if key == "kind" else _plain(item) for key, item in value.items()}
+    if value is None or isinstance(value, str):
+        return value
+    raise ValueError(f"expected a kind of platform, or a mapping with kind, got {shown(value)}")
+
+
+def _plain(value: object) -> Any:
+    """Numbers where there are such, text elsewhere, to any depth: the platform's constructor knows which."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    try:
+        return number(value)
+    except ValueError:
+        return value
+
+
+FileName = Annotated[str, BeforeValidator(_file_name)]
+Three = Annotated[list[float], BeforeValidator(_three)]
+
+
+class RobotPart(Part):
+    """Which robot. A bare name or path in its place is its source."""
+
+    source: FileName = Field(
+        description="a bundled name (see `nmm robots`), a .urdf or .xacro file, relative to the scenario, or "
+        "package://PACKAGE/PATH"
+    )
+    arguments: dict[str, Annotated[str, BeforeValidator(_argument)]] = Field(
+        default_factory=dict, description="xacro arguments, as {d: 0.5, l1: 0.6}"
+    )
+    platform: Annotated[str | dict[str, Any] | None, BeforeValidator(_kind_of_platform)] = Field(
+        None,
+        description="how the base moves: a kind (car), measured in the file, or with its parameters, as "
+        "{kind: car, wheelbase: 0.5, limits: {v: 1}}; when not given, what the file declares, or a unicycle",
+    )
+    package_dirs: list[FileName] = Field(
+        default_factory=list,
+        description="folders that hold the packages of package:// names, relative to the scenario",
+    )
+    wheels: Annotated[list[str] | dict[str, float] | None, BeforeValidator(_wheels)] = Field(
+        None,
+        description="joints that only roll, as a list, or with their radius, m, as {wheel_left: 0.1}; "
+        "when not given, the loader finds them",
+    )
+    lock: dict[str, Number] = Field(
+        default_factory=dict, description="joints to fix, and their values, rad or m, as {torso: 0.2}"
+    )
+    axle: Annotated[str | list[float] | None, BeforeValidator(_axle)] = Field(
+        None,
+        description="the platform's reference point in the root link: a frame, or [x, y] or [x, y, z], m; "
+        "when not given, the root link itself",
+    )
+    missing_meshes: Literal["error", "skip"] = Field(
+        "error", description="error, or skip to leave out shapes whose mesh is not there"
+    )
+
+    def build(self, absolute: Absolute, place: Place) -> Robot:
+        """The robot; `place` is where this part stands in the scenario."""
+        from nmm.loading import load
+
+        data = self.explicit(absolute, place)
+        keywords = {key: data[key] for key in type(self).model_fields if key not in ("source", "platform")}
+        platform = _platform(self.platform)
+        return load(data["source"], platform=platform, **keywords)
+
+    def explicit(self, absolute: Absolute, place: Place) -> dict[str, Any]:
+        """Every key as plain data, files with absolute paths."""
+        source = self.source
+        is_name = not Path(source).suffix and len(Path(source).parts) == 1
+        if not is_name and not source.startswith(PACKAGE):
+            source = str(absolute(source, (*place, "source")))
+        folders = [str(absolute(folder, (*place, "package_dirs"))) for folder in self.package_dirs]
+        return {**self.model_dump(), "source": source, "package_dirs": folders}
+
+
+def _named(value: object) -> object:
+    return {"source": value} if isinstance(value, str) else value
+
+
+AnyRobotPart = Annotated[RobotPart, BeforeValidator(_named)]
+
+
+class ArmPart(Part):
+    """An arm, and where it is mounted."""
+
+    arm: AnyRobotPart = Field(description="the arm: a name, a path, or a mapping with the keys of a robot")
+    at: str | None = Field(
+        None, description="the platform's frame that carries it; when not given, mount, arm_mount or top"
+    )
+    xyz: Three = Field(
+        default_factory=lambda: [0.0, 0.0, 0.0], description="of the arm's root link in that frame, m"
+    )
+    rpy: Three = Field(
+        default_factory=lambda: [0.0, 0.0, 0.0], description="roll, pitch, yaw about fixed axes, rad"
+    )
+    prefix: str | None = Field(
+        None,
+        description="put before the arm's names; when not given, none, or the arm's name where they clash",
+    )
+
+    def mount_on(self, platform: Robot, absolute: Absolute, place: Place) -> Robot:
+        """The platform with this arm."""
+        from nmm.loading import mount
+
+        with at("arm"):
+            arm = self.arm.build(absolute, (*place, "arm"))
+        with self.own_keys():
+            return mount(platform, arm, at=self.at, placement=(self.xyz, self.rpy), prefix=self.prefix)
+
+    def explicit(self, absolute: Absolute, place: Place) -> dict[str, Any]:
+        """Every key as plain data, files with absolute paths."""
+        return {**self.model_dump(), "arm": self.arm.explicit(absolute, (*place, "arm"))}
+
+
+class MountedPart(Part):
+    """A platform with arms on it: as a robot with `arm`, `at`, `xyz`, `rpy`, `prefix`, or with `arms`."""
+
+    platform: AnyRobotPart = Field(
+        description="the platform: a name, a path, or a mapping with the keys of a robot (where "
+        "platform is the kind)"
+    )
+    arms: list[ArmPart] = Field(default_factory=list, description="several arms: a list of such keys")
+    arm: AnyRobotPart | None = Field(None, description="one arm: as in the list, beside platform")
+    at: str | None = Field(None, description="as in the list")
+    xyz: Three | None = Field(None, description="as in the list")
+    rpy: Three | None = Field(None, description="as in the list")
+    prefix: str | None = Field(None, description="as in the list")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_form(cls, data: Any) -> Any:
+        if "arms" in data:
+            for key in ("arm", "at", "xyz", "rpy", "prefix"):
+                if key in data:
+                    raise at_key(key, "expected it in the list of arms, where arms is given")
+            if not data["arms"]:
+                raise at_key("arms", "expected at least 1")
+        return data
+
+    def build(self, absolute: Absolute, place: Place) -> Robot:
+        """The platform with its arms; `place` is where this part stands in the scenario."""
+        with at("platform"):
+            robot = self.platform.build(absolute, (*place, "platform"))
+        single = self._single()
+        if single is not None:
+            return single.mount_on(robot, absolute, place)
+        for i, arm in enumerate(self.arms):
+            with at("arms", i):
+                robot = arm.mount_on(robot, absolute, (*place, "arms", i))
+        return robot
+
+    def explicit(self, absolute: Absolute, place: Place) -> dict[str, Any]:
+        """Every key of the form that was used, as plain data, files with absolute paths."""
+        platform = {"platform": self.platform.explicit(absolute, (*place, "platform"))}
+        single = self._single()
+        if single is not None:
+            return platform | single.explicit(absolute, place)
+        arms = [arm.explicit(absolute, (*place, "arms", i)) for i, arm in enumerate(self.arms)]
+        return {**platform, "arms": arms}
+
+    def _single(self) -> ArmPart | None:
+        if self.arm is None:
+            return None
+        zero = [0.0, 0.0, 0.0]
+        return ArmPart(
+            arm=self.arm, at=self.at, xyz=self.xyz or zero, rpy=self.rpy or zero, prefix=self.prefix
+        )
+
+
+def _chosen(value: Any, _: Any) -> RobotPart | MountedPart:
+    """The presence of an arm decides which keys there are."""
+    if isinstance(value, RobotPart | MountedPart):
+        return value
+    value = _named(value)
+    mounted = isinstance(value, Mapping) and ("arm" in value or "arms" in value)
+    return (MountedPart if mounted else RobotPart).model_validate(value)
+
+
+RobotChoice = Annotated[RobotPart | MountedPart, WrapValidator(_chosen)]
+
+
+def _platform(value: str | dict[str, Any] | None) -> Platform | str | None:
+    """The platform of a mapping with its kind and parameters; a name stays one."""
+    if not isinstance(value, dict):
+        return value
+    from nmm.platforms import platform_by_name
+
+    keywords = {key: item for key, item in value.items() if key != "kind"}
+    with at("platform"):
+        with at("kind"):
+            kind = platform_by_name(value["kind"])
+        parameters = inspect.signature(kind).parameters
+        for key in keywords:
+            if key not in parameters:
+                raise KeyedError((key,), unknown("key", key, ["kind", *parameters]))
+        for key, parameter in parameters.items():
+            if key not in keywords and parameter.default is inspect.Parameter.empty:
+                raise KeyedError((key,), f"this key is missing for platform {kind.name} with parameters")
+        try:
+            return kind(**keywords)
+        except InputError as error:
+            text = str(error).removeprefix(f"{kind.name}: ")
+            head, _, rest = text.partition(": ")
+            raise (KeyedError((head,), rest) if head in keywords and rest else InputError(text)) from None
