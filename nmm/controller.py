@@ -216,6 +216,12 @@ class Controller:
         self._state[0] = HELD if hold else FREE
 
     @property
+    def derivatives(self) -> tuple[Array, Array, Array]:
+        """What the inputs move, in the last call, as views: J (s, m), the constraint's (k, m), h (1, m)."""
+        found = self._results
+        return found.task.J, found.constraint.J, found.h[np.newaxis]
+
+    @property
     def partition_sign(self) -> int:
         """Sign of det Ja in the last call (0 without a partition): between two signs Ja is singular."""
         determinant = self._results.report[2] if self._state[1] >= 0 else 0.0

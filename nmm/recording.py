@@ -106,7 +106,8 @@ class Recorder:
         singular_values = np.linalg.svd(self._J[:count], compute_uv=False).astype(np.float64)
         if outcome is not Outcome.SINGULAR:  # which says so itself
             self._warn_of_singularities(singular_values)
-        self.warnings += excesses(robot, self.t, self.q[:count], self._u[:count])
+        if outcome in (Outcome.COMPLETED, Outcome.INTERRUPTED):  # of one that failed it goes without saying
+            self.warnings += excesses(robot, self.t, self.q[:count], self._u[:count])
         frame, columns, target = _shown(controller)
         path, desired = None, None
         if frame is not None:

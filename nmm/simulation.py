@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array, positive
 from nmm.controller import Controller, Step
 from nmm.errors import DivergedError, InputError, RunError, SingularError
+from nmm.felt import idle_inputs
 from nmm.integrators import Integrator, integrator
 from nmm.recording import Recorder
 from nmm.stability import Instability, find_instability
@@ -74,6 +75,12 @@ def simulate(
     advance = integrator(method, robot, positive(tolerance, "tolerance"))
     recorder = Recorder(controller, times)
     outcome, message = Outcome.COMPLETED, ""
+    idle = idle_inputs(controller, q)
+    if idle:
+        recorder.warnings.append(
+            f"neither the task nor the objective feels {', '.join(idle)}: at first order nothing moves "
+            f"{'it' if len(idle) == 1 else 'them'} (an objective can)"
+        )
     controller.reset()
     try:
         _integrate(controller, advance, recorder, times, q, progress)

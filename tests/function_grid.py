@@ -250,7 +250,7 @@ def modules() -> list[ModuleType]:
     names = [nmm.__name__ + "." + name for name in ("equations", "program", "controller", "integrators")]
     for package in ("platforms", "tasks", "references", "objectives", "resolvers"):
         found = importlib.import_module(f"nmm.{package}")
-        names += [info.name for info in pkgutil.iter_modules(found.__path__, f"nmm.{package}.")]
+        names += [info.name for info in pkgutil.walk_packages(found.__path__, f"nmm.{package}.")]
     return [importlib.import_module(name) for name in names]
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from wheeled_examples import EXAMPLES as WHEELED
 
 from nmm.platforms import (
     Car,
@@ -22,6 +23,20 @@ from nmm.platforms import (
 )
 
 Array = NDArray[np.float64]
+
+#: Those described by their wheels that are regular at all random angles of the shared tests.
+REGULAR = (
+    *("axle", "wheel speeds", "front drive", "trailers", "two trailers side by side", "hitch with nothing"),
+    *(
+        "omni",
+        "mecanum",
+        "one steered",
+        "two steered",
+        "driven casters",
+        "axles and a driven caster",
+        "stuck",
+    ),
+)
 
 #: Examples by a name for the test's id.
 EXAMPLES: dict[str, Platform] = {
@@ -42,6 +57,7 @@ EXAMPLES: dict[str, Platform] = {
     "mecanum": Mecanum(0.05, 0.3, 0.2),
     "mecanum_wide": Mecanum(0.2, 0.5, 1.1),
     "fixed": Fixed(),
+    **{f"wheeled, {name}": WHEELED[name] for name in REGULAR},
 }
 
 #: Entries of G beyond this are near where the wheels cannot roll (a rear-driven car steered to 90 degrees).

@@ -85,7 +85,9 @@ def hand_built_robot(folder: Path) -> Robot:
 
 def inputs(robot: Robot, t: float) -> np.ndarray:
     arm = (0.4 * np.sin(t + i) for i in range(robot.n_u - 2))
-    return np.array([0.5 * np.cos(t), 0.8 * np.sin(0.7 * t), *arm])
+    # A car must not steer to 90 degrees.
+    turn = 0.2 if "steering_rate" in robot.u_names else 0.8
+    return np.array([0.5 * np.cos(t), turn * np.sin(0.7 * t), *arm])
 
 
 def drive(
@@ -98,7 +100,8 @@ def drive(
         middle = q[k] + 0.5 * dt * robot.S(q[k]) @ inputs(robot, t[k])
         q[k + 1] = q[k] + dt * robot.S(middle) @ inputs(robot, t[k] + 0.5 * dt)
     u = np.array([inputs(robot, now) for now in t])
-    return Motion(robot, t, q, u, frame=frame, **fields)
+    # A base has no end-effector.
+    return Motion(robot, t, q, u, frame=frame if frame in robot.frames else None, **fields)
 
 
 def straight(robot: Robot, v: float, omega: float, t: np.ndarray) -> Motion:

@@ -62,7 +62,7 @@ FIVE_ROWS = (
 #: Changes to the scenario above, by `--set`, and what the line has to say.
 SETTINGS: list[tuple[str, list[str]]] = [
     # unknown robot, frame, joint, coordinate, input, kind
-    ("robot=unicycle_2", ["robot", "unknown robot 'unicycle_2'", "available: unicycle_2r, unicycle_3r"]),
+    ("robot=unicycle_2", ["robot", "unknown robot 'unicycle_2'", "available: car_base, "]),
     ("robot=nowhere.urdf", ["robot", "nowhere.urdf", "no such file"]),
     ("robot.platform=hover", ["robot.platform", "unknown platform 'hover'", "available: unicycle"]),
     ("robot.arguments.dd=1", ["robot.arguments.dd", "unknown", "'dd'", "wheel_radius"]),
@@ -181,7 +181,7 @@ COMMANDS: list[tuple[list[str], list[str]]] = [
     (["play", "theirs"], ["theirs", "expected a run's folder"]),
     (["play", "nowhere"], ["nowhere", "expected a run's folder"]),
     (["play", "theirs", "--port", "many"], ["--port", "integer"]),
-    (["info", "nobody"], ["unknown robot 'nobody'", "available: unicycle_2r"]),
+    (["info", "nobody"], ["unknown robot 'nobody'", "available: car_base"]),
     (["info", "nowhere.urdf"], ["nowhere.urdf", "no such file"]),
     (["info", "unicycle_2r", "--platform", "hover"], ["unknown platform 'hover'", "available: unicycle"]),
     (["info", "unicycle_2r", "--scenario", "nowhere"], ["unknown scenario 'nowhere'"]),
@@ -250,7 +250,8 @@ def test_robots(name: str, expected: list[str], folder: Path, capfd: pytest.Capt
         folder,
         capfd,
     )
-    refused(["info", name], [name, *expected], folder, capfd)
+    if name != "mesh.urdf":  # `info` lists what is missing
+        refused(["info", name], [name, *expected], folder, capfd)
 
 
 @pytest.mark.parametrize(("arguments", "expected"), COMMANDS, ids=[" ".join(line) for line, _ in COMMANDS])

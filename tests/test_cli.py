@@ -38,6 +38,8 @@ def test_help_names_every_command_and_teaches(run: Command, arguments: Sequence[
         "paper",
         "play",
         "info",
+        "check",
+        "view",
         "scenarios",
         "robots",
         "--version",

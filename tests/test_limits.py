@@ -93,6 +93,16 @@ def test_a_motion_that_goes_outside_says_where_and_how_far(limited: Robot) -> No
         assert (f"{name} at {aside.t[first[0]]:.3g} s" in said) if first.size else (name not in said)
 
 
+def test_limits_of_a_platform_measured_in_the_file() -> None:
+    car = nmm.load("car_base", limits={"v": 0.5})
+    assert car.u_limits[0] == 0.5
+    assert nmm.load("car_base", platform="front_drive_car", limits={"v": 0.5}).u_limits[0] == 0.5
+    with pytest.raises(nmm.RobotError, match=r"limits of platform car: unknown input 'w'.*steering_rate"):
+        nmm.load("car_base", limits={"w": 1.0})
+    mounted = nmm.mount(car, "small_arm")
+    assert mounted.u_limits[0] == 0.5
+
+
 @pytest.mark.parametrize(
     ("limits", "message"),
     [
@@ -104,6 +114,12 @@ def test_a_motion_that_goes_outside_says_where_and_how_far(limited: Robot) -> No
 def test_wrong_limits_of_inputs(limits: dict[str, float], message: str) -> None:
     with pytest.raises(nmm.InputError, match=message):
         Unicycle(limits=limits)
+
+
+def test_limits_in_a_scenario(tmp_path: Path) -> None:
+    steered = nmm.Scenario.load("car_steered_by_the_null_space", {"robot.platform.limits": {"v": 0.3}})
+    assert steered.robot().u_limits[0] == 0.3
+    assert any("v (0.6" in warning for warning in steered.override("duration", 2).run().warnings)
 
 
 def test_a_scenario_names_the_key(tmp_path: Path, limited: Robot) -> None:

@@ -59,11 +59,15 @@ BOXES = """() => {
 }"""
 
 
-@pytest.fixture(scope="module", params=["hand-built", "unicycle_2r", "unicycle_3r"])
+#: Bases with swivels, trailers and rollers, and a base that stands still.
+OTHERS = ("car_base", "trailer_base", "omni_base", "small_arm")
+
+
+@pytest.fixture(scope="module", params=["hand-built", "unicycle_2r", "unicycle_3r", *OTHERS])
 def robot(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Robot:
     if request.param == "hand-built":
         return hand_built_robot(tmp_path_factory.mktemp("robot"))
-    return nmm.load(request.param)
+    return nmm.load(request.param, platform="fixed" if request.param == "small_arm" else None)
 
 
 # The file

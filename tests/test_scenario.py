@@ -251,6 +251,19 @@ def test_robot_files_are_relative_to_the_scenario(tmp_path: Path, monkeypatch: p
         scenario(tmp_path, text, robot="robots/arm.urdf").robot()
 
 
+def test_settings_reach_below_a_robots_bare_name() -> None:
+    """`robot: name`, `platform: name`, `arm: name` are mappings with one key, written short."""
+    steered = Scenario.load("car_steered_by_the_null_space")
+    changed = steered.override("robot.platform.arguments.wheelbase", 0.8).override("robot.arm.lock.q5", 0.1)
+    assert changed.robot().platform.parameters[0] == 0.8  # the wheelbase, measured in the file
+    assert changed.robot().q_names[-1] == "q4"
+    assert steered.override("robot.platform.source", "omni_base").robot().platform.name == "mecanum"
+    kind = Scenario.load("unicycle_2r_position", {"robot.platform": "unicycle"})
+    assert kind.override("robot.platform.kind", "unicycle").robot().platform.name == "unicycle"
+    with pytest.raises(ScenarioError, match=r"set robot\.platform\.kind\.name: .*unicycle.*has no keys"):
+        kind.override("robot.platform.kind.name", 1)
+
+
 # Runs that come out again
 
 
@@ -291,6 +304,7 @@ def test_resolved_holds_every_default_as_plain_data() -> None:
         "wheels": None,
         "lock": {},
         "axle": None,
+        "limits": {},
         "missing_meshes": "error",
     }
 

@@ -12,7 +12,9 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from nmm.cli.options import SetOption, settings_of
 from nmm.cli.output import complain
+from nmm.cli.robot_commands import check, info, robots, scenarios, view
 from nmm.errors import InputError, NmmError
 
 #: What typer raises for wrong usage: options that do not exist, arguments that are missing.
@@ -30,15 +32,6 @@ app = typer.Typer(
 
 ScenarioArgument = Annotated[
     str, typer.Argument(metavar="SCENARIO", help="A bundled name (see `nmm scenarios`) or a YAML file.")
-]
-SetOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="KEY=VALUE",
-        help="Change a key of the scenario, by its dotted path; lists count from 0. Numbers may be "
-        "arithmetic with pi, lists and mappings are written as in YAML. May be repeated.",
-    ),
 ]
 
 
@@ -65,6 +58,8 @@ def nmm(
     nmm run unicycle_2r_position --play       and watch it in the browser
     nmm compare unicycle_2r_position          reduced against projected gradient
     nmm paper                                 the paper's four cases and figures
+    nmm view unicycle_3r                      a robot in the browser, with sliders
+    nmm check my_robot.urdf                   everything that is wrong with a file
 
     Units are metres, radians and seconds. Exit status: 0; 1 when a run failed (what there is of it is
     written); 2 for bad input, with one line on standard error that says what was expected.
@@ -115,7 +110,7 @@ def run(
     """
     from nmm.cli.runs import run_scenario
 
-    return run_scenario(scenario, resolver, _settings(settings), out, html=html, play=play)
+    return run_scenario(scenario, resolver, settings_of(settings), out, html=html, play=play)
 
 
 @app.command()
@@ -148,7 +143,7 @@ def compare(
     kinds = list(dict.fromkeys(kind.strip() for kind in resolvers.split(",") if kind.strip()))
     if not kinds:
         raise InputError("--resolvers: expected kinds with commas between them, as in rg,pg")
-    return compare_resolvers(scenario, kinds, _settings(settings), out)
+    return compare_resolvers(scenario, kinds, settings_of(settings), out)
 
 
 @app.command()
@@ -186,64 +181,8 @@ def play(
     return play_folder(folder, port, open_browser=not no_open)
 
 
-@app.command()
-def info(
-    robot: Annotated[
-        str,
-        typer.Argument(metavar="ROBOT", help="A bundled name (see `nmm robots`) or a .urdf or .xacro file."),
-    ],
-    platform: Annotated[
-        str | None, typer.Option(metavar="NAME", help="How the base moves.", show_default="unicycle")
-    ] = None,
-    scenario: Annotated[
-        str | None, typer.Option(metavar="SCENARIO", help="Show the redundancy for this scenario's task.")
-    ] = None,
-) -> int:
-    """Describe a robot.
-
-    Coordinates, inputs and limits with their units, frames that a task may speak of, wheels, and the
-    degree of redundancy for tasks of 2, 3 and 6 rows, or for a scenario's task.
-
-    \b
-    nmm info unicycle_2r
-    nmm info my_robot.urdf
-    nmm info unicycle_3r --scenario unicycle_3r_position
-    """
-    from nmm.cli.descriptions import describe_robot
-
-    return describe_robot(robot, platform, scenario)
-
-
-@app.command()
-def scenarios(
-    keys: Annotated[bool, typer.Option("--keys", help="List the keys of a scenario file instead.")] = False,
-) -> int:
-    """List the bundled scenarios.
-
-    They are YAML files; to make your own, start from the scenario.yaml that a run writes.
-    """
-    from nmm.cli.descriptions import list_keys, list_scenarios
-
-    return list_keys() if keys else list_scenarios()
-
-
-@app.command()
-def robots() -> int:
-    """List the bundled robots."""
-    from nmm.cli.descriptions import list_robots
-
-    return list_robots()
-
-
-def _settings(given: Sequence[str] | None) -> dict[str, object]:
-    """The `--set` options as a mapping."""
-    settings: dict[str, object] = {}
-    for text in given or ():
-        key, equals, value = text.partition("=")
-        if not equals or not key.strip():
-            raise InputError(f"--set: expected KEY=VALUE, as in resolver.alpha=5, got {text!r}")
-        settings[key.strip()] = value
-    return settings
+for _command in (info, check, view, scenarios, robots):
+    app.command()(_command)
 
 
 def status_of(arguments: Sequence[str]) -> int:

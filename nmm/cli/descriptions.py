@@ -1,126 +1,202 @@
-"""info, scenarios and robots."""
+"""info: a robot in tables."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator
-from math import isfinite
+from collections.abc import Iterator, Sequence
+from math import degrees, isfinite
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from nmm.bundled import bundled_robots, bundled_scenarios
 from nmm.cli.output import show_table, show_text
+from nmm.errors import InputError
 
 if TYPE_CHECKING:
-    from nmm.robot import Robot
+    from nmm.arrays import Array
+    from nmm.controller import Controller
+    from nmm.loading.provenance import Provenance
+    from nmm.robot import Robot, Wheel
 
 OK = 0
 #: An angle beyond this many turns is a joint without limits.
 UNBOUNDED = 1e6
+#: Where the kind of platform comes from, for `Provenance.platform`.
+_CHOSEN = {"file": "declared in the file", "default": "by default"}
 
 
-def list_scenarios() -> int:
-    """The bundled scenarios."""
-    from nmm.scenario import Scenario
-
-    loaded = [Scenario.load(name) for name in bundled_scenarios()]
-    show_table(["scenario", "what it shows"], [[scenario.name, scenario.title] for scenario in loaded])
-    return OK
-
-
-def list_keys() -> int:
-    """The keys of a scenario file."""
-    from nmm.scenario.reference import sections
-
-    for section in sections():
-        show_text(f"{section.title} ({section.summary.rstrip('.')})")
-        show_table(["key", "default", "meaning"], section.keys)
-        show_text()
-    return OK
-
-
-def list_robots() -> int:
-    """The bundled robots."""
-    rows = []
-    for name, path in bundled_robots().items():
-        text = path.read_text(encoding="utf-8")
-        about = re.search(r"<!--\s*(.+?)\s*(?:\n\s*\n|-->)", text, re.DOTALL)
-        arguments = re.findall(r'<xacro:arg\s+name="([^"]+)"\s+default="([^"]*)"', text)
-        rows.append(
-            [
-                name,
-                " ".join(about.group(1).split()) if about else "",
-                ", ".join(f"{argument}={default}" for argument, default in arguments),
-            ]
-        )
-    show_table(["robot", "what it is", "arguments (m)"], rows)
-    return OK
-
-
-def describe_robot(source: str, platform: str | None, scenario: str | None) -> int:
-    """Coordinates, inputs, frames, wheels, redundancy."""
+def describe_robot(
+    source: str | None,
+    scenario: str | None,
+    *,
+    platform: str | None,
+    lock: dict[str, float],
+    axle: str | list[float] | None,
+    package_dirs: Sequence[Path],
+) -> int:
+    """Everything about a robot, or about a scenario's robot and task."""
     from nmm.loading import load
 
-    task = None
+    if source is None and scenario is None:
+        raise InputError("expected ROBOT, a bundled name or a file, or --scenario SCENARIO, which has one")
+    if source is None and (platform or lock or axle or package_dirs):
+        raise InputError(
+            "--platform, --lock, --axle and --package-dir are for ROBOT, a scenario says its own"
+        )
+    robot = None
+    if source is not None:
+        robot = load(
+            source,
+            platform=platform,
+            lock=lock,
+            axle=axle,
+            package_dirs=package_dirs,
+            missing_meshes="skip",
+        )
+    task: list[tuple[str, int]] = [
+        ("position in the plane", 2),
+        ("position in space", 3),
+        ("pose in space", 6),
+    ]
+    unfelt: Sequence[str] | None = None
     if scenario is not None:
-        from nmm.scenario import Scenario
+        name, controller, q0 = _of_scenario(scenario, robot)
+        from nmm.felt import unfelt_inputs
 
-        loaded = Scenario.load(scenario)
-        task = loaded.name, len(loaded.controller().rows)
-    robot = load(source, platform=platform)
+        robot = controller.robot
+        task, unfelt = [(name, len(controller.rows))], unfelt_inputs(controller, q0)
+    assert robot is not None  # there is a source, or a scenario
+    _show(robot, task)
+    for name in unfelt or ():
+        show_text(f"the task does not feel {name}: only the objective can use it")
+    if unfelt == ():
+        show_text("the task feels every input")
+    _show_loading(robot)
+    return OK
+
+
+def _of_scenario(name: str, robot: Robot | None) -> tuple[str, Controller, Array]:
+    """A scenario's name, its controller (on another robot, if one is given), and its start."""
+    from nmm.scenario import Scenario
+    from nmm.scenario.keys import KeyedError
+
+    scenario = Scenario.load(name)
+    if robot is None:
+        controller = scenario.controller()
+    else:
+        try:
+            controller = scenario.parts.build(robot)
+        except KeyedError as error:
+            key = ".".join(map(str, error.place))
+            raise InputError(
+                f"scenario {name} does not fit robot {robot.name}: {key}: {error.text}"
+            ) from None
+    try:
+        q0 = controller.robot.q(scenario.parts.q0)
+    except InputError:
+        q0 = controller.robot.q()  # the start is the other robot's
+    return scenario.name, controller, q0
+
+
+def _show(robot: Robot, tasks: Sequence[tuple[str, int]]) -> None:
     show_text(f"{robot.name} ({robot.source}), {robot.platform.name} platform")
     show_text()
     show_table(
-        ["coordinate", "unit", "of", "lower", "upper"],
-        _coordinates(robot),
-        numeric=["lower", "upper"],
+        ["coordinate", "unit", "of", "lower", "upper"], _coordinates(robot), numeric=["lower", "upper"]
     )
     show_text()
-    show_table(["input", "unit", "limit"], _inputs(robot), numeric=["limit"])
+    show_table(["input", "unit", "of", "limit"], _inputs(robot), numeric=["limit"])
     show_text()
+    for name, inputs in robot.groups.items():
+        show_text(f"group {name}: {', '.join(inputs) or 'none'}")
     show_text(f"frames: {', '.join(robot.frames)}")
+    for name, value in _parameters(robot):
+        show_text(f"platform {name}: {value}")
     show_text()
     if robot.wheels:
         show_table(
-            ["wheel", "radius", "centre, from the root link"],
-            [
-                [w.joint, f"{w.radius:g} m", f"({', '.join(f'{c:g}' for c in w.center)}) m"]
-                for w in robot.wheels
-            ],
+            ["wheel", "radius", "on", "swivels on", "rollers", "centre there"],
+            [_wheel(wheel) for wheel in robot.wheels],
             numeric=["radius"],
         )
         show_text()
-    show_table(
-        ["task", "rows", "static redundancy", "kinematic redundancy"],
-        _redundancies(robot, task),
-        numeric=["rows", "static redundancy", "kinematic redundancy"],
-    )
-    if robot.notes:
-        show_text()
-        for note in robot.notes:
-            show_text(f"note: {note}")
-    return OK
+    columns = ["task", "rows", "static redundancy", "kinematic redundancy"]
+    show_table(columns, _redundancies(robot, tasks), numeric=columns[1:])
 
 
 def _coordinates(robot: Robot) -> Iterator[list[str]]:
-    model = robot.model
-    for i, (name, unit) in enumerate(zip(robot.q_names, robot.q_units, strict=True)):
-        of = "platform" if i < robot.platform.n_p else "arm"
-        lower, upper = float(model.lowerPositionLimit[i]), float(model.upperPositionLimit[i])
-        yield [name, unit, of, _limit(lower), _limit(upper)]
+    n_p = robot.platform.n_p
+    for i, (name, unit, (lower, upper)) in enumerate(
+        zip(robot.q_names, robot.q_units, robot.q_limits, strict=True)
+    ):
+        of = "platform" if i < n_p else _arm(robot, name)
+        yield [name, unit, of, _limit(float(lower)), _limit(float(upper))]
 
 
 def _inputs(robot: Robot) -> Iterator[list[str]]:
-    arm = robot.model.velocityLimit[robot.platform.n_p :]
-    limits = ["-"] * robot.platform.p + [_limit(float(limit)) for limit in arm]
-    for name, unit, limit in zip(robot.u_names, robot.u_units, limits, strict=True):
-        yield [name, unit, limit]
+    for i, (name, unit, limit) in enumerate(zip(robot.u_names, robot.u_units, robot.u_limits, strict=True)):
+        of = "platform" if i < robot.platform.p else _arm(robot, name)
+        yield [name, unit, of, _limit(float(limit))]
+
+
+def _arm(robot: Robot, joint: str) -> str:
+    """The arm that a joint is part of."""
+    return next((name for name, joints in robot.arms.items() if joint in joints), "arm")
 
 
 def _limit(value: float) -> str:
     return f"{value:.4g}" if isfinite(value) and abs(value) < UNBOUNDED else "-"
 
 
-def _redundancies(robot: Robot, task: tuple[str, int] | None) -> Iterator[list[str]]:
-    tasks = [("position in the plane", 2), ("position in space", 3), ("pose in space", 6)]
-    for name, s in tasks if task is None else [task]:
+def _parameters(robot: Robot) -> Iterator[tuple[str, str]]:
+    """The platform's own numbers and names, as it was measured or given; m and rad."""
+    for name, value in vars(robot.platform).items():
+        if isinstance(value, int | float):
+            yield name, f"{value:.6g}"
+        elif isinstance(value, str):
+            yield name, value
+        elif isinstance(value, tuple) and name not in ("coordinates", "inputs", "input_units"):
+            for i, item in enumerate(value):
+                yield f"{name} {i + 1}", str(item)
+
+
+def _wheel(wheel: Wheel) -> list[str]:
+    return [
+        wheel.joint,
+        f"{wheel.radius:g} m",
+        "the root's body" if wheel.carrier == "theta" else wheel.carrier,
+        wheel.swivel or "-",
+        f"{degrees(wheel.roller):g}°" if wheel.roller else "-",
+        f"({', '.join(f'{c:.4g}' for c in wheel.center)}) m",
+    ]
+
+
+def _redundancies(robot: Robot, tasks: Sequence[tuple[str, int]]) -> Iterator[list[str]]:
+    for name, s in tasks:
         yield [name, str(s), *(str(count - s) if count >= s else "-" for count in (robot.n, robot.n_u))]
+
+
+def _show_loading(robot: Robot) -> None:
+    """What loading found and did."""
+    made: Provenance | None = getattr(robot.parts, "provenance", None)
+    lines = [f"note: {note}" for note in robot.notes]
+    if made is not None:
+        if made.platform in _CHOSEN:
+            lines.insert(0, f"platform: {robot.platform.name}, {_CHOSEN[made.platform]}")
+        lines += [f"prefix of {arm}: {prefix}" for arm, prefix in made.prefixed.items()]
+        lines += _files(made)
+    if lines:
+        show_text()
+    for line in lines:
+        show_text(line)
+
+
+def _files(made: Provenance) -> Iterator[str]:
+    """Meshes and packages."""
+    missing = [name for name, file in made.meshes.items() if file is None]
+    if made.meshes:
+        yield f"meshes: {len(made.meshes) - len(missing)} of {len(made.meshes)} found"
+    yield from (f"mesh not found: {name}" for name in missing)
+    yield from (f"package {name}: {folder}" for name, folder in made.packages.items() if folder is not None)
+    lost = [name for name, folder in made.packages.items() if folder is None]
+    if lost:
+        looked = ", ".join(dict.fromkeys(map(str, made.searched)))
+        yield f"package not found: {', '.join(lost)}; looked in {looked}"

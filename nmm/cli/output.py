@@ -46,7 +46,8 @@ def show_table(
 
 def show_text(text: str = "") -> None:
     """Print text that wraps on a terminal."""
-    console().print(text)
+    out = console()
+    out.print(text, soft_wrap=not out.is_terminal)
 
 
 def warn(text: str) -> None:

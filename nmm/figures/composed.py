@@ -60,7 +60,8 @@ def _draw_views(made: Figure, scene: Scene, top: float) -> float:
         height = min(tall, 6.2)
         if index and top - style.GAP - height < style.BOTTOM:
             break
-        top -= style.GAP + height
+        rows = 1 if index else style.legend_rows(scene.names, _VIEW)
+        top -= style.room(rows) + height
         axes = style.place(made, style.LEFT, top, _VIEW * height / tall, height)
         scene.draw(axes, view)
         if index == 0:
@@ -110,7 +111,8 @@ def _draw_paths(axes: Axes, runs: Sequence[Trajectory], looks: Sequence[style.Lo
     for run, (name, color, dashes) in zip(runs, looks, strict=True):
         if run.path is not None:
             axes.plot(*run.path[:, :2].T, dashes, color=color, linewidth=1.5, label=f"{name}: {run.frame}")
-        axes.plot(*run.q[:, :2].T, dashes, color=color, linewidth=0.8, label=f"{name}: platform")
+        if run.robot.platform.n_p:
+            axes.plot(*run.q[:, :2].T, dashes, color=color, linewidth=0.8, label=f"{name}: platform")
     axes.set_aspect("equal", adjustable="datalim")
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(nbins=9, steps=[1, 2, 5, 10]))

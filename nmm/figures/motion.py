@@ -16,6 +16,7 @@ from nmm.arrays import Array
 from nmm.errors import InputError
 from nmm.figures import style
 from nmm.figures.silhouette import Pose, Silhouette
+from nmm.playback.placements import base_position
 from nmm.trajectory import Trajectory
 
 #: Distance of a time's label from what it belongs to, m.
@@ -54,11 +55,12 @@ def stroboscopic(trajectory: Trajectory, instants: ArrayLike | int | None = None
     scene = Scene(trajectory, instants)
     across = style.PAGE - style.LEFT - style.RIGHT
     heights = [scene.height(view, across) for view in scene.views]
-    total = style.BOTTOM + style.column_height(heights, [1] * len(heights)) + _BETWEEN * (len(heights) - 1)
+    legends = [style.legend_rows(scene.names, across), *[1] * (len(heights) - 1)]
+    total = style.BOTTOM + style.column_height(heights, legends) + _BETWEEN * (len(heights) - 1)
     made = style.figure(style.PAGE, total)
     top = total
-    for index, (view, height) in enumerate(zip(scene.views, heights, strict=True)):
-        top -= style.GAP + height
+    for index, (view, height, rows) in enumerate(zip(scene.views, heights, legends, strict=True)):
+        top -= style.room(rows) + height
         axes = style.place(made, style.LEFT, top, across, height)
         scene.draw(axes, view)
         if index == 0:
@@ -86,6 +88,17 @@ class Scene:
         heights = np.array([[*pose.joints[:, 2], *pose.tip[:, 2]] for pose in self.poses])
         rises = heights.size > 0 and float(np.ptp(heights, axis=0).max()) > _RISES
         self.views = (ABOVE, SIDE) if rises else (ABOVE,)
+
+    @property
+    def names(self) -> list[str]:
+        """The entries of its legend."""
+        names = ["desired path"] if "desired" in self.lines else []
+        names += [self._path_name, "start", "end"]
+        return names if self.trajectory.target is None else [*names, "target"]
+
+    @property
+    def _path_name(self) -> str:
+        return f"path of {self.trajectory.frame}" if self.trajectory.frame else "path of the platform"
 
     def limits(self, view: tuple[int, int]) -> list[tuple[float, float]]:
         """Limits of both axes that hold everything, with a margin, m."""
@@ -137,8 +150,10 @@ class Scene:
                 dashes=(4, 2.5), label="desired path", zorder=5.2,
             )  # fmt: skip
         if path is not None:
-            name = f"path of {trajectory.frame}" if trajectory.frame else "path of the platform"
-            axes.plot(path[:, across], path[:, up], color=_PATH_COLOR, linewidth=1.5, label=name, zorder=5.1)
+            axes.plot(
+                path[:, across], path[:, up], color=_PATH_COLOR, linewidth=1.5, label=self._path_name,
+                zorder=5.1,
+            )  # fmt: skip
             for point, marker, text in ((path[0], "o", "start"), (path[-1], "s", "end")):
                 axes.plot(
                     point[across], point[up], marker, color=style.GREEN if text == "start" else style.PINK,
@@ -158,7 +173,7 @@ def _label_places(poses: Sequence[Pose], lines: Sequence[Array]) -> Array:
     angles = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
     places: list[Array] = []
     for pose in poses:
-        body = np.vstack(pose.body)[:, :2]
+        body = pose.main[:, :2]
         centre = 0.5 * (body.min(axis=0) + body.max(axis=0))
         reach = float(np.linalg.norm(body - centre, axis=1).max())
         candidates = centre + (reach + _LABEL) * np.column_stack([np.cos(angles), np.sin(angles)])
@@ -182,7 +197,9 @@ def _how_many(trajectory: Trajectory, silhouette: Silhouette) -> int:
     """So many instants that the platform moves by about its length from one to the next."""
     body = np.vstack(silhouette.at(trajectory.q[0]).body)[:, :2]
     length = float(np.linalg.norm(body.max(axis=0) - body.min(axis=0)))
-    driven = float(np.linalg.norm(np.diff(trajectory.q[:, :2], axis=0), axis=1).sum())
+    driven = float(
+        np.linalg.norm(np.diff(base_position(trajectory.robot, trajectory.q), axis=0), axis=1).sum()
+    )
     if not np.isfinite(driven):
         return LEAST
     return int(np.clip(1 + driven // (1.1 * length), LEAST, MOST)) if len(trajectory) > 1 else 1
@@ -204,7 +221,7 @@ def _lines(trajectory: Trajectory) -> dict[str, Array]:
     every = max(1, len(trajectory) // 1500)
     kept = np.unique([*range(0, len(trajectory), every), len(trajectory) - 1])
     if trajectory.path is None:
-        x_y = trajectory.q[kept, :2]
+        x_y = base_position(trajectory.robot, trajectory.q[kept])
         return {"path": np.column_stack([x_y, np.zeros(len(kept))])}
     lines = {"path": trajectory.path[kept]}
     if trajectory.desired is not None:
@@ -230,7 +247,7 @@ def _draw_pose(axes: Axes, pose: Pose, view: tuple[int, int], strength: float, l
     )
     axes.add_collection(PolyCollection(shapes, facecolors=[body], linewidths=0, zorder=zorder), autolim=False)
     marks = [hull(points[:, view]) for points in pose.wheels]
-    if view == ABOVE:
+    if view == ABOVE and len(pose.heading):
         marks.append(pose.heading[:, view])
     axes.add_collection(PolyCollection(marks, facecolors=[edge], linewidths=0, zorder=zorder), autolim=False)
     zorder = 4.0 + later

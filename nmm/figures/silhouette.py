@@ -11,25 +11,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from nmm.arrays import Array
 from nmm.configuration import Configuration
-from nmm.robot import Robot, Wheel
+from nmm.figures.solids import Solid, body_wheels, neutral_outline, platform_shapes, tyre, wheel_points
+from nmm.playback.placements import Placements
+from nmm.playback.rolling import Rolling
+from nmm.robot import Robot
 
-#: Directions, spread evenly over the sphere, in which a mesh's outermost points are kept.
-_DIRECTIONS = 200
-#: Points on a circle that stands for a round edge.
-_AROUND = 28
-#: Half width and half length of the neutral outline of a platform without shapes, m.
-_NEUTRAL = 0.2
-
-
-@dataclass(frozen=True, eq=False)
-class Solid:
-    """Points (k, 3), m, whose convex hull is a shape, in the frame of joint `joint`."""
-
-    joint: int
-    points: Array
+#: A joint that is not farther beside its link's axis than this stands on a column, m.
+_COLUMN = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +31,7 @@ class Pose:
     Attributes
     ----------
     body, wheels : (k, 3) points of each convex shape of the platform, and of each wheel
+    main : (k, 3) those of the root link's body, or of all where it has no shape
     heading : (3, 3) a triangle on the platform that points ahead
     links : (2, 3) the ends of each line of the arm
     joints : (k, 3) the arm's joints
@@ -47,6 +40,7 @@ class Pose:
 
     body: list[Array]
     wheels: list[Array]
+    main: Array
     heading: Array
     links: list[Array]
     joints: Array
@@ -70,18 +64,24 @@ class Silhouette:
         self.robot = robot
         model = robot.model
         self._anchors = _anchors(robot)
-        platform = [
-            joint for joint in range(1, model.njoints) if model.joints[joint].idx_q < robot.platform.n_p
+        own = [joint for joint in range(1, model.njoints) if model.joints[joint].idx_q < robot.platform.n_p]
+        #: The platform's main joint: the last of x, y, theta; the world itself under a fixed base.
+        self._root = next((joint for joint in own if model.joints[joint].idx_q == 2), 0)
+        self._arm = [joint for joint in range(1, model.njoints) if joint not in own]
+        self._body = platform_shapes(robot, own or [self._root])
+        self._rolling, self._placements = Rolling(robot), Placements(robot)
+        # How casters stand follows from the way that they have come, which a configuration does not tell.
+        self._wheels = [
+            Solid(robot.display_model.getJointId(wheel.joint), wheel_points(robot, wheel))
+            for wheel in robot.wheels
+            if not wheel.swivel or wheel.swivel in self._rolling.steered
         ]
-        #: The platform's main joint: the last of x, y, theta.
-        self._root = next(joint for joint in platform if model.joints[joint].idx_q == 2)
-        self._arm = [joint for joint in range(1, model.njoints) if joint not in platform]
-        self._body = _platform_shapes(robot, platform)
-        self._wheels = [Solid(self._root, _wheel_points(wheel)) for wheel in robot.wheels]
         if not self._body:
-            self._body = [Solid(self._root, _neutral_outline(self._wheels))]
-        self._heading = _heading_mark(self._body, self._root)
+            tyres = [tyre(wheel.radius, wheel.axis) + wheel.center for wheel in body_wheels(robot)]
+            self._body = [Solid(self._root, neutral_outline(tyres))]
+        self._heading = _heading_mark(self._body, self._root) if own else np.zeros((0, 3))
         self._tips = _tips(robot, self._arm, frame)
+        self._feet = _feet(robot, self._arm)
 
     def at(self, q: Array) -> Pose:
         """The drawing at configuration q, (n,)."""
@@ -104,17 +104,35 @@ class Silhouette:
         ]
         tips = [(joint, world(joint, point[None])[0]) for joint, point in self._tips]
         links += [np.array([joints[joint], tip]) for joint, tip in tips if joint in joints]
+        links += [
+            np.array([world(solid.joint, solid.points)[0], joints[joint]]) for joint, solid in self._feet
+        ]
+        body = [world(solid.joint, solid.points) for solid in self._body]
+        of_root = [
+            points for solid, points in zip(self._body, body, strict=True) if solid.joint == self._root
+        ]
         return Pose(
-            body=[world(solid.joint, solid.points) for solid in self._body],
-            wheels=[world(solid.joint, solid.points) for solid in self._wheels],
+            body=body,
+            main=np.vstack(of_root or body),
+            wheels=self._wheels_at(q),
             heading=world(self._root, self._heading),
             links=links,
             joints=np.array(list(joints.values())).reshape(-1, 3),
             tip=np.array([tip for _, tip in tips]).reshape(-1, 3),
         )
 
+    def _wheels_at(self, q: Array) -> list[Array]:
+        """Points (k, 3) of each wheel in the world, steered as it is at q."""
+        if not self._wheels:
+            return []
+        places = self._placements.world(q, self._rolling.settled(q))
+        found = [(places[wheel.joint - 1], wheel.points) for wheel in self._wheels]
+        return [points @ place[:3, :3].T + place[:3, 3] for place, points in found]
+
     def _place(self, configuration: Configuration, joint: int) -> tuple[Array, Array]:
         """Rotation and position of a joint's frame in the world."""
+        if joint == 0:
+            return np.eye(3), np.zeros(3)
         name, offset = self._anchors[joint]
         placement = configuration.placement(name) * offset
         return np.array(placement.rotation), np.array(placement.translation)
@@ -127,98 +145,6 @@ def _anchors(robot: Robot) -> dict[int, tuple[str, Any]]:
         frame = robot.model.frames[robot.frame_id(name)]
         anchors.setdefault(int(frame.parentJoint), (name, frame.placement.inverse()))
     return anchors
-
-
-def _platform_shapes(robot: Robot, platform: Sequence[int]) -> list[Solid]:
-    """The shapes that the platform's joints carry: what is seen, or else what collides."""
-    names = {robot.model.names[joint]: joint for joint in platform}
-    for model, geometry in ((robot.display_model, robot.visual_model), (robot.model, robot.collision_model)):
-        solids = []
-        for shape in geometry.geometryObjects:
-            joint = names.get(model.names[shape.parentJoint])
-            if joint is not None:
-                solids.append(Solid(joint, _shape_points(shape)))
-        if solids:
-            return _outermost(solids)
-    return []
-
-
-def _shape_points(shape: Any) -> Array:
-    """Points whose convex hull is that of a Pinocchio geometry object, in its joint's frame."""
-    geometry = shape.geometry
-    if hasattr(geometry, "halfSide"):
-        points = _corners(-np.array(geometry.halfSide), np.array(geometry.halfSide))
-    elif type(geometry).__name__ == "Cylinder":
-        points = _cylinder(float(geometry.radius), float(geometry.halfLength))
-    elif hasattr(geometry, "vertices") or hasattr(geometry, "points"):
-        vertices = geometry.vertices() if hasattr(geometry, "vertices") else geometry.points()
-        points = _extremes(np.array(vertices).reshape(-1, 3) * np.array(shape.meshScale))
-    else:
-        geometry.computeLocalAABB()
-        box = geometry.aabb_local
-        points = _corners(np.array(box.min_), np.array(box.max_))
-    return points @ np.array(shape.placement.rotation).T + np.array(shape.placement.translation)
-
-
-def _corners(low: Array, high: Array) -> Array:
-    x, y, z = np.meshgrid(*zip(low, high, strict=True), indexing="ij")
-    return np.column_stack([x.ravel(), y.ravel(), z.ravel()])
-
-
-def _cylinder(radius: float, half_length: float) -> Array:
-    """Points on the two rims of a cylinder about z."""
-    angles = np.linspace(0.0, 2.0 * np.pi, _AROUND, endpoint=False)
-    rim = np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(_AROUND, half_length)])
-    return np.vstack([rim, rim * (1.0, 1.0, -1.0)])
-
-
-def _extremes(vertices: Array) -> Array:
-    """The outermost of many points in directions spread over the sphere: nearly their convex hull."""
-    if len(vertices) <= _DIRECTIONS:
-        return vertices
-    k = np.arange(_DIRECTIONS) + 0.5
-    z = 1.0 - 2.0 * k / _DIRECTIONS
-    angle = k * np.pi * (3.0 - np.sqrt(5.0))  # the golden angle: Fibonacci's sphere
-    level = np.sqrt(1.0 - z * z)
-    directions = np.column_stack([level * np.cos(angle), level * np.sin(angle), z])
-    chosen: Array = vertices[np.unique(np.argmax(vertices @ directions.T, axis=0))]
-    return chosen
-
-
-def _outermost(solids: list[Solid]) -> list[Solid]:
-    """Without the shapes that another of the same joint hides from above and from the side."""
-    boxes = [(solid.joint, solid.points.min(axis=0), solid.points.max(axis=0)) for solid in solids]
-    kept = []
-    for i, (joint, low, high) in enumerate(boxes):
-        hidden = any(
-            i != j
-            and joint == other
-            and np.all(low >= outer_low - 1e-3)
-            and np.all(high <= outer_high + 1e-3)
-            and (i > j or not np.allclose([low, high], [outer_low, outer_high], atol=1e-3))
-            for j, (other, outer_low, outer_high) in enumerate(boxes)
-        )
-        if not hidden:
-            kept.append(solids[i])
-    return kept
-
-
-def _wheel_points(wheel: Wheel) -> Array:
-    """A tyre about the wheel's axis, half as wide as its radius."""
-    axis = wheel.axis / np.linalg.norm(wheel.axis)
-    up = np.array([0.0, 0.0, 1.0])
-    R = np.column_stack([np.cross(axis, up), up, axis])
-    return _cylinder(wheel.radius, 0.25 * wheel.radius) @ R.T + wheel.center
-
-
-def _neutral_outline(wheels: list[Solid]) -> Array:
-    """A box around the wheels, or of a neutral size where there is none."""
-    if not wheels:
-        return _corners(np.array([-_NEUTRAL, -_NEUTRAL, 0.0]), np.array([_NEUTRAL, _NEUTRAL, _NEUTRAL]))
-    points = np.vstack([wheel.points for wheel in wheels])
-    low, high = points.min(axis=0), points.max(axis=0)
-    ahead = max(high[0], 0.5 * (high[1] - low[1]))
-    return _corners(np.array([low[0], low[1], 0.0]), np.array([ahead, high[1], high[2]]))
 
 
 def _heading_mark(body: list[Solid], root: int) -> Array:
@@ -252,6 +178,35 @@ def _tips(robot: Robot, arm: Sequence[int], frame: str | None) -> list[tuple[int
         if np.linalg.norm(outermost) > 1e-6:
             found.append((leaf, np.array(outermost)))
     return found
+
+
+def _feet(robot: Robot, arm: Sequence[int]) -> list[tuple[int, Solid]]:
+    """Where the column stands that carries an arm's first joint: the origin of the link below it, where the
+    joint turns or slides along the line from there."""
+    model, found = robot.model, []
+    for joint in arm:
+        name = model.names[joint]
+        if model.parents[joint] in arm or not model.existFrame(name, pin.FrameType.JOINT):
+            continue
+        below = model.frames[model.frames[model.getFrameId(name, pin.FrameType.JOINT)].parentFrame]
+        foot = np.array(below.placement.translation)
+        column = model.jointPlacements[joint].translation - foot
+        along = _motion(robot, joint)
+        beside = float(np.linalg.norm(np.cross(column, along)))
+        high = float(np.linalg.norm(column)) > _COLUMN
+        if below.parentJoint == model.parents[joint] and high and beside < _COLUMN:
+            found.append((joint, Solid(int(model.parents[joint]), foot[np.newaxis])))
+    return found
+
+
+def _motion(robot: Robot, joint: int) -> Array:
+    """The direction (3,) about or along which a joint moves, in its parent's frame."""
+    kind, model = robot.model.joints[joint], robot.model
+    data = kind.createData()
+    kind.calc(data, np.zeros(model.nq))
+    screw = np.array(data.S, dtype=np.float64).reshape(6)
+    turned: Array = model.jointPlacements[joint].rotation @ (screw[3:] if screw[3:].any() else screw[:3])
+    return turned
 
 
 def _leaves(robot: Robot, arm: Sequence[int]) -> list[int]:

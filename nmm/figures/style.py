@@ -115,9 +115,12 @@ def room(rows: int) -> float:
 def legend_columns(names: Sequence[str], width: float = PAGE - LEFT - RIGHT) -> int:
     """How many legend entries fit side by side into a width, in."""
     lengths = [0.42 + 0.058 * len(name) for name in names]
-    if sum(lengths) <= width:
-        return max(len(names), 1)
-    return max(1, min(len(names), int(width / max(lengths))))
+    for columns in range(len(names), 1, -1):
+        # A legend is filled column by column, the first ones with one entry more.
+        filled = np.array_split(lengths, columns)
+        if sum(float(column.max()) for column in filled) <= width:
+            return columns
+    return 1
 
 
 def legend_rows(names: Sequence[str], width: float = PAGE - LEFT - RIGHT) -> int:

@@ -96,7 +96,7 @@ def _mass(link: Element) -> float | None:
 
 
 def _on_joints(joints: list[Element]) -> Iterator[Problem]:
-    """Speeds without a limit, and followers."""
+    """Speeds without a limit, joints that cannot move, and followers."""
     for joint in joints:
         kind, owner = joint.get("type", ""), f"joint {joint.get('name')!r}"
         if kind == "fixed":
@@ -106,6 +106,13 @@ def _on_joints(joints: list[Element]) -> Iterator[Problem]:
             yield Problem(f"{owner}: no <limit>, so no limit of its velocity", joint.line)
         elif _number(limit, "velocity") == 0.0:
             yield Problem(f"{owner}: <limit> velocity is 0, which is taken as no limit", limit.line)
+        if limit is not None and kind != "continuous":
+            lower, upper = _number(limit, "lower"), _number(limit, "upper")
+            if lower == upper:
+                yield Problem(
+                    f"{owner}: <limit> lets it stand at {lower:g} only (both ends are 0 unless given)",
+                    limit.line,
+                )
     lock = leaders_to_lock(joints)
     for joint in joints:
         mimic = child(joint, "mimic")

@@ -27,6 +27,7 @@ def load(
     lock: Mapping[str, float] | None = None,
     axle: str | ArrayLike | None = None,
     name: str | None = None,
+    limits: Mapping[str, float] | None = None,
     missing_meshes: Literal["error", "skip"] = "error",
     visual_model: pin.GeometryModel | None = None,
     collision_model: pin.GeometryModel | None = None,
@@ -52,6 +53,7 @@ def load(
     lock : joints to fix, and their values (rad or m), within their limits
     axle : the platform's reference point in the root link: a frame, whose yaw counts too, or x, y(, z) in m
     name : the robot's name; by default that of the file or model
+    limits : largest absolute values of the platform's inputs, by name, in their units
     missing_meshes : "error", or "skip" to leave out, with a note, the shapes whose mesh is not there
     visual_model, collision_model : the shapes, with a Pinocchio model
 
@@ -78,7 +80,9 @@ def load(
     try:
         if lock is not None and not isinstance(lock, Mapping):
             raise RobotError(f"lock: expected a value for each joint's name, got {lock!r}")
-        options = Options(platform, wheels, lock or {}, axle, name)
+        if limits is not None and not isinstance(limits, Mapping):
+            raise RobotError(f"limits: expected a value for each input's name, got {limits!r}")
+        options = Options(platform, wheels, lock or {}, axle, name, limits or {})
         if isinstance(source, pin.Model):
             if arguments or folders:
                 raise RobotError("arguments and package_dirs are for files, the source is a pin.Model")

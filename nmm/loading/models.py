@@ -35,6 +35,7 @@ class Options:
     lock: Mapping[str, float] = field(default_factory=dict)
     axle: str | ArrayLike | None = None
     name: str | None = None
+    limits: Mapping[str, float] = field(default_factory=dict)
     add_pairs: AddPairs | None = None
 
 
@@ -56,6 +57,11 @@ def robot_from(source: Source, options: Options) -> Robot:
         moved = rebuild(rebuilt.model, rebuilt.geometries, where, root=placement.inverse())
         rebuilt = replace(moved, notes=(*rebuilt.notes, told(placement)))
     platform, origin = _platform(rebuilt, source, options)
+    if options.limits:
+        try:
+            platform = platform.with_limits(options.limits)
+        except InputError as error:
+            raise RobotError(f"{where}: {error}") from None
     own = _own_joints(platform, rebuilt.model, locked.values, where)
     display = _on_platform(rebuilt, platform, own, where)
     if not platform.coordinates and options.wheels:

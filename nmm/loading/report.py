@@ -17,7 +17,7 @@ from nmm.loading.leaders import leaders_to_lock
 from nmm.loading.load import load
 from nmm.loading.packages import Packages
 from nmm.loading.second_opinion import second_opinion
-from nmm.loading.text import printable
+from nmm.loading.text import one_line, printable
 from nmm.loading.wheel_advice import wheel_advice
 from nmm.loading.xacro_file import expand
 from nmm.loading.xml_tree import Element, parse
@@ -82,7 +82,8 @@ def report(
 
 def _is_callers(message: str) -> bool:
     """Whether an error is about what the caller gave, not about the file."""
-    return any(text in message for text in ("package_dirs: expected", "unknown xacro argument", "arguments"))
+    ours = ("package_dirs: expected", "unknown xacro argument", "are for .xacro files", "arguments: expected")
+    return any(text in message for text in ours)
 
 
 def _unread(
@@ -220,6 +221,8 @@ class _Report:
             )
         except InputError as error:
             return [Problem(str(error).removeprefix(f"{self.description.path}: "))]
+        except Exception as error:  # a library's, which `load` did not foresee: a report comes all the same
+            return [Problem(f"cannot be loaded: {type(error).__name__}: {one_line(str(error))}")]
         self.warnings += [Problem(text) for text in wheel_advice(robot, _top(root))]
         self.warnings += [Problem(text) for text in second_opinion(self.description.xml)]
         self._about(robot)

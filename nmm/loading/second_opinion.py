@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import logging
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -16,6 +17,7 @@ from nmm.loading.text import one_line
 #: Largest difference of placements, m and of rotation matrices' entries.
 SAME = 1e-6
 _LOGGER = "yourdfpy.urdf"
+_DEFAULTED = re.compile(r"<limit> of joint is missing attribute '(lower|upper)'")
 
 
 def second_opinion(xml: str) -> list[str]:
@@ -37,8 +39,10 @@ def second_opinion(xml: str) -> list[str]:
             differing = list(_differences(xml, other))
         except Exception as error:  # whatever it stumbles over
             return [f"yourdfpy cannot read it: {type(error).__name__}: {one_line(str(error), 160)}"]
-    opinions = [] if valid else [f"yourdfpy: {text}" for text in other_errors]
-    return [*opinions, *(f"yourdfpy: {one_line(text, 160)}" for text in said), *differing]
+    # It asks for limits that the standard gives a default; `advice` tells where that default is no good.
+    texts = [] if valid else [text for text in other_errors if not _DEFAULTED.search(text)]
+    told = dict.fromkeys([*texts, *(one_line(text, 160) for text in said)])
+    return [*(f"yourdfpy: {text}" for text in told), *differing]
 
 
 def _differences(xml: str, other: Any) -> Iterator[str]:

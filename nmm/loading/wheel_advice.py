@@ -1,4 +1,4 @@
-"""What there is to say about a loaded robot's wheels: those not found, and whether the root is at their axle."""
+"""What there is to say about a robot's wheels: those not found, and whether the root is at their axle."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Platforms: one file each. `PLATFORMS` finds them by name."""
+"""Platforms: one file each, and `wheeled/`, the general one. `PLATFORMS` finds them by name."""
 
 from __future__ import annotations
 
@@ -12,11 +12,24 @@ from nmm.platforms.mecanum import Mecanum
 from nmm.platforms.omnidirectional import Omnidirectional
 from nmm.platforms.tractor import Tractor, Trailer
 from nmm.platforms.unicycle import Unicycle
+from nmm.platforms.wheeled import (
+    CasterWheel,
+    CommonSpeed,
+    FixedWheel,
+    Hitch,
+    OmniWheel,
+    Speed,
+    Spin,
+    Spins,
+    SteeredWheel,
+    WheeledPlatform,
+)
 
 PLATFORMS: dict[str, type[Platform]] = {
     kind.name: kind
     for kind in (
-        Unicycle, DifferentialDrive, Car, FrontDriveCar, Tractor, Omnidirectional, Mecanum, Fixed
+        Unicycle, DifferentialDrive, Car, FrontDriveCar, Tractor, Omnidirectional, Mecanum, Fixed,
+        WheeledPlatform,
     )
 }  # fmt: skip
 
@@ -31,17 +44,27 @@ def platform_by_name(name: str) -> type[Platform]:
 __all__ = [
     "PLATFORMS",
     "Car",
+    "CasterWheel",
+    "CommonSpeed",
     "DifferentialDrive",
     "Fixed",
+    "FixedWheel",
     "FrontDriveCar",
+    "Hitch",
     "Layout",
     "Mecanum",
+    "OmniWheel",
     "Omnidirectional",
     "Pivot",
     "Platform",
     "RollingJoint",
+    "Speed",
+    "Spin",
+    "Spins",
+    "SteeredWheel",
     "Tractor",
     "Trailer",
     "Unicycle",
+    "WheeledPlatform",
     "platform_by_name",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Self
@@ -47,11 +48,19 @@ class Platform(ABC):
     _limits: Mapping[str, float] = {}
 
     def __init__(self, *, limits: Mapping[str, float] | None = None) -> None:
-        for name, value in (limits or {}).items():
+        self._limits = self._checked(limits or {})
+
+    def with_limits(self, limits: Mapping[str, float]) -> Self:
+        """The same platform with other limits for the inputs named."""
+        limited = copy.copy(self)
+        limited._limits = {**self._limits, **self._checked(limits)}
+        return limited
+
+    def _checked(self, limits: Mapping[str, float]) -> dict[str, float]:
+        for name in limits:
             if name not in self.inputs:
                 raise InputError(unknown("input", name, self.inputs, f"limits of platform {self.name}"))
-            positive(value, f"limit of {name}")
-        self._limits = {name: float(value) for name, value in (limits or {}).items()}
+        return {name: positive(value, f"limit of {name}") for name, value in limits.items()}
 
     @classmethod
     def fit(cls, layout: Layout) -> Self:

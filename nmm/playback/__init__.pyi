@@ -4,3 +4,4 @@ from .live import play as play
 from .motion import Motion as Motion
 from .rolling import wheel_angles as wheel_angles
 from .rolling import wheel_rates as wheel_rates
+from .viewer import view as view

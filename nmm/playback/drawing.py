@@ -64,7 +64,8 @@ class DrawnRobot:
         for joint in range(1, model.njoints):
             below.append(f"{below[model.parents[joint]]}/{segment(model.names[joint])}")
         self.paths = below[1:]
-        self.root = below[model.getJointId(robot.q_names[2])]
+        # A fixed base stands where the robot's own node is.
+        self.root = below[model.getJointId("theta") if robot.platform.n_p else 0]
         self.visuals = [
             f"{below[geometry.parentJoint]}/visual {i} {segment(geometry.name)}"
             for i, geometry in enumerate(robot.visual_model.geometryObjects)

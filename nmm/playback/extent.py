@@ -20,7 +20,7 @@ def corners(boxes: Array) -> Array:
 
 
 def robot_boxes(robot: Robot, q: Array, wheels: Array) -> Array:
-    """Boxes along the world's axes around everything visible, (K, 2, 3) m, for q (K, n) and wheels (K, W)."""
+    """Boxes along the world's axes around everything visible, (K, 2, 3) m, for q (K, n) and wheels (K, D)."""
     placements = Placements(robot)
     model, visuals = robot.display_model, robot.visual_model
     data, geometry_data = model.createData(), visuals.createData()

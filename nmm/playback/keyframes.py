@@ -8,6 +8,7 @@ import numpy as np
 
 from nmm.arrays import Array
 from nmm.playback.motion import Motion
+from nmm.playback.placements import base_position
 from nmm.playback.rolling import wheel_angles
 
 #: No part may turn further than this between two frames, rad: half a turn would be played backwards.
@@ -20,7 +21,7 @@ MOST_BETWEEN = 32
 
 @dataclass(frozen=True, eq=False)
 class Keyframes:
-    """K instants of a motion: t (K,) s, q (K, n), wheels (K, W) rad."""
+    """K instants of a motion: t (K,) s, q (K, n), wheels (K, D) rad (see `rolling_joints`)."""
 
     t: Array
     q: Array
@@ -58,7 +59,7 @@ def ghost_samples(motion: Motion, count: int) -> list[int]:
     """Samples at which ghosts stand: evenly along the way that platform and end-effector travel."""
     if count <= 0 or len(motion.t) < 2:
         return []
-    steps = np.linalg.norm(np.diff(motion.q[:, :2], axis=0), axis=1)
+    steps = np.linalg.norm(np.diff(base_position(motion.robot, motion.q), axis=0), axis=1)
     if motion.driven is not None:
         steps = steps + np.linalg.norm(np.diff(motion.driven, axis=0), axis=1)
     way = np.concatenate([[0.0], np.cumsum(steps)])

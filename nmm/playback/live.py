@@ -56,8 +56,15 @@ def play(
         encode(command) for command in playback_scene(motions, title=heading, ghosts=ghosts, autoplay=True)
     ]
     server = PageServer(lambda host: socket_page(heading, host), hello, port=port)
+    serve(server, "Playing", open_browser=open_browser, stop=stop)
+
+
+def serve(
+    server: PageServer, what: str, *, open_browser: bool = True, stop: threading.Event | None = None
+) -> None:
+    """Print where a server's page is, and return at Ctrl-C or when `stop` is set, with the server closed."""
     try:
-        print(f"Playing at {server.url} (Ctrl-C ends it)", flush=True)
+        print(f"{what} at {server.url} (Ctrl-C ends it)", flush=True)
         if open_browser:
             _open(server.url)
         stop = stop or threading.Event()
@@ -97,9 +104,9 @@ class LiveViewer:
         self, robot: Robot, q: ArrayLike | None = None, *, port: int | None = None, open_browser: bool = False
     ) -> None:
         self.robot = robot
-        self._state = robot.q(q), np.zeros(len(robot.wheels))
         self._rolling = Rolling(robot)
-        commands, self._drawn = live_scene(robot, self._state[0], title=robot.name)
+        self._state = robot.q(q), self._rolling.settled(robot.q(q))
+        commands, self._drawn = live_scene(robot, *self._state, title=robot.name)
         self._server = PageServer(
             lambda host: socket_page(robot.name, host), [encode(c) for c in commands], self._pose, port=port
         )
@@ -117,7 +124,8 @@ class LiveViewer:
         Parameters
         ----------
         q : (n,) coordinates in m and rad
-        wheel_angles : (wheels,) rad; when not given, the wheels roll from the last q to this one
+        wheel_angles : rad, of the wheels, then of their swivels; when not given, the wheels roll from the
+            last q to this one
 
         Raises
         ------
@@ -127,9 +135,9 @@ class LiveViewer:
         after = self.robot.q(q)
         if wheel_angles is None:
             before, turned = self._state
-            wheels = turned + self._rolling.steps(np.array([before, after]))[0]
+            wheels = self._rolling.angles(np.array([before, after]), start=turned)[-1]
         else:
-            wheels = vector(wheel_angles, len(self.robot.wheels), "wheel_angles")
+            wheels = vector(wheel_angles, len(self._rolling.joints), "wheel_angles")
         self._state = after, wheels
         self._server.changed()
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from importlib import metadata, resources
 from importlib.util import find_spec
 from pathlib import Path
@@ -30,21 +30,37 @@ def file_page(commands: Iterable[Command], title: str) -> str:
     return _page(title, source="page", sources="'none'", before_scripts=block)
 
 
-def socket_page(title: str, host: str) -> str:
-    """A page that gets its commands from the server at `host` (address:port)."""
-    return _page(title, source="socket", sources=f"ws://{host}", before_scripts="")
+def socket_page(title: str, host: str, *, scripts: Sequence[str] = (), styles: Sequence[str] = ()) -> str:
+    """A page that gets its commands from the server at `host` (address:port).
+
+    Parameters
+    ----------
+    scripts, styles : files of web/ that this page has besides; the scripts run before the commands come
+    """
+    return _page(
+        title, source="socket", sources=f"ws://{host}", before_scripts="", scripts=scripts, styles=styles
+    )
 
 
-def _page(title: str, *, source: str, sources: str, before_scripts: str) -> str:
-    scripts = "\n".join(f"<script>\n{_resource(name)}</script>" for name in SCRIPTS)
+def _page(
+    title: str,
+    *,
+    source: str,
+    sources: str,
+    before_scripts: str,
+    scripts: Sequence[str] = (),
+    styles: Sequence[str] = (),
+) -> str:
+    *libraries, start = SCRIPTS
+    code = "\n".join(f"<script>\n{_resource(name)}</script>" for name in (*libraries, *scripts, start))
     parts = {
         "policy": POLICY.format(sources=sources),
         "version": metadata.version("nmm"),
         "title": html.escape(title),
         "source": source,
-        "style": _resource("style.css"),
+        "style": "\n".join(_resource(name) for name in ("style.css", *styles)),
         "meshcat": _meshcat_viewer(),
-        "scripts": before_scripts + scripts,
+        "scripts": before_scripts + code,
     }
     # Split once, so that nothing that is put in is searched for more places.
     pieces = _resource("page.html").split("@")

@@ -10,6 +10,20 @@ from nmm.errors import RobotError
 from nmm.robot import Robot
 
 
+def rolling_joints(robot: Robot) -> tuple[str, ...]:
+    """Names of the D joints of the display model that are no coordinates: the wheels', then their swivels'.
+
+    Playback's arrays of wheel angles, (D,) rad, are in this order.
+    """
+    swivels = dict.fromkeys(wheel.swivel for wheel in robot.wheels if wheel.swivel)
+    return (*(wheel.joint for wheel in robot.wheels), *swivels)
+
+
+def base_position(robot: Robot, q: Array) -> Array:
+    """x and y of the platform, (..., 2) m, for coordinates q (..., n); a fixed base stands at the origin."""
+    return q[..., :2] if robot.platform.n_p else np.zeros((*q.shape[:-1], 2))
+
+
 class Placements:
     """Forward kinematics of `robot.display_model`, joints 1 to njoints - 1 in Pinocchio's order.
 
@@ -23,7 +37,7 @@ class Placements:
         self.model = robot.display_model
         self._data = self.model.createData()
         self._coordinates = [self._index(name) for name in robot.q_names]
-        self._wheels = [self._index(wheel.joint) for wheel in robot.wheels]
+        self._wheels = [self._index(name) for name in rolling_joints(robot)]
         self._neutral = pin.neutral(self.model)
 
     def _index(self, name: str) -> int:
@@ -38,7 +52,7 @@ class Placements:
         return int(joint.idx_q)
 
     def configuration(self, q: Array, wheels: Array) -> Array:
-        """The display model's configuration for coordinates q (n,) and wheel angles (W,) rad."""
+        """The display model's configuration for coordinates q (n,) and wheel angles (D,) rad."""
         full = self._neutral.copy()
         full[self._coordinates] = q
         full[self._wheels] = wheels

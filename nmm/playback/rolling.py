@@ -1,4 +1,4 @@
-"""How far the wheels turn: they roll and do not slip along the direction in which they roll."""
+"""How far the wheels turn and their swivels with them: wheels roll where they touch the ground."""
 
 from __future__ import annotations
 
@@ -6,67 +6,125 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, vector
+from nmm.playback.carriers import Carriers, at_point
 from nmm.playback.motion import Motion
+from nmm.playback.placements import rolling_joints
+from nmm.playback.swivels import Swivel
 from nmm.robot import Robot
 
 
 class Rolling:
-    """The rolling of a robot's W wheels, with what does not change worked out once.
+    """The rolling of a robot's W wheels and of their swivels, with what does not change worked out once.
 
-    A wheel of centre c, axis a and radius r turns at (a × z)·v_c / r, with v_c the velocity of its
-    centre, all in the root's axes: the point that touches the ground then has no velocity along a × z.
+    A wheel of centre c, axis a and radius r, which grips along the direction d in which it rolls turned by
+    γ (its rollers' angle), turns at v_c·d(γ) / (r cos γ), with v_c the velocity of its centre: the point
+    that touches the ground then has no velocity along d(γ). d = a × z.
+
+    Attributes
+    ----------
+    joints : names of the D joints of the display model that are no coordinates: the W wheels', then the
+        swivels'. All angles (D,) here are theirs, rad
+    steered : the swivels among them whose angle is a function of q: see `settled`
     """
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        axes = np.array([wheel.axis for wheel in robot.wheels]).reshape(-1, 3)
-        centers = np.array([wheel.center for wheel in robot.wheels]).reshape(-1, 3)
-        self._directions = np.column_stack([axes[:, 1], -axes[:, 0]])
+        self.joints = rolling_joints(robot)
+        wheels = robot.wheels
+        self._carriers = Carriers(robot, [wheel.carrier for wheel in wheels])
+        carriers = [self._carriers.names.index(wheel.carrier) for wheel in wheels]
+        self._carrier = np.array(carriers, dtype=int)
+        planar = [
+            [self._carriers.planar(k, part) for part in (wheel.center, wheel.axis)]
+            for k, wheel in zip(carriers, wheels, strict=True)
+        ]
+        centers, axes = np.array(planar).reshape(-1, 2, 2).transpose(1, 0, 2)
+        # d = a × z, and d turned by γ; dividing by r cos γ once.
+        self._rolling = np.column_stack([axes[:, 1], -axes[:, 0]])
+        roller = np.array([wheel.roller for wheel in wheels])
+        cosine, sine = np.cos(roller)[:, np.newaxis], np.sin(roller)[:, np.newaxis]
+        across = np.column_stack([-self._rolling[:, 1], self._rolling[:, 0]])
+        self._radii = np.array([wheel.radius for wheel in wheels])
+        self._gripping = (cosine * self._rolling + sine * across) / (self._radii * np.cos(roller))[
+            :, np.newaxis
+        ]
         self._levers = np.column_stack([-centers[:, 1], centers[:, 0]])
-        self._radii = np.array([wheel.radius for wheel in robot.wheels])
+        self._swivels = [
+            Swivel.of(robot, self._carriers, name, wheels) for name in self.joints[len(wheels) :]
+        ]
+        swivels = zip(self.joints[len(wheels) :], self._swivels, strict=True)
+        self.steered = tuple(
+            name for name, swivel in swivels if swivel.drive is not None and not swivel.trail
+        )
 
-    def rates(self, q: ArrayLike, u: ArrayLike) -> Array:
-        """Spin rates, (W,) rad/s, at coordinates q (n,) and inputs u (n_u,), from q_dot = G(qp) up.
+    def rates(self, q: ArrayLike, u: ArrayLike, angles: ArrayLike | None = None) -> Array:
+        """Rates (D,) rad/s at coordinates q (n,), inputs u (n_u,) that do not change, and angles (D,).
+
+        Without angles, those of `settled`.
 
         Raises
         ------
         InputError : wrong lengths, numbers that are not finite
         """
-        platform, q = self.robot.platform, self.robot.q(q)
-        qp_dot = platform.G(q[: platform.n_p]) @ vector(u, self.robot.n_u, "u")[: platform.p]
-        return self._turned(qp_dot[np.newaxis, :3], q[np.newaxis, 2])[0]
+        q, u = self.robot.q(q), vector(u, self.robot.n_u, "u")
+        at = self.settled(q, u) if angles is None else vector(angles, len(self.joints), "angles")
+        twists = self._carriers.twists(q, self.robot.S(q) @ u)
+        rates = np.concatenate([self._turned(twists), np.zeros(len(self._swivels))])
+        for k, swivel in enumerate(self._swivels, len(self._radii)):
+            twist, angle = twists[swivel.carrier], swivel.sign * float(at[k])
+            rates[k] = swivel.rate(q, u, twist, float(at[k]))
+            turn = float(twist[2]) + swivel.sign * float(rates[k])
+            for wheel in swivel.wheels:
+                rates[wheel.index] = wheel.spin(wheel.along(at_point(twist, swivel.pivot), angle), turn)
+        return rates
 
-    def steps(self, q: Array) -> Array:
-        """Angles turned from each configuration in q (N, n) to the next, (N - 1, W) rad.
+    def settled(self, q: ArrayLike, u: ArrayLike | None = None) -> Array:
+        """Angles (D,) at which a robot starts at q (n,): steered wheels look the way they go, the rest at 0.
 
-        The platform is taken to move along an arc in between, at a constant twist: exact for inputs that
-        are constant in between, third order in the step otherwise.
+        Where that depends on the inputs, and u (n_u,) is not given or keeps still, they are at 0 too.
         """
-        moved = np.diff(q[:, :3], axis=0)
-        turn = moved[:, 2].copy()
-        # The chord of an arc is shorter than the arc by this factor. A turn of more than half a
-        # revolution between two samples says nothing about the arc, so the chord is taken as it is.
-        shorter = np.where(np.abs(turn) < np.pi, np.sinc(turn / (2.0 * np.pi)), 1.0)
-        moved[:, :2] /= shorter[:, np.newaxis]
-        return self._turned(moved, q[:-1, 2] + 0.5 * turn)
+        q = self.robot.q(q)
+        u = np.zeros(self.robot.n_u) if u is None else vector(u, self.robot.n_u, "u")
+        return np.array([0.0 for _ in self._radii] + [swivel.settled(q, u) for swivel in self._swivels])
 
-    def _turned(self, moved: Array, heading: Array) -> Array:
-        """Angles (N, W) for displacements or velocities (x, y, θ) (N, 3) in the world at headings (N,)."""
-        cosine, sine = np.cos(heading), np.sin(heading)
-        x, y, turn = moved.T
-        forward = (cosine * x + sine * y)[:, np.newaxis] + turn[:, np.newaxis] * self._levers[:, 0]
-        sideways = (cosine * y - sine * x)[:, np.newaxis] + turn[:, np.newaxis] * self._levers[:, 1]
-        angles: Array = (forward * self._directions[:, 0] + sideways * self._directions[:, 1]) / self._radii
+    def angles(self, q: Array, u: Array | None = None, start: Array | None = None) -> Array:
+        """Angles (N, D) at the configurations q (N, n).
+
+        Parameters
+        ----------
+        q : between two, each body that carries wheels is taken to move along an arc, at a constant twist
+        u : (N, n_u) the inputs there; estimated from q when not given
+        start : (D,) angles at the first; wheels at 0 and swivels settled when not given
+        """
+        twists, count = self._carriers.steps(q), len(self._radii)
+        angles = np.zeros((len(q), len(self.joints)))
+        if start is not None:
+            angles[:] = start
+        turned = self._turned(twists)
+        for k, swivel in enumerate(self._swivels, count):
+            own = twists[:, swivel.carrier]
+            path = swivel.path(q, u, own, None if start is None else float(start[k]))
+            angles[:, k] = path.angles
+            turns = own[:, 2] + swivel.sign * np.diff(path.angles)
+            for wheel in swivel.wheels:
+                turned[:, wheel.index] = wheel.spin(wheel.same * path.ways, turns)
+        angles[1:, :count] += np.cumsum(turned, axis=0)
         return angles
 
+    def _turned(self, twists: Array) -> Array:
+        """Spins (…, W) of wheels that are fixed on their carriers, for the carriers' twists (…, C, 3)."""
+        at = twists[..., self._carrier, :]
+        velocity = at[..., :2] + at[..., 2:] * self._levers
+        spins: Array = np.sum(velocity * self._gripping, axis=-1)
+        return spins
 
-def wheel_rates(robot: Robot, q: ArrayLike, u: ArrayLike) -> Array:
-    """Spin rates of the wheels, (W,) rad/s: see `Rolling.rates`."""
-    return Rolling(robot).rates(q, u)
+
+def wheel_rates(robot: Robot, q: ArrayLike, u: ArrayLike, angles: ArrayLike | None = None) -> Array:
+    """Rates of the wheels and their swivels, (D,) rad/s: see `Rolling.rates`."""
+    return Rolling(robot).rates(q, u, angles)
 
 
 def wheel_angles(motion: Motion) -> Array:
-    """Angles of the wheels, (N, W) rad, zero at the first sample: see `Rolling.steps`."""
-    angles = np.zeros((len(motion.t), len(motion.robot.wheels)))
-    angles[1:] = np.cumsum(Rolling(motion.robot).steps(motion.q), axis=0)
-    return angles
+    """Angles of the wheels, then of their swivels, (N, D) rad; wheels at zero at the first sample: see
+    `Rolling.angles`."""
+    return Rolling(motion.robot).angles(motion.q, motion.u)

@@ -13,6 +13,7 @@ from nmm.playback.encoding import packed
 from nmm.playback.extent import corners, robot_boxes
 from nmm.playback.keyframes import Keyframes, ghost_samples, keyframes
 from nmm.playback.motion import Motion
+from nmm.playback.placements import base_position
 from nmm.playback.rolling import wheel_angles
 from nmm.playback.shapes import Y_TO_Z, cylinder, sphere
 from nmm.robot import Robot
@@ -29,8 +30,9 @@ COLORS: tuple[Rgb, ...] = (
 DESIRED: Rgb = (0.16, 0.18, 0.22)
 TARGET: Rgb = (0.83, 0.10, 0.22)
 
-#: Instants at which the room that the robots take is measured.
+#: Instants at which the room that the robots take is measured, and poses for the room that one can take.
 INSTANTS = 80
+POSES = 100
 
 
 def playback_scene(
@@ -75,7 +77,7 @@ def playback_scene(
         start=start,
         duration=end - start,
         view=packed(_view(boxes, motions), np.float64),
-        follow=_held(boxes, np.mean([_at(times, frame, frame.q[:, :2]) for frame in frames], axis=0)),
+        follow=_held(boxes, _middle(motions, frames, times)),
         size=size,
     )
     animations = []
@@ -92,7 +94,8 @@ def playback_scene(
             "motion",
             path=path,
             root=robot.root,
-            label=motion.label,
+            # The page calls the line that it draws the end-effector's, unless it is told otherwise.
+            label=motion.label or ("" if motion.driven is not None else motion.robot.name),
             color=list(color),
             tag=motion.label if several else "",
             height=float(boxes[i, 0, 1, 2]),
@@ -112,15 +115,16 @@ def playback_scene(
     return drawing.commands
 
 
-def live_scene(robot: Robot, q: Array, *, title: str, room: float = 2.0) -> tuple[list[Command], DrawnRobot]:
+def live_scene(
+    robot: Robot, q: Array, wheels: Array, *, title: str, room: float = 2.0
+) -> tuple[list[Command], DrawnRobot]:
     """Commands for a robot that somebody moves from outside, and the robot, to place it.
 
     Parameters
     ----------
-    q : (n,) where it stands at first
+    q, wheels : (n,) where it stands at first, and (D,) its wheels' angles, rad
     room : ground to show around it, m
     """
-    wheels = np.zeros(len(robot.wheels))
     box = robot_boxes(robot, q[np.newaxis], wheels[np.newaxis])[0]
     around = box + np.array([[-room, -room, 0.0], [room, room, 0.0]])
     drawing = Drawing()
@@ -132,7 +136,7 @@ def live_scene(robot: Robot, q: Array, *, title: str, room: float = 2.0) -> tupl
         start=0.0,
         duration=0.0,
         view=packed(corners(around), np.float64),
-        follow=_held(box[np.newaxis, np.newaxis], q[np.newaxis, :2]),
+        follow=_held(_reached(robot, q, wheels)[np.newaxis], base_position(robot, q)[np.newaxis]),
         size=0.5 * float(np.linalg.norm(np.ptp(around, axis=0))),
     )
     drawn = DrawnRobot(drawing, robot, "/nmm/motion 0/robot")
@@ -148,6 +152,16 @@ def live_scene(robot: Robot, q: Array, *, title: str, room: float = 2.0) -> tupl
     )
     drawing.add("ready")
     return drawing.commands, drawn
+
+
+def _reached(robot: Robot, q: Array, wheels: Array) -> Array:
+    """Boxes around the robot at q (n,) and with its joints anywhere in their limits, (POSES + 1, 2, 3)."""
+    lower, upper = np.clip(robot.q_limits, -np.pi, np.pi).T
+    poses = np.random.default_rng(0).uniform(lower, upper, (POSES, robot.n))
+    moving = np.arange(robot.n) >= min(3, robot.platform.n_p)
+    poses[:, ~moving] = q[~moving]
+    poses = np.vstack([q, poses])
+    return robot_boxes(robot, poses, np.tile(wheels, (len(poses), 1)))
 
 
 def _desired(drawing: Drawing, motions: Sequence[Motion]) -> None:
@@ -196,6 +210,16 @@ def _boxes(motions: Sequence[Motion], frames: Sequence[Keyframes], times: Array)
             for motion, frame in zip(motions, frames, strict=True)
         ]
     )
+
+
+def _middle(motions: Sequence[Motion], frames: Sequence[Keyframes], times: Array) -> Array:
+    """Midpoint of the platforms at the times, (times, 2)."""
+    places = [
+        _at(times, frame, base_position(motion.robot, frame.q))
+        for motion, frame in zip(motions, frames, strict=True)
+    ]
+    middle: Array = np.mean(places, axis=0)
+    return middle
 
 
 def _at(times: Array, frames: Keyframes, values: Array) -> Array:

@@ -19,8 +19,15 @@ MOST_NODES = 200_000
 _NULL = ("", "~", "null", "Null", "NULL")
 _TRUE = ("true", "True", "TRUE")
 _FALSE = ("false", "False", "FALSE")
-#: Keys that may hold one name in place of a mapping, and which key of the mapping the name is.
-_SHORTHANDS: dict[Place, str] = {("robot",): "source"}
+
+
+def _shorthand(path: Place, data: Mapping[str, Any]) -> str | None:
+    """Which key of the mapping a name is that stands at `path` in the mapping's place; None elsewhere."""
+    where = tuple("*" if isinstance(step, int) else step for step in path)
+    if where == ("robot", "platform"):
+        mounted = isinstance(data["robot"], Mapping) and {"arm", "arms"} & set(data["robot"])
+        return "source" if mounted else "kind"
+    return "source" if where in {("robot",), ("robot", "arm"), ("robot", "arms", "*", "arm")} else None
 
 
 @dataclass
@@ -83,8 +90,9 @@ class Document:
         for depth, step in enumerate(path[:-1]):
             if isinstance(place, dict):
                 inner = place.setdefault(step, {})
-                if isinstance(inner, str) and path[: depth + 1] in _SHORTHANDS:
-                    inner = place[step] = {_SHORTHANDS[path[: depth + 1]]: inner}
+                shorthand = _shorthand(path[: depth + 1], copy.data)
+                if isinstance(inner, str) and shorthand is not None:
+                    inner = place[step] = {shorthand: inner}
                 place = inner
             else:
                 place = place[step]
@@ -119,9 +127,9 @@ def _parsed(key: str, document: Document) -> Place:
         elif isinstance(place, dict):
             path = (*path, step)
             place = place.get(step, {})
-        elif isinstance(place, str) and path in _SHORTHANDS:
+        elif isinstance(place, str) and (shorthand := _shorthand(path, document.data)) is not None:
             path = (*path, step)
-            place = place if step == _SHORTHANDS[path[:-1]] else {}
+            place = place if step == shorthand else {}
         else:
             raise ScenarioError(f"{where}: {dotted(path)} is {shown(place)}, which has no keys")
     return path

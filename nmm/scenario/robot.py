@@ -106,7 +106,7 @@ class RobotPart(Part):
     platform: Annotated[str | dict[str, Any] | None, BeforeValidator(_kind_of_platform)] = Field(
         None,
         description="how the base moves: a kind (car), measured in the file, or with its parameters, as "
-        "{kind: car, wheelbase: 0.5, limits: {v: 1}}; when not given, what the file declares, or a unicycle",
+        "{kind: car, wheelbase: 0.5}; when not given, what the file declares, or a unicycle",
     )
     package_dirs: list[FileName] = Field(
         default_factory=list,
@@ -124,6 +124,9 @@ class RobotPart(Part):
         None,
         description="the platform's reference point in the root link: a frame, or [x, y] or [x, y, z], m; "
         "when not given, the root link itself",
+    )
+    limits: dict[str, Number] = Field(
+        default_factory=dict, description="largest absolute values of the platform's inputs, as {v: 0.5}"
     )
     missing_meshes: Literal["error", "skip"] = Field(
         "error", description="error, or skip to leave out shapes whose mesh is not there"
@@ -264,6 +267,8 @@ def _platform(value: str | dict[str, Any] | None) -> Platform | str | None:
     with at("platform"):
         with at("kind"):
             kind = platform_by_name(value["kind"])
+        if not keywords:
+            return kind.name
         parameters = inspect.signature(kind).parameters
         for key in keywords:
             if key not in parameters:

@@ -5,14 +5,16 @@
   const FIELD = 36;
   // From the target towards the camera, in the world's axes.
   const TOWARDS = new THREE.Vector3(0.42, -0.9, 0.82);
-  const camera = (nmm.camera = { following: false, moved: false });
+  const camera = (nmm.camera = { following: false, moved: false, held: null });
+  // Not the window: a page may have something beside the view.
+  const view = document.getElementById("view");
   const upright = (v) => new THREE.Vector3(v.x, v.z, -v.y);
   let eye, points, last;
 
-  camera.build = (view, size) => {
+  camera.build = (held, size) => {
     points = [];
-    for (let i = 0; i < view.length; i += 3) points.push(upright(new THREE.Vector3().fromArray(view, i)));
-    eye = new THREE.PerspectiveCamera(FIELD, window.innerWidth / window.innerHeight, 0.01 * size, 80 * size);
+    for (let i = 0; i < held.length; i += 3) points.push(upright(new THREE.Vector3().fromArray(held, i)));
+    eye = new THREE.PerspectiveCamera(FIELD, view.clientWidth / view.clientHeight, 0.01 * size, 80 * size);
     nmm.viewer.set_camera(eye);
     nmm.viewer.set_object(["Cameras", "default", "rotated"], eye);
     const controls = nmm.viewer.controls;
@@ -30,7 +32,8 @@
     const head = document.getElementById("heading").getBoundingClientRect();
     const narrow = window.innerWidth < 640;
     const below = window.innerHeight - bar.top + (narrow ? 44 : 10);
-    return [narrow ? head.bottom + 4 : 24, bar.height ? below : 24];
+    const under = view.clientHeight < window.innerHeight ? 56 : 24; // where a panel is below the view
+    return [narrow || camera.held ? head.bottom + 4 : 24, bar.height ? below : under];
   }
 
   // Where, along one axis of the picture, what is held leaves the same room on both sides.
@@ -51,7 +54,7 @@
   // The nearest place for an eye that looks along -towards and has all that is held in the free part of the
   // window.
   function look(held, towards) {
-    const [width, height] = [window.innerWidth, window.innerHeight];
+    const [width, height] = [view.clientWidth, view.clientHeight];
     const [top, bottom] = covered();
     const across = Math.tan((FIELD * Math.PI) / 360);
     const tx = ((across * width) / height) * 0.94;
@@ -94,8 +97,10 @@
   camera.reset = () => {
     camera.moved = false;
     const towards = upright(TOWARDS);
-    if (!camera.following) return look(points, towards);
+    if (!camera.following && !camera.held) return look(points, towards);
     last = middle();
+    // A page may say itself what there is to hold, as points in three.js's axes.
+    if (camera.held) return look(camera.held(), towards);
     const { radius, low, high } = nmm.stage.follow;
     const half = 0.5 * (high - low);
     const around = [];

@@ -145,8 +145,8 @@
     (event) => {
       const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
       if (event.ctrlKey || event.metaKey || event.altKey || keys[key] === undefined || !nmm.stage) return;
-      // Letters and space belong to MeshCat's panel while one types there.
-      if (event.target.closest && event.target.closest(".dg")) return;
+      // Letters, arrows and space belong to a panel while one types or slides there.
+      if (event.target.closest && event.target.closest(".dg, #panel")) return;
       event.preventDefault();
       keys[key](event);
     },

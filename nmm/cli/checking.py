@@ -1,0 +1,58 @@
+"""check: what is wrong with a robot's file."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from nmm.bundled import bundled_robots
+from nmm.cli.output import complain, show_table, show_text
+
+if TYPE_CHECKING:
+    from nmm.loading.findings import Problem
+    from nmm.loading.report import Report
+
+OK, BAD_INPUT = 0, 2
+
+
+def check_file(file: str, arguments: Mapping[str, object], package_dirs: Sequence[Path]) -> int:
+    """Print every problem and warning, a line each; 2 when there are problems, else 0 and what it holds."""
+    from nmm.loading.packages import package_file
+    from nmm.loading.report import report
+
+    if file.startswith("package://"):
+        path = package_file(file, package_dirs)
+    else:
+        path = bundled_robots().get(file, Path(file))
+    made = report(path, arguments, package_dirs)
+    shown = os.path.relpath(path) if file in bundled_robots() else file
+    for problem in made.problems:
+        print(_line(shown, problem, made))
+    for warning in made.warnings:
+        print(_line(shown, warning, made, "warning: "))
+    counts = f"{_counted(made.problems, 'problem')}, {_counted(made.warnings, 'warning')}"
+    if made.problems:
+        sys.stdout.flush()
+        complain("nmm check", f"{file}: {counts}")
+        return BAD_INPUT
+    if made.warnings:
+        show_text()
+    show_table(["", ""], [[label, value] for label, value in made.facts.items()], title=f"{file}: {counts}")
+    return OK
+
+
+def _line(file: str, problem: Problem, made: Report, kind: str = "") -> str:
+    """file:line: message, as compilers do; of an expanded file the line comes last, and says so."""
+    message = " ".join(problem.message.split())
+    if problem.line is None:
+        return f"{file}: {kind}{message}"
+    if made.expanded:
+        return f"{file}: {kind}{message} (line {problem.line} of the expanded file)"
+    return f"{file}:{problem.line}: {kind}{message}"
+
+
+def _counted(things: Sequence[Problem], name: str) -> str:
+    return f"{len(things) or 'no'} {name}{'' if len(things) == 1 else 's'}"

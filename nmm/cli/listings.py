@@ -1,0 +1,50 @@
+"""scenarios and robots: what is bundled."""
+
+from __future__ import annotations
+
+import re
+
+from nmm.bundled import bundled_robots, bundled_scenarios
+from nmm.cli.output import show_table, show_text
+
+OK = 0
+
+
+def list_scenarios() -> int:
+    """The bundled scenarios."""
+    from nmm.scenario import Scenario
+
+    loaded = [Scenario.load(name) for name in bundled_scenarios()]
+    show_table(["scenario", "what it shows"], [[scenario.name, scenario.title] for scenario in loaded])
+    return OK
+
+
+def list_keys() -> int:
+    """The keys of a scenario file."""
+    from nmm.scenario.reference import sections
+
+    for section in sections():
+        show_text(f"{section.title} ({section.summary.rstrip('.')})")
+        show_table(["key", "default", "meaning"], section.keys)
+        show_text()
+    return OK
+
+
+def list_robots() -> int:
+    """The bundled robots, with the platform of those whose files declare one."""
+    rows = []
+    for name, path in bundled_robots().items():
+        text = path.read_text(encoding="utf-8")
+        about = re.search(r"<!--\s*(.+?)\s*(?:\n\s*\n|-->)", text, re.DOTALL)
+        declared = re.search(r'<nmm\s+platform="([^"]+)"', text)
+        platform = f" Platform: {declared.group(1)}." if declared else ""
+        arguments = re.findall(r'<xacro:arg\s+name="([^"]+)"\s+default="([^"]*)"', text)
+        rows.append(
+            [
+                name,
+                (" ".join(about.group(1).split()) if about else "") + platform,
+                ", ".join(f"{argument}={default}" for argument, default in arguments),
+            ]
+        )
+    show_table(["robot", "what it is", "arguments (m, rad)"], rows)
+    return OK

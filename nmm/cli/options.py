@@ -1,0 +1,110 @@
+"""Options that several commands have, and what their texts mean."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from nmm.errors import InputError
+
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Change a key of the scenario, by its dotted path; lists count from 0. Numbers may be "
+        "arithmetic with pi, lists and mappings are written as in YAML. May be repeated.",
+    ),
+]
+ArgumentOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", "-a", metavar="ARG=VALUE", help="Set an argument of a xacro file. May be repeated."
+    ),
+]
+PlatformOption = Annotated[
+    str | None,
+    typer.Option(metavar="NAME", help="How the base moves.", show_default="what the file says, or unicycle"),
+]
+LockOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="JOINT=VALUE",
+        help="Fix a joint at a value, rad or m; arithmetic with pi will do. May be repeated.",
+    ),
+]
+AxleOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="FRAME|X,Y",
+        help="Where the platform's reference point is in the root link: a frame, or x and y in m.",
+        show_default="the root link's origin",
+    ),
+]
+PackageOption = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--package-dir",
+        metavar="DIR",
+        help="A folder that is, or holds, the packages of package:// and $(find ...). May be repeated.",
+    ),
+]
+PortOption = Annotated[
+    int | None, typer.Option(metavar="N", help="Port on this machine.", show_default="a free one")
+]
+NoOpenOption = Annotated[bool, typer.Option("--no-open", help="Print the address, open no browser.")]
+
+
+def settings_of(given: Sequence[str] | None) -> dict[str, object]:
+    """The `--set` options of a scenario: values by dotted key."""
+    return dict(_pairs(given, "--set", "KEY=VALUE, as in resolver.alpha=5"))
+
+
+def arguments_of(given: Sequence[str] | None) -> dict[str, object]:
+    """The `--set` options of a robot's file: xacro arguments by name."""
+    return dict(_pairs(given, "--set", "ARG=VALUE, as in d=0.5"))
+
+
+def lock_of(given: Sequence[str] | None) -> dict[str, float]:
+    """The `--lock` options: values (rad or m) by joint.
+
+    Raises
+    ------
+    InputError : no JOINT=VALUE, not a number, or a joint named twice
+    """
+    from nmm.scenario.numbers import evaluate
+
+    lock: dict[str, float] = {}
+    for joint, text in _pairs(given, "--lock", "JOINT=VALUE, as in torso=0.2"):
+        if joint in lock:
+            raise InputError(f"--lock: joint {joint} is given twice")
+        try:
+            lock[joint] = evaluate(text)
+        except ValueError as error:
+            raise InputError(f"--lock: {joint}: {error}") from None
+    return lock
+
+
+def axle_of(given: str | None) -> str | list[float] | None:
+    """The `--axle` option: a frame, or x, y (and z), m."""
+    if given is None or "," not in given:
+        return given
+    from nmm.scenario.numbers import evaluate
+
+    try:
+        return [evaluate(part) for part in given.split(",")]
+    except ValueError as error:
+        raise InputError(f"--axle: expected a frame or X,Y in m, got {given!r}: {error}") from None
+
+
+def _pairs(given: Sequence[str] | None, option: str, expected: str) -> list[tuple[str, str]]:
+    pairs = []
+    for text in given or ():
+        key, equals, value = text.partition("=")
+        if not equals or not key.strip():
+            raise InputError(f"{option}: expected {expected}, got {text!r}")
+        pairs.append((key.strip(), value))
+    return pairs

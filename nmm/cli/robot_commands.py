@@ -1,0 +1,143 @@
+"""The commands about robots and about what is bundled, with their options and their help."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from nmm.cli.options import (
+    ArgumentOption,
+    AxleOption,
+    LockOption,
+    NoOpenOption,
+    PackageOption,
+    PlatformOption,
+    PortOption,
+    arguments_of,
+    axle_of,
+    lock_of,
+)
+
+ROBOT_HELP = "A bundled name (see `nmm robots`), a .urdf or .xacro file, or package://PACKAGE/PATH."
+
+
+def info(
+    robot: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="ROBOT",
+            help=f"{ROBOT_HELP} Not needed with --scenario, which has one.",
+            show_default=False,
+        ),
+    ] = None,
+    platform: PlatformOption = None,
+    scenario: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SCENARIO",
+            help="Show the redundancy for this scenario's task, and the inputs that it does not feel.",
+        ),
+    ] = None,
+    lock: LockOption = None,
+    axle: AxleOption = None,
+    package_dir: PackageOption = None,
+) -> int:
+    """Describe a robot.
+
+    Coordinates, inputs and limits with their units, groups of inputs, frames that a task may speak of, the
+    platform with its parameters, wheels, the degree of redundancy for tasks of 2, 3 and 6 rows or for a
+    scenario's task, what loading did to the file, meshes and packages.
+
+    \b
+    nmm info unicycle_2r
+    nmm info my_robot.urdf --platform car --lock torso=0.2 --lock head=pi/6
+    nmm info my_robot.urdf --axle -0.1,0 --package-dir ~/ros/src
+    nmm info --scenario unicycle_3r_position
+    """
+    from nmm.cli.descriptions import describe_robot
+
+    return describe_robot(
+        robot,
+        scenario,
+        platform=platform,
+        lock=lock_of(lock),
+        axle=axle_of(axle),
+        package_dirs=package_dir or [],
+    )
+
+
+def check(
+    file: Annotated[str, typer.Argument(metavar="FILE", help=ROBOT_HELP)],
+    arguments: ArgumentOption = None,
+    package_dir: PackageOption = None,
+) -> int:
+    """Say everything that is wrong with a robot's file.
+
+    Each problem on a line of its own, with the line of the file; then warnings: what nmm takes, but hardly
+    was meant, and what it takes only with an option. A file without problems is loaded, to prove it.
+
+    \b
+    nmm check my_robot.urdf
+    nmm check my_robot.urdf.xacro -a arm=true --package-dir ~/ros/src
+
+    The lines of a xacro file's problems are those of the text that xacro makes of it. Exit status 2 when
+    there are problems.
+    """
+    from nmm.cli.checking import check_file
+
+    return check_file(file, arguments_of(arguments), package_dir or [])
+
+
+def view(
+    robot: Annotated[str, typer.Argument(metavar="ROBOT", help=ROBOT_HELP)],
+    platform: PlatformOption = None,
+    lock: LockOption = None,
+    axle: AxleOption = None,
+    package_dir: PackageOption = None,
+    port: PortOption = None,
+    no_open: NoOpenOption = False,
+    frames: Annotated[
+        bool, typer.Option("--frames/--no-frames", help="Show frames at first; the page can change it.")
+    ] = True,
+) -> int:
+    """Look at a robot in the browser.
+
+    In 3D, with MeshCat: a slider for each coordinate, frames with their names, and the pose of one of them
+    in numbers. Only this machine can reach it. Ctrl-C ends it.
+
+    \b
+    nmm view unicycle_3r
+    nmm view my_robot.urdf --platform car --lock head=0.3 --no-frames
+    """
+    from nmm.cli.viewing import view_robot
+
+    return view_robot(
+        robot,
+        platform=platform,
+        lock=lock_of(lock),
+        axle=axle_of(axle),
+        package_dirs=package_dir or [],
+        port=port,
+        open_browser=not no_open,
+        frames=frames,
+    )
+
+
+def scenarios(
+    keys: Annotated[bool, typer.Option("--keys", help="List the keys of a scenario file instead.")] = False,
+) -> int:
+    """List the bundled scenarios.
+
+    They are YAML files; to make your own, start from the scenario.yaml that a run writes.
+    """
+    from nmm.cli.listings import list_keys, list_scenarios
+
+    return list_keys() if keys else list_scenarios()
+
+
+def robots() -> int:
+    """List the bundled robots: whole ones, bases and arms."""
+    from nmm.cli.listings import list_robots
+
+    return list_robots()

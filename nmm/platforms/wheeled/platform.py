@@ -1,0 +1,182 @@
+"""The general platform: wheels say how it moves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.arrays import Array, vector
+from nmm.compiled import Kernel
+from nmm.errors import InputError
+from nmm.packing import pack
+from nmm.platforms.base import Platform
+from nmm.platforms.layout import Layout
+from nmm.platforms.wheeled.descriptions import MAIN, FixedWheel, Hitch, OmniWheel, Wheel
+from nmm.platforms.wheeled.fit import parts_from
+from nmm.platforms.wheeled.geometry import Bodies
+from nmm.platforms.wheeled.inputs import Input
+from nmm.platforms.wheeled.kernel import BODIES, SIZE, wheeled
+from nmm.platforms.wheeled.problem import contradiction, folded, singularity
+from nmm.platforms.wheeled.rates import WheelRate, wheel_rates
+from nmm.platforms.wheeled.structure import Constraint, choose
+
+
+class WheeledPlatform(Platform):
+    """A platform described by its wheels: A from their rolling without slip, G spans the null space of A.
+
+    qp = [x, y, theta, steering angles and hitch angles], each body's steered wheels before its hitches,
+    each hitch before what it carries. G = M⁻¹ [0; I], where M has the rows of A and, below, those of the
+    inputs: smooth in qp wherever the inputs determine the motion.
+
+    Wheels that repeat others (the second on an axle) add no row. Steered wheels beyond those that fix the
+    centre of rotation follow: their steering rates are no inputs, and keep the axes concurrent. Steered
+    wheels with a trail are driven casters, which the motion turns, unless their rates are inputs.
+
+    Parameters
+    ----------
+    wheels : their descriptions
+    hitches : joints with further bodies
+    inputs : "v", "vx", "vy", "omega", "<joint>_rate", `Speed`, `Spin`, `Spins`, `CommonSpeed`; the steering
+        rates that are missing are added while they are free. By default v and omega where there is an axle,
+        v where it is steered too, vx, vy, omega where no wheel constrains the main body; then the steering
+        rates of wheels without trail
+    limits : largest absolute value of each input, by name
+
+    Raises
+    ------
+    InputError : a name given twice or unknown, wheels that leave nothing to steer, inputs that repeat others
+
+    Source: Campion, Bastin, D'Andréa-Novel, "Structural properties and classification of kinematic and
+    dynamic models of wheeled mobile robots", IEEE Trans. Robotics and Automation 12(1), 1996.
+    """
+
+    name = "wheeled"
+
+    def __init__(
+        self,
+        wheels: Sequence[Wheel],
+        hitches: Sequence[Hitch] = (),
+        inputs: Sequence[Input] | None = None,
+        *,
+        limits: Mapping[str, float] | None = None,
+    ) -> None:
+        self.wheels = tuple(wheels)
+        self.hitches = tuple(hitches)
+        for part, kind in [(w, Wheel) for w in self.wheels] + [(h, Hitch) for h in self.hitches]:
+            if not isinstance(part, kind) or type(part) is Wheel:
+                raise InputError(f"{self.name}: expected wheels of a kind and hitches, got {part!r}")
+        _check_distinct([wheel.name for wheel in self.wheels], "wheel")
+        self._bodies = Bodies(self.wheels, self.hitches)
+        self._structure = choose(self._bodies, self.wheels, inputs)
+        self.coordinates = ("x", "y", *self._bodies.names)
+        self.inputs = tuple(name for name, _, _ in self._structure.inputs)
+        self.input_units = tuple(unit for _, unit, _ in self._structure.inputs)
+        _check_distinct(self.inputs, "input")
+        self._parameters = self._packed()
+        super().__init__(limits=limits)
+
+    @classmethod
+    def fit(cls, layout: Layout) -> Self:
+        """The platform of a robot's file: see `parts_from` for which joint becomes what.
+
+        Raises
+        ------
+        InputError : as `parts_from`; a body with fixed wheels on two axles, which could not turn
+        """
+        platform = cls(*parts_from(layout))
+        axles: dict[str, Constraint] = {}
+        for constraint in platform._structure.constraints:
+            wheel = constraint.wheels[0]
+            if isinstance(wheel, FixedWheel) and axles.setdefault(wheel.body, constraint) is not constraint:
+                raise InputError(
+                    f"{layout.robot}: wheels {axles[wheel.body].names} and {constraint.names} are on "
+                    "different axles of one body, which could not turn; if they are omni or mecanum wheels, "
+                    "which a file does not show, or some skid, choose another platform or describe it"
+                )
+        return platform
+
+    @property
+    def velocity_map(self) -> Kernel:
+        return wheeled
+
+    @property
+    def parameters(self) -> Array:
+        return self._parameters
+
+    @property
+    def coordinate_limits(self) -> Array:
+        limits = super().coordinate_limits
+        for number, body in enumerate(self._bodies.all[1:], start=1):
+            limits[2 + number] = body.lower, body.upper
+        return limits
+
+    @property
+    def mobility(self) -> int:
+        """δ_m: independent motions with the centred steered wheels held (Campion), hitched bodies' too."""
+        return self._structure.mobility
+
+    @property
+    def steerability(self) -> int:
+        """δ_s: independent steering rates of centred wheels; p = δ_m + δ_s."""
+        return self.p - self.mobility
+
+    def pfaffian(self, qp: Array) -> Array:
+        """No sideways motion of a wheel on each independent axis, and steering that keeps axes concurrent."""
+        rows = [row.at(self._bodies, qp) for row in self._structure.pfaffian]
+        return np.array(rows).reshape(self.n_p - self.p, self.n_p)
+
+    def problem(self, qp: ArrayLike) -> str | None:
+        """Which wheels' axes contradict each other, or with which wheel an input ceases to say anything."""
+        qp = vector(qp, self.n_p, "qp")
+        found = contradiction(self._structure, self._bodies, qp)
+        if found is None and not np.all(np.isfinite(self.G(qp))):
+            found = singularity(self._structure, self._bodies, qp)
+        return found or folded(self._bodies, qp)
+
+    def roller(self, x: float, y: float) -> float:
+        """Angle γ of the rollers of the main body's wheel that is nearest to (x, y)."""
+        wheels = [wheel for wheel in self.wheels if wheel.body == MAIN]
+        nearest = min(wheels, key=lambda wheel: math.hypot(wheel.x - x, wheel.y - y), default=None)
+        return nearest.roller if isinstance(nearest, OmniWheel) else 0.0
+
+    def wheel_rates(
+        self, qp: ArrayLike, up: ArrayLike, swivels: Mapping[str, float] | None = None
+    ) -> dict[str, WheelRate]:
+        """How fast every wheel spins and turns about its pivot, rad/s, at qp (n_p,) under the inputs up (p,).
+
+        Parameters
+        ----------
+        swivels : the casters' angles by wheel, rad; zero for those not named
+
+        Raises
+        ------
+        InputError : the wheels cannot roll at qp, an unknown caster, wrong lengths
+        """
+        qp = vector(qp, self.n_p, "qp")
+        problem = self.problem(qp)
+        if problem is not None:
+            raise InputError(f"{self.name}: {problem}")
+        qp_dot = self.G(qp) @ vector(up, self.p, "up")
+        return wheel_rates(self._bodies, self.wheels, qp, qp_dot, swivels or {})
+
+    def _packed(self) -> Array:
+        bodies = [[body.carrier, body.place.real, body.place.imag] for body in self._bodies.all]
+        sections: list[list[list[float]]] = [[] for _ in range(SIZE + 1)]
+        sections[BODIES] = bodies
+        # All closures were given the platform's size.
+        sections[SIZE] = [[followed.row.length] for followed in self._structure.followed[:1]] or [[1.0]]
+        rows = [*self._structure.pfaffian, *(row for _, _, row in self._structure.inputs)]
+        for number, row in enumerate(rows):
+            section, lines = row.packed(number)
+            sections[section] += lines
+        return pack([np.array(section, dtype=float) for section in sections], float)
+
+
+def _check_distinct(names: Sequence[str], what: str) -> None:
+    twice = [name for k, name in enumerate(names) if name in names[:k]]
+    if twice:
+        raise InputError(f"{what} {twice[0]}: the name is given twice; {what}s: {', '.join(names)}")

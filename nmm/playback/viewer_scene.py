@@ -1,0 +1,151 @@
+"""The commands of the viewer's page: a robot, where its joints turn, and its frames."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from nmm.arrays import Array
+from nmm.playback.drawing import Command, Drawing, DrawnRobot, segment
+from nmm.playback.extent import robot_boxes
+from nmm.playback.placements import position_and_quaternion
+from nmm.playback.rolling import Rolling
+from nmm.playback.scene import live_scene
+from nmm.robot import Robot
+
+#: Limits beyond this, m or rad, are none.
+UNBOUNDED = 1e3
+#: Where a slider ends to which there is no limit: rad, m of the platform, m of the arm.
+ANGLE, WAY, REACH = float(np.pi), 3.0, 1.0
+#: Frames with this in their names are what an arm ends in, the first ones more than the last.
+TIPS = ("ee", "tcp", "tool", "grasp", "gripper", "hand", "flange", "tip")
+
+
+def rest(robot: Robot) -> Array:
+    """The configuration nearest to zero within the limits, (n,)."""
+    lower, upper = robot.q_limits.T
+    return np.asarray(np.clip(np.zeros(robot.n), lower, upper))
+
+
+def viewer_scene(robot: Robot, q: Array, *, frames: bool = True) -> list[Command]:
+    """Commands for a robot at q (n,) that the page's sliders move.
+
+    Parameters
+    ----------
+    frames : whether frames are shown at first
+    """
+    wheels = Rolling(robot).settled(q)
+    commands, drawn = live_scene(robot, q, wheels, title=robot.name, room=1.0)
+    box = robot_boxes(robot, q[np.newaxis], wheels[np.newaxis])[0]
+    length = float(np.clip(0.08 * np.linalg.norm(np.ptp(box, axis=0)), 0.02, 0.25))
+    drawing = Drawing()
+    listed = list(_frames(robot, drawn, drawing))
+    drawing.add("joints", coordinates=list(_coordinates(robot, drawn, q)))
+    drawing.add("frames", frames=listed, shown=frames, length=length, pose=_first_tip(listed))
+    drawing.add("hold")
+    # The last command says that everything has come.
+    return [*commands[:-1], *drawing.commands, commands[-1]]
+
+
+def _coordinates(robot: Robot, drawn: DrawnRobot, q: Array) -> Iterator[dict[str, Any]]:
+    """Each coordinate: its slider, its joint's placement at zero in the parent's frame, and its screw: for a
+    unit of it the joint turns by `angular` and slides by `linear`."""
+    model = robot.display_model
+    neutral = pin.neutral(model)
+    for i, (name, unit, (lower, upper)) in enumerate(
+        zip(robot.q_names, robot.q_units, robot.q_limits, strict=True)
+    ):
+        joint = model.getJointId(name)
+        data = model.joints[joint].createData()
+        model.joints[joint].calc(data, neutral)
+        screw = np.array(data.S, dtype=np.float64).reshape(6)
+        position, quaternion = position_and_quaternion(model.jointPlacements[joint].homogeneous)
+        of_platform = i < robot.platform.n_p
+        end = ANGLE if unit == "rad" else WAY if of_platform else REACH
+        arms = [arm for arm, joints in robot.arms.items() if name in joints]
+        yield {
+            "name": name,
+            "unit": unit,
+            "of": "platform" if of_platform else next(iter(arms), "arm"),
+            "lower": float(lower) if abs(lower) < UNBOUNDED else min(-end, float(q[i])),
+            "upper": float(upper) if abs(upper) < UNBOUNDED else max(end, float(q[i])),
+            "value": float(q[i]),
+            "path": drawn.paths[joint - 1],
+            "position": position.tolist(),
+            "quaternion": quaternion.tolist(),
+            "linear": screw[:3].tolist(),
+            "angular": screw[3:].tolist(),
+        }
+
+
+def _frames(robot: Robot, drawn: DrawnRobot, drawing: Drawing) -> Iterator[dict[str, Any]]:
+    """Each frame that a task may speak of: its node, and whether it is shown at first."""
+    model = robot.display_model
+    tips = set(_tips(robot))
+    chosen = {*_joint_links(robot), *tips}
+    for i, name in enumerate(robot.frames):
+        frame = _frame(model, name)
+        if frame is None or name in robot.platform.coordinates[:2]:
+            continue  # x and y are steps on the way to the root
+        parent = drawn.paths[frame.parentJoint - 1] if frame.parentJoint else drawn.paths[0].rsplit("/", 1)[0]
+        path = f"{parent}/frame {i} {segment(name)}"
+        drawing.transform(path, np.array(frame.placement.homogeneous))
+        yield {"name": name, "path": path, "shown": name in chosen, "tip": name in tips}
+
+
+def _frame(model: pin.Model, name: str) -> pin.Frame | None:
+    """The frame that `Robot.frame_id` means by a name, in the display model."""
+    for kind in (pin.FrameType.BODY, pin.FrameType.OP_FRAME):
+        if model.existFrame(name, kind):
+            return model.frames[model.getFrameId(name, kind)]
+    return model.frames[model.getFrameId(name)] if model.existFrame(name) else None
+
+
+def _joint_links(robot: Robot) -> Iterator[str]:
+    """The root link, and the link below each joint of the arm and of the platform, or the joint's own frame
+    where there is no link."""
+    model, n_p = robot.model, robot.platform.n_p
+    root = model.getJointId("theta") if n_p else 0
+    joints = [root, *(model.getJointId(name) for name in robot.q_names[3 if n_p else 0 :])]
+    for joint in joints:
+        links = [
+            frame.name
+            for frame in model.frames
+            if frame.parentJoint == joint
+            and frame.type == pin.FrameType.BODY
+            and (joint == root or frame.placement.isIdentity(1e-9))
+        ]
+        yield links[0] if links else str(model.names[joint])
+
+
+def _tips(robot: Robot) -> Iterator[str]:
+    """The frame at the end of each branch of the arm: the one whose name says so, or the farthest out."""
+    model = robot.model
+    carrying = set(model.parents)
+    above = {frame.parentFrame for frame in model.frames}
+    for name in robot.q_names[robot.platform.n_p :]:
+        joint = model.getJointId(name)
+        kinds = (pin.FrameType.BODY, pin.FrameType.OP_FRAME)
+        ends = [
+            frame
+            for i, frame in enumerate(model.frames)
+            if frame.parentJoint == joint and frame.type in kinds and i not in above
+        ]
+        if joint not in carrying and ends:
+            yield min(ends, key=_how_little_a_tip).name
+
+
+def _how_little_a_tip(frame: pin.Frame) -> tuple[int, float]:
+    words = frame.name.lower().replace("-", "_").split("_")
+    ranks = [i for i, tip in enumerate(TIPS) if any(word.startswith(tip) for word in words)]
+    return min(ranks, default=len(TIPS)), -float(np.linalg.norm(frame.placement.translation))
+
+
+def _first_tip(frames: list[dict[str, Any]]) -> str:
+    """The frame whose pose is told at first: a tip that is named as one, or any, or the first shown."""
+    tips = [frame["name"] for frame in frames if frame["tip"]]
+    named = [name for tip in TIPS for name in tips if tip in name.lower().split("_")]
+    return str(next(iter([*named, *tips, *(frame["name"] for frame in frames if frame["shown"]), ""])))

@@ -1,0 +1,373 @@
+"""`nmm check`: every problem with its line, warnings about what is odd, and what the file holds."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import Result
+from urdf_parts import AXIS, LIMIT, inertial, joint, link, random_tree, robot, shape, write
+
+import nmm
+from nmm.bundled import bundled_robots
+from nmm.cli.app import status_of
+from nmm.errors import RobotError
+from nmm.loading.packages import package_file
+from nmm.loading.report import Report, report
+from nmm.loading.second_opinion import second_opinion
+
+Command = Callable[..., Result]
+TIAGO = "robots/tiago_description/robots/tiago_no_hand.urdf"
+XACRO = 'name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"'
+HEAVY_LINKS = link("a", inertial()) + link("b", inertial())
+
+
+@pytest.fixture
+def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Command:
+    """Run a command line in an empty folder, in this process."""
+    monkeypatch.chdir(tmp_path)
+    return lambda *arguments: Result(status_of(arguments), *capfd.readouterr())
+
+
+def reported(tmp_path: Path, text: str, name: str = "robot.urdf", **options: object) -> Report:
+    return report(write(tmp_path / name, text), **options)  # type: ignore[arg-type]  # each test gives its own
+
+
+def warned(tmp_path: Path, text: str, **options: object) -> list[str]:
+    """The warnings about a file that has no problems."""
+    made = reported(tmp_path, text, **options)
+    assert made.problems == ()
+    return [warning.message for warning in made.warnings]
+
+
+def moments(xx: float, yy: float, zz: float, xy: float = 0.0, mass: float = 1.0) -> str:
+    values = f'ixx="{xx}" ixy="{xy}" ixz="0" iyy="{yy}" iyz="0" izz="{zz}"'
+    return f'<inertial><mass value="{mass}"/><inertia {values}/></inertial>'
+
+
+# Problems
+
+
+def test_every_problem_is_named_with_its_line(run: Command, tmp_path: Path) -> None:
+    lines = [
+        '<robot name="r">',
+        '<link name="a"/>',
+        '<link name="b"/>',
+        '<joint name="x" type="revolute"><parent link="a"/><child link="b"/>',
+        '  <limit lower="2" upper="1" effort="1" velocity="1"/></joint>',
+        '<joint name="k" type="floating"><parent link="b"/><child link="c"/></joint>',
+        '<link name="c"><visual><geometry><sphere radius="-1"/></geometry></visual></link>',
+        '<link name="c"/>',
+        "</robot>",
+    ]
+    write(tmp_path / "bad.urdf", "\n".join(lines))
+    result = run("check", "bad.urdf")
+    assert result.status == 2
+    assert result.err == "nmm check: bad.urdf: 5 problems, no warnings\n"
+    expected = [
+        (4, "joint 'x': the name is taken by a coordinate"),
+        (5, "lower 2 is above upper 1"),
+        (6, "floating joint is refused"),
+        (7, "expected lengths of 0 or more"),
+        (8, "two links named 'c'"),
+    ]
+    printed = result.out.splitlines()
+    assert len(printed) == len(expected)
+    for line, (number, words) in zip(printed, expected, strict=True):
+        assert line.startswith(f"bad.urdf:{number}: ")
+        assert words in line
+
+
+@pytest.mark.parametrize(
+    "text", ["", "hello", "<sdf/>", '<robot name="r">\n<link name="a"/>', "\x00", "<!DOCTYPE r>\n<robot/>"]
+)
+@pytest.mark.parametrize("suffix", ["urdf", "xacro"])
+def test_what_is_no_urdf_is_said_in_a_line(run: Command, tmp_path: Path, text: str, suffix: str) -> None:
+    write(tmp_path / f"bad.{suffix}", text)
+    result = run("check", f"bad.{suffix}")
+    assert result.status == 2
+    assert result.err.startswith(f"nmm check: bad.{suffix}: 1 problem, ")
+    assert len(result.out.splitlines()) == 1
+    assert "Traceback" not in result.out + result.err
+
+
+def test_bytes_that_are_no_text_are_a_problem(run: Command, tmp_path: Path) -> None:
+    (tmp_path / "bad.urdf").write_bytes(b'<robot name="r">\n\xff\xfe</robot>')
+    result = run("check", "bad.urdf")
+    assert result.status == 2
+    assert result.out == "bad.urdf:2: not UTF-8 text\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["nowhere.urdf"], "nowhere.urdf: no such file"),
+        (["."], "directory"),
+        (["notes.txt"], "expected a name that ends in .urdf or .xacro"),
+        (["unicycle_2r", "-a", "d"], "--set: expected ARG=VALUE, as in d=0.5, got 'd'"),
+        (["unicycle_2r", "-a", "dd=1"], "unknown xacro argument 'dd' (did you mean 'd'?)"),
+        (["unicycle_2r", "--package-dir", "nowhere"], "package_dirs: expected a folder"),
+        (["unicycle_2r", "--nonsense"], "No such option"),
+        ([], "Missing argument 'FILE'"),
+    ],
+)
+def test_wrong_usage_is_one_line(run: Command, tmp_path: Path, arguments: Sequence[str], words: str) -> None:
+    write(tmp_path / "notes.txt", "")
+    result = run("check", *arguments)
+    assert (result.status, result.out) == (2, "")
+    assert result.err.startswith("nmm check: ")
+    assert words in result.err
+    assert len(result.err.splitlines()) == 1
+
+
+def test_of_a_xacro_file_the_lines_are_said_to_be_the_expanded_ones(run: Command, tmp_path: Path) -> None:
+    text = robot(
+        '<xacro:arg name="n" default="b"/>', link("a"), link("$(arg n)"), joint(child="bb"), attributes=XACRO
+    )
+    write(tmp_path / "bad.xacro", text)
+    result = run("check", "bad.xacro")
+    assert result.status == 2
+    first = result.out.splitlines()[0]
+    assert re.search(r"^bad\.xacro: .*\(line \d+ of the expanded file\)$|one root link", first)
+    assert "unknown child link 'bb'" in result.out
+    assert "(line " in result.out
+    assert run("check", "bad.xacro", "-a", "n=bb").status == 0
+
+
+def test_every_missing_package_is_named_with_where_it_was_looked_for(tmp_path: Path) -> None:
+    mesh = '<mesh filename="file://$(find {})/m.stl"/>'
+    text = robot(
+        link("a", shape(mesh.format("lost_one"))), link("b", shape(mesh.format("lost_two"))),
+        joint(kind="odd"), attributes=XACRO,
+    )  # fmt: skip
+    made = reported(tmp_path, text, "robot.xacro", package_dirs=[tmp_path])
+    messages = [problem.message for problem in made.problems]
+    for package in ("lost_one", "lost_two"):
+        (found,) = [message for message in messages if package in message]
+        assert f"package {package!r} not found" in found
+        assert str(tmp_path) in found
+    assert any("unknown joint type 'odd'" in message for message in messages)
+    (tmp_path / "lost_one").mkdir()
+    again = reported(tmp_path, text, "robot.xacro", package_dirs=[tmp_path])
+    assert not any("package 'lost_one' not found" in problem.message for problem in again.problems)
+
+
+def test_xacro_in_a_urdf_is_a_problem(tmp_path: Path) -> None:
+    made = reported(tmp_path, robot(link("a", shape('<mesh filename="file://$(find p)/m.stl"/>'))))
+    (problem,) = made.problems
+    assert "$(find p): name the file .xacro" in problem.message
+    assert problem.line == 1
+
+
+def test_what_only_loading_notices_is_a_problem(tmp_path: Path) -> None:
+    text = robot('<nmm platform="car"/>', HEAVY_LINKS, joint())
+    made = reported(tmp_path, text)
+    (problem,) = made.problems
+    assert "steering joint" in problem.message
+    with pytest.raises(nmm.InputError, match="steering joint"):
+        nmm.load(made.file)
+
+
+# Warnings
+
+
+@pytest.mark.parametrize(
+    ("inertia", "words"),
+    [
+        (moments(1, 1, 3), "no body has this inertia"),
+        (moments(1, 1, 1, xy=2), "not positive definite"),
+        (moments(0, 0, 0), "no moments of inertia"),
+        (moments(1, 1, 1, mass=0), "no mass, but moments"),
+        (moments(1, 1, 1, mass=5000), "a mass of 5000 kg"),
+    ],
+)
+def test_inertias_that_no_body_has(tmp_path: Path, inertia: str, words: str) -> None:
+    text = robot(link("a", inertia), "\n", link("b", inertial()), joint())
+    warnings = [text for text in warned(tmp_path, text) if text.startswith("link 'a'")]
+    assert len(warnings) == 1
+    assert words in warnings[0]
+
+
+def test_inertias_of_bodies_are_taken(tmp_path: Path) -> None:
+    """Boxes turned at random, thin rods and plates among them: the triangle inequality is met, or just so."""
+    rng = np.random.default_rng(3)
+    parts = [link("a", inertial())]
+    for k in range(20):
+        sides = rng.uniform(0.0, 1.0, 3) * (1.0, 1.0, k % 2)
+        turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        square = np.sum(sides**2)
+        tensor = turn @ np.diag((square - sides**2) / 12.0) @ turn.T
+        axes = "xyz"
+        values = " ".join(
+            f'i{axes[i]}{axes[j]}="{float(tensor[i, j])!r}"' for i in range(3) for j in range(i, 3)
+        )
+        parts.append(link(f"b{k}", f'<inertial><mass value="1"/><inertia {values}/></inertial>'))
+        parts.append(joint(f"j{k}", "a", f"b{k}"))
+    assert warned(tmp_path, robot(*parts)) == []
+
+
+def test_bodies_that_move_without_mass(tmp_path: Path) -> None:
+    fixed = joint("f", "b", "c", "fixed", body="")
+    light = robot(link("a"), link("b"), link("c"), joint(), fixed)
+    (warning,) = warned(tmp_path, light)
+    assert warning.startswith("link 'b': moves with joint 'j' and has no <inertial>")
+    # What is fixed to it has the mass.
+    assert warned(tmp_path, robot(link("a"), link("b"), link("c", inertial()), joint(), fixed)) == []
+
+
+def test_joints_without_a_limit_of_velocity(tmp_path: Path) -> None:
+    zero = '<limit lower="-1" upper="1" effort="1" velocity="0"/>'
+    text = robot(
+        HEAVY_LINKS, link("c", inertial()),
+        joint("j", body=AXIS + zero), joint("k", "b", "c", "continuous", AXIS),
+    )  # fmt: skip
+    warnings = warned(tmp_path, text)
+    assert [warning.split(":")[0] for warning in warnings] == ["joint 'j'", "joint 'k'"]
+    loaded = nmm.load(tmp_path / "robot.urdf")
+    assert np.isinf(loaded.u_limits[-2:]).all()
+
+
+def test_a_joint_that_its_limits_hold_is_told(tmp_path: Path) -> None:
+    (warning,) = warned(tmp_path, robot(HEAVY_LINKS, joint(body=AXIS + '<limit effort="1" velocity="1"/>')))
+    assert warning.startswith("joint 'j': <limit> lets it stand at 0 only")
+    np.testing.assert_array_equal(nmm.load(tmp_path / "robot.urdf").q_limits[-1], 0.0)
+
+
+def test_followers_are_told_with_what_to_lock(tmp_path: Path) -> None:
+    mimic = '<mimic joint="{}" multiplier="2"/>'
+    up = '<limit lower="0.3" upper="1" effort="1" velocity="1"/>'
+    text = robot(
+        HEAVY_LINKS, link("c", inertial()), link("d", inertial()),
+        joint("lead", "a", "b", body=AXIS + up),
+        joint("first", "b", "c", body=AXIS + LIMIT + mimic.format("lead")),
+        joint("second", "c", "d", body=AXIS + LIMIT + mimic.format("first")),
+    )  # fmt: skip
+    made = reported(tmp_path, text)
+    with pytest.raises(RobotError, match="mimic"):
+        nmm.load(made.file)
+    followers = [warning.message for warning in made.warnings if "<mimic>" in warning.message]
+    assert len(followers) == 2
+    assert all("lock={'lead': 0.3}" in text for text in followers)
+
+
+def test_names_of_a_link_and_a_joint(tmp_path: Path) -> None:
+    (warning,) = warned(tmp_path, robot(HEAVY_LINKS, joint("b")))
+    assert warning.startswith("joint 'b': a link has that name")
+    # As it says.
+    loaded = nmm.load(tmp_path / "robot.urdf")
+    assert loaded.model.frames[loaded.frame_id("b")].type.name == "BODY"
+
+
+def test_meshes_that_are_not_there(tmp_path: Path) -> None:
+    meshes = [shape(f'<mesh filename="{name}"/>') for name in ("package://nowhere/m.stl", "gone.stl")]
+    text = robot(link("a", "\n".join(meshes)))
+    made = reported(tmp_path, text)
+    assert made.problems == ()
+    assert made.facts["meshes"] == "0 of 2 found"
+    messages = [(warning.line, warning.message) for warning in made.warnings]
+    assert any(line == 1 and "package 'nowhere' not found" in text for line, text in messages)
+    assert all("missing_meshes='skip'" in text for line, text in messages if line)
+    assert any(line == 2 and "mesh 'gone.stl': no such file" in text for line, text in messages)
+    assert any("looked in" in text and str(tmp_path) in text for _, text in messages)
+    with pytest.raises(RobotError, match=r"gone\.stl"):
+        nmm.load(made.file)
+    nmm.load(made.file, missing_meshes="skip")
+
+
+def test_a_mesh_of_an_unknown_format_is_a_problem(tmp_path: Path) -> None:
+    write(tmp_path / "shape.step", "")
+    made = reported(tmp_path, robot(link("a", shape('<mesh filename="shape.step"/>'))))
+    (problem,) = made.problems
+    assert "unknown format, expected .3mf" in problem.message
+
+
+def wheeled(x: float = 0.0, left: str = "left_wheel", right: str = "right_wheel", more: str = "") -> str:
+    """A body on two wheels whose axle is at x."""
+    parts = [link("base", inertial())]
+    for name, y in ((left, 0.2), (right, -0.2)):
+        at = f'<origin xyz="{x} {y} 0.1"/>'
+        limit = '<limit effort="1" velocity="1"/>'
+        parts += [link(f"{name}_link", inertial())]
+        parts += [joint(name, "base", f"{name}_link", "continuous", f'<axis xyz="0 1 0"/>{limit}', at)]
+    return robot(*parts, more)
+
+
+def test_the_root_link_belongs_on_the_wheels_axle(tmp_path: Path) -> None:
+    assert warned(tmp_path, wheeled()) == []
+    (warning,) = warned(tmp_path, wheeled(-0.25))
+    assert warning.startswith(
+        "root link 'base' is not at the wheels' axle, whose midpoint is at (-0.25, 0) m"
+    )
+    assert "axle=(-0.25, 0)" in warning
+    moved = nmm.load(tmp_path / "robot.urdf", axle=(-0.25, 0))
+    np.testing.assert_allclose(np.mean([wheel.center for wheel in moved.wheels], axis=0)[:2], 0.0, atol=1e-15)
+
+
+def test_wheels_that_are_not_recognised_are_told_and_why(tmp_path: Path) -> None:
+    warnings = warned(tmp_path, wheeled(left="left", right="right"))
+    assert [warning.split("'")[1] for warning in warnings] == ["left", "right"]
+    assert all("if it is a wheel, say so, wheels=[" in warning for warning in warnings)
+    upright = joint("spare_wheel", "base", "spare", "continuous", AXIS + '<limit effort="1" velocity="1"/>')
+    (warning,) = warned(tmp_path, wheeled(more=link("spare", inertial()) + upright))
+    assert "spare_wheel stays a coordinate in spite of its name: its axis is not level" in warning
+
+
+# Second opinion
+
+
+def test_pinocchio_and_yourdfpy_agree_on_random_trees() -> None:
+    for seed in range(5):
+        assert second_opinion(random_tree(np.random.default_rng(seed), 12)) == []
+
+
+def test_a_second_reader_that_reads_something_else_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    import yourdfpy
+
+    other = yourdfpy.URDF.load
+    monkeypatch.setattr(
+        yourdfpy.URDF, "load",
+        lambda file, **options: other(_moved(file), **options),
+    )  # fmt: skip
+    (text,) = second_opinion(robot(HEAVY_LINKS, joint()))
+    assert "Pinocchio and yourdfpy read it differently: link 'b'" in text
+
+
+def _moved(file: object) -> object:
+    import io
+
+    return io.BytesIO(file.read().replace(b'xyz="0.1 0.2 0.3"', b'xyz="0.1 0.2 0.4"'))  # type: ignore[attr-defined]
+
+
+# Files that are right
+
+
+@pytest.mark.parametrize("name", ["unicycle_2r", "unicycle_3r", "differential_base", "car_base", "omni_base"])
+def test_the_bundled_robots_have_nothing_wrong(run: Command, name: str) -> None:
+    result = run("check", name)
+    assert (result.status, result.err) == (0, "")
+    assert result.out.splitlines()[0] == f"{name}: no problems, no warnings"
+    assert result.value("robot") == name
+
+
+def test_the_summary_counts_what_the_file_holds(run: Command) -> None:
+    result = run("check", f"package://example-robot-data/{TIAGO}")
+    assert (result.status, result.err) == (0, "")
+    text = package_file(f"package://example-robot-data/{TIAGO}").read_text(encoding="utf-8")
+    kinds = re.findall(r'<joint name="[^"]+" type="(\w+)"', text)
+    assert result.value("links") == str(len(re.findall(r"<link name=", text)))
+    for kind in set(kinds):
+        assert f"{kinds.count(kind)} {kind}" in result.value("joints")
+    found, of, total, _ = result.value("meshes").split()
+    assert (found, of) == (total, "of")
+    assert result.value("packages").startswith("example-robot-data in ")
+    assert result.value("wheels") == "wheel_left_joint, wheel_right_joint"
+
+
+def test_a_report_says_what_was_used(tmp_path: Path) -> None:
+    made = report(bundled_robots()["unicycle_2r"], {"d": 0.5})
+    assert made.expanded
+    assert "d=0.5" in made.facts["xacro arguments"]
+    assert made.text.startswith("<?xml")

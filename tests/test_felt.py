@@ -1,0 +1,72 @@
+"""Inputs that a task does not feel: found, said where nothing else moves them, moved by an objective."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import nmm
+from nmm.felt import idle_inputs, unfelt_inputs
+from nmm.robot import Robot
+
+START = {"q2": 0.2, "q3": 1.7, "q4": 0.6}
+TIP = [0.6, 0.1, 0.58]
+
+
+@pytest.fixture(scope="module")
+def car() -> Robot:
+    return nmm.mount("car_base", "small_arm", at="arm_mount")
+
+
+def controller(robot: Robot, objective: nmm.Objective | None = None) -> nmm.Controller:
+    return nmm.Controller(robot, nmm.Task(nmm.Position("ee"), TIP), nmm.ProjectedGradient(), objective)
+
+
+def test_a_position_feels_neither_steering_nor_tool_roll(car: Robot) -> None:
+    plain = controller(car)
+    assert unfelt_inputs(plain, car.q(START)) == ("steering_rate", "q5")
+    assert idle_inputs(plain, car.q(START)) == ("steering_rate", "q5")
+
+
+def test_what_the_objective_feels_is_not_idle(car: Robot) -> None:
+    steered = controller(car, nmm.Quadratic(nmm.Square({"steering": 1, "q1": -1})))
+    assert unfelt_inputs(steered, car.q(START)) == ("steering_rate", "q5")
+    assert idle_inputs(steered, car.q(START)) == ("q5",)
+
+
+def test_what_a_constraint_feels_is_not_idle(car: Robot) -> None:
+    task = nmm.Task(nmm.Position("ee"), TIP)
+    held = nmm.Task(nmm.Coordinates("steering", "x", "q4", "q5"), [0.1, 0, 0.6, 0])
+    extended = nmm.Controller(car, task, nmm.ExtendedJacobian(), constraint=held)
+    assert unfelt_inputs(extended, car.q(START)) == ("steering_rate", "q5")
+    assert idle_inputs(extended, car.q(START)) == ()
+
+
+def test_a_run_says_it_once(car: Robot) -> None:
+    run = nmm.simulate(controller(car), START, 0.5, 0.01)
+    said = [warning for warning in run.warnings if "steering_rate, q5" in warning]
+    assert said == list(run.warnings)
+    assert len(said) == 1
+    idle = run.u[:, [car.input("steering_rate"), car.input("q5")]]
+    np.testing.assert_allclose(idle, 0.0, atol=1e-15)  # the kinematics' rounding
+
+
+def test_the_objective_moves_what_the_task_does_not_feel(car: Robot) -> None:
+    squares = nmm.Quadratic(nmm.Square("steering", 0.4), nmm.Square("q5", -0.3))
+    run = nmm.simulate(controller(car, squares), START, 2.0, 0.01)
+    assert run.warnings == ()
+    # Alone in their columns, they go to their targets as the gradient's flow says: e(t) = e(0) exp(-alpha t).
+    for name, target in (("steering", 0.4), ("q5", -0.3)):
+        reached = run.q[:, car.coordinate(name)]
+        np.testing.assert_allclose(reached, target * (1 - np.exp(-10 * run.t)), atol=1e-6)
+    assert np.abs(run.error[-1]).max() < 0.15 * np.abs(run.error[0]).max()
+
+
+def test_a_task_that_cannot_be_evaluated_there_says_nothing(car: Robot) -> None:
+    def near_the_start(configuration: nmm.Configuration) -> float:
+        if abs(configuration.q[0]) > 1e-3:
+            raise ValueError("far away")
+        return float(configuration.q[4])
+
+    task = nmm.Task(nmm.CallableFunction(near_the_start, ["a"]), [0.0])
+    assert unfelt_inputs(nmm.Controller(car, task, nmm.ProjectedGradient()), car.q(START)) == ()

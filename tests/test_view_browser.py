@@ -1,0 +1,253 @@
+"""`nmm view` in a real browser: the sliders move the robot to where Pinocchio says."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from command_line import process
+from playback_browser import PROJECT, UPRIGHT, WALK, Window, assert_same, drawn_visuals, expected_visuals
+from playback_browser import browser as browser
+from playback_browser import window as window
+from playback_robot import hand_built_robot
+from playwright.sync_api import Page
+from test_playback_live import free_port, listening, wait_for
+
+import nmm
+from nmm.playback import view
+from nmm.playback.extent import corners
+from nmm.playback.rolling import Rolling
+from nmm.playback.viewer_scene import rest
+from nmm.robot import Robot
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture(scope="module", params=["hand-built", "unicycle_3r", "car_base"])
+def robot(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Robot:
+    if request.param == "hand-built":  # with skew axes, and a joint that slides
+        return hand_built_robot(tmp_path_factory.mktemp("robot"))
+    return nmm.load(request.param)
+
+
+@pytest.fixture(scope="module")
+def robot_3r() -> Robot:
+    return nmm.load("unicycle_3r")
+
+
+@contextmanager
+def shown(robot: Robot, **options: object) -> Iterator[str]:
+    """The address of a robot that is shown."""
+    stop, port = threading.Event(), free_port()
+    settings = {"port": port, "open_browser": False, "stop": stop, **options}
+    viewer = threading.Thread(target=view, args=(robot,), kwargs=settings)
+    viewer.start()
+    wait_for(lambda: port in listening())
+    try:
+        yield f"http://127.0.0.1:{port}/"
+    finally:
+        stop.set()
+        viewer.join(timeout=10)
+        assert port not in listening()
+
+
+def slide(page: Page, name: str, fraction: float) -> float:
+    """Move a slider as a user's hand does, to a fraction of its way; returns its value."""
+    slider = page.locator(f'input[data-name="{name}"]')
+    value: float = slider.evaluate(
+        """(slider, fraction) => {
+          slider.value = Number(slider.min) + fraction * (slider.max - slider.min);
+          slider.dispatchEvent(new Event("input"));
+          return Number(slider.value);
+        }""",
+        fraction,
+    )
+    return value
+
+
+def drawn_frames(page: Page) -> dict[str, np.ndarray]:
+    """World placement of each frame's node, by the frame's name."""
+    matrices = page.evaluate(WALK)
+    paths = page.evaluate("nmm.frames.list.map(({ name, path }) => [name, path])")
+    return {name: UPRIGHT.T @ np.reshape(matrices[path], (4, 4)).T for name, path in paths}
+
+
+def expected_frames(robot: Robot, q: np.ndarray) -> dict[str, np.ndarray]:
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, q)
+    return {name: data.oMf[robot.frame_id(name)].homogeneous for name in robot.frames}
+
+
+def test_sliders_move_every_joint_to_where_pinocchio_says(robot: Robot, window: Window) -> None:
+    rng = np.random.default_rng(8)
+    with shown(robot) as url:
+        page = window.open(url)
+        sliders = page.locator("input[data-name]").evaluate_all("all => all.map((one) => one.dataset.name)")
+        assert tuple(sliders) == robot.q_names
+        angles = Rolling(robot).settled(rest(robot))  # wheels and swivels stay
+        assert_same(drawn_visuals(page), expected_visuals(robot, rest(robot), angles))
+        for _ in range(3):
+            q = np.array([slide(page, name, rng.uniform()) for name in robot.q_names])
+            assert_same(drawn_visuals(page), expected_visuals(robot, q, angles), 1e-6)
+            drawn, expected = drawn_frames(page), expected_frames(robot, q)
+            for name in ("x", "y"):
+                expected.pop(name, None)
+            assert_same(drawn, {name: expected[name] for name in drawn}, 1e-6)
+            assert drawn.keys() == expected.keys()
+        page.locator("#rest").click()
+        assert_same(drawn_visuals(page), expected_visuals(robot, rest(robot), angles), 1e-12)
+
+
+def test_sliders_end_at_the_limits_and_show_what_they_are_at(window: Window, tmp_path: Path) -> None:
+    robot = nmm.load("car_base")
+    with shown(robot) as url:
+        page = window.open(url)
+        slider = page.locator('input[data-name="steering"]')
+        lower, upper = robot.q_limits[3]
+        assert float(slider.get_attribute("min") or "nan") == pytest.approx(lower)
+        assert float(slider.get_attribute("max") or "nan") == pytest.approx(upper)
+        theta = page.locator('input[data-name="theta"]')
+        assert float(theta.get_attribute("max") or "nan") == pytest.approx(np.pi)
+        value = slide(page, "steering", 0.75)
+        assert value == pytest.approx(0.3)
+        row = page.locator("label.coordinate", has=slider)
+        assert row.locator("output").inner_text() == "17.2° · 0.300 rad"
+        assert slider.get_attribute("aria-valuetext") == "17.2° · 0.300 rad"
+        slide(page, "x", 1.0)
+        row = page.locator("label.coordinate", has=page.locator('input[data-name="x"]'))
+        assert row.locator("output").inner_text().endswith(" m")
+
+
+def test_the_keyboard_moves_a_slider(robot_3r: Robot, window: Window) -> None:
+    with shown(robot_3r) as url:
+        page = window.open(url)
+        slider = page.locator('input[data-name="q2"]')
+        slider.focus()
+        page.keyboard.press("ArrowRight")
+        first = float(slider.input_value())
+        assert first > 0.0
+        page.keyboard.press("ArrowLeft")
+        page.keyboard.press("ArrowLeft")
+        assert float(slider.input_value()) == pytest.approx(-first)
+        page.keyboard.press("End")
+        assert float(slider.input_value()) == pytest.approx(np.pi)
+        q = robot_3r.q({"q2": np.pi})
+        angles = Rolling(robot_3r).settled(q)
+        assert_same(drawn_visuals(page), expected_visuals(robot_3r, q, angles))
+        page.keyboard.press("Tab")
+        assert page.evaluate("document.activeElement.dataset.name") == "q3"
+
+
+def test_the_pose_of_a_frame_is_told(robot_3r: Robot, window: Window) -> None:
+    with shown(robot_3r) as url:
+        page = window.open(url)
+        assert page.locator("#posed").input_value() == "ee"
+        values = {name: slide(page, name, 0.5 + 0.11 * k) for k, name in enumerate(robot_3r.q_names, -2)}
+        q = robot_3r.q(values)
+        for frame in ("ee", "link2", "base_link"):
+            page.locator("#posed").select_option(frame)
+            placement = pin.SE3(expected_frames(robot_3r, q)[frame])
+            told = page.evaluate(f"nmm.frames.pose({frame!r})")
+            np.testing.assert_allclose(told["position"], placement.translation, atol=1e-9)
+            np.testing.assert_allclose(told["rpy"], pin.rpy.matrixToRpy(placement.rotation), atol=1e-9)
+            cells = page.locator("#pose dd").all_inner_texts()
+            assert [float(cell.rstrip(" m°")) for cell in cells] == pytest.approx(
+                [*placement.translation, *np.degrees(pin.rpy.matrixToRpy(placement.rotation))], abs=6e-3
+            )
+
+
+def visible_names(page: Page) -> set[str]:
+    page.wait_for_timeout(150)  # names follow the picture
+    return set(page.locator("#labels span:visible").all_inner_texts())
+
+
+def test_frames_are_shown_and_hidden_by_name(robot_3r: Robot, window: Window) -> None:
+    window.page.set_viewport_size({"width": 1000, "height": 640})
+    with shown(robot_3r) as url:
+        page = window.open(url)
+        first = {"base_footprint", "link1", "link2", "link3", "ee"}
+        assert visible_names(page) == first
+        page.locator("#frames summary").click()
+        page.locator('input[data-frame="gripper"]').check()
+        page.locator('input[data-frame="link1"]').uncheck()
+        assert visible_names(page) == (first | {"gripper"}) - {"link1"}
+        page.locator("#triads").click()
+        assert visible_names(page) == set()
+        assert not page.evaluate("nmm.frames.list.some(({ triad }) => triad && triad.visible)")
+        page.locator("#triads").click()
+        page.get_by_role("button", name="at first").click()
+        assert visible_names(page) == first
+        page.locator("#names").click()
+        assert visible_names(page) == set()
+        listed = page.locator("input[data-frame]").evaluate_all("all => all.map((one) => one.dataset.frame)")
+        assert listed == [name for name in robot_3r.frames if name not in ("x", "y")]
+    with shown(robot_3r, frames=False) as url:
+        page = window.open(url)
+        assert page.locator("#triads").get_attribute("aria-pressed") == "false"
+        assert visible_names(page) == set()
+
+
+def test_names_do_not_lie_on_one_another(window: Window) -> None:
+    """The default frames of a robot with many."""
+    window.page.set_viewport_size({"width": 1100, "height": 800})
+    robot = nmm.load("package://example-robot-data/robots/tiago_description/robots/tiago_no_hand.urdf")
+    with shown(robot) as url:
+        page = window.open(url)
+        assert len(visible_names(page)) > 10
+        boxes = page.locator("#labels span:visible").evaluate_all(
+            """all => all.map((one) => one.getBoundingClientRect())
+                         .map(({ left, top, right, bottom }) => [left, top, right, bottom])"""
+        )
+    view_width = 1100 - 320
+    for i, (left, top, right, bottom) in enumerate(boxes):
+        assert left >= 0
+        assert right <= view_width
+        for other in boxes[:i]:
+            assert right <= other[0] or other[2] <= left or bottom <= other[1] or other[3] <= top
+
+
+@pytest.mark.parametrize("size", [(1280, 800), (800, 900), (420, 760)])
+def test_the_robot_is_in_the_picture_also_after_it_moved(
+    robot_3r: Robot, window: Window, size: tuple[int, int]
+) -> None:
+    window.page.set_viewport_size({"width": size[0], "height": size[1]})
+    with shown(robot_3r) as url:
+        page = window.open(url)
+        for values in ({}, {"x": 2.0, "y": -3.0, "theta": 1.0, "q2": 1.5, "q3": -0.3}):
+            q = robot_3r.q(values)
+            page.evaluate("(values) => nmm.joints.set(values)", values)
+            page.locator("#reset").click()
+            placements = expected_visuals(robot_3r, q, Rolling(robot_3r).settled(q)).values()
+            points = []
+            for placement, geometry in zip(placements, robot_3r.visual_model.geometryObjects, strict=True):
+                geometry.geometry.computeLocalAABB()
+                box = geometry.geometry.aabb_local
+                local = corners(np.array([box.min_, box.max_]))
+                points += (local @ placement[:3, :3].T + placement[:3, 3]).tolist()
+            assert np.abs(page.evaluate(PROJECT, points)).max() < 1.0
+
+
+def test_the_command_shows_a_robot_until_it_is_interrupted(window: Window, tmp_path: Path) -> None:
+    port = free_port()
+    viewer = process(tmp_path, "view", "unicycle_2r", "--no-open", "--port", str(port), "--lock", "q1=pi/2")
+    assert viewer.stdout is not None
+    assert f"http://127.0.0.1:{port}/" in viewer.stdout.readline()
+    assert listening()[port] == "0100007F"
+    page = window.open(f"http://127.0.0.1:{port}/")
+    assert page.locator("input[data-name]").evaluate_all("all => all.map((one) => one.dataset.name)") == [
+        "x", "y", "theta", "q2",
+    ]  # fmt: skip
+    q2 = slide(page, "q2", 0.9)
+    locked = nmm.load("unicycle_2r", lock={"q1": np.pi / 2})
+    angles = Rolling(locked).settled(locked.q())
+    assert_same(drawn_visuals(page), expected_visuals(locked, locked.q({"q2": q2}), angles))
+    viewer.send_signal(signal.SIGINT)
+    _, err = viewer.communicate(timeout=15)
+    assert (viewer.returncode, err) == (0, "")
+    assert port not in listening()
