@@ -60,7 +60,8 @@ EXAMPLES: dict[str, Platform] = {
     **{f"wheeled, {name}": WHEELED[name] for name in REGULAR},
 }
 
-#: Entries of G beyond this are near where the wheels cannot roll (a rear-driven car steered to 90 degrees).
+#: Where G is so many times larger than at its smallest, the wheels nearly cannot roll: a rear-driven car
+#: steered to 90 degrees.
 LARGEST = 10.0
 
 
@@ -71,7 +72,14 @@ def random_qp(platform: Platform, rng: np.random.Generator, size: float) -> Arra
     they are compared with.
     """
     lower, upper = np.clip(platform.coordinate_limits.T, -size, size)
-    while True:
+
+    def size_of_G(qp: Array) -> float:
+        return float(np.abs(platform.G(qp)).max(initial=0.0))
+
+    sample = np.random.default_rng(0).uniform(lower, upper, (20, platform.n_p))
+    usual = max(1.0, min(size_of_G(qp) for qp in sample))
+    for _ in range(1000):
         qp = rng.uniform(lower, upper)
-        if np.abs(platform.G(qp)).max(initial=0.0) <= LARGEST:
+        if size_of_G(qp) <= LARGEST * usual:
             return qp
+    raise AssertionError(f"{platform.name}: no configuration found where its wheels roll well")

@@ -27,7 +27,7 @@ def test_the_page_of_scenario_keys_is_the_schemas() -> None:
 def test_the_readmes_python_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """All but the line that opens a browser."""
     text = (ROOT / "README.md").read_text(encoding="utf-8")
-    (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    code, mounted = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
     assert "trajectory.play()" in code
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
@@ -37,6 +37,11 @@ def test_the_readmes_python_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert trajectory.complete
     assert trajectory.error_norm[-1] < 1e-10
     assert (tmp_path / "runs" / "first" / "motion.png").stat().st_size > 10_000
+    exec(mounted, names)
+    controller = names["controller"]
+    assert isinstance(controller, nmm.Controller)
+    assert controller.robot.q_names[3] == "steering"
+    assert len(controller(0.0, controller.robot.q({"ur5_elbow_joint": 1.0, "ur5_wrist_2_joint": 1.0}))) == 8
 
 
 @pytest.mark.parametrize(

@@ -210,9 +210,7 @@ class ReducedGradient(Resolver):
         options = np.array([*flags, *itertools.chain.from_iterable(candidates)], dtype=np.int64)
         state = np.full(1 + shape.s, -1, dtype=np.int64)
         state[0] = 0
-        c: Sequence[float] | Array = (
-            [] if self.weights is None else 1.0 / np.sqrt(weight_diagonal(self.weights, shape))
-        )
+        c = np.zeros(0) if self.weights is None else weight_diagonal(self.weights, shape) ** -0.5
         return Setup(np.array([self.alpha, self.threshold, self.tolerance, *c]), options, state)
 
     @staticmethod
