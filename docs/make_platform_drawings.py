@@ -11,9 +11,6 @@ from collections.abc import Callable
 
 from top_view import ANGLE, AXIS, BODY, FOLDER, INK, INPUT, LENGTH, Body, Drawing
 
-#: What another page's drawings are made with too.
-__all__ = ["ANGLE", "AXIS", "BODY", "FOLDER", "INK", "INPUT", "LENGTH", "Body", "Drawing"]
-
 TILT = math.radians(25.0)
 
 

@@ -166,10 +166,9 @@ class Controller:
     def _fail(self, t: float, q: Array) -> None:
         self.robot.q(q)  # a q that is not finite is the caller's error
         problem = self.robot.platform.problem(q[: self.robot.platform.n_p])
-        if problem is not None:
-            raise SingularError(f"at t = {t:g} s: {problem}")
         status = Status(int(self._results.report[0]))
-        raise SingularError(f"at t = {t:g} s: {status.meaning}")
+        also = "" if problem is None else f"; {problem}"
+        raise SingularError(f"at t = {t:g} s: {status.meaning}{also}")
 
     def evaluate(self, t: float, q: ArrayLike) -> Step:
         """All quantities at (t, q); a singular matrix is reported in `status`, not raised.

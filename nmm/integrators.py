@@ -91,7 +91,10 @@ class Adaptive:
         while solver.status == "running":
             message = solver.step()
             if solver.status == "failed":
-                raise RunError(f"at t = {solver.t:g} s: {message}")
+                raise RunError(
+                    f"at t = {solver.t:g} s: {message.rstrip('.')}: the inputs change without bound "
+                    "there, as near a singular configuration"
+                )
         ahead: Array = solver.y
         return ahead
 

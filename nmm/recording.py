@@ -19,6 +19,8 @@ from nmm.trajectory import Outcome, Trajectory
 
 #: Below this ratio of smallest to largest singular value a run is warned about.
 NEARLY_SINGULAR = 1e-3
+#: The task error grows by less than this in one step, times 1 + its size (m, rad): feedback lets it fall.
+JUMP = 0.01
 
 
 class Recorder:
@@ -59,6 +61,21 @@ class Recorder:
         half = self._count // 2
         return bool(half and error[half:].max() > 0.1 * error[:half].max())
 
+    @property
+    def jump(self) -> str | None:
+        """Where the task error grew in one step as no feedback lets it, unless the target itself jumped."""
+        r_d, error = self._rows[1, : self._count], np.linalg.norm(self._rows[2, : self._count], axis=1)
+        grown = np.diff(error) - np.linalg.norm(np.diff(r_d, axis=0), axis=1)
+        if not grown.size:
+            return None
+        k = int(np.argmax(grown))
+        if grown[k] < JUMP * (1.0 + error[k]):
+            return None
+        return (
+            f"at t = {self._times[k]:.4g} s the task error jumped from {error[k]:.3g} to {error[k + 1]:.3g} "
+            "in one step: a singular configuration was passed between two samples"
+        )
+
     def add(self, sample: Step) -> None:
         """Record one sample."""
         self._write(self._count, sample)
@@ -85,7 +102,9 @@ class Recorder:
         names = ", ".join(self._controller.robot.u_names[column] for column in sample.partition)
         warning = f"the block Ja of [{names}] became singular and no other candidate was better"
         if not any(warning in said for said in self.warnings):
-            self.warnings.append(f"at t = {sample.t:.3g} s {warning}: give more partitions")
+            automatic = getattr(self._controller.resolver, "automatic", False)
+            advice = "J itself is close to losing rank" if automatic else "give more partitions"
+            self.warnings.append(f"at t = {sample.t:.3g} s {warning}: {advice}")
 
     def _warn_of_singularities(self, singular_values: Array) -> None:
         if not len(singular_values):

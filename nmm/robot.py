@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -144,6 +145,17 @@ class Robot:
         return limits
 
     @cached_property
+    def fingerprint(self) -> str:
+        """A digest of coordinates, inputs, geometry and platform: the same for robots that move alike."""
+        model, platform = self.model, self.platform
+        numbers = [placement.homogeneous.ravel() for placement in model.jointPlacements]
+        numbers += [frame.placement.homogeneous.ravel() for frame in model.frames] + [platform.parameters]
+        names = [*self.q_names, *self.u_names, platform.name, *(frame.name for frame in model.frames)]
+        # Rounded: another machine's last digit is no other robot.
+        text = "\n".join([*names, *(f"{number:.6f}" for number in np.concatenate(numbers) + 0.0)])
+        return hashlib.sha256(text.replace("-0.000000", "0.000000").encode()).hexdigest()[:16]
+
+    @cached_property
     def groups(self) -> Mapping[str, tuple[str, ...]]:
         """Inputs that are spoken of together: "platform", "arm" (all joints), and each arm by its name."""
         p = self.platform.p
@@ -185,11 +197,12 @@ class Robot:
             )
             if not lower - slack <= value <= upper + slack
         ]
-        if outside:
-            raise InputError(f"{self.name}: outside its limits: {', '.join(outside)}")
+        complaints = [f"outside its limits: {', '.join(outside)}"] if outside else []
         problem = self.platform.problem(q[: self.platform.n_p])
         if problem is not None:
-            raise InputError(f"{self.name}: {problem}")
+            complaints.append(problem)
+        if complaints:
+            raise InputError(f"{self.name}: {'; '.join(complaints)}")
 
     def coordinate(self, name: str) -> int:
         """Index of a coordinate in q; `InputError` lists the names."""

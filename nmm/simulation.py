@@ -107,6 +107,8 @@ def simulate(
             recorder.warnings.append(f"for part of the run {advice}")
         else:
             message = f"{message}; {advice}"
+    if outcome is Outcome.COMPLETED and recorder.jump is not None:
+        outcome, message = Outcome.UNSTABLE, recorder.jump
     return recorder.trajectory(outcome, message, dt, method)
 
 

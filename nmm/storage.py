@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import yaml
 
-from nmm.errors import InputError
+from nmm.errors import InputError, RobotError
 from nmm.summary import FORMAT
 
 if TYPE_CHECKING:
+    from nmm.robot import Robot
     from nmm.trajectory import Trajectory
 
 ARRAYS = ("t", "q", "u", "q_dot", "r", "r_d", "error", "objective", "sigma_min", "partition", "residual")
@@ -104,9 +105,23 @@ def save(trajectory: Trajectory, folder: str | Path, *, figures: bool = True, ht
     return Path(folder)
 
 
-def load(folder: str | Path) -> Trajectory:
-    """Read a run's folder; `InputError` names what is missing."""
-    from nmm.loading import load as load_robot
+#: What to do about a robot that was put together in Python.
+_ASK = "give the robot that it ran on: Trajectory.load(folder, robot)"
+
+
+def load(folder: str | Path, robot: Robot | None = None) -> Trajectory:
+    """Read a run's folder.
+
+    Parameters
+    ----------
+    folder : written by `save`
+    robot : the robot of the run; needed where it was neither a scenario's nor loaded from one file alone
+        (mounted, with locked joints, on a platform that was given)
+
+    Raises
+    ------
+    InputError : names what is missing, or says that the robot is another
+    """
     from nmm.scenario import Scenario
     from nmm.trajectory import Outcome, Trajectory
 
@@ -123,10 +138,12 @@ def load(folder: str | Path) -> Trajectory:
     scenario = None
     if (folder / "scenario.yaml").exists():
         loaded = Scenario.load(folder / "scenario.yaml")
-        scenario, robot = loaded.resolved(), loaded.robot()
-    else:
-        source = summary["robot"]
-        robot = load_robot(source["source"], arguments=source["arguments"])
+        scenario = loaded.resolved()
+        robot = loaded.robot() if robot is None else robot
+    elif robot is None:
+        robot = _from_its_file(folder, summary["robot"])
+    if robot.fingerprint != summary["robot"].get("fingerprint", robot.fingerprint):
+        raise InputError(f"{folder}: {robot.name} is another robot than the run's ({_ASK})")
     return Trajectory(
         robot=robot,
         r_names=tuple(summary["r_names"]),
@@ -141,6 +158,16 @@ def load(folder: str | Path) -> Trajectory:
         scenario=scenario,
         **arrays,
     )
+
+
+def _from_its_file(folder: Path, said: dict[str, Any]) -> Robot:
+    """The robot of the file that a run names."""
+    from nmm.loading import load as load_robot
+
+    try:
+        return load_robot(said["source"], arguments=said["arguments"])
+    except RobotError as error:
+        raise InputError(f"{folder}: its robot {said['name']} cannot be loaded ({_ASK}): {error}") from None
 
 
 def _arrays(trajectory: Trajectory) -> dict[str, Any]:

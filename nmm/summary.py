@@ -29,7 +29,12 @@ def summarise(trajectory: Trajectory) -> dict[str, Any]:
         "complete": trajectory.complete,
         "message": trajectory.message,
         "warnings": list(trajectory.warnings),
-        "robot": {"name": robot.name, "source": robot.source, "arguments": dict(robot.arguments)},
+        "robot": {
+            "name": robot.name,
+            "source": robot.source,
+            "arguments": dict(robot.arguments),
+            "fingerprint": robot.fingerprint,
+        },
         "platform": robot.platform.name,
         "resolver": trajectory.resolver,
         "method": trajectory.method,

@@ -120,11 +120,16 @@ class Trajectory:
         return save(self, folder, figures=figures, html=html)
 
     @staticmethod
-    def load(folder: str | Path) -> Trajectory:
-        """Read a run's folder; `InputError` when it is none."""
+    def load(folder: str | Path, robot: Robot | None = None) -> Trajectory:
+        """Read a run's folder; with the robot it ran on, if that was put together in Python.
+
+        Raises
+        ------
+        InputError : it is no run's folder, or its robot cannot be loaded, or is another one
+        """
         from nmm.storage import load
 
-        return load(folder)
+        return load(folder, robot)
 
     def plot(self) -> Figure:
         """One figure that shows the run: the motion from above, errors, objective, inputs."""

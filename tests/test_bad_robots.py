@@ -661,7 +661,7 @@ def test_nothing_gets_past_the_checks(tmp_path: Path, capfd: pytest.CaptureFixtu
 
 
 def test_pinocchio_alone_would_not_say(capfd: pytest.CaptureFixture[str]) -> None:
-    """Why there is a check: the cause is on C's standard error, or nowhere (FACTS that may change)."""
+    """Why there is a check: the cause is on C's standard error, or nowhere (which may change)."""
     for text in (BAD["two roots"][0], BAD["revolute without limit"][0], BAD["unknown parent"][0]):
         with pytest.raises(ValueError, match="does not contain a valid URDF"):
             pin.buildModelFromXML(text)

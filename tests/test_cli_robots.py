@@ -82,7 +82,7 @@ def test_info_tells_units_limits_and_groups(run: Command, tmp_path: Path) -> Non
     assert inputs["q"] == ["rad/s", "arm", "1"]
     assert result.value("group platform:") == "v, steering_rate"
     assert result.value("group arm:") == "q"
-    assert result.value("platform wheelbase:") == "0.8"
+    assert result.value("platform wheelbase:") == "0.8 m"
     assert "platform: car, declared in the file" in result.out
     assert rows(result, "wheel")["left_wheel"][:2] == ["0.1", "m"]
     assert result.value("position in the plane").split() == ["2", "3", "1"]

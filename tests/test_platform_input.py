@@ -97,7 +97,9 @@ def test_input_limits(kind: str) -> None:
 def test_coordinate_limits() -> None:
     limits = Car(1.0, max_steering=0.6).coordinate_limits
     np.testing.assert_array_equal(limits, [[-np.inf, np.inf]] * 3 + [[-0.6, 0.6]])
-    assert np.all(np.isinf(Car(1.0).coordinate_limits))
+    # Without a limit of its own, a rear-driven car's steering ends where its wheels' axes contradict.
+    np.testing.assert_allclose(Car(1.0).coordinate_limits[3], [-np.pi / 2, np.pi / 2], atol=1e-5)
+    assert np.all(np.isinf(FrontDriveCar(1.0).coordinate_limits))
     assert FrontDriveCar(1.0, max_steering=pi).coordinate_limits[3, 1] == pi
     tractor = Tractor([Trailer(1.0), Trailer(1.0, joint="hitch2", max_angle=1.2)])
     np.testing.assert_array_equal(tractor.coordinate_limits, [[-np.inf, np.inf]] * 4 + [[-1.2, 1.2]])

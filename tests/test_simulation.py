@@ -194,3 +194,18 @@ def test_bad_input_is_refused(robot_2r: Robot, change: dict, words: str) -> None
     q0, duration = arguments.pop("q0"), arguments.pop("duration")
     with pytest.raises(nmm.InputError, match=words):
         nmm.simulate(case_1(robot_2r), q0, duration, **arguments)
+
+
+def test_a_singularity_passed_between_two_samples_is_no_success() -> None:
+    """A trailer's arm without a posture to keep: the reduced gradient runs it into its end of reach."""
+    run = nmm.Scenario.load("small_arm_second_trailer", {"objective": None}).run()
+    assert run.outcome == "unstable"
+    assert "a singular configuration was passed between two samples" in run.message
+
+
+def test_a_target_that_jumps_is_not_taken_for_a_singularity(robot_2r: nmm.Robot) -> None:
+    step = nmm.CallableReference(lambda t: [1.0 if t < 0.5 else 1.3, 0.2], 2, rate=lambda t: [0.0, 0.0])
+    task = nmm.Task(nmm.Position("ee", "xy"), step, 5.0)
+    run = nmm.simulate(nmm.Controller(robot_2r, task, nmm.ProjectedGradient()), {"q2": 0.7}, 2.0, 0.01)
+    assert run.complete, run.message
+    assert run.error_norm[-1] < 1e-3

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -142,3 +143,34 @@ def test_no_redundancy_left_is_legal_and_said(robot_2r: nmm.Robot) -> None:
         assert run.complete
         assert run.error_norm[-1] < 1e-3 * run.error_norm[0]
         assert any("no redundancy is left" in warning for warning in run.summary()["warnings"])
+
+
+UR5 = "package://example-robot-data/robots/ur_description/urdf/ur5_robot.urdf"
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        lambda: nmm.mount("car_base", "small_arm", prefix="a_"),
+        lambda: nmm.load("unicycle_3r", lock={"q3": 0.4}),
+        lambda: nmm.load(UR5, platform="fixed"),
+        lambda: nmm.load("unicycle_2r", platform="differential"),
+        lambda: nmm.load("car_base", platform="front_drive_car"),
+        lambda: nmm.load("differential_base", platform=nmm.DifferentialDrive(0.2, 0.5)),
+        lambda: nmm.load("unicycle_2r", axle=(0.1, 0.0)),
+    ],
+    ids=["mounted", "locked", "fixed", "by wheel speeds", "by its front", "other wheels", "other axle"],
+)
+def test_a_robot_put_together_in_python_is_asked_for(made: Callable[[], nmm.Robot], tmp_path: Path) -> None:
+    """Its file alone would be another robot: that is refused, not taken silently."""
+    robot = made()
+    task = nmm.Task(nmm.Coordinates(robot.q_names[-1]), nmm.Line([0.0], [0.1], 0.2))
+    run = nmm.simulate(nmm.Controller(robot, task, nmm.ProjectedGradient()), np.zeros(robot.n), 0.2, 0.1)
+    run.save(tmp_path / "run", figures=False)
+    with pytest.raises(nmm.InputError, match=r"give the robot that it ran on: Trajectory\.load"):
+        nmm.Trajectory.load(tmp_path / "run")
+    again = nmm.Trajectory.load(tmp_path / "run", made())
+    np.testing.assert_array_equal(again.q, run.q)
+    assert again.robot.u_names == robot.u_names
+    with pytest.raises(nmm.InputError, match="is another robot than the run's"):
+        nmm.Trajectory.load(tmp_path / "run", nmm.load("unicycle_3r"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from math import degrees, isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from nmm.cli.output import show_table, show_text
 from nmm.errors import InputError
@@ -41,9 +41,9 @@ def describe_robot(
         raise InputError(
             "--platform, --lock, --axle and --package-dir are for ROBOT, a scenario says its own"
         )
-    robot = None
+    given: Robot | None = None
     if source is not None:
-        robot = load(
+        given = load(
             source,
             platform=platform,
             lock=lock,
@@ -58,12 +58,12 @@ def describe_robot(
     ]
     unfelt: Sequence[str] | None = None
     if scenario is not None:
-        name, controller, q0 = _of_scenario(scenario, robot)
+        name, controller, q0 = _of_scenario(scenario, given)
         from nmm.felt import unfelt_inputs
 
-        robot = controller.robot
+        given = controller.robot
         task, unfelt = [(name, len(controller.rows))], unfelt_inputs(controller, q0)
-    assert robot is not None  # there is a source, or a scenario
+    robot = cast("Robot", given)  # there is a source, or a scenario
     _show(robot, task)
     for name in unfelt or ():
         show_text(f"the task does not feel {name}: only the objective can use it")
@@ -108,7 +108,7 @@ def _show(robot: Robot, tasks: Sequence[tuple[str, int]]) -> None:
     for name, inputs in robot.groups.items():
         show_text(f"group {name}: {', '.join(inputs) or 'none'}")
     show_text(f"frames: {', '.join(robot.frames)}")
-    for name, value in _parameters(robot):
+    for name, value in robot.platform.described().items():
         show_text(f"platform {name}: {value}")
     show_text()
     if robot.wheels:
@@ -146,18 +146,6 @@ def _limit(value: float) -> str:
     return f"{value:.4g}" if isfinite(value) and abs(value) < UNBOUNDED else "-"
 
 
-def _parameters(robot: Robot) -> Iterator[tuple[str, str]]:
-    """The platform's own numbers and names, as it was measured or given; m and rad."""
-    for name, value in vars(robot.platform).items():
-        if isinstance(value, int | float):
-            yield name, f"{value:.6g}"
-        elif isinstance(value, str):
-            yield name, value
-        elif isinstance(value, tuple) and name not in ("coordinates", "inputs", "input_units"):
-            for i, item in enumerate(value):
-                yield f"{name} {i + 1}", str(item)
-
-
 def _wheel(wheel: Wheel) -> list[str]:
     return [
         wheel.joint,
@@ -176,13 +164,14 @@ def _redundancies(robot: Robot, tasks: Sequence[tuple[str, int]]) -> Iterator[li
 
 def _show_loading(robot: Robot) -> None:
     """What loading found and did."""
-    made: Provenance | None = getattr(robot.parts, "provenance", None)
+    from nmm.loading.provenance import provenance_of
+
+    made = provenance_of(robot)
     lines = [f"note: {note}" for note in robot.notes]
-    if made is not None:
-        if made.platform in _CHOSEN:
-            lines.insert(0, f"platform: {robot.platform.name}, {_CHOSEN[made.platform]}")
-        lines += [f"prefix of {arm}: {prefix}" for arm, prefix in made.prefixed.items()]
-        lines += _files(made)
+    if made.platform in _CHOSEN:
+        lines.insert(0, f"platform: {robot.platform.name}, {_CHOSEN[made.platform]}")
+    lines += [f"prefix of {arm}: {prefix}" for arm, prefix in made.prefixed.items()]
+    lines += _files(made)
     if lines:
         show_text()
     for line in lines:

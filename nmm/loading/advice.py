@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from nmm.loading.check_mimics import leaders_to_lock
 from nmm.loading.findings import Findings, Problem, child, children
-from nmm.loading.leaders import leaders_to_lock
 from nmm.loading.xml_tree import Element
 
 #: A body heavier than this, kg, was probably not written in kg.

@@ -17,7 +17,7 @@ from nmm.arrays import array
 from nmm.errors import InputError, unknown
 from nmm.loading.chain import CHAIN_JOINTS, Head, rebuild, replaced_joints
 from nmm.loading.joint_kinds import is_continuous, is_simple, kind
-from nmm.loading.provenance import Parts, parts_of
+from nmm.loading.provenance import parts_of, provenance_of
 from nmm.loading.reduction import reduced
 from nmm.loading.root_layout import ROOTS, ChainRoot, RootLayout
 from nmm.robot import Robot
@@ -215,11 +215,8 @@ class PinocchioLayout:
     def _matched(self) -> tuple[list[tuple[int, int]], dict[int, float]]:
         """Joints of the model with the columns of q, and those that stand at a value."""
         robot, model = self.robot, self.model
-        parts = robot.parts
-        held = {}
-        if isinstance(parts, Parts):
-            held = dict(parts.provenance.locked)
-            held |= {name: value for name, (_, value) in parts.provenance.mimicked.items()}
+        made = provenance_of(robot)
+        held = {**made.locked, **{name: value for name, (_, value) in made.mimicked.items()}}
         standing = {name for wheel in robot.wheels for name in (wheel.swivel, wheel.joint)}
         own = list(robot.q_names[self._n_root :])
         pairs, still = [], {}

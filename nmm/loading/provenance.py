@@ -70,6 +70,11 @@ class Parts:
     provenance: Provenance = field(default_factory=Provenance)
 
 
+def provenance_of(robot: Robot) -> Provenance:
+    """What is known of the robot's making; nothing when `load` did not make it."""
+    return robot.parts.provenance if isinstance(robot.parts, Parts) else Provenance()
+
+
 def parts_of(robot: Robot) -> Parts:
     """The parts of a robot that was loaded.
 

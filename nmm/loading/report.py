@@ -11,11 +11,12 @@ from pathlib import Path
 from nmm.errors import InputError, RobotError
 from nmm.loading.advice import advice, joints_by_type
 from nmm.loading.check import find_problems
+from nmm.loading.check_mimics import leaders_to_lock
 from nmm.loading.description import Description, argument_texts, describe
 from nmm.loading.findings import Problem, child, children
-from nmm.loading.leaders import leaders_to_lock
 from nmm.loading.load import load
 from nmm.loading.packages import Packages
+from nmm.loading.provenance import provenance_of
 from nmm.loading.second_opinion import second_opinion
 from nmm.loading.text import one_line, printable
 from nmm.loading.wheel_advice import wheel_advice
@@ -229,19 +230,13 @@ class _Report:
         return []
 
     def _about(self, robot: Robot) -> None:
-        locked = ", ".join(
-            f"{name} at {value:g}" for name, value in getattr(_made(robot), "locked", {}).items()
-        )
+        locked = ", ".join(f"{name} at {value:g}" for name, value in provenance_of(robot).locked.items())
         self.facts["platform"] = robot.platform.name
         self.facts["coordinates"] = f"{robot.n}: {', '.join(robot.q_names)}"
         self.facts["wheels"] = ", ".join(wheel.joint for wheel in robot.wheels) or "none"
         self.facts["mass"] = f"{sum(inertia.mass for inertia in robot.model.inertias):.4g} kg"
         if locked:
             self.facts["locked to load it"] = locked
-
-
-def _made(robot: Robot) -> object:
-    return getattr(robot.parts, "provenance", None)
 
 
 def _root(text: str) -> Element | None:

@@ -109,6 +109,10 @@ class Platform(ABC):
         whose rollers turn about its rolling direction; ±π/4 for a mecanum wheel."""
         return 0.0
 
+    def described(self) -> dict[str, str]:
+        """The parameters in words, with their units, for people."""
+        return {}
+
     @property
     def n_p(self) -> int:
         """Number of platform coordinates."""

@@ -109,12 +109,17 @@ class _Bicycle(Platform):
     def parameters(self) -> Array:
         return np.array([self.wheelbase])
 
+    def described(self) -> dict[str, str]:
+        widest = "no limit" if self.max_steering is None else f"{math.degrees(self.max_steering):.4g}°"
+        return {"wheelbase": f"{self.wheelbase:g} m", "steering": self.steering, "max_steering": widest}
+
     @property
     def coordinate_limits(self) -> Array:
-        """Those of the steering angle are ±max_steering, if given."""
+        """Those of the steering angle are ±max_steering or, with rear drive, where it ceases to steer."""
         limits = super().coordinate_limits
-        if self.max_steering is not None:
-            limits[3] = [-self.max_steering, self.max_steering]
+        widest = self._widest if self.max_steering is None else self.max_steering
+        if self.max_steering is not None or widest < math.pi:
+            limits[3] = [-widest, widest]
         return limits
 
     def pfaffian(self, qp: Array) -> Array:

@@ -79,6 +79,9 @@ class DifferentialDrive(Platform):
     def parameters(self) -> Array:
         return np.array([self.radius, self.track])
 
+    def described(self) -> dict[str, str]:
+        return {"radius": f"{self.radius:g} m", "track": f"{self.track:g} m"}
+
     @property
     def velocity_map(self) -> Kernel:
         return differential_drive

@@ -96,6 +96,9 @@ class Mecanum(Platform):
     def parameters(self) -> Array:
         return np.array([self.radius, self.length, self.width])
 
+    def described(self) -> dict[str, str]:
+        return {"radius": f"{self.radius:g} m", "length": f"{self.length:g} m", "width": f"{self.width:g} m"}
+
     @property
     def velocity_map(self) -> Kernel:
         return mecanum

@@ -153,6 +153,13 @@ class Tractor(Platform):
                 limits[row] = [-trailer.max_angle, trailer.max_angle]
         return limits
 
+    def described(self) -> dict[str, str]:
+        return {
+            f"trailer at {trailer.joint}": f"hitch {trailer.hitch:g} m behind the axle ahead, length "
+            f"{trailer.length:g} m"
+            for trailer in self.trailers
+        }
+
     @property
     def velocity_map(self) -> Kernel:
         return tractor

@@ -63,5 +63,7 @@ def _text(value: object) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, list) and value:
-        return "".join(map(str, value))
+        if all(isinstance(item, str) for item in value):
+            return "".join(value)
+        return f"[{', '.join(map(_text, value))}]"
     return f"{value:g}" if isinstance(value, float) else str(value or "")

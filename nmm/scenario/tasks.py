@@ -31,8 +31,8 @@ class TaskPart(FunctionPart):
     """A function of the robot that follows a reference."""
 
     reference: Reference = Field(
-        description="the target: a number, numbers, or a mapping with a kind of reference (or position, "
-        "heading, coordinates: another point of the robot)"
+        description="the target: a number, numbers, or a mapping with a kind of reference, among them "
+        "functions of the configuration (position, orientation, heading, coordinates, ...)"
     )
     gain: Numbers | None = Field(
         1.0,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from nmm.errors import InputError
 from nmm.function import Function, Row, Stage
 from nmm.robot import Robot
 
@@ -25,4 +26,12 @@ class Comparison(Function):
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
         kernel, s = self.task.function.comparison, len(self.task.rows(robot))
-        return () if kernel is None else (Stage(kernel, s, before=2 * s),)
+        if kernel is None:
+            return ()
+        for part in (self.task.function, self.task.reference):
+            if max(stage.rows for stage in part.stages(robot)) != s:
+                raise InputError(
+                    f"{type(part).__name__}: expected stages of {s} rows, as many as its components, where "
+                    f"{type(self.task.function).__name__} compares it"
+                )
+        return (Stage(kernel, s, before=2 * s),)

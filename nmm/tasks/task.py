@@ -64,8 +64,9 @@ class Task:
                 f"{name}: expected a number, {s} numbers or a {s} x {s} matrix, got shape {gain.shape}"
             )
         if np.linalg.eigvalsh(gain + gain.T).min() <= 0.0:
+            came = one_line(array(self.gain, name))
             raise InputError(
-                f"{name}: expected positive definite (above 0; None for planning mode), got {one_line(gain)}"
+                f"{name}: expected positive definite (above 0; None for planning mode), got {came}"
             )
         return gain
 

@@ -124,6 +124,16 @@ class WheeledPlatform(Platform):
         """δ_s: independent steering rates of centred wheels; p = δ_m + δ_s."""
         return self.p - self.mobility
 
+    def described(self) -> dict[str, str]:
+        return {
+            **{
+                f"{type(wheel).__name__} {wheel.name}": f"at ({wheel.x:.4g}, {wheel.y:.4g}) m on "
+                f"{wheel.body}, radius {wheel.radius:.4g} m"
+                for wheel in self.wheels
+            },
+            **{f"Hitch {hitch.joint}": f"at ({hitch.x:.4g}, {hitch.y:.4g}) m" for hitch in self.hitches},
+        }
+
     def pfaffian(self, qp: Array) -> Array:
         """No sideways motion of a wheel on each independent axis, and steering that keeps axes concurrent."""
         rows = [row.at(self._bodies, qp) for row in self._structure.pfaffian]
