@@ -58,9 +58,7 @@ class Configuration:
 
     def center_of_mass(self) -> tuple[Array, Array]:
         """Centre of mass (3,) in the world, m, and its Jacobian in the coordinates, (3, n)."""
-        model, data = self.robot.model, self.robot.model.createData()
-        jacobian = np.array(pin.jacobianCenterOfMass(model, data, self.q, False), order="C")
-        return np.array(data.com[0]), jacobian
+        return _center_of_mass(self.robot)(self.q)
 
     def hessian(self, frame: str) -> Array:
         """H[i, j, k] = d jacobian[i, j] / dq[k], shape (6, n, n).
@@ -118,6 +116,26 @@ def kinematics_updater(
     return update_with_hessians if hessians.size else update
 
 
+def _center_of_mass(robot: Robot) -> Callable[[Array], tuple[Array, Array]]:
+    """com(q) -> centre of mass (3,) and its Jacobian (3, n), with what stands still.
+
+    Pinocchio leaves out the mass on the universe, the root link's of a fixed base.
+    """
+    model, data = robot.model, robot.model.createData()
+    standing = model.inertias[0]
+    moving = sum(inertia.mass for inertia in list(model.inertias)[1:])
+    share = moving / (moving + standing.mass)
+    fixed_part = (1.0 - share) * np.array(standing.lever)
+
+    def at(q: Array) -> tuple[Array, Array]:
+        jacobian = np.array(pin.jacobianCenterOfMass(model, data, q, False), order="C")
+        if share == 0.0:
+            return fixed_part, np.zeros_like(jacobian)
+        return share * np.array(data.com[0]) + fixed_part, share * jacobian
+
+    return at
+
+
 def _with_center_of_mass(
     robot: Robot, frames: tuple[str, ...], placements: Array, jacobians: Array, hessians: Array
 ) -> Callable[[float, Array], None]:
@@ -129,7 +147,7 @@ def _with_center_of_mass(
     update_others = kinematics_updater(
         robot, tuple(frames[k] for k in others), other_placements, other_jacobians, other_hessians
     )
-    model, data = robot.model, robot.model.createData()
+    center_of_mass = _center_of_mass(robot)
     placements[slot, :, :3] = np.eye(3)
 
     def update(t: float, q: Array) -> None:
@@ -137,8 +155,7 @@ def _with_center_of_mass(
         placements[others], jacobians[others] = other_placements, other_jacobians
         if hessians.size:
             hessians[others] = other_hessians  # no function asks for that of the centre of mass
-        jacobians[slot, :3] = pin.jacobianCenterOfMass(model, data, q, False)
-        placements[slot, :, 3] = data.com[0]
+        placements[slot, :, 3], jacobians[slot, :3] = center_of_mass(q)
 
     return update
 

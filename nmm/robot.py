@@ -90,6 +90,12 @@ class Robot:
             raise InputError(
                 f"{self.name}: expected one number per joint, got nq {self.model.nq}, nv {self.model.nv}"
             )
+        shared = [name for name in self.q_names[self.platform.n_p :] if name in self.platform.inputs]
+        if shared:
+            raise InputError(
+                f"{self.name}: joints have the names of inputs of the {self.platform.name} platform: "
+                f"{', '.join(shared)}"
+            )
         head = self.q_names[: self.platform.n_p]
         if head != self.platform.coordinates:
             raise InputError(
@@ -140,8 +146,21 @@ class Robot:
     def u_limits(self) -> Array:
         """Largest absolute value of each input, (n_u,): the platform's, then the joints' velocity limits."""
         arm = np.array(self.model.velocityLimit[self.platform.n_p :])
-        limits = np.concatenate([self.platform.input_limits, np.where(arm > 0.0, arm, np.inf)])
+        limits = np.concatenate([self._platform_limits(), np.where(arm > 0.0, arm, np.inf)])
         limits.flags.writeable = False
+        return limits
+
+    def _platform_limits(self) -> Array:
+        """Those of the platform, and of its own joints where an input is one's rate (a steering rate)."""
+        platform = self.platform
+        limits = platform.input_limits
+        if platform.n_p > 3:
+            G = platform.G(np.zeros(platform.n_p))
+            for column in range(platform.p):
+                (rows,) = np.nonzero(G[:, column])
+                if len(rows) == 1 and rows[0] >= 3 and G[rows[0], column] == 1.0:
+                    own = float(self.model.velocityLimit[rows[0]])
+                    limits[column] = min(limits[column], own if own > 0.0 else np.inf)
         return limits
 
     @cached_property

@@ -14,6 +14,7 @@ from nmm.errors import DivergedError, InputError, RunError, SingularError
 from nmm.felt import idle_inputs
 from nmm.integrators import Integrator, integrator
 from nmm.recording import Recorder
+from nmm.slip import told as told_slip
 from nmm.stability import Instability, find_instability
 from nmm.trajectory import Outcome, Trajectory
 
@@ -75,6 +76,7 @@ def simulate(
     advance = integrator(method, robot, positive(tolerance, "tolerance"))
     recorder = Recorder(controller, times)
     outcome, message = Outcome.COMPLETED, ""
+    recorder.warnings += told_slip(robot)
     idle = idle_inputs(controller, q)
     if idle:
         recorder.warnings.append(

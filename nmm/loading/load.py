@@ -80,6 +80,8 @@ def load(
     try:
         if lock is not None and not isinstance(lock, Mapping):
             raise RobotError(f"lock: expected a value for each joint's name, got {lock!r}")
+        if name is not None and not isinstance(name, str):
+            raise RobotError(f"name: expected a string, got {name!r}")
         if limits is not None and not isinstance(limits, Mapping):
             raise RobotError(f"limits: expected a value for each input's name, got {limits!r}")
         options = Options(platform, wheels, lock or {}, axle, name, limits or {})

@@ -21,6 +21,7 @@ from nmm.loading.source import Source
 from nmm.loading.wheels import find_wheels
 from nmm.platforms import Layout, Platform, Unicycle, platform_by_name
 from nmm.robot import Robot, Wheel
+from nmm.slip import told as told_slip
 
 #: Adds its pairs to the collision shapes on a model.
 AddPairs = Callable[[pin.Model, pin.GeometryModel], None]
@@ -140,7 +141,7 @@ def _without_wheels(
                 f"{len(solid.collisionPairs)} collision pairs: none within a body or across one joint"
             )
     model.name = whole.name = options.name or source.name
-    return Robot(
+    robot = Robot(
         name=model.name,
         model=model,
         collision_model=solid,
@@ -153,6 +154,7 @@ def _without_wheels(
         notes=(*parts.notes, *notes),
         parts=replace(parts, provenance=replace(parts.provenance, reduced=tuple(names))),
     )
+    return replace(robot, notes=(*robot.notes, *told_slip(robot)))
 
 
 def _with_held_wheels(display: Rebuilt, asked: Sequence[str] | Mapping[str, float], where: str) -> Rebuilt:

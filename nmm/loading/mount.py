@@ -17,7 +17,7 @@ from nmm.loading.collision_pairs import add_pairs
 from nmm.loading.load import load
 from nmm.loading.models import Options, robot_from
 from nmm.loading.provenance import Parts, parts_of
-from nmm.loading.reduction import reduced
+from nmm.loading.reduction import reduced, told_apart
 from nmm.loading.source import Source
 from nmm.loading.text import printable
 from nmm.platforms import Unicycle
@@ -49,8 +49,9 @@ def mount(
     platform : a robot from `load` or `mount`, or what `load` takes. It keeps its platform, wheels and arms
     arm : another; of a mobile robot all but its x, y and theta is mounted, with its wheels standing still
     at : frame of the platform that carries the arm; by default the one that is named mount, arm_mount or top
-    placement : of the arm's root link in that frame: a pin.SE3, a matrix (4, 4), or position and roll, pitch,
-        yaw (about fixed axes, as in a URDF), (xyz, rpy), m and rad. None: on the frame itself
+    placement : of the arm's root link (of its reference point, if it was loaded with `axle`) in that frame:
+        a pin.SE3, a matrix (4, 4), or position and roll, pitch, yaw (about fixed axes, as in a URDF),
+        (xyz, rpy), m and rad. None: on the frame itself
     prefix : put before the names of the arm's joints, frames and shapes; by default none, or the arm's name
         and _ where names clash. The arm is called by it (without the _) in `Robot.arms` and `Robot.groups`
     name : the robot's name; by default "PLATFORM with ARM"
@@ -70,9 +71,10 @@ def mount(
     >>> robot.q_names
     ('x', 'y', 'theta', 'q1', 'q2', 'second_q1', 'second_q2')
     """
+    if name is not None and not isinstance(name, str):
+        raise RobotError(f"name: expected a string, got {name!r}")
     base = platform if isinstance(platform, Robot) else load(platform)
-    # Whatever platform the arm's file declares, only its joints are wanted.
-    other = arm if isinstance(arm, Robot) else load(arm, platform=Unicycle())
+    other = arm if isinstance(arm, Robot) else _loaded_arm(arm)
     try:
         return _mounted(base, other, at, _pose(placement), prefix, name)
     except RobotError as error:
@@ -236,8 +238,13 @@ def _appended(
     kinds = (pin.FrameType.BODY, pin.FrameType.OP_FRAME)
     kind = next((kind for kind in kinds if model.existFrame(frame, kind)), None)
     index = model.getFrameId(frame) if kind is None else model.getFrameId(frame, kind)
-    whole, visual = pin.appendModel(model, body.model, platform.visual, body.visual, index, pose)
-    _, collision = pin.appendModel(model, body.model, platform.collision, body.collision, index, pose)
+    below, names = told_apart(model, "&below")
+    above, more = told_apart(body.model, "&above")
+    names |= more
+    whole, visual = pin.appendModel(below, above, platform.visual, body.visual, index, pose)
+    _, collision = pin.appendModel(below, above, platform.collision, body.collision, index, pose)
+    for joined in whole.frames:
+        joined.name = names.get(joined.name, joined.name)
     # It forgets the armature.
     for part in (model, body.model):
         for joint in range(1, part.njoints):
@@ -252,13 +259,21 @@ def _told(base: Robot, arm: Robot, key: str, frame: str, prefix: str) -> str:
     return f"{arm.name} mounted{known} at {frame} of {base.name}{named}"
 
 
+def _loaded_arm(source: str | Path | pin.Model) -> Robot:
+    """The robot of a file whose arm is wanted: its platform matters only for which wheels stand still."""
+    try:
+        return load(source)
+    except RobotError:
+        return load(source, platform=Unicycle())
+
+
 def _pose(placement: pin.SE3 | ArrayLike | Sequence[ArrayLike] | None) -> pin.SE3:
     """A pose from the forms that `mount` takes."""
     if placement is None:
         return pin.SE3.Identity()
-    if isinstance(placement, pin.SE3):
-        return placement
     try:
+        if isinstance(placement, pin.SE3):
+            return _from_matrix(array(placement.homogeneous, "placement"))
         if isinstance(placement, Sequence) and len(placement) == 2:
             xyz, rpy = (vector(part, 3, name) for part, name in zip(placement, ("xyz", "rpy"), strict=True))
             return pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz)

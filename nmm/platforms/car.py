@@ -14,7 +14,16 @@ from nmm.compiled import PLATFORM, Kernel, kernel
 from nmm.errors import InputError
 from nmm.platforms.base import Array, Platform
 from nmm.platforms.layout import Layout, Pivot
-from nmm.platforms.measuring import NEAR, check_axle, misfit, say_pivots, symmetric_limit
+from nmm.platforms.measuring import (
+    NEAR,
+    check_axle,
+    misfit,
+    rolls_forward,
+    say_pivots,
+    say_wheels,
+    symmetric_limit,
+    wheels_on,
+)
 from nmm.platforms.own_joints import coordinates_with
 
 #: |cos δ| below which a steering angle counts as 90 degrees.
@@ -100,6 +109,10 @@ class _Bicycle(Platform):
             wrong = f"there are {len(named)}" if named else "there is none"
             raise misfit(layout, cls.name, expected, wrong, say_pivots(layout.pivots))
         check_axle(layout, cls.name)
+        for wheel in wheels_on(layout, named[0].joint):
+            if abs(wheel.x) > NEAR or not rolls_forward(wheel):
+                expected = "the steered wheel below its steering axis, rolling ahead (see platform wheeled)"
+                raise misfit(layout, cls.name, expected, "it is off it or turned", say_wheels([wheel]))
         limit = symmetric_limit(named[0])
         if limit is not None and limit > cls._widest:
             limit = None
