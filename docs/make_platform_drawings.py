@@ -9,7 +9,7 @@ import cmath
 import math
 from collections.abc import Callable
 
-from top_view import ANGLE, AXIS, BODY, FOLDER, INK, INPUT, LENGTH, Body, Drawing
+from top_view import ANGLE, AXIS, BODY, FOLDER, INK, Body, Drawing
 
 TILT = math.radians(25.0)
 

@@ -78,7 +78,7 @@ def test_info_tells_units_limits_and_groups(run: Command, tmp_path: Path) -> Non
     assert coordinates["steering"] == ["rad", "platform", "-0.5", "0.5"]
     assert coordinates["q"] == ["rad", "arm", "-1", "1"]
     assert tuple(inputs) == loaded.u_names
-    assert inputs["steering_rate"] == ["rad/s", "platform", "-"]
+    assert inputs["steering_rate"] == ["rad/s", "platform", "1"]
     assert inputs["q"] == ["rad/s", "arm", "1"]
     assert result.value("group platform:") == "v, steering_rate"
     assert result.value("group arm:") == "q"

@@ -52,11 +52,11 @@ def test_a_run_says_it_once(car: Robot) -> None:
 
 
 def test_the_objective_moves_what_the_task_does_not_feel(car: Robot) -> None:
-    squares = nmm.Quadratic(nmm.Square("steering", 0.4), nmm.Square("q5", -0.3))
+    squares = nmm.Quadratic(nmm.Square("steering", 0.15), nmm.Square("q5", -0.3))
     run = nmm.simulate(controller(car, squares), START, 2.0, 0.01)
     assert run.warnings == ()
     # Alone in their columns, they go to their targets as the gradient's flow says: e(t) = e(0) exp(-alpha t).
-    for name, target in (("steering", 0.4), ("q5", -0.3)):
+    for name, target in (("steering", 0.15), ("q5", -0.3)):
         reached = run.q[:, car.coordinate(name)]
         np.testing.assert_allclose(reached, target * (1 - np.exp(-10 * run.t)), atol=1e-6)
     assert np.abs(run.error[-1]).max() < 0.15 * np.abs(run.error[0]).max()

@@ -20,7 +20,7 @@ from nmm.loading.provenance import Parts, parts_of
 from nmm.loading.reduction import reduced, told_apart
 from nmm.loading.source import Source
 from nmm.loading.text import printable
-from nmm.platforms import Unicycle
+from nmm.platforms import Fixed
 from nmm.robot import Robot
 
 # Frames on which something is meant to be mounted.
@@ -263,8 +263,8 @@ def _loaded_arm(source: str | Path | pin.Model) -> Robot:
     """The robot of a file whose arm is wanted: its platform matters only for which wheels stand still."""
     try:
         return load(source)
-    except RobotError:
-        return load(source, platform=Unicycle())
+    except InputError:  # on no platform then: a joint may be called v, and a declared platform need not fit
+        return load(source, platform=Fixed())
 
 
 def _pose(placement: pin.SE3 | ArrayLike | Sequence[ArrayLike] | None) -> pin.SE3:

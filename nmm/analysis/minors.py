@@ -1,0 +1,151 @@
+"""Maximal minors of J by the names of their columns: all of them are zero where J loses rank."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TypeAlias
+
+import numpy as np
+
+from nmm.arrays import Array, Integers
+from nmm.errors import InputError, unknown
+
+#: A minor's columns: names of inputs, or "v, omega, q2".
+Columns: TypeAlias = str | Sequence[str]
+#: Which minors: all, none, or those listed.
+Choice: TypeAlias = bool | Sequence[Columns]
+
+MOST_MINORS = 20_000
+#: How many numbers may be in the square blocks whose determinants are taken at once.
+BLOCK = 4_000_000
+#: A determinant this small beside the product of its columns' lengths (Hadamard's bound) is rounding.
+ROUNDING = 1e-12
+
+
+class Minors(Mapping[tuple[str, ...], float | Array]):
+    """Minors keyed by tuples of input names: `minors["v", "q2"]`, or `minors["v, q2"]`.
+
+    A key may name the columns in any order; an odd permutation changes the sign. Unknown keys raise
+    `InputError`, with the names that exist.
+
+    Attributes
+    ----------
+    columns (count, s) : indices of the columns of each minor, in the order of the names
+    array (..., count) : their values, in the product of the rows' units over that of the inputs; with leading
+        axes, such as the samples of a trajectory, an item is an array
+    inputs : names of J's columns
+    """
+
+    def __init__(self, columns: Integers, values: Array, inputs: Sequence[str]) -> None:
+        self.columns = columns
+        self.array = values
+        self.inputs = tuple(inputs)
+        self._place = {tuple(sorted(map(int, row))): i for i, row in enumerate(columns)}
+
+    @property
+    def names(self) -> tuple[tuple[str, ...], ...]:
+        """The keys, in order."""
+        return tuple(tuple(self.inputs[j] for j in row) for row in self.columns)
+
+    def _find(self, key: Columns) -> tuple[int, float]:
+        wanted = column_indices(key, self.inputs, self.columns.shape[1])
+        place = self._place.get(tuple(sorted(wanted)))
+        if place is None:
+            raise InputError(f"minor {', '.join(split(key))}: not among those chosen")
+        own = [int(j) for j in self.columns[place]]
+        return place, _sign([own.index(j) for j in wanted])
+
+    def __getitem__(self, key: Columns) -> float | Array:
+        place, sign = self._find(key)
+        value = sign * self.array[..., place]
+        return float(value) if value.ndim == 0 else value
+
+    def __contains__(self, key: object) -> bool:
+        try:
+            self._find(key)  # type: ignore[arg-type]
+        except (InputError, TypeError):
+            return False
+        return True
+
+    def __iter__(self) -> Iterator[tuple[str, ...]]:
+        return iter(self.names)
+
+    def __len__(self) -> int:
+        return len(self.columns)
+
+
+def _sign(permutation: Sequence[int]) -> float:
+    swaps = sum(a > b for a, b in itertools.combinations(permutation, 2))
+    return -1.0 if swaps % 2 else 1.0
+
+
+def split(key: Columns) -> tuple[str, ...]:
+    """The names in a key."""
+    return tuple(part.strip() for part in key.split(",")) if isinstance(key, str) else tuple(key)
+
+
+def column_indices(key: Columns, inputs: Sequence[str], s: int) -> tuple[int, ...]:
+    """Indices of s different columns; `InputError` for an unknown name or another number of them."""
+    names = split(key)
+    for name in names:
+        if name not in inputs:
+            raise InputError(unknown("input", name, inputs, "minor"))
+    if len(names) != s or len(set(names)) != s:
+        raise InputError(
+            f"minor: expected {s} different inputs, as many as J has rows, got {', '.join(names)}"
+        )
+    return tuple(list(inputs).index(name) for name in names)
+
+
+def chosen_columns(choice: Choice, inputs: Sequence[str], s: int, most: int = MOST_MINORS) -> Integers:
+    """Columns (count, s) of the minors chosen.
+
+    Raises
+    ------
+    InputError : more minors than `most`; a name that is no input
+    """
+    if isinstance(choice, str):
+        raise InputError(f"minors: expected a list of them, as in [{choice!r}], got {choice!r}")
+    if choice is True:
+        count = math.comb(len(inputs), s)
+        if count > most:
+            raise InputError(
+                f"minors: J ({s} x {len(inputs)}) has {count}, expected at most {most}; "
+                "list those wanted, or ask for none (minors=False)"
+            )
+        listed = list(itertools.combinations(range(len(inputs)), s))
+    else:
+        listed = [] if choice is False else [column_indices(key, inputs, s) for key in choice]
+    return np.array(listed, dtype=np.int64).reshape(len(listed), s)
+
+
+def determinants(J: Array, columns: Integers) -> Array:
+    """det J[:, columns] of each row of columns (count, s), for J (..., s, m): shape (..., count)."""
+    s = J.shape[-2]
+    flat = J.reshape(-1, s, J.shape[-1])
+    found = np.empty((len(flat), len(columns)))
+    step = max(1, BLOCK // max(1, columns.size * s))
+    for first in range(0, len(flat), step):
+        block = flat[first : first + step][:, :, columns]  # (.., s, count, s)
+        found[first : first + step] = np.linalg.det(np.moveaxis(block, 1, 2))
+    return found.reshape(*J.shape[:-2], len(columns))
+
+
+def determinant_rates(J: Array, J_u: Array, columns: Integers) -> Array:
+    """Derivatives (k, count) of those determinants along k motions, from J_u (k, s, m), column by column."""
+    A = np.moveaxis(J[:, columns], 1, 0)
+    found = np.zeros((len(J_u), len(columns)))
+    for k, derivative in enumerate(J_u):
+        dA = np.moveaxis(derivative[:, columns], 1, 0)
+        for c in range(J.shape[0]):
+            replaced = A.copy()
+            replaced[:, :, c] = dA[:, :, c]
+            found[k] += np.linalg.det(replaced)
+    return found
+
+
+def hadamard_bounds(J: Array, columns: Integers) -> Array:
+    """Product of the lengths of each minor's columns, shape (..., count)."""
+    return np.prod(np.linalg.norm(J, axis=-2)[..., columns], axis=-1)

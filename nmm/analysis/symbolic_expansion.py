@@ -1,0 +1,185 @@
+"""Trigonometric polynomials in exact arithmetic: sums of e^{i k·angles} times powers of scalars.
+
+Products of cosines and sines become sums of angles at once, so that equal expressions are equal term by term
+and a platform's heading falls out of the minors without any simplification.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+
+from nmm.errors import InputError
+
+#: Powers of the variables in a term, by their index, sorted; an angle's power is its factor in the exponent.
+Key = tuple[tuple[int, int], ...]
+#: Real and imaginary part.
+Gaussian = tuple[Fraction, Fraction]
+
+_ZERO = Fraction(0)
+
+
+class TooLarge(InputError):
+    """The expressions grew beyond what a person could read: use the numeric analysis."""
+
+
+class Ring:
+    """The variables of an analysis, and how much work it may still do.
+
+    Parameters
+    ----------
+    budget : products of terms after which `TooLarge` is raised
+    """
+
+    def __init__(self, budget: int) -> None:
+        self.names: list[str] = []
+        self.is_angle: list[bool] = []
+        self.budget = budget
+        self._left = budget
+
+    def variable(self, name: str, angle: bool) -> int:
+        """Index of a variable, which is made when it is new."""
+        if name in self.names:
+            index = self.names.index(name)
+            if self.is_angle[index] != angle:
+                raise InputError(f"symbolic: {name!r} names an angle and a length; give other names")
+            return index
+        self.names.append(name)
+        self.is_angle.append(angle)
+        return len(self.names) - 1
+
+    def spend(self, products: int) -> None:
+        """Count work; `TooLarge` when none is left."""
+        self._left -= products
+        if self._left < 0:
+            raise TooLarge(
+                f"symbolic: too large: more than {self.budget} products of terms; "
+                "use the numeric analysis, a task of fewer rows, or lock joints"
+            )
+
+    def number(self, value: Fraction | int) -> Expansion:
+        """A constant."""
+        return Expansion(self, {(): (Fraction(value), _ZERO)} if value else {})
+
+    def scalar(self, name: str, power: int = 1) -> Expansion:
+        """A length or a straight coordinate, to a power that may be negative."""
+        return Expansion(self, {((self.variable(name, False), power),): (Fraction(1), _ZERO)})
+
+    def cos(self, angle: Mapping[int, int]) -> Expansion:
+        """cos(k·angles); `angle` holds k by the variables' index."""
+        return self.wave(angle, (Fraction(1, 2), _ZERO))
+
+    def sin(self, angle: Mapping[int, int]) -> Expansion:
+        """sin(k·angles)."""
+        return self.wave(angle, (_ZERO, Fraction(-1, 2)))
+
+    def wave(self, angle: Mapping[int, int], half: Gaussian) -> Expansion:
+        """half e^{i k·angles} and its conjugate."""
+        k = tuple(sorted((i, n) for i, n in angle.items() if n))
+        if not k:
+            return self.number(2 * half[0])
+        return Expansion(self, {k: half, tuple((i, -n) for i, n in k): (half[0], -half[1])})
+
+
+class Expansion:
+    """A real trigonometric polynomial: coefficient by key, no coefficient zero."""
+
+    __slots__ = ("ring", "terms")
+
+    def __init__(self, ring: Ring, terms: dict[Key, Gaussian]) -> None:
+        self.ring = ring
+        self.terms = terms
+
+    def __bool__(self) -> bool:
+        return bool(self.terms)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Expansion) and self.terms == other.terms
+
+    __hash__ = None  # type: ignore[assignment]  # made of a dict
+
+    def __add__(self, other: Expansion) -> Expansion:
+        terms = dict(self.terms)
+        for key, (re, im) in other.terms.items():
+            old = terms.get(key)
+            new = (re, im) if old is None else (old[0] + re, old[1] + im)
+            if new[0] or new[1]:
+                terms[key] = new
+            else:
+                del terms[key]
+        return Expansion(self.ring, terms)
+
+    def __neg__(self) -> Expansion:
+        return self.scaled(Fraction(-1))
+
+    def __sub__(self, other: Expansion) -> Expansion:
+        return self + (-other)
+
+    def scaled(self, factor: Fraction) -> Expansion:
+        """Times a number."""
+        if not factor:
+            return Expansion(self.ring, {})
+        return Expansion(self.ring, {k: (re * factor, im * factor) for k, (re, im) in self.terms.items()})
+
+    def __mul__(self, other: Expansion) -> Expansion:
+        self.ring.spend(len(self.terms) * len(other.terms))
+        terms: dict[Key, Gaussian] = {}
+        for one, (a, b) in self.terms.items():
+            for two, (c, d) in other.terms.items():
+                key = _times(one, two)
+                re = a * c - b * d if b and d else a * c
+                im = a * d + b * c
+                old = terms.get(key)
+                terms[key] = (re, im) if old is None else (old[0] + re, old[1] + im)
+        return Expansion(self.ring, {k: v for k, v in terms.items() if v[0] or v[1]})
+
+    def power(self, exponent: int) -> Expansion:
+        """To a power of at least 0."""
+        result = self.ring.number(1)
+        for _ in range(exponent):
+            result = result * self
+        return result
+
+    def derivative(self, variable: int) -> Expansion:
+        """By an angle or a scalar."""
+        angle = self.ring.is_angle[variable]
+        terms: dict[Key, Gaussian] = {}
+        for key, (re, im) in self.terms.items():
+            n = dict(key).get(variable, 0)
+            if n and angle:
+                terms[key] = (-im * n, re * n)
+            elif n:
+                lower = tuple((i, m - (i == variable)) for i, m in key if i != variable or m != 1)
+                terms[lower] = (re * n, im * n)
+        return Expansion(self.ring, terms)
+
+    def variables(self) -> set[int]:
+        """Those that occur."""
+        return {i for key in self.terms for i, _ in key}
+
+
+def _times(one: Key, two: Key) -> Key:
+    if not one or not two:
+        return one or two
+    powers = dict(one)
+    for i, n in two:
+        total = powers.get(i, 0) + n
+        if total:
+            powers[i] = total
+        else:
+            del powers[i]
+    return tuple(sorted(powers.items()))
+
+
+def determinant(rows: list[list[Expansion]]) -> Expansion:
+    """By cofactors along the first row, which keeps zeros cheap."""
+    ring = rows[0][0].ring
+    if len(rows) == 1:
+        return rows[0][0]
+    total = ring.number(0)
+    for column, entry in enumerate(rows[0]):
+        if entry:
+            below = [row[:column] + row[column + 1 :] for row in rows[1:]]
+            product = entry * determinant(below)
+            total = total - product if column % 2 else total + product
+    return total
