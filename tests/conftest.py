@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from spatial_arms import load_tiago, load_ur5
 
 from nmm.loading import load
 from nmm.robot import Robot
@@ -22,6 +23,16 @@ def robot_3r() -> Robot:
 @pytest.fixture(scope="session")
 def robots(robot_2r: Robot, robot_3r: Robot) -> dict[str, Robot]:
     return {robot.name: robot for robot in (robot_2r, robot_3r)}
+
+
+@pytest.fixture(scope="session")
+def ur5() -> Robot:
+    return load_ur5()
+
+
+@pytest.fixture(scope="session")
+def tiago() -> Robot:
+    return load_tiago()
 
 
 @pytest.fixture

@@ -311,7 +311,7 @@ def test_what_has_no_formula_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(InputError, match="no formula for Distance; there are Position, Heading"):
         symbolic(robot, Distance("ee", [0.0, 0.0, 0.0]))
     with pytest.raises(InputError, match="unknown geometry 'symbol'"):
-        symbolic(robot, TIP, geometry="symbol")  # type: ignore[arg-type]
+        symbolic(robot, TIP, geometry="symbol")  # type: ignore[arg-type]  # wrong on purpose
     with pytest.raises(InputError, match="at most 4 rows"):
         symbolic(robot, [TIP, TIP, TIP])
     with pytest.raises(InputError, match="unknown frame"):

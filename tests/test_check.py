@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -335,10 +336,8 @@ def test_a_second_reader_that_reads_something_else_is_noticed(monkeypatch: pytes
     assert "Pinocchio and yourdfpy read it differently: link 'b'" in text
 
 
-def _moved(file: object) -> object:
-    import io
-
-    return io.BytesIO(file.read().replace(b'xyz="0.1 0.2 0.3"', b'xyz="0.1 0.2 0.4"'))  # type: ignore[attr-defined]
+def _moved(file: io.BytesIO) -> io.BytesIO:
+    return io.BytesIO(file.read().replace(b'xyz="0.1 0.2 0.3"', b'xyz="0.1 0.2 0.4"'))
 
 
 # Files that are right

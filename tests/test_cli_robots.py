@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -212,9 +213,9 @@ def test_robots_lists_robots_bases_and_arms(run: Command) -> None:
 # Inputs that a task does not feel
 
 
-def controller_on(robot: nmm.Robot, frame: str, **options: object) -> nmm.Controller:
+def controller_on(robot: nmm.Robot, frame: str, **options: Any) -> nmm.Controller:
     task = nmm.Task(nmm.Position(frame, "xy"), nmm.Constant([1.0, 0.5]), 2.0)
-    return nmm.Controller(robot, task, nmm.ReducedGradient(alpha=1.0), **options)  # type: ignore[arg-type]
+    return nmm.Controller(robot, task, nmm.ReducedGradient(alpha=1.0), **options)
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ import pytest
 from function_grid import random_configuration
 from numpy import pi
 from numpy.typing import NDArray
-from spatial_arms import MOVING, UR5, load_ur5
+from spatial_arms import MOVING, UR5
 from test_derivatives import check_function
 
 import nmm
@@ -28,11 +28,6 @@ from nmm.tasks import (
 )
 
 Array = NDArray[np.float64]
-
-
-@pytest.fixture(scope="module")
-def ur5() -> Robot:
-    return load_ur5()
 
 
 @pytest.mark.parametrize("axis", ["x", "y", "z", (1, -2, 3), (0, 0, -1)])

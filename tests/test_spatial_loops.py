@@ -8,7 +8,7 @@ import pytest
 from function_grid import random_configuration
 from numpy import pi
 from numpy.typing import NDArray
-from spatial_arms import MOVING, UR5, load_tiago, load_ur5, near, pose
+from spatial_arms import MOVING, UR5, near, pose
 
 import nmm
 from nmm.configuration import Configuration
@@ -27,16 +27,6 @@ from nmm.tasks import (
 )
 
 Array = NDArray[np.float64]
-
-
-@pytest.fixture(scope="module")
-def ur5() -> Robot:
-    return load_ur5()
-
-
-@pytest.fixture(scope="module")
-def tiago() -> Robot:
-    return load_tiago()
 
 
 # Closed loops

@@ -8,7 +8,7 @@ import pytest
 from function_grid import random_configuration
 from numpy import pi
 from numpy.typing import NDArray
-from spatial_arms import MOVING, UR5, load_tiago, load_ur5, pose
+from spatial_arms import MOVING, UR5, pose
 from test_derivatives import assert_close, check_function, derivative, partials
 
 from nmm.configuration import Configuration
@@ -29,16 +29,6 @@ from nmm.tasks import (
 from nmm.tasks.comparison import Comparison
 
 Array = NDArray[np.float64]
-
-
-@pytest.fixture(scope="module")
-def ur5() -> Robot:
-    return load_ur5()
-
-
-@pytest.fixture(scope="module")
-def tiago() -> Robot:
-    return load_tiago()
 
 
 @pytest.fixture(scope="module")

@@ -64,7 +64,7 @@ class Minors(Mapping[tuple[str, ...], float | Array]):
 
     def __contains__(self, key: object) -> bool:
         try:
-            self._find(key)  # type: ignore[arg-type]
+            self._find(key)  # type: ignore[arg-type]  # which is what is asked
         except (InputError, TypeError):
             return False
         return True

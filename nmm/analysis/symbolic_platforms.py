@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from fractions import Fraction
+from typing import Any
 
 from nmm.analysis.symbolic_expansion import Expansion, Ring
 from nmm.analysis.symbolic_geometry import Geometry
@@ -35,15 +36,13 @@ def _unicycle(platform: Platform, geometry: Geometry) -> Columns:
     return [[c, zero], [s, zero], [zero, one]], [one, one]
 
 
-def _differential(platform: Platform, geometry: Geometry) -> Columns:
-    assert isinstance(platform, DifferentialDrive)
+def _differential(platform: DifferentialDrive, geometry: Geometry) -> Columns:
     ring = geometry.ring
     c, s = _heading(ring)
     half = geometry.length(platform.radius, "r").scaled(Fraction(1, 2))
     # Both columns times the track b: r b c / 2, r b s / 2, -+r.
-    along, across, turn = half * _length(platform.track, "b", geometry) * c, half, half + half
-    across = half * _length(platform.track, "b", geometry) * s
-    b = _length(platform.track, "b", geometry)
+    b = geometry.length(platform.track, "b")
+    along, across, turn = half * b * c, half * b * s, half + half
     return [[along, along], [across, across], [-turn, turn]], [b, b]
 
 
@@ -53,23 +52,21 @@ def _omnidirectional(platform: Platform, geometry: Geometry) -> Columns:
     return [[c, -s, zero], [s, c, zero], [zero, zero, one]], [one, one, one]
 
 
-def _car(platform: Platform, geometry: Geometry) -> Columns:
-    assert isinstance(platform, Car)
+def _car(platform: Car, geometry: Geometry) -> Columns:
     ring = geometry.ring
     c, s, zero, one = *_heading(ring), ring.number(0), ring.number(1)
     steering = {ring.variable(platform.steering, True): 1}
-    L = _length(platform.wheelbase, "L", geometry)
+    L = geometry.length(platform.wheelbase, "L")
     across = L * ring.cos(steering)
     rows = [[across * c, zero], [across * s, zero], [ring.sin(steering), zero], [zero, one]]
     return rows, [across, one]
 
 
-def _front_drive_car(platform: Platform, geometry: Geometry) -> Columns:
-    assert isinstance(platform, FrontDriveCar)
+def _front_drive_car(platform: FrontDriveCar, geometry: Geometry) -> Columns:
     ring = geometry.ring
     c, s, zero, one = *_heading(ring), ring.number(0), ring.number(1)
     steering = {ring.variable(platform.steering, True): 1}
-    L = _length(platform.wheelbase, "L", geometry)
+    L = geometry.length(platform.wheelbase, "L")
     along = L * ring.cos(steering)
     return [[along * c, zero], [along * s, zero], [ring.sin(steering), zero], [zero, one]], [L, one]
 
@@ -83,11 +80,8 @@ def _heading(ring: Ring) -> tuple[Expansion, Expansion]:
     return ring.cos(theta), ring.sin(theta)
 
 
-def _length(value: float, name: str, geometry: Geometry) -> Expansion:
-    return geometry.length(value, name)
-
-
-_FORMULAS: dict[type[Platform], Callable[[Platform, Geometry], Columns]] = {
+#: Each takes platforms of its own kind.
+_FORMULAS: dict[type[Platform], Callable[[Any, Geometry], Columns]] = {
     Unicycle: _unicycle,
     DifferentialDrive: _differential,
     Car: _car,

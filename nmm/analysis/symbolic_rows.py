@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
+from typing import Any
 
 from nmm.analysis.symbolic_chain import chain_to
 from nmm.analysis.symbolic_expansion import Expansion
@@ -121,8 +122,7 @@ def bearing_suffix(number: int) -> str:
     return "" if number == 1 else str(number)
 
 
-def _position(function: Function, frames: Frames) -> list[SymbolicRow]:
-    assert isinstance(function, Position)
+def _position(function: Position, frames: Frames) -> list[SymbolicRow]:
     function.rows(frames.robot)
     at = frames.of(function.frame)
     values = at.position if function.relative_to is None else relative(at, frames.of(function.relative_to))
@@ -132,9 +132,8 @@ def _position(function: Function, frames: Frames) -> list[SymbolicRow]:
     ]
 
 
-def _heading(function: Function, frames: Frames) -> list[SymbolicRow]:
+def _heading(function: Heading, frames: Frames) -> list[SymbolicRow]:
     """ψ = atan2(s, c): dψ = (c ds - s dc) / (c² + s²)."""
-    assert isinstance(function, Heading)
     function.rows(frames.robot)
     d = direction(frames.of(function.frame), tuple(float(value) for value in function.direction))
     c, s = (d[AXES[axis]] for axis in PLANES[function.about])
@@ -143,8 +142,7 @@ def _heading(function: Function, frames: Frames) -> list[SymbolicRow]:
     return [SymbolicRow(Arc(s, c), gradient, c * c + s * s)]
 
 
-def _coordinates(function: Function, frames: Frames) -> list[SymbolicRow]:
-    assert isinstance(function, Coordinates)
+def _coordinates(function: Coordinates, frames: Frames) -> list[SymbolicRow]:
     ring, names = frames.geometry.ring, frames.robot.q_names
     rows = []
     for values in coefficients(function.combinations, frames.robot):
@@ -154,16 +152,14 @@ def _coordinates(function: Function, frames: Frames) -> list[SymbolicRow]:
     return rows
 
 
-def _posture(function: Function, frames: Frames) -> list[SymbolicRow]:
-    assert isinstance(function, Posture)
+def _posture(function: Posture, frames: Frames) -> list[SymbolicRow]:
     function.rows(frames.robot)
     names = function.names or frames.robot.q_names[frames.robot.platform.n_p :]
     return _coordinates(Coordinates(*names), frames)
 
 
-def _bearing(function: Function, frames: Frames) -> list[SymbolicRow]:
+def _bearing(function: Bearing, frames: Frames) -> list[SymbolicRow]:
     """With T - p = rho (cos g, sin g): dg = (sin g dp_x - cos g dp_y) / rho."""
-    assert isinstance(function, Bearing)
     function.rows(frames.robot)
     x, y = function_rows(function.of, frames)[:2]
     if not isinstance(x.value, Expansion) or not isinstance(y.value, Expansion):
@@ -177,7 +173,8 @@ def _bearing(function: Function, frames: Frames) -> list[SymbolicRow]:
     return [SymbolicRow(Arc(ring.sin(g), ring.cos(g)), gradient, ring.scalar(f"rho{suffix}"))]
 
 
-_FORMULAS: dict[type[Function], Callable[[Function, Frames], list[SymbolicRow]]] = {
+#: Each takes functions of its own kind.
+_FORMULAS: dict[type[Function], Callable[[Any, Frames], list[SymbolicRow]]] = {
     Position: _position,
     Heading: _heading,
     Coordinates: _coordinates,

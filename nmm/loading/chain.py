@@ -12,22 +12,20 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from nmm.errors import RobotError
 from nmm.loading.joint_kinds import is_continuous, is_simple, kind, one_number, value_at
+from nmm.loading.joint_limits import joint_limits, no_limits
+from nmm.platforms.own_joints import PLANAR as CHAIN
 
 Head = Sequence[tuple[str, Any]]
 
-CHAIN = ("x", "y", "theta")
 #: The platform's chain: names and joints.
 CHAIN_JOINTS: Head = tuple(
     zip(CHAIN, (pin.JointModelPX(), pin.JointModelPY(), pin.JointModelRZ()), strict=True)
 )
 # The kinds of the chain's joints, in a model that has them already.
 _CHAIN_KINDS = (("PX",), ("PY",), ("RZ", "RUBZ"))
-# Pinocchio's "no limit" is the largest number there is.
-_HUGE = 1e300
 
 
 @dataclass(frozen=True)
@@ -145,7 +143,7 @@ def _add_joints(model: pin.Model, plan: _Plan, first: Sequence[str]) -> dict[int
     placement = source.jointPlacements[1] if count and plan.head else pin.SE3.Identity()
     parent = 0
     for name, joint in plan.head:
-        limits = _limits(source, parent + 1) if plan.keeps_chain else _no_limits(joint)
+        limits = joint_limits(source, parent + 1) if plan.keeps_chain else no_limits(joint)
         parent = model.addJoint(parent, joint, placement, name, *limits)
         placement = pin.SE3.Identity()
     # What hung on the universe of a fixed base moves with the root.
@@ -158,7 +156,7 @@ def _add_joints(model: pin.Model, plan: _Plan, first: Sequence[str]) -> dict[int
             one_number(source.joints[joint], neutral),
             plan.moved(source.parents[joint], source.jointPlacements[joint]),
             source.names[joint],
-            *_limits(source, joint),
+            *joint_limits(source, joint),
         )
     # Of a replaced root there is nothing to copy, of a kept chain there is.
     for joint in range(1 if plan.keeps_chain else count + 1, source.njoints):
@@ -184,35 +182,6 @@ def _order(source: pin.Model, count: int, first: Sequence[str]) -> list[int]:
         key = [(rank.get(source.names[i], len(rank)), i) for i in children[joint]]
         stack.extend(i for _, i in sorted(key, reverse=True))
     return order
-
-
-def _no_limits(joint: Any) -> tuple[NDArray[np.float64], ...]:
-    nq, nv = joint.nq, joint.nv
-    nothing = np.zeros(nv)
-    lower, upper = np.full(nq, -np.inf), np.full(nq, np.inf)
-    # Cosine and sine, or a quaternion, as Pinocchio bounds them.
-    angles = {4: slice(2, 4), 7: slice(3, 7)}.get(nq, slice(0, 0))
-    lower[angles], upper[angles] = -1.01, 1.01
-    infinite = np.full(nv, np.inf)
-    return (-infinite, infinite, -infinite, infinite, lower, upper, nothing, nothing, nothing)
-
-
-def _limits(source: pin.Model, joint: int) -> tuple[NDArray[np.float64], ...]:
-    """Limits of effort, velocity, position and friction (lower, upper), and damping; infinite where none."""
-    v, q = source.joints[joint].idx_v, source.joints[joint].idx_q
-    velocity = source.velocityLimit[v : v + 1]  # `lowerVelocityLimit` comes back with the wrong sign
-    lower, upper = source.lowerPositionLimit[q : q + 1], source.upperPositionLimit[q : q + 1]
-    if is_continuous(source.joints[joint]):
-        lower, upper = np.full(1, -np.inf), np.full(1, np.inf)
-    limits = (
-        *(source.lowerEffortLimit[v : v + 1], source.upperEffortLimit[v : v + 1], -velocity, velocity),
-        *(lower, upper),
-    )
-    return (
-        *(np.where(np.abs(limit) > _HUGE, np.copysign(np.inf, limit), limit) for limit in limits),
-        *(source.lowerDryFrictionLimit[v : v + 1], source.upperDryFrictionLimit[v : v + 1]),
-        source.damping[v : v + 1],
-    )
 
 
 def _add_frames(model: pin.Model, plan: _Plan, joints: Mapping[int, int]) -> dict[int, int]:
