@@ -220,6 +220,11 @@ class Controller:
         found = self._results
         return found.task.J, found.constraint.J, found.h[np.newaxis]
 
+    def equation_solver(self) -> tuple[Callable[[float, Array], float], Array]:
+        """(solve, J) for loops over many configurations: solve(t, q) does a step, whose matrix is then in the
+        view J (s, m). q is (n,), float64, contiguous; nothing is checked."""
+        return self._solve, self._results.task.J
+
     @property
     def partition_sign(self) -> int:
         """Sign of det Ja in the last call (0 without a partition): between two signs Ja is singular."""

@@ -249,6 +249,12 @@ class Robot:
         except InputError as error:
             raise InputError(f"{error} (robot {self.name} has q = {', '.join(self.q_names)})") from None
 
+    @property
+    def rest(self) -> Array:
+        """The configuration nearest to zero within the limits, (n,)."""
+        lower, upper = self.q_limits.T
+        return np.asarray(np.clip(np.zeros(self.n), lower, upper))
+
     def S(self, q: ArrayLike) -> Array:
         """S = blkdiag(G(qp), I), shape (n, n_u): q_dot = S(q) u (paper, eqs. 2 and 3)."""
         n_p, p = self.platform.n_p, self.platform.p

@@ -145,7 +145,7 @@ def test_info_of_a_scenario_shows_its_robot_and_what_its_task_does_not_feel(
         (["unicycle_2r", "--scenario", "unicycle_3r_position"], "does not fit robot unicycle_2r"),
         (["unicycle_2r", "--lock", "q1"], "--lock: expected JOINT=VALUE, as in torso=0.2, got 'q1'"),
         (["unicycle_2r", "--lock", "q1=left"], "--lock: q1: expected a number"),
-        (["unicycle_2r", "--lock", "q1=1", "--lock", "q1=2"], "joint q1 is given twice"),
+        (["unicycle_2r", "--lock", "q1=1", "--lock", "q1=2"], "--lock: q1 is given twice"),
         (["unicycle_2r", "--lock", "q9=1"], "'q9'"),
         (["unicycle_2r", "--axle", "1,a"], "--axle: expected a frame or X,Y in m"),
         (["unicycle_2r", "--axle", "wheel"], "unknown frame 'wheel'"),

@@ -23,7 +23,6 @@ import nmm
 from nmm.playback import view
 from nmm.playback.extent import corners
 from nmm.playback.rolling import Rolling
-from nmm.playback.viewer_scene import rest
 from nmm.robot import Robot
 
 pytestmark = pytest.mark.browser
@@ -90,8 +89,8 @@ def test_sliders_move_every_joint_to_where_pinocchio_says(robot: Robot, window: 
         page = window.open(url)
         sliders = page.locator("input[data-name]").evaluate_all("all => all.map((one) => one.dataset.name)")
         assert tuple(sliders) == robot.q_names
-        angles = Rolling(robot).settled(rest(robot))  # wheels and swivels stay
-        assert_same(drawn_visuals(page), expected_visuals(robot, rest(robot), angles))
+        angles = Rolling(robot).settled(robot.rest)  # wheels and swivels stay
+        assert_same(drawn_visuals(page), expected_visuals(robot, robot.rest, angles))
         for _ in range(3):
             q = np.array([slide(page, name, rng.uniform()) for name in robot.q_names])
             assert_same(drawn_visuals(page), expected_visuals(robot, q, angles), 1e-6)
@@ -101,7 +100,7 @@ def test_sliders_move_every_joint_to_where_pinocchio_says(robot: Robot, window: 
             assert_same(drawn, {name: expected[name] for name in drawn}, 1e-6)
             assert drawn.keys() == expected.keys()
         page.locator("#rest").click()
-        assert_same(drawn_visuals(page), expected_visuals(robot, rest(robot), angles), 1e-12)
+        assert_same(drawn_visuals(page), expected_visuals(robot, robot.rest, angles), 1e-12)
 
 
 def test_sliders_end_at_the_limits_and_show_what_they_are_at(window: Window, tmp_path: Path) -> None:

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from nmm.analysis.reached import Tasks as Tasks
+from nmm.analysis.reached import stacked
 from nmm.arrays import Array, array, positive, scalar, vector
 from nmm.controller import Controller
 from nmm.errors import InputError, SingularError, unknown
 from nmm.function import Row
+from nmm.platforms.base import Platform
 from nmm.resolvers.projected_gradient import ProjectedGradient
 from nmm.resolvers.reduced_gradient import Partition
 from nmm.robot import Robot
-from nmm.tasks.task import Stack, Task
+from nmm.tasks.task import Stack
 
-Tasks: TypeAlias = Task | Stack | Sequence[Task]
-#: What can be analysed: a controller, or a robot and its task.
+#: What can be analysed: a controller, or a robot and its task (functions are enough, without targets).
 Subject: TypeAlias = Controller | tuple[Robot, Tasks]
 #: Candidates for RG's partition: "automatic" or lists of inputs; None for the controller's own.
 Candidates: TypeAlias = str | Sequence[Partition] | None
@@ -47,10 +49,10 @@ class Jacobians:
         self.resolver = None
         if isinstance(subject, Controller):
             self.robot, self.task, self.resolver = subject.robot, subject.task, subject.resolver
-            added = subject.constraint if constraint is None else Stack.of(constraint)
+            added = subject.constraint if constraint is None else stacked(constraint)
         elif isinstance(subject, tuple) and len(subject) == 2 and isinstance(subject[0], Robot):
-            self.robot, self.task = subject[0], Stack.of(subject[1])
-            added = Stack() if constraint is None else Stack.of(constraint)
+            self.robot, self.task = subject[0], stacked(subject[1])
+            added = Stack() if constraint is None else stacked(constraint)
         else:
             raise InputError(f"analysis: expected a Controller or (robot, task), got {subject!r}")
         self._of_task = Controller(self.robot, self.task, ProjectedGradient())
@@ -91,6 +93,31 @@ class Jacobians:
             for direction in directions.T
         ]
         return np.array(found).reshape(directions.shape[1], len(self.rows), self.robot.n_u)
+
+    def batch(self, q: Array, t: float = 0.0, progress: Callable[[float], None] | None = None) -> Array:
+        """J (N, s, m) at N configurations (N, n) and one time, some microseconds each.
+
+        Where there is none (the wheels cannot roll, the task is undefined), it is not a number.
+
+        Parameters
+        ----------
+        progress : called with the fraction done, about a hundred times
+        """
+        solve, found = self._of_task.equation_solver()
+        platform = self.robot.platform
+        rolls = type(platform).problem is Platform.problem
+        points = np.ascontiguousarray(q, dtype=np.float64)
+        J = np.empty((len(points), len(self.rows), self.robot.n_u))
+        every = max(1, len(points) // 100)
+        for k, point in enumerate(points):
+            solve(t, point)
+            J[k] = found
+            if not rolls and platform.problem(point[: platform.n_p]) is not None:
+                J[k] = np.nan
+            if progress is not None and k % every == 0:
+                progress(k / len(points))
+        J[~np.isfinite(J).all(axis=(1, 2))] = np.nan
+        return J
 
     def history(self, t: Array, q: Array) -> tuple[Array, Array]:
         """J (N, s, m) and Jc (N, k, m) at N samples."""

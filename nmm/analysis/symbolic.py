@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal
 
+from nmm.analysis.reached import Tasks, stacked
 from nmm.analysis.symbolic_arguments import argument_names
 from nmm.analysis.symbolic_expansion import Expansion, Ring, TooLarge, determinant
 from nmm.analysis.symbolic_form import factored, in_names, named
@@ -19,9 +20,7 @@ from nmm.analysis.symbolic_tree import Product, to_sympy
 from nmm.analysis.symbolic_value import Written, written
 from nmm.analysis.symbolic_words import latex_of, text_of
 from nmm.errors import InputError, unknown
-from nmm.function import Function
 from nmm.robot import Robot
-from nmm.tasks import Stack, Task
 
 __all__ = ["SymbolicAnalysis", "TooLarge", "symbolic"]
 
@@ -127,7 +126,7 @@ class SymbolicAnalysis:
 
 def symbolic(
     robot: Robot,
-    task: Function | Task | Stack | Sequence[Function | Task],
+    task: Tasks,
     *,
     geometry: Literal["symbols", "numbers"] = "symbols",
     arguments: Mapping[str, str] | None = None,
@@ -155,7 +154,7 @@ def symbolic(
         raise InputError("symbolic: needs SymPy: pip install nmm[symbolic]") from None
     if geometry not in ("symbols", "numbers"):
         raise InputError(unknown("geometry", geometry, ("symbols", "numbers")))
-    stack = _stack(task, robot)
+    stack = stacked(task)
     if len(stack.rows(robot)) > robot.n_u:
         raise InputError(
             f"symbolic: expected a task of at most {robot.n_u} rows, as {robot.name} has inputs, "
@@ -206,14 +205,6 @@ def symbolic(
         divided=any(divisor != ring.number(1) for divisor in (*denominators, *column_denominators)),
         notes=tuple(dict.fromkeys(lengths.notes)),
     )
-
-
-def _stack(task: Function | Task | Stack | Sequence[Function | Task], robot: Robot) -> Stack:
-    """Tasks from what was given; a function alone has a constant reference."""
-    if isinstance(task, Stack):
-        return task
-    given = [task] if isinstance(task, Function | Task) else list(task)
-    return Stack.of([Task(f, [0.0] * len(f.rows(robot))) if isinstance(f, Function) else f for f in given])
 
 
 def _matrix(

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
+from nmm.analysis.reached import Reached
 from nmm.analysis.symbolic_chain import chain_to
 from nmm.analysis.symbolic_expansion import Expansion
 from nmm.analysis.symbolic_geometry import Geometry, exact
@@ -20,7 +21,8 @@ from nmm.tasks.coordinates import coefficients
 from nmm.tasks.heading import PLANES
 from nmm.tasks.position import AXES
 
-_OF_TIME = (Circle, Constant, Line, PiecewisePolynomial, Polynomial, Spline)
+#: References whose derivative by q is 0.
+_OF_TIME = (Circle, Constant, Line, PiecewisePolynomial, Polynomial, Reached, Spline)
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,6 +44,35 @@ AxleOption = Annotated[
         show_default="the root link's origin",
     ),
 ]
+TaskOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--task",
+        metavar="KIND[:FRAME[:AXES]]",
+        help="The task: position, pose, orientation, heading, center_of_mass; coordinates:q1,q2; posture; "
+        "or a mapping as in a scenario, '{kind: pointing, frame: ee, at: [2, 0, 1]}'. Without FRAME the "
+        "end of the arm. May be repeated: tasks stand above each other.",
+        show_default="the scenario's",
+    ),
+]
+AtOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--at",
+        metavar="COORDINATE=VALUE",
+        help="Where, m or rad; arithmetic with pi will do. May be repeated.",
+        show_default="a scenario's start; 0, or the nearest within the limits",
+    ),
+]
+SubjectSetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Set an argument of a robot's xacro file (d=0), or a key of a scenario "
+        "(robot.arguments.d=0). May be repeated.",
+    ),
+]
 PackageOption = Annotated[
     list[Path] | None,
     typer.Option(
@@ -69,23 +98,28 @@ def arguments_of(given: Sequence[str] | None) -> dict[str, object]:
 
 
 def lock_of(given: Sequence[str] | None) -> dict[str, float]:
-    """The `--lock` options: values (rad or m) by joint.
+    """The `--lock` options: values (rad or m) by joint."""
+    return values_of(given, "--lock", "JOINT=VALUE, as in torso=0.2")
+
+
+def values_of(given: Sequence[str] | None, option: str, expected: str) -> dict[str, float]:
+    """Numbers by name, of an option NAME=VALUE that may be repeated; arithmetic with pi will do.
 
     Raises
     ------
-    InputError : no JOINT=VALUE, not a number, or a joint named twice
+    InputError : no NAME=VALUE, not a number, or a name given twice
     """
     from nmm.scenario.numbers import evaluate
 
-    lock: dict[str, float] = {}
-    for joint, text in _pairs(given, "--lock", "JOINT=VALUE, as in torso=0.2"):
-        if joint in lock:
-            raise InputError(f"--lock: joint {joint} is given twice")
+    values: dict[str, float] = {}
+    for name, text in _pairs(given, option, expected):
+        if name in values:
+            raise InputError(f"{option}: {name} is given twice")
         try:
-            lock[joint] = evaluate(text)
+            values[name] = evaluate(text)
         except ValueError as error:
-            raise InputError(f"--lock: {joint}: {error}") from None
-    return lock
+            raise InputError(f"{option}: {name}: {error}") from None
+    return values
 
 
 def axle_of(given: str | None) -> str | list[float] | None:

@@ -10,7 +10,7 @@ from nmm.playback.encoding import encode
 from nmm.playback.live import serve
 from nmm.playback.page import socket_page
 from nmm.playback.server import PageServer
-from nmm.playback.viewer_scene import rest, viewer_scene
+from nmm.playback.viewer_scene import viewer_scene
 from nmm.robot import Robot
 
 SCRIPTS = ("viewer_joints.js", "viewer_labels.js", "viewer_frames.js")
@@ -44,7 +44,7 @@ def view(
     ------
     InputError : wrong q; the port is taken, not allowed or not a port
     """
-    commands = viewer_scene(robot, rest(robot) if q is None else robot.q(q), frames=frames)
+    commands = viewer_scene(robot, robot.rest if q is None else robot.q(q), frames=frames)
     server = PageServer(
         lambda host: socket_page(robot.name, host, scripts=SCRIPTS, styles=STYLES),
         [encode(command) for command in commands],

@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from nmm.arrays import Array
+from nmm.loading.tips import first_tip, tips
 from nmm.playback.drawing import Command, Drawing, DrawnRobot, segment
 from nmm.playback.extent import robot_boxes
 from nmm.playback.placements import position_and_quaternion
@@ -20,14 +21,6 @@ from nmm.robot import Robot
 UNBOUNDED = 1e3
 #: Where a slider ends to which there is no limit: rad, m of the platform, m of the arm.
 ANGLE, WAY, REACH = float(np.pi), 3.0, 1.0
-#: Frames with this in their names are what an arm ends in, the first ones more than the last.
-TIPS = ("ee", "tcp", "tool", "grasp", "gripper", "hand", "flange", "tip")
-
-
-def rest(robot: Robot) -> Array:
-    """The configuration nearest to zero within the limits, (n,)."""
-    lower, upper = robot.q_limits.T
-    return np.asarray(np.clip(np.zeros(robot.n), lower, upper))
 
 
 def viewer_scene(robot: Robot, q: Array, *, frames: bool = True) -> list[Command]:
@@ -44,7 +37,8 @@ def viewer_scene(robot: Robot, q: Array, *, frames: bool = True) -> list[Command
     drawing = Drawing()
     listed = list(_frames(robot, drawn, drawing))
     drawing.add("joints", coordinates=list(_coordinates(robot, drawn, q)))
-    drawing.add("frames", frames=listed, shown=frames, length=length, pose=_first_tip(listed))
+    told = first_tip(robot) or _first_shown(listed)
+    drawing.add("frames", frames=listed, shown=frames, length=length, pose=told)
     drawing.add("hold")
     # The last command says that everything has come.
     return [*commands[:-1], *drawing.commands, commands[-1]]
@@ -84,8 +78,8 @@ def _coordinates(robot: Robot, drawn: DrawnRobot, q: Array) -> Iterator[dict[str
 def _frames(robot: Robot, drawn: DrawnRobot, drawing: Drawing) -> Iterator[dict[str, Any]]:
     """Each frame that a task may speak of: its node, and whether it is shown at first."""
     model = robot.display_model
-    tips = set(_tips(robot))
-    chosen = {*_joint_links(robot), *tips}
+    ends = set(tips(robot))
+    chosen = {*_joint_links(robot), *ends}
     for i, name in enumerate(robot.frames):
         frame = _frame(model, name)
         if frame is None or name in robot.platform.coordinates[:2]:
@@ -93,7 +87,7 @@ def _frames(robot: Robot, drawn: DrawnRobot, drawing: Drawing) -> Iterator[dict[
         parent = drawn.paths[frame.parentJoint - 1] if frame.parentJoint else drawn.paths[0].rsplit("/", 1)[0]
         path = f"{parent}/frame {i} {segment(name)}"
         drawing.transform(path, np.array(frame.placement.homogeneous))
-        yield {"name": name, "path": path, "shown": name in chosen, "tip": name in tips}
+        yield {"name": name, "path": path, "shown": name in chosen, "tip": name in ends}
 
 
 def _frame(model: pin.Model, name: str) -> pin.Frame | None:
@@ -121,31 +115,6 @@ def _joint_links(robot: Robot) -> Iterator[str]:
         yield links[0] if links else str(model.names[joint])
 
 
-def _tips(robot: Robot) -> Iterator[str]:
-    """The frame at the end of each branch of the arm: the one whose name says so, or the farthest out."""
-    model = robot.model
-    carrying = set(model.parents)
-    above = {frame.parentFrame for frame in model.frames}
-    for name in robot.q_names[robot.platform.n_p :]:
-        joint = model.getJointId(name)
-        kinds = (pin.FrameType.BODY, pin.FrameType.OP_FRAME)
-        ends = [
-            frame
-            for i, frame in enumerate(model.frames)
-            if frame.parentJoint == joint and frame.type in kinds and i not in above
-        ]
-        if joint not in carrying and ends:
-            yield min(ends, key=_how_little_a_tip).name
-
-
-def _how_little_a_tip(frame: pin.Frame) -> tuple[int, float]:
-    words = frame.name.lower().replace("-", "_").split("_")
-    ranks = [i for i, tip in enumerate(TIPS) if any(word.startswith(tip) for word in words)]
-    return min(ranks, default=len(TIPS)), -float(np.linalg.norm(frame.placement.translation))
-
-
-def _first_tip(frames: list[dict[str, Any]]) -> str:
-    """The frame whose pose is told at first: a tip that is named as one, or any, or the first shown."""
-    tips = [frame["name"] for frame in frames if frame["tip"]]
-    named = [name for tip in TIPS for name in tips if tip in name.lower().split("_")]
-    return str(next(iter([*named, *tips, *(frame["name"] for frame in frames if frame["shown"]), ""])))
+def _first_shown(frames: list[dict[str, Any]]) -> str:
+    """The frame whose pose is told at first, of a robot without an arm."""
+    return str(next((frame["name"] for frame in frames if frame["shown"]), ""))

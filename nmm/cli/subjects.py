@@ -1,0 +1,139 @@
+"""What an analysis is about: a robot with a task, a scenario, or a run, and the configuration asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nmm.arrays import Array
+from nmm.cli.options import arguments_of, settings_of, values_of
+from nmm.errors import InputError
+
+if TYPE_CHECKING:
+    from nmm.analysis.jacobians import Subject
+    from nmm.controller import Controller
+    from nmm.function import Function
+    from nmm.robot import Robot
+    from nmm.scenario import Scenario
+    from nmm.tasks import Stack, Task
+    from nmm.trajectory import Trajectory
+
+
+@dataclass(frozen=True, eq=False)
+class Studied:
+    """What a command analyses.
+
+    Attributes
+    ----------
+    name : the robot's or the scenario's
+    robot : the robot
+    task : its task; a bare function where no target was said
+    controller : the scenario's, with its resolver and constraint; None for a robot, or with another task
+    q (n,) : where; the scenario's start, the run's, or the configuration nearest to zero
+    t : s
+    trajectory : the run, for a run's folder
+    scenario : the scenario, or the run's
+    """
+
+    name: str
+    robot: Robot
+    task: Stack | tuple[Task | Function, ...]
+    controller: Controller | None
+    q: Array
+    t: float = 0.0
+    trajectory: Trajectory | None = None
+    scenario: Scenario | None = None
+
+    @property
+    def subject(self) -> Subject:
+        """As `nmm.analysis` takes it."""
+        return self.controller if self.controller is not None else (self.robot, self.task)
+
+
+def studied(
+    source: str,
+    *,
+    tasks: Sequence[str] | None,
+    at: Sequence[str] | None = None,
+    t: float | None = None,
+    settings: Sequence[str] | None = None,
+    **loading: Any,
+) -> Studied:
+    """What SOURCE means: a run's folder, a scenario by name or as YAML file, or else a robot.
+
+    Parameters
+    ----------
+    tasks : texts of `--task`; those of the scenario when there are none
+    at : COORDINATE=VALUE of `--at`, m and rad
+    t : s; 0, or the run's first instant
+    settings : `--set`, of the robot's xacro arguments or of the scenario's keys
+    loading : platform, lock, axle, package_dirs of `nmm.load`; a robot's only
+
+    Raises
+    ------
+    InputError : nothing of that name, options that do not fit it, a robot without a task
+    """
+    from nmm.scenario.short_task import short_task
+
+    run, scenario, robot = _opened(source, settings, loading)
+    own = None if scenario is None else scenario.controller()
+    robot = robot if own is None else own.robot
+    given = tuple(short_task(text, robot) for text in tasks or ())
+    if not given and own is None:
+        raise InputError(
+            f"{source} is a robot: expected --task, as in --task position, --task position:FRAME:xy, "
+            "--task pose:FRAME (may be repeated)"
+        )
+    q = _start(robot, run, scenario)
+    for name, value in values_of(at, "--at", "COORDINATE=VALUE, as in q1=pi/2").items():
+        q[robot.coordinate(name)] = value
+    first = 0.0 if run is None or not len(run) else float(run.t[0])
+    return Studied(
+        name=robot.name if scenario is None else scenario.name,
+        robot=robot,
+        task=given if given or own is None else own.task,
+        controller=None if given else own,
+        q=q,
+        t=first if t is None else t,
+        trajectory=run,
+        scenario=scenario,
+    )
+
+
+def _opened(
+    source: str, settings: Sequence[str] | None, loading: dict[str, Any]
+) -> tuple[Trajectory | None, Scenario | None, Robot]:
+    """The run, the scenario and the robot of SOURCE; run and scenario where it is one."""
+    from nmm.bundled import bundled_scenarios
+    from nmm.loading import load
+    from nmm.scenario import Scenario
+    from nmm.scenario.scenario import SUFFIXES
+    from nmm.storage import is_run
+    from nmm.trajectory import Trajectory
+
+    path = Path(source).expanduser()
+    of_folder = path.is_dir() and is_run(path)
+    of_scenario = source in bundled_scenarios() or path.suffix in SUFFIXES
+    if not (of_folder or of_scenario):
+        return None, None, load(source, arguments=arguments_of(settings), **loading)
+    wrong = [f"--{key.replace('_', '-')}" for key, value in loading.items() if value]
+    if wrong:
+        raise InputError(f"{', '.join(wrong)}: of a robot's file; {source} has a robot of its own")
+    if of_scenario:
+        scenario = Scenario.load(source, settings_of(settings))
+        return None, scenario, scenario.robot()
+    if settings:
+        raise InputError(f"--set: expected a robot or a scenario; {source} is a run, which is as it was")
+    run = Trajectory.load(path)
+    if not len(run):
+        raise InputError(f"{source}: expected a run with at least one sample")
+    file = path / "scenario.yaml"
+    return run, Scenario.load(file) if file.exists() else None, run.robot
+
+
+def _start(robot: Robot, run: Trajectory | None, scenario: Scenario | None) -> Array:
+    if run is not None:
+        return run.q[0].copy()
+    return robot.rest.copy() if scenario is None else robot.q(scenario.parts.q0)
