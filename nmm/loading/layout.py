@@ -15,7 +15,7 @@ from nmm.arrays import positive
 from nmm.errors import InputError, RobotError, unknown
 from nmm.loading.chain import CHAIN
 from nmm.loading.joint_kinds import axis, is_revolute, kind
-from nmm.platforms.layout import Layout, Pivot, RollingJoint
+from nmm.platforms.layout import HITCHES, STEERING, SWIVELS, Layout, Pivot, RollingJoint
 
 Array = NDArray[np.float64]
 
@@ -24,7 +24,6 @@ _LEVEL = 1e-3
 # A centre so near the root link's xy plane lies in it: the plane is then not the ground.
 _ON_PLANE = 1e-6
 _SHAPES = ("Cylinder", "Sphere", "Capsule")
-_PIVOT_NAMES = ("steer", "hitch", "trailer", "caster", "swivel")
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,7 +195,7 @@ def measure_layout(
         for name, joint in measured.joints.items()
         if measured.is_upright(joint)
         and measured.axis(joint)[2] > 0.0
-        and (joint in carrying or any(word in name.lower() for word in _PIVOT_NAMES))
+        and (joint in carrying or any(word in name.lower() for word in (*STEERING, *HITCHES, *SWIVELS)))
     ]
     return Layout(
         str(model.name),

@@ -219,4 +219,4 @@ class FrontDriveCar(_Bicycle):
 
 def _may_steer(pivot: Pivot) -> bool:
     on_axis = pivot.carrier == "theta" and abs(pivot.y) <= NEAR and pivot.x > NEAR
-    return on_axis and "steer" in pivot.joint.lower()
+    return on_axis and pivot.steers

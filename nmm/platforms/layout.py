@@ -4,6 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+#: Parts of an upright joint's name, in lower case, that say what it is.
+STEERING = ("steer",)
+HITCHES = ("hitch", "trailer")
+SWIVELS = ("caster", "swivel")
+
 
 @dataclass(frozen=True)
 class Pivot:
@@ -23,6 +28,16 @@ class Pivot:
     y: float
     lower: float
     upper: float
+
+    @property
+    def steers(self) -> bool:
+        """Whether its name says that it steers."""
+        return any(word in self.joint.lower() for word in STEERING)
+
+    @property
+    def hitches(self) -> bool:
+        """Whether its name says that it carries a trailer."""
+        return any(word in self.joint.lower() for word in HITCHES)
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,7 @@ def measure_trailers(layout: Layout, platform: str) -> list[MeasuredTrailer]:
 
 def _hitch_on(layout: Layout, platform: str, carrier: str) -> Pivot | None:
     """The hitch behind one body, None behind the last."""
-    named = [pivot for pivot in layout.pivots if pivot.carrier == carrier and _is_hitch(pivot)]
+    named = [pivot for pivot in layout.pivots if pivot.carrier == carrier and pivot.hitches]
     if not named:
         return None
     found = say_pivots(named)
@@ -59,10 +59,6 @@ def _hitch_on(layout: Layout, platform: str, carrier: str) -> Pivot | None:
         expected = "hitches midway between the wheels of the body in front"
         raise misfit(layout, platform, expected, f"{named[0].joint} is off the x axis", found)
     return named[0]
-
-
-def _is_hitch(pivot: Pivot) -> bool:
-    return any(word in pivot.joint.lower() for word in ("hitch", "trailer"))
 
 
 def _length(layout: Layout, platform: str, pivot: Pivot) -> float:

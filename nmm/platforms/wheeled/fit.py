@@ -6,12 +6,9 @@ import cmath
 import math
 
 from nmm.errors import InputError
-from nmm.platforms.layout import Layout, Pivot, RollingJoint
+from nmm.platforms.layout import HITCHES, Layout, Pivot, RollingJoint
 from nmm.platforms.wheeled.descriptions import MAIN, CasterWheel, FixedWheel, Hitch, SteeredWheel, Wheel
 
-#: Parts of a joint's name, in lower case, that say what it is.
-STEERING = ("steer",)
-HITCHES = ("hitch", "trailer")
 #: How far a wheel's centre may be from a pivot's axis and count as on it, m.
 _ON_AXIS = 1e-6
 
@@ -35,14 +32,10 @@ def parts_from(layout: Layout) -> tuple[list[Wheel], list[Hitch]]:
     hitches = [
         Hitch(pivot.joint, pivot.x, pivot.y, pivot.carrier, pivot.lower, pivot.upper)
         for pivot in layout.pivots
-        if _is(pivot, HITCHES) and pivot.joint in carriers
+        if pivot.hitches and pivot.joint in carriers
     ]
     bodies = {MAIN, *(hitch.joint for hitch in hitches)}
     return [_wheel(wheel, pivots, bodies, layout.robot) for wheel in layout.wheels], hitches
-
-
-def _is(pivot: Pivot, words: tuple[str, ...]) -> bool:
-    return any(word in pivot.joint.lower() for word in words)
 
 
 def _wheel(wheel: RollingJoint, pivots: dict[str, Pivot], bodies: set[str], robot: str) -> Wheel:
@@ -59,7 +52,7 @@ def _wheel(wheel: RollingJoint, pivots: dict[str, Pivot], bodies: set[str], robo
     place = complex(wheel.x, wheel.y)
     ahead = place * cmath.rect(1.0, -wheel.heading)  # in the wheel's own axes
     at = (wheel.joint, pivot.x, pivot.y, wheel.radius)
-    if _is(pivot, STEERING):
+    if pivot.steers:
         return SteeredWheel(
             *at, wheel.heading, pivot.carrier, pivot.joint, -ahead.real, ahead.imag, pivot.lower, pivot.upper
         )
