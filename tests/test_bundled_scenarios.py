@@ -14,6 +14,7 @@ import nmm.references
 import nmm.resolvers
 import nmm.tasks
 from nmm import Scenario
+from nmm.analysis import analyse_along
 from nmm.bundled import bundled_scenarios
 
 PI = math.pi
@@ -60,6 +61,13 @@ def test_every_bundled_scenario_runs_to_its_end(runs: dict[str, nmm.Trajectory])
         assert run.summary()["lateral_slip_max"] <= 1e-12, name
         # Wheel speeds as inputs (0.1 m a radian) make J small, not singular: that would be a warning.
         assert run.sigma_min.min() > 0.05, name
+
+
+def test_the_platform_makes_up_for_an_arm_that_stays_singular(runs: dict[str, nmm.Trajectory]) -> None:
+    run = runs["unicycle_2r_stretched"]
+    history = analyse_along(Scenario.load("unicycle_2r_stretched").controller(), run)
+    assert history.sigma_min["arm"].max() < 1e-12
+    assert history.sigma_min["robot"].min() > 0.9
 
 
 def test_switching_switches_by_both_rules_and_tracks_through_it(runs: dict[str, nmm.Trajectory]) -> None:
