@@ -49,7 +49,8 @@ def load(
         declares, `<nmm platform="car"/>` below <robot>, or else a unicycle
     package_dirs : folders that are, or hold, the ROS packages that the file speaks of
     wheels : joints that only roll, or the radius (m) of each; `()` for none. By default those with "wheel"
-        in the joint's or link's name, with a level axis and no joint below them; none on a fixed base
+        in the joint's or link's name, with a level axis and no joint below them; on a fixed base they
+        stand still
     lock : joints to fix, and their values (rad or m), within their limits
     axle : the platform's reference point in the root link: a frame, whose yaw counts too, or x, y(, z) in m
     name : the robot's name; by default that of the file or model

@@ -18,7 +18,7 @@ from nmm.loading.locking import with_locked
 from nmm.loading.provenance import Parts
 from nmm.loading.reduction import reduced
 from nmm.loading.source import Source
-from nmm.loading.wheels import find_wheels
+from nmm.loading.wheels import find_wheels, held_joints
 from nmm.platforms import Layout, Platform, Unicycle, platform_by_name
 from nmm.robot import Robot, Wheel
 from nmm.slip import told as told_slip
@@ -65,7 +65,7 @@ def robot_from(source: Source, options: Options) -> Robot:
             raise RobotError(f"{where}: {error}") from None
     own = _own_joints(platform, rebuilt.model, locked.values, where)
     display = _on_platform(rebuilt, platform, own, where)
-    if not platform.coordinates and options.wheels:
+    if not platform.coordinates:
         display = _with_held_wheels(display, options.wheels, where)
     notes = (*source.notes, *display.notes)
     provenance = replace(source.provenance, locked=locked.values, mimicked=locked.followers, platform=origin)
@@ -157,15 +157,17 @@ def _without_wheels(
     return replace(robot, notes=(*robot.notes, *told_slip(robot)))
 
 
-def _with_held_wheels(display: Rebuilt, asked: Sequence[str] | Mapping[str, float], where: str) -> Rebuilt:
-    """The model of a base that does not move, with the wheels that the caller names fixed."""
-    shown, solid = display.geometries
-    wheels, _ = find_wheels(display.model, (solid, shown), asked, where)
-    names = list(dict.fromkeys(name for wheel in wheels for name in (wheel.swivel, wheel.joint) if name))
+def _with_held_wheels(
+    display: Rebuilt, asked: Sequence[str] | Mapping[str, float] | None, where: str
+) -> Rebuilt:
+    """The model of a base that does not move, with its wheels fixed."""
+    names, notes = held_joints(display.model, asked, where)
+    if not names:
+        return replace(display, notes=(*display.notes, *notes))
     ids = [display.model.getJointId(name) for name in names]
     model, geometries = reduced(display.model, display.geometries, ids, np.zeros(display.model.nq))
     note = f"wheels of a fixed base, which stand still: {', '.join(names)}"
-    return Rebuilt(model, geometries, (*display.notes, note))
+    return Rebuilt(model, geometries, (*display.notes, *notes, note))
 
 
 def _wheels(

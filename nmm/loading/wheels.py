@@ -41,22 +41,55 @@ def find_wheels(
     RobotError : a name that is no joint, or no wheel, or a wheel whose radius cannot be found
     """
     measured = Measured(model, geometries, where)
+    names, notes = _wheel_joints(measured, asked, own)
+    radii = measured.asked(asked) or {}
+    return tuple(_wheel(measured, name, radii.get(name), own, roller) for name in names), notes
+
+
+def held_joints(
+    model: pin.Model, asked: Sequence[str] | Mapping[str, float] | None, where: str
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The joints of a fixed base that stand still, wheels after the swivels that they are on, and notes.
+
+    They are the wheels that `find_wheels` would take on a platform; their radii do not matter.
+
+    Raises
+    ------
+    RobotError : a name that is no joint, or no wheel
+    """
+    measured = Measured(model, (), where)
+    names, notes = _wheel_joints(measured, asked, ())
+    held = [joint for name in names for joint in (_swivel(measured, name, ()), name) if joint]
+    return tuple(dict.fromkeys(held)), notes
+
+
+def _wheel_joints(
+    measured: Measured, asked: Sequence[str] | Mapping[str, float] | None, own: Sequence[str]
+) -> tuple[list[str], tuple[str, ...]]:
+    """Names of the wheels' joints, and notes on joints that are named wheels and are none."""
     radii = measured.asked(asked)
     if radii is None:
         candidates = [name for name, i in measured.joints.items() if measured.is_named_wheel(i)]
         candidates = [name for name in candidates if name not in own]
     else:
         candidates = list(radii)
-    reasons = {name: _why_no_wheel(measured, name, candidates, own) for name in candidates}
-    wheels, notes = [], []
-    for name, reason in reasons.items():
+    names, notes = [], []
+    for name in candidates:
+        reason = _why_no_wheel(measured, name, candidates, own)
         if reason is None:
-            wheels.append(_wheel(measured, name, (radii or {}).get(name), own, roller))
+            names.append(name)
         elif radii is None:
             notes.append(f"{name} stays a coordinate in spite of its name: {reason}")
         else:
-            raise RobotError(f"{where}: joint {name!r} is no wheel: {reason}")
-    return tuple(wheels), tuple(notes)
+            raise RobotError(f"{measured.where}: joint {name!r} is no wheel: {reason}")
+    return names, tuple(notes)
+
+
+def _swivel(measured: Measured, name: str, own: Sequence[str]) -> str:
+    """The swivel on which a wheel's joint is; "" without."""
+    carrier = int(measured.model.parents[measured.joints[name]])
+    carrier_name = str(measured.model.names[carrier])
+    return carrier_name if carrier > measured.root and carrier_name not in own else ""
 
 
 def _why_no_wheel(measured: Measured, name: str, candidates: Sequence[str], own: Sequence[str]) -> str | None:
@@ -86,9 +119,9 @@ def _wheel(
     roller: Callable[[float, float], float] | None,
 ) -> Wheel:
     model, joint = measured.model, measured.joints[name]
-    carrier, swivel = int(model.parents[joint]), ""
-    if carrier > measured.root and str(model.names[carrier]) not in own:
-        carrier, swivel = int(model.parents[carrier]), str(model.names[carrier])
+    carrier, swivel = int(model.parents[joint]), _swivel(measured, name, own)
+    if swivel:
+        carrier = int(model.parents[carrier])
     carried = measured.placements[carrier].inverse()
     center = carried.act(measured.placements[joint].translation)
     pivot = np.zeros(3)
