@@ -1,0 +1,207 @@
+"""`nmm redundancy` and `nmm laps`: what they print and write, and what they refuse."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from short_scenario import MINIMAL
+
+import nmm
+from nmm.analysis.redundancy import redundancy as report_of
+from nmm.analysis.self_motion import self_motion
+from nmm.cli.laps import run_laps
+from nmm.cli.redundancy import laps, redundancy
+from nmm.cli.redundancy_tables import direction_of
+from nmm.errors import InputError
+from nmm.tasks import Position
+
+BENT = ["theta=0.3", "q1=0.4", "q2=0.7"]
+ROUND = "{kind: circle, center: [1.2, 0.2], radius: 0.1, rate: pi}"
+
+Printed = pytest.CaptureFixture[str]
+
+
+@pytest.fixture
+def round_path(tmp_path: Path) -> Path:
+    """A scenario that goes round in two seconds."""
+    path = tmp_path / "round.yaml"
+    path.write_text(MINIMAL.replace("[1, 0.5]", ROUND), encoding="utf-8")
+    return path
+
+
+def test_the_report_is_the_librarys(capsys: Printed) -> None:
+    assert redundancy("unicycle_2r", task=["position"], at=BENT) == 0
+    q = dict(text.split("=") for text in BENT)
+    robot = nmm.load("unicycle_2r")
+    expected = report_of((robot, Position("ee", "xy")), {name: float(value) for name, value in q.items()})
+    out = capsys.readouterr().out
+    assert out.strip() == expected.text()
+    for part in ("n - s = 5 - 2 = 3", "m - s = 4 - 2 = 2", "the wheels withhold 1 of the 3", *expected.texts):
+        assert part in out
+
+
+def test_options_of_the_robot_and_of_a_scenario(capsys: Printed) -> None:
+    assert redundancy("unicycle_2r", task=["position"], at=["q1=pi/2"], settings=["d=0"]) == 0
+    assert "J is singular" in capsys.readouterr().out
+    assert redundancy("unicycle_3r_position") == 0
+    assert "n - s = 6 - 3 = 3" in capsys.readouterr().out
+    assert redundancy("unicycle_2r", task=["position"], platform="omnidirectional") == 0
+    assert "every self-motion" not in capsys.readouterr().out
+
+
+def test_a_self_motion_is_told_and_written(capsys: Printed, tmp_path: Path) -> None:
+    page = tmp_path / "motion.html"
+    status = redundancy(
+        "unicycle_2r", task=["position"], at=BENT, self_motion="1", duration=1.0, speed=0.4, html=page
+    )
+    assert status == 0
+    out = capsys.readouterr().out
+    robot = nmm.load("unicycle_2r")
+    q0 = robot.q({"theta": 0.3, "q1": 0.4, "q2": 0.7})
+    moved = self_motion((robot, Position("ee", "xy")), q0, direction=1, duration=1.0, speed=0.4)
+    assert f"self-motion: {moved.text}, and back" in out
+    q2 = next(line.split() for line in out.splitlines() if line.startswith("q2 "))
+    q = moved.trajectory.q[:, 4]
+    expected = [q[0], q[moved.turning], q.min(), q.max()]
+    np.testing.assert_allclose([float(text) for text in q2[2:]], expected, rtol=1e-3)
+    assert "the task stays within" in out
+    assert f"written: {page}" in out
+    text = page.read_text(encoding="utf-8")
+    assert f"<title>unicycle_2r: {moved.text}" in text
+
+
+@pytest.mark.parametrize(
+    ("text", "direction"),
+    [("0", 0), (" 3", 3), ("-1", -1), ("v", "v"), ("v=-1,q2=pi/2", {"v": -1.0, "q2": np.pi / 2})],
+)
+def test_directions(text: str, direction: Any) -> None:
+    assert direction_of(text) == direction
+
+
+def test_what_ends_a_self_motion_is_warned_of(capsys: Printed) -> None:
+    assert redundancy("kinova_car", self_motion="steering_rate", duration=8.0, speed=0.5) == 0
+    printed = capsys.readouterr()
+    assert "turns back early: steering at the limit" in printed.err
+
+
+def test_a_long_sentence_is_no_title(tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
+    redundancy("ur5_unicycle_pose", self_motion="v", duration=0.5, html=page)
+    assert "<title>differential_base with ur5: self-motion" in page.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: redundancy("unicycle_2r"), "expected --task"),
+        (lambda: redundancy("unicycle_2r", task=["position"], play=True), "expected --self-motion"),
+        (lambda: redundancy("unicycle_2r", task=["position"], html=Path("x.html")), "expected --self-motion"),
+        (lambda: redundancy("unicycle_2r", task=["position"], self_motion="9"), "from 0 to 1, got 9"),
+        (lambda: redundancy("unicycle_2r", task=["position"], self_motion="w"), "unknown input 'w'"),
+        (lambda: redundancy("unicycle_2r", task=["position"], self_motion="v=x"), "--self-motion: v"),
+        (lambda: redundancy("unicycle_2r", task=["position"], self_motion="v,q2=1"), "INPUT=RATE"),
+        (lambda: redundancy("unicycle_2r", task=["position"], self_motion="0", speed=0.0), "speed"),
+        (lambda: redundancy("unicycle_2r", task=["pose"]), "expected at most 4"),
+        (lambda: redundancy("no_such_robot", task=["position"]), "no_such_robot"),
+        (lambda: laps("unicycle_2r_position", resolvers=" , "), "--resolvers"),
+        (lambda: laps("unicycle_2r_position", resolvers="rg,best"), "best"),
+        (lambda: laps("unicycle_2r_position", number=0), "laps: expected a whole number"),
+        (lambda: laps("unicycle_2r_position", period=7.0), "not where it was 7 s before"),
+        (lambda: laps("unicycle_3r_spline"), "does not say its period"),
+        (lambda: laps("no_such_scenario"), "no_such_scenario"),
+    ],
+)
+def test_bad_input(
+    call: Callable[[], int], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=message):
+        call()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_laps_are_printed_and_written(capsys: Printed, round_path: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "laps"
+    assert laps(str(round_path), number=3, out=folder) == 0
+    out = capsys.readouterr().out
+    assert "period 2 s" in out
+    assert "lap 1 begins" in out
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "laps.csv",
+        "laps.png",
+        "pg",
+        "rg",
+        "summary.json",
+    ]
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert summary["complete"]
+    assert list(summary["laps"]) == ["rg", "pg"]
+    with (folder / "laps.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["resolver"], row["lap"]) for row in rows] == [
+        (k, str(lap)) for k in ("rg", "pg") for lap in range(4)
+    ]
+    for kind in ("rg", "pg"):
+        run = nmm.Trajectory.load(folder / kind)
+        steps = (len(run) - 1) // 3
+        own = [row for row in rows if row["resolver"] == kind]
+        np.testing.assert_array_equal([float(row["q2"]) for row in own], run.q[::steps, 4])
+        drift = np.diff(run.q[::steps], axis=0)
+        np.testing.assert_array_equal([float(row["drift_x"]) for row in own[1:]], drift[:, 0])
+        distance = summary["laps"][kind]["distance"]
+        np.testing.assert_array_equal([float(row["posture_drift"]) for row in own[1:]], distance)
+        assert own[0]["drift_x"] == own[0]["posture_drift"] == ""
+        assert summary["laps"][kind]["verdict"] in out
+    assert f"files in  {folder}" in out
+    assert (folder / "laps.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_settings_and_periods_reach_the_laps(round_path: Path, tmp_path: Path, capsys: Printed) -> None:
+    status = run_laps(
+        str(round_path),
+        ["pg"],
+        {"task.reference.rate": "2*pi", "dt": 0.02},
+        laps=1,
+        period=3.0,
+        out=tmp_path / "a",
+    )
+    assert status == 0
+    run = nmm.Trajectory.load(tmp_path / "a" / "pg")
+    assert run.t[-1] == pytest.approx(3.0)
+    assert run.dt == pytest.approx(0.02)
+    assert "period 3 s" in capsys.readouterr().out
+
+
+def test_the_folder_is_replaced_if_it_is_ours(round_path: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "laps"
+    for kinds in (["pg"], ["rg"]):
+        assert run_laps(str(round_path), kinds, {"dt": 0.05}, laps=1, period=None, out=folder) == 0
+    assert not (folder / "pg").exists()
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "precious.txt").write_text("mine")
+    with pytest.raises(InputError, match="was not written by nmm"):
+        run_laps(str(round_path), ["pg"], {}, laps=1, period=None, out=other)
+    assert (other / "precious.txt").read_text() == "mine"
+
+
+def test_laps_that_end_early_are_written_and_fail(tmp_path: Path, capsys: Printed) -> None:
+    """An extended Jacobian whose constraint is the task's own row: singular at once."""
+    path = tmp_path / "stuck.yaml"
+    text = MINIMAL.replace("[1, 0.5]", ROUND).replace(
+        "{kind: rg}", "{kind: ej, constraint: [{kind: position, frame: ee, axes: xy, reference: [1.2, 0.2]}]}"
+    )
+    path.write_text(text, encoding="utf-8")
+    assert run_laps(str(path), ["ej"], {}, laps=2, period=None, out=tmp_path / "out") == 1
+    printed = capsys.readouterr()
+    assert "ended in lap 1" in printed.err
+    assert "nmm laps: EJ ended" in printed.err
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert not summary["complete"]
+    assert not (tmp_path / "out" / "laps.png").exists()
