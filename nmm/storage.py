@@ -18,6 +18,7 @@ from nmm.errors import InputError, RobotError
 from nmm.summary import FORMAT
 
 if TYPE_CHECKING:
+    from nmm.playback.ellipsoids import Wanted
     from nmm.robot import Robot
     from nmm.trajectory import Trajectory
 
@@ -72,7 +73,14 @@ def is_run(folder: Path) -> bool:
     return isinstance(summary, dict) and summary.get("format") == FORMAT
 
 
-def save(trajectory: Trajectory, folder: str | Path, *, figures: bool = True, html: bool = False) -> Path:
+def save(
+    trajectory: Trajectory,
+    folder: str | Path,
+    *,
+    figures: bool = True,
+    html: bool = False,
+    ellipsoids: Wanted = False,
+) -> Path:
     """Write trajectory.npz, trajectory.csv, summary.json, scenario.yaml, figures and playback.html.
 
     Parameters
@@ -80,10 +88,13 @@ def save(trajectory: Trajectory, folder: str | Path, *, figures: bool = True, ht
     folder : a new folder, or one of nmm's, which is replaced
     figures : whether to draw the figures (PNG)
     html : whether to write playback.html
+    ellipsoids : whether manipulability ellipsoids are drawn, in ellipses.png and playback.html, or how
+        (`nmm.playback.ellipsoids.EllipsoidOptions`)
 
     Raises
     ------
-    InputError : the folder exists and is not ours, or cannot be written
+    InputError : the folder exists and is not ours, or cannot be written; ellipsoids of a frame or with
+        sizes that the robot does not have
     """
     with replaced_folder(folder, is_run) as temporary:
         np.savez(temporary / "trajectory.npz", **_arrays(trajectory))  # compressing gains little on doubles
@@ -96,12 +107,13 @@ def save(trajectory: Trajectory, folder: str | Path, *, figures: bool = True, ht
         if figures and len(trajectory) > 1:
             from nmm.figures import write_run_figures
 
-            write_run_figures(trajectory, temporary)
+            write_run_figures(trajectory, temporary, ellipsoids=ellipsoids)
         if html and len(trajectory):
             from nmm.playback import write_html
 
             title = trajectory.robot.name if trajectory.scenario is None else str(trajectory.scenario["name"])
-            write_html([trajectory.motion()], temporary / "playback.html", title=title)
+            page = temporary / "playback.html"
+            write_html([trajectory.motion()], page, title=title, ellipsoids=ellipsoids)
     return Path(folder)
 
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from nmm.playback import Motion
+    from nmm.playback.ellipsoids import Wanted
 
 
 class Outcome(StrEnum):
@@ -113,11 +114,13 @@ class Trajectory:
 
         return summarise(self)
 
-    def save(self, folder: str | Path, *, figures: bool = True, html: bool = False) -> Path:
+    def save(
+        self, folder: str | Path, *, figures: bool = True, html: bool = False, ellipsoids: Wanted = False
+    ) -> Path:
         """Write the run's folder (see `nmm.storage.save`): arrays, tables, summary, figures, playback."""
         from nmm.storage import save
 
-        return save(self, folder, figures=figures, html=html)
+        return save(self, folder, figures=figures, html=html, ellipsoids=ellipsoids)
 
     @staticmethod
     def load(folder: str | Path, robot: Robot | None = None) -> Trajectory:
@@ -137,6 +140,16 @@ class Trajectory:
 
         return overview(self)
 
+    def plot_ellipses(self, path: str | Path | None = None, options: Wanted = True) -> Figure:
+        """The end-effector's path with manipulability ellipses (see `nmm.figures.ellipses`); also as PNG."""
+        from nmm.figures.ellipses import ellipses
+        from nmm.figures.style import save
+
+        made = ellipses(self, options)
+        if path is not None:
+            save(made, path)
+        return made
+
     def motion(self, label: str | None = None) -> Motion:
         """What playback shows of it."""
         from nmm.playback import Motion
@@ -153,8 +166,8 @@ class Trajectory:
             frame=self.frame,
         )
 
-    def play(self, *, port: int | None = None, open_browser: bool = True) -> None:
+    def play(self, *, port: int | None = None, open_browser: bool = True, ellipsoids: Wanted = False) -> None:
         """Play the motion in a browser with MeshCat; returns when the user ends it (Ctrl-C)."""
         from nmm.playback import play
 
-        play([self.motion()], port=port, open_browser=open_browser)
+        play([self.motion()], port=port, open_browser=open_browser, ellipsoids=ellipsoids)

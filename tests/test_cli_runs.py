@@ -268,7 +268,7 @@ def test_play_shows_a_comparison(run: Command, monkeypatch: pytest.MonkeyPatch) 
     assert run("play", "two", "--port", "7123", "--no-open").status == 0
     ((motions, options),) = shown
     assert [motion.label for motion in motions] == ["RG", "PG"]
-    assert options == {"port": 7123, "open_browser": False}
+    assert options == {"port": 7123, "open_browser": False, "ellipsoids": False}
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -22,10 +22,13 @@ from playback_browser import browser as browser
 from playback_browser import small_robot as small_robot
 from playback_browser import window as window
 from playback_robot import drive, hand_built_robot
+from playwright.sync_api import Page
 from test_playback_live import listening, start_player
 
 import nmm
+from nmm.configuration import Configuration
 from nmm.playback import LiveViewer, Motion
+from nmm.playback.ellipsoids import CLOSE, THINNEST, EllipsoidOptions
 from nmm.playback.extent import corners, robot_boxes
 from nmm.playback.keyframes import ghost_samples, keyframes
 from nmm.playback.placements import Placements
@@ -143,6 +146,103 @@ def test_the_robots_stay_in_the_picture(
     page.set_viewport_size({"width": 500, "height": 500})
     page.wait_for_function("viewer.camera.aspect === 1")
     assert_in_picture(page, motions, times)
+
+
+# Ellipsoids
+
+#: m of drawing for each m/s
+SCALE = 0.25
+
+
+def velocities(robot: Robot, q: np.ndarray, part: str) -> np.ndarray:
+    """J_v of the end-effector, the columns of the arm's inputs or of all, drawn to scale."""
+    first = robot.platform.p if part == "arm" else 0
+    J = Configuration(robot, q).jacobian("ee")[:3] @ robot.S(q)
+    return np.asarray(SCALE * J[:, first:])
+
+
+def stretch(matrix: np.ndarray, least: float) -> np.ndarray:
+    """The symmetric matrix that makes a ball into the ellipsoid of A Aᵀ, with radii of at least `least`."""
+    U, radii, _ = np.linalg.svd(np.hstack([matrix, np.zeros((3, 3))]), full_matrices=False)
+    return np.asarray((U * np.maximum(radii, least)) @ U.T)
+
+
+def drawn_ellipsoid(page: Page, motion: int, part: str) -> tuple[np.ndarray, np.ndarray]:
+    """Centre, and the matrix of `stretch`, of what the page shows."""
+    matrix = page.evaluate(WALK)[f"/nmm/motion {motion}/ellipsoids/{part}"]
+    place = UPRIGHT.T @ np.reshape(matrix, (4, 4)).T
+    assert np.linalg.det(place[:3, :3]) > 0.0
+    return place[:3, 3], stretch(place[:3, :3], 0.0)
+
+
+@pytest.mark.parametrize("name", ["hand-built", "unicycle_2r"])
+def test_ellipsoids_are_those_of_the_jacobian(name: str, window: Window, tmp_path: Path) -> None:
+    robot = hand_built_robot(tmp_path) if name == "hand-built" else nmm.load(name)
+    first = drive(robot, label="RG")
+    second = Motion(robot, first.t, first.q * 0.7 + 0.1, first.u, frame="ee", label="PG")
+    motions = [first, second]
+    page = window.open(file_url(motions, tmp_path, ellipsoids=EllipsoidOptions(scale=SCALE)))
+    frames = [keyframes(motion) for motion in motions]
+    largest = max(
+        float(np.linalg.norm(velocities(robot, q, part), 2))
+        for frame in frames
+        for q in frame.q
+        for part in ("robot", "arm")
+    )
+    least = THINNEST * largest
+    count = len(frames[0])
+    assert np.array_equal(frames[0].t, frames[1].t)
+    for at in (0.0, 60, 7, count - 1, 17.5, 101.3, 0.4):
+        now = float(np.float32(np.interp(at, np.arange(count), frames[0].t)))
+        page.evaluate(f"nmm.player.seek({now!r})")
+        for i, frame in enumerate(frames):
+            q = np.array([np.interp(now, frame.t, column) for column in frame.q.T])
+            center = Configuration(robot, q).placement("ee").translation
+            for part in ("robot", "arm"):
+                drawn = drawn_ellipsoid(page, i, part)
+                # At a frame as exact as single precision, between two as close as was promised.
+                close = 2e-6 if at == int(at) else CLOSE * largest
+                np.testing.assert_allclose(drawn[0], center, atol=close)
+                np.testing.assert_allclose(drawn[1], stretch(velocities(robot, q, part), least), atol=close)
+    # What the planar robot cannot do is drawn as thin as that.
+    flat = np.linalg.eigvalsh(drawn_ellipsoid(page, 0, "robot")[1])
+    assert (flat[0] == pytest.approx(least, rel=1e-4)) == (name == "unicycle_2r")
+
+
+def test_ellipsoids_are_shown_hidden_and_in_the_picture(
+    small_robot: Robot, window: Window, tmp_path: Path
+) -> None:
+    motions = [drive(small_robot, label=label) for label in ("RG", "PG")]
+    window.page.set_viewport_size({"width": 900, "height": 600})
+    page = window.open(file_url(motions, tmp_path, ellipsoids=EllipsoidOptions(scale=1.5)))
+    groups = [f"/nmm/motion {i}/ellipsoids" for i in range(2)]
+
+    def shown(path: str) -> bool:
+        return bool(page.evaluate(f"nmm.node({path!r}).visible"))
+
+    button = page.locator("#ellipsoids")
+    button.click()
+    assert button.get_attribute("aria-pressed") == "false"
+    assert [shown(group) for group in groups] == [False, False]
+    page.keyboard.press("e")
+    assert [shown(group) for group in groups] == [True, True]
+    legend = page.locator("#legend")
+    assert "1 m/s is drawn as 1.5 m" in legend.inner_text()
+    legend.get_by_text("arm alone").click()
+    assert [shown(f"{group}/{part}") for group in groups for part in ("robot", "arm")] == [True, False] * 2
+    legend.get_by_text("arm alone").click()
+    assert shown(f"{groups[1]}/arm")
+    # A motion's own entry takes its ellipsoids along.
+    legend.get_by_text("PG", exact=True).click()
+    assert not shown("/nmm/motion 1")
+    for fraction in (0.0, 0.4, 1.0):
+        page.evaluate(f"nmm.player.seek({fraction} * nmm.stage.duration)")
+        center, reach = drawn_ellipsoid(page, 0, "robot")
+        ends = np.vstack([center + reach @ d for d in np.vstack([np.eye(3), -np.eye(3)])])
+        assert np.abs(np.array(page.evaluate(PROJECT, ends.tolist()))).max() < 1.0
+    page = window.open(file_url([motions[0]], tmp_path))
+    assert not page.locator("#ellipsoids").is_visible()
+    assert page.evaluate("nmm.ellipsoids") is None
 
 
 # Live

@@ -17,6 +17,7 @@ from nmm.scenario import Scenario
 from nmm.storage import check_replaceable, is_run, replaced_folder
 
 if TYPE_CHECKING:
+    from nmm.playback.ellipsoids import Wanted
     from nmm.trajectory import Trajectory
 
 #: Marks a folder of `nmm compare`.
@@ -32,6 +33,7 @@ def run_scenario(
     *,
     html: bool,
     play: bool,
+    ellipsoids: Wanted = False,
 ) -> int:
     """Run a scenario, write its folder, print its table."""
     scenario = _load(name, resolver, settings)
@@ -39,11 +41,11 @@ def run_scenario(
     check_folder(folder, is_run)
     trajectory = _run(scenario)
     with _shielded():
-        trajectory.save(folder, html=html)
+        trajectory.save(folder, html=html, ellipsoids=ellipsoids)
     show_run(trajectory, folder)
     status = _status("nmm run", [trajectory], folder)
     if play and len(trajectory):
-        trajectory.play()
+        trajectory.play(ellipsoids=ellipsoids)
     return status
 
 
@@ -59,7 +61,12 @@ def _shielded() -> Iterator[None]:
 
 
 def compare_resolvers(
-    name: str, kinds: Sequence[str], settings: Mapping[str, object], out: Path | None
+    name: str,
+    kinds: Sequence[str],
+    settings: Mapping[str, object],
+    out: Path | None,
+    *,
+    ellipsoids: Wanted = False,
 ) -> int:
     """Run a scenario with several resolvers; write and print how they compare."""
     scenarios = [_load(name, kind, settings) for kind in kinds]
@@ -73,7 +80,7 @@ def compare_resolvers(
         if trajectories[-1].outcome == "interrupted":
             break
     with _shielded():
-        _write_comparison(scenarios[0].name, trajectories, folder)
+        _write_comparison(scenarios[0].name, trajectories, folder, ellipsoids)
     table = [dict(describe(trajectory, folder / trajectory.resolver)) for trajectory in trajectories]
     labels = list(dict.fromkeys(label for column in table for label in column))
     show_table(
@@ -105,7 +112,7 @@ def write_the_paper(folder: Path) -> int:
     return OK if paper.holds else FAILED
 
 
-def play_folder(folder: Path, port: int | None, *, open_browser: bool) -> int:
+def play_folder(folder: Path, port: int | None, *, open_browser: bool, ellipsoids: Wanted = False) -> int:
     """Play a run, or the runs of a comparison in one scene."""
     from nmm.playback import play
     from nmm.trajectory import Trajectory
@@ -119,8 +126,22 @@ def play_folder(folder: Path, port: int | None, *, open_browser: bool) -> int:
     ]
     if not motions:
         raise InputError(f"{folder}: expected a run with at least one sample")
-    play(motions, port=port, open_browser=open_browser)
+    play(motions, port=port, open_browser=open_browser, ellipsoids=ellipsoids)
     return OK
+
+
+def ellipsoids_of(wanted: bool, scale: float | None) -> Wanted:
+    """What `--ellipsoids` and `--ellipsoid-scale` ask for; a scale alone asks for ellipsoids too.
+
+    Raises
+    ------
+    InputError : a scale that is not above zero
+    """
+    if scale is None:
+        return wanted
+    from nmm.playback.ellipsoids import EllipsoidOptions
+
+    return EllipsoidOptions(scale=scale)
 
 
 def _load(name: str, resolver: str | None, settings: Mapping[str, object]) -> Scenario:
@@ -164,7 +185,9 @@ def _is_comparison(folder: Path) -> bool:
     return isinstance(summary, dict) and summary.get("format") == COMPARISON
 
 
-def _write_comparison(title: str, trajectories: Sequence[Trajectory], folder: Path) -> None:
+def _write_comparison(
+    title: str, trajectories: Sequence[Trajectory], folder: Path, ellipsoids: Wanted
+) -> None:
     with replaced_folder(folder, _is_comparison) as temporary:
         for trajectory in trajectories:
             trajectory.save(temporary / trajectory.resolver, figures=False)
@@ -180,6 +203,5 @@ def _write_comparison(title: str, trajectories: Sequence[Trajectory], folder: Pa
             from nmm.playback import write_html
 
             comparison(shown).savefig(temporary / "comparison.png")
-            write_html(
-                [trajectory.motion() for trajectory in shown], temporary / "playback.html", title=title
-            )
+            motions = [trajectory.motion() for trajectory in shown]
+            write_html(motions, temporary / "playback.html", title=title, ellipsoids=ellipsoids)

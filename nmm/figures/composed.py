@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,6 +17,9 @@ from nmm.figures import curves, style
 from nmm.figures.motion import Scene, stroboscopic
 from nmm.figures.objective import draw_best_objective, has_objective, objective_comparison
 from nmm.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from nmm.playback.ellipsoids import Wanted
 
 #: Width of a figure of two columns and of its left column, in.
 _WIDTH, _VIEW = 10.4, 4.8
@@ -133,13 +137,16 @@ def _draw_norms(
         style.note(axes, "zero throughout")
 
 
-def write_run_figures(trajectory: Trajectory, folder: str | Path) -> list[Path]:
+def write_run_figures(
+    trajectory: Trajectory, folder: str | Path, *, ellipsoids: Wanted = False
+) -> list[Path]:
     """Write motion.png, errors.png, inputs.png and, where there is an objective, objective.png.
 
     Parameters
     ----------
     trajectory : a run of at least one sample
     folder : an existing folder
+    ellipsoids : whether ellipses.png is written too, or how (`nmm.playback.ellipsoids.EllipsoidOptions`)
 
     Returns
     -------
@@ -153,4 +160,9 @@ def write_run_figures(trajectory: Trajectory, folder: str | Path) -> list[Path]:
     }
     if has_objective([trajectory]):
         figures["objective"] = objective_comparison([trajectory])
+    if ellipsoids is not False:
+        # Not before: with it comes the whole of the analysis.
+        from nmm.figures.ellipses import ellipses
+
+        figures["ellipses"] = ellipses(trajectory, ellipsoids)
     return [style.save(made, folder / f"{name}.png") for name, made in figures.items()]

@@ -1,3 +1,4 @@
+from .ellipsoids import EllipsoidOptions as EllipsoidOptions
 from .html import write_html as write_html
 from .live import LiveViewer as LiveViewer
 from .live import play as play

@@ -89,25 +89,13 @@ class DrawnRobot:
         matrices = np.array(
             [self.placements.relative(q, w) for q, w in zip(frames.q, frames.wheels, strict=True)]
         )
-        times, kept = _times(frames.t - start)
+        times, kept = page_times(frames.t - start)
         positions, quaternions = position_and_quaternion(matrices[kept])
         animations = []
         for joint, path in enumerate(self.paths):
-            tracks = [
-                {
-                    "name": f".{name}",
-                    "type": kind,
-                    "times": packed(times, np.float32),
-                    "values": packed(values[:, joint], np.float32),
-                }
-                for name, kind, values in (
-                    ("position", "vector3", positions),
-                    ("quaternion", "quaternion", quaternions),
-                )
-                if np.ptp(values[:, joint], axis=0).max() > 1e-12
-            ]
-            if tracks:
-                animations.append({"path": path, "clip": {"fps": 1, "name": "motion", "tracks": tracks}})
+            animations += animation(
+                path, times, {"position": positions[:, joint], "quaternion": quaternions[:, joint]}
+            )
         return animations
 
     def ghosts(self, path: str, q: Array, wheels: Array) -> None:
@@ -122,6 +110,27 @@ class DrawnRobot:
                 for i, joint in enumerate(self.paths)
             ],
         )
+
+
+def animation(path: str, times: Array, tracks: Mapping[str, Array]) -> list[Command]:
+    """MeshCat's animation of a node; none where nothing changes.
+
+    Parameters
+    ----------
+    times : (K,) from `page_times`
+    tracks : "position" (K, 3), "quaternion" (K, 4), "scale" (K, 3)
+    """
+    moving = [
+        {
+            "name": f".{name}",
+            "type": "quaternion" if name == "quaternion" else "vector3",
+            "times": packed(times, np.float32),
+            "values": packed(values, np.float32),
+        }
+        for name, values in tracks.items()
+        if np.ptp(values, axis=0).max() > 1e-12
+    ]
+    return [{"path": path, "clip": {"fps": 1, "name": "motion", "tracks": moving}}] if moving else []
 
 
 def segment(name: str) -> str:
@@ -139,7 +148,7 @@ def _mixed(color: Sequence[float], tint: Rgb | None) -> Rgb:
     return mixed[0], mixed[1], mixed[2]
 
 
-def _times(t: Array) -> tuple[Array, Array]:
+def page_times(t: Array) -> tuple[Array, Array]:
     """Times in the browser's single precision, ascending, and which of them are kept.
 
     The last one is rounded down: seeking to the end must find it.

@@ -6,11 +6,15 @@ import os
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from nmm.errors import InputError
 from nmm.playback.motion import Motion
 from nmm.playback.page import file_page
 from nmm.playback.scene import playback_scene
+
+if TYPE_CHECKING:
+    from nmm.playback.ellipsoids import Wanted
 
 
 def write_html(
@@ -21,6 +25,7 @@ def write_html(
     ghosts: int | None = None,
     fps: float = 60.0,
     autoplay: bool = False,
+    ellipsoids: Wanted = False,
 ) -> Path:
     """Write a page that plays the motions, each in a colour of its own.
 
@@ -34,14 +39,17 @@ def write_html(
     ghosts : transparent copies of each robot along its way; 6 when not given, 3 of each of several
     fps : frames for each second of motion
     autoplay : whether it plays when it is opened
+    ellipsoids : whether manipulability ellipsoids are drawn, or how (`EllipsoidOptions`)
 
     Raises
     ------
-    InputError : no motion, or the file cannot be written
+    InputError : no motion, or the file cannot be written; ellipsoids as in `playback_scene`
     """
     if title is None:
         title = motions[0].robot.name if motions else ""
-    commands = playback_scene(motions, title=title, ghosts=ghosts, fps=fps, autoplay=autoplay)
+    commands = playback_scene(
+        motions, title=title, ghosts=ghosts, fps=fps, autoplay=autoplay, ellipsoids=ellipsoids
+    )
     return _write_atomically(Path(path), file_page(commands, title))
 
 

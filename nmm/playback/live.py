@@ -8,6 +8,7 @@ import threading
 import webbrowser
 from collections.abc import Sequence
 from types import TracebackType
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +22,9 @@ from nmm.playback.scene import live_scene, playback_scene
 from nmm.playback.server import PageServer
 from nmm.robot import Robot
 
+if TYPE_CHECKING:
+    from nmm.playback.ellipsoids import Wanted
+
 
 def play(
     motions: Sequence[Motion],
@@ -29,6 +33,7 @@ def play(
     open_browser: bool = True,
     title: str | None = None,
     ghosts: int | None = None,
+    ellipsoids: Wanted = False,
     stop: threading.Event | None = None,
 ) -> None:
     """Play motions in a browser, in real time; returns at Ctrl-C or when `stop` is set.
@@ -43,18 +48,18 @@ def play(
     open_browser : whether to open the page in the user's browser
     title : heading; the first robot's name when not given
     ghosts : transparent copies of each robot along its way; 6 when not given, 3 of each of several
+    ellipsoids : whether manipulability ellipsoids are drawn, or how (`EllipsoidOptions`)
     stop : ends the playback when set (by another thread)
 
     Raises
     ------
-    InputError : no motion; the port is taken, not allowed or not a port
+    InputError : no motion; the port is taken, not allowed or not a port; ellipsoids as in `playback_scene`
     """
     if title is None:
         title = motions[0].robot.name if motions else ""
     heading = title
-    hello = [
-        encode(command) for command in playback_scene(motions, title=heading, ghosts=ghosts, autoplay=True)
-    ]
+    commands = playback_scene(motions, title=heading, ghosts=ghosts, autoplay=True, ellipsoids=ellipsoids)
+    hello = [encode(command) for command in commands]
     server = PageServer(lambda host: socket_page(heading, host), hello, port=port)
     serve(server, "Playing", open_browser=open_browser, stop=stop)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from nmm.playback.placements import base_position
 from nmm.playback.rolling import wheel_angles
 from nmm.playback.shapes import Y_TO_Z, cylinder, sphere
 from nmm.robot import Robot
+
+if TYPE_CHECKING:
+    from nmm.playback.ellipsoids import SceneEllipsoids, Wanted
 
 #: Colours of the motions: told apart by readers with any colour vision.
 COLORS: tuple[Rgb, ...] = (
@@ -42,6 +46,7 @@ def playback_scene(
     ghosts: int | None = None,
     fps: float = 60.0,
     autoplay: bool = False,
+    ellipsoids: Wanted = False,
 ) -> list[Command]:
     """Commands for motions that are played: robots, paths, ghosts, animation.
 
@@ -52,10 +57,11 @@ def playback_scene(
     ghosts : transparent copies of each robot along its way; 6 when not given, 3 of each of several
     fps : frames for each second of motion
     autoplay : whether the page begins to play by itself
+    ellipsoids : whether manipulability ellipsoids are drawn, or how (`EllipsoidOptions`)
 
     Raises
     ------
-    InputError : no motion
+    InputError : no motion; ellipsoids of a frame or with sizes that a robot does not have
     """
     if not motions:
         raise InputError("motions: expected at least one motion, got none")
@@ -64,6 +70,9 @@ def playback_scene(
     end = max(float(motion.t[-1]) for motion in motions)
     times = np.linspace(start, end, INSTANTS)
     boxes = _boxes(motions, frames, times)
+    shown = _ellipsoids(motions, frames, ellipsoids)
+    if shown is not None:
+        boxes = shown.around(boxes, times)
     size = _size(boxes, motions)
     several = len(motions) > 1
     if ghosts is None:
@@ -108,8 +117,12 @@ def playback_scene(
                 points=packed(motion.driven, np.float32),
                 times=packed(motion.t - start, np.float64),
             )
+        if shown is not None:
+            animations += shown.draw(drawing, i, path, color, start)
     _desired(drawing, motions)
     _targets(drawing, motions, size)
+    if shown is not None:
+        shown.tell(drawing, [f"/nmm/motion {i}" for i in range(len(motions))], COLORS[0])
     drawing.add("set_animation", animations=animations, options={"play": False, "repetitions": 1})
     drawing.add("ready")
     return drawing.commands
@@ -152,6 +165,19 @@ def live_scene(
     )
     drawing.add("ready")
     return drawing.commands, drawn
+
+
+def _ellipsoids(
+    motions: Sequence[Motion], frames: Sequence[Keyframes], wanted: Wanted
+) -> SceneEllipsoids | None:
+    """The ellipsoids asked for."""
+    if wanted is False:
+        return None
+    # Not before: with it comes the whole of the analysis.
+    from nmm.playback.ellipsoids import SceneEllipsoids, options_of
+
+    options = options_of(wanted)
+    return None if options is None else SceneEllipsoids(motions, frames, options)
 
 
 def _reached(robot: Robot, q: Array, wheels: Array) -> Array:

@@ -115,6 +115,7 @@
       nmm.viewer.set_dirty();
     },
     ghosts: () => setShown("ghosts", nmm.ghosts, !isPressed("ghosts")),
+    ellipsoids: () => setShown("ellipsoids", nmm.ellipsoids, !isPressed("ellipsoids")),
     paths: () => setShown("paths", nmm.scenery.paths, !isPressed("paths")),
   };
   for (const [id, action] of Object.entries(actions)) get(id).addEventListener("click", action);
@@ -137,6 +138,7 @@
     f: actions.follow,
     r: actions.reset,
     g: actions.ghosts,
+    e: actions.ellipsoids,
     p: actions.paths,
     m: () => document.body.classList.toggle("panel"),
   };
@@ -159,6 +161,7 @@
     ball: '<circle cx="12" cy="6" r="5" fill="currentColor"/>',
   };
 
+  // path: a node that the entry shows and hides, or several.
   nmm.legend = ({ kind, color, text, path }) => {
     if (path === undefined && [...get("legend").children].some((item) => item.textContent === text)) return;
     const item = document.createElement("li");
@@ -171,9 +174,9 @@
       holder.setAttribute("aria-pressed", "true");
       holder.title = `Show or hide ${text}`;
       holder.addEventListener("click", () => {
-        const node = nmm.node(path);
-        node.visible = !node.visible;
-        holder.setAttribute("aria-pressed", String(node.visible));
+        const on = holder.getAttribute("aria-pressed") !== "true";
+        for (const one of [path].flat()) nmm.node(one).visible = on;
+        holder.setAttribute("aria-pressed", String(on));
         nmm.viewer.set_dirty();
       });
     }

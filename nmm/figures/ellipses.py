@@ -1,0 +1,197 @@
+"""Manipulability ellipses along a motion: how fast the end-effector can move, by the robot and by its arm."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from nmm.analysis.parts import WHOLE
+from nmm.arrays import Array
+from nmm.errors import InputError
+from nmm.figures import style
+from nmm.figures.motion import ABOVE, SIDE, hull
+from nmm.figures.silhouette import Pose, Silhouette
+from nmm.playback.ellipsoids import (
+    NAMES,
+    SHARE,
+    EllipsoidOptions,
+    Wanted,
+    extent_of,
+    largest_radius,
+    options_of,
+    scale_text,
+)
+from nmm.playback.keyframes import ghost_samples
+from nmm.playback.motion import Motion
+from nmm.trajectory import Trajectory
+
+#: At most and at least so many instants with ellipses, and at how many of them the robot is drawn.
+MOST, LEAST, ROBOTS = 12, 6, 5
+#: Between two instants the frame moves by so many of the largest radius as drawn, if they are not too few.
+_APART = 1.5
+#: No way is so short that ellipses are drawn smaller than this, beside those of a long one.
+_SMALLEST = 0.3
+#: The path is drawn with at most so many points.
+_POINTS = 1500
+#: A radius below this part of the largest is rounding: what has none upwards needs no view from the side.
+_FLAT = 1e-6
+#: Room for the x axis' label between two views, and for the line above the legend, in.
+_BETWEEN, _LINE = 0.2, 0.2
+_AXES = "xyz"
+_BODY, _EDGE, _FILL, _RIM, _ARM = "#EEF0F3", "#BFC5CE", style.SKY, style.BLUE, style.VERMILLION
+
+
+def ellipses(trajectory: Trajectory, options: Wanted = True) -> Figure:
+    """The end-effector's path with the ellipses of its velocities at instants spread evenly along the way.
+
+    An ellipse holds the velocities, seen in that view, that inputs of size 1 give the frame: the shadow of
+    the ellipsoid of J_v J_vᵀ, not its section. Filled: the whole robot; outlined: its arm alone. A second
+    view from the side where there is anything to see from there.
+
+    Parameters
+    ----------
+    trajectory : the run, of at least one sample
+    options : frame, sizes of the inputs, and scale; True for the task's frame, 1, and a readable one
+
+    Raises
+    ------
+    InputError : no sample; a frame or an input that the robot does not have
+    """
+    scene = _Scene(trajectory, options_of(options) or EllipsoidOptions())
+    across = style.PAGE - style.LEFT - style.RIGHT
+    heights = [scene.height(view, across) for view in scene.views]
+    legends = [style.legend_rows(scene.names, across), *[1] * (len(heights) - 1)]
+    total = style.BOTTOM + style.column_height(heights, legends) + _BETWEEN * (len(heights) - 1)
+    made = style.figure(style.PAGE, total + _LINE)
+    top = total
+    for index, (view, height, rows) in enumerate(zip(scene.views, heights, legends, strict=True)):
+        top -= style.room(rows) + height
+        axes = style.place(made, style.LEFT, top, across, height)
+        scene.draw(axes, view)
+        if index == 0:
+            style.legend(axes)
+        top -= _BETWEEN
+    made.text(
+        style.LEFT / style.PAGE, 1.0 - 0.5 * _LINE / (total + _LINE), scene.text, fontsize=style.SMALL,
+        color=style.GREY, va="top",
+    )  # fmt: skip
+    return made
+
+
+class _Scene:
+    """What is drawn: ellipsoids and robots at instants, the path, the scale."""
+
+    def __init__(self, trajectory: Trajectory, options: EllipsoidOptions) -> None:
+        if not len(trajectory):
+            raise InputError("figure of the ellipses: expected a run with at least one sample, got none")
+        robot = trajectory.robot
+        self.frame = options.frame_on(robot, trajectory.frame)
+        kept = np.unique(np.linspace(0, len(trajectory) - 1, min(len(trajectory), _POINTS)).astype(int))
+        q = trajectory.q[kept]
+        along = options.ellipsoids(robot, self.frame, q)
+        self.path = along[WHOLE].center
+        motion = Motion(robot, trajectory.t[kept], q, trajectory.u[kept], path=self.path)
+        silhouette = Silhouette(robot, self.frame)
+        largest = largest_radius([along])
+        # What is driven again and again is no longer than a circle of its extent.
+        around = np.pi / np.sqrt(2.0) * np.linalg.norm(np.ptp(self.path, axis=0))
+        way = float(min(np.linalg.norm(np.diff(self.path, axis=0), axis=1).sum(), around))
+        extent = extent_of(robot, q[0])
+        # On a short way smaller ones than the page's, that leave each other room.
+        room = float(np.clip(way / (LEAST - 1) / SHARE, _SMALLEST * extent, extent))
+        self.scale = options.drawn_scale(room, [along])
+        apart = _APART * self.scale * largest
+        count = int(np.clip(1 + way // apart, LEAST, MOST)) if apart > 0.0 else LEAST
+        samples = ghost_samples(motion, count) or [0]
+        drawn = np.unique(np.linspace(0, len(samples) - 1, ROBOTS).round().astype(int))
+        self.poses = [silhouette.at(q[samples[k]]) for k in drawn]
+        self.outlines = {
+            view: {part: found.projected(view).outline(self.scale)[samples] for part, found in along.items()}
+            for view in (ABOVE, SIDE)
+        }
+        sizes = zip(along[WHOLE].input_sizes, robot.u_units, strict=True)
+        self.sizes = list(dict.fromkeys(f"{size:.3g} {unit}" for size, unit in sizes))
+        upwards = float(np.nan_to_num(along[WHOLE].half_extents()[:, 2]).max())
+        rises = float(np.ptp(self.path[:, 2])) > _FLAT
+        self.views = (ABOVE, SIDE) if rises or upwards > _FLAT * largest else (ABOVE,)
+
+    @property
+    def names(self) -> list[str]:
+        """The entries of its legend."""
+        return [*(NAMES[part] for part in self.outlines[ABOVE]), f"path of {self.frame}", "start", "end"]
+
+    @property
+    def text(self) -> str:
+        """What the ellipses are, and their scale."""
+        # Inputs of many sizes are not listed: it is one line.
+        sizes = ", ".join(self.sizes) if len(self.sizes) <= 2 else "the sizes given"
+        return f"velocities for ‖u‖ ≤ 1 ({sizes}); {scale_text(self.scale)}"
+
+    def limits(self, view: tuple[int, int]) -> list[tuple[float, float]]:
+        """Limits of both axes that hold everything, with a margin, m."""
+        points = [self.path[:, view], *(pose.points()[:, view] for pose in self.poses)]
+        points += [outlines.reshape(-1, 2) for outlines in self.outlines[view].values()]
+        found = np.vstack([part[np.all(np.isfinite(part), axis=1)] for part in points])
+        low, high = found.min(axis=0), found.max(axis=0)
+        if view == SIDE:
+            low[1] = min(low[1], 0.0)
+        margin = 0.04 * float(np.max(high - low))
+        return [(float(a) - margin, float(b) + margin) for a, b in zip(low, high, strict=True)]
+
+    def height(self, view: tuple[int, int], width: float) -> float:
+        """How high a view is that has this width, in the same unit."""
+        (left, right), (low, high) = self.limits(view)
+        return width * (high - low) / (right - left)
+
+    def draw(self, axes: Axes, view: tuple[int, int]) -> None:
+        """Draw the scene seen along the world axis that `view` leaves out."""
+        across, up = view
+        style.label(axes, x=f"{_AXES[across]} [m]", y=f"{_AXES[up]} [m]")
+        axes.set_aspect("equal", adjustable="box")
+        horizontal, vertical = self.limits(view)
+        axes.set_xlim(*horizontal)
+        axes.set_ylim(*vertical)
+        room = axes.get_window_extent()
+        for axis, pixels in ((axes.xaxis, room.width), (axes.yaxis, room.height)):
+            nbins = int(np.clip(pixels / style.DPI / 0.25, 3, 9))
+            axis.set_major_locator(MaxNLocator(nbins=nbins, steps=[1, 2, 5, 10]))
+        for pose in self.poses:
+            _draw_faintly(axes, pose, view)
+        for part, outlines in self.outlines[view].items():
+            known = list(outlines[np.isfinite(outlines).all(axis=(1, 2))])
+            fill = to_rgba(_FILL, 0.22 if part == WHOLE else 0.0)
+            color, width = (_RIM, 1.0) if part == WHOLE else (_ARM, 1.3)
+            shapes = PolyCollection(
+                known, facecolors=[fill], edgecolors=[color], linewidths=width, label=NAMES[part],
+                zorder=4.0 if part == WHOLE else 4.5,
+            )  # fmt: skip
+            axes.add_collection(shapes, autolim=False)
+        path = self.path[:, view]
+        axes.plot(*path.T, color=style.BLACK, linewidth=1.2, label=f"path of {self.frame}", zorder=5.0)
+        for point, marker, text in ((path[0], "o", "start"), (path[-1], "s", "end")):
+            axes.plot(
+                *point, marker, color=style.GREEN if text == "start" else style.PINK, markersize=5,
+                markeredgecolor="white", markeredgewidth=0.8, label=text, linestyle="none", zorder=6.0,
+            )  # fmt: skip
+
+
+def _draw_faintly(axes: Axes, pose: Pose, view: tuple[int, int]) -> None:
+    """A robot in the background: its platform's outline, its wheels, its arm."""
+    bodies = [hull(points[:, view]) for points in pose.body]
+    # Edges of all shapes first, faces above them: what stays visible is the edge of their union.
+    edges = PolyCollection(bodies, facecolors="none", edgecolors=[_EDGE], linewidths=1.2, zorder=2.0)
+    faces = PolyCollection(bodies, facecolors=[_BODY], linewidths=0, zorder=2.1)
+    wheels = [hull(points[:, view]) for points in pose.wheels]
+    marks = PolyCollection(wheels, facecolors=[_EDGE], linewidths=0, zorder=2.2)
+    lines = [ends[:, view] for ends in pose.links]
+    links = LineCollection(lines, colors=[_EDGE], linewidths=2.2, capstyle="round", zorder=2.3)
+    for drawn in (edges, faces, marks, links):
+        axes.add_collection(drawn, autolim=False)
+    joints: Array = pose.joints[:, view]
+    axes.plot(
+        *joints.T, "o", markersize=2.6, color="white", markeredgecolor=_EDGE, zorder=2.4, linestyle="none"
+    )
