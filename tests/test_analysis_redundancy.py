@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from platform_grid import EXAMPLES, random_qp
 from robot_grid import built, frame_of, start
 
-from nmm.analysis.null_space import orthonormal_null_space, readable_null_space
-from nmm.analysis.redundancy import RedundancyReport, redundancy
+from nmm.analysis.redundant.null_space import orthonormal_null_space, readable_null_space
+from nmm.analysis.redundant.report import RedundancyReport, redundancy
 from nmm.configuration import Configuration
 from nmm.controller import Controller
 from nmm.errors import InputError, SingularError

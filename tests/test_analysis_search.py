@@ -11,9 +11,7 @@ import twin
 from numpy import cos, pi, sin
 from numpy.typing import NDArray
 
-from nmm.analysis.families import SingularFamily
-from nmm.analysis.search import SingularitySearch, find_singularities
-from nmm.analysis.singular_point import nearest_singularity
+from nmm.analysis.searching import SingularFamily, SingularitySearch, find_singularities, nearest_singularity
 from nmm.errors import InputError, SingularError
 from nmm.loading import load
 from nmm.robot import Robot

@@ -10,9 +10,8 @@ import twin
 from numpy import pi
 from numpy.typing import NDArray
 
-from nmm.analysis.search import find_singularities
-from nmm.analysis.search_text import value_text, values_text
-from nmm.analysis.singular_point import nearest_singularity
+from nmm.analysis.searching import find_singularities, nearest_singularity
+from nmm.analysis.searching.text import value_text, values_text
 from nmm.cli.searching import search_command, show_nearest, show_search
 from nmm.cli.subjects import studied
 from nmm.loading import load

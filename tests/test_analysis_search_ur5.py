@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from spatial_arms import load_ur5
 
-from nmm.analysis.families import SingularFamily
-from nmm.analysis.search import SingularitySearch, find_singularities
-from nmm.analysis.singular_point import nearest_singularity
+from nmm.analysis.searching import SingularFamily, SingularitySearch, find_singularities, nearest_singularity
 from nmm.loading import load
 from nmm.robot import Robot
 from nmm.tasks import Pose

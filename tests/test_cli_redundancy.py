@@ -13,8 +13,8 @@ import pytest
 from short_scenario import MINIMAL
 
 import nmm
-from nmm.analysis.redundancy import redundancy as report_of
-from nmm.analysis.self_motion import self_motion
+from nmm.analysis.redundant.moving import self_motion
+from nmm.analysis.redundant.report import redundancy as report_of
 from nmm.cli.laps import run_laps
 from nmm.cli.redundancy import laps, redundancy
 from nmm.cli.redundancy_tables import direction_of

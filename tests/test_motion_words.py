@@ -9,8 +9,15 @@ from numpy.typing import NDArray
 from platform_grid import EXAMPLES
 from robot_grid import built, start
 
-from nmm.analysis.motion_words import COORDINATES, INPUTS, Words, coordinate_words, input_words, motion_text
-from nmm.analysis.redundancy import redundancy
+from nmm.analysis.redundant.motion_words import (
+    COORDINATES,
+    INPUTS,
+    Words,
+    coordinate_words,
+    input_words,
+    motion_text,
+)
+from nmm.analysis.redundant.report import redundancy
 from nmm.configuration import Configuration
 from nmm.robot import Robot
 from nmm.tasks import Position

@@ -9,7 +9,7 @@ import pytest
 from numpy import pi
 from numpy.typing import NDArray
 
-from nmm.analysis.repeatability import Repeatability, repeatability
+from nmm.analysis.redundant.laps import Repeatability, repeatability
 from nmm.controller import Controller
 from nmm.errors import InputError
 from nmm.references import Bearing, Circle, Constant, Line, PoseReference, Spline, Turn

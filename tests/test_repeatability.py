@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from short_scenario import scenario
 
 import nmm
-from nmm.analysis.repeatability import Laps, Repeatability, repeatability
+from nmm.analysis.redundant.laps import Laps, Repeatability, repeatability
 from nmm.controller import Controller
 from nmm.errors import InputError
 from nmm.figures.repeatability import laps as laps_figure

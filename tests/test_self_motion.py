@@ -14,8 +14,8 @@ from spatial_arms import UR5
 from test_repeatability import planar_arm
 
 import nmm
-from nmm.analysis.redundancy import redundancy
-from nmm.analysis.self_motion import SelfMotion, self_motion
+from nmm.analysis.redundant.moving import SelfMotion, self_motion
+from nmm.analysis.redundant.report import redundancy
 from nmm.configuration import Configuration
 from nmm.errors import InputError, SingularError
 from nmm.playback import write_html

@@ -1,23 +1,9 @@
-"""Singularity analysis: where J loses rank, why, and what the platform buys. Arrays in, arrays out."""
+"""Analyses of a robot with a task: where J loses rank and why, what is free, and what a person looks at.
 
-from nmm.analysis.algorithmic import ExtendedSingularity, PartitionSingularities
-from nmm.analysis.along import SingularityHistory, analyse_along
-from nmm.analysis.instants import Crossing, Dip
-from nmm.analysis.minors import Minors
-from nmm.analysis.parts import Part
-from nmm.analysis.restoration import Restoration
-from nmm.analysis.singularity import SingularityReport, analyse
+Names are loaded when first used (the list is `__init__.pyi`); formulas are in `nmm.analysis.symbolic`, which
+needs SymPy.
+"""
 
-__all__ = [
-    "Crossing",
-    "Dip",
-    "ExtendedSingularity",
-    "Minors",
-    "Part",
-    "PartitionSingularities",
-    "Restoration",
-    "SingularityHistory",
-    "SingularityReport",
-    "analyse",
-    "analyse_along",
-]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -15,7 +15,7 @@ from nmm.cli.runs import check_folder
 from nmm.storage import replaced_folder
 
 if TYPE_CHECKING:
-    from nmm.analysis.repeatability import Laps, Repeatability
+    from nmm.analysis.redundant.laps import Laps, Repeatability
 
 #: Marks a folder of `nmm laps`.
 FORMAT = "nmm laps 1"
@@ -32,7 +32,7 @@ def run_laps(
     out: Path | None,
 ) -> int:
     """Run the laps, write the folder, print the tables; 1 when a run ended before its last lap."""
-    from nmm.analysis.repeatability import repeatability
+    from nmm.analysis.redundant.laps import repeatability
     from nmm.scenario import Scenario
 
     scenario = Scenario.load(name, settings)

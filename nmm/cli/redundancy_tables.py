@@ -13,7 +13,7 @@ from nmm.cli.subjects import studied
 from nmm.errors import InputError
 
 if TYPE_CHECKING:
-    from nmm.analysis.self_motion import SelfMotion
+    from nmm.analysis.redundant.moving import SelfMotion
 
 OK = 0
 #: A page's title does not hide the robot: a longer sentence is left to the table.
@@ -41,7 +41,7 @@ def show_redundancy(
     ------
     InputError : wrong options; a direction that does not exist
     """
-    from nmm.analysis.redundancy import redundancy
+    from nmm.analysis.redundant.report import redundancy
 
     if along is None and (html is not None or play):
         raise InputError(
@@ -52,7 +52,7 @@ def show_redundancy(
     show_text(report.text())
     if along is None:
         return OK
-    from nmm.analysis.self_motion import self_motion
+    from nmm.analysis.redundant.moving import self_motion
 
     moved = self_motion(
         found.subject, found.q, t=found.t, direction=direction_of(along), duration=duration, speed=speed

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from nmm.cli.output import progress, show_table, show_text
 
 if TYPE_CHECKING:
-    from nmm.analysis.families import SingularFamily
-    from nmm.analysis.search import SingularitySearch
-    from nmm.analysis.singular_point import SingularPoint
+    from nmm.analysis.searching.family import SingularFamily
+    from nmm.analysis.searching.many_starts import SingularitySearch
+    from nmm.analysis.searching.nearest import SingularPoint
     from nmm.cli.subjects import Studied
 
 OK = 0
@@ -30,8 +30,8 @@ def search_command(
     starts : local minimisations of the search; None for no search of families
     nearest : whether to look for the nearest to `studied.q`
     """
-    from nmm.analysis.search import find_singularities
-    from nmm.analysis.singular_point import nearest_singularity
+    from nmm.analysis.searching.many_starts import find_singularities
+    from nmm.analysis.searching.nearest import nearest_singularity
 
     if starts is not None:
         with progress("searching") as report:
@@ -59,7 +59,7 @@ def search_command(
 
 def show_search(search: SingularitySearch) -> None:
     """The families in a table, what each loses and where, what was searched."""
-    from nmm.analysis.families import of_starts
+    from nmm.analysis.searching.family import of_starts
 
     show_text(search.summary)
     if search.found and not search.everywhere:
@@ -116,7 +116,7 @@ def _row(number: int, family: SingularFamily) -> tuple[str, ...]:
 
 
 def _value(value: float, unit: str) -> str:
-    from nmm.analysis.search_text import value_text
+    from nmm.analysis.searching.text import value_text
 
     return value_text(float(value), unit)
 

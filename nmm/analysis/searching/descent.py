@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from nmm.analysis.search_measure import ROUNDING, Flags, Measure
-from nmm.analysis.search_space import Space
+from nmm.analysis.searching.measure import ROUNDING, Flags, Measure
+from nmm.analysis.searching.space import Space
 from nmm.arrays import Array
 
 #: Lengths of a step that are tried.

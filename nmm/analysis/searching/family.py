@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nmm.analysis.search_text import combination_text, listed, values_text
+from nmm.analysis.searching.text import combination_text, listed, values_text
 from nmm.arrays import Array
 
 #: Values of the same kind that differ by less are the same, rad or m.

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nmm.analysis.search_descent import descend
-from nmm.analysis.search_measure import Flags, Measure
-from nmm.analysis.search_space import Space
+from nmm.analysis.searching.descent import descend
+from nmm.analysis.searching.measure import Flags, Measure
+from nmm.analysis.searching.space import Space
 from nmm.arrays import Array, Integers
 
 #: Slopes this small beside those of J itself are none.

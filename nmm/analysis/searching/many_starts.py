@@ -9,15 +9,15 @@ from numbers import Integral
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.analysis.families import SingularFamily, of_starts
 from nmm.analysis.jacobians import Jacobians, Subject
 from nmm.analysis.parts import WHOLE
-from nmm.analysis.search_descent import descend
-from nmm.analysis.search_families import everywhere, families_of
-from nmm.analysis.search_measure import Measure
-from nmm.analysis.search_minimum import LocalMinimum, followed, lowest
-from nmm.analysis.search_space import Space, search_space
-from nmm.analysis.search_text import listed, value_text
+from nmm.analysis.searching.descent import descend
+from nmm.analysis.searching.family import SingularFamily, of_starts
+from nmm.analysis.searching.measure import Measure
+from nmm.analysis.searching.minimum import LocalMinimum, followed, lowest
+from nmm.analysis.searching.sorting import everywhere, families_of
+from nmm.analysis.searching.space import Space, search_space
+from nmm.analysis.searching.text import listed, value_text
 from nmm.arrays import Array, positive, scalar
 from nmm.errors import InputError, SingularError
 

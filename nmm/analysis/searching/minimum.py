@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import Bounds, minimize
 
-from nmm.analysis.search_measure import Measure
-from nmm.analysis.search_space import Space
+from nmm.analysis.searching.measure import Measure
+from nmm.analysis.searching.space import Space
 from nmm.arrays import Array
 
 #: So many of the lowest ends are followed to the bottom.

@@ -8,16 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.analysis.families import SingularFamily
 from nmm.analysis.jacobians import Jacobians, Subject, checked
 from nmm.analysis.parts import WHOLE
-from nmm.analysis.search import TOLERANCE, counted, seeded
-from nmm.analysis.search_descent import descend
-from nmm.analysis.search_families import family_at
-from nmm.analysis.search_measure import Measure
-from nmm.analysis.search_slide import slide
-from nmm.analysis.search_space import Space, search_space
-from nmm.analysis.search_text import listed, value_text
+from nmm.analysis.searching.descent import descend
+from nmm.analysis.searching.family import SingularFamily
+from nmm.analysis.searching.many_starts import TOLERANCE, counted, seeded
+from nmm.analysis.searching.measure import Measure
+from nmm.analysis.searching.slide import slide
+from nmm.analysis.searching.sorting import family_at
+from nmm.analysis.searching.space import Space, search_space
+from nmm.analysis.searching.text import listed, value_text
 from nmm.arrays import Array, positive
 
 #: Nearest candidates that are followed to the end.

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from nmm.analysis.families import Relation, SingularFamily
-from nmm.analysis.search_local import localised, stay_singular
-from nmm.analysis.search_measure import Flags, Measure
-from nmm.analysis.search_space import Space
+from nmm.analysis.searching.family import Relation, SingularFamily
+from nmm.analysis.searching.local import localised, stay_singular
+from nmm.analysis.searching.measure import Flags, Measure
+from nmm.analysis.searching.space import Space
 from nmm.arrays import Array
 
 #: Random members that prove a family, and how much less exact than a point that has converged they are.

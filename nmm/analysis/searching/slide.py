@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from nmm.analysis.search_descent import LONGEST, descend
-from nmm.analysis.search_local import FLAT
-from nmm.analysis.search_measure import Measure
-from nmm.analysis.search_space import Space
+from nmm.analysis.searching.descent import LONGEST, descend
+from nmm.analysis.searching.local import FLAT
+from nmm.analysis.searching.measure import Measure
+from nmm.analysis.searching.space import Space
 from nmm.arrays import Array
 
 #: Lengths of a tangent step that are tried.

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from nmm.analysis.families import Relation, SingularFamily, merged
-from nmm.analysis.search_local import Local, localised, shaken, tangents, walk
-from nmm.analysis.search_measure import Flags, Measure
-from nmm.analysis.search_proof import completed, holds
-from nmm.analysis.search_space import Space
+from nmm.analysis.searching.family import Relation, SingularFamily, merged
+from nmm.analysis.searching.local import Local, localised, shaken, tangents, walk
+from nmm.analysis.searching.measure import Flags, Measure
+from nmm.analysis.searching.proof import completed, holds
+from nmm.analysis.searching.space import Space
 from nmm.arrays import Array
 
 #: What spreads less than this along a walk stays, in units.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nmm.analysis.search_measure import Flags, Measure
+from nmm.analysis.searching.measure import Flags, Measure
 from nmm.arrays import Array, Integers, vector
 from nmm.errors import InputError, SingularError
 from nmm.robot import Robot

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, TypeAlias, Union
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.analysis.periods import common_period, expect_periodic
+from nmm.analysis.redundant.periods import common_period, expect_periodic
 from nmm.arrays import Array, Integers, positive
 from nmm.controller import Controller
 from nmm.errors import InputError

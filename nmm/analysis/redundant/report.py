@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from nmm.analysis.directions import direction_text
 from nmm.analysis.jacobians import Jacobians, Subject, checked
-from nmm.analysis.motion_words import coordinate_words, input_words, motion_text
-from nmm.analysis.null_space import orthonormal_null_space, projector, readable_null_space
 from nmm.analysis.parts import ranks, singular_values
+from nmm.analysis.redundant.motion_words import coordinate_words, input_words, motion_text
+from nmm.analysis.redundant.null_space import orthonormal_null_space, projector, readable_null_space
 from nmm.arrays import Array, positive
 from nmm.controller import Controller
 from nmm.errors import SingularError

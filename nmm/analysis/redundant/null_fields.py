@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.analysis.motion_words import listed
-from nmm.analysis.null_space import readable_null_space
+from nmm.analysis.redundant.motion_words import listed
+from nmm.analysis.redundant.null_space import readable_null_space
 from nmm.arrays import Array, Integers, scalar, vector
 from nmm.errors import InputError
 from nmm.robot import Robot

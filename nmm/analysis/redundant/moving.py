@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.analysis.jacobians import Jacobians, Subject, checked
-from nmm.analysis.motion_words import input_words, listed, motion_text
-from nmm.analysis.null_fields import NEARLY_SINGULAR, Direction, Ended, Field, null_field
 from nmm.analysis.reached import Reached
-from nmm.analysis.redundancy import rank_of
+from nmm.analysis.redundant.motion_words import input_words, listed, motion_text
+from nmm.analysis.redundant.null_fields import NEARLY_SINGULAR, Direction, Ended, Field, null_field
+from nmm.analysis.redundant.report import rank_of
 from nmm.arrays import Array, positive
 from nmm.configuration import Configuration
 from nmm.controller import Controller, Step
