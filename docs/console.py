@@ -1,7 +1,8 @@
 """Commands in the documentation with what they print: `python docs/console.py` runs and rewrites them.
 
-A block ```console that begins with "$ nmm ..." holds what its commands print. They run in an empty folder,
-one after the other through the page, so that a page may run a scenario and analyse the run.
+A block ```console holds what the commands in it print ("$ nmm ..."). They run in an empty folder, one after
+the other through the page, so that a page may run a scenario and analyse the run. The tests compare them. A
+block ```text with commands is written too, but not compared: its numbers are rounding, or chaotic.
 """
 
 from __future__ import annotations
@@ -15,27 +16,31 @@ import tempfile
 from pathlib import Path
 
 FOLDER = Path(__file__).parent
-#: Pages whose blocks are written here; the tests compare them.
+#: Pages whose blocks are written here.
 PAGES = ("singularities.md",)
+COMPARED, WRITTEN = ("console",), ("console", "text")
 
-_BLOCK = re.compile(r"(?<=^```console\n)(.*?)(?=^```$)", re.DOTALL | re.MULTILINE)
+_BLOCK = re.compile(r"^```(?P<kind>\w+)\n(?P<body>\$ .*?)^```$", re.DOTALL | re.MULTILINE)
 _PROMPT = "$ "
 
 
-def rewritten(text: str) -> str:
-    """The page with every console block run anew, in a folder of its own."""
+def rewritten(text: str, kinds: tuple[str, ...] = WRITTEN) -> str:
+    """The page with the commands in blocks of these kinds run anew, in a folder of its own."""
+
+    def anew(block: re.Match[str]) -> str:
+        if block["kind"] not in kinds:
+            return block.group()
+        commands = [line for line in block["body"].splitlines() if line.startswith(_PROMPT)]
+        printed = "\n".join(f"{command}\n{_run(command)}".rstrip() for command in commands)
+        return f"```{block['kind']}\n{printed}\n```"
+
     before = Path.cwd()
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         try:
-            return _BLOCK.sub(lambda block: _run_block(block.group()), text)
+            return _BLOCK.sub(anew, text)
         finally:
             os.chdir(before)
-
-
-def _run_block(block: str) -> str:
-    commands = [line for line in block.splitlines() if line.startswith(_PROMPT)]
-    return "\n".join(f"{command}\n{_run(command)}".rstrip() for command in commands) + "\n"
 
 
 def _run(command: str) -> str:

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from nmm.arrays import Array
 
@@ -67,6 +66,8 @@ def dips(t: Array, values: Array, threshold: float, value_at: Callable[[float], 
     A minimum at an end of the motion counts. One above the threshold at its sample is looked at too
     where a neighbour's slope lets it reach below: a singularity that is passed between two samples.
     """
+    from scipy.optimize import minimize_scalar  # a tenth of a second that other analyses need not spend
+
     found = []
     for index in _minima(values, RISE * threshold):
         first, last = max(index - 1, 0), min(index + 1, len(t) - 1)

@@ -147,5 +147,12 @@ def determinant_rates(J: Array, J_u: Array, columns: Integers) -> Array:
 
 
 def hadamard_bounds(J: Array, columns: Integers) -> Array:
-    """Product of the lengths of each minor's columns, shape (..., count)."""
-    return np.prod(np.linalg.norm(J, axis=-2)[..., columns], axis=-1)
+    """Product of the lengths of each minor's columns, shape (..., count).
+
+    Entries of J are good to some 1e-14 of the longest column, and minors no better than that times the other
+    columns: with `ROUNDING` beside it, each column counts as at least a hundredth of the longest. A column
+    that is nothing but rounding would otherwise be significant beside itself.
+    """
+    lengths = np.linalg.norm(J, axis=-2)
+    floor = 1e-2 * np.max(lengths, axis=-1, keepdims=True, initial=0.0)
+    return np.prod(np.maximum(lengths, floor)[..., columns], axis=-1)

@@ -2,12 +2,17 @@
 
     app             the commands about runs with their options and help; errors and exit status
     robot_commands  likewise those about robots, and the listings
+    singularities, mapping, redundancy   likewise those that analyse: singularities, map, redundancy and laps
     options         options that several commands have, and what their texts mean
+    subjects        what an analysis is about: a robot with a task, a scenario, a run
     runs            run, compare, paper, play
     descriptions    info
     checking        check
     viewing         view
     listings        scenarios, robots
+    singularity_*, symbolic_*, searching   what `singularities` prints
+    map_files       map
+    redundancy_tables, laps              redundancy, laps
     report          the numbers of a run, as a table
     output          tables, warnings and progress, on a terminal and in a pipe
 

@@ -12,9 +12,12 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from nmm.cli.mapping import map_measures
 from nmm.cli.options import SetOption, settings_of
 from nmm.cli.output import complain
+from nmm.cli.redundancy import laps, redundancy
 from nmm.cli.robot_commands import check, info, robots, scenarios, view
+from nmm.cli.singularities import singularities
 from nmm.errors import InputError, NmmError
 
 #: What typer raises for wrong usage: options that do not exist, arguments that are missing.
@@ -32,6 +35,21 @@ app = typer.Typer(
 
 ScenarioArgument = Annotated[
     str, typer.Argument(metavar="SCENARIO", help="A bundled name (see `nmm scenarios`) or a YAML file.")
+]
+
+EllipsoidsOption = Annotated[
+    bool,
+    typer.Option(
+        "--ellipsoids",
+        help="Draw the manipulability ellipsoids: how fast the robot, and its arm alone, can move the "
+        "end-effector in each direction.",
+    ),
+]
+EllipsoidScaleOption = Annotated[
+    float | None,
+    typer.Option(
+        metavar="M", help="Draw the ellipsoids with M metres for each m/s.", show_default="a readable one"
+    ),
 ]
 
 
@@ -60,6 +78,7 @@ def nmm(
     nmm paper                                 the paper's four cases and figures
     nmm view unicycle_3r                      a robot in the browser, with sliders
     nmm check my_robot.urdf                   everything that is wrong with a file
+    nmm singularities unicycle_2r_position    where J loses rank, and why
 
     Units are metres, radians and seconds. Exit status: 0; 1 when a run failed (what there is of it is
     written); 2 for bad input, with one line on standard error that says what was expected.
@@ -95,6 +114,8 @@ def run(
     play: Annotated[
         bool, typer.Option("--play", help="Play the motion in the browser afterwards; Ctrl-C ends it.")
     ] = False,
+    ellipsoids: EllipsoidsOption = False,
+    ellipsoid_scale: EllipsoidScaleOption = None,
 ) -> int:
     """Run a scenario and write what happened.
 
@@ -103,14 +124,19 @@ def run(
     nmm run unicycle_2r_position --set dt=0.001 --set resolver.alpha=5
     nmm run unicycle_2r_position --set task.0.reference.radius=2 --set robot.arguments.d=0.5
     nmm run unicycle_3r_spline --set 'q0={x: 0.2, q2: pi/3}' --html --out here
+    nmm run unicycle_3r_position --ellipsoids --html
 
     The folder holds trajectory.npz and trajectory.csv (times, coordinates, inputs, errors, objective),
-    summary.json (the numbers of the table), scenario.yaml (every key, to be run again) and figures as PNG.
+    summary.json (the numbers of the table), scenario.yaml (every key, to be run again) and figures as PNG,
+    with --ellipsoids ellipses.png among them.
     Ctrl-C ends the run and writes the part that was computed, marked incomplete.
     """
-    from nmm.cli.runs import run_scenario
+    from nmm.cli.runs import ellipsoids_of, run_scenario
 
-    return run_scenario(scenario, resolver, settings_of(settings), out, html=html, play=play)
+    drawn = ellipsoids_of(ellipsoids, ellipsoid_scale)
+    return run_scenario(
+        scenario, resolver, settings_of(settings), out, html=html, play=play, ellipsoids=drawn
+    )
 
 
 @app.command()
@@ -126,6 +152,8 @@ def compare(
             metavar="DIR", help="Where to write, as for `nmm run`.", show_default="runs/<scenario>-compare"
         ),
     ] = None,
+    ellipsoids: EllipsoidsOption = False,
+    ellipsoid_scale: EllipsoidScaleOption = None,
 ) -> int:
     """Run a scenario with several resolvers.
 
@@ -138,12 +166,13 @@ def compare(
     The folder holds comparison.png, playback.html (all robots in one scene), summary.json and, for each
     resolver, a folder with its run.
     """
-    from nmm.cli.runs import compare_resolvers
+    from nmm.cli.runs import compare_resolvers, ellipsoids_of
 
     kinds = list(dict.fromkeys(kind.strip() for kind in resolvers.split(",") if kind.strip()))
     if not kinds:
         raise InputError("--resolvers: expected kinds with commas between them, as in rg,pg")
-    return compare_resolvers(scenario, kinds, settings_of(settings), out)
+    drawn = ellipsoids_of(ellipsoids, ellipsoid_scale)
+    return compare_resolvers(scenario, kinds, settings_of(settings), out, ellipsoids=drawn)
 
 
 @app.command()
@@ -171,18 +200,24 @@ def play(
         int | None, typer.Option(metavar="N", help="Port on this machine.", show_default="a free one")
     ] = None,
     no_open: Annotated[bool, typer.Option("--no-open", help="Print the address, open no browser.")] = False,
+    ellipsoids: EllipsoidsOption = False,
+    ellipsoid_scale: EllipsoidScaleOption = None,
 ) -> int:
     """Play a run in the browser.
 
     In 3D, with MeshCat; only this machine can reach it. Ctrl-C ends it.
     """
-    from nmm.cli.runs import play_folder
+    from nmm.cli.runs import ellipsoids_of, play_folder
 
-    return play_folder(folder, port, open_browser=not no_open)
+    drawn = ellipsoids_of(ellipsoids, ellipsoid_scale)
+    return play_folder(folder, port, open_browser=not no_open, ellipsoids=drawn)
 
 
-for _command in (info, check, view, scenarios, robots):
+for _command in (info, check, view, singularities, redundancy, laps, scenarios, robots):
     app.command()(_command)
+
+
+app.command("map")(map_measures)
 
 
 def status_of(arguments: Sequence[str]) -> int:
@@ -218,7 +253,11 @@ def status_of(arguments: Sequence[str]) -> int:
 
 
 def _commands() -> list[str]:
-    return [command.callback.__name__ for command in app.registered_commands if command.callback is not None]
+    return [
+        command.name or command.callback.__name__
+        for command in app.registered_commands
+        if command.callback is not None
+    ]
 
 
 def _complain(prefix: str, text: str, status: int) -> int:

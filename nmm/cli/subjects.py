@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nmm.arrays import Array
+import numpy as np
+
+from nmm.arrays import Array, scalar
 from nmm.cli.options import arguments_of, settings_of, values_of
-from nmm.errors import InputError
+from nmm.errors import InputError, unknown
 
 if TYPE_CHECKING:
     from nmm.analysis.jacobians import Subject
@@ -19,6 +21,9 @@ if TYPE_CHECKING:
     from nmm.scenario import Scenario
     from nmm.tasks import Stack, Task
     from nmm.trajectory import Trajectory
+
+#: Options by the arguments of `nmm.load`.
+_OPTIONS = {"platform": "--platform", "lock": "--lock", "axle": "--axle", "package_dirs": "--package-dir"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +72,7 @@ def studied(
     ----------
     tasks : texts of `--task`; those of the scenario when there are none
     at : COORDINATE=VALUE of `--at`, m and rad
-    t : s; 0, or the run's first instant
+    t : s; 0, or the run's first instant. Of a run, q is where it was then
     settings : `--set`, of the robot's xacro arguments or of the scenario's keys
     loading : platform, lock, axle, package_dirs of `nmm.load`; a robot's only
 
@@ -77,18 +82,19 @@ def studied(
     """
     from nmm.scenario.short_task import short_task
 
-    run, scenario, robot = _opened(source, settings, loading)
+    run, scenario, loaded = _opened(source, settings, loading)
     own = None if scenario is None else scenario.controller()
-    robot = robot if own is None else own.robot
+    robot = loaded if own is None else own.robot
     given = tuple(short_task(text, robot) for text in tasks or ())
     if not given and own is None:
+        what = "a robot" if run is None else "a run without a scenario"
         raise InputError(
-            f"{source} is a robot: expected --task, as in --task position, --task position:FRAME:xy, "
+            f"{source} is {what}: expected --task, as in --task position, --task position:FRAME:xy, "
             "--task pose:FRAME (may be repeated)"
         )
-    q = _start(robot, run, scenario)
+    q = _start(robot, run, scenario) if t is None or run is None else _then(run, t)
     for name, value in values_of(at, "--at", "COORDINATE=VALUE, as in q1=pi/2").items():
-        q[robot.coordinate(name)] = value
+        q[robot.coordinate(name)] = scalar(value, f"--at: {name}")
     first = 0.0 if run is None or not len(run) else float(run.t[0])
     return Studied(
         name=robot.name if scenario is None else scenario.name,
@@ -106,19 +112,23 @@ def _opened(
     source: str, settings: Sequence[str] | None, loading: dict[str, Any]
 ) -> tuple[Trajectory | None, Scenario | None, Robot]:
     """The run, the scenario and the robot of SOURCE; run and scenario where it is one."""
-    from nmm.bundled import bundled_scenarios
+    from nmm.bundled import bundled_robots, bundled_scenarios
     from nmm.loading import load
     from nmm.scenario import Scenario
     from nmm.scenario.scenario import SUFFIXES
-    from nmm.storage import is_run
     from nmm.trajectory import Trajectory
 
     path = Path(source).expanduser()
-    of_folder = path.is_dir() and is_run(path)
     of_scenario = source in bundled_scenarios() or path.suffix in SUFFIXES
-    if not (of_folder or of_scenario):
+    of_folder = bool(source) and path.is_dir() and not of_scenario and source not in bundled_robots()
+    if of_folder:
+        _check_folder(source, path)
+    elif not of_scenario:
+        if source not in bundled_robots() and not path.suffix and "/" not in source:
+            names = [*bundled_robots(), *bundled_scenarios()]
+            raise InputError(unknown("robot or scenario", source, names) + "; or give a path")
         return None, None, load(source, arguments=arguments_of(settings), **loading)
-    wrong = [f"--{key.replace('_', '-')}" for key, value in loading.items() if value]
+    wrong = [_OPTIONS[key] for key, value in loading.items() if value]
     if wrong:
         raise InputError(f"{', '.join(wrong)}: of a robot's file; {source} has a robot of its own")
     if of_scenario:
@@ -131,6 +141,26 @@ def _opened(
         raise InputError(f"{source}: expected a run with at least one sample")
     file = path / "scenario.yaml"
     return run, Scenario.load(file) if file.exists() else None, run.robot
+
+
+def _check_folder(source: str, path: Path) -> None:
+    """`InputError` for a folder that is no run's; it names the runs inside, which `nmm compare` leaves."""
+    from nmm.storage import is_run
+
+    if is_run(path):
+        return
+    inside = sorted(folder.name for folder in path.iterdir() if folder.is_dir() and is_run(folder))
+    what = f"another folder, which holds the runs {', '.join(inside)}" if inside else "another folder"
+    raise InputError(f"{source}: expected a robot, a scenario or a run's folder, this is {what}")
+
+
+def _then(run: Trajectory, t: float) -> Array:
+    """q (n,) of a run at an instant, linear between its samples."""
+    if not run.t[0] <= t <= run.t[-1]:
+        raise InputError(
+            f"--time: expected an instant of the run, {run.t[0]:g} to {run.t[-1]:g} s, got {t:g}"
+        )
+    return np.array([np.interp(t, run.t, column) for column in run.q.T])
 
 
 def _start(robot: Robot, run: Trajectory | None, scenario: Scenario | None) -> Array:

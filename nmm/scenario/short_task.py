@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from nmm.robot import Robot
     from nmm.tasks import Task
 
+#: What a text may be.
+EXPECTED = "KIND:FRAME:AXES, as in position:ee:xy, or a mapping as in a scenario"
+
 _PARTS: tuple[type[FunctionPart], ...] = (
     PositionPart,
     OrientationPart,
@@ -49,27 +52,32 @@ def _by_kind(parts: tuple[type[Any], ...]) -> dict[str, type[Any]]:
 def short_task(text: str, robot: Robot) -> Task | Function:
     """The task of a text; a function of the robot where the text names no reference.
 
-    KIND, KIND:FRAME or KIND:FRAME:AXES; without a frame the end of the arm, without axes those that the robot
-    can move along; coordinates:q1,q2 and posture:q1,q2 take names. Or a mapping, as in a scenario's `task`.
+    KIND, KIND:FRAME, KIND:FRAME:AXES or KIND::AXES; without a frame the end of the arm, without axes those
+    that the robot can move along; coordinates:q1,q2 and posture:q1,q2 take names. Or a mapping, as in a
+    scenario's `task`.
 
     Raises
     ------
     InputError : what the text says wrong, and what there is
     """
     stripped = text.strip()
+    if not stripped:
+        raise InputError(f"task: expected {EXPECTED}, got nothing")
     if stripped.startswith("{"):
         data = read_text(stripped, f"task {text}", lines=False).data["value"]
     else:
         data = _from_words(stripped, robot)
     if not isinstance(data, Mapping):
-        raise InputError(f"task {text}: expected KIND:FRAME:AXES, as in position:ee:xy, or a mapping")
+        raise InputError(f"task {text}: expected {EXPECTED}")
     with_reference = "reference" in data
     parts = _by_kind(TASKS if with_reference else _PARTS)
-    kind = data.get("kind")
+    if data.get("kind") is None:
+        raise InputError(f"task {text}: kind: this key is missing; expected one of {', '.join(parts)}")
+    kind = str(data["kind"])
     if kind not in parts:
         raise InputError(unknown("kind", kind, parts, f"task {text}"))
     try:
-        part = parts[str(kind)].model_validate(dict(data))
+        part = parts[kind].model_validate(dict(data))
         made: Task | Function = part.build_task(robot) if with_reference else part.build(robot)
     except ValidationError as error:
         wrong = first_error(error, data)
@@ -85,7 +93,7 @@ def _from_words(text: str, robot: Robot) -> dict[str, Any]:
     kind, *words = (word.strip() for word in text.split(":"))
     if kind in ("coordinates", "posture"):
         names = [name.strip() for name in words[0].split(",")] if words and words[0] else None
-        if len(words) > 1 or (kind == "coordinates" and names is None):
+        if len(words) > 1 or (kind == "coordinates" and names is None) or (names and not all(names)):
             raise InputError(f"task {text}: expected {kind}:NAME,NAME,...")
         return {"kind": kind} | ({} if names is None else {"of": names})
     if kind in ("pointing", "distance"):
@@ -96,12 +104,11 @@ def _from_words(text: str, robot: Robot) -> dict[str, Any]:
     if kind not in _by_kind(_PARTS):
         raise InputError(unknown("kind", kind, _by_kind(_PARTS), f"task {text}"))
     data: dict[str, Any] = {"kind": kind}
+    given = words.pop(0) if words and (kind != "center_of_mass" or not words[0]) else ""
     if kind != "center_of_mass":
-        data["frame"] = words.pop(0) if words and words[0] else _tip(robot, text)
+        data["frame"] = given or _tip(robot, text)
         if data["frame"] not in robot.frames:
             raise InputError(unknown("frame", data["frame"], robot.frames, f"task {text}"))
-    elif words and not words[0]:
-        words.pop(0)
     axes = words.pop(0) if words else ""
     if words or (axes and kind not in ("position", "center_of_mass")):
         raise InputError(

@@ -1,0 +1,181 @@
+"""map: what the options mean, the map, its folder and its table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nmm.cli.options import values_of
+from nmm.cli.output import progress, show_table
+from nmm.cli.runs import check_folder
+from nmm.cli.subjects import studied
+from nmm.errors import InputError
+
+if TYPE_CHECKING:
+    from nmm.analysis.map_result import Map
+    from nmm.analysis.map_singular_set import SingularSet
+    from nmm.robot import Robot
+
+OK = 0
+
+
+def make_map(
+    source: str,
+    *,
+    tasks: Sequence[str] | None = None,
+    over: str | None = None,
+    ranges: Sequence[str] | None = None,
+    workspace: str | None = None,
+    frame: str | None = None,
+    height: str | None = None,
+    measures: str = "sigma_min",
+    part: str = "robot",
+    samples: str = "300",
+    at: Sequence[str] | None = None,
+    t: float | None = None,
+    alpha: float = 0.5,
+    weights: Sequence[str] | None = None,
+    length: float | None = None,
+    settings: Sequence[str] | None = None,
+    out: Path | None = None,
+    **loading: Any,
+) -> int:
+    """Compute a map, write its folder, print its table; see `nmm.cli.mapping` for the options' meaning."""
+    from nmm.analysis.map_result import is_map
+    from nmm.analysis.maps import singularity_map
+
+    counts = counts_of(samples)
+    bounds = ranges_of(ranges)
+    if workspace is None:
+        _refuse({"--frame": frame, "--height": height}, "--workspace PLANE")
+    else:
+        _refuse({"--over": over}, "a map over two coordinates, without --workspace")
+        if len(set(counts)) > 1:
+            raise InputError(f"--samples: expected one number with --workspace, got {samples}")
+    what = studied(source, tasks=tasks, at=at, t=t, settings=settings, **loading)
+    folder = out or Path("runs") / f"{what.name}-map"
+    check_folder(folder, is_map)
+    common: dict[str, Any] = {
+        "ranges": bounds,
+        "measures": _names(measures, "--measure"),
+        "part": part,
+        "at": what.q,
+        "t": what.t,
+        "alpha": alpha,
+        "weights": values_of(weights, "--weight", "NAME=VALUE, as in platform=4") or None,
+        "length": length,
+    }
+    with progress(f"map of {what.name}") as report:
+        if workspace is None:
+            names = _two_first(what.robot) if over is None else _names(over, "--over")
+            made = singularity_map(what.subject, names, samples=counts, progress=report, **common)
+        else:
+            from nmm.analysis.workspace import workspace_map
+
+            made = workspace_map(
+                what.subject,
+                frame,
+                plane=workspace,
+                height=None if height is None else range_of(height, "--height"),
+                samples=counts[0],
+                progress=report,
+                **common,
+            )
+    made.save(folder)
+    show_map(made, folder)
+    return OK
+
+
+def show_map(made: Map, folder: Path) -> None:
+    """Print the table of a map that was saved in `folder`."""
+    rows = [row for name in made.values for row in _measure_rows(made, name)]
+    show_table(
+        ["measure", "smallest", "at", "largest", "at ", "unit"],
+        rows,
+        title=f"{made.about.robot}: {', '.join(made.about.task)}",
+        numeric=["smallest", "largest"],
+    )
+    show_table(["", ""], list(_other_rows(made, folder)))
+
+
+def _measure_rows(made: Map, name: str) -> Iterator[list[str]]:
+    """One row; of a workspace one of the best and one of the worst postures."""
+    layers = {"": False} if made.kind == "coordinates" else {", best": False, ", worst": True}
+    for layer, worst in layers.items():
+        row = [name + layer]
+        for value, where, on in made.extremes(name, worst=worst).values():
+            place = ", ".join(f"{axis} = {x:.4g}" for axis, x in zip(made.names, where, strict=True))
+            row += [f"{value:.4g}", on or place]
+        yield [*row, made.about.units[name] or "-"]
+
+
+def _other_rows(made: Map, folder: Path) -> Iterator[tuple[str, str]]:
+    yield f"{made.about.part} singular", _found(made, made.singular)
+    if made.arm_singular is not None:
+        yield "arm alone singular", _found(made, made.arm_singular)
+    if made.kind == "workspace":
+        reached = (made.rank >= 0).mean()
+        yield "reached", f"{reached:.0%} of {made.rank.size} cells"
+    yield "files in", str(folder)
+
+
+def _found(made: Map, those: SingularSet) -> str:
+    """How many lines and points; in a workspace these are of some postures drawn, not of all."""
+    sampled = made.kind == "workspace" and len(those.points) > 0
+    return those.text() + (", of postures drawn" if sampled else "")
+
+
+def _two_first(robot: Robot) -> list[str]:
+    """The arm's first two coordinates; the first two of a robot whose arm has fewer."""
+    arm = robot.q_names[robot.platform.n_p :]
+    return list((arm if len(arm) >= 2 else robot.q_names)[:2])
+
+
+def _names(text: str, option: str) -> list[str]:
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    if not names:
+        raise InputError(f"{option}: expected names with commas between them, got {text!r}")
+    return names
+
+
+def counts_of(text: str) -> tuple[int, int]:
+    """ "500" or "300x200"."""
+    words = text.lower().split("x")
+    if len(words) > 2 or not all(word.strip().isdecimal() for word in words):
+        raise InputError(f"--samples: expected a whole number, or two as in 300x200, got {text!r}")
+    return int(words[0]), int(words[-1])
+
+
+def ranges_of(given: Sequence[str] | None) -> dict[str, tuple[float, float]]:
+    """The `--range` options: (lower, upper) by name."""
+    found: dict[str, tuple[float, float]] = {}
+    for text in given or ():
+        name, equals, values = text.partition("=")
+        name = name.strip()
+        if not equals or not name:
+            raise InputError(f"--range: expected NAME=LOWER:UPPER, as in q1=-pi:pi, got {text!r}")
+        if name in found:
+            raise InputError(f"--range: {name} is given twice")
+        found[name] = range_of(values, f"--range: {name}")
+    return found
+
+
+def range_of(text: str, option: str) -> tuple[float, float]:
+    """LOWER:UPPER, each arithmetic with pi."""
+    from nmm.scenario.numbers import evaluate
+
+    words = text.split(":")
+    if len(words) != 2:
+        raise InputError(f"{option}: expected LOWER:UPPER, as in -pi:pi, got {text!r}")
+    try:
+        lower, upper = (evaluate(word) for word in words)
+    except ValueError as error:
+        raise InputError(f"{option}: {error}") from None
+    return lower, upper
+
+
+def _refuse(given: dict[str, object], needs: str) -> None:
+    wrong = [option for option, value in given.items() if value is not None]
+    if wrong:
+        raise InputError(f"{', '.join(wrong)}: expected with {needs}")

@@ -1,0 +1,235 @@
+"""What `nmm singularities --symbolic` prints: formulas, and what follows from them, each with its reason."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from nmm.analysis.minors import Columns, chosen_columns
+from nmm.cli.singularity_words import header, minor, say
+from nmm.errors import InputError
+
+if TYPE_CHECKING:
+    from nmm.analysis.symbolic import Bound, Claim, SymbolicAnalysis
+    from nmm.cli.subjects import Studied
+
+#: Reasons for more minors than these are not given.
+MANY_REASONS = 12
+
+
+def formulas(given: Studied) -> tuple[SymbolicAnalysis | None, str]:
+    """The analysis; or None and the reason why there is none.
+
+    Raises
+    ------
+    InputError : SymPy is missing, or the task does not fit the robot
+    """
+    try:
+        import sympy  # noqa: F401
+    except ImportError:
+        raise InputError("symbolic: needs SymPy: pip install nmm[symbolic]") from None
+    from nmm.analysis.jacobians import Jacobians
+    from nmm.analysis.symbolic import symbolic
+
+    Jacobians(given.subject)  # complains about what is wrong with the input, formulas or not
+    try:
+        return symbolic(given.robot, given.task), ""
+    except InputError as error:
+        return None, str(error).removeprefix("symbolic: ")
+
+
+def show_latex(given: Studied, analysis: SymbolicAnalysis, chosen: Sequence[Columns] | None) -> None:
+    """Print the formulas as LaTeX, and nothing else."""
+    print(_only(analysis, chosen).latex())
+
+
+def show_formulas(given: Studied, analysis: SymbolicAnalysis, chosen: Sequence[Columns] | None) -> None:
+    """Print formulas and claims."""
+    formulas = [line for line in _only(analysis, chosen).text().splitlines() if not line.startswith("note: ")]
+    body = "\n".join(formulas)
+    for line in (*header(given), *_geometry(analysis, body)):
+        say(line)
+    if re.search(r"\b[cs]\d", body):
+        say("c1 is cos(q1), s12 is sin(q1 + q2)")
+    say()
+    for line in formulas:
+        say(line)
+    say("what follows")
+    for line in _claims(given, analysis):
+        say(f"  {line}")
+    for note in analysis.notes:
+        say(f"note: {note}")
+
+
+def _only(analysis: SymbolicAnalysis, chosen: Sequence[Columns] | None) -> SymbolicAnalysis:
+    """With the chosen minors alone to be written."""
+    if chosen is None:
+        return analysis
+    indices = chosen_columns(chosen, analysis.u_names, len(analysis.row_names))
+    wanted = {tuple(analysis.u_names[j] for j in sorted(row)) for row in indices}
+    return replace(
+        analysis, short_forms={name: form for name, form in analysis.short_forms.items() if name in wanted}
+    )
+
+
+def _geometry(analysis: SymbolicAnalysis, body: str) -> Iterator[str]:
+    """Values of the lengths in the formulas, and the arguments that are 0."""
+    used = {name: value for name, value in analysis.geometry.items() if re.search(rf"\b{name}\b", body)}
+    if used:
+        yield "geometry: " + _values(analysis, used)
+    zero = _zero(analysis)
+    if zero:
+        yield f"zero, and so not in the formulas: {', '.join(zero)}"
+
+
+def _values(analysis: SymbolicAnalysis, values: dict[str, float]) -> str:
+    ring = analysis.derivation.ring
+    angles = {name for name, is_angle in zip(ring.names, ring.is_angle, strict=True) if is_angle}
+    return ", ".join(
+        f"{name} = {value:g} {'rad' if name in angles else 'm'}" for name, value in values.items()
+    )
+
+
+def _zero(analysis: SymbolicAnalysis) -> list[str]:
+    """Arguments of the robot's file that are 0."""
+    found = []
+    for name, text in analysis.robot.arguments.items():
+        try:
+            if float(text) == 0.0:
+                found.append(name)
+        except ValueError:
+            continue
+    return found
+
+
+def _claims(given: Studied, analysis: SymbolicAnalysis) -> Iterator[str]:
+    """Where J loses rank, also without the first length of the file, and which minors never vanish."""
+    from nmm.analysis.symbolic import lower_bound, singular_set
+
+    bound = lower_bound(analysis)
+    if bound is None:
+        yield from _claim(singular_set(analysis))
+    else:
+        when = _nonzero(bound.conditions[0], analysis)
+        why = bound.statement.removesuffix(" at every configuration")
+        yield f"J has rank {len(analysis.row_names)} at every configuration{when}, as {why}."
+        yield from _because(bound.steps)
+    first = next((name for name in _in_minors(analysis) if name in given.robot.arguments), None)
+    if first and given.robot.platform.p and not _zero(analysis):
+        try:
+            without = singular_set(analysis, (first,))
+        except InputError:  # J is divided by it
+            pass
+        else:
+            yield from _claim(without)
+            key = first if given.scenario is None else f"robot.arguments.{first}"
+            yield f"  --set {key}=0 has the formulas"
+    yield from _minors(analysis)
+
+
+def _because(steps: Sequence[str]) -> Iterator[str]:
+    for i, step in enumerate(steps):
+        yield f"  {'         ' if i else 'because: '}{step}"
+
+
+def _nonzero(constant: Any, analysis: SymbolicAnalysis) -> str:
+    """ " when d != 0": of the lengths in a product."""
+    symbols = {str(symbol) for symbol in constant.free_symbols}
+    names = [name for name in analysis.geometry if name in symbols]
+    return f" when {' and '.join(f'{name} != 0' for name in names)}" if names else ""
+
+
+def _in_minors(analysis: SymbolicAnalysis) -> list[str]:
+    """The lengths that some minor has."""
+    minors = [value for value in analysis.minors.values() if value != 0]
+    symbols = {str(symbol) for value in minors for symbol in value.free_symbols}
+    return [name for name in analysis.geometry if name in symbols]
+
+
+def _claim(claim: Claim) -> Iterator[str]:
+    """A statement, what it means for single joints, and the proof."""
+    yield f"{claim.statement[0].upper()}{claim.statement[1:]}."
+    values = [_value(condition) for condition in claim.conditions]
+    if values and all(values):
+        each = ", each" if len(values) > 1 else ","
+        yield f"  that is {' and '.join(filter(None, values))}{each} up to half turns"
+    yield from _because(claim.steps)
+
+
+def _value(condition: Any) -> str | None:
+    """ "q1 = pi/2" for cos(q1), "q2 = 0" for sin(q2); None for what is not of one angle."""
+    import sympy
+
+    if not isinstance(condition, sympy.sin | sympy.cos) or not condition.args[0].is_Symbol:
+        return None
+    return f"{condition.args[0]} = {'0' if isinstance(condition, sympy.sin) else 'pi/2'}"
+
+
+def _minors(analysis: SymbolicAnalysis) -> Iterator[str]:
+    """Which minors never vanish, and when; which do somewhere."""
+    from nmm.analysis.symbolic import never_zero, vanishing
+
+    nonzero = [columns for columns, form in analysis.minor_forms.items() if form.number]
+    if len(nonzero) < 2:  # the only one vanishes where J is singular
+        return
+    bounds = never_zero(analysis)
+    for bound in bounds.values():
+        yield from _bound(analysis, bound)
+    reasons = {columns: why for columns, why in vanishing(analysis).items() if columns in nonzero}
+    if reasons:
+        few = len(reasons) <= MANY_REASONS
+        count = ":" if few else f": {len(reasons)} minors"
+        yield f"Vanish somewhere, whatever the lengths, joint limits apart{count}"
+        for columns, why in reasons.items() if few else ():
+            yield f"  {minor(columns)}, as {why}"
+    lost = {
+        columns
+        for columns, bound in bounds.items()
+        if bound.exact and bound.holds(analysis.geometry) is False
+    }
+    if lost | set(reasons) == set(nonzero):
+        yield "So every minor vanishes somewhere: no partition serves RG everywhere."
+    open_ = [columns for columns in nonzero if columns not in reasons and columns not in bounds]
+    if open_:
+        yield f"Not decided whether they vanish: {', '.join(map(minor, open_))}."
+
+
+def _bound(analysis: SymbolicAnalysis, bound: Bound) -> Iterator[str]:
+    conditions = [_larger(analysis, a, b) for a, b in bound.requires]
+    conditions += [f"{name} != 0" for name in bound.nonzero]
+    when = f" when {' and '.join(conditions)}" if conditions else ""
+    names = {str(symbol) for pair in bound.requires for part in pair for symbol in part.free_symbols}
+    values = {k: v for k, v in analysis.geometry.items() if k in names | set(bound.nonzero)}
+    holds = bound.holds(analysis.geometry)
+    here = ""
+    if holds is None:
+        moving = ", ".join(name for name in analysis.definitions if name in names)
+        here = f" That depends on the configuration, through {moving}."
+    elif conditions:
+        here = f" That {'holds' if holds else 'does not hold'} here: {_values(analysis, values)}."
+    otherwise = ", and only then" if bound.exact and bound.requires else ""
+    yield f"{minor(bound.columns)} never vanishes{when}{otherwise}.{here}"
+    reasons = [
+        f"the terms beside {_plain(analysis, left)} reach at most {_plain(analysis, right)}"
+        for left, right in bound.requires
+    ]
+    if reasons:
+        yield from _because([f"cosines and sines are at most 1, so that {'; '.join(reasons)}"])
+
+
+def _larger(analysis: SymbolicAnalysis, a: Any, b: Any) -> str:
+    left = _plain(analysis, a)
+    positive = left in analysis.definitions or analysis.geometry.get(left, -1.0) > 0.0
+    return f"{left if positive else f'|{left}|'} > {_plain(analysis, b)}"
+
+
+def _plain(analysis: SymbolicAnalysis, expression: Any) -> str:
+    """An expression as text; |l1| is l1 where the robot's l1 is above 0."""
+
+    def without_bars(match: re.Match[str]) -> str:
+        name = match[1]
+        return name if analysis.geometry.get(name, -1.0) > 0.0 else f"|{name}|"
+
+    return re.sub(r"Abs\((\w+)\)", without_bars, str(expression)).replace("**", "^").replace("*", " ")

@@ -1,0 +1,22 @@
+"""What the tests of the singularity analysis look at: tasks, a constraint of EJ."""
+
+from __future__ import annotations
+
+import twin
+
+from nmm.controller import Controller
+from nmm.references import Bearing
+from nmm.resolvers import ExtendedJacobian
+from nmm.robot import Robot
+from nmm.tasks import Coordinates, Heading, Position, Task
+
+TIP = Task(Position("ee", "xy"), [0.0, 0.0])
+TIP_3D = Task(Position("ee", "xyz"), [0.0, 0.0, 0.0])
+POINTING = (TIP, Task(Heading("link2"), 0.0))
+LINK_POINTING = (TIP, Task(Heading("link1"), Bearing(Position("link2", "xy"), twin.TARGET)))
+#: Two rows that take up the freedom of TIP: J_e is singular where d + l1 c1 = 0.
+HELD = (Task(Coordinates("q1"), 0.0), Task(Heading("link2"), 0.0))
+
+
+def extended(constraint: Task | tuple[Task, ...], robot: Robot) -> Controller:
+    return Controller(robot, TIP, ExtendedJacobian(), None, constraint)
