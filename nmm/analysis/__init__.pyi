@@ -6,6 +6,9 @@ from .ellipsoids import Ellipsoids as Ellipsoids
 from .ellipsoids import ellipsoids_along as ellipsoids_along
 from .instants import Crossing as Crossing
 from .instants import Dip as Dip
+from .mapping import Map as Map
+from .mapping import singularity_map as singularity_map
+from .mapping import workspace_map as workspace_map
 from .minors import Minors as Minors
 from .parts import Part as Part
 from .redundant import Laps as Laps

@@ -13,8 +13,8 @@ from nmm.cli.subjects import studied
 from nmm.errors import InputError
 
 if TYPE_CHECKING:
-    from nmm.analysis.map_result import Map
-    from nmm.analysis.map_singular_set import SingularSet
+    from nmm.analysis.mapping.result import Map
+    from nmm.analysis.mapping.singular_set import SingularSet
     from nmm.robot import Robot
 
 OK = 0
@@ -42,8 +42,8 @@ def make_map(
     **loading: Any,
 ) -> int:
     """Compute a map, write its folder, print its table; see `nmm.cli.mapping` for the options' meaning."""
-    from nmm.analysis.map_result import is_map
-    from nmm.analysis.maps import singularity_map
+    from nmm.analysis.mapping.coordinates import singularity_map
+    from nmm.analysis.mapping.result import is_map
 
     counts = counts_of(samples)
     bounds = ranges_of(ranges)
@@ -71,7 +71,7 @@ def make_map(
             names = _two_first(what.robot) if over is None else _names(over, "--over")
             made = singularity_map(what.subject, names, samples=counts, progress=report, **common)
         else:
-            from nmm.analysis.workspace import workspace_map
+            from nmm.analysis.mapping.workspace import workspace_map
 
             made = workspace_map(
                 what.subject,

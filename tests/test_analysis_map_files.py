@@ -1,0 +1,156 @@
+"""What a map tells, writes and draws, and what it refuses."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from nmm.analysis.mapping.coordinates import singularity_map
+from nmm.analysis.mapping.result import is_map
+from nmm.analysis.mapping.workspace import workspace_map
+from nmm.errors import InputError
+from nmm.figures.map_sets import thinned
+from nmm.loading import load
+from nmm.robot import Robot
+from nmm.tasks import Heading, Position
+
+PLANAR = Position("ee", "xy")
+WITH_HEADING = (PLANAR, Heading("link2"))
+
+
+@pytest.fixture(scope="module")
+def fixed_2r() -> Robot:
+    wheels = {"left_wheel_joint": 0.0, "right_wheel_joint": 0.0}
+    return load("unicycle_2r", platform="fixed", lock=wheels)
+
+
+def test_extremes_count_the_singular_places_that_the_grid_misses(robot_2r: Robot) -> None:
+    measures = ("sigma_min", "eccentricity", "arm_manipulability", "platform_manipulability", "weighted")
+    made = singularity_map((robot_2r, PLANAR), samples=20, measures=measures)
+    assert made.singular.empty
+    found = made.extremes("sigma_min")
+    assert found["smallest"].value == made.values["sigma_min"].min()
+    assert found["smallest"].on == ""
+    smallest = made.extremes("arm_manipulability")["smallest"]
+    assert smallest.value == 0.0
+    assert smallest.on == "the arm's singular lines"
+    assert np.sin(smallest.at[1]) == pytest.approx(0.0, abs=1e-9)
+
+    robot = load("unicycle_2r", arguments={"d": 0.0})
+    made = singularity_map((robot, WITH_HEADING), samples=20, measures=(*measures, "manipulability"))
+    assert made.values["sigma_min"].min() > 1e-3  # no node is on a line
+    for name in made.values:
+        end, value = ("largest", 1.0) if name == "eccentricity" else ("smallest", 0.0)
+        found = made.extremes(name)
+        assert found[end].value == value
+        assert np.cos(found[end].at[0]) == pytest.approx(0.0, abs=1e-9)
+        told = made.summary()["measures"][name][end]
+        assert told == {"value": value, "at": list(found[end].at), "on": "the singular lines"}
+
+
+def test_only_the_worst_postures_of_a_workspace_are_singular(robot_2r: Robot) -> None:
+    made = workspace_map(
+        (robot_2r, PLANAR), samples=30, configurations=1024, measures=("sigma_min", "arm_manipulability")
+    )
+    name = "arm_manipulability"
+    best = np.nanmin(made.values[name])
+    assert made.extremes(name)["smallest"][::2] == (best, "")
+    assert made.extremes(name, worst=True)["smallest"][::2] == (0.0, "the arm's singular lines")
+    assert made.summary()["measures"][name]["worst"]["smallest"]["value"] == 0.0
+
+
+def test_a_line_keeps_the_points_that_its_shape_needs() -> None:
+    straight = np.column_stack([np.linspace(0.0, 3.0, 400), np.linspace(1.0, 2.0, 400)])
+    np.testing.assert_array_equal(thinned(straight, np.full(2, 1e-6)), straight[[0, -1]])
+    angle = np.linspace(0.0, 2.0 * np.pi, 900)
+    circle = np.column_stack([np.cos(angle), np.sin(angle)])
+    kept = thinned(circle, np.full(2, 1e-3))
+    np.testing.assert_array_equal(kept[[0, -1]], circle[[0, -1]])
+    assert 20 < len(kept) < 200
+    # Chords of a circle are nearest to its centre in their middles.
+    assert all(np.hypot(*(0.5 * (a + b))) > 1.0 - 1.001e-3 for a, b in pairwise(kept))
+
+
+def test_a_map_is_written_and_replaced_only_by_another(tmp_path: Path, robot_2r: Robot) -> None:
+    made = singularity_map((robot_2r, PLANAR), samples=20, measures=("sigma_min", "weighted"))
+    folder = made.save(tmp_path / "map")
+    assert is_map(folder)
+    assert {file.name for file in folder.iterdir()} == {
+        "map.npz", "map.json", "sigma_min.png", "weighted.png"
+    }  # fmt: skip
+    arrays = np.load(folder / "map.npz", allow_pickle=False)
+    np.testing.assert_array_equal(arrays["weighted"], made.values["weighted"])
+    np.testing.assert_array_equal(arrays["axis_1"], made.axes[1])
+    lines = arrays["arm_singular_lines"]
+    assert np.isnan(lines).all(axis=1).sum() == 3
+    made.save(folder)
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "mine.txt").write_text("mine")
+    with pytest.raises(InputError, match="not written by nmm"):
+        made.save(other)
+    with pytest.raises(InputError, match="unknown measure 'condition'"):
+        made.plot("condition")
+
+
+def test_a_figure_says_what_is_singular(robot_2r: Robot, tmp_path: Path) -> None:
+    made = singularity_map((robot_2r, PLANAR), samples=20)
+    figure = made.plot("sigma_min", tmp_path / "one.png")
+    assert (tmp_path / "one.png").stat().st_size > 10_000
+    axes, bar = figure.axes
+    names = axes.get_legend_handles_labels()[1]
+    assert names == ["arm alone singular", "robot singular: none found"]
+    assert axes.get_xlabel() == "q₁ [rad]"
+    assert bar.get_ylabel() == r"$\mathregular{σ_{min}}$ [mixed units]"
+    figure.canvas.draw()
+    assert "π/2" in [tick.get_text() for tick in axes.get_xticklabels()]
+
+
+def test_progress_rises_to_one(robot_2r: Robot) -> None:
+    for make in (
+        lambda report: singularity_map((robot_2r, PLANAR), samples=30, progress=report),
+        lambda report: workspace_map((robot_2r, PLANAR), samples=20, configurations=256, progress=report),
+    ):
+        seen: list[float] = []
+        make(seen.append)
+        assert seen == sorted(seen)
+        assert seen[0] >= 0.0
+        assert seen[-1] == 1.0
+        assert np.diff(seen).max() < 0.2
+        # Of the last tenth, where singular places are searched, too.
+        assert sum(0.9 < done < 1.0 for done in seen) >= 3
+
+
+BAD: list[tuple[dict[str, Any], str]] = [
+    ({"over": ("q1", "q9")}, r"unknown coordinate 'q9'.*available: x, y, theta, q1, q2"),
+    ({"over": ("q1", "q1")}, "two different coordinates, got q1 twice"),
+    ({"over": ("q1",)}, "expected two coordinates"),
+    ({"ranges": {"q1": (1.0, 1.0)}}, "range of q1: expected lower below upper, got 1 to 1"),
+    ({"ranges": {"q1": (1.0, np.inf)}}, "range of q1: expected finite numbers"),
+    ({"ranges": {"theta": (0.0, 1.0)}}, "unknown coordinate 'theta'"),
+    ({"samples": 1}, "samples: expected .* at least 2, got 1"),
+    ({"samples": (20, 1)}, "samples"),
+    ({"samples": 2.5}, "samples"),
+    ({"measures": ("sigma_max",)}, r"unknown measure 'sigma_max' \(did you mean 'sigma_min'\?\)"),
+    ({"measures": ()}, "at least one"),
+    ({"part": "leg"}, "unknown part 'leg'"),
+    ({"alpha": 1.2}, "alpha: expected a number from 0 to 1"),
+    ({"weights": {"leg": 2.0}}, "unknown input or group 'leg'"),
+    ({"weights": {"arm": 0.0}}, "above 0"),
+    ({"at": [1.0]}, "expected 5 numbers"),
+]
+
+
+@pytest.mark.parametrize(("wrong", "message"), BAD, ids=[str(wrong) for wrong, _ in BAD])
+def test_bad_input_is_named(robot_2r: Robot, wrong: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        singularity_map((robot_2r, PLANAR), **wrong)
+
+
+def test_a_task_of_more_rows_than_inputs_has_no_map(fixed_2r: Robot) -> None:
+    with pytest.raises(InputError, match="3 rows"):
+        singularity_map((fixed_2r, WITH_HEADING))
