@@ -5,7 +5,9 @@ from __future__ import annotations
 import importlib.util
 import re
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 import nmm
@@ -13,15 +15,38 @@ import nmm
 ROOT = Path(__file__).resolve().parent.parent
 
 
-def test_the_page_of_scenario_keys_is_the_schemas() -> None:
-    path = ROOT / "docs" / "make_scenario_keys.py"
-    spec = importlib.util.spec_from_file_location("make_scenario_keys", path)
+def script(name: str) -> Any:
+    """A script of docs/ as a module."""
+    spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
+    return module
+
+
+def test_the_page_of_scenario_keys_is_the_schemas() -> None:
     expected = (ROOT / "docs" / "scenarios.md").read_text(encoding="utf-8")
-    assert module.page() == expected, "run python docs/make_scenario_keys.py"
+    assert script("make_scenario_keys").page() == expected, "run python docs/make_scenario_keys.py"
+
+
+def words_and_numbers(text: str) -> tuple[list[str], list[float]]:
+    """A text's lines without their numbers and spaces, and the numbers."""
+    number = r"(?<![A-Za-z_\d])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?"
+    lines = ["".join(re.sub(number, "#", line).split()) for line in text.splitlines()]
+    return lines, [float(found) for found in re.findall(number, text)]
+
+
+def test_commands_in_the_docs_print_what_the_docs_say() -> None:
+    """The same words, and the same numbers but for rounding, counts of starts among them."""
+    console = script("console")
+    for name in console.PAGES:
+        pytest.importorskip("sympy")
+        page = (ROOT / "docs" / name).read_text(encoding="utf-8")
+        said, said_numbers = words_and_numbers(page)
+        printed, printed_numbers = words_and_numbers(console.rewritten(page, console.COMPARED))
+        assert printed == said, "run python docs/console.py"
+        np.testing.assert_allclose(printed_numbers, said_numbers, rtol=0.05, atol=1e-6)
 
 
 def test_the_readmes_python_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
