@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from numbers import Integral
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -50,6 +52,14 @@ def positive(value: ArrayLike, name: str) -> float:
     if result <= 0.0:
         raise InputError(f"{name}: expected a number above 0, got {result:g}")
     return result
+
+
+def counted(value: object, name: str, least: int = 1) -> int:
+    """A whole number, at least `least`."""
+    if not isinstance(value, Integral) or isinstance(value, bool) or value < least:
+        expected = "above 0" if least == 1 else f"from {least}"
+        raise InputError(f"{name}: expected a whole number {expected}, got {value!r}")
+    return int(value)
 
 
 def matrix(value: ArrayLike, shape: tuple[int, int], name: str) -> Array:

@@ -66,14 +66,14 @@ class Recorder:
         """Where the task error grew in one step as no feedback lets it, unless the target itself jumped."""
         r_d, error = self._rows[1, : self._count], np.linalg.norm(self._rows[2, : self._count], axis=1)
         grown = np.diff(error) - np.linalg.norm(np.diff(r_d, axis=0), axis=1)
-        if not grown.size:
+        jumps = np.flatnonzero(grown >= JUMP * (1.0 + error[:-1]))
+        if not jumps.size:
             return None
-        k = int(np.argmax(grown))
-        if grown[k] < JUMP * (1.0 + error[k]):
-            return None
+        k = int(jumps[0])
+        again = f" (and {jumps.size - 1} times later)" if jumps.size > 1 else ""
         return (
             f"at t = {self._times[k]:.4g} s the task error jumped from {error[k]:.3g} to {error[k + 1]:.3g} "
-            "in one step: a singular configuration was passed between two samples"
+            f"in one step{again}: a singular configuration was passed between two samples"
         )
 
     def add(self, sample: Step) -> None:

@@ -61,16 +61,28 @@ def check_replaceable(folder: str | Path, is_ours: Callable[[Path], bool]) -> No
     if final.is_dir() and (not any(final.iterdir()) or is_ours(final)):
         return
     if final.exists() or final.is_symlink():
-        raise InputError(f"{final}: exists and was not written by nmm; expected a new folder or one of nmm's")
+        raise InputError(
+            f"{final}: exists and is not what this writes; expected a new or an empty folder, or one that "
+            "this wrote before"
+        )
 
 
 def is_run(folder: Path) -> bool:
     """Whether a folder holds a run that nmm wrote."""
+    return has_format(folder / "summary.json", FORMAT)
+
+
+def has_format(file: Path, expected: str) -> bool:
+    """Whether a JSON file of ours says that its folder is of that format."""
+    return _format(file) == expected
+
+
+def _format(file: Path) -> object:
     try:
-        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        summary = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError):
-        return False
-    return isinstance(summary, dict) and summary.get("format") == FORMAT
+        return None
+    return summary.get("format") if isinstance(summary, dict) else None
 
 
 def save(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,9 @@ import pytest
 import twin
 from numpy import cos, pi, sin
 from numpy.typing import NDArray
+from urdf_parts import AXIS, joint, link, robot, write
 
+from nmm.analysis import analyse
 from nmm.analysis.searching import SingularFamily, SingularitySearch, find_singularities, nearest_singularity
 from nmm.errors import InputError, SingularError
 from nmm.loading import load
@@ -209,6 +212,25 @@ def test_ranges_and_what_does_not_move(planar: Robot) -> None:
     assert not find_singularities(subject, starts=20, ranges={"q1": (0.2, 1.0), "q2": (0.5, 2.0)}).found
     with pytest.raises(SingularError, match="everywhere in these ranges"):
         find_singularities((planar, made(lambda a, b: np.nan)), starts=5)
+
+
+def test_examples_are_singular_though_the_ranges_go_beyond_the_limits(tmp_path: Path) -> None:
+    hinge = AXIS + '<limit lower="-2" upper="2" effort="1" velocity="1"/>'
+    ahead = '<origin xyz="0.5 0 0"/>'
+    joints = [
+        joint("q1", "base", "upper", body=hinge, origin=""),
+        joint("q2", "upper", "fore", body=hinge, origin=ahead),
+        joint("tip", "fore", "ee", "fixed", "", ahead),
+    ]
+    links = [link(name) for name in ("base", "upper", "fore", "ee")]
+    arm = load(write(tmp_path / "arm.urdf", robot(*links, *joints)), platform="fixed")
+    task = (arm, Position("ee", "xy"))
+    (family,) = find_singularities(task, starts=40, ranges={"q2": (-pi, pi)}).families
+    assert pinned(family) == near(q2=OF_SIN)
+    for example in family.examples:
+        assert analyse(task, example).rank == 1
+    (inside,) = find_singularities(task, starts=40).families
+    assert pinned(inside) == near(q2=[0.0])
 
 
 def test_the_same_seed_the_same_result(robot_3r: Robot, planar: Robot) -> None:

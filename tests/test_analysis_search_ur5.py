@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from spatial_arms import load_ur5
 
+from nmm.analysis import analyse
 from nmm.analysis.searching import SingularFamily, SingularitySearch, find_singularities, nearest_singularity
 from nmm.loading import load
 from nmm.robot import Robot
@@ -90,6 +91,10 @@ def test_ur5(fixed_ur5: Robot, rng: np.random.Generator) -> None:
     search = find_singularities((fixed_ur5, TOOL))
     check_ur5(search, shoulder)
     assert search.converged == search.starts == 200
+    for family in search.families:  # no example lies where another family is met: nothing would bring it back
+        report = analyse((fixed_ur5, TOOL), family.examples[0], minors=False)
+        assert report.rank == 5
+        assert report.by_input.effective
 
 
 def test_what_the_platform_removes_of_ur5(ur5: Robot, fixed_ur5: Robot, rng: np.random.Generator) -> None:

@@ -381,8 +381,11 @@ def test_search_and_nearest_get_what_they_need(run: Command) -> None:
     result = run(*arm, "--search", "--starts", "20", "--nearest", "--seed", "3")
     assert (result.status, result.err) == (0, "")
     assert "20 starts" in result.out
-    assert "0.4" in result.out  # the distance to the stretched arm
+    assert "distance 0.4," in result.out  # to the stretched arm
+    alone = run(*arm, "--nearest", "--length", "0.5").out
+    assert "starts" not in alone.splitlines()[0]
+    assert "distance 0.4," in alone
     part = run(*POSITION, "--search", "--part", "arm", "--starts", "20")
     assert "q2 = 0" in part.out
-    for wrong in (("--part", "leg"), ("--starts", "0")):
+    for wrong in (("--part", "leg"), ("--starts", "0"), ("--length", "-1"), ("--no-minors",)):
         assert run(*arm, "--search", *wrong).status == 2

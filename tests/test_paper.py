@@ -184,7 +184,7 @@ def test_any_other_folder_is_refused(tmp_path: Path, content: dict[str, str]) ->
     folder.mkdir()
     for name, inside in content.items():
         (folder / name).write_text(inside)
-    with pytest.raises(InputError, match="was not written by nmm"):
+    with pytest.raises(InputError, match="exists and is not what this writes"):
         write_paper(folder, jobs=1)
     assert {path.name: path.read_text() for path in folder.iterdir()} == content
     assert [path.name for path in tmp_path.iterdir()] == ["paper"]

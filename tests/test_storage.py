@@ -81,12 +81,12 @@ def test_an_older_run_of_ours_is_replaced_and_nothing_else_is(run: nmm.Trajector
     foreign = tmp_path / "thesis"
     foreign.mkdir()
     (foreign / "chapter1.tex").write_text("years of work")
-    with pytest.raises(nmm.InputError, match="not written by nmm"):
+    with pytest.raises(nmm.InputError, match="exists and is not what this writes"):
         run.save(foreign)
     assert [path.name for path in foreign.iterdir()] == ["chapter1.tex"]
     file = tmp_path / "file"
     file.write_text("x")
-    with pytest.raises(nmm.InputError, match="not written by nmm"):
+    with pytest.raises(nmm.InputError, match="exists and is not what this writes"):
         run.save(file)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "run", "thesis"]
 

@@ -103,7 +103,8 @@ def run(
         Path | None,
         typer.Option(
             metavar="DIR",
-            help="Where to write. A folder that nmm wrote is replaced; any other that exists is refused.",
+            help="Where to write. What this command wrote there before is replaced; a folder of anything "
+            "else is refused.",
             show_default="runs/<scenario>-<resolver>",
         ),
     ] = None,
@@ -213,11 +214,13 @@ def play(
     return play_folder(folder, port, open_browser=not no_open, ellipsoids=drawn)
 
 
-for _command in (info, check, view, singularities, redundancy, laps, scenarios, robots):
+for _command in (info, check, view, singularities):
     app.command()(_command)
-
-
 app.command("map")(map_measures)
+app.command()(redundancy)
+app.command()(laps)
+app.command()(scenarios)
+app.command()(robots)
 
 
 def status_of(arguments: Sequence[str]) -> int:

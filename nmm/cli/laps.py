@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nmm.cli.output import complain, progress, show_table, show_text, warn
+from nmm.cli.output import complain, progress, shielded, show_table, show_text, warn
 from nmm.cli.runs import check_folder
-from nmm.storage import replaced_folder
+from nmm.storage import has_format, replaced_folder
 
 if TYPE_CHECKING:
     from nmm.analysis.redundant.laps import Laps, Repeatability
@@ -40,13 +40,15 @@ def run_laps(
     check_folder(folder, _is_ours)
     with progress(f"{scenario.name}, {laps} laps") as report:
         found = repeatability(scenario, laps=laps, resolvers=kinds, period=period, progress=report)
-    _write(found, folder)
+    with shielded():
+        _write(found, folder)
     show_text(f"{scenario.name}: {found.transient}; period {found.period:.6g} s")
     for one in found.laps:
         for warning in one.trajectory.warnings:
             warn(f"{one.name.upper()}: {warning}")
         show_text()
-        show_table(*_table(one), title=f"{one.name.upper()} {one.verdict}", numeric=_table(one)[0])
+        columns, rows = _table(one)
+        show_table(columns, rows, title=f"{one.name.upper()} {one.verdict}", numeric=columns)
         if one.winding:
             show_text(one.winding)
     show_text()
@@ -76,11 +78,7 @@ def _short(value: float) -> str:
 
 
 def _is_ours(folder: Path) -> bool:
-    try:
-        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return False
-    return isinstance(summary, dict) and summary.get("format") == FORMAT
+    return has_format(folder / "summary.json", FORMAT)
 
 
 def _write(found: Repeatability, folder: Path) -> None:
@@ -135,5 +133,11 @@ def _lines(found: Repeatability) -> Iterator[list[object]]:
     for one in found.laps:
         blank = [""] * (len(names) + 2)
         for k, q in enumerate(one.q):
-            change = [*one.drift[k - 1].tolist(), float(one.distance[k - 1]), float(one.displacement[k - 1])]
-            yield [one.name, k, *q.tolist(), *(change if k else blank), float(one.errors[k])]
+            change: Sequence[object] = blank
+            if k:
+                change = [
+                    *one.drift[k - 1].tolist(),
+                    float(one.distance[k - 1]),
+                    float(one.displacement[k - 1]),
+                ]
+            yield [one.name, k, *q.tolist(), *change, float(one.errors[k])]

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import json
 import os
-import signal
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from nmm.cli.output import complain, progress, show_table
+from nmm.cli.output import complain, progress, shielded, show_table
 from nmm.cli.report import describe, show_run
 from nmm.errors import InputError
 from nmm.scenario import Scenario
-from nmm.storage import check_replaceable, is_run, replaced_folder
+from nmm.storage import check_replaceable, has_format, is_run, replaced_folder
 
 if TYPE_CHECKING:
     from nmm.playback.ellipsoids import Wanted
@@ -40,24 +38,13 @@ def run_scenario(
     folder = out or Path("runs") / f"{scenario.name}-{scenario.parts.resolver.kind}"
     check_folder(folder, is_run)
     trajectory = _run(scenario)
-    with _shielded():
+    with shielded():
         trajectory.save(folder, html=html, ellipsoids=ellipsoids)
     show_run(trajectory, folder)
     status = _status("nmm run", [trajectory], folder)
     if play and len(trajectory):
         trajectory.play(ellipsoids=ellipsoids)
     return status
-
-
-@contextmanager
-def _shielded() -> Iterator[None]:
-    """Whoever presses Ctrl-C twice wants the run to end, not to lose what there is of it."""
-    before = {number: signal.signal(number, signal.SIG_IGN) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def compare_resolvers(
@@ -79,7 +66,7 @@ def compare_resolvers(
         trajectories.append(_run(scenario))
         if trajectories[-1].outcome == "interrupted":
             break
-    with _shielded():
+    with shielded():
         _write_comparison(scenarios[0].name, trajectories, folder, ellipsoids)
     table = [dict(describe(trajectory, folder / trajectory.resolver)) for trajectory in trajectories]
     labels = list(dict.fromkeys(label for column in table for label in column))
@@ -178,11 +165,7 @@ def check_folder(folder: Path, is_ours: Callable[[Path], bool]) -> None:
 
 
 def _is_comparison(folder: Path) -> bool:
-    try:
-        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return False
-    return isinstance(summary, dict) and summary.get("format") == COMPARISON
+    return has_format(folder / "summary.json", COMPARISON)
 
 
 def _write_comparison(

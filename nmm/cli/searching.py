@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from nmm.cli.output import progress, show_table, show_text
+from nmm.words import listed
 
 if TYPE_CHECKING:
     from nmm.analysis.searching.family import SingularFamily
@@ -22,6 +23,7 @@ def search_command(
     seed: int = 0,
     part: str = "robot",
     nearest: bool = False,
+    length: float | None = None,
 ) -> int:
     """Search all singular configurations, the nearest to the one studied, or both; print what was found.
 
@@ -29,6 +31,7 @@ def search_command(
     ----------
     starts : local minimisations of the search; None for no search of families
     nearest : whether to look for the nearest to `studied.q`
+    length : so many m count as 1 rad
     """
     from nmm.analysis.searching.many_starts import find_singularities
     from nmm.analysis.searching.nearest import nearest_singularity
@@ -43,13 +46,14 @@ def search_command(
                     at=studied.q,
                     part=part,
                     t=studied.t,
+                    length=length,
                     progress=report,
                 )
             )
     if nearest:
         with progress("the nearest") as report:
             found = nearest_singularity(
-                studied.subject, studied.q, seed=seed, part=part, t=studied.t, progress=report
+                studied.subject, studied.q, seed=seed, part=part, t=studied.t, length=length, progress=report
             )
         if starts is not None:
             show_text()
@@ -71,7 +75,7 @@ def show_search(search: SingularitySearch) -> None:
     for number, family in enumerate(search.families, 1):
         at = _values(family.names, family.examples[0], search.units, leave_out=search.indifferent)
         which = "" if search.everywhere else f"{number} "
-        show_text(f"{which}loses {' and '.join(family.lost)}{f', at {at}' if at else ''}")
+        show_text(f"{which}loses {listed(family.lost)}{f', at {at}' if at else ''}")
     if search.unsorted:
         show_text(f"{of_starts(search.unsorted)} ended where families meet")
     if search.smallest is not None:
@@ -98,7 +102,7 @@ def show_nearest(point: SingularPoint | None) -> None:
                 for name, change in point.changes.items()
             ],
         )
-        show_text(f"loses {' and '.join(point.lost)} (rank {point.rank} of {point.full_rank})")
+        show_text(f"loses {listed(point.lost)} (rank {point.rank} of {point.full_rank})")
     show_text(point.family_text)
     if point.changes:
         show_text(point.proof_text)

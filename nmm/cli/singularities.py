@@ -143,8 +143,12 @@ def singularities(
         "--latex": (latex and not symbolic, "expected --symbolic with it, whose formulas it writes"),
         "--json": (as_json and (symbolic or looking), "expected without --symbolic, --search and --nearest"),
         "--symbolic": (symbolic and looking, "expected without --search and --nearest, which are numeric"),
-        "--minor": (minor is not None and minors is not None, "expected without --minors and --no-minors"),
+        "--minor": (
+            minor is not None and (minors is not None or looking),
+            "expected without --minors, --no-minors, --search and --nearest",
+        ),
         "--starts": (starts is not None and not search, "expected with --search"),
+        "--minors": (minors is not None and looking, "expected without --search and --nearest"),
         "--seed": (seed is not None and not looking, other),
         "--part": (part is not None and not looking, other),
     }
@@ -170,7 +174,12 @@ def singularities(
         from nmm.cli.searching import search_command
 
         return search_command(
-            given, STARTS if starts is None else starts, 0 if seed is None else seed, part or "robot", nearest
+            given,
+            (STARTS if starts is None else starts) if search else None,
+            0 if seed is None else seed,
+            part or "robot",
+            nearest,
+            length,
         )
     choice, left_out = _chosen(given, minors, minor)
     if given.trajectory is not None and symbolic:

@@ -19,10 +19,8 @@ def tips(robot: Robot) -> tuple[str, ...]:
 
 
 def first_tip(robot: Robot) -> str | None:
-    """Of the tips one whose name says so, or else the first; None for a robot without an arm."""
-    ends = tips(robot)
-    named = [name for tip in TIPS for name in ends if tip in name.lower().split("_")]
-    return next(iter([*named, *ends]), None)
+    """Of the tips the one whose name says it best, or else the first; None for a robot without an arm."""
+    return min(tips(robot), key=_rank, default=None)
 
 
 def _tips(robot: Robot) -> Iterator[str]:
@@ -42,6 +40,11 @@ def _tips(robot: Robot) -> Iterator[str]:
 
 
 def _how_little_a_tip(frame: pin.Frame) -> tuple[int, float]:
-    words = frame.name.lower().replace("-", "_").split("_")
+    return _rank(frame.name), -float(np.linalg.norm(frame.placement.translation))
+
+
+def _rank(name: str) -> int:
+    """The place in `TIPS` of the first word that a frame's name holds."""
+    words = name.lower().replace("-", "_").split("_")
     ranks = [i for i, tip in enumerate(TIPS) if any(word.startswith(tip) for word in words)]
-    return min(ranks, default=len(TIPS)), -float(np.linalg.norm(frame.placement.translation))
+    return min(ranks, default=len(TIPS))

@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.analysis.redundant.periods import common_period, expect_periodic
-from nmm.arrays import Array, Integers, positive
+from nmm.arrays import Array, Integers, counted, positive
 from nmm.controller import Controller
-from nmm.errors import InputError
+from nmm.errors import InputError, unknown
 from nmm.robot import Robot
 from nmm.simulation import simulate
 from nmm.trajectory import Outcome, Trajectory
@@ -95,12 +95,12 @@ class Laps:
 
     @property
     def factor(self) -> float | None:
-        """The last lap's drift over that of the lap before; None with fewer than three laps, of which the
-        first holds the transient."""
+        """The last lap's drift over that of the lap before (infinite where that was 0); None with fewer than
+        three laps, of which the first holds the transient."""
         distance = self.distance
-        if len(distance) < 3 or distance[-2] == 0.0:
+        if len(distance) < 3:
             return None
-        return float(distance[-1] / distance[-2])
+        return float(distance[-1] / distance[-2]) if distance[-2] > 0.0 else math.inf
 
     @property
     def finished(self) -> bool:
@@ -158,7 +158,7 @@ class Repeatability:
         for one in self.laps:
             if one.name == name:
                 return one
-        raise KeyError(name)
+        raise InputError(unknown("resolver", name, [one.name for one in self.laps], "laps"))
 
     @property
     def complete(self) -> bool:
@@ -207,8 +207,7 @@ def repeatability(
     ------
     InputError : the task's references do not repeat themselves with a period, or one has to be given
     """
-    if isinstance(laps, bool) or not isinstance(laps, int | np.integer) or laps < 1:
-        raise InputError(f"laps: expected a whole number above 0, got {laps!r}")
+    laps = counted(laps, "laps")
     from nmm.scenario import Scenario  # a room further down: only those who have one need it
 
     scenarios: dict[str, Scenario] = {}

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nmm.analysis.searching.text import combination_text, listed, values_text
+from nmm.analysis.searching.text import combination_text, values_text
 from nmm.arrays import Array
+from nmm.words import listed
 
 #: Values of the same kind that differ by less are the same, rad or m.
 SAME_VALUE = 1e-4

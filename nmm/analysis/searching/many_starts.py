@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from numbers import Integral
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,9 +16,10 @@ from nmm.analysis.searching.measure import Measure
 from nmm.analysis.searching.minimum import LocalMinimum, followed, lowest
 from nmm.analysis.searching.sorting import everywhere, families_of
 from nmm.analysis.searching.space import Space, search_space
-from nmm.analysis.searching.text import listed, value_text
-from nmm.arrays import Array, positive, scalar
-from nmm.errors import InputError, SingularError
+from nmm.analysis.searching.text import value_text
+from nmm.arrays import Array, counted, positive, scalar
+from nmm.errors import SingularError
+from nmm.words import listed
 
 #: Singular values this small beside the largest are zero.
 TOLERANCE = 1e-8
@@ -164,7 +164,8 @@ def find_singularities(
     """
     jacobians = Jacobians(subject)
     measure = Measure(jacobians, part, length, sizes, scalar(t, "t"))
-    starts, seed, tolerance = counted(starts, "starts"), seeded(seed), positive(tolerance, "tolerance")
+    starts, seed = counted(starts, "starts"), counted(seed, "seed", 0)
+    tolerance = positive(tolerance, "tolerance")
     robot, rng = measure.robot, np.random.default_rng(seed)
     stand = robot.rest if at is None else robot.q(at)
     units = np.where([unit == "m" for unit in robot.q_units], 1.0 if length is None else float(length), 1.0)
@@ -201,20 +202,6 @@ def find_singularities(
         fixed={names[j]: float(stand[j]) for j in range(robot.n) if j not in space.moving},
         tolerance=tolerance,
     )
-
-
-def counted(value: object, name: str) -> int:
-    """A whole number above 0."""
-    if not isinstance(value, Integral) or isinstance(value, bool) or value < 1:
-        raise InputError(f"{name}: expected a whole number above 0, got {value!r}")
-    return int(value)
-
-
-def seeded(value: object) -> int:
-    """A whole number that is not negative."""
-    if not isinstance(value, Integral) or isinstance(value, bool) or value < 0:
-        raise InputError(f"seed: expected a whole number from 0, got {value!r}")
-    return int(value)
 
 
 def _starts(

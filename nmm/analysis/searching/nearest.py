@@ -12,13 +12,13 @@ from nmm.analysis.jacobians import Jacobians, Subject, checked
 from nmm.analysis.parts import WHOLE
 from nmm.analysis.searching.descent import descend
 from nmm.analysis.searching.family import SingularFamily
-from nmm.analysis.searching.many_starts import TOLERANCE, counted, seeded
+from nmm.analysis.searching.many_starts import TOLERANCE
 from nmm.analysis.searching.measure import Measure
 from nmm.analysis.searching.slide import slide
 from nmm.analysis.searching.sorting import family_at
 from nmm.analysis.searching.space import Space, search_space
 from nmm.analysis.searching.text import listed, value_text
-from nmm.arrays import Array, positive
+from nmm.arrays import Array, counted, positive
 
 #: Nearest candidates that are followed to the end.
 KEPT = 8
@@ -153,7 +153,8 @@ def nearest_singularity(
     jacobians = Jacobians(subject)
     t, given = checked(jacobians, t, q)
     measure = Measure(jacobians, part, length, sizes, t)
-    starts, seed, tolerance = counted(starts, "starts"), seeded(seed), positive(tolerance, "tolerance")
+    starts, seed = counted(starts, "starts"), counted(seed, "seed", 0)
+    tolerance = positive(tolerance, "tolerance")
     robot, rng = measure.robot, np.random.default_rng(seed)
     L = 1.0 if length is None else float(length)
     units = np.where([unit == "m" for unit in robot.q_units], L, 1.0)

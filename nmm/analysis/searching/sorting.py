@@ -41,7 +41,7 @@ def families_of(
             waiting = waiting[1:]
             continue
         members = [j for j in waiting if j == i or _belongs(space, family, local, j)]
-        family = _with_examples(measure, space, family, local.z[members], tolerance)
+        family = _with_examples(measure, space, family, local.z[members], tolerance, rng)
         again = next((k for k, one in enumerate(found) if one.same_as(family)), None)
         if again is None:
             found.append(family)
@@ -197,14 +197,25 @@ def _belongs(space: Space, family: SingularFamily, local: Local, i: int) -> bool
 
 
 def _with_examples(
-    measure: Measure, space: Space, family: SingularFamily, z: Array, tolerance: float
+    measure: Measure,
+    space: Space,
+    family: SingularFamily,
+    z: Array,
+    tolerance: float,
+    rng: np.random.Generator,
 ) -> SingularFamily:
-    """With its starts, and with examples: first one whose free coordinates are where `at` has them."""
+    """With its starts, and with examples: first one whose free coordinates are where `at` has them.
+
+    Not where another family is met there: what is lost, and what brings it back, would be another's too.
+    """
     q = space.fold(space.q(z[:EXAMPLES]))
     plain = q[:1].copy()
     for name in family.free:
         j = space.robot.coordinate(name)
         plain[0, j] = space.at[j]
     if int(measure.ranks(plain, tolerance)[0]) == family.rank:
-        q = np.concatenate([plain, q[: EXAMPLES - 1]])
+        there = localised(measure, space, space.z(plain), tolerance, rng)
+        member = localised(measure, space, z[:1], tolerance, rng)
+        if there.signature(0) == member.signature(0):
+            q = np.concatenate([plain, q[: EXAMPLES - 1]])
     return replace(family, examples=q, starts=len(z), lost=measure.lost_text(q[0], family.rank))

@@ -81,8 +81,9 @@ class Space:
         """q (..., n) with circular coordinates brought into their ranges; the upper end for the lower."""
         low = self.lower + DIGITS
         turned = low + np.mod(q - low, TURN)
-        lower, upper = self.robot.q_limits.T  # files write pi in some digits
-        return np.asarray(np.where(self.circular, np.clip(turned, lower, upper), q))
+        turned = np.where((turned > self.upper) & (turned - TURN >= self.lower), turned - TURN, turned)
+        # Where neither is inside, the range is short of a turn by the digits in which files write pi.
+        return np.asarray(np.where(self.circular, np.clip(turned, self.lower, self.upper), q))
 
 
 def reach(robot: Robot) -> float:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from math import degrees, pi
 
+from nmm.words import listed
+
 #: Values this near a fraction of pi are written as one: files write pi/2 as 1.5708.
 NEAR = 5e-5
 #: Denominators of such fractions.
@@ -59,10 +61,3 @@ def combination_text(coefficients: Mapping[str, int]) -> str:
 def either(texts: Sequence[str]) -> str:
     """ "a", "a or b", "a, b or c"."""
     return listed(texts, "or")
-
-
-def listed(texts: Sequence[str], word: str = "and") -> str:
-    """ "a", "a and b", "a, b and c"."""
-    if len(texts) < 2:
-        return "".join(texts)
-    return f"{', '.join(texts[:-1])} {word} {texts[-1]}"

@@ -11,6 +11,7 @@ from nmm.platforms.wheeled.descriptions import SteeredWheel, Wheel
 from nmm.platforms.wheeled.geometry import Bodies
 from nmm.platforms.wheeled.kernel import CONTRADICTION
 from nmm.platforms.wheeled.structure import Constraint, Structure
+from nmm.words import listed
 
 #: Beyond its limit a hitch is folded by more than this, rad.
 _SLACK = 1e-9
@@ -80,8 +81,7 @@ def _wheels(constraints: list[Constraint]) -> list[Wheel]:
 
 
 def _listed(wheels: list[Wheel]) -> str:
-    names = [wheel.name for wheel in wheels]
-    return " and ".join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else names[0]
+    return listed([wheel.name for wheel in wheels])
 
 
 def _angles(wheels: list[Wheel], bodies: Bodies, qp: Array) -> str:
