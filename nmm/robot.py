@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 
 #: Stands for the robot's centre of mass where a function names a frame (`tasks.CenterOfMass`).
 CENTER_OF_MASS = "<center of mass>"
+#: A limit this large is none, m or rad.
+UNLIMITED = 1e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,6 +143,17 @@ class Robot:
         limits[: len(own), 1] = np.minimum(limits[: len(own), 1], own[:, 1])
         limits.flags.writeable = False
         return limits
+
+    @cached_property
+    def limited(self) -> NDArray[np.bool_]:
+        """Whether each lower and upper limit of `q_limits` is one, (n, 2): finite and below 1e6 in size.
+
+        URDF asks for two numbers at every sliding joint, so files write ±1e9 or the largest float for
+        "none". No joint slides a thousand kilometres or turns 160 000 times.
+        """
+        limited = np.isfinite(self.q_limits) & (np.abs(self.q_limits) < UNLIMITED)
+        limited.flags.writeable = False
+        return np.asarray(limited)
 
     @cached_property
     def u_limits(self) -> Array:

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ellipsoid_examples import directions, jacobian, load, swing
+from figure_examples import PAPER, check_legible, cut, drawn_points, run
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
-from test_ellipsoids import directions, jacobian, load, swing
-from test_figures import PAPER, check_legible, cut, drawn_points, run
 
 from nmm.analysis.ellipsoids import ellipsoids_along
 from nmm.arrays import Array

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from functools import cache
 from itertools import permutations, product
 
 import numpy as np
 import pytest
+from ellipsoid_examples import columns, directions, jacobian, load, random_q, swing
 
 import nmm
 from nmm.analysis.ellipsoids import Ellipsoids, carried_frame, ellipsoids_along, frame_of
@@ -14,44 +14,10 @@ from nmm.arrays import Array
 from nmm.configuration import Configuration
 from nmm.errors import InputError
 from nmm.playback.ellipsoids import EllipsoidOptions
-from nmm.robot import Robot
 
 #: A planar robot, a spatial one, an arm on a fixed base, one on a car, one with more inputs than it needs.
 ROBOTS = ("unicycle_2r", "unicycle_3r", "small_arm", "car with arm", "omni with arm")
 PARTS = ("robot", "arm", "platform")
-
-
-@cache
-def load(name: str) -> Robot:
-    bases = {"car with arm": "car_base", "omni with arm": "omni_base"}
-    if name in bases:
-        return nmm.mount(bases[name], "small_arm", at="arm_mount")
-    return nmm.load(name, platform="fixed" if name == "small_arm" else None)
-
-
-def random_q(robot: Robot, count: int, seed: int = 0) -> Array:
-    q = np.random.default_rng(seed).uniform(-1.2, 1.2, (count, robot.n))
-    return np.asarray(np.clip(q, *np.clip(robot.q_limits, -1.2, 1.2).T))
-
-
-def swing(robot: Robot, t: Array) -> Array:
-    """A smooth motion (N, n) of all coordinates."""
-    k = np.arange(robot.n)
-    return 0.2 * k + 0.9 * np.sin(np.outer(t, 0.5 + 0.23 * k) + k)
-
-
-def directions(count: int, size: int, seed: int = 1) -> Array:
-    found = np.random.default_rng(seed).normal(size=(count, size))
-    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
-
-
-def columns(robot: Robot, part: str) -> list[int]:
-    p = robot.platform.p
-    return {"robot": [*range(robot.n_u)], "arm": [*range(p, robot.n_u)], "platform": [*range(p)]}[part]
-
-
-def jacobian(robot: Robot, frame: str, q: Array, part: str = "robot") -> Array:
-    return np.asarray((Configuration(robot, q).jacobian(frame)[:3] @ robot.S(q))[:, columns(robot, part)])
 
 
 # The mathematics

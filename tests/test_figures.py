@@ -8,14 +8,12 @@ import sysconfig
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 
 import matplotlib
 import numpy as np
 import pytest
-from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PolyCollection
+from figure_examples import PAPER, check_legible, cut, drawn_points, run
 from matplotlib.figure import Figure
 
 from nmm import figures
@@ -25,20 +23,12 @@ from nmm.figures import style
 from nmm.loading import load
 from nmm.resolvers import ProjectedGradient
 from nmm.robot import Robot
-from nmm.scenario import Scenario
 from nmm.simulation import simulate
 from nmm.tasks import Coordinates, Heading, Position, Task
 from nmm.trajectory import Trajectory
 
 #: Where the packages of example-robot-data are.
 SHARE = Path(sysconfig.get_paths()["purelib"]) / "cmeel.prefix" / "share"
-PAPER = ["unicycle_2r_position", "unicycle_2r_pointing", "unicycle_2r_link_pointing", "unicycle_3r_position"]
-
-
-@cache
-def run(name: str, resolver: str = "rg", **settings: object) -> Trajectory:
-    given = {key.replace("__", "."): value for key, value in settings.items()}
-    return Scenario.load(name, {"dt": 0.02, **given}).with_resolver(resolver).run()
 
 
 def two(trajectory: Trajectory) -> list[Trajectory]:
@@ -60,43 +50,10 @@ KINDS: dict[str, Callable[[Trajectory], Figure]] = {
 }
 
 
-def check_legible(made: Figure) -> None:
-    """Nothing is clipped, no legend lies over curves, every axis that has numbers says what they are."""
-    made.canvas.draw()
-    renderer = made.canvas.get_renderer()  # type: ignore[attr-defined]  # Agg's, which every canvas here is
-    width, height = made.get_size_inches()
-    box = made.get_tightbbox(renderer)
-    assert box.x0 >= 0.0
-    assert box.y0 >= 0.0
-    assert box.x1 <= width
-    assert box.y1 <= height
-    for axes in made.axes:
-        numbered = [label for label in axes.get_yticklabels() if label.get_visible() and label.get_text()]
-        shares = [other for other in made.axes if other.get_ylabel() and same_row(axes, other)]
-        assert not numbered or shares
-        shown = axes.get_legend()
-        if shown is not None:
-            assert shown.get_window_extent(renderer).y0 >= axes.get_window_extent(renderer).y1 - 1.0
-    assert any("[s]" in axes.get_xlabel() or "[m]" in axes.get_xlabel() for axes in made.axes)
-
-
-def same_row(a: Axes, b: Axes) -> bool:
-    return abs(a.get_position().y0 - b.get_position().y0) < 1e-9
-
-
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", PAPER)
 def test_figures_of_the_paper_are_legible(name: str, kind: str) -> None:
     check_legible(KINDS[kind](run(name)))
-
-
-def drawn_points(axes: Axes) -> np.ndarray:
-    """Every vertex drawn in data coordinates: robots, paths, marks."""
-    points = [line.get_xydata() for line in axes.lines]
-    for collection in axes.collections:
-        assert isinstance(collection, LineCollection | PolyCollection)
-        points += [path.vertices for path in collection.get_paths()]
-    return np.vstack([np.asarray(part) for part in points])
 
 
 @pytest.mark.parametrize("name", PAPER)
@@ -169,12 +126,6 @@ def test_run_with_as_many_rows_as_inputs(robot_2r: Robot) -> None:
     assert trajectory.complete
     for make in KINDS.values():
         check_legible(make(trajectory))
-
-
-def cut(trajectory: Trajectory, count: int) -> Trajectory:
-    arrays = ("t", "q", "u", "r", "r_d", "error", "objective", "sigma_min", "partition", "residual")
-    names = (*arrays, "path", "desired")
-    return replace(trajectory, **{name: getattr(trajectory, name)[:count] for name in names})
 
 
 @pytest.mark.parametrize("count", [1, 2, 40])

@@ -7,14 +7,14 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from nmm.analysis.parts import WHOLE
 from nmm.arrays import Array
 from nmm.errors import InputError
 from nmm.figures import style
-from nmm.figures.motion import ABOVE, SIDE, hull
+from nmm.figures.motion import hull
 from nmm.figures.silhouette import Pose, Silhouette
+from nmm.figures.views import ABOVE, SIDE, View, Viewed, page
 from nmm.playback.ellipsoids import (
     NAMES,
     SHARE,
@@ -39,9 +39,8 @@ _SMALLEST = 0.3
 _POINTS = 1500
 #: A radius below this part of the largest is rounding: what has none upwards needs no view from the side.
 _FLAT = 1e-6
-#: Room for the x axis' label between two views, and for the line above the legend, in.
-_BETWEEN, _LINE = 0.2, 0.2
-_AXES = "xyz"
+#: Room for the line above the legend, in.
+_LINE = 0.2
 _BODY, _EDGE, _FILL, _RIM, _ARM = "#EEF0F3", "#BFC5CE", style.SKY, style.BLUE, style.VERMILLION
 
 
@@ -61,28 +60,16 @@ def ellipses(trajectory: Trajectory, options: Wanted = True) -> Figure:
     ------
     InputError : no sample; a frame or an input that the robot does not have
     """
-    scene = _Scene(trajectory, options_of(options) or EllipsoidOptions())
-    across = style.PAGE - style.LEFT - style.RIGHT
-    heights = [scene.height(view, across) for view in scene.views]
-    legends = [style.legend_rows(scene.names, across), *[1] * (len(heights) - 1)]
-    total = style.BOTTOM + style.column_height(heights, legends) + _BETWEEN * (len(heights) - 1)
-    made = style.figure(style.PAGE, total + _LINE)
-    top = total
-    for index, (view, height, rows) in enumerate(zip(scene.views, heights, legends, strict=True)):
-        top -= style.room(rows) + height
-        axes = style.place(made, style.LEFT, top, across, height)
-        scene.draw(axes, view)
-        if index == 0:
-            style.legend(axes)
-        top -= _BETWEEN
+    scene = _Ellipses(trajectory, options_of(options) or EllipsoidOptions())
+    made = page(scene, above=_LINE)
     made.text(
-        style.LEFT / style.PAGE, 1.0 - 0.5 * _LINE / (total + _LINE), scene.text, fontsize=style.SMALL,
-        color=style.GREY, va="top",
+        style.LEFT / style.PAGE, 1.0 - 0.5 * _LINE / float(made.get_size_inches()[1]), scene.text,
+        fontsize=style.SMALL, color=style.GREY, va="top",
     )  # fmt: skip
     return made
 
 
-class _Scene:
+class _Ellipses(Viewed):
     """What is drawn: ellipsoids and robots at instants, the path, the scale."""
 
     def __init__(self, trajectory: Trajectory, options: EllipsoidOptions) -> None:
@@ -131,34 +118,14 @@ class _Scene:
         sizes = ", ".join(self.sizes) if len(self.sizes) <= 2 else "the sizes given"
         return f"velocities for ‖u‖ ≤ 1 ({sizes}); {scale_text(self.scale)}"
 
-    def limits(self, view: tuple[int, int]) -> list[tuple[float, float]]:
-        """Limits of both axes that hold everything, with a margin, m."""
+    def points(self, view: View) -> list[Array]:
+        """Path, robots and ellipses."""
         points = [self.path[:, view], *(pose.points()[:, view] for pose in self.poses)]
-        points += [outlines.reshape(-1, 2) for outlines in self.outlines[view].values()]
-        found = np.vstack([part[np.all(np.isfinite(part), axis=1)] for part in points])
-        low, high = found.min(axis=0), found.max(axis=0)
-        if view == SIDE:
-            low[1] = min(low[1], 0.0)
-        margin = 0.04 * float(np.max(high - low))
-        return [(float(a) - margin, float(b) + margin) for a, b in zip(low, high, strict=True)]
+        return points + [outlines.reshape(-1, 2) for outlines in self.outlines[view].values()]
 
-    def height(self, view: tuple[int, int], width: float) -> float:
-        """How high a view is that has this width, in the same unit."""
-        (left, right), (low, high) = self.limits(view)
-        return width * (high - low) / (right - left)
-
-    def draw(self, axes: Axes, view: tuple[int, int]) -> None:
+    def draw(self, axes: Axes, view: View) -> None:
         """Draw the scene seen along the world axis that `view` leaves out."""
-        across, up = view
-        style.label(axes, x=f"{_AXES[across]} [m]", y=f"{_AXES[up]} [m]")
-        axes.set_aspect("equal", adjustable="box")
-        horizontal, vertical = self.limits(view)
-        axes.set_xlim(*horizontal)
-        axes.set_ylim(*vertical)
-        room = axes.get_window_extent()
-        for axis, pixels in ((axes.xaxis, room.width), (axes.yaxis, room.height)):
-            nbins = int(np.clip(pixels / style.DPI / 0.25, 3, 9))
-            axis.set_major_locator(MaxNLocator(nbins=nbins, steps=[1, 2, 5, 10]))
+        self.dress(axes, view)
         for pose in self.poses:
             _draw_faintly(axes, pose, view)
         for part, outlines in self.outlines[view].items():
@@ -179,7 +146,7 @@ class _Scene:
             )  # fmt: skip
 
 
-def _draw_faintly(axes: Axes, pose: Pose, view: tuple[int, int]) -> None:
+def _draw_faintly(axes: Axes, pose: Pose, view: View) -> None:
     """A robot in the background: its platform's outline, its wheels, its arm."""
     bodies = [hull(points[:, view]) for points in pose.body]
     # Edges of all shapes first, faces above them: what stays visible is the edge of their union.

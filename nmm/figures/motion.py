@@ -9,13 +9,13 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array
 from nmm.errors import InputError
 from nmm.figures import style
 from nmm.figures.silhouette import Pose, Silhouette
+from nmm.figures.views import ABOVE, SIDE, View, Viewed, page
 from nmm.playback.placements import base_position
 from nmm.trajectory import Trajectory
 
@@ -25,11 +25,6 @@ _LABEL = 0.12
 MOST, LEAST = 11, 4
 #: Strength of the earliest drawing, of 1 for the last.
 FAINTEST = 0.4
-#: Room for the x axis' label between two views, in.
-_BETWEEN = 0.2
-#: A view's world axes: across the page, up the page.
-ABOVE, SIDE = (0, 1), (0, 2)
-_AXES = "xyz"
 #: A run whose arm rises or falls by more than this is drawn from the side too, m.
 _RISES = 0.01
 _PATH_COLOR, _BODY, _EDGE, _ARM = style.BLUE, "#B9C0CA", "#3F4652", style.VERMILLION
@@ -52,24 +47,10 @@ def stroboscopic(trajectory: Trajectory, instants: ArrayLike | int | None = None
     ------
     InputError : no sample; an instant outside the run
     """
-    scene = Scene(trajectory, instants)
-    across = style.PAGE - style.LEFT - style.RIGHT
-    heights = [scene.height(view, across) for view in scene.views]
-    legends = [style.legend_rows(scene.names, across), *[1] * (len(heights) - 1)]
-    total = style.BOTTOM + style.column_height(heights, legends) + _BETWEEN * (len(heights) - 1)
-    made = style.figure(style.PAGE, total)
-    top = total
-    for index, (view, height, rows) in enumerate(zip(scene.views, heights, legends, strict=True)):
-        top -= style.room(rows) + height
-        axes = style.place(made, style.LEFT, top, across, height)
-        scene.draw(axes, view)
-        if index == 0:
-            style.legend(axes)
-        top -= _BETWEEN
-    return made
+    return page(Scene(trajectory, instants))
 
 
-class Scene:
+class Scene(Viewed):
     """What is drawn of a run: the robot's poses, its paths, its marks."""
 
     def __init__(self, trajectory: Trajectory, instants: ArrayLike | int | None = None) -> None:
@@ -100,37 +81,20 @@ class Scene:
     def _path_name(self) -> str:
         return f"path of {self.trajectory.frame}" if self.trajectory.frame else "path of the platform"
 
-    def limits(self, view: tuple[int, int]) -> list[tuple[float, float]]:
-        """Limits of both axes that hold everything, with a margin, m."""
+    def points(self, view: View) -> list[Array]:
+        """Robots, paths, labels and target."""
         points = [*(pose.points() for pose in self.poses), *self.lines.values()]
         if view == ABOVE:
             points.append(np.column_stack([self.labels, np.zeros(len(self.labels))]))
         if self.trajectory.target is not None:
             points.append(self.trajectory.target[None])
-        found = np.vstack([part[np.all(np.isfinite(part), axis=1)] for part in points])[:, view]
-        low, high = found.min(axis=0), found.max(axis=0)
-        if view == SIDE:
-            low[1] = min(low[1], 0.0)
-        # The margin is the same on all sides, but no view gets narrower than a third of the other axis.
-        margin = 0.04 * float(np.max(high - low))
-        return [(float(a) - margin, float(b) + margin) for a, b in zip(low, high, strict=True)]
+        return [part[:, view] for part in points]
 
-    def height(self, view: tuple[int, int], width: float) -> float:
-        """How high a view is that has this width, in the same unit."""
-        (left, right), (low, high) = self.limits(view)
-        return width * (high - low) / (right - left)
-
-    def draw(self, axes: Axes, view: tuple[int, int]) -> None:
+    def draw(self, axes: Axes, view: View) -> None:
         """Draw the scene seen along the world axis that `view` leaves out."""
         across, up = view
         trajectory = self.trajectory
-        style.label(axes, x=f"{_AXES[across]} [m]", y=f"{_AXES[up]} [m]")
-        axes.set_aspect("equal", adjustable="box")
-        horizontal, vertical = self.limits(view)
-        axes.set_xlim(*horizontal)
-        axes.set_ylim(*vertical)
-        for axis in (axes.xaxis, axes.yaxis):
-            axis.set_major_locator(MaxNLocator(nbins=9, steps=[1, 2, 5, 10]))
+        self.dress(axes, view)
         strengths = np.linspace(FAINTEST, 1.0, len(self.poses)) if len(self.poses) > 1 else [1.0]
         for k, (pose, strength) in enumerate(zip(self.poses, strengths, strict=True)):
             # From the side the robots of a round path stand behind each other: every second one is enough.
@@ -235,7 +199,7 @@ def _faded(color: str, strength: float) -> tuple[float, float, float]:
     return red, green, blue
 
 
-def _draw_pose(axes: Axes, pose: Pose, view: tuple[int, int], strength: float, later: float) -> None:
+def _draw_pose(axes: Axes, pose: Pose, view: View, strength: float, later: float) -> None:
     """One drawing of the robot: above the earlier ones (`later` in [0, 1)), all arms above all platforms."""
     edge, body = _faded(_EDGE, strength), _faded(_BODY, strength)
     zorder = 3.0 + later

@@ -28,8 +28,6 @@ from nmm.trajectory import Outcome, Trajectory
 if TYPE_CHECKING:
     from nmm.scenario import Scenario
 
-#: A coordinate with limits beyond this has none, m and rad.
-UNLIMITED = 1e6
 #: A drift below this has closed: what the integrator and the feedback leave, m and rad.
 CLOSED = 1e-6
 #: A drift that falls at least by this factor from lap to lap converges.
@@ -73,8 +71,7 @@ class Laps:
     @property
     def turns(self) -> Integers:
         """(K, n): full turns of each lap, counted where one is the same posture: of angles without limits."""
-        unlimited = np.all(np.abs(self.robot.q_limits) > UNLIMITED, axis=1)
-        free = unlimited & (np.array(self.robot.q_units) == "rad")
+        free = ~self.robot.limited.any(axis=1) & (np.array(self.robot.q_units) == "rad")
         return np.where(free, np.round(self.drift / (2.0 * np.pi)), 0.0).astype(np.int64)
 
     @property

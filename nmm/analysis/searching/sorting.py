@@ -41,7 +41,7 @@ def families_of(
             waiting = waiting[1:]
             continue
         members = [j for j in waiting if j == i or _belongs(space, family, local, j)]
-        family = _with_examples(measure, space, family, local.z[members], tolerance, rng)
+        family = _with_examples(measure, space, family, local, members, tolerance, rng)
         again = next((k for k, one in enumerate(found) if one.same_as(family)), None)
         if again is None:
             found.append(family)
@@ -200,22 +200,24 @@ def _with_examples(
     measure: Measure,
     space: Space,
     family: SingularFamily,
-    z: Array,
+    local: Local,
+    members: list[int],
     tolerance: float,
     rng: np.random.Generator,
 ) -> SingularFamily:
     """With its starts, and with examples: first one whose free coordinates are where `at` has them.
 
-    Not where another family is met there: what is lost, and what brings it back, would be another's too.
+    None lies where another family is met: what is lost there, and what brings it back, would be that one's.
     """
+    told = space.z(family.examples[:1])
+    usual = localised(measure, space, told, tolerance, rng).signature(0)
+    z = np.concatenate([told, *(local.z[j : j + 1] for j in members if local.signature(j) == usual)])
     q = space.fold(space.q(z[:EXAMPLES]))
     plain = q[:1].copy()
     for name in family.free:
         j = space.robot.coordinate(name)
         plain[0, j] = space.at[j]
-    if int(measure.ranks(plain, tolerance)[0]) == family.rank:
-        there = localised(measure, space, space.z(plain), tolerance, rng)
-        member = localised(measure, space, z[:1], tolerance, rng)
-        if there.signature(0) == member.signature(0):
-            q = np.concatenate([plain, q[: EXAMPLES - 1]])
-    return replace(family, examples=q, starts=len(z), lost=measure.lost_text(q[0], family.rank))
+    there = localised(measure, space, space.z(plain), tolerance, rng)
+    if there.rank[0] == family.rank and there.signature(0) == usual:
+        q = np.concatenate([plain, q[: EXAMPLES - 1]])
+    return replace(family, examples=q, starts=len(members), lost=measure.lost_text(q[0], family.rank))

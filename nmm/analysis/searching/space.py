@@ -92,8 +92,8 @@ def reach(robot: Robot) -> float:
     total = sum(float(np.linalg.norm(placement.translation)) for placement in model.jointPlacements)
     travel = [
         float(np.max(np.abs(limits)))
-        for unit, limits in zip(robot.q_units, robot.q_limits, strict=True)
-        if unit == "m" and np.all(np.isfinite(limits)) and np.max(np.abs(limits)) < 1e6
+        for unit, limits, limited in zip(robot.q_units, robot.q_limits, robot.limited, strict=True)
+        if unit == "m" and limited.all()
     ]
     tip = max((float(np.linalg.norm(frame.placement.translation)) for frame in model.frames), default=0.0)
     return max(total + sum(travel) + tip, 0.1)
@@ -127,7 +127,7 @@ def search_space(
     robot = measure.robot
     moving = _moving(robot, among)
     given = _ranges(robot, moving, ranges)
-    own = np.abs(robot.q_limits) < 1e6  # loaders write "none" as a huge number too
+    own = robot.limited
     lower = np.where(own[:, 0], robot.q_limits[:, 0], -np.inf)
     upper = np.where(own[:, 1], robot.q_limits[:, 1], np.inf)
     angle = np.array([unit == "rad" for unit in robot.q_units])
