@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +14,13 @@ import pytest
 from short_scenario import MINIMAL
 
 import nmm
+import nmm.cli.laps
 from nmm.analysis.redundant.moving import self_motion
 from nmm.analysis.redundant.report import redundancy as report_of
 from nmm.cli.laps import run_laps
 from nmm.cli.redundancy import laps, redundancy
 from nmm.cli.redundancy_tables import direction_of
-from nmm.errors import InputError
+from nmm.errors import InputError, SingularError
 from nmm.tasks import Position
 
 BENT = ["theta=0.3", "q1=0.4", "q2=0.7"]
@@ -42,7 +44,13 @@ def test_the_report_is_the_librarys(capsys: Printed) -> None:
     expected = report_of((robot, Position("ee", "xy")), {name: float(value) for name, value in q.items()})
     out = capsys.readouterr().out
     assert out.strip() == expected.text()
-    for part in ("n - s = 5 - 2 = 3", "m - s = 4 - 2 = 2", "the wheels withhold 1 of the 3", *expected.texts):
+    for part in (
+        "n - s = 5 - 2 = 3",
+        "n_u - s = 4 - 2 = 2",
+        "n = 5 coordinates, n_u = 4 inputs, s = 2 rows",
+        "the wheels withhold 1 of them, which",
+        *expected.texts,
+    ):
         assert part in out
 
 
@@ -90,6 +98,55 @@ def test_what_ends_a_self_motion_is_warned_of(capsys: Printed) -> None:
     assert "turns back early: steering at the limit" in printed.err
 
 
+def test_what_is_rounding_is_printed_as_zero(capsys: Printed) -> None:
+    """Along its own axis the platform of a motion straight ahead neither slides nor turns."""
+    assert redundancy("unicycle_2r", task=["position"], at=["q2=pi/3"], self_motion="0", duration=1.0) == 0
+    cells = {line.split()[0]: line.split() for line in capsys.readouterr().out.splitlines() if line}
+    assert cells["y"][2:] == cells["theta"][2:] == ["0"] * 4
+    assert float(cells["x"][5]) > 0.01
+
+
+def test_a_short_motion_has_samples_of_its_own(capsys: Printed) -> None:
+    assert redundancy("unicycle_2r", task=["position"], at=BENT, self_motion="0", duration=0.01) == 0
+    assert "over 0.02 s" in capsys.readouterr().out
+
+
+def test_a_motion_that_cannot_begin_comes_after_the_report(capsys: Printed) -> None:
+    with pytest.raises(SingularError, match="q is singular"):
+        redundancy("unicycle_2r", task=["position"], at=["q1=pi/2"], settings=["d=0"], self_motion="0")
+    assert "J is singular" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("width", [60, 80])
+def test_lines_go_on_below_themselves_on_a_terminal(
+    width: int, capsys: Printed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Breaks are between words alone, and what goes on is indented deeper than what begins."""
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("NO_COLOR", "1")
+    monkeypatch.setenv("COLUMNS", str(width))
+    assert redundancy("car_steered_by_the_null_space") == 0
+    narrow = capsys.readouterr().out
+    for name in ("FORCE_COLOR", "COLUMNS"):
+        monkeypatch.delenv(name)
+    assert redundancy("car_steered_by_the_null_space") == 0
+    wide = capsys.readouterr().out
+    assert narrow.split() == wide.split()
+    assert max(len(line) for line in narrow.splitlines()) <= width
+    begins = [line for line in wide.splitlines() if line]
+    rest = iter(line for line in narrow.splitlines() if line)
+    for line in begins:
+        first = next(rest)
+        got = first.split()
+        indent = len(line) - len(line.lstrip())
+        assert len(first) - len(first.lstrip()) == indent
+        while len(got) < len(line.split()):
+            more = next(rest)
+            assert len(more) - len(more.lstrip()) == indent + 2
+            got += more.split()
+
+
 def test_a_long_sentence_is_no_title(tmp_path: Path) -> None:
     page = tmp_path / "page.html"
     redundancy("ur5_unicycle_pose", self_motion="v", duration=0.5, html=page)
@@ -102,11 +159,33 @@ def test_a_long_sentence_is_no_title(tmp_path: Path) -> None:
         (lambda: redundancy("unicycle_2r"), "expected --task"),
         (lambda: redundancy("unicycle_2r", task=["position"], play=True), "expected --self-motion"),
         (lambda: redundancy("unicycle_2r", task=["position"], html=Path("x.html")), "expected --self-motion"),
-        (lambda: redundancy("unicycle_2r", task=["position"], self_motion="9"), "from 0 to 1, got 9"),
-        (lambda: redundancy("unicycle_2r", task=["position"], self_motion="w"), "unknown input 'w'"),
+        (
+            lambda: redundancy("unicycle_2r", task=["position"], self_motion="9"),
+            "--self-motion: .*from 0 to 1, got 9",
+        ),
+        (
+            lambda: redundancy("unicycle_2r", task=["position"], self_motion="w"),
+            "--self-motion: unknown input 'w'",
+        ),
         (lambda: redundancy("unicycle_2r", task=["position"], self_motion="v=x"), "--self-motion: v"),
         (lambda: redundancy("unicycle_2r", task=["position"], self_motion="v,q2=1"), "INPUT=RATE"),
-        (lambda: redundancy("unicycle_2r", task=["position"], self_motion="0", speed=0.0), "speed"),
+        (lambda: redundancy("unicycle_2r", task=["position"], self_motion="0", speed=0.0), "^--speed"),
+        (lambda: redundancy("unicycle_2r", task=["position"], self_motion="v="), "--self-motion: v"),
+        (lambda: redundancy("unicycle_2r", task=["position"], self_motion=" "), "--self-motion: expected"),
+        (lambda: redundancy("unicycle_2r", task=["position"], duration=-1.0), "^--duration"),
+        (
+            lambda: redundancy(
+                "unicycle_2r", task=["position"], at=["q1=pi/2"], settings=["d=0"], self_motion="w"
+            ),
+            "--self-motion: unknown input 'w'",
+        ),
+        (
+            lambda: redundancy(
+                "unicycle_2r", task=["position"], self_motion="0", html=Path("nowhere") / "x.html"
+            ),
+            "--html: nowhere/x.html cannot be written",
+        ),
+        (lambda: redundancy("unicycle_2r", task=["position"], self_motion="0", html=Path()), "is a folder"),
         (lambda: redundancy("unicycle_2r", task=["pose"]), "expected at most 4"),
         (lambda: redundancy("no_such_robot", task=["position"]), "no_such_robot"),
         (lambda: laps("unicycle_2r_position", resolvers=" , "), "--resolvers"),
@@ -118,11 +197,12 @@ def test_a_long_sentence_is_no_title(tmp_path: Path) -> None:
     ],
 )
 def test_bad_input(
-    call: Callable[[], int], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    call: Callable[[], int], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Printed
 ) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InputError, match=message):
         call()
+    assert capsys.readouterr().out == ""
     assert list(tmp_path.iterdir()) == []
 
 
@@ -186,7 +266,7 @@ def test_the_folder_is_replaced_if_it_is_ours(round_path: Path, tmp_path: Path) 
     other = tmp_path / "other"
     other.mkdir()
     (other / "precious.txt").write_text("mine")
-    with pytest.raises(InputError, match="was not written by nmm"):
+    with pytest.raises(InputError, match="exists and is not what this writes"):
         run_laps(str(round_path), ["pg"], {}, laps=1, period=None, out=other)
     assert (other / "precious.txt").read_text() == "mine"
 
@@ -205,3 +285,21 @@ def test_laps_that_end_early_are_written_and_fail(tmp_path: Path, capsys: Printe
     summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
     assert not summary["complete"]
     assert not (tmp_path / "out" / "laps.png").exists()
+
+
+def test_laps_that_end_in_the_middle_of_the_first_are_written(
+    tmp_path: Path, capsys: Printed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C a tenth of the way through two laps."""
+
+    def ctrl_c(fraction: float) -> None:
+        if fraction > 0.1:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(nmm.cli.laps, "progress", lambda label: nullcontext(ctrl_c))
+    out = tmp_path / "out"
+    assert run_laps("unicycle_2r_position", ["rg"], {}, laps=2, period=None, out=out) == 1
+    assert "RG ended in lap 1" in capsys.readouterr().err
+    lines = (out / "laps.csv").read_text(encoding="utf-8").splitlines()
+    assert [line.split(",")[:2] for line in lines[1:]] == [["rg", "0"]]
+    assert (out / "rg" / "trajectory.npz").exists()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy import pi
@@ -12,6 +14,7 @@ from robot_grid import built, start
 from nmm.analysis.redundant.motion_words import (
     COORDINATES,
     INPUTS,
+    WHO,
     Words,
     coordinate_words,
     input_words,
@@ -19,6 +22,7 @@ from nmm.analysis.redundant.motion_words import (
 )
 from nmm.analysis.redundant.report import redundancy
 from nmm.configuration import Configuration
+from nmm.loading import load
 from nmm.robot import Robot
 from nmm.tasks import Position
 
@@ -39,8 +43,8 @@ def body_displacement(robot: Robot, q: Array, u: Array, step: float = 1e-3) -> A
 
 #: Which displacement, and with which sign.
 DISPLACED = {
-    "drive forward": (0, 1), "drive back": (0, -1), "slide left": (1, 1), "slide right": (1, -1),
-    "turn left": (2, 1), "turn right": (2, -1),
+    "drives forward": (0, 1), "drives back": (0, -1), "slides left": (1, 1), "slides right": (1, -1),
+    "turns left": (2, 1), "turns right": (2, -1),
 }  # fmt: skip
 
 
@@ -59,8 +63,8 @@ def test_words_of_platforms_are_what_they_do(base: str, rng: np.random.Generator
             text = motion_text(u, robot.u_names, robot.u_units, words, robot.platform.p)
             phrase = text.split(" at ")[0]
             assert text == f"{phrase} at 0.7 {robot.u_units[k]} alone"
-            if phrase in DISPLACED:
-                axis, sign = DISPLACED[phrase]
+            if phrase.removeprefix(WHO) in DISPLACED:
+                axis, sign = DISPLACED[phrase.removeprefix(WHO)]
                 assert sign * body_displacement(robot, q, u)[axis] > 0.0, name
                 said += 1
     assert said or base == "differential"
@@ -68,7 +72,7 @@ def test_words_of_platforms_are_what_they_do(base: str, rng: np.random.Generator
 
 def test_wheels_forward_drive_forward() -> None:
     robot = built("differential", "small arm")
-    assert INPUTS["omega_left"] == Words("left wheel forward", "left wheel back")
+    assert INPUTS["omega_left"] == Words("the left wheel rolls forward", "the left wheel rolls back")
     left, right = robot.input("omega_left"), robot.input("omega_right")
     for only, turns in ((left, -1), (right, 1)):  # the left wheel forward turns the robot to the right
         u = np.zeros(robot.n_u)
@@ -84,7 +88,7 @@ def test_steering_left_makes_it_turn_left() -> None:
         u = np.zeros(robot.n_u)
         u[robot.input("steering_rate")] = 0.2
         q = moved(robot, robot.q(), u, 1.0)
-        assert input_words(robot, robot.q())["steering_rate"].positive == "steer left"
+        assert input_words(robot, robot.q())["steering_rate"].positive == "the platform steers left"
         drive = np.eye(robot.n_u)[robot.input("v")]
         assert body_displacement(robot, q, drive)[2] > 0
 
@@ -95,9 +99,9 @@ def test_inputs_with_names_of_their_own() -> None:
     assert {"rear_left_spin", "steer_a_rate", "vx"} <= names
     robot = built("described by its wheels", "small arm")
     words = input_words(robot, robot.q())
-    assert words[robot.platform.inputs[0]].positive == "drive forward"
-    rate = Words("paddle", "paddle").phrase(-0.25, "rad/s")
-    assert rate == "paddle at -0.25 rad/s"
+    assert words[robot.platform.inputs[0]].positive == "the platform drives forward"
+    rate = Words("paddle runs", "paddle runs").phrase(-0.25, "rad/s")
+    assert rate == "paddle runs at -0.25 rad/s"
 
 
 @pytest.mark.parametrize("q1", [0.0, 0.9])
@@ -151,6 +155,121 @@ def test_words_of_a_spatial_arm(ur5: Robot, trial: int) -> None:
     assert words["wrist_3_joint"].positive.split()[1] == "turns"
 
 
+#: What a joint does, whichever way it goes.
+TURNS = {"turns"}
+LIFTS = {"lifts", "lowers", "turns"}  # upright links turn
+ELBOWS = {"opens", "closes", "bends", "unfolds"}
+KINDS = {
+    "Panda": ("joint", {"1 3 5 7": TURNS, "2": LIFTS, "4 6": ELBOWS}),
+    "TIAGo": (
+        "arm_",
+        {"1_joint 3_joint 5_joint 7_joint": TURNS, "2_joint": LIFTS, "4_joint 6_joint": ELBOWS},
+    ),
+    "UR5": (
+        "",
+        {
+            "shoulder_pan_joint wrist_2_joint wrist_3_joint": TURNS,
+            "shoulder_lift_joint": LIFTS,
+            "elbow_joint": ELBOWS,
+        },
+    ),
+}
+
+
+@pytest.mark.parametrize("arm", KINDS)
+def test_rolls_turn_shoulders_lift_and_elbows_open(arm: str, tiago: Robot, rng: np.random.Generator) -> None:
+    """The makers' own kinds of joints: what bends and what rolls does not depend on the posture."""
+    robot = tiago if arm == "TIAGo" else built("unicycle", arm)
+    lower, upper = np.clip(robot.q_limits, -3.0, 3.0).T
+    for q in (robot.rest, *(rng.uniform(lower, upper) for _ in range(20))):
+        words = input_words(robot, q)
+        before, kinds = KINDS[arm]
+        for endings, expected in kinds.items():
+            for ending in endings.split():
+                (name,) = [name for name in words if name.endswith(before + ending)]
+                said = {text.removeprefix(f"{name} ").split()[0] for text in words[name]}
+                assert said <= expected, (name, words[name])
+
+
+def chain(folder: Path, *joints: tuple[str, str, str, str], end: str) -> Robot:
+    """An arm on a fixed base from (name, type, origin, axis)."""
+    links, before = ['<link name="base"/>'], "base"
+    for name, kind, xyz, axis in joints:
+        limits = '<limit lower="-2" upper="2" effort="1" velocity="1"/>'
+        links.append(
+            f'<link name="{name}_link"/><joint name="{name}" type="{kind}"><parent link="{before}"/>'
+            f'<child link="{name}_link"/><origin xyz="{xyz}"/><axis xyz="{axis}"/>{limits}</joint>'
+        )
+        before = f"{name}_link"
+    links.append(
+        f'<link name="ee"/><joint name="end" type="fixed"><parent link="{before}"/><child link="ee"/>'
+        f'<origin xyz="{end}"/></joint>'
+    )
+    path = folder / "chain.urdf"
+    path.write_text(f'<robot name="chain">{"".join(links)}</robot>')
+    return load(path, platform="fixed")
+
+
+@pytest.mark.parametrize("column", [0.0, 0.36])
+@pytest.mark.parametrize("along", [0.0, 0.2, 0.42])
+@pytest.mark.parametrize("further", [0.0, 0.1, 0.4])
+def test_words_do_not_depend_on_where_a_file_puts_origins(
+    column: float, along: float, further: float, tmp_path: Path, rng: np.random.Generator
+) -> None:
+    """Seven joints, roll and bend in turn: an origin may be anywhere on its joint's axis."""
+    robot = chain(
+        tmp_path,
+        ("a1", "revolute", f"0 0 {0.36 - column}", "0 0 1"),
+        ("a2", "revolute", f"0 0 {column}", "0 1 0"),
+        ("a3", "revolute", f"0 0 {along}", "0 0 1"),
+        ("a4", "revolute", f"0 0 {0.42 - along}", "0 1 0"),
+        ("a5", "revolute", f"0 0 {further}", "0 0 1"),
+        ("a6", "revolute", f"0 0 {0.4 - further}", "0 1 0"),
+        ("a7", "revolute", "0 0 0", "0 0 1"),
+        end="0 0 0.15",
+    )
+    for q in rng.uniform(-2.0, 2.0, (10, 7)):
+        words = input_words(robot, q)
+        for name in ("a1", "a3", "a5", "a7"):
+            assert words[name].positive.startswith(f"{name} turns")
+        for name in ("a4", "a6"):  # bending either way from the straight arm
+            assert words[name] == Words(
+                *[f"{name} {word}" for word in ("closes", "opens")][:: 1 if q[int(name[1]) - 1] > 0 else -1]
+            )
+        elbow = [
+            Configuration(robot, q + step * np.eye(7)[1]).placement("a4_link").translation[2]
+            for step in (0.0, 1e-4)
+        ]
+        assert words["a2"].positive == ("a2 lifts" if elbow[1] > elbow[0] else "a2 lowers")
+
+
+def test_words_of_a_scara(tmp_path: Path) -> None:
+    robot = chain(
+        tmp_path,
+        ("j1", "revolute", "0 0 0.3", "0 0 1"),
+        ("j2", "revolute", "0.4 0 0", "0 0 1"),
+        ("quill", "prismatic", "0.3 0 0", "0 0 -1"),
+        ("j4", "revolute", "0 0 0", "0 0 -1"),
+        end="0 0 -0.1",
+    )
+    words = input_words(robot, robot.q({"j2": 0.5, "quill": 0.1}))
+    assert words["j1"] == Words("j1 turns left", "j1 turns right")
+    assert words["j2"] == Words("j2 closes", "j2 opens")
+    assert words["j4"] == Words("j4 turns right", "j4 turns left")
+    assert words["quill"].positive.split()[1] in ("extends", "slides")
+
+
+def test_the_shoulder_of_the_papers_spatial_arm_lifts(robot_3r: Robot, rng: np.random.Generator) -> None:
+    for q2 in rng.uniform(-3.0, 3.0, 10):
+        q = robot_3r.q({"q1": 0.4, "q2": q2, "q3": 0.5})
+        heights = [
+            Configuration(robot_3r, one).placement("link3").translation[2]
+            for one in (q, q + 1e-4 * np.eye(6)[robot_3r.coordinate("q2")])
+        ]
+        expected = "q2 lifts" if heights[1] > heights[0] else "q2 lowers"
+        assert input_words(robot_3r, q)["q2"].positive == expected
+
+
 def test_a_torso_extends_upwards(tiago: Robot) -> None:
     words = input_words(tiago, tiago.rest)
     assert words["torso_lift_joint"] == Words("torso_lift_joint extends", "torso_lift_joint retracts")
@@ -174,7 +293,7 @@ def test_a_whole_sentence_comes_true(robot_2r: Robot, theta: float, q2: float) -
             tip = [Configuration(robot_2r, one).placement("ee").translation for one in (q, ahead)]
             assert np.abs(tip[1] - tip[0]).max() < 1e-7
             for phrase, (axis, sign) in DISPLACED.items():
-                if phrase in text:
+                if f"{WHO}{phrase}" in text:
                     assert sign * body_displacement(robot_2r, q, u, 1e-4)[axis] > 0
             bends = abs(ahead[4]) > abs(q[4])
             assert ("q2 closes" if bends else "q2 opens") in text
@@ -190,7 +309,7 @@ def test_withheld_motions_are_said_in_the_platforms_axes(robot_2r: Robot) -> Non
     (vector,), (text,) = report.withheld, report.withheld_texts
     left = -np.sin(1.1) * vector[0] + np.cos(1.1) * vector[1]
     ahead = np.cos(1.1) * vector[0] + np.sin(1.1) * vector[1]
-    assert f"slide {'left' if left > 0 else 'right'} at {abs(left):.2g} m/s" in text
+    assert f"slides {'left' if left > 0 else 'right'} at {abs(left):.2g} m/s" in text
     np.testing.assert_allclose(ahead, 0.0, atol=1e-12)  # what the wheels admit is not in it
     assert set(COORDINATES) <= set(coordinate_words(robot_2r, q))
 
@@ -202,10 +321,16 @@ def test_motions_in_words() -> None:
     def said(*rates: float) -> str:
         return motion_text(np.array(rates), names, units, words, 1)
 
-    assert said(-0.31, 1, 0) == "drive back at 0.31 m/s while a opens at 1 rad/s"
-    assert (
-        said(0.31, -1, 0.5) == "drive forward at 0.31 m/s while a closes at 1 rad/s and b turns at +0.5 rad/s"
+    assert said(-0.31, 1, 0) == "the platform drives back at 0.31 m/s while a opens at 1 rad/s"
+    assert said(0.31, -1, 0.5) == (
+        "the platform drives forward at 0.31 m/s while a closes at 1 rad/s and b turns at +0.5 rad/s"
     )
     assert said(0, 1, -2) == "a opens at 1 rad/s while b turns at -2 rad/s"
     assert said(0, 0, 1) == "b turns at +1 rad/s alone"
     assert said(0, 0, 0) == "nothing moves"
+
+
+def test_the_platform_is_named_once() -> None:
+    names, units = ("v", "omega", "omega_left"), ("m/s", "rad/s", "rad/s")
+    text = motion_text(np.array([1.0, -1.0, 1.0]), names, units, INPUTS, 3)
+    assert text.startswith("the platform drives forward at 1 m/s, turns right at 1 rad/s and the left wheel ")

@@ -117,6 +117,7 @@ def test_on_many_platforms(base: str) -> None:
     for k in range(len(report.readable)):
         found = self_motion((robot, Position(frame)), q0, direction=k, duration=1.0, speed=0.3)
         assert_laws(found, 0.3, 1.0)
+        assert found.trajectory.desired is None  # the task rests: no path is to be followed
 
 
 def test_a_fixed_base_moves_its_arm() -> None:
@@ -194,6 +195,9 @@ def test_a_singular_start_is_refused() -> None:
     robot = nmm.load("unicycle_2r", arguments={"d": 0.0})
     with pytest.raises(SingularError, match="rank 1 at q and 2 nearby"):
         self_motion((robot, TIP), {"q1": pi / 2})
+    for wrong, message in ((3, "from 0 to 2, got 3"), ("w", "unknown input 'w'")):
+        with pytest.raises(InputError, match=message):
+            self_motion((robot, TIP), {"q1": pi / 2}, direction=wrong)
 
 
 def test_a_row_that_nothing_moves_is_no_singularity(robot_2r: Robot) -> None:

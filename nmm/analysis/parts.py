@@ -81,6 +81,12 @@ def ranks(values: Array, largest: Array, tolerance: float) -> Integers:
     return np.sum(values > tolerance * np.asarray(largest)[..., np.newaxis], axis=-1, dtype=np.int64)
 
 
+def rank_of(matrix: Array, tolerance: float) -> int:
+    """How many singular values of one matrix exceed `tolerance` times the largest."""
+    values = singular_values(matrix)
+    return int(ranks(values, np.array(values.max(initial=0.0)), tolerance))
+
+
 def condition_numbers(values: Array, rank: Integers) -> Array:
     """Largest over smallest of singular values (..., s); infinite where the rank (...) is below s."""
     full = rank == values.shape[-1]

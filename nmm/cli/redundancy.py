@@ -109,7 +109,8 @@ def laps(
         Path | None,
         typer.Option(
             metavar="DIR",
-            help="Where to write. A folder that nmm wrote is replaced; any other that exists is refused.",
+            help="Where to write. What this command wrote there before is replaced; a folder of anything "
+            "else is refused.",
             show_default="runs/<scenario>-laps",
         ),
     ] = None,

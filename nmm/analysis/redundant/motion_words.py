@@ -1,8 +1,9 @@
-"""Motions in words: "drive back at 0.31 m/s while q2 opens at 1 rad/s"."""
+"""Motions in words: "the platform drives back at 0.31 m/s while q2 opens at 1 rad/s"."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ from nmm.arrays import Array
 from nmm.configuration import Configuration
 from nmm.loading.tips import tips
 from nmm.robot import Robot
+from nmm.words import listed
 
 
 class Words(NamedTuple):
@@ -26,30 +28,35 @@ class Words(NamedTuple):
         return f"{self.positive if rate > 0.0 else self.negative} at {abs(rate):.2g} {unit}"
 
 
+#: Who it is in the platform's phrases; of two in a row the second goes without.
+WHO = "the platform "
+DRIVES = Words(f"{WHO}drives forward", f"{WHO}drives back")
+SLIDES = Words(f"{WHO}slides left", f"{WHO}slides right")
+TURNS = Words(f"{WHO}turns left", f"{WHO}turns right")
 #: The platforms' inputs by name.
 INPUTS: Mapping[str, Words] = {
-    "v": Words("drive forward", "drive back"),
-    "omega": Words("turn left", "turn right"),
-    "vx": Words("drive forward", "drive back"),
-    "vy": Words("slide left", "slide right"),
-    "drive": Words("drive forward", "drive back"),
-    "strafe": Words("slide left", "slide right"),
-    "turn": Words("turn left", "turn right"),
-    "omega_left": Words("left wheel forward", "left wheel back"),
-    "omega_right": Words("right wheel forward", "right wheel back"),
-    "steering_rate": Words("steer left", "steer right"),
+    "v": DRIVES,
+    "omega": TURNS,
+    "vx": DRIVES,
+    "vy": SLIDES,
+    "drive": DRIVES,
+    "strafe": SLIDES,
+    "turn": TURNS,
+    "omega_left": Words("the left wheel rolls forward", "the left wheel rolls back"),
+    "omega_right": Words("the right wheel rolls forward", "the right wheel rolls back"),
+    "steering_rate": Words(f"{WHO}steers left", f"{WHO}steers right"),
 }
 #: Those of platforms that are described by their wheels, by the end of the name; {} is what stands before it.
 ENDINGS: Mapping[str, Words] = {
-    "_speed": Words("roll {} forward", "roll {} back"),
-    "_spin": Words("turn {} forward", "turn {} back"),
-    "_rate": Words("steer {} left", "steer {} right"),
+    "_speed": Words("{} rolls forward", "{} rolls back"),
+    "_spin": Words("{} turns forward", "{} turns back"),
+    "_rate": Words("{} steers left", "{} steers right"),
 }
 #: The platforms' coordinates in their own axes, x ahead and y to the left.
 COORDINATES: Mapping[str, Words] = {
-    "x": Words("slide forward", "slide back"),
-    "y": Words("slide left", "slide right"),
-    "theta": Words("turn left", "turn right"),
+    "x": Words(f"{WHO}slides forward", f"{WHO}slides back"),
+    "y": SLIDES,
+    "theta": TURNS,
 }
 
 #: A rate below this part of the largest is not worth a word.
@@ -62,6 +69,10 @@ STAYS = 0.01
 NEAR = 1.0 / 3.0
 #: Levers below this are none, m.
 NO_LEVER = 1e-6
+#: Axes whose sine is below this are parallel.
+PARALLEL = 1e-3
+#: A length along an axis below this part of the arm's longest is no link.
+SHORT = 0.1
 
 
 def input_words(robot: Robot, q: Array) -> dict[str, Words]:
@@ -82,13 +93,13 @@ def _of_input(name: str) -> Words:
         if name.endswith(ending) and name != ending:
             stem = name.removesuffix(ending)
             return Words(words.positive.format(stem), words.negative.format(stem))
-    return Words(name, name)
+    return Words(f"{name} runs", f"{name} runs")
 
 
 def motion_text(
     rates: Array, names: Sequence[str], units: Sequence[str], words: Mapping[str, Words], of_platform: int
 ) -> str:
-    """A motion in a sentence: what the platform does, while the joints do the rest, a thousandth left out.
+    """A motion in a clause: what the platform does, while the joints do the rest, a thousandth left out.
 
     Parameters
     ----------
@@ -98,7 +109,7 @@ def motion_text(
     """
     moved = [k for k in range(len(rates)) if abs(rates[k]) > WORTH * np.abs(rates).max(initial=0.0)]
     phrases = {k: words[names[k]].phrase(float(rates[k]), units[k]) for k in moved}
-    platform = [phrase for k, phrase in phrases.items() if k < of_platform]
+    platform = _without_repeating_who([phrase for k, phrase in phrases.items() if k < of_platform])
     arm = [phrase for k, phrase in phrases.items() if k >= of_platform]
     if not phrases:
         return "nothing moves"
@@ -109,19 +120,24 @@ def motion_text(
     return f"{listed(platform)} while {listed(arm)}"
 
 
-def listed(phrases: Sequence[str]) -> str:
-    """ "a, b and c"."""
-    return " and ".join([", ".join(phrases[:-1]), phrases[-1]] if len(phrases) > 1 else phrases)
+def _without_repeating_who(phrases: Sequence[str]) -> list[str]:
+    """ "the platform drives forward", "turns left"."""
+    return [
+        phrase.removeprefix(WHO) if k and phrases[k - 1].startswith(WHO) else phrase
+        for k, phrase in enumerate(phrases)
+    ]
 
 
 def joint_words(robot: Robot, q: Array) -> dict[str, Words]:
     """Words for each joint of the arm at q, by name.
 
-    A joint between two links opens when the distance from where the link before it begins to where the
-    link after it ends grows with its angle, and closes when it falls; stretched and folded, where the
-    distance only falls or only grows, it bends and unfolds. An upright one that is no such elbow turns left
-    or right, as seen from above. Another lifts or lowers the end of its link. A prismatic joint extends when
-    it moves away from where the link before it begins. What does none of these turns or slides.
+    An elbow has its axis across the link before it and the link after it. It opens when the distance from
+    where the one begins to where the other ends grows with its angle, and closes when it falls; stretched and
+    folded, where the distance only falls or only grows, it bends and unfolds. A roll, whose axis runs along
+    the link before or after it, turns. A shoulder, before which the arm only turns about one line, lifts or
+    lowers the end of its link. Whatever is upright and no elbow turns left or right, as seen from above. A
+    prismatic joint extends when it moves away from where the link before it begins. What does none of these
+    turns or slides.
     """
     skeleton = _Skeleton(robot, q)
     return {name: skeleton.words(name) for name in robot.q_names[robot.platform.n_p :]}
@@ -153,11 +169,12 @@ class _Skeleton:
             return self._prismatic(name, joint)
         axis, origin = self._axis(joint, angular=True), self._origin(joint)
         start, end = self._link_before(joint, axis, origin), self._link_after(joint, axis, origin)
-        if start is not None and end is not None:
+        roll = self._is_roll(joint, axis, origin)
+        if start is not None and end is not None and not roll and not self._is_shoulder(joint, axis):
             return _elbow(name, axis, start - origin, end - origin)
         if abs(axis[2]) > UPRIGHT:
             return _signed(name, "turns left", "turns right", axis[2])
-        if end is not None:
+        if end is not None and not roll:
             rise = float(np.cross(axis, end - origin)[2])
             if abs(rise) > STAYS * float(np.linalg.norm(np.cross(axis, end - origin))):
                 return _signed(name, "lifts", "lowers", rise)
@@ -170,26 +187,65 @@ class _Skeleton:
             return Words(f"{name} slides", f"{name} slides")
         return _signed(name, "extends", "retracts", growth)
 
-    def _link_before(self, joint: int, axis: Array, origin: Array) -> Array | None:
-        """Where the link before a joint begins: at the nearest turning joint of the arm off its axis."""
-        points = []
+    def _is_shoulder(self, joint: int, axis: Array) -> bool:
+        """Whether the joints before one only turn the arm about a line that is not parallel to its axis."""
+        axes = [self._axis(above, angular=True) for above in self._above(joint) if self._turns(above)]
+        column = len(axes) == 1 or all(abs(one[2]) > UPRIGHT for one in axes)
+        return column and all(float(np.linalg.norm(np.cross(one, axis))) > PARALLEL for one in axes)
+
+    def _is_roll(self, joint: int, axis: Array, origin: Array) -> bool:
+        """Whether the arm runs on along a joint's axis, rather than across it.
+
+        Compared are the parts of the axis and of the common normals of Denavit and Hartenberg, which depend
+        neither on the posture nor on where the file puts the joint's origin on its axis.
+        """
+        above, (below, end) = self._above(joint), self._below(joint)
+        if not any(self._turns(one) for one in above):
+            return False
+        feet, gaps = [], []
+        for neighbours in (above, below):
+            turning = next((one for one in neighbours if self._turns(one)), None)
+            point = end if turning is None else self._origin(turning)
+            # Behind a prismatic joint an axis does not stay where it is: there its origin counts.
+            rigid = turning is not None and turning == neighbours[0]
+            other = self._axis(neighbours[0], angular=True) if rigid else axis
+            foot, gap = _common_normal(axis, point - origin, other)
+            feet.append(foot)
+            gaps.append(gap)
+        return abs(feet[1] - feet[0]) > max(*gaps, SHORT * self._longest)
+
+    @cached_property
+    def _longest(self) -> float:
+        """The longest way from a joint of the arm to the next, m."""
+        pairs = [(joint, above[0]) for joint in self.arm if (above := self._above(joint))]
+        return max((float(np.linalg.norm(self._origin(a) - self._origin(b))) for a, b in pairs), default=0.0)
+
+    def _above(self, joint: int) -> list[int]:
+        """The arm's joints before one, the nearest first."""
+        found = []
         above = int(self.model.parents[joint])
         while above in self.arm:
-            if self._turns(above):
-                points.append(self._origin(above))
+            found.append(above)
             above = int(self.model.parents[above])
+        return found
+
+    def _below(self, joint: int) -> tuple[list[int], Array]:
+        """The joints after one, the nearest first, and the arm's end; of several branches the first."""
+        for last, end in self._ends.items():
+            chain = [last, *self._above(last)]
+            if joint in chain:
+                return chain[: chain.index(joint)][::-1], end
+        return [], self._origin(joint)
+
+    def _link_before(self, joint: int, axis: Array, origin: Array) -> Array | None:
+        """Where the link before a joint begins: at the nearest turning joint of the arm off its axis."""
+        points = [self._origin(above) for above in self._above(joint) if self._turns(above)]
         return _off_axis(points, axis, origin)
 
     def _link_after(self, joint: int, axis: Array, origin: Array) -> Array | None:
         """Where the link after a joint ends: at the next joint off its axis, or at the arm's end."""
-        for last, end in self._ends.items():
-            chain = [last]
-            while chain[-1] > joint:  # a joint's number is above its parent's
-                chain.append(int(self.model.parents[chain[-1]]))
-            if chain[-1] == joint:
-                points = [self._origin(later) for later in chain[-2::-1]]
-                return _off_axis([*points, end], axis, origin)
-        return None
+        below, end = self._below(joint)
+        return _off_axis([*(self._origin(later) for later in below), end], axis, origin)
 
     def _turns(self, joint: int) -> bool:
         return self.robot.q_units[self.model.joints[joint].idx_q] == "rad"
@@ -210,6 +266,18 @@ class _Skeleton:
 def _signed(name: str, positive: str, negative: str, sign: float) -> Words:
     up, down = f"{name} {positive}", f"{name} {negative}"
     return Words(up, down) if sign > 0.0 else Words(down, up)
+
+
+def _common_normal(axis: Array, to: Array, other: Array) -> tuple[float, float]:
+    """Where the common normal of two axes meets the first, counted along it, and how long it is, m.
+
+    `to` leads from the first axis to the other; of parallel ones the normal at its end is taken.
+    """
+    normal = np.cross(axis, other)
+    size = float(np.linalg.norm(normal))
+    if size < PARALLEL:
+        return float(axis @ to), float(np.linalg.norm(np.cross(axis, to)))
+    return float(np.cross(to, other) @ normal) / size**2, abs(float(to @ normal)) / size
 
 
 def _off_axis(points: Sequence[Array], axis: Array, origin: Array) -> Array | None:

@@ -9,10 +9,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.analysis.jacobians import Jacobians, Subject, checked
+from nmm.analysis.parts import rank_of
 from nmm.analysis.reached import Reached
-from nmm.analysis.redundant.motion_words import input_words, listed, motion_text
-from nmm.analysis.redundant.null_fields import NEARLY_SINGULAR, Direction, Ended, Field, null_field
-from nmm.analysis.redundant.report import rank_of
+from nmm.analysis.redundant.motion_words import input_words, motion_text
+from nmm.analysis.redundant.null_fields import (
+    NEARLY_SINGULAR,
+    Direction,
+    Ended,
+    Field,
+    expect_direction,
+    null_field,
+)
+from nmm.analysis.singularity import TOLERANCE
 from nmm.arrays import Array, positive
 from nmm.configuration import Configuration
 from nmm.controller import Controller, Step
@@ -25,6 +33,7 @@ from nmm.resolvers.projected_gradient import ProjectedGradient
 from nmm.robot import Robot
 from nmm.tasks.task import Stack, Task
 from nmm.trajectory import Outcome, Trajectory
+from nmm.words import listed
 
 #: How fast the task is brought back from the integrator's drift, 1/s.
 GAIN = 10.0
@@ -103,7 +112,8 @@ def self_motion(
         raise InputError(f"dt: expected at most a quarter of the duration, {duration / 4.0:g} s, got {dt:g}")
     robot.check_limits(q)
     J = jacobians.J(t, q)
-    rank = rank_of(J)
+    rank = rank_of(J, TOLERANCE)
+    expect_direction(robot, J, rank, direction)
     nearby = _nearby(jacobians, t, q, rank)
     motion = _Motion(robot, held(jacobians, t, q), t, q, null_field(robot, J, nearby, rank, direction), rank)
     length = 2.0 * speed * duration / np.pi
@@ -114,7 +124,7 @@ def self_motion(
         reached = length * (1.0 - np.cos(np.pi * times[len(samples) - 1] / duration)) / 2.0
         if len(samples) < 3 or reached < 1e-3 * 2.0 * speed * duration / np.pi:
             raise SingularError(
-                f"self-motion: it cannot begin: {ended} (the other way may be free: the inputs negated)"
+                f"the self-motion cannot begin: {ended} (the other way may be free: the inputs negated)"
             )
         length = SHORTER * reached
         why = ended
@@ -146,11 +156,11 @@ def _nearby(jacobians: Jacobians, t: float, q: Array, rank: int) -> Array:
     near = q + AROUND * np.random.default_rng(0).uniform(-1.0, 1.0, (8, q.size))
     found = jacobians.batch(near, t)
     found = found[np.isfinite(found).all(axis=(1, 2))]
-    most = max((rank_of(J) for J in found), default=rank)
+    most = max((rank_of(J, TOLERANCE) for J in found), default=rank)
     if most > rank:
         raise SingularError(
-            f"self-motion: J has rank {rank} at q and {most} nearby: what leaves the task at rest here does "
-            "not lead on from here; expected a q that is not singular"
+            f"J has rank {rank} at q and {most} nearby: q is singular, and a motion that leaves "
+            "the task at rest there moves it a little further on; expected a q that is not singular"
         )
     return found
 
@@ -247,4 +257,5 @@ class _Motion:
         words = input_words(robot, self.q)
         text = motion_text(first / np.abs(first).max(), robot.u_names, robot.u_units, words, robot.platform.p)
         trajectory = recorder.trajectory(Outcome.COMPLETED, "", float(times[1]), "rk4")
-        return SelfMotion(replace(trajectory, resolver="self-motion"), text, length, ended)
+        # The task rests: there is no path that it should follow.
+        return SelfMotion(replace(trajectory, resolver="self-motion", desired=None), text, length, ended)

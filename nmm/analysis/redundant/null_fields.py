@@ -7,11 +7,11 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.analysis.redundant.motion_words import listed
 from nmm.analysis.redundant.null_space import readable_null_space
 from nmm.arrays import Array, Integers, scalar, vector
-from nmm.errors import InputError
+from nmm.errors import InputError, unknown
 from nmm.robot import Robot
+from nmm.words import listed
 
 #: What moves: a vector of `RedundancyReport.readable` by its number, an input by name, inputs by name or all.
 Direction = int | str | Mapping[str, float] | ArrayLike
@@ -31,21 +31,42 @@ class Ended(Exception):
 Field = Callable[[Array, Array], Array]
 
 
+def expect_direction(
+    robot: Robot, J: Array, rank: int, direction: Direction, name: str = "direction"
+) -> Array | int:
+    """A direction checked: the number of a readable null vector, or else the wished inputs (m,).
+
+    Errors call it `name`.
+
+    Raises
+    ------
+    InputError : no motion is free, no such number, an unknown input, or a wish that only moves the task
+    """
+    free = J.shape[1] - rank
+    if not free:
+        raise InputError(
+            f"{name}: the task leaves no motion free: J has rank {rank}, and there are {rank} inputs"
+        )
+    if not isinstance(direction, bool) and isinstance(direction, int | np.integer):
+        if not 0 <= direction < free:
+            numbers = "0, the only number" if free == 1 else f"a number from 0 to {free - 1}"
+            raise InputError(f"{name}: expected {numbers}, got {direction}")
+        return int(direction)
+    wish = _wish(robot, direction, name)
+    try:
+        _of_wish(wish, rank)(J, np.zeros(robot.n_u))
+    except Ended as ended:
+        raise InputError(f"{name}: {ended}") from None
+    return wish
+
+
 def null_field(robot: Robot, J: Array, nearby: Array, rank: int, direction: Direction) -> Field:
+    """The field of a direction that `expect_direction` accepts, J (k, s, m) being known at some q nearby."""
+    chosen = expect_direction(robot, J, rank, direction)
+    if not isinstance(chosen, int):
+        return _of_wish(chosen, rank)
     p = robot.platform.p
-    basis = readable_null_space(J, rank, [1] * p + [0] * (robot.n_u - p))
-    if not len(basis):
-        raise InputError(f"self-motion: the task leaves no motion free: J has rank {rank}, as many as inputs")
-    if isinstance(direction, bool) or not isinstance(direction, int | np.integer):
-        wished = _of_wish(_wish(robot, direction), rank)
-        try:
-            wished(J, np.zeros(robot.n_u))
-        except Ended as ended:
-            raise InputError(f"direction: {ended}") from None
-        return wished
-    if not 0 <= direction < len(basis):
-        raise InputError(f"direction: expected a number from 0 to {len(basis) - 1}, got {direction}")
-    start = basis[int(direction)]
+    start = readable_null_space(J, rank, [1] * p + [0] * (robot.n_u - p))[chosen]
     columns = np.flatnonzero(start)
     smallest = [np.linalg.svd(one[:, columns])[2][-1] @ one[:, columns].T for one in nearby]
     if np.abs(smallest).max(initial=0.0) > DEPENDENT:
@@ -84,17 +105,18 @@ def _of_wish(wish: Array, rank: int) -> Field:
     return field
 
 
-def _wish(robot: Robot, direction: Direction) -> Array:
+def _wish(robot: Robot, direction: Direction, what: str) -> Array:
     wish = np.zeros(robot.n_u)
-    if isinstance(direction, str):
-        wish[robot.input(direction)] = 1.0
-    elif isinstance(direction, Mapping):
-        for name, value in direction.items():
-            wish[robot.input(name)] = scalar(value, f"direction: {name}")
+    if isinstance(direction, str | Mapping):
+        wished = {direction: 1.0} if isinstance(direction, str) else direction
+        for name, value in wished.items():
+            if name not in robot.u_names:
+                raise InputError(unknown("input", name, robot.u_names, what))
+            wish[robot.input(name)] = scalar(value, f"{what}: {name}")
     elif isinstance(direction, bool):
-        raise InputError(f"direction: expected a number, an input or inputs, got {direction!r}")
+        raise InputError(f"{what}: expected a number, an input or inputs, got {direction!r}")
     else:
-        wish = vector(direction, robot.n_u, "direction")
+        wish = vector(direction, robot.n_u, what)
     if not wish.any():
-        raise InputError("direction: expected at least one input that is not 0")
+        raise InputError(f"{what}: expected at least one input that is not 0")
     return wish

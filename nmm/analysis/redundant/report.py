@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike
 
 from nmm.analysis.directions import direction_text
 from nmm.analysis.jacobians import Jacobians, Subject, checked
-from nmm.analysis.parts import ranks, singular_values
+from nmm.analysis.parts import rank_of
 from nmm.analysis.redundant.motion_words import coordinate_words, input_words, motion_text
 from nmm.analysis.redundant.null_space import orthonormal_null_space, projector, readable_null_space
+from nmm.analysis.singularity import TOLERANCE
 from nmm.arrays import Array, positive
 from nmm.controller import Controller
 from nmm.errors import SingularError
@@ -23,9 +24,7 @@ from nmm.resolvers.projected_gradient import ProjectedGradient
 from nmm.robot import Robot
 from nmm.tasks.comparison import Comparison
 
-#: Singular values this small beside the largest are zero; the resolvers' own tolerance.
-TOLERANCE = 1e-10
-#: The same for Lie brackets, which are taken by differences.
+#: Singular values of Lie brackets, which are taken by differences, this small beside the largest are zero.
 BRACKET_TOLERANCE = 1e-5
 #: Step of the differences along the fields of the brackets, m and rad.
 STEP = 1e-5
@@ -98,14 +97,17 @@ class RedundancyReport:
 
     def text(self) -> str:
         """The report for people."""
-        return "\n".join([*self._counts(), "", *self._motions(), *self._withheld()])
+        parts = (self._counts(), self._motions(), self._withheld())
+        return "\n\n".join("\n".join(part) for part in parts if part)
 
     def _counts(self) -> list[str]:
         robot, s = self.robot, len(self.rows)
         lines = [
             f"{robot.name}, task {', '.join(self.rows)}",
-            f"static redundancy     n - s = {robot.n} - {s} = {self.static} (configurations)",
-            f"kinematic redundancy  m - s = {robot.n_u} - {s} = {self.kinematic} (motions)",
+            f"n = {_many(robot.n, 'coordinate')}, n_u = {_many(robot.n_u, 'input')}, s = {_many(s, 'row')} of "
+            "the task",
+            f"static redundancy       n - s = {robot.n} - {s} = {self.static} (configurations)",
+            f"kinematic redundancy  n_u - s = {robot.n_u} - {s} = {self.kinematic} (motions)",
             "at "
             + ", ".join(f"{name} = {value:.4g}" for name, value in zip(robot.q_names, self.q, strict=True))
             + ":",
@@ -124,8 +126,12 @@ class RedundancyReport:
 
     def _motions(self) -> list[str]:
         if not self.free:
-            return ["no motion of the inputs leaves the task at rest"]
-        lines = ["the task stays at rest when the inputs"]
+            return []
+        several = self.free > 1
+        lines = [
+            f"the task stays at rest in {'each of these motions' if several else 'this motion'} "
+            f"(--self-motion takes {'their numbers' if several else 'its number'}):"
+        ]
         for k, (vector, text) in enumerate(zip(self.readable, self.texts, strict=True)):
             moved = [name for name, rate in zip(self.robot.u_names, vector, strict=True) if rate]
             of_it = ""
@@ -133,41 +139,44 @@ class RedundancyReport:
                 of_it = f" (the task {'never feels' if moved[0] in self.unfelt else 'does not feel'} it"
                 of_it += ")" if moved[0] in self.unfelt else " here)"
             lines.append(f"  {k}  {text}{of_it}")
-        lines.append("or do the opposite, or any combination")
-        return lines
+        return [*lines, "and in their opposites and combinations" if several else "and in its opposite"]
 
     def _withheld(self) -> list[str]:
         k = len(self.withheld)
         if not k:
             if self.robot.n == self.robot.n_u:
                 return []
-            return ["every self-motion of the coordinates is one of the inputs'"]
+            return ["the inputs give every motion of the coordinates that leaves the task at rest"]
+        them = "it" if k == 1 else "them"
         lines = [
-            "",
-            f"the wheels withhold {k} of the {self.manifold} self-motions: no input moves the robot at once "
-            "along",
+            f"the coordinates could move in {_many(self.manifold, 'independent way')} with the task at rest; "
+            f"the wheels withhold {k} of them, which no input gives:",
             *(
-                f"  {text}   (q_dot: {coordinates})"
+                f"  - {text} (q_dot: {coordinates})"
                 for text, coordinates in zip(self.withheld_texts, self.withheld_coordinates, strict=True)
             ),
         ]
-        if self.free < 2:
-            why = "one motion alone only leads there and back" if self.free else "the inputs have to rest"
-            return [*lines, f"{why}: no manoeuvre reaches them with the task at rest all the while"]
-        if self.by_brackets is None:
+        if not self.free:
+            why = "no motion of the inputs leaves the task at rest"
+        elif self.free == 1:
+            why = "only one motion of the inputs leaves the task at rest, and it only leads there and back"
+        elif self.by_brackets is None:
             return lines
-        if self.by_brackets == k:
+        elif self.by_brackets == k:
             return [
                 *lines,
-                f"but there and back along two motions of the inputs in turn, the task at rest, leads along "
-                f"{'it' if k == 1 else 'them'}: {'a manoeuvre reaches' if k == 1 else 'manoeuvres reach'} "
-                f"every configuration nearby with this task value (rank of the Lie brackets)",
+                f"but a manoeuvre gives {them}, the task at rest all the while: two motions of the inputs in "
+                "turn, there and back (rank of the Lie brackets); so every configuration nearby with this "
+                "task value can be reached",
             ]
-        return [
-            *lines,
-            f"manoeuvres of two motions in turn lead along {self.by_brackets or 'none'} of them (rank of the "
-            "Lie brackets; longer manoeuvres were not looked at)",
-        ]
+        else:
+            give = f"give {self.by_brackets} of them" if self.by_brackets else f"do not give {them} either"
+            return [
+                *lines,
+                f"manoeuvres, two motions of the inputs in turn, there and back, {give} (rank of the Lie "
+                "brackets; longer manoeuvres were not looked at)",
+            ]
+        return [*lines, f"nor does a manoeuvre give {them} with the task at rest all the while: {why}"]
 
 
 def _many(count: int, what: str) -> str:
@@ -218,12 +227,6 @@ def redundancy(
         withheld_texts=texts,
         by_brackets=_by_brackets(jacobians, t, q, rank_J) if len(withheld) else 0,
     )
-
-
-def rank_of(matrix: Array, tolerance: float = TOLERANCE) -> int:
-    """How many singular values exceed `tolerance` times the largest."""
-    values = singular_values(matrix)
-    return int(ranks(values, np.array(values.max(initial=0.0)), tolerance))
 
 
 def coordinate_jacobian(jacobians: Jacobians, t: float, q: Array) -> Array:
