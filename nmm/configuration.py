@@ -52,9 +52,8 @@ class Configuration:
         """dv/dq_dot of a frame, shape (6, n): linear (m) over angular (rad) rows, in world axes."""
         frame_id = self.robot.frame_id(frame)
         pin.updateFramePlacement(self.robot.model, self._data, frame_id)
-        return np.array(
-            pin.getFrameJacobian(self.robot.model, self._data, frame_id, JACOBIAN_FRAME), order="C"
-        )
+        jacobian = pin.getFrameJacobian(self.robot.model, self._data, frame_id, JACOBIAN_FRAME)
+        return np.array(jacobian, order="C").reshape(6, self.robot.n)
 
     def center_of_mass(self) -> tuple[Array, Array]:
         """Centre of mass (3,) in the world, m, and its Jacobian in the coordinates, (3, n)."""
@@ -99,6 +98,10 @@ def kinematics_updater(
         for slot, frame_id in enumerate(ids)
     ]
 
+    if model.nv == 1:  # Pinocchio's Jacobian is then a vector
+        jacobians = jacobians[:, :, 0]
+        work = [(*item[:3], jacobians[slot]) for slot, item in enumerate(work)]
+
     # Local names, not attributes: a third of this function's own time is looking things up.
     def update(t: float, q: Array) -> None:
         compute_jacobians(model, data, q)
@@ -128,7 +131,7 @@ def _center_of_mass(robot: Robot) -> Callable[[Array], tuple[Array, Array]]:
     fixed_part = (1.0 - share) * np.array(standing.lever)
 
     def at(q: Array) -> tuple[Array, Array]:
-        jacobian = np.array(pin.jacobianCenterOfMass(model, data, q, False), order="C")
+        jacobian = np.array(pin.jacobianCenterOfMass(model, data, q, False), order="C").reshape(3, model.nv)
         if share == 0.0:
             return fixed_part, np.zeros_like(jacobian)
         return share * np.array(data.com[0]) + fixed_part, share * jacobian

@@ -42,7 +42,7 @@ STATEMENTS = {
         "J has rank 2 at every configuration when d != 0, as det J J^T >= d^2/2.",
         "because: Δ[v, omega] - Δ[v, q1] = d, whatever q is",
         "J has rank 2 except exactly where cos(q1) = 0 and sin(q2) = 0, for d = 0",
-        "Δ[v, omega] never vanishes when d > l1 + l2, and only then. That does not hold here: d = 0.3 m",
+        "Δ[v, omega] never vanishes when |d| > l1 + l2, and only then. That does not hold here: d = 0.3 m",
         "So every minor vanishes somewhere: no partition serves RG everywhere.",
         "--set d=0 has the formulas",
     ],
@@ -52,7 +52,7 @@ STATEMENTS = {
         "Δ[v, omega, q2] = d + l1 c1",
         "J has rank 3 at every configuration when d != 0, as det J J^T >= d^2.",
         "Δ[v, omega, q1] never vanishes when d != 0. That holds here: d = 0.3 m.",
-        "Δ[v, omega, q2] never vanishes when d > l1, and only then. That does not hold here",
+        "Δ[v, omega, q2] never vanishes when |d| > l1, and only then. That does not hold here",
         "Δ[v, q1, q2], as cos(q1) is a factor",
     ],
     (*POSITION, "--set", "d=0"): [

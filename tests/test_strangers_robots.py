@@ -148,3 +148,16 @@ def test_names_are_strings() -> None:
         nmm.load("unicycle_2r", name=3)  # type: ignore[arg-type]  # wrong on purpose
     with pytest.raises(nmm.RobotError, match="name: expected a string, got 3"):
         nmm.mount("car_base", "small_arm", name=3)  # type: ignore[arg-type]  # wrong on purpose
+
+
+@pytest.mark.parametrize("function", [nmm.Position("tip", "xy"), nmm.CenterOfMass("xy")], ids=["tip", "mass"])
+def test_a_robot_of_one_joint(function: nmm.Function, tmp_path: Path) -> None:
+    """For one coordinate Pinocchio's Jacobians are vectors."""
+    parts = [link("base"), link("arm", inertial()), link("tip")]
+    parts += [joint("q1", "base", "arm", body=UP), joint("end", "arm", "tip", "fixed", "")]
+    one = nmm.load(write(tmp_path / "one.urdf", robot(*parts)), platform="fixed")
+    assert one.q_names == ("q1",)
+    step = 1e-6
+    ahead, behind = (function.evaluate(0.0, Configuration(one, [0.4 + way])) for way in (step, -step))
+    here = function.evaluate(0.0, Configuration(one, [0.4]))
+    np.testing.assert_allclose(here.value_q[:, 0], (ahead.value - behind.value) / (2 * step), atol=1e-9)

@@ -42,7 +42,7 @@ def make_map(
     **loading: Any,
 ) -> int:
     """Compute a map, write its folder, print its table; see `nmm.cli.mapping` for the options' meaning."""
-    from nmm.analysis.mapping.coordinates import singularity_map
+    from nmm.analysis.mapping.coordinates import check_held, singularity_map
     from nmm.analysis.mapping.result import is_map
 
     counts = counts_of(samples)
@@ -66,13 +66,16 @@ def make_map(
         "weights": values_of(weights, "--weight", "NAME=VALUE, as in platform=4") or None,
         "length": length,
     }
+    given = values_of(at, "--at", "COORDINATE=VALUE")
     with progress(f"map of {what.name}") as report:
         if workspace is None:
             names = _two_first(what.robot) if over is None else _names(over, "--over")
+            check_held(given, names, "--at")
             made = singularity_map(what.subject, names, samples=counts, progress=report, **common)
         else:
-            from nmm.analysis.mapping.workspace import workspace_map
+            from nmm.analysis.mapping.workspace import check_given, workspace_map
 
+            check_given(given, what.subject, frame, what.q, "--at")
             made = workspace_map(
                 what.subject,
                 frame,
@@ -101,12 +104,17 @@ def show_map(made: Map, folder: Path) -> None:
 
 def _measure_rows(made: Map, name: str) -> Iterator[list[str]]:
     """One row; of a workspace one of the best and one of the worst postures."""
+    from nmm.analysis.mapping.measures import MEASURES
+
     layers = {"": False} if made.kind == "coordinates" else {", best": False, ", worst": True}
+    # Of the best postures no singular place is known: between the cells a value may be worse yet.
+    low = "smallest" if MEASURES[name].better > 0.0 else "largest"
     for layer, worst in layers.items():
+        between = " (of the cells only)" if made.kind == "workspace" and not worst else ""
         row = [name + layer]
-        for value, where, on in made.extremes(name, worst=worst).values():
+        for end, (value, where, on) in made.extremes(name, worst=worst).items():
             place = ", ".join(f"{axis} = {x:.4g}" for axis, x in zip(made.names, where, strict=True))
-            row += [f"{value:.4g}", on or place]
+            row += [f"{value:.4g}", on or place + (between if end == low else "")]
         yield [*row, made.about.units[name] or "-"]
 
 
@@ -121,7 +129,7 @@ def _other_rows(made: Map, folder: Path) -> Iterator[tuple[str, str]]:
 
 
 def _found(made: Map, those: SingularSet) -> str:
-    """How many lines and points; in a workspace these are of some postures drawn, not of all."""
+    """Lines, and how many points; in a workspace these are of some postures drawn, not of all."""
     sampled = made.kind == "workspace" and len(those.points) > 0
     return those.text() + (", of postures drawn" if sampled else "")
 

@@ -70,7 +70,7 @@ def map_measures(
         str,
         typer.Option(
             metavar="NAME,...",
-            help="Some of sigma_min, condition, manipulability, arm_manipulability, "
+            help="Some of sigma_min, inverse_condition, manipulability, arm_manipulability, "
             "platform_manipulability, weighted, eccentricity.",
         ),
     ] = "sigma_min",
@@ -124,7 +124,7 @@ def map_measures(
     nmm map unicycle_2r --task position:ee:xy --over q1,q2
     nmm map unicycle_2r --task position:ee:xy --task heading:link2 --set d=0 --over q1,q2
     nmm map my_robot.urdf --task pose --over elbow_joint,wrist_2_joint --range elbow_joint=-pi/2:pi/2
-    nmm map unicycle_3r --task position --workspace xz --measure weighted,condition --alpha 0.3
+    nmm map unicycle_3r --task position --workspace xz --measure weighted,inverse_condition --alpha 0.3
 
     The folder holds map.npz (axes, values, rank, singular lines and points), map.json (what was computed)
     and a PNG a measure.

@@ -8,12 +8,14 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from nmm.analysis.minors import Columns, chosen_columns
-from nmm.cli.singularity_words import header, minor, say
+from nmm.cli.singularity_words import block, header, minor, say
 from nmm.errors import InputError
+from nmm.words import listed
 
 if TYPE_CHECKING:
     from nmm.analysis.symbolic import Bound, Claim, SymbolicAnalysis
     from nmm.cli.subjects import Studied
+    from nmm.robot import Robot
 
 #: Reasons for more minors than these are not given.
 MANY_REASONS = 12
@@ -112,18 +114,19 @@ def _claims(given: Studied, analysis: SymbolicAnalysis) -> Iterator[str]:
     if bound is None:
         yield from _claim(singular_set(analysis))
     else:
-        when = _nonzero(bound.conditions[0], analysis)
+        rank, constant = len(analysis.row_names), bound.conditions[0]
         why = bound.statement.removesuffix(" at every configuration")
-        yield f"J has rank {len(analysis.row_names)} at every configuration{when}, as {why}."
+        when, here = _nonzero(constant, analysis), _here(constant, analysis)
+        yield f"J has rank {rank} at every configuration{when}, as {why}.{here}"
         yield from _because(bound.steps)
     first = next((name for name in _in_minors(analysis) if name in given.robot.arguments), None)
-    if first and given.robot.platform.p and not _zero(analysis):
+    if first and given.robot.platform.p and not _zero(analysis) and _may_be_zero(given.robot, first):
         try:
             without = singular_set(analysis, (first,))
         except InputError:  # J is divided by it
             pass
         else:
-            yield from _claim(without)
+            yield from _claim(without, f"With {first} = 0 instead: ")
             key = first if given.scenario is None else f"robot.arguments.{first}"
             yield f"  --set {key}=0 has the formulas"
     yield from _minors(analysis)
@@ -134,11 +137,33 @@ def _because(steps: Sequence[str]) -> Iterator[str]:
         yield f"  {'         ' if i else 'because: '}{step}"
 
 
+def _may_be_zero(robot: Robot, argument: str) -> bool:
+    """Whether the robot's file takes 0 for an argument: an arm without an upper arm is none."""
+    from nmm.loading import load
+
+    try:
+        load(robot.source, arguments={**robot.arguments, argument: "0"})
+    except InputError:
+        return False
+    return True
+
+
+def _lengths(constant: Any, analysis: SymbolicAnalysis) -> list[str]:
+    """The lengths in a product."""
+    symbols = {str(symbol) for symbol in constant.free_symbols}
+    return [name for name in analysis.geometry if name in symbols]
+
+
 def _nonzero(constant: Any, analysis: SymbolicAnalysis) -> str:
     """ " when d != 0": of the lengths in a product."""
-    symbols = {str(symbol) for symbol in constant.free_symbols}
-    names = [name for name in analysis.geometry if name in symbols]
+    names = _lengths(constant, analysis)
     return f" when {' and '.join(f'{name} != 0' for name in names)}" if names else ""
+
+
+def _here(constant: Any, analysis: SymbolicAnalysis) -> str:
+    """ " That holds here: d = 0.3 m.": of lengths that are not 0."""
+    values = {name: analysis.geometry[name] for name in _lengths(constant, analysis)}
+    return f" That holds here: {_values(analysis, values)}." if values and all(values.values()) else ""
 
 
 def _in_minors(analysis: SymbolicAnalysis) -> list[str]:
@@ -148,9 +173,9 @@ def _in_minors(analysis: SymbolicAnalysis) -> list[str]:
     return [name for name in analysis.geometry if name in symbols]
 
 
-def _claim(claim: Claim) -> Iterator[str]:
+def _claim(claim: Claim, given: str = "") -> Iterator[str]:
     """A statement, what it means for single joints, and the proof."""
-    yield f"{claim.statement[0].upper()}{claim.statement[1:]}."
+    yield f"{given}{claim.statement[0].upper()}{claim.statement[1:]}."
     values = [_value(condition) for condition in claim.conditions]
     if values and all(values):
         each = ", each" if len(values) > 1 else ","
@@ -191,6 +216,10 @@ def _minors(analysis: SymbolicAnalysis) -> Iterator[str]:
     }
     if lost | set(reasons) == set(nonzero):
         yield "So every minor vanishes somewhere: no partition serves RG everywhere."
+    serving = [columns for columns, bound in bounds.items() if bound.holds(analysis.geometry)]
+    if serving:
+        serves = "serves" if len(serving) == 1 else "serve"
+        yield f"So {listed([block(columns) for columns in serving])} {serves} RG everywhere."
     open_ = [columns for columns in nonzero if columns not in reasons and columns not in bounds]
     if open_:
         yield f"Not decided whether they vanish: {', '.join(map(minor, open_))}."
@@ -221,8 +250,7 @@ def _bound(analysis: SymbolicAnalysis, bound: Bound) -> Iterator[str]:
 
 def _larger(analysis: SymbolicAnalysis, a: Any, b: Any) -> str:
     left = _plain(analysis, a)
-    positive = left in analysis.definitions or analysis.geometry.get(left, -1.0) > 0.0
-    return f"{left if positive else f'|{left}|'} > {_plain(analysis, b)}"
+    return f"{left if left in analysis.definitions else f'|{left}|'} > {_plain(analysis, b)}"
 
 
 def _plain(analysis: SymbolicAnalysis, expression: Any) -> str:

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from nmm.analysis.symbolic.value import ROTATION_VECTOR
 from nmm.arrays import Array, scalar
 from nmm.errors import InputError, unknown
+from nmm.rotations import log3
 
 if TYPE_CHECKING:
-    from nmm.analysis.symbolic import SymbolicAnalysis
+    from nmm.analysis.symbolic.analysis import SymbolicAnalysis
 
 
 class SymbolicFunctions:
@@ -27,18 +30,24 @@ class SymbolicFunctions:
         self._geometry = dict(analysis.geometry)
         self._n = len(analysis.q)
         self._columns = tuple(analysis.minors)
+        self._shape = analysis.J.shape
         names = [*analysis.q, *self._geometry]
         arguments = [analysis.symbols[name] for name in names]
-        aux = [(analysis.symbols[name], value) for name, value in analysis.definitions.items()]
+        modules = [
+            {name: partial(_rotation_vector, part) for part, name in enumerate(ROTATION_VECTOR)},
+            "numpy",
+        ]
 
-        def compiled(entries: list[Any]) -> Any:
-            entries = [sympy.sympify(entry).subs(aux) for entry in entries]
-            return sympy.lambdify(arguments, entries, "numpy", cse=True)
+        def compiled(entries: list[Any], auxiliary: Sequence[Any] = ()) -> Any:
+            entries = [sympy.sympify(entry) for entry in entries]
+            return sympy.lambdify([*arguments, *auxiliary], entries, modules, cse=True)
 
-        self._shape = analysis.J.shape
-        self._f = compiled(list(analysis.f))
-        self._J = compiled(list(analysis.J))
-        self._minors = compiled(list(analysis.minors.values()))
+        # Auxiliary quantities are computed first, and given to the others.
+        auxiliary = [analysis.symbols[name] for name in analysis.definitions]
+        self._auxiliary = compiled(list(analysis.definitions.values()))
+        self._f = compiled(list(analysis.f), auxiliary)
+        self._J = compiled(list(analysis.J), auxiliary)
+        self._minors = compiled(list(analysis.minors.values()), auxiliary)
 
     def f(self, q: ArrayLike, **geometry: float) -> Array:
         """Task value, (..., s), m and rad; angles are not wrapped."""
@@ -63,5 +72,16 @@ class SymbolicFunctions:
             if name not in values:
                 raise InputError(unknown("length", name, values))
             values[name] = scalar(value, name)
-        found = function(*np.moveaxis(q, -1, 0), *values.values())
+        given = [*np.moveaxis(q, -1, 0), *values.values()]
+        found = function(*given, *self._auxiliary(*given))
         return np.stack([np.broadcast_to(entry, q.shape[:-1]) for entry in found], axis=-1).astype(np.float64)
+
+
+def _rotation_vector(part: int, *entries: ArrayLike) -> Array:
+    """One component (rad) of the rotation vectors of matrices, whose entries are given row by row."""
+    full = np.broadcast_arrays(*(np.asarray(entry, dtype=np.float64) for entry in entries))
+    matrices = np.stack(full, axis=-1).reshape(-1, 3, 3)
+    vectors = np.empty((len(matrices), 3))
+    for matrix, vector in zip(matrices, vectors, strict=True):
+        log3(matrix, vector)
+    return vectors[:, part].reshape(full[0].shape)

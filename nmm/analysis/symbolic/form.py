@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from fractions import Fraction
 from math import gcd
 
-from nmm.analysis.symbolic_expansion import Expansion, Key
-from nmm.analysis.symbolic_factor import factors_of
-from nmm.analysis.symbolic_tree import ZERO, Node, Product, Sum, Symbol, Trig
+from nmm.analysis.symbolic.expansion import Expansion, Gaussian, Key, Ring
+from nmm.analysis.symbolic.factor import factors_of
+from nmm.analysis.symbolic.tree import ZERO, Node, Product, Sum, Symbol, Trig
 
 #: Names of factors that several minors have, in the order in which they are given.
 FACTOR_NAMES = ("Lambda", "Gamma", "Phi", "Psi", "Omega")
 #: A factor gets a name when at least so many minors have it.
 _OFTEN = 3
+#: So many cosines and sines of sums are tried as products.
+_MANY = 4
+#: More waves than that are not tried together.
+_LONG = 100
 
 
 def factored(value: Expansion) -> Product:
@@ -32,7 +36,7 @@ def factored(value: Expansion) -> Product:
         result = result.times(_scalars(value, key))
     parts = []
     for factor, power in factors:
-        part = _as_sum(factor)
+        part = as_sum(factor)
         for _ in range(power):
             parts.append(part)
     for part in sorted(parts, key=_length):
@@ -40,11 +44,31 @@ def factored(value: Expansion) -> Product:
     return tidy(result)
 
 
-def named(products: Sequence[Product]) -> tuple[dict[str, Product], list[Product]]:
-    """Names for the sums that several of the products have as a factor, and the products in these names."""
+def expanded(product: Product, ring: Ring) -> Expansion:
+    """The polynomial that a product was written from; no factor in it may have a name."""
+    total = ring.number(product.number)
+    for factor, power in product.factors:
+        if isinstance(factor, Symbol):
+            total = total * ring.scalar(factor.name, power)
+            continue
+        if isinstance(factor, Sum):
+            one = ring.number(0)
+            for term in factor.terms:
+                one = one + expanded(term, ring)
+        else:
+            angle = {ring.variable(name, True): n for name, n in factor.angle}
+            one = ring.cos(angle) if factor.kind == "cos" else ring.sin(angle)
+        total = total * one.power(power)
+    return total
+
+
+def named(products: Sequence[Product], taken: Collection[str]) -> tuple[dict[str, Product], list[Product]]:
+    """Names, none of those taken, for sums that several products have as a factor; the products in them."""
     names: dict[str, Product] = {}
     products = list(products)
     for name in FACTOR_NAMES:
+        if name in taken:
+            continue
         counts: Counter[Sum] = Counter()
         for product in products:
             counts.update(set(_sums(product)))
@@ -66,8 +90,10 @@ def in_names(product: Product, names: Mapping[str, Product]) -> Product:
     return product
 
 
-def _as_sum(value: Expansion) -> Product:
-    """A factor that has no factors itself, as a product of a number and one sum (or one cosine)."""
+def as_sum(value: Expansion) -> Product:
+    """A value without looking for factors, as a product of a number and one sum (or one cosine)."""
+    if not value:
+        return ZERO
     ring = value.ring
     by_scalars: dict[Key, dict[Key, tuple[Fraction, Fraction]]] = {}
     for key, coefficient in value.terms.items():
@@ -75,15 +101,68 @@ def _as_sum(value: Expansion) -> Product:
         angles = tuple((i, n) for i, n in key if ring.is_angle[i])
         by_scalars.setdefault(lengths, {})[angles] = coefficient
     terms: list[Product] = []
-    for lengths, waves in by_scalars.items():
+    for lengths, waves in sorted(by_scalars.items()):
         part = Expansion(ring, waves)
         plain = _terms(part)
         if len(by_scalars) > 1 and len(plain) > 1:
             product = factored(part)
             if _length(product) <= sum(map(_length, plain)):
                 plain = [product]
+        if len(plain) >= _MANY:
+            split = _split(part)
+            if split is not None and sum(map(_length, split)) < sum(map(_length, plain)):
+                plain = split
         terms += [tidy(_scalars(value, lengths).times(term)) for term in plain]
+    if len(by_scalars) > 1 and len(terms) >= _MANY and len(value.terms) <= _LONG:
+        split = _split(value)
+        if split is not None and _length(_written(split)) <= _length(_written(terms)):
+            terms = split
+    return _written(terms)
+
+
+def _written(terms: list[Product]) -> Product:
+    """A sum with what is common taken out."""
     return _normalised(_collected(terms))
+
+
+def _split(value: Expansion) -> list[Product] | None:
+    """C cos φ + S sin φ + R, for the angle that leaves the fewest waves; None when none leaves fewer."""
+    found: list[tuple[int, int, tuple[Expansion, Expansion, Expansion]]] = []
+    for angle in value.variables():
+        if value.ring.is_angle[angle] and all(abs(dict(key).get(angle, 0)) <= 1 for key in value.terms):
+            parts = _harmonics(value, angle)
+            found.append((sum(len(part.terms) for part in parts), angle, parts))
+    if not found:
+        return None
+    left, angle, (cosine, sine, rest) = min(found, key=lambda one: one[:2])
+    if left >= len(value.terms):
+        return None
+    name = ((value.ring.names[angle], 1),)
+    split = [
+        tidy(factored(part).times(Product(Fraction(1), ((Trig(kind, name), 1),))))
+        for kind, part in (("cos", cosine), ("sin", sine))
+        if part
+    ]
+    return [*split, factored(rest)] if rest else split
+
+
+def _harmonics(value: Expansion, angle: int) -> tuple[Expansion, Expansion, Expansion]:
+    """C, S and R of C cos φ + S sin φ + R; φ occurs once in each wave or not at all."""
+    cosine: dict[Key, Gaussian] = {}
+    sine: dict[Key, Gaussian] = {}
+    for key, (re, im) in value.terms.items():
+        n = dict(key).get(angle, 0)
+        if n:
+            # (a e^{ir}) e^{iφ} and its conjugate: C gets a e^{ir}, S gets i a e^{ir}, and their conjugates.
+            other = tuple((i, k) for i, k in key if i != angle)
+            for table, term in ((cosine, (re, im)), (sine, (-n * im, n * re))):
+                old = table.get(other, (Fraction(0), Fraction(0)))
+                table[other] = (old[0] + term[0], old[1] + term[1])
+    made = [
+        Expansion(value.ring, {key: part for key, part in table.items() if part[0] or part[1]})
+        for table in (cosine, sine)
+    ]
+    return made[0], made[1], value.without({angle})
 
 
 def _terms(value: Expansion) -> list[Product]:
@@ -119,7 +198,7 @@ def _collected(terms: list[Product]) -> list[Product]:
     inside = [_without(term, common) for term in terms if common in dict(term.factors)]
     outside = [term for term in terms if common not in dict(term.factors)]
     bracket = _normalised(_collected(inside))
-    return sorted([*outside, Product(Fraction(1), ((common, 1),)).times(bracket)], key=_rank)
+    return sorted([*outside, tidy(Product(Fraction(1), ((common, 1),)).times(bracket))], key=_rank)
 
 
 def _without(term: Product, factor: Node) -> Product:

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+import importlib
 import itertools
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal
 
 from nmm.analysis.reached import Tasks, stacked
-from nmm.analysis.symbolic_arguments import argument_names
-from nmm.analysis.symbolic_expansion import Expansion, Ring, TooLarge, determinant
-from nmm.analysis.symbolic_form import factored, in_names, named
-from nmm.analysis.symbolic_functions import SymbolicFunctions
-from nmm.analysis.symbolic_geometry import Geometry
-from nmm.analysis.symbolic_platforms import platform_columns
-from nmm.analysis.symbolic_rows import Frames, SymbolicRow, bearing_suffix, frames_of, task_rows
-from nmm.analysis.symbolic_tree import Product, to_sympy
-from nmm.analysis.symbolic_value import Written, written
-from nmm.analysis.symbolic_words import latex_of, text_of
+from nmm.analysis.symbolic.arguments import argument_names
+from nmm.analysis.symbolic.derivation import Derivation, derived
+from nmm.analysis.symbolic.expansion import Expansion, Ring, TooLarge, maximal_minors
+from nmm.analysis.symbolic.form import factored, in_names, named
+from nmm.analysis.symbolic.functions import SymbolicFunctions
+from nmm.analysis.symbolic.geometry import Geometry
+from nmm.analysis.symbolic.row import Turn
+from nmm.analysis.symbolic.rows import frames_of
+from nmm.analysis.symbolic.tree import Product, to_sympy
+from nmm.analysis.symbolic.value import Written, auxiliary_written, matrix_latex, matrix_text, written
+from nmm.analysis.symbolic.words import latex_of, text_of
 from nmm.errors import InputError, unknown
 from nmm.robot import Robot
 
@@ -42,10 +46,10 @@ class SymbolicAnalysis:
     entry_forms, minor_forms : J's entries and the minors in factors (`symbolic_tree.Product`)
     named_forms, short_forms, short_entries : factors with a name; minors and entries in these names
     definitions : what auxiliary symbols are, such as rho and g of a bearing
-    definition_texts : the same as text
+    definition_texts, definition_latex : the same as text and LaTeX, and the matrix of a rotation vector
     numerators : the minors times J's denominators, multiplied out
-    divided : whether J has denominators
-    notes : what was rounded
+    derivation : what the formulas were written from
+    notes : what was rounded or summed up
     """
 
     robot: Robot
@@ -61,8 +65,9 @@ class SymbolicAnalysis:
     short_forms: Mapping[tuple[str, ...], Product] = field(repr=False)
     definitions: Mapping[str, Any] = field(repr=False)
     definition_texts: Mapping[str, str] = field(repr=False)
+    definition_latex: Mapping[str, str] = field(repr=False)
     numerators: Mapping[tuple[str, ...], Expansion] = field(repr=False)
-    divided: bool
+    derivation: Derivation = field(repr=False)
     notes: tuple[str, ...] = ()
 
     @cached_property
@@ -111,6 +116,26 @@ class SymbolicAnalysis:
         swaps = sum(a > b for a, b in itertools.combinations(order, 2))
         return (-1) ** swaps * self.minors[tuple(self.u_names[j] for j in sorted(order))]
 
+    @property
+    def divided(self) -> bool:
+        """Whether J has denominators that may vanish."""
+        return any(one.variables() for one in self.denominators)
+
+    @property
+    def denominators(self) -> list[Expansion]:
+        """What J's rows and columns are divided by."""
+        return [*self.derivation.row_denominators, *self.derivation.column_denominators]
+
+    def without(self, *lengths: str) -> SymbolicAnalysis:
+        """The same with lengths set to 0: what changes where d = 0.
+
+        Raises
+        ------
+        InputError : a name that is no length of `geometry`, or one that J is divided by
+        """
+        with _reason(self.robot, len(self.row_names)):
+            return _assembled(self.robot, self.row_names, self.derivation.without(lengths))
+
     def functions(self) -> SymbolicFunctions:
         """f, J and the minors as numpy functions of q."""
         return SymbolicFunctions(self)
@@ -135,10 +160,11 @@ def symbolic(
 
     Parameters
     ----------
-    robot : a robot on a unicycle, differential, car, front_drive_car, omnidirectional platform or fixed base
-    task : functions (`Position`, `Heading`, `Coordinates`, `Posture`) or tasks made of them, one or several.
-        A task's reference counts where it depends on the configuration (`Bearing` of a `Position`, or one of
-        these functions): J is then J_bar = (∂f/∂q - ∂g/∂q) S (paper, eq. 13)
+    robot : on any platform but one described by its wheels
+    task : functions of `nmm.tasks` but a user's own, or tasks made of them, one or several. A task's
+        reference counts where it depends on the configuration (`Bearing` of a `Position`, or one of these
+        functions): J is then J_bar = (∂f/∂q - ∂g/∂q) S (paper, eq. 13). `Orientation` and `Pose` are taken
+        without a reference: J is that of the error 0, velocities in the frame's own axes
     geometry : "symbols" for the robot's lengths that are not zero, or "numbers"
     arguments : names for lengths by their label, {"x_q2": "l1"} for the offset of joint q2 along x; by
         default the names of the xacro file's arguments, for which the file is read again
@@ -149,7 +175,7 @@ def symbolic(
     InputError : SymPy is not installed, a function or platform without a formula here, more rows than inputs
     """
     try:
-        import sympy
+        importlib.import_module("sympy")
     except ImportError:
         raise InputError("symbolic: needs SymPy: pip install nmm[symbolic]") from None
     if geometry not in ("symbols", "numbers"):
@@ -160,72 +186,69 @@ def symbolic(
             f"symbolic: expected a task of at most {robot.n_u} rows, as {robot.name} has inputs, "
             f"got {len(stack.rows(robot))}"
         )
+    demanded = arguments is not None
     if arguments is None:
-        arguments = {}
-        if geometry == "symbols":
-            every = [f for task in stack for f in (task.function, task.reference)]
-            arguments = argument_names(robot, frames_of(every))
-    ring = Ring(BUDGET)
-    lengths = Geometry(ring, arguments, geometry == "numbers")
-    frames = Frames(robot, lengths)
-    plain, controlled = task_rows(stack, frames)
-    J, denominators, column_denominators = _matrix(controlled, frames)
+        every = [f for task in stack for f in (task.function, task.reference)]
+        arguments = argument_names(robot, frames_of(every)) if geometry == "symbols" else {}
+    lengths = Geometry(Ring(BUDGET), arguments, demanded, geometry == "numbers", robot.q_names)
+    names = tuple(row.name for row in stack.rows(robot))
+    with _reason(robot, len(names)):
+        return _assembled(robot, names, derived(robot, stack, lengths))
+
+
+@contextmanager
+def _reason(robot: Robot, s: int) -> Iterator[None]:
+    """`TooLarge` says of what."""
+    try:
+        yield
+    except TooLarge as error:
+        raise TooLarge(
+            f"symbolic: too large: {robot.name} with {robot.n_u} inputs and a task of {s} rows "
+            f"({math.comb(robot.n_u, s)} minors) takes {error}; use the numeric analysis, a task of fewer "
+            "rows, or lock joints"
+        ) from None
+
+
+def _assembled(robot: Robot, row_names: tuple[str, ...], derivation: Derivation) -> SymbolicAnalysis:
+    """The formulas of a derivation."""
+    import sympy
+
+    ring, rows, columns = derivation.ring, derivation.row_denominators, derivation.column_denominators
+    numbers = maximal_minors([list(line) for line in derivation.matrix])
     entries = tuple(
-        tuple(
-            _quotient(entry, [row, column]) for entry, column in zip(line, column_denominators, strict=True)
-        )
-        for line, row in zip(J, denominators, strict=True)
+        tuple(_quotient(entry, [row, column]) for entry, column in zip(line, columns, strict=True))
+        for line, row in zip(derivation.matrix, rows, strict=True)
     )
-    minors: dict[tuple[str, ...], Product] = {}
-    numerators: dict[tuple[str, ...], Expansion] = {}
-    for columns in itertools.combinations(range(robot.n_u), len(J)):
-        value = determinant([[line[j] for j in columns] for line in J])
-        divisors = [*denominators, *(column_denominators[j] for j in columns)]
-        key = tuple(robot.u_names[j] for j in columns)
-        numerators[key], minors[key] = value, _quotient(value, divisors)
-    names, short = named(list(minors.values()))
+    keys = {picked: tuple(robot.u_names[j] for j in picked) for picked in numbers}
+    minors = {
+        key: _quotient(numbers[picked], [*rows, *(columns[j] for j in picked)])
+        for picked, key in keys.items()
+    }
+    names, short = named(list(minors.values()), {*ring.names, *robot.q_names})
     symbols = {name: sympy.Symbol(name, real=True) for name in (*robot.q_names, *ring.names, *names)}
-    values = tuple(written(row.value, symbols) for row in plain)
-    definitions, texts = _definitions(frames, symbols)
+    meanings = {one.name: auxiliary_written(one, symbols) for one in derivation.auxiliaries}
+    turns = {value.name: value for value in derivation.values if isinstance(value, Turn)}
     return SymbolicAnalysis(
         robot=robot,
-        row_names=tuple(row.name for row in stack.rows(robot)),
+        row_names=row_names,
         u_names=robot.u_names,
         symbols=symbols,
-        geometry=lengths.values,
-        values=values,
+        geometry=derivation.lengths,
+        values=tuple(written(value, symbols) for value in derivation.values),
         entry_forms=entries,
         short_entries=tuple(tuple(in_names(entry, names) for entry in line) for line in entries),
         minor_forms=minors,
         named_forms=names,
         short_forms=dict(zip(minors, short, strict=True)),
-        definitions=definitions,
-        definition_texts=texts,
-        numerators=numerators,
-        divided=any(divisor != ring.number(1) for divisor in (*denominators, *column_denominators)),
-        notes=tuple(dict.fromkeys(lengths.notes)),
+        definitions={name: one.expression for name, one in meanings.items()},
+        definition_texts={name: one.text for name, one in meanings.items()}
+        | {name: matrix_text(turn) for name, turn in turns.items()},
+        definition_latex={name: one.latex for name, one in meanings.items()}
+        | {name: matrix_latex(turn) for name, turn in turns.items()},
+        numerators={key: numbers[picked] for picked, key in keys.items()},
+        derivation=derivation,
+        notes=derivation.notes,
     )
-
-
-def _matrix(
-    rows: list[SymbolicRow], frames: Frames
-) -> tuple[list[list[Expansion]], list[Expansion], list[Expansion]]:
-    """(∂f/∂q) S times a denominator for each row and column, and these denominators."""
-    platform, ring = frames.robot.platform, frames.geometry.ring
-    G, column_denominators = platform_columns(platform, frames.geometry)
-    n_p, p = platform.n_p, platform.p
-    matrix = []
-    for row in rows:
-        moved = []
-        for j in range(p):
-            total = ring.number(0)
-            for i in range(n_p):
-                if G[i][j] and row.gradient[i]:
-                    total = total + row.gradient[i] * G[i][j]
-            moved.append(total)
-        matrix.append(moved + row.gradient[n_p:])
-    ones = [ring.number(1)] * (frames.robot.n - n_p)
-    return matrix, [row.denominator for row in rows], column_denominators + ones
 
 
 def _quotient(value: Expansion, divisors: list[Expansion]) -> Product:
@@ -238,19 +261,3 @@ def _quotient(value: Expansion, divisors: list[Expansion]) -> Product:
             below = factored(divisor)
             result = result.times(Product(1 / below.number, tuple((f, -n) for f, n in below.factors)))
     return result
-
-
-def _definitions(frames: Frames, symbols: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, str]]:
-    """rho and g of each bearing: T - p = rho (cos g, sin g)."""
-    import sympy
-
-    expressions: dict[str, Any] = {}
-    texts: dict[str, str] = {}
-    ring = frames.geometry.ring
-    for i, (x, y, to_x, to_y) in enumerate(frames.bearings, 1):
-        dx, dy = (written(ring.number(to) - at, symbols) for to, at in ((to_x, x), (to_y, y)))
-        rho, g = (f"{name}{bearing_suffix(i)}" for name in ("rho", "g"))
-        expressions[rho] = sympy.sqrt(dx.expression**2 + dy.expression**2)
-        expressions[g] = sympy.atan2(dy.expression, dx.expression)
-        texts[rho], texts[g] = f"hypot({dx.text}, {dy.text})", f"atan2({dy.text}, {dx.text})"
-    return expressions, texts

@@ -10,11 +10,13 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Any
 
-from nmm.analysis.symbolic_expansion import Expansion, Key, Ring, TooLarge
-from nmm.analysis.symbolic_lattice import basis_of
+from nmm.analysis.symbolic.expansion import Expansion, Key, Ring, TooLarge
+from nmm.analysis.symbolic.half_angles import to_tangents, to_waves
+from nmm.analysis.symbolic.lattice import basis_of
+from nmm.analysis.symbolic.polynomial_factors import polynomial_factors
 
 #: The largest polynomial that is given to SymPy: its terms.
-_LARGEST = 5_000
+_LARGEST = 20_000
 
 
 def factors_of(value: Expansion) -> tuple[Fraction, dict[Key, int], list[tuple[Expansion, int]]]:
@@ -69,8 +71,8 @@ def _polynomial_factors(value: Expansion) -> list[tuple[Expansion, int]]:
     ring = value.ring
     angles = sorted(i for i in value.variables() if ring.is_angle[i])
     scalars = sorted(i for i in value.variables() if not ring.is_angle[i])
-    waves = [tuple(dict(key).get(i, 0) for i in angles) for key in value.terms]
-    basis, seen = basis_of(waves, len(angles))
+    combinations = [tuple(dict(key).get(i, 0) for i in angles) for key in value.terms]
+    basis, seen = basis_of(combinations, len(angles))
     degrees = [max((abs(k[j]) for k in seen), default=0) for j in range(len(basis))]
     size = 1
     for degree in degrees:
@@ -78,31 +80,22 @@ def _polynomial_factors(value: Expansion) -> list[tuple[Expansion, int]]:
     size *= len({tuple((i, n) for i, n in key if i in scalars) for key in value.terms})
     if size > _LARGEST:
         raise TooLarge(
-            f"symbolic: too large: a minor is a polynomial of up to {size} terms in half angles "
-            f"(limit {_LARGEST}); use the numeric analysis, a task of fewer rows, or lock joints"
+            f"a formula of up to {size} terms in half angles, with {len(angles)} angles and {len(scalars)} "
+            f"lengths (limit {_LARGEST})"
         )
     ring.spend(size)
     if not angles and not scalars:
         return []
     generators = [f"t{j}" for j in range(len(basis))] + [f"a{j}" for j in range(len(scalars))]
-    domain, *gens = polynomial_ring(generators, sympy.QQ)
-    tangents, lengths = gens[: len(basis)], gens[len(basis) :]
-    powers = [_wave_powers(domain, t, m) for t, m in zip(tangents, degrees, strict=True)]
-    total = domain.zero
-    for key, k in zip(value.terms, seen, strict=True):
-        re, im = value.terms[key]
-        real, imaginary = (
-            domain(sympy.QQ(re.numerator, re.denominator)),
-            domain(sympy.QQ(im.numerator, im.denominator)),
-        )
-        for j, n in enumerate(k):
-            a, b = powers[j][n]
-            real, imaginary = real * a - imaginary * b, real * b + imaginary * a
-        for index, n in key:
-            if index in scalars:
-                real *= lengths[scalars.index(index)] ** n
-        total += real  # the imaginary parts cancel
-    _, found = total.factor_list()
+    domain, *_ = polynomial_ring(generators, sympy.QQ)
+    waves = {
+        (*k, *(dict(key).get(i, 0) for i in scalars)): coefficient
+        for (key, coefficient), k in zip(value.terms.items(), seen, strict=True)
+    }
+    total = domain.from_dict(
+        {key: sympy.QQ(n.numerator, n.denominator) for key, n in to_tangents(waves, degrees).items()}
+    )
+    found = polynomial_factors(total, list(range(len(basis), len(generators))))
     forms: list[tuple[Any, tuple[int, ...]]] = []
     for polynomial, power in found:
         top = tuple(max(m[j] for m in polynomial.monoms()) for j in range(len(basis)))
@@ -116,18 +109,6 @@ def _polynomial_factors(value: Expansion) -> list[tuple[Expansion, int]]:
     return _joined(forms, back)
 
 
-def _wave_powers(domain: Any, t: Any, m: int) -> dict[int, tuple[Any, Any]]:
-    """Real and imaginary part of z^n (1 + t²)^m = (1 + i t)^(m+n) (1 - i t)^(m-n) for |n| <= m."""
-    table = {}
-    for n in range(-m, m + 1):
-        re, im = domain.one, domain.zero
-        for sign, count in ((1, m + n), (-1, m - n)):
-            for _ in range(count):
-                re, im = re - sign * t * im, im + sign * t * re
-        table[n] = (re, im)
-    return table
-
-
 class _Back:
     """From forms in half angles to trigonometric polynomials in the ring's angles."""
 
@@ -136,29 +117,24 @@ class _Back:
     ) -> None:
         self.ring = ring
         self.scalars = scalars
-        self.rows = [{angles[i]: n for i, n in enumerate(row) if n} for row in basis]
+        self.angles = angles
+        self.basis = basis
 
     def __call__(self, polynomial: Any, degree: tuple[int, ...]) -> Expansion:
         """The form, whose degrees are even: t^n of degree 2 m is sin^n cos^(2m-n) of the half angle."""
-        ring, total = self.ring, self.ring.number(0)
-        for monomial, coefficient in polynomial.terms():
-            number = Fraction(int(coefficient.numerator), int(coefficient.denominator))
-            term = ring.number(number)
-            for j, d in enumerate(degree):
-                term = term * self._half(j, monomial[j], d)
-            for index, n in zip(self.scalars, monomial[len(degree) :], strict=True):
-                if n:
-                    term = term * ring.scalar(ring.names[index], n)
-            total = total + term
-        return total
-
-    def _half(self, j: int, n: int, d: int) -> Expansion:
-        """sin^n cos^(d-n) of φ_j / 2, d even, by sin² = (1 - c)/2, cos² = (1 + c)/2, sin cos = s/2."""
-        ring, row = self.ring, self.rows[j]
-        c, one, half = ring.cos(row), ring.number(1), Fraction(1, 2)
-        result = ring.sin(row).scaled(half) if n % 2 else one
-        result = result * (one - c).scaled(half).power(n // 2)
-        return result * (one + c).scaled(half).power((d - n) // 2)
+        powers = {
+            monomial: Fraction(int(coefficient.numerator), int(coefficient.denominator))
+            for monomial, coefficient in polynomial.terms()
+        }
+        terms = {}
+        for exponents, coefficient in to_waves(powers, degree).items():
+            key = dict(zip(self.scalars, exponents[len(degree) :], strict=True))
+            for k, row in zip(exponents, self.basis, strict=False):
+                for i, n in zip(self.angles, row, strict=True):
+                    key[i] = key.get(i, 0) + k * n
+            terms[tuple(sorted((i, n) for i, n in key.items() if n))] = coefficient
+        self.ring.spend(len(terms))
+        return Expansion(self.ring, terms)
 
 
 def _joined(forms: list[tuple[Any, tuple[int, ...]]], back: _Back) -> list[tuple[Expansion, int]]:

@@ -170,8 +170,9 @@ def _linear(angle: tuple[tuple[str, int], ...], name: Any, space: str) -> str:
 
 
 def latex_name(name: str) -> str:
-    if name in ("theta", "rho", "omega", "Lambda", "Gamma", "Phi", "Psi", "Omega"):
-        return f"\\{name}"
+    greek = re.fullmatch(r"(theta|rho|omega|alpha|beta|kappa|Lambda|Gamma|Phi|Psi|Omega)(\d*)", name)
+    if greek:
+        return f"\\{greek[1]}" + (f"_{{{greek[2]}}}" if greek[2] else "")
     letters = re.fullmatch(r"([A-Za-z])(\d+)", name)
     if letters:
         return f"{letters[1]}_{{{letters[2]}}}" if len(letters[2]) > 1 else f"{letters[1]}_{letters[2]}"

@@ -52,26 +52,28 @@ def chain_to(robot: Robot, frame: str) -> Chain:
     joints: list[ChainJoint] = []
     index = int(at.parentJoint)
     while index > 0:
-        joint = model.joints[index]
-        data = joint.createData()
-        joint.calc(data, np.zeros(model.nq))
-        motion = np.array(data.S, dtype=np.float64).reshape(6)
-        linear, angular = motion[:3], motion[3:]
-        if linear.any() == angular.any():
-            raise InputError(
-                f"symbolic: expected joints that turn or slide, {model.names[index]} is a "
-                f"{str(joint.shortname()).removeprefix('JointModel')}"
-            )
-        placement = model.jointPlacements[index]
-        joints.insert(
-            0,
-            ChainJoint(
-                str(model.names[index]),
-                "prismatic" if linear.any() else "revolute",
-                linear if linear.any() else angular,
-                np.array(placement.translation),
-                np.array(placement.rotation),
-            ),
-        )
+        joints.insert(0, chain_joint(robot, index))
         index = int(model.parents[index])
     return Chain(frame, tuple(joints), np.array(at.placement.translation), np.array(at.placement.rotation))
+
+
+def chain_joint(robot: Robot, index: int) -> ChainJoint:
+    """One joint, by Pinocchio's index; `InputError` for one that neither turns nor slides."""
+    model = robot.model
+    joint, placement = model.joints[index], model.jointPlacements[index]
+    data = joint.createData()
+    joint.calc(data, np.zeros(model.nq))
+    motion = np.array(data.S, dtype=np.float64).reshape(-1)
+    if motion.size != 6 or motion[:3].any() == motion[3:].any():
+        raise InputError(
+            f"symbolic: expected joints that turn or slide, {model.names[index]} is a "
+            f"{str(joint.shortname()).removeprefix('JointModel')}"
+        )
+    slides = bool(motion[:3].any())
+    return ChainJoint(
+        str(model.names[index]),
+        "prismatic" if slides else "revolute",
+        motion[:3] if slides else motion[3:],
+        np.array(placement.translation),
+        np.array(placement.rotation),
+    )

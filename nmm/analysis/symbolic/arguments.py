@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from nmm.analysis.symbolic_chain import Chain, chain_to
+from nmm.analysis.symbolic.chain import Chain, chain_to
 from nmm.errors import NmmError
 from nmm.robot import Robot
 

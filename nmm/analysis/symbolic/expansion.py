@@ -6,6 +6,7 @@ and a platform's heading falls out of the minors without any simplification.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from fractions import Fraction
 
@@ -37,6 +38,10 @@ class Ring:
         self.budget = budget
         self._left = budget
 
+    def renewed(self) -> None:
+        """The whole budget again, for another analysis in the same variables."""
+        self._left = self.budget
+
     def variable(self, name: str, angle: bool) -> int:
         """Index of a variable, which is made when it is new."""
         if name in self.names:
@@ -52,10 +57,7 @@ class Ring:
         """Count work; `TooLarge` when none is left."""
         self._left -= products
         if self._left < 0:
-            raise TooLarge(
-                f"symbolic: too large: more than {self.budget} products of terms; "
-                "use the numeric analysis, a task of fewer rows, or lock joints"
-            )
+            raise TooLarge(f"more than {self.budget} products of terms")
 
     def number(self, value: Fraction | int) -> Expansion:
         """A constant."""
@@ -157,6 +159,11 @@ class Expansion:
         """Those that occur."""
         return {i for key in self.terms for i, _ in key}
 
+    def without(self, variables: set[int]) -> Expansion:
+        """The terms in which none of the variables occurs: with scalars set to 0, or averaged over angles."""
+        kept = {k: v for k, v in self.terms.items() if not any(i in variables for i, _ in k)}
+        return Expansion(self.ring, kept)
+
 
 def _times(one: Key, two: Key) -> Key:
     if not one or not two:
@@ -171,15 +178,19 @@ def _times(one: Key, two: Key) -> Key:
     return tuple(sorted(powers.items()))
 
 
-def determinant(rows: list[list[Expansion]]) -> Expansion:
-    """By cofactors along the first row, which keeps zeros cheap."""
+def maximal_minors(rows: list[list[Expansion]]) -> dict[tuple[int, ...], Expansion]:
+    """Of a matrix (s, m), s <= m, by their columns: along the first row, each smaller minor made once."""
     ring = rows[0][0].ring
-    if len(rows) == 1:
-        return rows[0][0]
-    total = ring.number(0)
-    for column, entry in enumerate(rows[0]):
-        if entry:
-            below = [row[:column] + row[column + 1 :] for row in rows[1:]]
-            product = entry * determinant(below)
-            total = total - product if column % 2 else total + product
-    return total
+    below: dict[tuple[int, ...], Expansion] = {(): ring.number(1)}
+    for size, row in enumerate(reversed(rows), 1):
+        found = {}
+        for columns in itertools.combinations(range(len(row)), size):
+            total = ring.number(0)
+            for i, j in enumerate(columns):
+                minor = below[columns[:i] + columns[i + 1 :]]
+                if row[j] and minor:
+                    product = row[j] * minor
+                    total = total - product if i % 2 else total + product
+            found[columns] = total
+        below = found
+    return below

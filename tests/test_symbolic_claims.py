@@ -1,0 +1,278 @@
+"""Where J loses rank and which minors never vanish: the statements of the paper's section V, each proved.
+
+The sentences, and where they are:
+  V-A   "Δ12 and Δ13 cannot simultaneously vanish if d ≠ 0": `test_two_minors_differ_by_d`
+        "rank J(q) = 2 everywhere and the NMM has no singular configurations": `test_no_singularity_with_d`
+        "(as opposed to the manipulator taken alone)": `test_the_manipulators_alone`
+        "if d > l1 + l2, Δ12 is always nonzero": `test_minors_that_never_vanish`
+        "In general, one may need to switch" between Δ12 and Δ13: `test_minors_that_never_vanish`
+        "as long as d ≠ 0, Δ123 never vanishes and the Jacobian has full rank everywhere": both
+  V-B   "Λ = 0 corresponds to the shoulder singularity": `test_the_manipulators_alone`
+        "No minor is always nonzero in this case": `test_minors_that_never_vanish`
+        "if s2 ≠ 0 or s3 ≠ 0 there is always a nonzero minor", "rank J(q) = 3, except when the manipulator is
+        stretched or folded along the vertical direction": `test_the_3r_is_singular_when_vertical`
+  VI-1  "Since d < l1 + l2, there is no minor guaranteed to be always nonzero": as in V-A
+  VI-3  "Δ123 = d ≠ 0, and thus rank J(q) = 3 everywhere", for link 1: "link heading" in the tests of V-A
+What d = 0 does is not in the paper: `WITHOUT_D`.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from symbolic_checks import PAPER, TASKS, made
+
+from nmm.analysis.symbolic import SymbolicAnalysis, lower_bound, never_zero, singular_set, symbolic, vanishing
+from nmm.analysis.symbolic.groebner import Basis, Undecided, Work
+from nmm.analysis.symbolic.zeros import Zeros
+from nmm.errors import InputError
+from nmm.loading import load
+from nmm.platforms import Omnidirectional
+from nmm.tasks import Coordinates, Heading, Position
+
+sympy = pytest.importorskip("sympy")
+
+Array = NDArray[np.float64]
+
+#: The singular sets for d = 0, as families of conditions in the symbols' names.
+WITHOUT_D: dict[tuple[str, str], list[set[str]]] = {
+    ("unicycle_2r", "position"): [{"cos(q1)", "sin(q2)"}],
+    ("unicycle_2r", "pointing"): [{"cos(q1)"}],
+    ("unicycle_2r", "link heading"): [{"cos(q1 + q2)"}],
+    ("unicycle_2r", "link pointing"): [{"rho*cos(q1 + q2) + l1*cos(q1)*cos(theta + q1 + q2 - g)"}],
+    # The tip above the column and the arm's plane along the heading; the tip above the column and the elbow
+    # stretched or folded (s2 = s3 = 0, or l2 = l3); the elbow so and the arm's plane across the heading.
+    ("unicycle_3r", "spatial position"): [
+        {"sin(q1)", "l2*sin(q2) + l3*sin(q2 + q3)"},
+        {"sin(q3)", "l2*sin(q2) + l3*sin(q2 + q3)"},
+        {"cos(q1)", "sin(q3)"},
+    ],
+}
+
+
+def residuals(analysis: SymbolicAnalysis, expressions: Any, lengths: dict[str, float]) -> Any:
+    """Expressions as a function of q."""
+    given = {analysis.symbols[name]: analysis.definitions[name] for name in analysis.definitions}
+    numbers = {analysis.symbols[name]: value for name, value in lengths.items()}
+    found = [sympy.sympify(one).subs(given).subs(numbers) for one in expressions]
+    function = sympy.lambdify([list(analysis.q.values())], found)
+    return lambda q: np.array(function(q), dtype=float) * np.ones(len(found))
+
+
+def zeros_of(function: Any, n: int, rng: np.random.Generator, starts: int) -> list[Array]:
+    """Where least squares from random starts find all residuals to be zero."""
+    found = []
+    for q0 in rng.uniform(-3, 3, (starts, n)):
+        solution = least_squares(function, q0, xtol=1e-15, ftol=1e-15, gtol=1e-15)
+        if np.max(np.abs(solution.fun)) < 1e-12:
+            found.append(solution.x)
+    return found
+
+
+def sympified(analysis: SymbolicAnalysis, text: str) -> Any:
+    return sympy.sympify(text, locals=dict(analysis.symbols))
+
+
+@pytest.mark.parametrize(("robot", "task"), PAPER[:-1])
+def test_no_singularity_with_d(robot: str, task: str, rng: np.random.Generator) -> None:
+    _, _, analysis = made(robot, task)
+    claim = singular_set(analysis)
+    assert claim.proved
+    assert not claim.families
+    s = len(analysis.row_names)
+    rho = ", rho" if task == "link pointing" else ""
+    assert claim.statement == f"J has rank {s} at every configuration, for all nonzero d{rho}"
+    # Whatever the lengths: where the minors are smallest, they are not all small.
+    functions = analysis.functions()
+    for lengths in ({}, {"l1": 0.4, "l2": 0.4}, {"d": -0.05, "l1": 0.9}):
+        given = {**analysis.geometry, **lengths}
+        J = functions.J(rng.uniform(-3, 3, (500, 5)), **given)
+        assert np.min(np.linalg.svd(J)[1]) > 0.02 * abs(given["d"])
+
+
+@pytest.mark.parametrize(("robot", "task"), PAPER)
+def test_what_d_zero_does(robot: str, task: str, rng: np.random.Generator) -> None:
+    analysis = made(robot, task)[2]
+    claim = singular_set(analysis, zero=["d"])
+    assert claim.proved
+    assert "for d = 0 and all nonzero l" in claim.statement
+    expected = [{sympified(analysis, text) for text in family} for family in WITHOUT_D[robot, task]]
+    for family in expected:
+        assert any({sympy.expand(one) for one in found} == family for found in claim.families)
+    assert len(claim.families) == len(expected)
+    # Where all conditions of a family vanish J has lost rank ...
+    without = analysis.without("d")
+    functions, s = without.functions(), len(analysis.row_names)
+    for lengths in (without.geometry, dict.fromkeys(without.geometry, 0.4)):
+        for family in claim.families:
+            points = zeros_of(residuals(without, family, lengths), len(analysis.q), rng, 4)
+            assert points
+            for q in points:
+                assert np.linalg.svd(functions.J(q, **lengths))[1][s - 1] < 1e-9
+        # ... and where J has lost rank, those of a family vanish.
+        minors = residuals(without, [m for m in without.minors.values() if m != 0], lengths)
+        points = zeros_of(minors, len(analysis.q), rng, 20)
+        assert len(points) > 4
+        everything = [residuals(without, family, lengths) for family in claim.families]
+        for q in points:
+            assert min(np.max(np.abs(function(q))) for function in everything) < 1e-4
+
+
+def test_the_3r_is_singular_when_vertical(rng: np.random.Generator) -> None:
+    _, _, analysis = made("unicycle_3r", "spatial position")
+    claim = singular_set(analysis)
+    assert claim.proved
+    assert claim.statement == (
+        "J has rank 3 except exactly where sin(q2) = 0 and sin(q3) = 0, for all nonzero d, l2, l3"
+    )
+    assert set(claim.conditions) == {sympy.sin(analysis.symbols["q2"]), sympy.sin(analysis.symbols["q3"])}
+    J = analysis.functions().J
+    for q in rng.uniform(-np.pi, np.pi, (20, 6)):
+        for q2, q3 in itertools.product((0.0, np.pi), repeat=2):
+            assert np.linalg.matrix_rank(J([*q[:4], q2, q3]), tol=1e-10) < 3
+        assert np.linalg.matrix_rank(J([*q[:4], 0.0, 0.4])) == 3
+        assert np.linalg.matrix_rank(J([*q[:4], 0.4, 0.0])) == 3
+        # Also where l2 = l3, with link 3 folded onto link 2: the tip is at the shoulder.
+        assert np.linalg.matrix_rank(J([*q[:4], 0.4, np.pi], l2=0.5, l3=0.5)) == 3
+
+
+def test_the_proof_goes_through_all_cases() -> None:
+    claim = singular_set(made("unicycle_3r", "spatial position")[2])
+    assert claim.steps[0] == "Δ[v, omega, q2] = -Λ (d + Λ c1) is 0 where Λ = 0 or d + Λ c1 = 0"
+    assert "where Λ = 0, s23 = 0: every minor has a factor that is 0" in claim.steps
+    assert any(step.startswith("where d + Λ c1 = 0: ") and "is 0 nowhere" in step for step in claim.steps)
+    assert (
+        claim.steps[-1]
+        == "Λ = 0, s23 = 0 is the same as sin(q2) = 0, sin(q3) = 0 (each vanishes on the other)"
+    )
+
+
+def test_the_manipulators_alone() -> None:
+    planar = symbolic(load("unicycle_2r", platform="fixed"), Position("ee", "xy"))
+    assert singular_set(planar).families == ((sympy.sin(planar.symbols["q2"]),),)
+    spatial = symbolic(load("unicycle_3r", platform="fixed"), Position("ee"))
+    elbow, shoulder = sorted(singular_set(spatial).families, key=lambda family: len(str(family)))
+    assert elbow == (sympy.sin(spatial.symbols["q3"]),)
+    assert sympy.expand(shoulder[0]) == made("unicycle_3r", "spatial position")[2].named["Lambda"]
+
+
+def test_two_minors_differ_by_d(rng: np.random.Generator) -> None:
+    robot, _, analysis = made("unicycle_2r")
+    bound = lower_bound(analysis)
+    assert bound.proved
+    assert bound.statement == "det J J^T >= d^2/2 at every configuration"
+    assert bound.steps[0] == "Δ[v, omega] - Δ[v, q1] = d, whatever q is"
+    J = analysis.functions().J(rng.uniform(-np.pi, np.pi, (4000, robot.n)))
+    determinants = np.linalg.det(J @ np.swapaxes(J, 1, 2))
+    assert determinants.min() >= 0.3**2 / 2
+    assert determinants.min() < 2 * 0.3**2  # not idle
+    assert lower_bound(made("unicycle_2r", "pointing")[2]).steps[0] == "Δ[v, omega, q1] = d, whatever q is"
+    assert lower_bound(made("unicycle_3r", "spatial position")[2]) is None
+    assert lower_bound(analysis.without("d")) is None
+    anywhere = symbolic(load("unicycle_2r", platform=Omnidirectional()), TASKS["position"])
+    assert lower_bound(anywhere).statement == "det J J^T >= 1 at every configuration"
+
+
+def test_minors_that_never_vanish(rng: np.random.Generator) -> None:
+    q = rng.uniform(-np.pi, np.pi, (4000, 6))
+    expected = {
+        "position": {"Δ[v, omega] vanishes nowhere exactly when |d| > |l1| + |l2|"},
+        "pointing": {
+            "Δ[v, omega, q1] vanishes nowhere exactly when d != 0",
+            "Δ[v, omega, q2] vanishes nowhere exactly when |d| > |l1|",
+        },
+        "link heading": {"Δ[v, omega, q1] vanishes nowhere exactly when d != 0"},
+        "link pointing": {"Δ[v, omega, q1] vanishes nowhere when |rho| > |l2| and d != 0"},
+        "spatial position": set(),
+    }
+    for robot, task in PAPER:
+        analysis = made(robot, task)[2]
+        bounds = never_zero(analysis)
+        assert {str(bound) for bound in bounds.values()} == expected[task]
+        if task == "link pointing":  # rho and g are no coordinates: nothing is said of where it vanishes
+            continue
+        # All others vanish somewhere whatever the lengths, and take both signs or are 0.
+        assert set(vanishing(analysis)) == set(analysis.minors) - set(bounds)
+        for d in (0.81, 0.49):
+            for columns, values in analysis.functions().minors(q[:, : len(analysis.q)], d=d).items():
+                one_sign = np.ptp(np.sign(values)) == 0 and values.any()
+                held = columns in bounds and bounds[columns].holds({**analysis.geometry, "d": d})
+                assert one_sign == held
+    bound = never_zero(made("unicycle_2r")[2])["v", "omega"]
+    assert bound.holds({"d": -0.9, "l1": 0.5, "l2": 0.3}) is True
+    assert bound.holds({"d": 0.7, "l1": 0.5, "l2": 0.3}) is False
+    assert bound.holds({"d": 0.9}) is None
+
+
+def test_where_a_minor_vanishes_is_said() -> None:
+    reasons = vanishing(made("unicycle_3r", "spatial position")[2])
+    assert reasons["v", "omega", "q1"] == "it is 0"
+    assert reasons["v", "omega", "q2"].startswith("its factor Λ has mean 0 over the joint angles")
+    assert reasons["v", "q2", "q3"] == "sin(q1) is a factor"
+
+
+def test_what_the_statements_leave_out() -> None:
+    """Where J does not exist, and a task that is singular everywhere."""
+    car = symbolic(load("car_base"), Heading("arm_mount"))
+    claim = singular_set(car)
+    assert claim.families == ((sympy.sin(car.symbols["steering"]),),)
+    assert "where J exists (cos(steering) != 0)" in claim.statement
+    twice = symbolic(made("unicycle_2r")[0], [Coordinates("q1"), Coordinates({"q1": 2})])
+    assert singular_set(twice).statement == "J has rank below 2 everywhere"
+    with pytest.raises(InputError, match="unknown length 'e'"):
+        singular_set(made("unicycle_2r")[2], zero=["e"])
+    with pytest.raises(InputError, match="L = 0: J is divided by it"):
+        singular_set(car, zero=["L"])
+
+
+def test_what_is_not_decided_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("nmm.analysis.symbolic.zeros._ALL", 100)
+    monkeypatch.setattr("nmm.analysis.symbolic.claims._BRIEF", 100)
+    claim = singular_set(made("unicycle_3r", "spatial position")[2])
+    assert not claim.proved
+    assert claim.statement.startswith("not decided")
+
+
+def test_bases_are_sympys(rng: np.random.Generator) -> None:
+    """Ideals of random polynomials; the same reduced basis."""
+    R, *variables = sympy.ring("a,b,c", sympy.QQ, "grevlex")
+    trivial = 0
+    for size in range(30):
+        generators = []
+        for _ in range(2 + size % 3):
+            terms = zip(rng.integers(0, 3, (3, 3)).tolist(), rng.integers(1, 4, 3).tolist(), strict=True)
+            generators.append(R.from_dict({tuple(exponents): R.domain(n) for exponents, n in terms}))
+        basis = Basis().with_more(generators, Work(10**6))
+        whole = sympy.polys.groebnertools.groebner(generators, R)
+        assert {led.polynomial for led in basis.members} == set(whole)
+        assert basis.is_one == (whole == [1])
+        trivial += basis.is_one
+        stepwise = Basis()
+        for generator in generators:
+            stepwise = stepwise.with_more([generator], Work(10**6))
+        assert {led.polynomial for led in stepwise.members} == set(whole)
+        assert basis.contains(generators[0] * variables[0] - generators[-1], Work(10**6))
+    assert 0 < trivial < 30
+    with pytest.raises(Undecided):
+        Basis().with_more([variables[0] ** 2 - variables[1], variables[0] * variables[2] - 1], Work(1))
+
+
+def test_what_is_not_zero_is_divided_out() -> None:
+    _, a, b, _ = sympy.ring("a,b,c", sympy.QQ, "grevlex")
+    assert Basis((), [0]).with_more([a * b, a * (b - 1)], Work(1000)).is_one
+    assert not Basis().with_more([a * b, a * (b - 1)], Work(1000)).is_one
+    assert not Basis((), [2]).with_more([a * b, a * (b - 1)], Work(1000)).is_one
+
+
+def test_waves_are_combinations_of_as_few_angles_as_there_can_be() -> None:
+    analysis = made("unicycle_2r", "link pointing")[2]
+    zeros = Zeros([form for form in analysis.minor_forms.values() if form.number], [])
+    assert zeros.known("q1")
+    assert zeros.known("q2")
+    assert not zeros.known("theta")
+    assert len(TASKS) == len(PAPER)

@@ -1,0 +1,136 @@
+"""Formulas of robots with every kind of joint and of known arms, and of what is too large."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from robot_grid import built, frame_of
+from spatial_arms import load_tiago
+from symbolic_checks import check_numbers
+from urdf_parts import AXIS, LIMIT, inertial, joint, link, write
+from urdf_parts import robot as urdf
+
+import nmm
+from nmm.analysis.symbolic import TooLarge, singular_set, symbolic
+from nmm.tasks import CenterOfMass, Orientation, Pose, Position, Posture
+
+sympy = pytest.importorskip("sympy")
+
+
+@pytest.mark.parametrize("seen_from", [None, "link2"])
+def test_pose_of_an_arm_whose_inputs_suffice(seen_from: str | None, rng: np.random.Generator) -> None:
+    """Six rows, velocities in the frame's own axes; f is the pose's position over its rotation vector."""
+    robot = built("unicycle", "small arm")
+    task = Pose("ee", seen_from)
+    analysis = symbolic(robot, task)
+    check_numbers(robot, task, analysis, rng.uniform(-1.5, 1.5, (3, robot.n)))
+    if seen_from is None:
+        claim = singular_set(analysis)
+        assert claim.proved
+        # The tool upright, or the arm so that the wrist's circle does not turn with it: both found.
+        assert len(claim.families) == 2
+
+
+def test_singularities_of_the_ur5_on_a_fixed_base_are_shoulder_elbow_and_wrist(
+    rng: np.random.Generator,
+) -> None:
+    """A textbook's result, from six rows and six joints."""
+    robot = built("fixed", "UR5")
+    analysis = symbolic(robot, Pose(frame_of("fixed", "UR5")))
+    claim = singular_set(analysis)
+    assert claim.proved
+    q2, q3, q4, q5 = (analysis.q[name] for name in list(analysis.q)[1:5])
+    a2, a3, d5 = (analysis.symbols[f"z_{name}_joint"] for name in ("elbow", "wrist_1", "wrist_3"))
+    shoulder = a2 * sympy.cos(q2) + a3 * sympy.cos(q2 + q3) - d5 * sympy.sin(q2 + q3 + q4)
+    found = {sympy.expand(condition) for (condition,) in claim.families}
+    assert found == {sympy.sin(q3), sympy.sin(q5), sympy.expand(shoulder)}
+    assert all("taken as" in note for note in analysis.notes)  # the file's quarter turns have ten digits
+    check_numbers(robot, Pose("tool0"), analysis, rng.uniform(-3, 3, (3, 6)), 1e-9)
+
+
+def test_wrist_of_the_ur5_has_one_minor_that_is_not_zero(rng: np.random.Generator) -> None:
+    robot = built("fixed", "UR5")
+    analysis = symbolic(robot, Position("wrist_1_link"))
+    assert sum(minor != 0 for minor in analysis.minors.values()) == 1
+    assert "the other 19 are 0" in analysis.text()
+    claim = singular_set(analysis)
+    assert claim.proved
+    assert "exactly where sin(elbow_joint) = 0 or" in claim.statement
+    assert not analysis.notes
+    check_numbers(robot, Position("wrist_1_link"), analysis, rng.uniform(-3, 3, (3, robot.n)))
+
+
+OBLIQUE = '<axis xyz="0.36 0.48 0.8"/>'
+CHAINS: dict[str, list[tuple[str, str, str]]] = {
+    "slides": [
+        ("revolute", AXIS, '<origin xyz="0.1 0.2 0.3" rpy="0.4 0 0"/>'),
+        ("prismatic", OBLIQUE, '<origin xyz="0 0.1 0" rpy="0 0 -0.7"/>'),
+    ],
+    "turns about an oblique axis": [
+        ("continuous", '<axis xyz="0 -1 0"/>', '<origin xyz="0 0.3 0" rpy="0 1.1 0"/>'),
+        ("revolute", OBLIQUE, '<origin xyz="0.2 0 0.1"/>'),
+    ],
+    "fixed joints between": [
+        ("fixed", "", '<origin xyz="0.1 0.2 0.3" rpy="0 0.5 0"/>'),
+        ("revolute", '<axis xyz="-1 0 0"/>', '<origin xyz="0.3 -0.1 0"/>'),
+        ("fixed", "", '<origin xyz="0 0 0.2" rpy="1.5707963267948966 0 0.3"/>'),
+        ("fixed", "", '<origin xyz="0.1 0 0"/>'),
+        ("prismatic", '<axis xyz="0 0 -1"/>', '<origin xyz="0 0 0.1"/>'),
+    ],
+    "turned about all axes": [
+        ("revolute", AXIS, '<origin xyz="0.1 0.2 0.3" rpy="0.5 -0.4 0.3"/>'),
+        ("prismatic", AXIS, '<origin xyz="0 0 0.1"/>'),
+    ],
+    "pitched by a quarter": [
+        ("revolute", AXIS, '<origin xyz="0.1 0 0.3" rpy="0.6 1.5707963267948966 0.3"/>'),
+        ("prismatic", '<axis xyz="0 1 0"/>', '<origin xyz="0.2 0 0" rpy="3.141592653589793 0 0"/>'),
+    ],
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "platform"),
+    [*((name, "fixed") for name in CHAINS), ("pitched by a quarter", "unicycle")],
+)
+def test_joints_of_every_kind_however_placed(
+    name: str, platform: str, rng: np.random.Generator, tmp_path: Path
+) -> None:
+    parts, last = [link("l", inertial(2.0, "0.1 0 0.2"))], "l"
+    for i, (kind, axis, origin) in enumerate(CHAINS[name]):
+        body = "" if kind == "fixed" else axis + LIMIT
+        parts += [
+            joint(f"j{i}", last, f"l{i}", kind, body, origin),
+            link(f"l{i}", inertial(1.0, "0 0.1 0.2")),
+        ]
+        last = f"l{i}"
+    parts += [joint("tip", last, "ee", "fixed", "", '<origin xyz="0.2 0 0.1"/>'), link("ee")]
+    robot = nmm.load(write(tmp_path / "robot.urdf", urdf(*parts)), platform=platform)
+    tasks = [Position("ee", axis) for axis in "xyz"] + [CenterOfMass("x"), Posture()]
+    if robot.n_u > 3:
+        tasks += [Position("ee"), Orientation("ee")]
+    q = rng.uniform(-1, 1, (3, robot.n))
+    for task in tasks:
+        analysis = symbolic(robot, task)
+        check_numbers(robot, task, analysis, q)
+        assert not analysis.notes
+
+
+@pytest.mark.parametrize(
+    ("robot", "frame", "task"),
+    [
+        (lambda: built("fixed", "Panda"), "panda_hand", Position),
+        (load_tiago, "arm_tool_link", Pose),
+        (lambda: built("unicycle", "UR5"), "ur5_tool0", Pose),
+    ],
+    ids=["Panda", "TIAGo", "UR5"],
+)
+def test_what_is_too_large_is_refused_and_says_why(robot: Any, frame: str, task: Any) -> None:
+    """The work is counted: how long it takes depends on the machine, some seconds at most."""
+    made_robot = robot()
+    with pytest.raises(
+        TooLarge, match=r"with \d+ inputs and a task of . rows \(\d+ minors\) takes .*numeric"
+    ):
+        symbolic(made_robot, task(frame))
