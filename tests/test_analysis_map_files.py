@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import pytest
 
 from nmm.analysis.mapping.coordinates import singularity_map
 from nmm.analysis.mapping.result import is_map
+from nmm.analysis.mapping.singular_set import SingularSet
 from nmm.analysis.mapping.workspace import workspace_map
 from nmm.errors import InputError
 from nmm.figures.map_sets import thinned
@@ -47,9 +49,26 @@ def test_extremes_count_the_singular_places_that_the_grid_misses(robot_2r: Robot
         end, value = ("largest", 1.0) if name == "eccentricity" else ("smallest", 0.0)
         found = made.extremes(name)
         assert found[end].value == value
-        assert np.cos(found[end].at[0]) == pytest.approx(0.0, abs=1e-9)
         told = made.summary()["measures"][name][end]
+        if name in ("arm_manipulability", "platform_manipulability"):  # two inputs, three rows
+            assert np.all(made.values[name] == 0.0)
+            assert told == {"value": 0.0, "at": None, "on": "everywhere"}
+            continue
+        assert np.cos(found[end].at[0]) == pytest.approx(0.0, abs=1e-9)
         assert told == {"value": value, "at": list(found[end].at), "on": "the singular lines"}
+
+
+def test_equal_nodes_beside_a_singular_line_are_no_constant_map(robot_2r: Robot) -> None:
+    """The arm's w is l1 l2 |sin q2|: the same at -1 and 1, and 0 between them."""
+    ranges = {"q1": (0.0, 1.0), "q2": (-1.0, 1.0)}
+    made = singularity_map(
+        (robot_2r, PLANAR), samples=2, ranges=ranges, measures="manipulability", part="arm"
+    )
+    assert np.ptp(made.values["manipulability"]) < 1e-12
+    made = dataclasses.replace(made, singular=SingularSet((np.array([[0.0, 0.0], [1.0, 0.0]]),)))
+    found = made.extremes("manipulability")
+    assert found["smallest"][::2] == (0.0, "the singular lines")
+    assert found["largest"].on == ""
 
 
 def test_only_the_worst_postures_of_a_workspace_are_singular(robot_2r: Robot) -> None:
@@ -91,7 +110,7 @@ def test_a_map_is_written_and_replaced_only_by_another(tmp_path: Path, robot_2r:
     other = tmp_path / "other"
     other.mkdir()
     (other / "mine.txt").write_text("mine")
-    with pytest.raises(InputError, match="not written by nmm"):
+    with pytest.raises(InputError, match="is not what this writes"):
         made.save(other)
     with pytest.raises(InputError, match="unknown measure 'condition'"):
         made.plot("condition")
@@ -131,10 +150,15 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"over": ("q1",)}, "expected two coordinates"),
     ({"ranges": {"q1": (1.0, 1.0)}}, "range of q1: expected lower below upper, got 1 to 1"),
     ({"ranges": {"q1": (1.0, np.inf)}}, "range of q1: expected finite numbers"),
-    ({"ranges": {"theta": (0.0, 1.0)}}, "unknown coordinate 'theta'"),
-    ({"samples": 1}, "samples: expected .* at least 2, got 1"),
-    ({"samples": (20, 1)}, "samples"),
-    ({"samples": 2.5}, "samples"),
+    ({"ranges": {"theta": (0.0, 1.0)}}, r"theta is not on an axis of the map \(q1, q2\)"),
+    ({"ranges": {"q9": (0.0, 1.0)}}, "unknown coordinate 'q9'"),
+    ({"at": {"q1": 1.0}}, r"at: q1 is on an axis of the map \(q1, q2\)"),
+    ({"samples": (4000, 4001)}, "samples: expected at most 16000000 in all"),
+    ({"samples": 1}, "samples: expected a whole number from 2, got 1"),
+    ({"samples": (20, 1)}, "samples: expected a whole number from 2, got 1"),
+    ({"samples": 2.5}, "samples: expected a whole number from 2, got 2.5"),
+    ({"samples": "64"}, "samples: expected a whole number from 2, got '64'"),
+    ({"samples": (20, 20, 20)}, r"samples: expected a whole number, or two, got \(20, 20, 20\)"),
     ({"measures": ("sigma_max",)}, r"unknown measure 'sigma_max' \(did you mean 'sigma_min'\?\)"),
     ({"measures": ()}, "at least one"),
     ({"part": "leg"}, "unknown part 'leg'"),

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from itertools import combinations
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from sliding_arm import sliding
 
 from nmm.analysis import analyse
 from nmm.analysis.mapping.coordinates import singularity_map
@@ -52,7 +54,7 @@ def test_measures_are_the_formulas_of_their_names(rng: np.random.Generator) -> N
         w_b = abs(np.linalg.det(own[:, 2:]))
         minors = [np.linalg.det(own[:, list(chosen)]) for chosen in combinations(range(5), 3)]
         assert found["sigma_min"][k] == pytest.approx(np.linalg.norm(own, -2), rel=1e-12)
-        assert found["condition"][k] == pytest.approx(1.0 / np.linalg.cond(own), rel=1e-12)
+        assert found["inverse_condition"][k] == pytest.approx(1.0 / np.linalg.cond(own), rel=1e-12)
         assert found["manipulability"][k] == pytest.approx(w, rel=1e-10)
         assert found["manipulability"][k] ** 2 == pytest.approx(np.sum(np.square(minors)), rel=1e-10)
         assert found["arm_manipulability"][k] == pytest.approx(w_b, rel=1e-10)
@@ -77,7 +79,7 @@ def test_measures_of_a_flat_an_empty_and_an_undefined_J() -> None:
 
 def test_cells_have_what_analyse_finds_there(robot_2r: Robot, rng: np.random.Generator) -> None:
     at = {"x": 0.3, "theta": 0.4}
-    measures = ("sigma_min", "condition", "manipulability", "arm_manipulability")
+    measures = ("sigma_min", "inverse_condition", "manipulability", "arm_manipulability")
     made = singularity_map(
         (robot_2r, WITH_HEADING), ("q2", "q1"), samples=(23, 31), measures=measures, at=at, length=0.7
     )
@@ -89,7 +91,9 @@ def test_cells_have_what_analyse_finds_there(robot_2r: Robot, rng: np.random.Gen
         np.testing.assert_array_equal(q, expected_q)
         report = analyse((robot_2r, WITH_HEADING), q, length=0.7)
         assert made.values["sigma_min"][row, column] == pytest.approx(report.sigma_min, rel=1e-12)
-        assert made.values["condition"][row, column] == pytest.approx(1.0 / report.condition, rel=1e-12)
+        assert made.values["inverse_condition"][row, column] == pytest.approx(
+            1.0 / report.condition, rel=1e-12
+        )
         w = np.prod(report.singular_values)
         assert made.values["manipulability"][row, column] == pytest.approx(w, rel=1e-12)
         assert made.values["arm_manipulability"][row, column] == 0.0
@@ -206,3 +210,38 @@ def test_the_platform_leaves_points_of_the_curves_of_a_ur5(ur5: Robot) -> None:
 def test_an_arm_of_too_few_inputs_has_no_set_of_its_own(robot_2r: Robot) -> None:
     assert singularity_map((robot_2r, WITH_HEADING), samples=5).arm_singular is None
     assert singularity_map((robot_2r, WITH_HEADING), samples=5, part="arm").singular.everywhere
+
+
+@pytest.mark.parametrize("samples", [2, 3])
+def test_nodes_that_are_all_singular_are_not_everywhere(robot_2r: Robot, samples: int) -> None:
+    """q2 = -π, 0, π at all nodes, where sin q2 = 0: three lines, as on any other grid."""
+    made = singularity_map((robot_2r, PLANAR), samples=samples)
+    assert made.arm_singular is not None
+    assert not made.arm_singular.everywhere
+    lines = sorted(made.arm_singular.lines, key=lambda line: line[0, 1])
+    assert len(lines) == 3
+    assert not len(made.arm_singular.points)
+    for line, q2 in zip(lines, (-np.pi, 0.0, np.pi), strict=True):
+        np.testing.assert_allclose(line[:, 1], q2, atol=1e-9)
+        assert np.ptp(line[:, 0]) == pytest.approx(2.0 * np.pi)
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "expected"),
+    [
+        (-1e9, 1e9, (-1.0, 1.0)),
+        (0.5, 1e9, (0.5, 1.5)),
+        (-1e9, -0.5, (-1.5, -0.5)),
+        (-0.2, 0.7, (-0.2, 0.7)),
+        (-2e3, 5e3, (-2e3, 5e3)),
+    ],
+)
+def test_a_slide_is_mapped_over_the_limits_that_it_has(
+    lower: float, upper: float, expected: tuple[float, float], tmp_path: Path
+) -> None:
+    robot = load(sliding(tmp_path, lower, upper), platform="fixed")
+    assert robot.limited.tolist() == [[lower > -1e9, upper < 1e9], [True, False]]
+    made = singularity_map((robot, Position("tip", "xy")), ("slide", "turn"), samples=5)
+    assert (made.axes[0][0], made.axes[0][-1]) == pytest.approx(expected)
+    # An angle without an upper limit, but with a lower one of -3: one turn from there.
+    assert (made.axes[1][0], made.axes[1][-1]) == pytest.approx((-3.0, -3.0 + 2.0 * np.pi))

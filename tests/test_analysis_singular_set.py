@@ -57,3 +57,19 @@ def test_a_matrix_that_is_singular_everywhere_says_so() -> None:
     found = set_of(lambda x, y: [[x, y], [2.0 * x, 2.0 * y]])
     assert found.everywhere
     assert found.text() == "everywhere"
+
+
+def test_nodes_on_curves_do_not_make_it_everywhere() -> None:
+    """Of sin(π x) sin(π y) with a node at each whole number, so that each is on two curves."""
+    axes = np.arange(3.0), np.arange(4.0)
+
+    def stacked(points: Array) -> Array:
+        return np.array([np.diag([np.sin(np.pi * x) * np.sin(np.pi * y), 1.0]) for x, y in points])
+
+    smallness, rank = [np.zeros((4, 3))] * 2, np.ones((4, 3), dtype=np.int64)
+    found = singular_set(stacked, smallness, rank, 2, axes)
+    assert not found.everywhere
+    assert len(found.lines) == 7
+    for line in found.lines:
+        off = np.abs(line - np.round(line)).max(axis=0)
+        assert off.min() < 1e-8

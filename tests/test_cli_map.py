@@ -11,7 +11,9 @@ import pytest
 
 from nmm.cli.app import status_of
 from nmm.cli.map_files import make_map
+from nmm.configuration import Configuration
 from nmm.errors import InputError
+from nmm.loading import load
 
 POSITION: dict[str, Any] = {"tasks": ["position:ee:xy"], "samples": "24"}
 
@@ -51,7 +53,8 @@ def test_a_map_is_written_and_told(capsys: pytest.CaptureFixture[str]) -> None:
     row = next(line for line in out.splitlines() if line.startswith("weighted"))
     assert f"{smallest['value']:.4g}" in row
     assert "robot singular      none found" in out
-    assert "arm alone singular  3 lines" in out
+    assert "arm alone singular  lines\n" in out
+    assert told["arm_singular"] == {"lines": True, "points": 0, "everywhere": False}
 
 
 def test_the_arguments_of_the_robot_count(capsys: pytest.CaptureFixture[str]) -> None:
@@ -62,7 +65,7 @@ def test_the_arguments_of_the_robot_count(capsys: pytest.CaptureFixture[str]) ->
         samples="40",
         out=Path("here"),
     )
-    assert "robot singular  2 lines" in capsys.readouterr().out
+    assert "robot singular  lines" in capsys.readouterr().out
     assert Path("here/sigma_min.png").exists()
 
 
@@ -90,11 +93,11 @@ def test_a_workspace_is_mapped(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_a_folder_of_a_map_is_replaced_and_no_other(tmp_path: Path) -> None:
     make_map("unicycle_2r", out=Path("map"), **POSITION)
-    make_map("unicycle_2r", out=Path("map"), measures="condition", **POSITION)
+    make_map("unicycle_2r", out=Path("map"), measures="inverse_condition", **POSITION)
     assert not Path("map/sigma_min.png").exists()
     Path("mine").mkdir()
     Path("mine/notes.txt").write_text("mine")
-    with pytest.raises(InputError, match="not written by nmm"):
+    with pytest.raises(InputError, match="is not what this writes"):
         make_map("unicycle_2r", out=Path("mine"), **POSITION)
     assert Path("mine/notes.txt").read_text() == "mine"
 
@@ -102,7 +105,7 @@ def test_a_folder_of_a_map_is_replaced_and_no_other(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"samples": "1"}, "at least 2"),
+        ({"samples": "1"}, "samples: expected a whole number from 2, got 1$"),
         ({"samples": "many"}, "--samples: expected a whole number"),
         ({"samples": "20x20x20"}, "--samples"),
         ({"samples": "20x30", "workspace": "xy"}, "--samples: expected one number with --workspace"),
@@ -139,12 +142,29 @@ LINES: list[tuple[list[str], str]] = [
     (["unicycle_2r", "--over", "q1,q1"], "two different coordinates, got q1 twice"),
     (["unicycle_2r", "--range", "q1=1:1"], "range of q1: expected lower below upper"),
     (["unicycle_2r", "--measure", "sigma"], "unknown measure 'sigma'"),
-    (["unicycle_2r", "--samples", "1"], "at least 2"),
+    (["unicycle_2r", "--samples", "1"], "samples: expected a whole number from 2, got 1"),
     (["unicycle_2r", "--task", "heading:link2", "--platform", "fixed"], "3 rows"),
-    (["unicycle_2r", "--out", "mine"], "not written by nmm"),
+    (["unicycle_2r", "--out", "mine"], "is not what this writes"),
     (["unicycle_2r", "--workspace", "xw"], "plane: expected two of x, y, z"),
     (["unicycle_2r", "--workspace", "xy", "--frame", "hand"], "unknown frame 'hand'"),
     (["unicycle_2r", "--alpha", "half"], "--alpha"),
+    (
+        ["unicycle_2r", "--samples", "100000"],
+        "expected at most 16000000 in all, as in 4000 x 4000, got 100000",
+    ),
+    (["unicycle_2r", "--samples", "4001", "--workspace", "xy"], "expected at most 16000000 in all"),
+    (["unicycle_2r", "--range", "theta=0:1"], "theta is not on an axis of the map (q1, q2)"),
+    (["unicycle_2r", "--range", "q9=0:1"], "unknown coordinate 'q9'; available: x, y, theta, q1, q2"),
+    (
+        ["unicycle_2r", "--at", "q2=1", "--workspace", "xy"],
+        "--at: q2 is varied over the workspace (q1, q2)",
+    ),
+    (["unicycle_2r", "--at", "q2=1"], "--at: q2 is on an axis of the map (q1, q2)"),
+    (
+        ["unicycle_2r", "--part", "platform", "--platform", "fixed"],
+        "platform of robot unicycle_2r has no inputs",
+    ),
+    (["unicycle_2r", "--measure", "condition"], "'inverse_condition'"),
     (["unicycle_9r"], "unicycle_9r"),
     ([], "SUBJECT"),
 ]
@@ -166,6 +186,47 @@ def test_bad_input_is_one_line_and_status_2(
 def test_a_robot_without_an_arm_has_no_workspace(capfd: pytest.CaptureFixture[str]) -> None:
     line = ["map", "differential_base", "--task", "position:base_footprint:xy", "--workspace", "xy"]
     refused(line, "expected a robot with an arm", capfd)
+
+
+@pytest.mark.parametrize("plane", ["xz", "zy"])
+def test_a_plane_seen_edge_on_is_refused(plane: str, capfd: pytest.CaptureFixture[str]) -> None:
+    line = ["map", "unicycle_2r", "--task", "position", "--workspace", plane]
+    z = Configuration(load("unicycle_2r"), np.zeros(5)).placement("ee").translation[2]
+    refused(line, f"ee moves in a horizontal plane, z = {z:.4g} m only; try --workspace xy\n", capfd)
+
+
+@pytest.mark.parametrize("measure", ["arm_manipulability", "weighted"])
+def test_a_robot_without_an_arm_has_no_measure_of_it(measure: str, capfd: pytest.CaptureFixture[str]) -> None:
+    line = ["map", "differential_base", "--task", "position:base_footprint:xy", "--over", "x,y"]
+    message = f"measure {measure}: arm of robot differential_base has no inputs"
+    refused([*line, "--measure", f"sigma_min,{measure}"], message, capfd)
+
+
+def test_a_constant_map_has_its_value_everywhere(capfd: pytest.CaptureFixture[str]) -> None:
+    """The angle of the platform turns J and changes no σ but by rounding."""
+    line = ["map", "unicycle_2r", "--task", "position:ee:xy", "--over", "x,theta", "--at", "q2=pi/3"]
+    assert status_of([*line, "--samples", "15"]) == 0
+    told = json.loads(Path("runs/unicycle_2r-map/map.json").read_text(encoding="utf-8"))
+    values = np.load("runs/unicycle_2r-map/map.npz", allow_pickle=False)["sigma_min"]
+    assert np.ptp(values) < 1e-12
+    for end, value in (("smallest", values.min()), ("largest", values.max())):
+        assert told["measures"]["sigma_min"][end] == {"value": value, "at": None, "on": "everywhere"}
+    out, _ = capfd.readouterr()
+    row = next(line for line in out.splitlines() if line.startswith("sigma_min"))
+    assert row.split().count("everywhere") == 2
+    assert "=" not in row
+
+
+def test_what_is_zero_everywhere_is_told_without_rounding(capfd: pytest.CaptureFixture[str]) -> None:
+    """A folded arm loses rank, whatever its first joint and the platform do."""
+    line = ["map", "unicycle_2r", "--task", "position:ee:xy", "--part", "arm", "--over", "theta,q1"]
+    assert status_of([*line, "--at", "q2=pi", "--samples", "15", "--measure", "sigma_min,eccentricity"]) == 0
+    told = json.loads(Path("runs/unicycle_2r-map/map.json").read_text(encoding="utf-8"))
+    assert told["singular"]["everywhere"]
+    for name, value in (("sigma_min", 0.0), ("eccentricity", 1.0)):
+        for end in ("smallest", "largest"):
+            assert told["measures"][name][end] == {"value": value, "at": None, "on": "everywhere"}
+    assert "robot singular" not in capfd.readouterr().out
 
 
 def refused(line: list[str], message: str, capfd: pytest.CaptureFixture[str]) -> None:

@@ -78,6 +78,18 @@ def test_links_between_files_lead_somewhere(page: str) -> None:
         assert ((ROOT / page).parent / target).exists(), target
 
 
+def test_the_python_on_singularities_runs() -> None:
+    pytest.importorskip("sympy")
+    text = (ROOT / "docs" / "singularities.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    names: dict[str, Any] = {}
+    exec(code, names)
+    assert names["report"].rank == 2
+    assert len(names["formulas"].minors) == 6
+    assert [family.pinned for family in names["search"].families] == [{"q2": pytest.approx((0.0, np.pi))}]
+    assert names["history"].sigma_min["arm"].max() < 1e-12
+
+
 def test_every_public_name_is_documented() -> None:
     for name in nmm.__all__:
         thing = getattr(nmm, name)

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
 
+from nmm.analysis.mapping.extremes import EVERYWHERE
 from nmm.analysis.mapping.measures import MEASURES
 from nmm.analysis.mapping.result import Map
 from nmm.arrays import Array
@@ -26,6 +27,7 @@ SIDE, BAR, BAR_GAP, BAR_ROOM, BETWEEN = 3.5, 0.14, 0.12, 0.75, 0.55
 LINE = 0.155
 #: Most coordinates that the title names one by one.
 MOST_NAMED = 6
+WORST = "worst posture"
 
 
 def map_figure(drawn: Map, measure: str) -> Figure:
@@ -39,7 +41,8 @@ def map_figure(drawn: Map, measure: str) -> Figure:
         raise InputError(unknown("measure", measure, drawn.values, "map"))
     layers = {"": drawn.values[measure]}
     if drawn.kind == "workspace":
-        layers = {"best posture": drawn.values[measure], "worst posture": drawn.worst[measure]}
+        layers = {"best posture": drawn.values[measure], WORST: drawn.worst[measure]}
+    layers = {name: _even(drawn, measure, name, values) for name, values in layers.items()}
     width, height = _size(drawn)
     step = width + BETWEEN + (0.3 if len(layers) > 1 else 0.0)
     total = style.LEFT + step * (len(layers) - 1) + width + BAR_GAP + BAR + BAR_ROOM
@@ -65,6 +68,12 @@ def map_figure(drawn: Map, measure: str) -> Figure:
     return made
 
 
+def _even(drawn: Map, measure: str, layer: str, values: Array) -> Array:
+    """The values; those of a constant map without the rounding, which a colour scale would blow up."""
+    smallest = drawn.extremes(measure, worst=layer == WORST)["smallest"]
+    return np.where(np.isnan(values), np.nan, smallest.value) if smallest.on == EVERYWHERE else values
+
+
 def _size(drawn: Map) -> tuple[float, float]:
     """Of the map, in: square where the axes have different units or are angles; else as it is."""
     spans = [float(axis[-1] - axis[0]) for axis in drawn.axes]
@@ -79,9 +88,11 @@ def _bounds(layers: Iterable[Array]) -> tuple[float, float]:
     if not values.size:
         return 0.0, 1.0
     low, high = float(values.min()), float(values.max())
+    if low == high:  # In the middle of the scale, which starts at zero.
+        return (min(0.0, 2.0 * low), max(0.0, 2.0 * high)) if high else (0.0, 1.0)
     # From zero, where it is near: it means singular.
     low = 0.0 if 0.0 <= low < 0.5 * high else low
-    return (low, high) if high > low else (low, low + 1.0)
+    return low, high
 
 
 def _draw_values(axes: Axes, drawn: Map, values: Array, bounds: tuple[float, float]) -> AxesImage:

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.analysis.jacobians import Subject
-from nmm.analysis.mapping.evaluation import Evaluator, Progress, Smallness, between
+from nmm.analysis.mapping.evaluation import Evaluator, Judged, Progress, Smallness, between
 from nmm.analysis.mapping.result import About, Map
 from nmm.analysis.mapping.singular_set import SingularSet, singular_set
-from nmm.analysis.parts import WHOLE
-from nmm.arrays import Array, vector
-from nmm.errors import InputError, unknown
-from nmm.resolvers.weights import Weights
+from nmm.arrays import Array, counted, vector
+from nmm.errors import InputError
 from nmm.robot import Robot
 
+#: Most nodes of a map in all; for more there is no picture, and soon no memory.
+MOST_NODES = 4000 * 4000
 #: How far to both sides a coordinate without limits is mapped when no range is given, m.
 SIDE = 1.0
 
@@ -27,15 +28,9 @@ def singularity_map(
     *,
     ranges: Mapping[str, Sequence[float]] | None = None,
     samples: int | Sequence[int] = (200, 200),
-    measures: str | Sequence[str] = ("sigma_min",),
-    part: str = WHOLE,
     at: ArrayLike | Mapping[str, float] | None = None,
-    t: float = 0.0,
-    alpha: float = 0.5,
-    weights: Weights | None = None,
-    length: float | None = None,
-    sizes: Mapping[str, float] | None = None,
     progress: Progress | None = None,
+    **judged: Unpack[Judged],
 ) -> Map:
     """Measures of J over two coordinates, the others held, and where J and the arm's part of it lose rank.
 
@@ -46,34 +41,28 @@ def singularity_map(
     ranges : (lower, upper) of either, m or rad, both ends included; without, the limits, of an angle not
         more than one turn: -π to π where it may; of a length without limits 1 m to both sides
     samples : how many along each, or (along the first, along the second); at least 2
-    measures : some of sigma_min, condition, manipulability, arm_manipulability, platform_manipulability,
-        weighted, eccentricity (`nmm.analysis.mapping.measures.MEASURES`)
-    part : whose columns of J: "robot", "platform", "arm" or an arm's name
     at : the coordinates held, (n,) or by name; without, the configuration nearest to zero
-    t : s
-    alpha : the arm's share in "weighted", in [0, 1]
+    progress : called with the fraction done
+    measures : some of sigma_min (without, this), inverse_condition, manipulability, arm_manipulability,
+        platform_manipulability, weighted, eccentricity (`nmm.analysis.mapping.measures.MEASURES`)
+    part : whose columns of J: "robot" (without, this), "platform", "arm" or an arm's name
+    t : s; without, 0
+    alpha : the arm's share in "weighted", in [0, 1]; without, 0.5
     weights : W > 0 of the inputs, by input or group ("platform", "arm"): the measures are of J W^(-1/2)
     length, sizes : as `analyse`; an input's limit as its size makes its top speed count as 1
-    progress : called with the fraction done
 
     Raises
     ------
-    InputError : an unknown coordinate, measure or part, a coordinate given twice, an empty range, fewer than
-        two samples, a task of more rows than inputs
+    InputError : an unknown coordinate, measure or part, a part without inputs, a coordinate given twice, a
+        range of one that is not mapped, a value of one that is, an empty range, fewer than two samples or
+        more than `MOST_NODES` in all, a task of more rows than inputs
     """
-    evaluator = Evaluator(
-        subject,
-        t=t,
-        measures=measures,
-        part=part,
-        alpha=alpha,
-        weights=weights,
-        length=length,
-        sizes=sizes,
-    )
+    evaluator = Evaluator(subject, **judged)
     robot = evaluator.robot
     held = robot.rest if at is None else robot.q(at)
     names, columns = coordinates(over, robot)
+    if isinstance(at, Mapping):
+        check_held(at, names, "at")
     axes = grid_axes(robot, names, held, ranges, sample_counts(samples))
     shape = len(axes[1]), len(axes[0])
 
@@ -92,13 +81,13 @@ def singularity_map(
         rank = those.rank.reshape(shape)
         return singular_set(lambda x: J_of(placed(x)), smallness, rank, full, axes, report)
 
-    whole = singular(part, found.own, between(progress, 0.8, 0.1))
+    whole = singular(evaluator.part, found.own, between(progress, 0.8, 0.1))
     arm = None if found.arm is None else singular("arm", found.arm, between(progress, 0.9, 0.1))
     if progress is not None:
         progress(1.0)
     return Map(
         kind="coordinates",
-        about=About.of(evaluator, length, sizes),
+        about=About.of(evaluator),
         names=names,
         units=(robot.q_units[columns[0]], robot.q_units[columns[1]]),
         axes=axes,
@@ -121,15 +110,27 @@ def coordinates(over: Sequence[str], robot: Robot) -> tuple[tuple[str, str], lis
     return (given[0], given[1]), columns
 
 
+def check_held(
+    given: Iterable[str], varied: Sequence[str], what: str, how: str = "on an axis of the map"
+) -> None:
+    """`InputError` for a coordinate that is given one value and is varied: that value would not count."""
+    for name in given:
+        if name in varied:
+            raise InputError(f"{what}: {name} is {how} ({', '.join(varied)})")
+
+
 def sample_counts(samples: int | Sequence[int]) -> tuple[int, int]:
     """How many along the first and the second axis."""
-    given = list(samples) if isinstance(samples, Sequence) else [samples, samples]
-    whole = len(given) == 2 and all(
-        isinstance(n, int | np.integer) and not isinstance(n, bool) for n in given
-    )
-    if not whole or min(given) < 2:
-        raise InputError(f"samples: expected a whole number, or two, of at least 2, got {samples!r}")
-    return int(given[0]), int(given[1])
+    if isinstance(samples, str) or not isinstance(samples, Sequence):
+        samples = [samples, samples]
+    if len(samples) != 2:
+        raise InputError(f"samples: expected a whole number, or two, got {samples!r}")
+    columns, rows = counted(samples[0], "samples", 2), counted(samples[1], "samples", 2)
+    if columns * rows > MOST_NODES:
+        raise InputError(
+            f"samples: expected at most {MOST_NODES} in all, as in 4000 x 4000, got {columns} x {rows}"
+        )
+    return columns, rows
 
 
 def grid_axes(
@@ -143,7 +144,8 @@ def grid_axes(
     given = dict(ranges or {})
     for name in given:
         if name not in names:
-            raise InputError(unknown("coordinate", name, names, "ranges"))
+            robot.coordinate(name)  # names the ones there are
+            raise InputError(f"ranges: {name} is not on an axis of the map ({', '.join(names)})")
     first, second = (
         np.linspace(
             *(checked_range(given[name], name) if name in given else usual_range(robot, name, held)), count
@@ -166,10 +168,10 @@ def usual_range(robot: Robot, name: str, held: Array) -> tuple[float, float]:
     index = robot.coordinate(name)
     lower, upper = robot.q_limits[index]
     if robot.q_units[index] == "m":
-        middle = held[index]
-        lower = lower if np.isfinite(lower) else middle - SIDE
-        return float(lower), float(upper if np.isfinite(upper) else max(middle, lower) + SIDE)
-    if upper - lower <= 2.0 * np.pi:
+        from_lower, to_upper = robot.limited[index]
+        lower = lower if from_lower else min(held[index], upper) - SIDE
+        upper = upper if to_upper else max(held[index], lower) + SIDE
+    if robot.q_units[index] == "m" or upper - lower <= 2.0 * np.pi:
         # A joint that cannot move has a range all the same: the value that it is held at, with some room.
         return (float(lower), float(upper)) if lower < upper else (lower - 0.5, lower + 0.5)
     start = min(max(lower, -np.pi), upper - 2.0 * np.pi)

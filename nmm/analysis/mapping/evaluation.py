@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypedDict
 
 import numpy as np
 
@@ -47,6 +47,23 @@ class Evaluated(NamedTuple):
     arm: Smallness | None
 
 
+class Judged(TypedDict, total=False):
+    """What is judged, and how, on every map: the options of `Evaluator`, which says what each of them means.
+
+    Attributes
+    ----------
+    t, measures, part, alpha, weights, length, sizes : see `Evaluator`; each has its default there
+    """
+
+    t: float
+    measures: str | Sequence[str]
+    part: str
+    alpha: float
+    weights: Weights | None
+    length: float | None
+    sizes: Mapping[str, float] | None
+
+
 class Evaluator:
     """Measures at any configurations.
 
@@ -63,7 +80,8 @@ class Evaluator:
 
     Raises
     ------
-    InputError : what is wrong with any of these; a task of more rows than inputs
+    InputError : what is wrong with any of these; a part without inputs, or a measure of one; a task of more
+        rows than inputs
     """
 
     def __init__(
@@ -85,15 +103,21 @@ class Evaluator:
         self.columns = groups(robot)
         if part not in self.columns:
             raise InputError(unknown("part", part, self.columns, f"robot {robot.name}"))
+        if not self.columns[part]:
+            raise InputError(f"part: {part} of robot {robot.name} has no inputs")
+        for name, measure in self.measures.items():
+            if measure.needs and not self.columns[measure.needs]:
+                raise InputError(f"measure {name}: {measure.needs} of robot {robot.name} has no inputs")
         self.part = part
         self.alpha = scalar(alpha, "alpha")
         if not 0.0 <= self.alpha <= 1.0:
             raise InputError(f"alpha: expected a number from 0 to 1, got {self.alpha:g}")
+        self.length, self.sizes = length, dict(sizes or {})
         rows, _, inputs = self.jacobians.sizes(length, sizes)
         shape = Shape(len(rows), 0, robot.u_names, robot.groups)
         self.weights = np.ones(robot.n_u) if weights is None else weight_diagonal(weights, shape)
         self._factors = inputs / np.sqrt(self.weights) / rows[:, np.newaxis]
-        self.scaled = length is not None or bool(sizes)
+        self.scaled = length is not None or bool(self.sizes)
 
     @property
     def arm_beside(self) -> bool:

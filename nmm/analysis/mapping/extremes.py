@@ -16,16 +16,21 @@ if TYPE_CHECKING:
 #: What a measure of the part is where the part's J loses rank.
 WHERE_SINGULAR: Mapping[str, float] = {
     "sigma_min": 0.0,
-    "condition": 0.0,
+    "inverse_condition": 0.0,
     "manipulability": 0.0,
     "eccentricity": 1.0,
 }
 #: Measures that are zero where the whole robot is singular: a part is there, too.
 OF_PARTS = ("arm_manipulability", "platform_manipulability", "weighted")
+#: Smallest and largest that differ by less than this, of the largest in size, differ by rounding.
+SAME = 1e-9
+EVERYWHERE = "everywhere"
 
 
 class Extreme(NamedTuple):
-    """A value, where on the map it is, and on what: a singular set, in words, or "" for a cell's sample."""
+    """A value, where on the map it is, and on what: a singular set, in words, "everywhere" where the map has
+    no other value (no place then says more than the others), or "" for a cell's sample.
+    """
 
     value: float
     at: tuple[float, float]
@@ -51,12 +56,18 @@ def extremes(made: Map, measure: str, *, worst: bool = False) -> dict[str, Extre
         row, column = np.unravel_index(pick(values), values.shape)
         where = float(made.axes[0][column]), float(made.axes[1][row])
         found[name] = Extreme(float(values[row, column]), where)
-    if made.kind == "coordinates" or worst:
-        for those, whose, value in _known(made, measure):
-            end = "largest" if value > 0.0 else "smallest"
-            at = _first_of(those)
-            found[end] = Extreme(value, found[end].at if at is None else at, _words(those, whose))
-            break
+    known = _known(made, measure)
+    constant = [value for those, _, value in known if those.everywhere]
+    between = [one for one in known if made.kind == "coordinates" or worst]
+    seen = [found["smallest"].value, found["largest"].value, *(value for *_, value in between)]
+    if constant or max(seen) - min(seen) <= SAME * max(map(abs, seen)):
+        return {
+            end: Extreme(constant[0] if constant else one.value, one.at, EVERYWHERE)
+            for end, one in found.items()
+        }
+    for those, whose, value in between[:1]:
+        end = "largest" if value > 0.0 else "smallest"
+        found[end] = Extreme(value, _first_of(those), _words(those, whose))
     return found
 
 
@@ -74,14 +85,13 @@ def _known(made: Map, measure: str) -> list[tuple[SingularSet, str, float]]:
     return [one for one in found if not one[0].empty]
 
 
-def _first_of(those: SingularSet) -> tuple[float, float] | None:
+def _first_of(those: SingularSet) -> tuple[float, float]:
     points = those.lines[0] if those.lines else those.points
-    return (float(points[0, 0]), float(points[0, 1])) if len(points) else None
+    return float(points[0, 0]), float(points[0, 1])
 
 
 def _words(those: SingularSet, whose: str) -> str:
     """ "the singular lines", "the arm's singular lines and point"."""
-    if those.everywhere:
-        return "everywhere"
-    counts = ((len(those.lines), "line"), (len(those.points), "point"))
-    return f"the {whose}singular " + " and ".join(f"{name}{'s' * (n > 1)}" for n, name in counts if n)
+    n = len(those.points)
+    kinds = ["lines"] * bool(those.lines) + [f"point{'s' * (n > 1)}"] * bool(n)
+    return f"the {whose}singular {' and '.join(kinds)}"

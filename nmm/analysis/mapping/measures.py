@@ -53,6 +53,7 @@ class Measure(NamedTuple):
     of : (spectra, part, alpha) -> (N,)
     on_part : whether it speaks of the part asked for; the others have parts of their own
     better : 1 where more is better, -1 where less is
+    needs : a part that it speaks of, whichever was asked for; "" for none
     """
 
     symbol: str
@@ -61,6 +62,7 @@ class Measure(NamedTuple):
     of: Callable[[Spectra, str, float], Array]
     on_part: bool = True
     better: float = 1.0
+    needs: str = ""
 
 
 def volume(spectra: Spectra, part: str) -> Array:
@@ -94,9 +96,9 @@ MEASURES: Mapping[str, Measure] = {
         "sigma",
         lambda J, part, _: J.of(part)[:, -1],
     ),
-    "condition": Measure(
+    "inverse_condition": Measure(
         "σ_min / σ_max",
-        "inverse condition: 1 isotropic, 0 singular",
+        "inverse condition number: 1 isotropic, 0 singular",
         "",
         lambda J, part, _: inverse_condition(J, part),
     ),
@@ -104,7 +106,12 @@ MEASURES: Mapping[str, Measure] = {
         "w", "manipulability sqrt(det J Jᵀ)", "volume", lambda J, part, _: volume(J, part)
     ),
     "arm_manipulability": Measure(
-        "w_b", "manipulability of the arm alone", "volume", lambda J, _, __: volume(J, "arm"), on_part=False
+        "w_b",
+        "manipulability of the arm alone",
+        "volume",
+        lambda J, _, __: volume(J, "arm"),
+        on_part=False,
+        needs="arm",
     ),
     "platform_manipulability": Measure(
         "w_p",
@@ -112,6 +119,7 @@ MEASURES: Mapping[str, Measure] = {
         "volume",
         lambda J, _, __: volume(J, "platform"),
         on_part=False,
+        needs="platform",
     ),
     "weighted": Measure(
         "α w_b + (1 − α) w",
@@ -119,6 +127,7 @@ MEASURES: Mapping[str, Measure] = {
         "volume",
         lambda J, _, alpha: weighted(J, "robot", alpha),
         on_part=False,
+        needs="arm",
     ),
     "eccentricity": Measure(
         "w_5",

@@ -16,8 +16,6 @@ from nmm.robot import Robot
 
 AXES = "xyz"
 Flags = NDArray[np.bool_]
-#: A joint that may go farther than this, m, has no limits worth the name.
-LONGEST = 100.0
 #: Newton steps onto a place, and the longest of them, rad or m: a stretched arm would leap.
 STEPS, LEAP = 12, 0.5
 
@@ -67,11 +65,8 @@ class Reach:
 
     def _usual(self, name: str) -> tuple[float, float]:
         index = self.robot.coordinate(name)
-        lower, upper = self.robot.q_limits[index]
-        if self.robot.q_units[index] == "m":
-            if not upper - lower < LONGEST:
-                raise InputError(f"ranges: expected one for {name}, which has no limits")
-            return float(lower), float(upper)
+        if self.robot.q_units[index] == "m" and not self.robot.limited[index].all():
+            raise InputError(f"ranges: expected one for {name}, which has no limits")
         return usual_range(self.robot, name, self.q)
 
     def postures(self, count: int, seed: int = 2006) -> Array:

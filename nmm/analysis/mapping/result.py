@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from nmm.analysis.mapping.evaluation import Evaluator
-from nmm.analysis.mapping.extremes import Extreme, extremes
+from nmm.analysis.mapping.extremes import EVERYWHERE, Extreme, extremes
 from nmm.analysis.mapping.measures import MEASURES, unit_of
 from nmm.analysis.mapping.singular_set import SingularSet
 from nmm.arrays import Array, Integers
-from nmm.storage import replaced_folder
+from nmm.storage import has_format, replaced_folder
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -50,7 +50,7 @@ class About:
     q_units: tuple[str, ...]
 
     @classmethod
-    def of(cls, evaluator: Evaluator, length: float | None, sizes: Mapping[str, float] | None) -> About:
+    def of(cls, evaluator: Evaluator) -> About:
         """Of what an evaluator computes."""
         robot, rows = evaluator.robot, evaluator.jacobians.rows
         parts = {"arm_manipulability": "arm", "platform_manipulability": "platform", "weighted": "robot"}
@@ -59,8 +59,9 @@ class About:
             own = [robot.u_units[j] for j in evaluator.columns[parts.get(name, evaluator.part)]]
             # In sizes J is free of units.
             units[name] = "" if evaluator.scaled else unit_of(measure, [row.unit for row in rows], own)
+        length = evaluator.length
         told = [f"L = {length:g} m counts as 1 rad"] if length is not None else []
-        told += [f"size of {name} {value:g}" for name, value in (sizes or {}).items()]
+        told += [f"size of {name} {value:g}" for name, value in evaluator.sizes.items()]
         if not told and "mixed units" in units.values():
             told = ["1 m counts as 1 rad"]
         weights = zip(robot.u_names, evaluator.weights, strict=True)
@@ -129,7 +130,7 @@ class Map:
         return q
 
     def extremes(self, measure: str, *, worst: bool = False) -> dict[str, Extreme]:
-        """ "smallest" and "largest" value of a measure, with where; see `map_extremes.extremes`."""
+        """ "smallest" and "largest" value of a measure, with where; see `nmm.analysis.mapping.extremes`."""
         return extremes(self, measure, worst=worst)
 
     @property
@@ -182,8 +183,8 @@ class Map:
                 }
                 for name in self.values
             },
-            "singular": _counts(self.singular),
-            "arm_singular": None if self.arm_singular is None else _counts(self.arm_singular),
+            "singular": _found(self.singular),
+            "arm_singular": None if self.arm_singular is None else _found(self.arm_singular),
         }
 
     def arrays(self) -> dict[str, Array | Integers]:
@@ -236,11 +237,7 @@ class Map:
 
 def is_map(folder: Path) -> bool:
     """Whether a folder holds a map that nmm wrote."""
-    try:
-        summary = json.loads((folder / "map.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return False
-    return isinstance(summary, dict) and summary.get("format") == FORMAT
+    return has_format(folder / "map.json", FORMAT)
 
 
 def joined(lines: tuple[Array, ...]) -> Array:
@@ -249,14 +246,19 @@ def joined(lines: tuple[Array, ...]) -> Array:
     return np.vstack([piece for line in lines for piece in (line, gap)]) if lines else np.zeros((0, 2))
 
 
-def _counts(those: SingularSet) -> dict[str, Any]:
-    return {"lines": len(those.lines), "points": len(those.points), "everywhere": those.everywhere}
+def _found(those: SingularSet) -> dict[str, Any]:
+    # Pieces of lines that cross, and both ends of a turn, make no count of lines.
+    return {"lines": bool(those.lines), "points": len(those.points), "everywhere": those.everywhere}
 
 
 def _ends(found: Mapping[str, Extreme]) -> dict[str, Any]:
     """Extremes in plain data; "on" says whether a cell has the value or a singular set between cells."""
     return {
-        end: {"value": _plain(value), "at": [_plain(x) for x in at], "on": on or "cell"}
+        end: {
+            "value": _plain(value),
+            "at": None if on == EVERYWHERE else [_plain(x) for x in at],
+            "on": on or "cell",
+        }
         for end, (value, at, on) in found.items()
     }
 

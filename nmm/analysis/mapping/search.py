@@ -61,7 +61,7 @@ class Search:
         cell = float(size.max()) * (1.0 + 2.0 * MARGIN) / self.longest
         if cell < 1e-9:
             raise InputError(f"workspace map: the arm does not move {self.reach.frame} in the plane")
-        counts = np.maximum(np.ceil(size * (1.0 + 2.0 * MARGIN) / cell - 1e-9), 1).astype(int)
+        counts = np.maximum(np.ceil(size * (1.0 + 2.0 * MARGIN) / cell - 1e-9), 2).astype(int)
         lower = 0.5 * (seen.min(axis=0) + seen.max(axis=0)) - 0.5 * cell * counts
         self.grid = Grid(lower, cell, int(counts[0]), int(counts[1]))
         cells, n = self.grid.columns * self.grid.rows, self.evaluator.robot.n

@@ -26,6 +26,9 @@ STEP = 1e-4
 FARTHEST, STEPS = 2.5, 40
 #: A minimum whose value is this many times what its neighbours are above it is far from zero.
 STEEP = 4.0
+#: Where all nodes are singular, so many places between them tell whether all the plane is; if not, curves run
+#: as regularly as the nodes, and are searched on a grid of at least so many nodes along each axis.
+BETWEEN, FINEST = 16, 41
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +39,8 @@ class SingularSet:
     ----------
     lines : curves, each (k, 2), in the axes' units
     points (p, 2) : singular points that are on no curve
-    everywhere : the rank is lost at each cell of the map; lines and points are then empty
+    everywhere : the rank is lost at each node of the map and at places drawn between them; lines and points
+        are then empty
     """
 
     lines: tuple[Array, ...] = ()
@@ -49,11 +53,15 @@ class SingularSet:
         return not (self.lines or len(self.points) or self.everywhere)
 
     def text(self) -> str:
-        """In words: "3 lines, 1 point"."""
+        """In words: "lines, 1 point".
+
+        Lines are not counted: those that cross are found in pieces, and the ends of a turn are one place.
+        """
         if self.everywhere:
             return "everywhere"
-        counts = [(len(self.lines), "line"), (len(self.points), "point")]
-        return ", ".join(f"{n} {name}{'s' * (n > 1)}" for n, name in counts if n) or "none found"
+        n = len(self.points)
+        told = ["lines"] * bool(self.lines) + [f"{n} point{'s' * (n > 1)}"] * bool(n)
+        return ", ".join(told) or "none found"
 
 
 def singular_set(
@@ -76,7 +84,9 @@ def singular_set(
     axes : the grid's coordinates, of the columns and of the rows
     """
     if np.all(rank < full):
-        return SingularSet(everywhere=True)
+        if _lost_between(J_of, axes):
+            return SingularSet(everywhere=True)
+        axes, smallness = _finer(J_of, axes)
     origin = np.array([axes[0][0], axes[1][0]])
     cell = np.array([axes[0][1] - axes[0][0], axes[1][1] - axes[1][0]])
     last = np.array([len(axes[0]) - 1.0, len(axes[1]) - 1.0])
@@ -87,6 +97,29 @@ def singular_set(
     found = found[np.all((found > -1e-6) & (found < last + 1e-6), axis=1)]
     lines, points = curves_and_points(np.clip(found, 0.0, last))
     return SingularSet(tuple(origin + cell * line for line in lines), origin + cell * points)
+
+
+def _lost_between(J_of: Callable[[Array], Array], axes: tuple[Array, Array]) -> bool:
+    """Whether the rank is lost at some places between the nodes, too: nodes alone may all be on curves."""
+    lower, upper = np.array([[axis[0], axis[-1]] for axis in axes]).T
+    J = J_of(np.random.default_rng(2006).uniform(lower, upper, (BETWEEN, 2)))
+    if J.shape[1] > J.shape[2]:
+        return True
+    values = np.linalg.svd(J[np.isfinite(J).all(axis=(1, 2))], compute_uv=False)
+    return bool(np.all(values[:, -1] <= TOLERANCE * values[:, 0]))
+
+
+def _finer(
+    J_of: Callable[[Array], Array], axes: tuple[Array, Array]
+) -> tuple[tuple[Array, Array], list[Array]]:
+    """Axes with more nodes, at least twice as many, and σ_min and w there."""
+    columns, rows = (np.linspace(axis[0], axis[-1], max(FINEST, 2 * len(axis))) for axis in axes)
+    J = J_of(np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2))
+    values = np.full((len(J), J.shape[1]), np.nan)
+    finite = np.isfinite(J).all(axis=(1, 2))
+    values[finite] = np.linalg.svd(J[finite], compute_uv=False)
+    shape = len(rows), len(columns)
+    return (columns, rows), [values[:, -1].reshape(shape), np.prod(values, axis=1).reshape(shape)]
 
 
 def candidates(values: Array) -> Array:

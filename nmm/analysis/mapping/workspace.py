@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.analysis.jacobians import Subject
-from nmm.analysis.mapping.coordinates import checked_range, sample_counts
-from nmm.analysis.mapping.evaluation import Evaluator, Progress, between
+from nmm.analysis.mapping.coordinates import check_held, checked_range, sample_counts
+from nmm.analysis.mapping.evaluation import Evaluator, Judged, Progress, between
 from nmm.analysis.mapping.lines import curves_and_points
 from nmm.analysis.mapping.reach import AXES, Reach
 from nmm.analysis.mapping.result import About, Map
 from nmm.analysis.mapping.search import Search
 from nmm.analysis.mapping.singular_set import SingularSet, polish
-from nmm.analysis.parts import WHOLE
-from nmm.arrays import Array, Integers
+from nmm.arrays import Array, Integers, counted
 from nmm.configuration import Configuration
 from nmm.errors import InputError
-from nmm.resolvers.weights import Weights
 from nmm.robot import Robot
 
 #: Postures drawn, and how many of them are led to a singular one each to draw these.
@@ -27,9 +26,13 @@ CONFIGURATIONS, SINGULAR_STARTS = 1 << 16, 1 << 9
 #: The longest step of the search for singular postures, of a joint's range, how many of them, and how far it
 #: may go in all, in such steps.
 UNIT, STEPS, FARTHEST = 0.05, 20, 10.0
+#: So many postures tell along which axes the frame moves: by more than this, m, or of its longest way.
+EDGE_ON, FLAT = 64, 1e-6
 #: To be curves, singular places are at least so many in all and so many on each, next to each other on a grid
 #: of so many cells, and the middle one of three so near, in cells, to the other two's line.
 FEWEST, SHORTEST, ACROSS, CROOKED = 64, 20, 40, 0.1
+#: What the joints of the postures are, to one who would hold them.
+VARIED = "varied over the workspace"
 #: Postures of one singular place put the frame there up to so much, m: σ is found zero up to rounding.
 SAME = 1e-6
 
@@ -43,15 +46,9 @@ def workspace_map(
     samples: int = 500,
     configurations: int = CONFIGURATIONS,
     ranges: Mapping[str, Sequence[float]] | None = None,
-    measures: str | Sequence[str] = ("sigma_min",),
-    part: str = WHOLE,
     at: ArrayLike | Mapping[str, float] | None = None,
-    t: float = 0.0,
-    alpha: float = 0.5,
-    weights: Weights | None = None,
-    length: float | None = None,
-    sizes: Mapping[str, float] | None = None,
     progress: Progress | None = None,
+    **judged: Unpack[Judged],
 ) -> Map:
     """The best and the worst value of each measure over the arm's postures that put a frame onto each cell.
 
@@ -76,49 +73,45 @@ def workspace_map(
     configurations : postures drawn, up to the next power of 2
     ranges : of the arm's joints, (lower, upper); without, the limits, of an angle at most one turn
     at : where the platform stands, (n,) or by name, and joints that move neither frame nor task
-    measures, part, t, alpha, weights, length, sizes, progress : as `maps.singularity_map`
+    progress, measures, part, t, alpha, weights, length, sizes : as `singularity_map`
 
     Raises
     ------
-    InputError : a robot without an arm, or one that moves the frame in no way; an unknown frame, joint,
-        measure or part; an empty range; fewer than two samples; a task of more rows than inputs
+    InputError : a robot without an arm, or one that moves the frame in no way, or not in both directions of
+        the plane; an unknown frame, joint, measure or part; an empty range; a value of a joint that is
+        varied; fewer than two samples or too many; a part without inputs, a task of more rows than inputs
     """
-    evaluator = Evaluator(
-        subject,
-        t=t,
-        measures=measures,
-        part=part,
-        alpha=alpha,
-        weights=weights,
-        length=length,
-        sizes=sizes,
-    )
+    evaluator = Evaluator(subject, **judged)
     robot = evaluator.robot
     if robot.n == robot.platform.n_p:
         raise InputError(f"workspace map: expected a robot with an arm, {robot.name} has none")
-    (longest, _), slab = sample_counts(samples), None if height is None else checked_range(height, "height")
+    longest, _ = sample_counts(samples)
+    count = counted(configurations, "configurations", 2)
+    slab = None if height is None else checked_range(height, "height")
     if len(plane) != 2 or plane[0] == plane[1] or not set(plane) <= set(AXES):
         raise InputError(f"plane: expected two of x, y, z, as in 'xy', got {plane!r}")
-    if configurations < 2:
-        raise InputError(f"configurations: expected at least 2, got {configurations!r}")
     held = robot.rest if at is None else robot.q(at)
     frame = _task_frame(evaluator) if frame is None else frame
     robot.frame_id(frame)
-    reach = Reach(robot, frame, plane, slab, held, _moving(evaluator, frame, held), ranges)
+    moving = _moving(evaluator, frame, held)
+    if isinstance(at, Mapping):
+        check_held(at, [robot.q_names[j] for j in moving], "at", VARIED)
+    reach = Reach(robot, frame, plane, slab, held, moving, ranges)
+    _check_plane(reach)
     search = Search(evaluator, reach, longest)
     drawing, spreading, filling, evening, ours, arms = _shares(progress, spread=len(reach.moving) > 2)
-    search.draw(1 << max(1, (configurations - 1).bit_length()), drawing)
+    search.draw(1 << (count - 1).bit_length(), drawing)
     search.spread(spreading)
     search.fill(filling)
     search.even(evening)
-    whole = _singular_places(evaluator, reach, part, ours)
+    whole = _singular_places(evaluator, reach, evaluator.part, ours)
     arm = _singular_places(evaluator, reach, "arm", arms) if evaluator.arm_beside else None
     if progress is not None:
         progress(1.0)
     columns, rows = search.grid.shape(1)
     return Map(
         kind="workspace",
-        about=About.of(evaluator, length, sizes),
+        about=About.of(evaluator),
         names=(plane[0], plane[1]),
         units=("m", "m"),
         axes=search.grid.axes,
@@ -133,6 +126,22 @@ def workspace_map(
         best_q=search.postures(1.0),
         worst_q=search.postures(-1.0),
     )
+
+
+def check_given(given: Iterable[str], subject: Subject, frame: str | None, q: Array, what: str) -> None:
+    """`InputError` for a joint that is given one value and is varied over the map, as `workspace_map` has it.
+
+    Parameters
+    ----------
+    given : coordinates that have a value
+    subject, frame, q (n,) : as `workspace_map`
+    what : said the value
+    """
+    evaluator = Evaluator(subject)
+    robot = evaluator.robot
+    if any(robot.coordinate(name) >= robot.platform.n_p for name in given):
+        moving = _moving(evaluator, _task_frame(evaluator) if frame is None else frame, q)
+        check_held(given, [robot.q_names[j] for j in moving], what, VARIED)
 
 
 def _shares(progress: Progress | None, *, spread: bool) -> list[Progress | None]:
@@ -164,6 +173,21 @@ def _moving(evaluator: Evaluator, frame: str, held: Array) -> Integers:
     if not moved.any():
         raise InputError(f"workspace map: the arm of {robot.name} moves {frame} in no way")
     return np.asarray(n_p + np.flatnonzero(moved), dtype=np.int64)
+
+
+def _check_plane(reach: Reach) -> None:
+    """`InputError` for an arm that moves the frame in a plane seen edge-on; it says which plane that is."""
+    points = reach.positions(reach.postures(EDGE_ON))
+    size = np.ptp(points, axis=0)
+    flat = [axis for axis in range(3) if size[axis] <= FLAT * max(1.0, float(size.max()))]
+    if not set(flat) & set(reach.in_plane) or len(flat) == 3:
+        return  # the search says that nothing moves
+    held = ", ".join(f"{AXES[axis]} = {points[0, axis]:.4g} m" for axis in flat)
+    if len(flat) > 1:
+        raise InputError(f"workspace map: {reach.frame} moves along a line, {held} only; it fills no plane")
+    where = "a horizontal plane" if AXES[flat[0]] == "z" else "a vertical plane"
+    other = AXES.replace(AXES[flat[0]], "")
+    raise InputError(f"{reach.frame} moves in {where}, {held} only; try --workspace {other}")
 
 
 def _moves(robot: Robot, frame: str, q: Array) -> Array:

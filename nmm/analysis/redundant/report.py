@@ -104,8 +104,8 @@ class RedundancyReport:
         robot, s = self.robot, len(self.rows)
         lines = [
             f"{robot.name}, task {', '.join(self.rows)}",
-            f"n = {_many(robot.n, 'coordinate')}, n_u = {_many(robot.n_u, 'input')}, s = {_many(s, 'row')} of "
-            "the task",
+            f"n = {_many(robot.n, 'coordinate')}, n_u = {_many(robot.n_u, 'input')}, "
+            f"s = {_many(s, 'row')} of the task",
             f"static redundancy       n - s = {robot.n} - {s} = {self.static} (configurations)",
             f"kinematic redundancy  n_u - s = {robot.n_u} - {s} = {self.kinematic} (motions)",
             "at "
