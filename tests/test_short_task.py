@@ -262,6 +262,11 @@ def test_a_run_without_its_scenario_needs_a_task(folder: Path, tmp_path: Path) -
         ("unicycle_2r", {"tasks": ["position"], "at": ["q1=nan"]}, "--at: q1: expected a finite number"),
         ("unicycle_2r", {"tasks": ["position"], "at": ["q1=1e999"]}, "--at: q1: expected finite numbers"),
         ("unicycle_2r", {"tasks": ["position"], "at": ["q1=1", "q1=2"]}, "--at: q1 is given twice"),
+        (
+            "unicycle_2r",
+            {"tasks": ["position"], "lock": {"q1": 0.1}, "at": ["q1=1"]},
+            "--at: q1 is locked, and no coordinate then",
+        ),
         ("unicycle_2r", {"tasks": ["position"], "settings": ["d"]}, "--set: expected ARG=VALUE"),
         ("unicycle_2r", {"tasks": ["position"], "settings": ["e=1"]}, "unknown xacro argument 'e'"),
         ("unicycle_2r", {"tasks": ["position"], "platform": "hover"}, "unknown platform 'hover'"),

@@ -15,8 +15,7 @@ from nmm.cli.options import (
     PlatformOption,
     SubjectSetOption,
     TaskOption,
-    axle_of,
-    lock_of,
+    loading_of,
 )
 
 
@@ -149,8 +148,5 @@ def map_measures(
         length=length,
         settings=settings,
         out=out,
-        platform=platform,
-        lock=lock_of(lock),
-        axle=axle_of(axle),
-        package_dirs=package_dir or [],
+        **loading_of(platform, lock, axle, package_dir),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -132,6 +132,18 @@ def axle_of(given: str | None) -> str | list[float] | None:
         return [evaluate(part) for part in given.split(",")]
     except ValueError as error:
         raise InputError(f"--axle: expected a frame or X,Y in m, got {given!r}: {error}") from None
+
+
+def loading_of(
+    platform: str | None, lock: Sequence[str] | None, axle: str | None, package_dirs: Sequence[Path] | None
+) -> dict[str, Any]:
+    """The four options about how a robot is loaded, as `nmm.load` takes them."""
+    return {
+        "platform": platform,
+        "lock": lock_of(lock),
+        "axle": axle_of(axle),
+        "package_dirs": list(package_dirs or ()),
+    }
 
 
 def _pairs(given: Sequence[str] | None, option: str, expected: str) -> list[tuple[str, str]]:

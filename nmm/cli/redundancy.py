@@ -18,8 +18,7 @@ from nmm.cli.options import (
     SetOption,
     SubjectSetOption,
     TaskOption,
-    axle_of,
-    lock_of,
+    loading_of,
     settings_of,
 )
 from nmm.errors import InputError
@@ -76,10 +75,7 @@ def redundancy(
         tasks=task,
         at=at,
         settings=settings,
-        platform=platform,
-        lock=lock_of(lock),
-        axle=axle_of(axle),
-        package_dirs=package_dir or [],
+        **loading_of(platform, lock, axle, package_dir),
         along=self_motion,
         duration=duration,
         speed=speed,

@@ -15,8 +15,7 @@ from nmm.cli.options import (
     PlatformOption,
     PortOption,
     arguments_of,
-    axle_of,
-    lock_of,
+    loading_of,
 )
 
 ROBOT_HELP = "A bundled name (see `nmm robots`), a .urdf or .xacro file, or package://PACKAGE/PATH."
@@ -60,10 +59,7 @@ def info(
     return describe_robot(
         robot,
         scenario,
-        platform=platform,
-        lock=lock_of(lock),
-        axle=axle_of(axle),
-        package_dirs=package_dir or [],
+        **loading_of(platform, lock, axle, package_dir),
     )
 
 
@@ -114,10 +110,7 @@ def view(
 
     return view_robot(
         robot,
-        platform=platform,
-        lock=lock_of(lock),
-        axle=axle_of(axle),
-        package_dirs=package_dir or [],
+        **loading_of(platform, lock, axle, package_dir),
         port=port,
         open_browser=not no_open,
         frames=frames,

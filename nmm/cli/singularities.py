@@ -17,8 +17,7 @@ from nmm.cli.options import (
     PlatformOption,
     SubjectSetOption,
     TaskOption,
-    axle_of,
-    lock_of,
+    loading_of,
 )
 from nmm.errors import InputError
 
@@ -163,10 +162,7 @@ def singularities(
         at=at,
         t=time,
         settings=settings,
-        platform=platform,
-        lock=lock_of(lock),
-        axle=axle_of(axle),
-        package_dirs=package_dir or [],
+        **loading_of(platform, lock, axle, package_dir),
     )
     if at:
         _warn_of_limits(given)

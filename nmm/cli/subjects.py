@@ -94,6 +94,8 @@ def studied(
         )
     q = _start(robot, run, scenario) if t is None or run is None else _then(run, t)
     for name, value in values_of(at, "--at", "COORDINATE=VALUE, as in q1=pi/2").items():
+        if name in (loading.get("lock") or {}):
+            raise InputError(f"--at: {name} is locked, and no coordinate then")
         q[robot.coordinate(name)] = scalar(value, f"--at: {name}")
     first = 0.0 if run is None or not len(run) else float(run.t[0])
     return Studied(

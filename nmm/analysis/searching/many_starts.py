@@ -82,9 +82,14 @@ class SingularitySearch:
     @property
     def summary(self) -> str:
         """One line: how many families, or that none was found, and from how many starts."""
-        whose = "J" if self.part == WHOLE else f"the {self.part}'s J"
+        whose = "J" if self.part == WHOLE else f"J's columns of the {self.part}"
         if self.everywhere:
-            return f"{whose} is singular everywhere: rank {self.families[0].rank}, not {self.full_rank}"
+            return (
+                f"{whose} lose rank everywhere: {self.families[0].rank}, where rows and inputs allow "
+                f"{self.full_rank}"
+                if self.part != WHOLE
+                else f"J is singular everywhere: rank {self.families[0].rank}, not {self.full_rank}"
+            )
         if not self.converged:
             return f"no singular configuration of {whose} found from {self.starts} starts"
         count = len(self.families)
