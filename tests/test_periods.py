@@ -109,5 +109,5 @@ def test_bad_subjects(robot_2r: Robot) -> None:
         repeatability(Scenario.load("unicycle_2r_position"), resolvers=())
     with pytest.raises(InputError, match="constraint"):
         repeatability(Scenario.load("unicycle_2r_manipulability"), resolvers=("ej",))
-    with pytest.raises(KeyError):
+    with pytest.raises(InputError, match="unknown resolver 'rg'; available: pg"):
         quick(with_reference(robot_2r, Circle([1.0, 0.2], 0.1, pi)))["rg"]
