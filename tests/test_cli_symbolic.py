@@ -75,9 +75,15 @@ STATEMENTS = {
     ],
     ("unicycle_2r_link_pointing",): [
         "Δ[v, omega, q1] = d (rho - l2 cos(theta + q1 + q2 - g))/rho",
-        "J has rank 3 at every configuration, for all nonzero d",
+        "  It is not decided whether Δ[v, omega, q2], Δ[v, q1, q2] and Δ[omega, q1, q2] vanish",
+        "J has rank 3 at every configuration, for all nonzero d, wherever rho != 0.",
         "never vanishes when rho > l2 and d != 0. That depends on the configuration, through rho.",
         "--set robot.arguments.d=0 has the formulas",
+    ],
+    ("small_arm", "--task", "position"): [
+        "(cos(q1) = 0 and sin(q3) = 0 and sin(q4) = 0) or (sin(q3) = 0 and sin(q4) = 0 and Λ = 0), for all",
+        "nonzero upper, fore, z_q5, z_ee, z_q5 + z_ee; Λ = upper s2 + fore s23 + s234 (z_q5 + z_ee).",
+        "c1 is cos(q1), s23 is sin(q2 + q3)",
     ],
     (*POSITION, "--platform", "fixed"): [
         "Δ[q1, q2] = l1 l2 s2",
@@ -119,6 +125,26 @@ def test_without_offset_the_3r_loses_rank_where_it_says(run: Command, rng: np.ra
     for _ in range(5):
         assert rank(True, q1=0.0) == rank(True, q3=pi) == rank(q1=pi / 2, q3=0.0) == 2
         assert rank(True) == rank(q1=0.0) == rank(q1=pi / 2) == rank(q3=0.0) == rank() == 3
+
+
+@pytest.mark.parametrize("robot", ["unicycle_2r", "unicycle_3r", "small_arm"])
+def test_abbreviations_are_explained_by_names_that_occur(robot: str, run: Command) -> None:
+    out = run(robot, "--task", "position", "--symbolic").out
+    explained = re.findall(r"\b([cs]\d+) is (?:cos|sin)\(", out)
+    assert explained
+    for name in explained:
+        assert re.search(rf"\b{name}\b(?! is )", out[out.index("\nf\n") :])
+
+
+def test_what_is_not_decided_comes_first(run: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("nmm.analysis.symbolic.zeros._ALL", 100)
+    monkeypatch.setattr("nmm.analysis.symbolic.claims._BRIEF", 100)
+    out = run("unicycle_3r", "--task", "position", "--symbolic").out
+    follows = out[out.index("what follows\n") :].splitlines()
+    assert follows[1].startswith("  Not decided: where J loses rank, as")
+    assert follows[2].startswith("  Not decided: where J loses rank for d = 0, as")
+    assert "Not decided" not in "".join(follows[3:])
+    assert "has the formulas" not in out
 
 
 def test_latex_alone(run: Command) -> None:

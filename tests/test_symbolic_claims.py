@@ -85,7 +85,7 @@ def test_no_singularity_with_d(robot: str, task: str, rng: np.random.Generator) 
     assert claim.proved
     assert not claim.families
     s = len(analysis.row_names)
-    rho = ", rho" if task == "link pointing" else ""
+    rho = ", wherever rho != 0" if task == "link pointing" else ""  # it depends on q
     assert claim.statement == f"J has rank {s} at every configuration, for all nonzero d{rho}"
     # Whatever the lengths: where the minors are smallest, they are not all small.
     functions = analysis.functions()
@@ -235,7 +235,10 @@ def test_what_is_not_decided_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("nmm.analysis.symbolic.claims._BRIEF", 100)
     claim = singular_set(made("unicycle_3r", "spatial position")[2])
     assert not claim.proved
-    assert claim.statement.startswith("not decided")
+    assert claim.statement.startswith("not decided: where J loses rank, as")
+    assert singular_set(made("unicycle_3r", "spatial position")[2], ["d"]).statement.startswith(
+        "not decided: where J loses rank for d = 0, as"
+    )
 
 
 def test_bases_are_sympys(rng: np.random.Generator) -> None:

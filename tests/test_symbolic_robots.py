@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from robot_grid import built, frame_of
+from scipy.optimize import least_squares
 from spatial_arms import load_tiago
 from symbolic_checks import check_numbers
 from urdf_parts import AXIS, LIMIT, inertial, joint, link, write
 from urdf_parts import robot as urdf
 
 import nmm
-from nmm.analysis.symbolic import TooLarge, singular_set, symbolic
+from nmm.analysis.symbolic import TooLarge, never_zero, singular_set, symbolic
 from nmm.tasks import CenterOfMass, Orientation, Pose, Position, Posture
 
 sympy = pytest.importorskip("sympy")
@@ -131,6 +133,97 @@ def test_what_is_too_large_is_refused_and_says_why(robot: Any, frame: str, task:
     """The work is counted: how long it takes depends on the machine, some seconds at most."""
     made_robot = robot()
     with pytest.raises(
-        TooLarge, match=r"with \d+ inputs and a task of . rows \(\d+ minors\) takes .*numeric"
+        TooLarge,
+        match=r"with \d+ inputs and a task of . rows \(\d+ minors\): so many joints .*make .* read; use",
     ):
         symbolic(made_robot, task(frame))
+
+
+def test_general_angles_between_the_axes_are_named_where_they_make_formulas_too_large(tmp_path: Path) -> None:
+    parts, last = [link("l", inertial(2.0, "0.1 0 0.2"))], "l"
+    for i in range(4):
+        placed = f'<origin xyz="0.1 0.2 0.3" rpy="0.{i + 3} 0.5 -0.7"/>'
+        parts += [joint(f"j{i}", last, f"l{i}", "revolute", AXIS + LIMIT, placed), link(f"l{i}")]
+        last = f"l{i}"
+    robot = nmm.load(write(tmp_path / "robot.urdf", urdf(*parts)), platform="fixed")
+    with pytest.raises(
+        TooLarge, match=r"general angles between their axes \(.*roll_j.*\) make formulas too long"
+    ):
+        symbolic(robot, Position(last))
+
+
+#: Shoulder, elbow and a forearm that turns about itself: the wrist's offset and the tip's add up.
+FOREARM = {"turn": ("0 0 1", ""), "lift": ("0 1 0", "0 0 0.1"), "elbow": ("0 1 0", "0.3 0 0"),
+           "roll": ("1 0 0", "0.2 0 0")}  # fmt: skip
+
+
+def _forearm(folder: Path, tip: float, platform: str, joints: Sequence[str] = tuple(FOREARM)) -> nmm.Robot:
+    parts, last = [link("l", inertial(2.0, "0.1 0 0.2"))], "l"
+    for name, (axis, place) in ((name, FOREARM[name]) for name in joints):
+        body = f'<axis xyz="{axis}"/>' + LIMIT
+        parts += [
+            joint(name, last, f"{name}_link", "revolute", body, f'<origin xyz="{place or "0 0 0"}"/>'),
+            link(f"{name}_link", inertial(1.0, "0 0.1 0.2")),
+        ]
+        last = f"{name}_link"
+    parts += [joint("tip", last, "ee", "fixed", "", f'<origin xyz="{tip} 0 0"/>'), link("ee")]
+    return nmm.load(write(folder / "robot.urdf", urdf(*parts)), platform=platform)
+
+
+def test_a_sum_of_lengths_is_no_condition_on_the_configuration(tmp_path: Path) -> None:
+    claim = singular_set(symbolic(_forearm(tmp_path, 0.1, "fixed"), Position("ee")))
+    assert len(claim.families) == 2
+    assert claim.statement.endswith("for all nonzero x_elbow, x_roll, x_ee, x_roll + x_ee")
+    assert not any("x_roll + x_ee = 0" in step for step in claim.steps)
+
+
+@pytest.mark.parametrize("platform", ["fixed", "unicycle"])
+@pytest.mark.parametrize("tip", [0.1, -0.2])
+def test_a_sum_of_lengths_is_zero_where_it_is_for_this_robot(
+    tip: float, platform: str, rng: np.random.Generator, tmp_path: Path
+) -> None:
+    """With the tip back in the elbow an arm has two joints that move it: its rank is 2, and 3 on wheels."""
+    robot = _forearm(tmp_path, tip, platform)
+    analysis = symbolic(robot, Position("ee"))
+    claim = singular_set(analysis)
+    assert claim.proved
+    assert ("for x_roll + x_ee = 0" in claim.statement) == (tip < 0.0)
+    J = analysis.functions().J
+    expected = 2 if (tip, platform) == (-0.2, "fixed") else 3
+    assert claim.statement.startswith("J has rank below 3 everywhere") == (expected == 2)
+    anywhere = rng.uniform(-3, 3, (20, robot.n))
+    assert (np.linalg.matrix_rank(J(anywhere), tol=1e-9) == expected).all()
+    for family in claim.families:
+        for q in _zeros(analysis, family, rng):
+            assert np.linalg.svd(J(q))[1][2] < 1e-9
+    assert bool(claim.families) == (expected == 3)
+
+
+@pytest.mark.parametrize("tip", [0.1, -0.2])
+def test_a_minor_that_is_a_sum_of_lengths(tip: float, tmp_path: Path) -> None:
+    analysis = symbolic(_forearm(tmp_path, tip, "unicycle", ["roll"]), Position("ee", "xy"))
+    claim, bound = singular_set(analysis), never_zero(analysis)["v", "omega"]
+    assert str(bound) == "Δ[v, omega] vanishes nowhere exactly when x_ee + x_roll != 0"
+    assert bound.holds(analysis.geometry) is (tip > 0.0)
+    assert claim.statement == (
+        "J has rank 2 at every configuration, for all nonzero x_roll + x_ee"
+        if tip > 0.0
+        else "J has rank below 2 everywhere, for x_roll + x_ee = 0"
+    )
+
+
+def _zeros(analysis: Any, family: Any, rng: np.random.Generator) -> list[Any]:
+    """Configurations where all expressions vanish, by least squares from random starts."""
+    lengths = {analysis.symbols[name]: value for name, value in analysis.geometry.items()}
+    values = sympy.lambdify([list(analysis.q.values())], [one.subs(lengths) for one in family])
+
+    def residuals(q: Any) -> Any:
+        return np.array(values(q), dtype=float)
+
+    found: list[Any] = []
+    for q0 in rng.uniform(-3, 3, (8, len(analysis.q))):
+        solution = least_squares(residuals, q0, xtol=1e-15, ftol=1e-15, gtol=1e-15)
+        if np.max(np.abs(solution.fun)) < 1e-12:
+            found.append(solution.x)
+    assert found
+    return found

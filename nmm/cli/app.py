@@ -48,7 +48,9 @@ EllipsoidsOption = Annotated[
 EllipsoidScaleOption = Annotated[
     float | None,
     typer.Option(
-        metavar="M", help="Draw the ellipsoids with M metres for each m/s.", show_default="a readable one"
+        metavar="M",
+        help="Draw the ellipsoids, with M metres for each m/s.",
+        show_default="a readable one",
     ),
 ]
 

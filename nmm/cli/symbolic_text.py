@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 #: Reasons for more minors than these are not given.
 MANY_REASONS = 12
+#: How the line begins that says that where J loses rank was not decided.
+NOT_DECIDED = "Not decided: "
 
 
 def formulas(given: Studied) -> tuple[SymbolicAnalysis | None, str]:
@@ -53,13 +55,15 @@ def show_formulas(given: Studied, analysis: SymbolicAnalysis, chosen: Sequence[C
     body = "\n".join(formulas)
     for line in (*header(given), *_geometry(analysis, body)):
         say(line)
-    if re.search(r"\b[cs]\d", body):
-        say("c1 is cos(q1), s12 is sin(q1 + q2)")
+    abbreviations = _abbreviations(analysis, body)
+    if abbreviations:
+        say(abbreviations)
     say()
     for line in formulas:
         say(line)
     say("what follows")
-    for line in _claims(given, analysis):
+    # That the main question was not decided comes first: no one looks for it below the proofs.
+    for line in sorted(_claims(given, analysis), key=lambda line: not line.startswith(NOT_DECIDED)):
         say(f"  {line}")
     for note in analysis.notes:
         say(f"note: {note}")
@@ -74,6 +78,22 @@ def _only(analysis: SymbolicAnalysis, chosen: Sequence[Columns] | None) -> Symbo
     return replace(
         analysis, short_forms={name: form for name, form in analysis.short_forms.items() if name in wanted}
     )
+
+
+def _abbreviations(analysis: SymbolicAnalysis, body: str) -> str:
+    """ "c1 is cos(q1), s12 is sin(q1 + q2)": of names that occur, a short one and one of a sum."""
+    found = sorted(
+        set(re.findall(r"\b[cs]\d+\b", body)) - set(analysis.symbols), key=lambda name: (len(name), name)
+    )
+    single = [name for name in found if len(name) == 2]
+    sums = sorted(
+        (name for name in found if len(name) > 2), key=lambda name: (len(name), name[0] != "s", name)
+    )
+    said = []
+    for name in (*single[:1], *sums[:1]):
+        kind = "cos" if name[0] == "c" else "sin"
+        said.append(f"{name} is {kind}({' + '.join(f'q{digit}' for digit in name[1:])})")
+    return ", ".join(said)
 
 
 def _geometry(analysis: SymbolicAnalysis, body: str) -> Iterator[str]:
@@ -127,8 +147,9 @@ def _claims(given: Studied, analysis: SymbolicAnalysis) -> Iterator[str]:
             pass
         else:
             yield from _claim(without, f"With {first} = 0 instead: ")
-            key = first if given.scenario is None else f"robot.arguments.{first}"
-            yield f"  --set {key}=0 has the formulas"
+            if without.proved:
+                key = first if given.scenario is None else f"robot.arguments.{first}"
+                yield f"  --set {key}=0 has the formulas"
     yield from _minors(analysis)
 
 
@@ -175,7 +196,10 @@ def _in_minors(analysis: SymbolicAnalysis) -> list[str]:
 
 def _claim(claim: Claim, given: str = "") -> Iterator[str]:
     """A statement, what it means for single joints, and the proof."""
-    yield f"{given}{claim.statement[0].upper()}{claim.statement[1:]}."
+    if not claim.proved:
+        yield f"{claim.statement[0].upper()}{claim.statement[1:]}; --search looks for it with numbers."
+        return
+    yield f"{given}{claim.statement}."
     values = [_value(condition) for condition in claim.conditions]
     if values and all(values):
         each = ", each" if len(values) > 1 else ","
@@ -222,7 +246,9 @@ def _minors(analysis: SymbolicAnalysis) -> Iterator[str]:
         yield f"So {listed([block(columns) for columns in serving])} {serves} RG everywhere."
     open_ = [columns for columns in nonzero if columns not in reasons and columns not in bounds]
     if open_:
-        yield f"Not decided whether they vanish: {', '.join(map(minor, open_))}."
+        few = len(open_) <= MANY_REASONS
+        which = listed([minor(columns) for columns in open_]) if few else f"{len(open_)} minors"
+        yield f"It is not decided whether {which} vanish{'es' if len(open_) == 1 else ''} somewhere."
 
 
 def _bound(analysis: SymbolicAnalysis, bound: Bound) -> Iterator[str]:
@@ -243,6 +269,7 @@ def _bound(analysis: SymbolicAnalysis, bound: Bound) -> Iterator[str]:
     reasons = [
         f"the terms beside {_plain(analysis, left)} reach at most {_plain(analysis, right)}"
         for left, right in bound.requires
+        if right != 0
     ]
     if reasons:
         yield from _because([f"cosines and sines are at most 1, so that {'; '.join(reasons)}"])
@@ -250,6 +277,8 @@ def _bound(analysis: SymbolicAnalysis, bound: Bound) -> Iterator[str]:
 
 def _larger(analysis: SymbolicAnalysis, a: Any, b: Any) -> str:
     left = _plain(analysis, a)
+    if b == 0:
+        return f"{left} != 0"
     return f"{left if left in analysis.definitions else f'|{left}|'} > {_plain(analysis, b)}"
 
 

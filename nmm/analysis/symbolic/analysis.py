@@ -133,7 +133,7 @@ class SymbolicAnalysis:
         ------
         InputError : a name that is no length of `geometry`, or one that J is divided by
         """
-        with _reason(self.robot, len(self.row_names)):
+        with _reason(self.robot, len(self.row_names), self.derivation.ring):
             return _assembled(self.robot, self.row_names, self.derivation.without(lengths))
 
     def functions(self) -> SymbolicFunctions:
@@ -192,20 +192,26 @@ def symbolic(
         arguments = argument_names(robot, frames_of(every)) if geometry == "symbols" else {}
     lengths = Geometry(Ring(BUDGET), arguments, demanded, geometry == "numbers", robot.q_names)
     names = tuple(row.name for row in stack.rows(robot))
-    with _reason(robot, len(names)):
+    with _reason(robot, len(names), lengths.ring):
         return _assembled(robot, names, derived(robot, stack, lengths))
 
 
 @contextmanager
-def _reason(robot: Robot, s: int) -> Iterator[None]:
-    """`TooLarge` says of what."""
+def _reason(robot: Robot, s: int, ring: Ring) -> Iterator[None]:
+    """`TooLarge` says of what, and why."""
     try:
         yield
-    except TooLarge as error:
+    except TooLarge:
+        angles = zip(ring.names, ring.is_angle, strict=True)
+        general = [name for name, angle in angles if angle and name not in robot.q_names]
+        why = "so many joints"
+        if general:
+            few = f"{', '.join(general[:3])}{', ...' if general[3:] else ''}"
+            why += f" with general angles between their axes ({few})"
         raise TooLarge(
             f"symbolic: too large: {robot.name} with {robot.n_u} inputs and a task of {s} rows "
-            f"({math.comb(robot.n_u, s)} minors) takes {error}; use the numeric analysis, a task of fewer "
-            "rows, or lock joints"
+            f"({math.comb(robot.n_u, s)} minors): {why} make formulas too long to be read; use the numeric "
+            "analysis, a task of fewer rows, or lock joints"
         ) from None
 
 
@@ -224,7 +230,7 @@ def _assembled(robot: Robot, row_names: tuple[str, ...], derivation: Derivation)
         key: _quotient(numbers[picked], [*rows, *(columns[j] for j in picked)])
         for picked, key in keys.items()
     }
-    names, short = named(list(minors.values()), {*ring.names, *robot.q_names})
+    names, short = named(list(minors.values()), {*ring.names, *robot.q_names}, derivation.lengths)
     symbols = {name: sympy.Symbol(name, real=True) for name in (*robot.q_names, *ring.names, *names)}
     meanings = {one.name: auxiliary_written(one, symbols) for one in derivation.auxiliaries}
     turns = {value.name: value for value in derivation.values if isinstance(value, Turn)}

@@ -10,6 +10,7 @@ from typing import Any
 
 from nmm.analysis.symbolic.analysis import SymbolicAnalysis
 from nmm.analysis.symbolic.claims import Claim
+from nmm.analysis.symbolic.constants import NOTHING, is_constant
 from nmm.analysis.symbolic.form import expanded
 from nmm.analysis.symbolic.tree import Product, Sum, Symbol, Trig, text, to_sympy
 from nmm.analysis.symbolic.words import condition_text, minor_name
@@ -22,7 +23,7 @@ class Bound:
     Attributes
     ----------
     columns : the minor's
-    requires : pairs (a, b) of expressions; |a| > b has to hold for each
+    requires : pairs (a, b) of expressions; |a| > b has to hold for each; b is 0 for a sum of lengths alone
     nonzero : lengths that must not be 0
     exact : whether the minor vanishes somewhere when the conditions do not hold
     """
@@ -33,7 +34,7 @@ class Bound:
     exact: bool = False
 
     def __str__(self) -> str:
-        parts = [f"|{a}| > {_bars(b)}" for a, b in self.requires]
+        parts = [f"|{a}| > {_bars(b)}" if b != 0 else f"{a} != 0" for a, b in self.requires]
         parts += [f"{name} != 0" for name in self.nonzero]
         return f"{minor_name(self.columns)} vanishes nowhere" + (
             f" {'exactly when' if self.exact else 'when'} {' and '.join(parts)}" if parts else ""
@@ -49,7 +50,7 @@ class Bound:
             for pair in self.requires
         ]
         nonzero = all(values[name] != 0.0 for name in self.nonzero)
-        return nonzero and all(abs(a) > b for a, b in numbers)
+        return nonzero and all(abs(a) > (b or NOTHING) for a, b in numbers)
 
 
 def _bars(expression: Any) -> str:
@@ -130,6 +131,8 @@ def never_zero(analysis: SymbolicAnalysis) -> dict[tuple[str, ...], Bound]:
     can reach, cosines and sines being at most 1; where each of them can be reached alone, it vanishes
     somewhere otherwise, too. A minor with a cosine or sine as a factor is not listed.
     """
+    import sympy
+
     found = {}
     for columns, form in analysis.minor_forms.items():
         if not form.number:
@@ -140,6 +143,10 @@ def never_zero(analysis: SymbolicAnalysis) -> dict[tuple[str, ...], Bound]:
                 continue
             if isinstance(factor, Symbol) and factor.name in analysis.geometry:
                 nonzero.append(factor.name)
+                continue
+            if is_constant(factor, analysis.geometry):
+                alone = Product(Fraction(1), ((factor, 1),))
+                requires.append((to_sympy(alone, analysis.symbols), sympy.Integer(0)))
                 continue
             condition = _condition(factor, analysis) if isinstance(factor, Sum) else None
             if condition is None:

@@ -8,6 +8,7 @@ from fractions import Fraction
 from typing import Any
 
 from nmm.analysis.symbolic.analysis import SymbolicAnalysis
+from nmm.analysis.symbolic.constants import constants
 from nmm.analysis.symbolic.families import Cases, TooMany
 from nmm.analysis.symbolic.form import factored
 from nmm.analysis.symbolic.groebner import Undecided
@@ -42,6 +43,8 @@ class Claim:
 def singular_set(analysis: SymbolicAnalysis, zero: Sequence[str] = ()) -> Claim:
     """Where J loses rank, for all values of the lengths that are not zero.
 
+    A factor of a minor that depends on lengths alone counts as zero, or as not zero, as this robot's own is.
+
     All minors vanish where one factor of each does. The cases are gone through; one is impossible when 1 is
     in the ideal of its factors and cos² + sin² - 1, lengths divided out (Nullstellensatz, over the complex
     numbers, hence over the real ones), and ends when each minor has a factor that vanishes all over it.
@@ -64,18 +67,28 @@ def singular_set(analysis: SymbolicAnalysis, zero: Sequence[str] = ()) -> Claim:
         return Claim(
             f"J has rank below {s} everywhere{gone}", True, ("every maximal minor is identically 0",)
         )
-    lengths, below = _nonzero(analysis, forms)
+    nonzero, below, zeros = _quantities(analysis, list(forms.values()))
+    gone_minors = [columns for columns, form in forms.items() if _has(form, zeros)]
+    steps = [f"{', '.join(map(minor_name, gone_minors))} = 0, as {_zero_text(zeros)}"] if gone_minors else []
+    forms = {columns: form for columns, form in forms.items() if columns not in gone_minors}
+    if not forms:
+        where = _where(analysis, [], below, zeros)
+        return Claim(f"J has rank below {s} everywhere{where}", True, tuple(steps))
     try:
-        nowhere = _nowhere(list(forms.values()), lengths, below)
+        nowhere = _nowhere(list(forms.values()), nonzero, below, zeros)
         if nowhere is not None:
-            where = _where(analysis, nowhere, below)
+            where = _where(analysis, nowhere, below, zeros)
             step = "1 is a combination of the minors and cos^2 + sin^2 - 1"
-            step += f", where {', '.join(nowhere)} may be divided by" if nowhere else ""
-            return Claim(f"J has rank {s} at every configuration{where}", True, (step,))
-        cases = _cases(analysis, forms, lengths, below)
+            step += f", where {', '.join(map(text, nowhere))} may be divided by" if nowhere else ""
+            step += " (Nullstellensatz)"
+            return Claim(f"J has rank {s} at every configuration{where}", True, (*steps, step))
+        cases = _cases(analysis, forms, nonzero, below, zeros)
     except (Undecided, TooMany):
-        return Claim("not decided: the minors are too large for a proof", False, ())
-    where = _where(analysis, lengths, below)
+        return Claim(
+            f"not decided: where J loses rank{gone}, as its minors are too large for a proof", False, ()
+        )
+    cases.steps[:0] = steps
+    where = _where(analysis, nonzero, below, zeros)
     families = tuple(
         tuple(to_sympy(factor, analysis.symbols) for factor in family) for family in cases.families
     )
@@ -96,38 +109,47 @@ def singular_set(analysis: SymbolicAnalysis, zero: Sequence[str] = ()) -> Claim:
     return Claim(statement, True, tuple(cases.steps), _as_one(families), families)
 
 
-def _nonzero(
-    analysis: SymbolicAnalysis, forms: dict[tuple[str, ...], Product]
-) -> tuple[list[str], list[Product]]:
-    """Names of the lengths in the minors, auxiliary ones too, and what else J is divided by."""
+def _quantities(
+    analysis: SymbolicAnalysis, forms: list[Product]
+) -> tuple[list[Product], list[Product], list[Product]]:
+    """What is not 0: lengths, auxiliary ones too, and sums of them; what else J is divided by; what is 0."""
     ring = analysis.derivation.ring
     lengths = {*analysis.geometry, *analysis.definitions}
     used = set().union(*(numerator.variables() for numerator in analysis.numerators.values()))
+    nonzero, zero = constants(forms, analysis)
     below: dict[Product, None] = {}
     for denominator in analysis.denominators:
         used |= denominator.variables()
         for factor, _ in factored(denominator).factors:
-            if not isinstance(factor, Symbol):
-                below[Product(Fraction(1), ((factor, 1),))] = None
+            alone = Product(Fraction(1), ((factor, 1),))
+            if not isinstance(factor, Symbol) and alone not in nonzero:
+                below[alone] = None
     names = [ring.names[i] for i in sorted(used) if not ring.is_angle[i] and ring.names[i] in lengths]
-    return names, list(below)
+    return [*map(_symbol, names), *nonzero], list(below), [one for one in zero if one not in below]
 
 
-def _nowhere(forms: list[Product], lengths: list[str], below: list[Product]) -> list[str] | None:
-    """Lengths that must not be 0 for the minors to have no common zero; None when they may have one."""
+def _has(form: Product, factors: list[Product]) -> bool:
+    """Whether some of these are factors of a product."""
+    return any(Product(Fraction(1), ((factor, 1),)) in factors for factor, _ in form.factors)
 
-    def empty(nonzero: list[str]) -> bool:
-        zeros = Zeros(forms, [*(_symbol(name) for name in nonzero), *below], _BRIEF)
+
+def _nowhere(
+    forms: list[Product], nonzero: list[Product], below: list[Product], zero: list[Product]
+) -> list[Product] | None:
+    """What must not be 0 for the minors to have no common zero; None when they may have one."""
+
+    def empty(nonzero: list[Product]) -> bool:
+        zeros = Zeros(forms, [*nonzero, *below], _BRIEF, zero)
         return zeros.within(zeros.everywhere, *forms).is_one
 
     try:
-        if not empty(lengths):
+        if not empty(nonzero):
             return None
     except Undecided:
         return None
-    needed = list(lengths)
-    for name in reversed(lengths):
-        fewer = [one for one in needed if one != name]
+    needed = list(nonzero)
+    for quantity in reversed(nonzero):
+        fewer = [one for one in needed if one != quantity]
         try:
             needed = fewer if empty(fewer) else needed
         except Undecided:
@@ -138,21 +160,18 @@ def _nowhere(forms: list[Product], lengths: list[str], below: list[Product]) -> 
 def _cases(
     analysis: SymbolicAnalysis,
     forms: dict[tuple[str, ...], Product],
-    lengths: list[str],
+    nonzero: list[Product],
     below: list[Product],
+    zero: list[Product],
 ) -> Cases:
     """The case distinction, gone through."""
     minors = []
     for columns, form in forms.items():
-        factors = [
-            Product(Fraction(1), ((factor, 1),))
-            for factor, power in form.factors
-            if power > 0 and not (isinstance(factor, Symbol) and factor.name in lengths)
-        ]
+        factors = [Product(Fraction(1), ((factor, 1),)) for factor, power in form.factors if power > 0]
         said = f"{minor_name(columns)} = {text(analysis.short_forms[columns])}"
-        minors.append((said, [factor for factor in factors if factor not in below]))
-    nonzero = [*(_symbol(name) for name in lengths), *below]
-    cases = Cases(Zeros(list(forms.values()), nonzero), minors, dict(analysis.named_forms))
+        minors.append((said, [factor for factor in factors if factor not in [*nonzero, *below]]))
+    zeros = Zeros(list(forms.values()), [*nonzero, *below], zero=zero)
+    cases = Cases(zeros, minors, dict(analysis.named_forms))
     cases.explore()
     return cases
 
@@ -161,14 +180,26 @@ def _symbol(name: str) -> Product:
     return Product(Fraction(1), ((Symbol(name), 1),))
 
 
-def _where(analysis: SymbolicAnalysis, nonzero: list[str], below: list[Product]) -> str:
-    """For which lengths a statement is made."""
-    zero = analysis.derivation.zero
-    parts = [f"{' = '.join(zero)} = 0"] if zero else []
-    parts += [f"all nonzero {', '.join(nonzero)}"] if nonzero else []
+def _zero_text(zero: list[Product]) -> str:
+    return " and ".join(f"{condition_text(one, {})} = 0" for one in zero)
+
+
+def _where(
+    analysis: SymbolicAnalysis, nonzero: list[Product], below: list[Product], zero: list[Product]
+) -> str:
+    """For which lengths a statement is made, and where: an auxiliary quantity depends on q."""
+    gone = analysis.derivation.zero
+    moving = [_symbol(name) for name in analysis.definitions]
+    lengths = ", ".join(condition_text(one, {}) for one in nonzero if one not in moving)
+    parts = [f"{' = '.join(gone)} = 0"] if gone else []
+    parts += [_zero_text(zero)] if zero else []
+    parts += [f"all nonzero {lengths}"] if lengths else []
+    elsewhere = " and ".join(f"{text(one)} != 0" for one in nonzero if one in moving)
     exists = " and ".join(f"{condition_text(one, analysis.named_forms)} != 0" for one in below)
-    return (f", for {' and '.join(parts)}" if parts else "") + (
-        f", where J exists ({exists})" if exists else ""
+    return (
+        (f", for {' and '.join(parts)}" if parts else "")
+        + (f", wherever {elsewhere}" if elsewhere else "")
+        + (f", where J exists ({exists})" if exists else "")
     )
 
 

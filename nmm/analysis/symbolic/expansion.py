@@ -57,7 +57,7 @@ class Ring:
         """Count work; `TooLarge` when none is left."""
         self._left -= products
         if self._left < 0:
-            raise TooLarge(f"more than {self.budget} products of terms")
+            raise TooLarge(f"formulas too long to be read (more than {self.budget} products of terms)")
 
     def number(self, value: Fraction | int) -> Expansion:
         """A constant."""

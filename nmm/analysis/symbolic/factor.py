@@ -80,8 +80,8 @@ def _polynomial_factors(value: Expansion) -> list[tuple[Expansion, int]]:
     size *= len({tuple((i, n) for i, n in key if i in scalars) for key in value.terms})
     if size > _LARGEST:
         raise TooLarge(
-            f"a formula of up to {size} terms in half angles, with {len(angles)} angles and {len(scalars)} "
-            f"lengths (limit {_LARGEST})"
+            f"formulas too long to be read ({len(angles)} angles and {len(scalars)} lengths in one: up to "
+            f"{size} terms in half angles, limit {_LARGEST})"
         )
     ring.spend(size)
     if not angles and not scalars:

@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from fractions import Fraction
 from math import gcd
 
+from nmm.analysis.symbolic.constants import is_constant
 from nmm.analysis.symbolic.expansion import Expansion, Gaussian, Key, Ring
 from nmm.analysis.symbolic.factor import factors_of
 from nmm.analysis.symbolic.tree import ZERO, Node, Product, Sum, Symbol, Trig
@@ -62,8 +63,13 @@ def expanded(product: Product, ring: Ring) -> Expansion:
     return total
 
 
-def named(products: Sequence[Product], taken: Collection[str]) -> tuple[dict[str, Product], list[Product]]:
-    """Names, none of those taken, for sums that several products have as a factor; the products in them."""
+def named(
+    products: Sequence[Product], taken: Collection[str], lengths: Collection[str]
+) -> tuple[dict[str, Product], list[Product]]:
+    """Names, none of those taken, for sums that several products have as a factor; the products in them.
+
+    Sums of lengths alone come last.
+    """
     names: dict[str, Product] = {}
     products = list(products)
     for name in FACTOR_NAMES:
@@ -72,10 +78,14 @@ def named(products: Sequence[Product], taken: Collection[str]) -> tuple[dict[str
         counts: Counter[Sum] = Counter()
         for product in products:
             counts.update(set(_sums(product)))
-        often = [(count, _size(node), node) for node, count in counts.items() if count >= _OFTEN]
+        often = [
+            (not is_constant(node, lengths), count, _size(node), node)
+            for node, count in counts.items()
+            if count >= _OFTEN
+        ]
         if not often:
             break
-        node = max(often, key=lambda entry: entry[:2])[2]
+        node = max(often, key=lambda entry: entry[:3])[3]
         names[name] = Product(Fraction(1), ((node, 1),))
         products = [_replaced(product, node, Symbol(name)) for product in products]
     return names, products

@@ -29,10 +29,15 @@ class Zeros:
     nonzero : products that do not vanish
     work : products of terms that all answers together may take, after which they raise `Undecided`; if
         none is given, some seconds' worth
+    zero : products of lengths that vanish
     """
 
     def __init__(
-        self, products: Iterable[Product], nonzero: Sequence[Product], work: int | None = None
+        self,
+        products: Iterable[Product],
+        nonzero: Sequence[Product],
+        work: int | None = None,
+        zero: Sequence[Product] = (),
     ) -> None:
         import sympy
         from sympy.polys.orderings import grevlex
@@ -40,7 +45,7 @@ class Zeros:
 
         waves: dict[Angle, None] = {}
         scalars: dict[str, None] = {}
-        for product in (*products, *nonzero):
+        for product in (*products, *nonzero, *zero):
             _collect(product, waves, scalars)
         self._seen = _in_few_angles(list(waves))
         count = max(map(len, self._seen.values()), default=0)
@@ -61,7 +66,8 @@ class Zeros:
             else:
                 inverse = inverse * f
         divided = [] if inverse == 1 else [1 - w * inverse]
-        self.everywhere = Basis((), indices).with_more([*circles, *divided], self._work)
+        vanishing = [self.polynomial(product) for product in zero]
+        self.everywhere = Basis((), indices).with_more([*circles, *divided, *vanishing], self._work)
 
     def within(self, basis: Basis, *products: Product) -> Basis:
         """The part of a set in which more products vanish."""
