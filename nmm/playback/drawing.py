@@ -13,6 +13,7 @@ from nmm.playback.encoding import encode, packed
 from nmm.playback.keyframes import Keyframes
 from nmm.playback.placements import Placements, position_and_quaternion
 from nmm.playback.shapes import shapes
+from nmm.playback.sticks import appearance
 from nmm.robot import Robot
 
 Rgb = tuple[float, float, float]
@@ -47,7 +48,7 @@ class Drawing:
 
 
 class DrawnRobot:
-    """A robot in the page: a node for each joint, in its parent's, and the visuals below the joints.
+    """A robot in the page: a node for each joint, in its parent's, and below the joints what is seen.
 
     Attributes
     ----------
@@ -66,12 +67,13 @@ class DrawnRobot:
         self.paths = below[1:]
         # A fixed base stands where the robot's own node is.
         self.root = below[model.getJointId("theta") if robot.platform.n_p else 0]
+        seen = appearance(robot).shapes.geometryObjects
         self.visuals = [
             f"{below[geometry.parentJoint]}/visual {i} {segment(geometry.name)}"
-            for i, geometry in enumerate(robot.visual_model.geometryObjects)
+            for i, geometry in enumerate(seen)
         ]
         self._drawing = drawing
-        for at, geometry in zip(self.visuals, robot.visual_model.geometryObjects, strict=True):
+        for at, geometry in zip(self.visuals, seen, strict=True):
             drawing.transform(at, np.array(geometry.placement.homogeneous))
             for k, shape in enumerate(shapes(geometry)):
                 color = _mixed(shape.color[:3], tint)

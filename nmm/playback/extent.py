@@ -9,6 +9,7 @@ import pinocchio as pin
 
 from nmm.arrays import Array
 from nmm.playback.placements import Placements
+from nmm.playback.sticks import appearance
 from nmm.robot import Robot
 
 _CORNERS = np.array(list(itertools.product((0, 1), repeat=3)))
@@ -22,7 +23,7 @@ def corners(boxes: Array) -> Array:
 def robot_boxes(robot: Robot, q: Array, wheels: Array) -> Array:
     """Boxes along the world's axes around everything visible, (K, 2, 3) m, for q (K, n) and wheels (K, D)."""
     placements = Placements(robot)
-    model, visuals = robot.display_model, robot.visual_model
+    model, visuals = robot.display_model, appearance(robot).shapes
     data, geometry_data = model.createData(), visuals.createData()
     local = {
         i: box for i, geometry in enumerate(visuals.geometryObjects) if (box := _local(geometry)) is not None
@@ -37,7 +38,7 @@ def robot_boxes(robot: Robot, q: Array, wheels: Array) -> Array:
             for i, box in local.items()
             for placement in [geometry_data.oMg[i]]
         ]
-        # A robot without visuals is as large as its skeleton.
+        # A robot of shapes without bounds is as large as its skeleton.
         everything = np.vstack(points or [data.oMi[i].translation for i in range(model.njoints)])
         boxes[k] = everything.min(axis=0), everything.max(axis=0)
     return boxes

@@ -20,6 +20,7 @@ from nmm.playback.page import socket_page
 from nmm.playback.rolling import Rolling
 from nmm.playback.scene import live_scene, playback_scene
 from nmm.playback.server import PageServer
+from nmm.playback.sticks import appearance
 from nmm.robot import Robot
 
 if TYPE_CHECKING:
@@ -61,15 +62,23 @@ def play(
     commands = playback_scene(motions, title=heading, ghosts=ghosts, autoplay=True, ellipsoids=ellipsoids)
     hello = [encode(command) for command in commands]
     server = PageServer(lambda host: socket_page(heading, host), hello, port=port)
-    serve(server, "Playing", open_browser=open_browser, stop=stop)
+    serve(server, "Playing", [motion.robot for motion in motions], open_browser=open_browser, stop=stop)
 
 
 def serve(
-    server: PageServer, what: str, *, open_browser: bool = True, stop: threading.Event | None = None
+    server: PageServer,
+    what: str,
+    robots: Sequence[Robot],
+    *,
+    open_browser: bool = True,
+    stop: threading.Event | None = None,
 ) -> None:
-    """Print where a server's page is, and return at Ctrl-C or when `stop` is set, with the server closed."""
+    """Print where a server's page is and which links of the robots are drawn without visuals, and return at
+    Ctrl-C or when `stop` is set, with the server closed."""
     try:
         print(f"{what} at {server.url} (Ctrl-C ends it)", flush=True)
+        for note in dict.fromkeys(note for robot in robots for note in appearance(robot).told()):
+            print(note, flush=True)
         if open_browser:
             _open(server.url)
         stop = stop or threading.Event()

@@ -50,4 +50,4 @@ def view(
         [encode(command) for command in commands],
         port=port,
     )
-    serve(server, "Showing the robot", open_browser=open_browser, stop=stop)
+    serve(server, "Showing the robot", [robot], open_browser=open_browser, stop=stop)

@@ -1,0 +1,264 @@
+"""What is seen of a robot: its visual shapes, and for bodies without any their collision shapes or sticks.
+
+A body is everything that moves with one joint. Quick experiments write URDFs of bare joints: those robots
+are drawn as a stick figure, from each joint to the next. A body with a visual looks as its file says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from nmm.arrays import Array
+from nmm.errors import RobotError
+from nmm.loading.joint_kinds import axis, is_revolute, kind
+from nmm.loading.provenance import parts_of
+from nmm.robot import Robot, Wheel
+
+fcl = pin.hppfcl
+
+GREY, DARK = (0.62, 0.65, 0.69, 1.0), (0.25, 0.27, 0.30, 1.0)
+#: Radius of a stick over the usual length of one, and its bounds, m; a joint's ball, a rail over a stick.
+SLIM, THINNEST, THICKEST, BALL, RAIL = 0.05, 0.002, 0.025, 1.8, 0.5
+#: Radius of a root link without shapes and without wheels, m; of a fixed one no more than this of the arm.
+BASE, FOOT = 0.2, 0.15
+#: Points nearer than this are one, m, and a slider's way beyond this is none.
+SAME, LONGEST = 1e-6, 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class Appearance:
+    """What is drawn of a robot.
+
+    Attributes
+    ----------
+    shapes : on `display_model`; `visual_model` itself where every body has a visual
+    solids, sticks : the links that are drawn by their collision shapes, and as sticks
+    """
+
+    shapes: pin.GeometryModel
+    solids: tuple[str, ...] = ()
+    sticks: tuple[str, ...] = ()
+
+    def told(self) -> list[str]:
+        """A sentence for each way in which links are drawn that have no visuals."""
+        notes = []
+        if self.solids:
+            notes.append(f"links without visuals are drawn by their collision shapes: {_listed(self.solids)}")
+        if self.sticks:
+            notes.append(f"links without shapes are drawn as sticks: {_listed(self.sticks)}")
+        return notes
+
+
+def appearance(robot: Robot) -> Appearance:
+    """What to draw of a robot; its models stay as they are. Sticks come after the visuals."""
+    model, visuals = robot.display_model, robot.visual_model
+    seen = {int(geometry.parentJoint) for geometry in visuals.geometryObjects}
+    bare = [joint for joint in range(_root(robot), model.njoints) if joint not in seen]
+    if not bare:
+        return Appearance(visuals)
+    solids = [geometry for geometry in _solids(robot) if geometry.parentJoint in bare]
+    solid = {int(geometry.parentJoint) for geometry in solids}
+    figure = _StickFigure(robot, [joint for joint in bare if joint not in solid])
+    drawn = list(figure.shapes())
+    if not solids and not drawn:  # links without length between others, at a wrist's crossing axes
+        return Appearance(visuals)
+    shapes = visuals.copy()
+    for geometry in (*solids, *drawn):
+        shapes.addGeometryObject(geometry)
+    sticks = {int(geometry.parentJoint) for geometry in drawn}
+    return Appearance(shapes, _links(robot, solid), _links(robot, sticks.intersection(figure.bare)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Plate:
+    """A root link: its middle (3,), half its sides, or its radius twice, (2,), thickness; m."""
+
+    middle: Array
+    half: Array
+    thick: float
+    round: bool
+
+
+def _plate(robot: Robot) -> _Plate:
+    """A disc through wheels that are equally far from the reference point, a box between others, and a disc
+    on the ground where the root link has none."""
+    wheels = [wheel for wheel in robot.wheels if wheel.carrier == "theta"]
+    if not wheels:
+        return _Plate(np.array([0.0, 0.0, 0.1 * BASE]), np.full(2, BASE), 0.2 * BASE, round=True)
+    centers = np.array([wheel.center for wheel in wheels])
+    height, thick = float(centers[:, 2].mean()), 0.5 * min(wheel.radius for wheel in wheels)
+    away = np.linalg.norm(centers[:, :2], axis=1)
+    if np.ptp(away) <= 0.1 * away.max():
+        # One wheel right below the reference point is as far from it as nothing.
+        radius = max(away.max(), thick)
+        return _Plate(np.array([0.0, 0.0, height]), np.full(2, radius), thick, round=True)
+    points = np.vstack([centers[:, :2], np.zeros(2)])
+    low, high = points.min(axis=0), points.max(axis=0)
+    half = 0.5 * np.maximum(high - low, 0.25 * np.max(high - low))
+    return _Plate(np.array([*(0.5 * (low + high)), height]), half, thick, round=False)
+
+
+class _StickFigure:
+    """The shapes that stand for bodies without any."""
+
+    def __init__(self, robot: Robot, bare: list[int]) -> None:
+        self.robot, self.model, self.bare = robot, robot.display_model, bare
+        self.root, self.plate = _root(robot), _plate(robot)
+        self.wheels = {self.model.getJointId(wheel.joint): wheel for wheel in robot.wheels}
+        self.lines = {joint: list(self._lines(joint)) for joint in bare if joint not in self.wheels}
+        lengths = [
+            float(np.linalg.norm(end - start))
+            for joint, lines in self.lines.items()
+            for start, end in lines
+            if joint != self.root or not robot.platform.n_p
+        ]
+        usual = float(np.median(lengths)) if lengths else BASE
+        self.radius = float(np.clip(SLIM * usual, THINNEST, THICKEST))
+        self.reach = sum(lengths)
+
+    def shapes(self) -> Iterator[pin.GeometryObject]:
+        """Everything, joint by joint."""
+        for joint in self.bare:
+            name = str(self.model.names[joint])
+            if joint in self.wheels:
+                yield self._tyre(joint, self.wheels[joint])
+                continue
+            for k, (start, end) in enumerate(self.lines[joint]):
+                yield _stick(f"stick {k} of {name}", joint, start, end, self.radius)
+            if joint == self.root:
+                yield self._base()
+                continue
+            parent = int(self.model.parents[joint])
+            # Links without length between others that have shapes stay unseen.
+            if not self.lines[joint] and not self.lines.get(parent):
+                continue
+            if is_revolute(self.model.joints[joint]):
+                ball = fcl.Sphere(BALL * self.radius)
+                yield _shape(f"joint {name}", joint, pin.SE3.Identity(), ball)
+            elif (way := self._way(joint)) is not None:
+                yield _stick(f"rail of {name}", parent, *way, RAIL * self.radius)
+
+    def _lines(self, joint: int) -> Iterator[tuple[Array, Array]]:
+        """From the joint's origin to its children's and to the farthest frame, (3,) each, in its frame."""
+        model = self.model
+        ends = [
+            np.array(model.jointPlacements[child].translation)
+            for child in range(joint + 1, model.njoints)
+            if model.parents[child] == joint
+        ]
+        carried = [
+            np.array(frame.placement.translation) for frame in model.frames if frame.parentJoint == joint
+        ]
+        # Of the platform's own frames none is an end.
+        if carried and joint != self.root:
+            far = max(carried, key=np.linalg.norm)
+            if not any(np.linalg.norm(far - end) < SAME for end in ends):
+                ends.append(far)
+        for end in ends:
+            start = self._foot(end) if joint == self.root else np.zeros(3)
+            if np.linalg.norm(end - start) > SAME:
+                yield start, end
+
+    def _foot(self, end: Array) -> Array:
+        """Where a stick stands on the root link: on a platform as nearly below its end as can be."""
+        if not self.robot.platform.n_p:
+            return np.zeros(3)
+        plate = self.plate
+        half = 0.7 * plate.half if plate.round else plate.half
+        return np.array(
+            [*np.clip(end[:2], plate.middle[:2] - half, plate.middle[:2] + half), plate.middle[2]]
+        )
+
+    def _base(self) -> pin.GeometryObject:
+        """The root link: a flat disc or box."""
+        plate = self.plate
+        middle, half = plate.middle, plate.half
+        if not self.robot.platform.n_p and self.reach > 0.0:
+            half = np.minimum(half, FOOT * self.reach)
+        at = pin.SE3(np.eye(3), middle)
+        if plate.round:
+            return _shape("base", self.root, at, fcl.Cylinder(float(half[0]), plate.thick))
+        return _shape("base", self.root, at, fcl.Box(2.0 * half[0], 2.0 * half[1], plate.thick))
+
+    def _tyre(self, joint: int, wheel: Wheel) -> pin.GeometryObject:
+        along = axis(self.model.joints[joint], pin.neutral(self.model))
+        tyre = fcl.Cylinder(wheel.radius, 0.4 * wheel.radius)
+        return _shape(f"wheel {wheel.joint}", joint, pin.SE3(_towards(along), np.zeros(3)), tyre, DARK)
+
+    def _way(self, joint: int) -> tuple[Array, Array] | None:
+        """Where a slider ends, (3,) twice, in its parent's frame; None where that is not known."""
+        model, sliding = self.model, self.model.joints[joint]
+        if not kind(sliding).startswith("P") or sliding.nq != 1:
+            return None
+        data = sliding.createData()
+        sliding.calc(data, pin.neutral(model))
+        along = np.array(data.S, dtype=np.float64).reshape(6)[:3]
+        ends = [float(limit[sliding.idx_q]) for limit in (model.lowerPositionLimit, model.upperPositionLimit)]
+        if not all(abs(end) < LONGEST for end in ends) or ends[1] - ends[0] < SAME:
+            return None
+        placement = model.jointPlacements[joint]
+        return placement.act(ends[0] * along), placement.act(ends[1] * along)
+
+
+def _root(robot: Robot) -> int:
+    """The joint that carries the root link; x and y before it carry nothing."""
+    return int(robot.display_model.getJointId("theta")) if robot.platform.n_p else 0
+
+
+def _solids(robot: Robot) -> Iterator[pin.GeometryObject]:
+    """The collision shapes, grey, on the display model."""
+    display = robot.display_model
+    try:
+        names, collisions = display.names, parts_of(robot).collision_model
+    except RobotError:  # made by hand: the wheels' shapes are those of what carries them
+        names, collisions = robot.model.names, robot.collision_model
+    for geometry in collisions.copy().geometryObjects:
+        name = names[geometry.parentJoint]
+        if display.existJointName(name):
+            geometry.parentJoint = display.getJointId(name)
+            geometry.meshColor, geometry.overrideMaterial = np.array(GREY), True
+            yield geometry
+
+
+def _links(robot: Robot, joints: set[int]) -> tuple[str, ...]:
+    """The link right below each joint, or the joint itself where there is none."""
+    model = robot.display_model
+    names: dict[int, str] = {}
+    for frame in model.frames:
+        if frame.type == pin.FrameType.BODY:
+            names.setdefault(int(frame.parentJoint), frame.name)
+    return tuple(names.get(joint, str(model.names[joint])) for joint in sorted(joints))
+
+
+def _listed(names: tuple[str, ...], most: int = 8) -> str:
+    more = len(names) - most
+    return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")
+
+
+def _stick(name: str, joint: int, start: Array, end: Array, radius: float) -> pin.GeometryObject:
+    """A capsule whose round ends are about the two points."""
+    length = float(np.linalg.norm(end - start))
+    at = pin.SE3(_towards((end - start) / length), 0.5 * (start + end))
+    return _shape(name, joint, at, fcl.Capsule(radius, length))
+
+
+def _towards(direction: Array) -> Array:
+    """A rotation that turns z to a unit vector."""
+    turned: Array = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), direction).matrix()
+    return turned
+
+
+def _shape(
+    name: str,
+    joint: int,
+    at: pin.SE3,
+    shape: pin.hppfcl.CollisionGeometry,
+    color: tuple[float, float, float, float] = GREY,
+) -> pin.GeometryObject:
+    geometry = pin.GeometryObject(name, joint, at, shape)
+    geometry.meshColor = np.array(color)
+    return geometry
