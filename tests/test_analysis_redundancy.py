@@ -142,7 +142,7 @@ def test_degrees_of_the_papers_robots(
 ) -> None:
     robot = robots[name]
     for _ in range(5):
-        report = redundancy((robot, task), draw(robot, rng))  # type: ignore[arg-type]
+        report = redundancy((robot, task), draw(robot, rng))  # type: ignore[arg-type]  # of several kinds
         assert (report.static, report.kinematic) == (static, kinematic)
         assert (report.manifold, report.free) == (static, kinematic)  # regular there
         assert len(report.withheld) == 1
@@ -263,7 +263,7 @@ def test_bad_input(robot_2r: Robot) -> None:
     with pytest.raises(InputError, match="tolerance"):
         redundancy((robot_2r, tip), {}, tolerance=0)
     with pytest.raises(InputError, match="expected a Controller"):
-        redundancy(robot_2r, {})  # type: ignore[arg-type]
+        redundancy(robot_2r, {})  # type: ignore[arg-type]  # wrong on purpose
 
 
 def test_where_the_wheels_cannot_roll() -> None:

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nmm.analysis.directions import direction_texts, readable_basis
+from nmm.analysis.directions import readable_basis
 from nmm.analysis.minors import determinants
-from nmm.analysis.parts import condition_numbers, ranks, singular_values
+from nmm.analysis.parts import Ranked, ranks, singular_values
 from nmm.arrays import Array, Integers
 
 
 @dataclass(frozen=True, eq=False)
-class ExtendedSingularity:
+class ExtendedSingularity(Ranked):
     """The extended Jacobian J_e = [J; Jc] (m, m) beside J.
 
     Attributes
@@ -25,7 +25,7 @@ class ExtendedSingularity:
     angle_measure : |det J_e| / sqrt(det J Jᵀ det Jc Jcᵀ), from 0 to 1 (Fischer's inequality): 1 when the
         constraint moves only what the task leaves free, 0 when it asks for what the task already fixes; not a
         number where J or Jc has itself lost rank
-    lost (m - rank, m) : combinations of the rows that no input moves
+    lost (m - rank, m) : combinations of the rows that no input moves: what task and constraint both speak of
     kinematic : J itself lost rank
     constraint_singular : Jc itself lost rank
     """
@@ -40,24 +40,9 @@ class ExtendedSingularity:
     constraint_singular: bool
 
     @property
-    def sigma_min(self) -> float:
-        """Smallest singular value of J_e."""
-        return float(self.singular_values[-1])
-
-    @property
-    def condition(self) -> float:
-        """Condition number of J_e; infinite without full rank."""
-        return float(condition_numbers(self.singular_values, np.array(self.rank)))
-
-    @property
     def algorithmic(self) -> bool:
         """J_e lost rank though J did not: EJ fails where other resolvers do not."""
         return not self.kinematic and self.rank < len(self.rows)
-
-    @property
-    def lost_text(self) -> tuple[str, ...]:
-        """`lost` in the rows' names: what task and constraint both speak of."""
-        return direction_texts(self.lost, self.rows)
 
 
 @dataclass(frozen=True, eq=False)

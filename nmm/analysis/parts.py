@@ -14,8 +14,32 @@ from nmm.robot import Robot
 WHOLE = "robot"
 
 
+class Ranked:
+    """What a matrix's singular values, its rank and the directions that it has lost say."""
+
+    rows: tuple[str, ...]
+    singular_values: Array
+    rank: int
+    lost: Array
+
+    @property
+    def sigma_min(self) -> float:
+        """Smallest singular value: how far the weakest direction of the rows moves for inputs of size 1."""
+        return float(self.singular_values[-1])
+
+    @property
+    def condition(self) -> float:
+        """Largest over smallest singular value; infinite without full rank."""
+        return float(condition_numbers(self.singular_values, np.array(self.rank)))
+
+    @property
+    def lost_text(self) -> tuple[str, ...]:
+        """`lost` in the rows' names."""
+        return direction_texts(self.lost, self.rows)
+
+
 @dataclass(frozen=True, eq=False)
-class Part:
+class Part(Ranked):
     """What some of the inputs can do for the task.
 
     Attributes
@@ -36,16 +60,6 @@ class Part:
     lost: Array
 
     @property
-    def sigma_min(self) -> float:
-        """Smallest singular value: how far the weakest direction of the task moves for inputs of size 1."""
-        return float(self.singular_values[-1])
-
-    @property
-    def condition(self) -> float:
-        """Largest over smallest singular value; infinite without full rank."""
-        return float(condition_numbers(self.singular_values, np.array(self.rank)))
-
-    @property
     def does_task(self) -> bool:
         """Whether these inputs alone reach every direction of the task here."""
         return self.rank == len(self.rows)
@@ -59,11 +73,6 @@ class Part:
     def singular(self) -> bool:
         """Whether the rank is below what so many inputs can have."""
         return self.rank < min(len(self.inputs), len(self.rows))
-
-    @property
-    def lost_text(self) -> tuple[str, ...]:
-        """`lost` in the rows' names."""
-        return direction_texts(self.lost, self.rows)
 
 
 def singular_values(J: Array) -> Array:

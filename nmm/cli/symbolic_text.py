@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from nmm.analysis.minors import Columns, chosen_columns
@@ -30,10 +31,8 @@ def formulas(given: Studied) -> tuple[SymbolicAnalysis | None, str]:
     ------
     InputError : SymPy is missing, or the task does not fit the robot
     """
-    try:
-        import sympy  # noqa: F401
-    except ImportError:
-        raise InputError("symbolic: needs SymPy: pip install nmm[symbolic]") from None
+    if find_spec("sympy") is None:
+        raise InputError("symbolic: needs SymPy: pip install nmm[symbolic]")
     from nmm.analysis.jacobians import Jacobians
     from nmm.analysis.symbolic import symbolic
 

@@ -41,7 +41,7 @@ def values_text(values: Iterable[float], unit: str, circular: bool = False) -> s
         opposite = next((other for other in left if abs(other + value) <= 2.0 * NEAR), None)
         both = opposite is not None and abs(value) > NEAR
         if both:
-            left.remove(opposite)  # type: ignore[arg-type]
+            left.remove(opposite)  # type: ignore[arg-type]  # one was found
         text = value_text(abs(value) if both else value, unit)
         whole_turn = circular and unit == "rad" and abs(abs(value) - pi) <= NEAR
         found.append(f"±{text.lstrip('-')}" if both or whole_turn else text)
