@@ -24,6 +24,11 @@ BLOCK = 4_000_000
 ROUNDING = 1e-12
 
 
+def minor_name(columns: Sequence[str]) -> str:
+    """ "Δ[v, omega, q2]": how a minor is written."""
+    return f"Δ[{', '.join(columns)}]"
+
+
 class Minors(Mapping[tuple[str, ...], float | Array]):
     """Minors keyed by tuples of input names: `minors["v", "q2"]`, or `minors["v, q2"]`.
 

@@ -11,10 +11,10 @@ import numpy as np
 from nmm.analysis.algorithmic import volume
 from nmm.analysis.along import SingularityHistory
 from nmm.analysis.instants import Crossing, Dip
-from nmm.analysis.minors import determinants
+from nmm.analysis.minors import determinants, minor_name
 from nmm.arrays import Array
 from nmm.cli.output import show_table
-from nmm.cli.singularity_words import block, header, listed, minor, number, say, sizes_note, without_twins
+from nmm.cli.singularity_words import block, header, named_or_counted, number, say, sizes_note, without_twins
 from nmm.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def _show_parts(given: Studied, history: SingularityHistory) -> None:
         rows.append(
             [
                 label,
-                listed(groups[key], "inputs"),
+                named_or_counted(groups[key], "inputs"),
                 number(sigma.min(), largest),
                 f"{history.t[sigma.argmin()]:g} s",
                 number(sigma.max(), largest),
@@ -158,7 +158,7 @@ def _show_crossings(run: Trajectory | None, history: SingularityHistory) -> None
             [
                 f"{crossing.t:.4g} s",
                 "+" if crossing.sign > 0 else "-",
-                minor(crossing.columns),
+                minor_name(crossing.columns),
                 *([_used(run, crossing)] if run is not None else []),
             ]
             for crossing in crossings
@@ -170,7 +170,8 @@ def _show_crossings(run: Trajectory | None, history: SingularityHistory) -> None
     else:
         say("No minor changes its sign.")
     if dead:
-        say(f"0 on the whole motion: {listed([minor(name) for name in sorted(dead)], 'minors')}")
+        names = [minor_name(name) for name in sorted(dead)]
+        say(f"0 on the whole motion: {named_or_counted(names, 'minors')}")
 
 
 def _used(run: Trajectory, crossing: Crossing) -> str:

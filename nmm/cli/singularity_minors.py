@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nmm.analysis.algorithmic import PartitionSingularities, partition_singularities
+from nmm.analysis.minors import minor_name
 from nmm.analysis.singularity import SingularityReport
 from nmm.cli.output import show_table
-from nmm.cli.singularity_words import block, directions, minor, number, say
+from nmm.cli.singularity_words import block, directions, number, say
 from nmm.resolvers.reduced_gradient import ReducedGradient
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ def show_minors(report: SingularityReport, left_out: int) -> None:
         )
         folded = _folded(report, found) if len(minors) == count else ()
         rows = [
-            ["0" if zero else number(value), _ratio(share, zero), minor(name)]
+            ["0" if zero else number(value), _ratio(share, zero), minor_name(name)]
             for name, value, share, zero in zip(
                 found.names, found.determinants, found.ratios, found.singular, strict=True
             )
@@ -71,7 +72,7 @@ def _zeros(report: SingularityReport, zeros: Sequence[tuple[str, ...]]) -> str:
     others = [name for name in zeros if not set(name) & set(idle)]
     parts = [f"every minor with {' or '.join(idle)}"] if idle else []
     if others:
-        names = ", ".join(map(minor, others))
+        names = ", ".join(map(minor_name, others))
         parts.append(names if len(names) <= MOST_TEXT else f"{len(others)} {'others' if idle else 'minors'}")
     return "; ".join(parts)
 

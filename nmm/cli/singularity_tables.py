@@ -17,7 +17,7 @@ from nmm.cli.singularity_words import (
     direction,
     directions,
     header,
-    listed,
+    named_or_counted,
     number,
     say,
     sizes_note,
@@ -95,7 +95,7 @@ def _show_parts(report: SingularityReport) -> None:
         rows.append(
             [
                 label,
-                listed(part.inputs, "inputs"),
+                named_or_counted(part.inputs, "inputs"),
                 f"{part.rank} of {s}",
                 number(part.sigma_min, largest),
                 number(part.condition),

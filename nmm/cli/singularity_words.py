@@ -92,14 +92,9 @@ def directions(vectors: Array, names: Sequence[str]) -> str:
     return "; ".join(direction(vector, names) for vector in vectors)
 
 
-def listed(names: Sequence[str], kind: str) -> str:
+def named_or_counted(names: Sequence[str], kind: str) -> str:
     """Names with commas between them; how many where they are many."""
     return f"{len(names)} {kind}" if len(names) > MOST_NAMES else ", ".join(names) or "none"
-
-
-def minor(columns: Sequence[str]) -> str:
-    """ "Δ[v, omega, q2]"."""
-    return f"Δ[{', '.join(columns)}]"
 
 
 def block(columns: Sequence[str]) -> str:

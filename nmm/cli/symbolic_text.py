@@ -8,8 +8,8 @@ from dataclasses import replace
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
-from nmm.analysis.minors import Columns, chosen_columns
-from nmm.cli.singularity_words import block, header, minor, say
+from nmm.analysis.minors import Columns, chosen_columns, minor_name
+from nmm.cli.singularity_words import block, header, say
 from nmm.errors import InputError
 from nmm.words import listed
 
@@ -231,7 +231,7 @@ def _minors(analysis: SymbolicAnalysis) -> Iterator[str]:
         count = ":" if few else f": {len(reasons)} minors"
         yield f"Vanish somewhere, whatever the lengths, joint limits apart{count}"
         for columns, why in reasons.items() if few else ():
-            yield f"  {minor(columns)}, as {why}"
+            yield f"  {minor_name(columns)}, as {why}"
     lost = {
         columns
         for columns, bound in bounds.items()
@@ -246,7 +246,7 @@ def _minors(analysis: SymbolicAnalysis) -> Iterator[str]:
     open_ = [columns for columns in nonzero if columns not in reasons and columns not in bounds]
     if open_:
         few = len(open_) <= MANY_REASONS
-        which = listed([minor(columns) for columns in open_]) if few else f"{len(open_)} minors"
+        which = listed([minor_name(columns) for columns in open_]) if few else f"{len(open_)} minors"
         yield f"It is not decided whether {which} vanish{'es' if len(open_) == 1 else ''} somewhere."
 
 
@@ -264,7 +264,7 @@ def _bound(analysis: SymbolicAnalysis, bound: Bound) -> Iterator[str]:
     elif conditions:
         here = f" That {'holds' if holds else 'does not hold'} here: {_values(analysis, values)}."
     otherwise = ", and only then" if bound.exact and bound.requires else ""
-    yield f"{minor(bound.columns)} never vanishes{when}{otherwise}.{here}"
+    yield f"{minor_name(bound.columns)} never vanishes{when}{otherwise}.{here}"
     reasons = [
         f"the terms beside {_plain(analysis, left)} reach at most {_plain(analysis, right)}"
         for left, right in bound.requires

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+from nmm.analysis.minors import minor_name
 from nmm.analysis.symbolic.analysis import SymbolicAnalysis
 from nmm.analysis.symbolic.claims import Claim
 from nmm.analysis.symbolic.constants import NOTHING, is_constant
 from nmm.analysis.symbolic.form import expanded
 from nmm.analysis.symbolic.tree import Product, Sum, Symbol, Trig, text, to_sympy
-from nmm.analysis.symbolic.words import condition_text, minor_name
+from nmm.analysis.symbolic.words import condition_text
 
 
 @dataclass(frozen=True)

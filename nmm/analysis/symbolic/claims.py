@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+from nmm.analysis.minors import minor_name
 from nmm.analysis.symbolic.analysis import SymbolicAnalysis
 from nmm.analysis.symbolic.constants import constants
 from nmm.analysis.symbolic.families import Cases, TooMany
 from nmm.analysis.symbolic.form import factored
 from nmm.analysis.symbolic.groebner import Undecided
 from nmm.analysis.symbolic.tree import GREEK, Product, Symbol, text, to_sympy
-from nmm.analysis.symbolic.words import condition_text, minor_name
+from nmm.analysis.symbolic.words import condition_text
 from nmm.analysis.symbolic.zeros import Zeros
 
 #: Products of terms for a proof in one step; there is another way when they are not enough.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from nmm.analysis.minors import minor_name
 from nmm.analysis.symbolic.form import in_names
 from nmm.analysis.symbolic.tree import GREEK, Product, Trig, latex, latex_name, text
 
@@ -13,11 +14,6 @@ _MANY = 4
 
 if TYPE_CHECKING:
     from nmm.analysis.symbolic.analysis import SymbolicAnalysis
-
-
-def minor_name(columns: tuple[str, ...]) -> str:
-    """ "Δ[v, omega, q2]"."""
-    return f"Δ[{', '.join(columns)}]"
 
 
 def condition_text(factor: Product, names: Mapping[str, Product]) -> str:
