@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import twin
 
-from nmm.controller import Controller
-from nmm.references import Bearing
+from nmm.control.controller import Controller
+from nmm.functions.references import Bearing
+from nmm.functions.tasks import Coordinates, Heading, Position, Task
 from nmm.resolvers import ExtendedJacobian
-from nmm.robot import Robot
-from nmm.tasks import Coordinates, Heading, Position, Task
+from nmm.robots.robot import Robot
 
 TIP = Task(Position("ee", "xy"), [0.0, 0.0])
 TIP_3D = Task(Position("ee", "xyz"), [0.0, 0.0, 0.0])

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from spatial_arms import load_tiago, load_ur5
 
-from nmm.loading import load
-from nmm.robot import Robot
+from nmm.robots.loading import load
+from nmm.robots.robot import Robot
 
 
 @pytest.fixture(scope="session")

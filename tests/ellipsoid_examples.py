@@ -8,8 +8,8 @@ import numpy as np
 
 import nmm
 from nmm.arrays import Array
-from nmm.configuration import Configuration
-from nmm.robot import Robot
+from nmm.robots.configuration import Configuration
+from nmm.robots.robot import Robot
 
 
 @cache

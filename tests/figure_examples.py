@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 
+from nmm.runs.trajectory import Trajectory
 from nmm.scenario import Scenario
-from nmm.trajectory import Trajectory
 
 PAPER = ["unicycle_2r_position", "unicycle_2r_pointing", "unicycle_2r_link_pointing", "unicycle_3r_position"]
 

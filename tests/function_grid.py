@@ -18,11 +18,17 @@ from numpy import pi
 from numpy.typing import NDArray
 from scipy.interpolate import PPoly
 
-import nmm
-from nmm.configuration import Configuration
-from nmm.function import Evaluation, Function
-from nmm.objectives import CallableObjective, JointRange, Manipulability, Objective, Quadratic, Square, Sum
-from nmm.references import (
+from nmm.functions.function import Evaluation, Function
+from nmm.functions.objectives import (
+    CallableObjective,
+    JointRange,
+    Manipulability,
+    Objective,
+    Quadratic,
+    Square,
+    Sum,
+)
+from nmm.functions.references import (
     Bearing,
     CallableReference,
     Circle,
@@ -35,8 +41,7 @@ from nmm.references import (
     Spline,
     Turn,
 )
-from nmm.robot import Robot
-from nmm.tasks import (
+from nmm.functions.tasks import (
     CallableFunction,
     CenterOfMass,
     Coordinates,
@@ -48,6 +53,8 @@ from nmm.tasks import (
     Position,
     Posture,
 )
+from nmm.robots.configuration import Configuration
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -245,10 +252,14 @@ def random_configuration(robot: Robot, rng: np.random.Generator) -> Array:
     return q
 
 
+KINDS = ("tasks", "references", "objectives")
+
+
 def modules() -> list[ModuleType]:
     """All modules of the mathematics."""
-    names = [nmm.__name__ + "." + name for name in ("equations", "program", "controller", "integrators")]
-    for package in ("platforms", "tasks", "references", "objectives", "resolvers"):
+    loose = ("control.equations", "functions.program", "control.controller", "runs.integrators")
+    names = [f"nmm.{name}" for name in loose]
+    for package in ("platforms", *(f"functions.{kind}" for kind in KINDS), "resolvers"):
         found = importlib.import_module(f"nmm.{package}")
         names += [info.name for info in pkgutil.walk_packages(found.__path__, f"nmm.{package}.")]
     return [importlib.import_module(name) for name in names]

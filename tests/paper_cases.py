@@ -11,12 +11,12 @@ import twin
 from numpy import pi
 from numpy.typing import NDArray
 
-from nmm.controller import Controller
-from nmm.objectives import Objective, Quadratic, Square
-from nmm.references import Bearing, Circle
+from nmm.control.controller import Controller
+from nmm.functions.objectives import Objective, Quadratic, Square
+from nmm.functions.references import Bearing, Circle
+from nmm.functions.tasks import Heading, Position, Task
 from nmm.resolvers import ProjectedGradient, ReducedGradient, Resolver
-from nmm.robot import Robot
-from nmm.tasks import Heading, Position, Task
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from playwright.sync_api import Browser, Page, sync_playwright
 from nmm.playback import Motion, write_html
 from nmm.playback.extent import corners, robot_boxes
 from nmm.playback.placements import Placements
-from nmm.robot import Robot
+from nmm.robots.robot import Robot
 
 #: three.js has y upwards: MeshCat turns the whole scene by this.
 UPRIGHT = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])

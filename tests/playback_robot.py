@@ -11,7 +11,7 @@ import trimesh
 
 from nmm.platforms import Unicycle
 from nmm.playback import Motion
-from nmm.robot import Robot, Wheel
+from nmm.robots.robot import Robot, Wheel
 
 fcl = pin.hppfcl
 

@@ -10,10 +10,10 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 import nmm
-from nmm.configuration import Configuration
-from nmm.loading.packages import Packages
-from nmm.references import Circle
-from nmm.robot import Robot
+from nmm.functions.references import Circle
+from nmm.robots.configuration import Configuration
+from nmm.robots.loading.packages import Packages
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -12,14 +12,14 @@ import twin
 from numpy.typing import NDArray
 from paper_cases import CIRCLE
 
-from nmm.analysis.jacobians import Jacobians
-from nmm.analysis.reached import stacked
-from nmm.analysis.symbolic import SymbolicAnalysis, symbolic
-from nmm.configuration import Configuration
-from nmm.loading import load
-from nmm.references import Bearing
-from nmm.robot import Robot
-from nmm.tasks import Heading, Position, Task
+from nmm.analysis.formulas import SymbolicAnalysis, symbolic
+from nmm.analysis.singular.jacobians import Jacobians
+from nmm.analysis.singular.reached import stacked
+from nmm.functions.references import Bearing
+from nmm.functions.tasks import Heading, Position, Task
+from nmm.robots.configuration import Configuration
+from nmm.robots.loading import load
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

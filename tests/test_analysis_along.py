@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from paper_cases import CASES
 
 from nmm.analysis import analyse, analyse_along
-from nmm.controller import Controller
+from nmm.control.controller import Controller
 from nmm.errors import InputError
-from nmm.loading import load
+from nmm.functions.tasks import Position
 from nmm.resolvers import ProjectedGradient
-from nmm.robot import Robot
-from nmm.simulation import simulate
-from nmm.tasks import Position
+from nmm.robots.loading import load
+from nmm.robots.robot import Robot
+from nmm.runs.simulation import simulate
 
 Array = NDArray[np.float64]
 

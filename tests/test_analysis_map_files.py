@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nmm.analysis.mapping.coordinates import singularity_map
-from nmm.analysis.mapping.result import is_map
-from nmm.analysis.mapping.singular_set import SingularSet
-from nmm.analysis.mapping.workspace import workspace_map
+from nmm.analysis.maps.coordinates import singularity_map
+from nmm.analysis.maps.result import is_map
+from nmm.analysis.maps.singular_set import SingularSet
+from nmm.analysis.maps.workspace import workspace_map
 from nmm.errors import InputError
 from nmm.figures.map_sets import thinned
-from nmm.loading import load
-from nmm.robot import Robot
-from nmm.tasks import Heading, Position
+from nmm.functions.tasks import Heading, Position
+from nmm.robots.loading import load
+from nmm.robots.robot import Robot
 
 PLANAR = Position("ee", "xy")
 WITH_HEADING = (PLANAR, Heading("link2"))

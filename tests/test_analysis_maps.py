@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from sliding_arm import sliding
 
 from nmm.analysis import analyse
-from nmm.analysis.mapping.coordinates import singularity_map
-from nmm.analysis.mapping.measures import MEASURES, Spectra
-from nmm.analysis.mapping.singular_set import SingularSet
-from nmm.configuration import Configuration
-from nmm.loading import load
-from nmm.robot import Robot
-from nmm.tasks import Heading, Pose, Position
+from nmm.analysis.maps.coordinates import singularity_map
+from nmm.analysis.maps.measures import MEASURES, Spectra
+from nmm.analysis.maps.singular_set import SingularSet
+from nmm.functions.tasks import Heading, Pose, Position
+from nmm.robots.configuration import Configuration
+from nmm.robots.loading import load
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 PLANAR = Position("ee", "xy")

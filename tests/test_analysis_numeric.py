@@ -14,13 +14,13 @@ from numpy import cos, pi, sin
 from numpy.typing import NDArray
 
 from nmm.analysis import SingularityReport, analyse
-from nmm.analysis.directions import direction_text, readable_basis
-from nmm.controller import Controller
+from nmm.analysis.singular.directions import direction_text, readable_basis
+from nmm.control.controller import Controller
 from nmm.errors import InputError, SingularError
-from nmm.loading import load, mount
+from nmm.functions.tasks import Coordinates, Pose, Position, Task
 from nmm.resolvers import ReducedGradient
-from nmm.robot import Robot
-from nmm.tasks import Coordinates, Pose, Position, Task
+from nmm.robots.loading import load, mount
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -9,17 +9,17 @@ from numpy.typing import NDArray
 from platform_grid import EXAMPLES, random_qp
 from robot_grid import built, frame_of, start
 
-from nmm.analysis.redundant.null_space import orthonormal_null_space, readable_null_space
-from nmm.analysis.redundant.report import RedundancyReport, redundancy
-from nmm.configuration import Configuration
-from nmm.controller import Controller
+from nmm.analysis.redundancy.null_space import orthonormal_null_space, readable_null_space
+from nmm.analysis.redundancy.report import RedundancyReport, redundancy
+from nmm.control.controller import Controller
 from nmm.errors import InputError, SingularError
-from nmm.function import Function
-from nmm.loading import load, mount
-from nmm.references import Bearing
+from nmm.functions.function import Function
+from nmm.functions.references import Bearing
+from nmm.functions.tasks import Heading, Pose, Position, Task
 from nmm.resolvers import ProjectedGradient
-from nmm.robot import Robot
-from nmm.tasks import Heading, Pose, Position, Task
+from nmm.robots.configuration import Configuration
+from nmm.robots.loading import load, mount
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from urdf_parts import AXIS, joint, link, robot, write
 
 from nmm.analysis import analyse
-from nmm.analysis.searching import SingularFamily, SingularitySearch, find_singularities, nearest_singularity
+from nmm.analysis.search import SingularFamily, SingularitySearch, find_singularities, nearest_singularity
 from nmm.errors import InputError, SingularError
-from nmm.loading import load
-from nmm.robot import Robot
+from nmm.functions.tasks import CallableFunction, Heading, Pose, Position, Posture
+from nmm.robots.loading import load
+from nmm.robots.robot import Robot
 from nmm.scenario import Scenario
-from nmm.tasks import CallableFunction, Heading, Pose, Position, Posture
 
 Array = NDArray[np.float64]
 

@@ -10,13 +10,13 @@ import twin
 from numpy import pi
 from numpy.typing import NDArray
 
-from nmm.analysis.searching import find_singularities, nearest_singularity
-from nmm.analysis.searching.text import value_text, values_text
+from nmm.analysis.search import find_singularities, nearest_singularity
+from nmm.analysis.search.text import value_text, values_text
 from nmm.cli.searching import search_command, show_nearest, show_search
 from nmm.cli.subjects import studied
-from nmm.loading import load
-from nmm.robot import Robot
-from nmm.tasks import CallableFunction, Position
+from nmm.functions.tasks import CallableFunction, Position
+from nmm.robots.loading import load
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -13,10 +13,10 @@ from scipy.optimize import minimize
 from spatial_arms import load_ur5
 
 from nmm.analysis import analyse
-from nmm.analysis.searching import SingularFamily, SingularitySearch, find_singularities, nearest_singularity
-from nmm.loading import load
-from nmm.robot import Robot
-from nmm.tasks import Pose
+from nmm.analysis.search import SingularFamily, SingularitySearch, find_singularities, nearest_singularity
+from nmm.functions.tasks import Pose
+from nmm.robots.loading import load
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nmm.analysis.mapping.singular_set import SingularSet, singular_set
+from nmm.analysis.maps.singular_set import SingularSet, singular_set
 
 Array = NDArray[np.float64]
 

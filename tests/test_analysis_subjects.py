@@ -9,19 +9,19 @@ from function_grid import ENTRIES, Entry
 from numpy.typing import NDArray
 
 from nmm.analysis import analyse
-from nmm.analysis.jacobians import Jacobians
-from nmm.configuration import Configuration
+from nmm.analysis.singular.jacobians import Jacobians
 from nmm.errors import InputError
-from nmm.loading import load
-from nmm.robot import Robot
-from nmm.tasks import Heading, Orientation, Pose, Position, Task
+from nmm.functions.tasks import Heading, Orientation, Pose, Position, Task
+from nmm.robots.configuration import Configuration
+from nmm.robots.loading import load
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 
 
 def subtracted() -> list[Entry]:
     """Tasks whose error is a difference; the others' rows are those of their error, tested below."""
-    tasks = [entry for entry in ENTRIES if type(entry.function).__module__.startswith("nmm.tasks")]
+    tasks = [entry for entry in ENTRIES if type(entry.function).__module__.startswith("nmm.functions.tasks")]
     return [entry for entry in tasks if entry.function.comparison is None]
 
 

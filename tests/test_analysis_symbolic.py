@@ -12,13 +12,13 @@ import pytest
 import twin
 from symbolic_checks import PAPER, TASKS, TIP, check_numbers, made, minors_of
 
-from nmm.analysis.symbolic import symbolic
-from nmm.analysis.symbolic.tree import latex
-from nmm.analysis.symbolic.words import latex_lines
+from nmm.analysis.formulas import symbolic
+from nmm.analysis.formulas.tree import latex
+from nmm.analysis.formulas.words import latex_lines
 from nmm.errors import InputError
-from nmm.loading import load
+from nmm.functions.tasks import Distance, Orientation, Pointing, Position
 from nmm.platforms import DifferentialDrive
-from nmm.tasks import Distance, Orientation, Pointing, Position
+from nmm.robots.loading import load
 
 sympy = pytest.importorskip("sympy")
 

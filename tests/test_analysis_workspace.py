@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 from sliding_arm import sliding
 
 from nmm.analysis import analyse
-from nmm.analysis.jacobians import Jacobians
-from nmm.analysis.mapping.reach import Reach
-from nmm.analysis.mapping.result import Map
-from nmm.analysis.mapping.search import BENT
-from nmm.analysis.mapping.workspace import in_curves, workspace_map
-from nmm.configuration import Configuration
+from nmm.analysis.maps.reach import Reach
+from nmm.analysis.maps.result import Map
+from nmm.analysis.maps.search import BENT
+from nmm.analysis.maps.workspace import in_curves, workspace_map
+from nmm.analysis.singular.jacobians import Jacobians
 from nmm.errors import InputError
-from nmm.loading import load
-from nmm.robot import Robot
-from nmm.tasks import Position
+from nmm.functions.tasks import Position
+from nmm.robots.configuration import Configuration
+from nmm.robots.loading import load
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 PLANAR = Position("ee", "xy")

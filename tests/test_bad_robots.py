@@ -13,7 +13,7 @@ import pytest
 from urdf_parts import AXIS, LIMIT, inertial, joint, link, robot, shape, write
 
 from nmm.errors import RobotError
-from nmm.loading import find_problems, load
+from nmm.robots.loading import find_problems, load
 
 XACRO = 'name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"'
 LINKS = link("a") + link("b")

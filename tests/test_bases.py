@@ -18,8 +18,8 @@ import yourdfpy
 from numpy.typing import NDArray
 from test_bundled_robots import coincident, reach_down, surface
 
-from nmm.loading.layout import measure_layout
 from nmm.platforms import Car, DifferentialDrive, Layout, Mecanum, Tractor
+from nmm.robots.loading.layout import measure_layout
 
 Array = NDArray[np.float64]
 ROBOTS = Path(__file__).resolve().parents[1] / "robots"

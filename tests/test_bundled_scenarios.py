@@ -9,10 +9,10 @@ import paper_cases
 import pytest
 
 import nmm
-import nmm.objectives
-import nmm.references
+import nmm.functions.objectives
+import nmm.functions.references
+import nmm.functions.tasks
 import nmm.resolvers
-import nmm.tasks
 from nmm import Scenario
 from nmm.analysis import analyse_along
 from nmm.bundled import bundled_scenarios

@@ -16,9 +16,9 @@ import nmm
 from nmm.bundled import bundled_robots
 from nmm.cli.app import status_of
 from nmm.errors import RobotError
-from nmm.loading.packages import package_file
-from nmm.loading.report import Report, report
-from nmm.loading.second_opinion import second_opinion
+from nmm.robots.loading.packages import package_file
+from nmm.robots.loading.report import Report, report
+from nmm.robots.loading.second_opinion import second_opinion
 
 Command = Callable[..., Result]
 TIAGO = "robots/tiago_description/robots/tiago_no_hand.urdf"

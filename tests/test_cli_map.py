@@ -11,9 +11,9 @@ import pytest
 
 from nmm.cli.app import status_of
 from nmm.cli.map_files import make_map
-from nmm.configuration import Configuration
 from nmm.errors import InputError
-from nmm.loading import load
+from nmm.robots.configuration import Configuration
+from nmm.robots.loading import load
 
 POSITION: dict[str, Any] = {"tasks": ["position:ee:xy"], "samples": "24"}
 

@@ -15,13 +15,13 @@ from short_scenario import MINIMAL
 
 import nmm
 import nmm.cli.laps
-from nmm.analysis.redundant.moving import self_motion
-from nmm.analysis.redundant.report import redundancy as report_of
+from nmm.analysis.redundancy.moving import self_motion
+from nmm.analysis.redundancy.report import redundancy as report_of
 from nmm.cli.laps import run_laps
 from nmm.cli.redundancy import laps, redundancy
 from nmm.cli.redundancy_tables import direction_of
 from nmm.errors import InputError, SingularError
-from nmm.tasks import Position
+from nmm.functions.tasks import Position
 
 BENT = ["theta=0.3", "q1=0.4", "q2=0.7"]
 ROUND = "{kind: circle, center: [1.2, 0.2], radius: 0.1, rate: pi}"

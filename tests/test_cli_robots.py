@@ -16,7 +16,7 @@ from urdf_parts import AXIS, LIMIT, inertial, joint, link, robot, shape, write
 import nmm
 from nmm.bundled import bundled_robots
 from nmm.cli.app import status_of
-from nmm.felt import unfelt_inputs
+from nmm.control.idle_inputs import unfelt_inputs
 
 Command = Callable[..., Result]
 

@@ -18,9 +18,9 @@ from numpy import pi
 from nmm import Scenario
 from nmm.analysis import analyse, analyse_along
 from nmm.cli.app import status_of
-from nmm.loading import load
-from nmm.tasks import Heading, Position
-from nmm.trajectory import Trajectory
+from nmm.functions.tasks import Heading, Position
+from nmm.robots.loading import load
+from nmm.runs.trajectory import Trajectory
 
 Command = Callable[..., Result]
 

@@ -16,8 +16,8 @@ from spatial_arms import load_ur5
 
 from nmm.analysis import analyse
 from nmm.cli.app import status_of
-from nmm.loading import load
-from nmm.tasks import Pose, Position
+from nmm.functions.tasks import Pose, Position
+from nmm.robots.loading import load
 
 pytest.importorskip("sympy")
 
@@ -137,8 +137,8 @@ def test_abbreviations_are_explained_by_names_that_occur(robot: str, run: Comman
 
 
 def test_what_is_not_decided_comes_first(run: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("nmm.analysis.symbolic.zeros._ALL", 100)
-    monkeypatch.setattr("nmm.analysis.symbolic.claims._BRIEF", 100)
+    monkeypatch.setattr("nmm.analysis.formulas.zeros._ALL", 100)
+    monkeypatch.setattr("nmm.analysis.formulas.claims._BRIEF", 100)
     out = run("unicycle_3r", "--task", "position", "--symbolic").out
     follows = out[out.index("what follows\n") :].splitlines()
     assert follows[1].startswith("  Not decided: where J loses rank, as")

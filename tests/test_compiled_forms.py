@@ -16,18 +16,18 @@ from numpy.typing import NDArray
 from paper_cases import CASES, TIP
 from platform_grid import EXAMPLES, random_qp
 
-from nmm.compiled import Kernel
-from nmm.configuration import Configuration
-from nmm.controller import Controller
-from nmm.function import Stage
-from nmm.loading import load
-from nmm.objectives import Sum
-from nmm.program import Program
+from nmm.control.controller import Controller
+from nmm.functions.function import Stage
+from nmm.functions.objectives import Sum
+from nmm.functions.program import Program
+from nmm.functions.tasks import Coordinates, Task
+from nmm.functions.tasks.comparison import Comparison
+from nmm.kernels.compiled import Kernel
 from nmm.resolvers import CallableResolver, ExtendedJacobian, ProjectedGradient, ReducedGradient, Resolver
 from nmm.resolvers.base import REPORT, Shape
-from nmm.robot import CENTER_OF_MASS, Robot
-from nmm.tasks import Coordinates, Task
-from nmm.tasks.comparison import Comparison
+from nmm.robots.configuration import Configuration
+from nmm.robots.loading import load
+from nmm.robots.robot import CENTER_OF_MASS, Robot
 
 Array = NDArray[np.float64]
 
@@ -263,7 +263,7 @@ def test_another_process_compiles_nothing(tmp_path: Path) -> None:
     counts = json.loads((tmp_path / "cache.json").read_text())
     assert {name for name, (_, misses) in counts.items() if misses} == set()
     assert sum(hits > 0 for hits, _ in counts.values()) > len(kernels())
-    assert counts["nmm.equations.step"] == [1, 0]
+    assert counts["nmm.control.equations.step"] == [1, 0]
 
 
 def test_a_new_controller_compiles_nothing(robot_2r: Robot, robot_3r: Robot) -> None:

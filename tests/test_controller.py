@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from paper_cases import CASES, CIRCLE, TIP, Case
 from platform_grid import EXAMPLES, random_qp
 
-from nmm.controller import Controller
-from nmm.objectives import Objective, Quadratic, Square
+from nmm.control.controller import Controller
+from nmm.functions.objectives import Objective, Quadratic, Square
+from nmm.functions.references import Bearing, Circle, Constant, Line
+from nmm.functions.tasks import Coordinates, Heading, Position, Task
 from nmm.platforms import WheeledPlatform
-from nmm.references import Bearing, Circle, Constant, Line
 from nmm.resolvers import ExtendedJacobian, ProjectedGradient, ReducedGradient, Resolver, Status
-from nmm.robot import Robot
-from nmm.tasks import Coordinates, Heading, Position, Task
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

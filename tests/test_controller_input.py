@@ -11,12 +11,11 @@ from numpy import pi
 from numpy.typing import NDArray
 from paper_cases import CIRCLE, H1, TIP
 
-from nmm.configuration import Configuration
-from nmm.controller import Controller
+from nmm.control.controller import Controller
 from nmm.errors import InputError, NmmError, SingularError
-from nmm.loading import load
-from nmm.objectives import CallableObjective, JointRange, Manipulability, Quadratic, Square, Sum
-from nmm.references import Bearing, CallableReference, Circle, Constant, PiecewisePolynomial, Spline
+from nmm.functions.objectives import CallableObjective, JointRange, Manipulability, Quadratic, Square, Sum
+from nmm.functions.references import Bearing, CallableReference, Circle, Constant, PiecewisePolynomial, Spline
+from nmm.functions.tasks import CallableFunction, Coordinates, Heading, Position, Task
 from nmm.resolvers import (
     CallableResolver,
     ExtendedJacobian,
@@ -25,8 +24,9 @@ from nmm.resolvers import (
     Resolver,
     Status,
 )
-from nmm.robot import Robot
-from nmm.tasks import CallableFunction, Coordinates, Heading, Position, Task
+from nmm.robots.configuration import Configuration
+from nmm.robots.loading import load
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -12,13 +12,13 @@ from function_grid import random_configuration
 from numpy.typing import NDArray
 from paper_cases import CASES, TIP, Case
 
-from nmm.controller import Controller
-from nmm.equations import step
-from nmm.objectives import CallableObjective, Objective
-from nmm.references import CallableReference
+from nmm.control.controller import Controller
+from nmm.control.equations import step
+from nmm.functions.objectives import CallableObjective, Objective
+from nmm.functions.references import CallableReference
+from nmm.functions.tasks import CallableFunction, Task
 from nmm.resolvers import CallableResolver, ProjectedGradient, ReducedGradient
-from nmm.robot import Robot
-from nmm.tasks import CallableFunction, Task
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 from paper_cases import CASES, Case
 from platform_grid import EXAMPLES, random_qp
 
-from nmm.analysis.reached import Reached
-from nmm.configuration import Configuration
-from nmm.controller import Controller
-from nmm.function import Function
-from nmm.objectives import Objective, Sum
-from nmm.program import Program
-from nmm.references import CallableReference
-from nmm.robot import Robot
-from nmm.tasks.comparison import Comparison
+from nmm.analysis.singular.reached import Reached
+from nmm.control.controller import Controller
+from nmm.functions.function import Function
+from nmm.functions.objectives import Objective, Sum
+from nmm.functions.program import Program
+from nmm.functions.references import CallableReference
+from nmm.functions.tasks.comparison import Comparison
+from nmm.robots.configuration import Configuration
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from nmm.analysis.ellipsoids import ellipsoids_along
+from nmm.analysis.singular.ellipsoids import ellipsoids_along
 from nmm.arrays import Array
 from nmm.cli.app import status_of
 from nmm.errors import InputError

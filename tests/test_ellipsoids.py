@@ -9,11 +9,11 @@ import pytest
 from ellipsoid_examples import columns, directions, jacobian, load, random_q, swing
 
 import nmm
-from nmm.analysis.ellipsoids import Ellipsoids, carried_frame, ellipsoids_along, frame_of
+from nmm.analysis.singular.ellipsoids import Ellipsoids, carried_frame, ellipsoids_along, frame_of
 from nmm.arrays import Array
-from nmm.configuration import Configuration
 from nmm.errors import InputError
 from nmm.playback.ellipsoids import EllipsoidOptions
+from nmm.robots.configuration import Configuration
 
 #: A planar robot, a spatial one, an arm on a fixed base, one on a car, one with more inputs than it needs.
 ROBOTS = ("unicycle_2r", "unicycle_3r", "small_arm", "car with arm", "omni with arm")

@@ -13,17 +13,17 @@ from numpy.typing import NDArray
 from paper_cases import CASES, H1, TIP, Case
 from test_derivatives import assert_close, check_equation, check_function, partials
 
-from nmm.compiled import FUNCTION, PLATFORM, RESOLVER, Kernel, kernel
-from nmm.configuration import Configuration
-from nmm.controller import Controller
+from nmm.control.controller import Controller
 from nmm.errors import InputError
-from nmm.function import Function, Row, Stage
-from nmm.objectives import Manipulability, Sum
+from nmm.functions.function import Function, Row, Stage
+from nmm.functions.objectives import Manipulability, Sum
+from nmm.functions.references import Line
+from nmm.functions.tasks import CallableFunction, Task
+from nmm.kernels.compiled import FUNCTION, PLATFORM, RESOLVER, Kernel, kernel
 from nmm.platforms import Platform
-from nmm.references import Line
 from nmm.resolvers import ProjectedGradient, ReducedGradient, Resolver, Setup, Shape
-from nmm.robot import Robot
-from nmm.tasks import CallableFunction, Task
+from nmm.robots.configuration import Configuration
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

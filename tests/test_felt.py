@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import nmm
-from nmm.felt import idle_inputs, unfelt_inputs
-from nmm.robot import Robot
+from nmm.control.idle_inputs import idle_inputs, unfelt_inputs
+from nmm.robots.robot import Robot
 
 START = {"q2": 0.2, "q3": 1.7, "q4": 0.6}
 TIP = [0.6, 0.1, 0.58]

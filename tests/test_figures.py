@@ -17,15 +17,15 @@ from figure_examples import PAPER, check_legible, cut, drawn_points, run
 from matplotlib.figure import Figure
 
 from nmm import figures
-from nmm.controller import Controller
+from nmm.control.controller import Controller
 from nmm.errors import InputError
 from nmm.figures import style
-from nmm.loading import load
+from nmm.functions.tasks import Coordinates, Heading, Position, Task
 from nmm.resolvers import ProjectedGradient
-from nmm.robot import Robot
-from nmm.simulation import simulate
-from nmm.tasks import Coordinates, Heading, Position, Task
-from nmm.trajectory import Trajectory
+from nmm.robots.loading import load
+from nmm.robots.robot import Robot
+from nmm.runs.simulation import simulate
+from nmm.runs.trajectory import Trajectory
 
 #: Where the packages of example-robot-data are.
 SHARE = Path(sysconfig.get_paths()["purelib"]) / "cmeel.prefix" / "share"

@@ -12,12 +12,12 @@ from function_grid import random_configuration
 from numpy.typing import NDArray
 from scipy.interpolate import PPoly
 
-from nmm.configuration import Configuration
-from nmm.function import Evaluation, Function
-from nmm.objectives import JointRange, Manipulability, Quadratic, Square, Sum
-from nmm.references import Bearing, Circle, Constant, Line, PiecewisePolynomial, Polynomial, Spline
-from nmm.robot import Robot
-from nmm.tasks import Coordinates, Heading, Position
+from nmm.functions.function import Evaluation, Function
+from nmm.functions.objectives import JointRange, Manipulability, Quadratic, Square, Sum
+from nmm.functions.references import Bearing, Circle, Constant, Line, PiecewisePolynomial, Polynomial, Spline
+from nmm.functions.tasks import Coordinates, Heading, Position
+from nmm.robots.configuration import Configuration
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

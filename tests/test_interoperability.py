@@ -13,7 +13,7 @@ from urdf_parts import joint, link, random_tree, robot, shape, write
 import nmm
 from nmm import InputError, PinocchioLayout
 from nmm.platforms import Fixed, Unicycle
-from nmm.robot import Robot
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

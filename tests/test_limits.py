@@ -12,7 +12,7 @@ from urdf_parts import joint, link, robot, write
 
 import nmm
 from nmm.platforms import Unicycle
-from nmm.robot import Robot
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 START = {"q1": 0.3, "q2": 0.6}

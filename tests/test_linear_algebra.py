@@ -1,4 +1,4 @@
-"""The loops of nmm.linear_algebra against numpy."""
+"""The loops of nmm.kernels.linear_algebra against numpy."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from nmm.linear_algebra import (
+from nmm.kernels.linear_algebra import (
     closest_solution,
     eliminate,
     orthonormal_rows,

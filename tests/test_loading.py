@@ -21,9 +21,9 @@ from urdf_parts import AXIS, LIMIT, inertial, joint, link, random_tree, robot, s
 import nmm.bundled as bundled
 from nmm.bundled import bundled_robots, bundled_scenarios
 from nmm.errors import InputError, NmmError, RobotError
-from nmm.loading import load
 from nmm.platforms import PLATFORMS, Layout, Unicycle
-from nmm.robot import Robot
+from nmm.robots.loading import load
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

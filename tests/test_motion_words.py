@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from platform_grid import EXAMPLES
 from robot_grid import built, start
 
-from nmm.analysis.redundant.motion_words import (
+from nmm.analysis.redundancy.motion_words import (
     COORDINATES,
     INPUTS,
     WHO,
@@ -20,11 +20,11 @@ from nmm.analysis.redundant.motion_words import (
     input_words,
     motion_text,
 )
-from nmm.analysis.redundant.report import redundancy
-from nmm.configuration import Configuration
-from nmm.loading import load
-from nmm.robot import Robot
-from nmm.tasks import Position
+from nmm.analysis.redundancy.report import redundancy
+from nmm.functions.tasks import Position
+from nmm.robots.configuration import Configuration
+from nmm.robots.loading import load
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -17,9 +17,9 @@ from urdf_parts import inertial, joint, link, numbers, random_tree, robot, shape
 
 import nmm
 from nmm import RobotError, Scenario, ScenarioError
-from nmm.configuration import Configuration
 from nmm.platforms import Fixed
-from nmm.robot import Robot
+from nmm.robots.configuration import Configuration
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

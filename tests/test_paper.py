@@ -20,9 +20,9 @@ from nmm.paper.claims import claims
 from nmm.paper.numbers import decay_rate, ripple, settling_time, smallest_determinant, text
 from nmm.paper.page import render
 from nmm.paper.results import CaseResult, Claim, Row
+from nmm.runs.storage import is_run
+from nmm.runs.trajectory import Trajectory
 from nmm.scenario import Scenario
-from nmm.storage import is_run
-from nmm.trajectory import Trajectory
 
 Progress = Callable[[float], None]
 

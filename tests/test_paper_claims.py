@@ -11,8 +11,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+from nmm.runs.trajectory import Trajectory
 from nmm.scenario import Scenario
-from nmm.trajectory import Trajectory
 
 SCENARIOS = {
     1: "unicycle_2r_position",

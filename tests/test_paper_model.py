@@ -12,10 +12,10 @@ from numpy import pi
 from numpy.typing import NDArray
 from paper_cases import CASES, Case
 
-from nmm.configuration import Configuration
-from nmm.loading import load
-from nmm.robot import Robot
-from nmm.tasks import Heading, Position
+from nmm.functions.tasks import Heading, Position
+from nmm.robots.configuration import Configuration
+from nmm.robots.loading import load
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

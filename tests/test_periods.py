@@ -9,14 +9,14 @@ import pytest
 from numpy import pi
 from numpy.typing import NDArray
 
-from nmm.analysis.redundant.laps import Repeatability, repeatability
-from nmm.controller import Controller
+from nmm.analysis.redundancy.laps import Repeatability, repeatability
+from nmm.control.controller import Controller
 from nmm.errors import InputError
-from nmm.references import Bearing, Circle, Constant, Line, PoseReference, Spline, Turn
+from nmm.functions.references import Bearing, Circle, Constant, Line, PoseReference, Spline, Turn
+from nmm.functions.tasks import Heading, Orientation, Pose, Position, Task
 from nmm.resolvers import ProjectedGradient
-from nmm.robot import Robot
+from nmm.robots.robot import Robot
 from nmm.scenario import Scenario
-from nmm.tasks import Heading, Orientation, Pose, Position, Task
 
 Array = NDArray[np.float64]
 

@@ -21,7 +21,7 @@ from nmm.playback.keyframes import LARGEST_TURN, ghost_samples, keyframes
 from nmm.playback.placements import Placements
 from nmm.playback.scene import playback_scene
 from nmm.playback.shapes import Shape, shapes
-from nmm.robot import Robot
+from nmm.robots.robot import Robot
 
 fcl = pin.hppfcl
 SHARE = Path(sys.prefix) / "lib" / f"python{sys.version_info[0]}.{sys.version_info[1]}" / "site-packages"

@@ -26,14 +26,14 @@ from playwright.sync_api import Page
 from test_playback_live import listening, start_player
 
 import nmm
-from nmm.configuration import Configuration
 from nmm.playback import LiveViewer, Motion
 from nmm.playback.ellipsoids import CLOSE, THINNEST, EllipsoidOptions
 from nmm.playback.extent import corners, robot_boxes
 from nmm.playback.keyframes import ghost_samples, keyframes
 from nmm.playback.placements import Placements
 from nmm.playback.rolling import wheel_angles
-from nmm.robot import Robot
+from nmm.robots.configuration import Configuration
+from nmm.robots.robot import Robot
 
 pytestmark = pytest.mark.browser
 

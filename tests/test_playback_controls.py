@@ -14,7 +14,7 @@ from playback_robot import drive
 
 from nmm.playback import Motion
 from nmm.playback.rolling import wheel_angles
-from nmm.robot import Robot
+from nmm.robots.robot import Robot
 
 pytestmark = pytest.mark.browser
 

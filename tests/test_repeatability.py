@@ -12,15 +12,15 @@ from scipy.integrate import solve_ivp
 from short_scenario import scenario
 
 import nmm
-from nmm.analysis.redundant.laps import Laps, Repeatability, repeatability
-from nmm.controller import Controller
+from nmm.analysis.redundancy.laps import Laps, Repeatability, repeatability
+from nmm.control.controller import Controller
 from nmm.errors import InputError
 from nmm.figures.repeatability import laps as laps_figure
-from nmm.references import Circle
+from nmm.functions.references import Circle
+from nmm.functions.tasks import Coordinates, Heading, Position, Task
 from nmm.resolvers import CallableResolver, ExtendedJacobian, ProjectedGradient
-from nmm.robot import Robot
+from nmm.robots.robot import Robot
 from nmm.scenario import Scenario
-from nmm.tasks import Coordinates, Heading, Position, Task
 
 Array = NDArray[np.float64]
 

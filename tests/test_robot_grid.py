@@ -13,7 +13,7 @@ from scipy.linalg import null_space, qr
 
 import nmm
 from nmm.resolvers import Resolver
-from nmm.robot import Robot
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from numpy import pi
 from numpy.typing import NDArray
 
 from nmm import InputError, rotation_vector
-from nmm.rotations import (
+from nmm.kernels.rotations import (
     between3,
     compose3,
     exp3,

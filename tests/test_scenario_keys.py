@@ -11,13 +11,13 @@ import pytest
 from short_scenario import scenario
 
 import nmm
-import nmm.objectives
-import nmm.references
+import nmm.functions.objectives
+import nmm.functions.references
+import nmm.functions.tasks
 import nmm.resolvers
-import nmm.tasks
 from nmm import Scenario, ScenarioError
-from nmm.configuration import Configuration
-from nmm.integrators import METHODS
+from nmm.robots.configuration import Configuration
+from nmm.runs.integrators import METHODS
 from nmm.scenario.functions import REFERENCES
 from nmm.scenario.objectives import OBJECTIVES
 from nmm.scenario.reference import sections
@@ -191,7 +191,7 @@ def test_every_function_of_the_library_can_be_asked_for() -> None:
     kinds = {section.title.split()[-1] for section in sections()}
     python_only = {"Callable", "PiecewisePolynomial", "Sum", "Square", "Stack", "Task", "Objective"}
     python_only |= {"rotation_vector"}
-    for module in (nmm.tasks, nmm.references, nmm.objectives):
+    for module in (nmm.functions.tasks, nmm.functions.references, nmm.functions.objectives):
         for name in module.__all__:
             if not any(name.startswith(word) for word in python_only):
                 kind = re.sub("(?<=[a-z])(?=[A-Z])", "_", name.removesuffix("Reference")).lower()

@@ -12,8 +12,8 @@ from short_scenario import scenario
 
 import nmm
 from nmm import Scenario, ScenarioError, rotation_vector
-from nmm.configuration import Configuration
-from nmm.loading.packages import Packages
+from nmm.robots.configuration import Configuration
+from nmm.robots.loading.packages import Packages
 
 PI = math.pi
 #: Six joints on a unicycle: enough for a pose. Its first joint's link is `shoulder_link`, its tip `tool0`.

@@ -14,13 +14,13 @@ from spatial_arms import UR5
 from test_repeatability import planar_arm
 
 import nmm
-from nmm.analysis.redundant.moving import SelfMotion, self_motion
-from nmm.analysis.redundant.report import redundancy
-from nmm.configuration import Configuration
+from nmm.analysis.redundancy.moving import SelfMotion, self_motion
+from nmm.analysis.redundancy.report import redundancy
 from nmm.errors import InputError, SingularError
+from nmm.functions.tasks import Pose, Position, Task
 from nmm.playback import write_html
-from nmm.robot import Robot
-from nmm.tasks import Pose, Position, Task
+from nmm.robots.configuration import Configuration
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -142,7 +142,7 @@ def test_a_scenarios_task_is_held_as_it_stands(robot_2r: Robot) -> None:
 
 def test_an_error_of_half_a_turn_is_held_too(robot_2r: Robot) -> None:
     """The error that stays at π may be read as -π: neither is an error of a turn."""
-    towards = nmm.Task(nmm.Heading("link2"), nmm.references.Bearing(nmm.Position("ee", "xy"), [-5.0, 0.0]))
+    towards = nmm.Task(nmm.Heading("link2"), nmm.Bearing(nmm.Position("ee", "xy"), [-5.0, 0.0]))
     robot = robot_2r
     found = self_motion((robot, [Task(TIP, [0.0, 0.0]), towards]), {"q1": 0.5, "q2": -0.5}, duration=1.0)
     assert_laws(found, 0.5, 1.0)

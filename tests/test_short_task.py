@@ -12,13 +12,9 @@ from numpy import pi
 
 from nmm import Scenario
 from nmm.cli.subjects import studied
-from nmm.configuration import Configuration
 from nmm.errors import InputError
-from nmm.function import Function
-from nmm.loading import load, mount
-from nmm.robot import Robot
-from nmm.scenario.short_task import short_task
-from nmm.tasks import (
+from nmm.functions.function import Function
+from nmm.functions.tasks import (
     CenterOfMass,
     Coordinates,
     Distance,
@@ -30,6 +26,10 @@ from nmm.tasks import (
     Posture,
     Task,
 )
+from nmm.robots.configuration import Configuration
+from nmm.robots.loading import load, mount
+from nmm.robots.robot import Robot
+from nmm.scenario.short_task import short_task
 
 
 @pytest.fixture(scope="module")

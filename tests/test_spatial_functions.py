@@ -12,11 +12,9 @@ from spatial_arms import MOVING, UR5
 from test_derivatives import check_function
 
 import nmm
-from nmm.configuration import Configuration
-from nmm.function import Function, Row, Stage
-from nmm.references import Circle, Constant, PoseReference, Slerp, Turn
-from nmm.robot import Robot
-from nmm.tasks import (
+from nmm.functions.function import Function, Row, Stage
+from nmm.functions.references import Circle, Constant, PoseReference, Slerp, Turn
+from nmm.functions.tasks import (
     CenterOfMass,
     Distance,
     Orientation,
@@ -26,6 +24,8 @@ from nmm.tasks import (
     Posture,
     Task,
 )
+from nmm.robots.configuration import Configuration
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 from spatial_arms import MOVING, UR5, near, pose
 
 import nmm
-from nmm.configuration import Configuration
-from nmm.references import Circle, PoseReference, Turn, rotation_vector
-from nmm.robot import Robot
-from nmm.tasks import (
+from nmm.functions.references import Circle, PoseReference, Turn, rotation_vector
+from nmm.functions.tasks import (
     CenterOfMass,
     Coordinates,
     Distance,
@@ -25,6 +23,8 @@ from nmm.tasks import (
     Posture,
     Task,
 )
+from nmm.robots.configuration import Configuration
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

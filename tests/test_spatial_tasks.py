@@ -11,12 +11,10 @@ from numpy.typing import NDArray
 from spatial_arms import MOVING, UR5, pose
 from test_derivatives import assert_close, check_function, derivative, partials
 
-from nmm.configuration import Configuration
-from nmm.function import Evaluation, Function
-from nmm.program import Program
-from nmm.references import PoseReference, Slerp, Turn, rotation_vector
-from nmm.robot import Robot
-from nmm.tasks import (
+from nmm.functions.function import Evaluation, Function
+from nmm.functions.program import Program
+from nmm.functions.references import PoseReference, Slerp, Turn, rotation_vector
+from nmm.functions.tasks import (
     CenterOfMass,
     Distance,
     Orientation,
@@ -26,7 +24,9 @@ from nmm.tasks import (
     Posture,
     Task,
 )
-from nmm.tasks.comparison import Comparison
+from nmm.functions.tasks.comparison import Comparison
+from nmm.robots.configuration import Configuration
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

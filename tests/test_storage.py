@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 import nmm
-from nmm.storage import ARRAYS, replaced_folder
+from nmm.runs.storage import ARRAYS, replaced_folder
 
 
 @pytest.fixture(scope="module")

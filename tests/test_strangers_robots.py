@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from urdf_parts import inertial, joint, link, robot, write
 
 import nmm
-from nmm.configuration import Configuration
-from nmm.slip import slipping_wheels
+from nmm.robots.configuration import Configuration
+from nmm.robots.slip import slipping_wheels
 
 Array = NDArray[np.float64]
 

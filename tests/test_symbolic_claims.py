@@ -27,13 +27,13 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from symbolic_checks import PAPER, TASKS, made
 
-from nmm.analysis.symbolic import SymbolicAnalysis, lower_bound, never_zero, singular_set, symbolic, vanishing
-from nmm.analysis.symbolic.groebner import Basis, Undecided, Work
-from nmm.analysis.symbolic.zeros import Zeros
+from nmm.analysis.formulas import SymbolicAnalysis, lower_bound, never_zero, singular_set, symbolic, vanishing
+from nmm.analysis.formulas.groebner import Basis, Undecided, Work
+from nmm.analysis.formulas.zeros import Zeros
 from nmm.errors import InputError
-from nmm.loading import load
+from nmm.functions.tasks import Coordinates, Heading, Position
 from nmm.platforms import Omnidirectional
-from nmm.tasks import Coordinates, Heading, Position
+from nmm.robots.loading import load
 
 sympy = pytest.importorskip("sympy")
 
@@ -231,8 +231,8 @@ def test_what_the_statements_leave_out() -> None:
 
 
 def test_what_is_not_decided_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("nmm.analysis.symbolic.zeros._ALL", 100)
-    monkeypatch.setattr("nmm.analysis.symbolic.claims._BRIEF", 100)
+    monkeypatch.setattr("nmm.analysis.formulas.zeros._ALL", 100)
+    monkeypatch.setattr("nmm.analysis.formulas.claims._BRIEF", 100)
     claim = singular_set(made("unicycle_3r", "spatial position")[2])
     assert not claim.proved
     assert claim.statement.startswith("not decided: where J loses rank, as")

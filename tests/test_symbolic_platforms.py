@@ -13,12 +13,10 @@ from urdf_parts import LIMIT, inertial, joint, link, write
 from urdf_parts import robot as urdf
 
 import nmm
-from nmm.analysis.symbolic import symbolic
+from nmm.analysis.formulas import symbolic
 from nmm.errors import InputError
-from nmm.platforms import Platform
-from nmm.references import Bearing, Circle, PoseReference
-from nmm.robot import Robot
-from nmm.tasks import (
+from nmm.functions.references import Bearing, Circle, PoseReference
+from nmm.functions.tasks import (
     CallableFunction,
     CenterOfMass,
     Coordinates,
@@ -31,6 +29,8 @@ from nmm.tasks import (
     Posture,
     Task,
 )
+from nmm.platforms import Platform
+from nmm.robots.robot import Robot
 
 sympy = pytest.importorskip("sympy")
 

@@ -16,8 +16,8 @@ from urdf_parts import AXIS, LIMIT, inertial, joint, link, write
 from urdf_parts import robot as urdf
 
 import nmm
-from nmm.analysis.symbolic import TooLarge, never_zero, singular_set, symbolic
-from nmm.tasks import CenterOfMass, Orientation, Pose, Position, Posture
+from nmm.analysis.formulas import TooLarge, never_zero, singular_set, symbolic
+from nmm.functions.tasks import CenterOfMass, Orientation, Pose, Position, Posture
 
 sympy = pytest.importorskip("sympy")
 

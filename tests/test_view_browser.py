@@ -23,7 +23,7 @@ import nmm
 from nmm.playback import view
 from nmm.playback.extent import corners
 from nmm.playback.rolling import Rolling
-from nmm.robot import Robot
+from nmm.robots.robot import Robot
 
 pytestmark = pytest.mark.browser
 

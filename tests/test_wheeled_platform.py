@@ -40,7 +40,7 @@ from nmm.platforms import (
 from nmm.platforms.wheeled.descriptions import CasterWheel, Hitch, OmniWheel, SteeredWheel
 from nmm.platforms.wheeled.inputs import Speed, Spin, Spins
 from nmm.platforms.wheeled.platform import WheeledPlatform
-from nmm.robot import Robot
+from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -16,15 +16,15 @@ from urdf_parts import joint, link, robot, write
 
 from nmm.errors import InputError, RobotError
 from nmm.figures.silhouette import Silhouette
-from nmm.loading import load
-from nmm.loading.layout import measure_layout
 from nmm.platforms import Omnidirectional, Unicycle
 from nmm.playback import LiveViewer, Motion, wheel_rates, write_html
 from nmm.playback.caster import caster_step
 from nmm.playback.keyframes import LARGEST_TURN, ghost_samples, keyframes
 from nmm.playback.placements import Placements, rolling_joints
 from nmm.playback.rolling import Rolling
-from nmm.robot import Robot, Wheel
+from nmm.robots.loading import load
+from nmm.robots.loading.layout import measure_layout
+from nmm.robots.robot import Robot, Wheel
 
 Array = np.ndarray
 

@@ -12,16 +12,16 @@ from nmm.bundled import bundled_robots
 from nmm.cli.output import complain, show_table, show_text
 
 if TYPE_CHECKING:
-    from nmm.loading.findings import Problem
-    from nmm.loading.report import Report
+    from nmm.robots.loading.findings import Problem
+    from nmm.robots.loading.report import Report
 
 OK, BAD_INPUT = 0, 2
 
 
 def check_file(file: str, arguments: Mapping[str, object], package_dirs: Sequence[Path]) -> int:
     """Print every problem and warning, a line each; 2 when there are problems, else 0 and what it holds."""
-    from nmm.loading.packages import package_file
-    from nmm.loading.report import report
+    from nmm.robots.loading.packages import package_file
+    from nmm.robots.loading.report import report
 
     if file.startswith("package://"):
         path = package_file(file, package_dirs)

@@ -12,9 +12,9 @@ from nmm.errors import InputError
 
 if TYPE_CHECKING:
     from nmm.arrays import Array
-    from nmm.controller import Controller
-    from nmm.loading.provenance import Provenance
-    from nmm.robot import Robot, Wheel
+    from nmm.control.controller import Controller
+    from nmm.robots.loading.provenance import Provenance
+    from nmm.robots.robot import Robot, Wheel
 
 OK = 0
 #: An angle beyond this many turns is a joint without limits.
@@ -33,7 +33,7 @@ def describe_robot(
     package_dirs: Sequence[Path],
 ) -> int:
     """Everything about a robot, or about a scenario's robot and task."""
-    from nmm.loading import load
+    from nmm.robots.loading import load
 
     if source is None and scenario is None:
         raise InputError("expected ROBOT, a bundled name or a file, or --scenario SCENARIO, which has one")
@@ -59,7 +59,7 @@ def describe_robot(
     unfelt: Sequence[str] | None = None
     if scenario is not None:
         name, controller, q0 = _of_scenario(scenario, given)
-        from nmm.felt import unfelt_inputs
+        from nmm.control.idle_inputs import unfelt_inputs
 
         given = controller.robot
         task, unfelt = [(name, len(controller.rows))], unfelt_inputs(controller, q0)
@@ -164,7 +164,7 @@ def _redundancies(robot: Robot, tasks: Sequence[tuple[str, int]]) -> Iterator[li
 
 def _show_loading(robot: Robot) -> None:
     """What loading found and did."""
-    from nmm.loading.provenance import provenance_of
+    from nmm.robots.loading.provenance import provenance_of
 
     made = provenance_of(robot)
     lines = [f"note: {note}" for note in robot.notes]

@@ -12,10 +12,10 @@ import numpy as np
 
 from nmm.cli.output import complain, progress, shielded, show_table, show_text, warn
 from nmm.cli.runs import check_folder
-from nmm.storage import has_format, replaced_folder
+from nmm.runs.storage import has_format, replaced_folder
 
 if TYPE_CHECKING:
-    from nmm.analysis.redundant.laps import Laps, Repeatability
+    from nmm.analysis.redundancy.laps import Laps, Repeatability
 
 #: Marks a folder of `nmm laps`.
 FORMAT = "nmm laps 1"
@@ -32,7 +32,7 @@ def run_laps(
     out: Path | None,
 ) -> int:
     """Run the laps, write the folder, print the tables; 1 when a run ended before its last lap."""
-    from nmm.analysis.redundant.laps import repeatability
+    from nmm.analysis.redundancy.laps import repeatability
     from nmm.scenario import Scenario
 
     scenario = Scenario.load(name, settings)

@@ -13,9 +13,9 @@ from nmm.cli.subjects import studied
 from nmm.errors import InputError
 
 if TYPE_CHECKING:
-    from nmm.analysis.mapping.result import Map
-    from nmm.analysis.mapping.singular_set import SingularSet
-    from nmm.robot import Robot
+    from nmm.analysis.maps.result import Map
+    from nmm.analysis.maps.singular_set import SingularSet
+    from nmm.robots.robot import Robot
 
 OK = 0
 
@@ -42,8 +42,8 @@ def make_map(
     **loading: Any,
 ) -> int:
     """Compute a map, write its folder, print its table; see `nmm.cli.mapping` for the options' meaning."""
-    from nmm.analysis.mapping.coordinates import check_held, singularity_map
-    from nmm.analysis.mapping.result import is_map
+    from nmm.analysis.maps.coordinates import check_held, singularity_map
+    from nmm.analysis.maps.result import is_map
 
     counts = counts_of(samples)
     bounds = ranges_of(ranges)
@@ -73,7 +73,7 @@ def make_map(
             check_held(given, names, "--at")
             made = singularity_map(what.subject, names, samples=counts, progress=report, **common)
         else:
-            from nmm.analysis.mapping.workspace import check_given, workspace_map
+            from nmm.analysis.maps.workspace import check_given, workspace_map
 
             check_given(given, what.subject, frame, what.q, "--at")
             made = workspace_map(
@@ -104,7 +104,7 @@ def show_map(made: Map, folder: Path) -> None:
 
 def _measure_rows(made: Map, name: str) -> Iterator[list[str]]:
     """One row; of a workspace one of the best and one of the worst postures."""
-    from nmm.analysis.mapping.measures import MEASURES
+    from nmm.analysis.maps.measures import MEASURES
 
     layers = {"": False} if made.kind == "coordinates" else {", best": False, ", worst": True}
     # Of the best postures no singular place is known: between the cells a value may be worse yet.

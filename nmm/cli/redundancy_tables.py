@@ -16,8 +16,8 @@ from nmm.cli.subjects import studied
 from nmm.errors import InputError, SingularError
 
 if TYPE_CHECKING:
-    from nmm.analysis.redundant.moving import SelfMotion
-    from nmm.analysis.redundant.report import RedundancyReport
+    from nmm.analysis.redundancy.moving import SelfMotion
+    from nmm.analysis.redundancy.report import RedundancyReport
 
 OK = 0
 #: Between samples of a self-motion, s; less for short ones.
@@ -48,8 +48,8 @@ def show_redundancy(
     InputError : wrong options; a direction that does not exist. Nothing has been printed then
     SingularError : the self-motion cannot begin; the report has been printed
     """
-    from nmm.analysis.redundant.null_fields import expect_direction
-    from nmm.analysis.redundant.report import redundancy
+    from nmm.analysis.redundancy.null_fields import expect_direction
+    from nmm.analysis.redundancy.report import redundancy
 
     if along is None and (html is not None or play):
         raise InputError(
@@ -64,7 +64,7 @@ def show_redundancy(
     if direction is None:
         show_report(report)
         return OK
-    from nmm.analysis.redundant.moving import self_motion
+    from nmm.analysis.redundancy.moving import self_motion
 
     expect_direction(found.robot, report.J, report.rank_J, direction, "--self-motion")
     dt = min(DT, duration / 4.0)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from nmm.cli.output import show_table, warn
 
 if TYPE_CHECKING:
-    from nmm.trajectory import Trajectory
+    from nmm.runs.trajectory import Trajectory
 
 
 def show_run(trajectory: Trajectory, folder: Path) -> None:

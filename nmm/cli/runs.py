@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 from nmm.cli.output import complain, progress, shielded, show_table
 from nmm.cli.report import describe, show_run
 from nmm.errors import InputError
+from nmm.runs.storage import check_replaceable, has_format, is_run, replaced_folder
 from nmm.scenario import Scenario
-from nmm.storage import check_replaceable, has_format, is_run, replaced_folder
 
 if TYPE_CHECKING:
     from nmm.playback.ellipsoids import Wanted
-    from nmm.trajectory import Trajectory
+    from nmm.runs.trajectory import Trajectory
 
 #: Marks a folder of `nmm compare`.
 COMPARISON = "nmm comparison 1"
@@ -102,7 +102,7 @@ def write_the_paper(folder: Path) -> int:
 def play_folder(folder: Path, port: int | None, *, open_browser: bool, ellipsoids: Wanted = False) -> int:
     """Play a run, or the runs of a comparison in one scene."""
     from nmm.playback import play
-    from nmm.trajectory import Trajectory
+    from nmm.runs.trajectory import Trajectory
 
     if _is_comparison(folder):
         folders = [folder / kind for kind in json.loads((folder / "summary.json").read_text("utf-8"))["runs"]]

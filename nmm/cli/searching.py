@@ -9,9 +9,9 @@ from nmm.cli.output import progress, show_table, show_text
 from nmm.words import listed
 
 if TYPE_CHECKING:
-    from nmm.analysis.searching.family import SingularFamily
-    from nmm.analysis.searching.many_starts import SingularitySearch
-    from nmm.analysis.searching.nearest import SingularPoint
+    from nmm.analysis.search.family import SingularFamily
+    from nmm.analysis.search.many_starts import SingularitySearch
+    from nmm.analysis.search.nearest import SingularPoint
     from nmm.cli.subjects import Studied
 
 OK = 0
@@ -33,8 +33,8 @@ def search_command(
     nearest : whether to look for the nearest to `studied.q`
     length : so many m count as 1 rad
     """
-    from nmm.analysis.searching.many_starts import find_singularities
-    from nmm.analysis.searching.nearest import nearest_singularity
+    from nmm.analysis.search.many_starts import find_singularities
+    from nmm.analysis.search.nearest import nearest_singularity
 
     if starts is not None:
         with progress("searching") as report:
@@ -63,7 +63,7 @@ def search_command(
 
 def show_search(search: SingularitySearch) -> None:
     """The families in a table, what each loses and where, what was searched."""
-    from nmm.analysis.searching.family import of_starts
+    from nmm.analysis.search.family import of_starts
 
     show_text(search.summary)
     if search.found and not search.everywhere:
@@ -120,7 +120,7 @@ def _row(number: int, family: SingularFamily) -> tuple[str, ...]:
 
 
 def _value(value: float, unit: str) -> str:
-    from nmm.analysis.searching.text import value_text
+    from nmm.analysis.search.text import value_text
 
     return value_text(float(value), unit)
 

@@ -22,9 +22,9 @@ from nmm.cli.options import (
 from nmm.errors import InputError
 
 if TYPE_CHECKING:
-    from nmm.analysis.minors import Choice
+    from nmm.analysis.singular.minors import Choice
     from nmm.cli.subjects import Studied
-    from nmm.trajectory import Trajectory
+    from nmm.runs.trajectory import Trajectory
 
 OK = 0
 #: All minors are listed up to so many.
@@ -205,7 +205,7 @@ def _chosen(given: Studied, all_or_none: bool | None, listed: Sequence[str] | No
         return list(listed), 0
     if all_or_none is not None:
         return all_or_none, 0
-    from nmm.analysis.reached import stacked
+    from nmm.analysis.singular.reached import stacked
 
     count = math.comb(given.robot.n_u, len(stacked(given.task).rows(given.robot)))
     return (True, 0) if count <= MANY_MINORS else (False, count)

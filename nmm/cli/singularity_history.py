@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nmm.analysis.algorithmic import volume
-from nmm.analysis.along import SingularityHistory
-from nmm.analysis.instants import Crossing, Dip
-from nmm.analysis.minors import determinants, minor_name
+from nmm.analysis.singular.algorithmic import volume
+from nmm.analysis.singular.along import SingularityHistory
+from nmm.analysis.singular.instants import Crossing, Dip
+from nmm.analysis.singular.minors import determinants, minor_name
 from nmm.arrays import Array
 from nmm.cli.output import show_table
 from nmm.cli.singularity_words import block, header, named_or_counted, number, say, sizes_note, without_twins
-from nmm.trajectory import Trajectory
+from nmm.runs.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from nmm.cli.subjects import Studied
@@ -30,7 +30,7 @@ def show_history(
     given: Studied, run: Trajectory, history: SingularityHistory, length: float | None, left_out: int
 ) -> None:
     """Print a history; `left_out` minors are not in it because they are many."""
-    from nmm.analysis.reached import stacked
+    from nmm.analysis.singular.reached import stacked
 
     rows = stacked(given.task).rows(given.robot)
     for line in header(given):

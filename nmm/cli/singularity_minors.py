@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nmm.analysis.algorithmic import PartitionSingularities, partition_singularities
-from nmm.analysis.minors import minor_name
-from nmm.analysis.singularity import SingularityReport
+from nmm.analysis.singular.algorithmic import PartitionSingularities, partition_singularities
+from nmm.analysis.singular.minors import minor_name
+from nmm.analysis.singular.singularity import SingularityReport
 from nmm.cli.output import show_table
 from nmm.cli.singularity_words import block, directions, number, say
 from nmm.resolvers.reduced_gradient import ReducedGradient

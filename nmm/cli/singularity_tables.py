@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nmm.analysis.restoration import Restoration
-from nmm.analysis.singularity import SingularityReport
+from nmm.analysis.singular.restoration import Restoration
+from nmm.analysis.singular.singularity import SingularityReport
 from nmm.cli.output import console, show_table
 from nmm.cli.singularity_minors import extended, idle_inputs, reduced_gradient, show_minors
 from nmm.cli.singularity_words import (

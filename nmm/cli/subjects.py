@@ -14,13 +14,13 @@ from nmm.cli.options import arguments_of, settings_of, values_of
 from nmm.errors import InputError, unknown
 
 if TYPE_CHECKING:
-    from nmm.analysis.jacobians import Subject
-    from nmm.controller import Controller
-    from nmm.function import Function
-    from nmm.robot import Robot
+    from nmm.analysis.singular.jacobians import Subject
+    from nmm.control.controller import Controller
+    from nmm.functions.function import Function
+    from nmm.functions.tasks import Stack, Task
+    from nmm.robots.robot import Robot
+    from nmm.runs.trajectory import Trajectory
     from nmm.scenario import Scenario
-    from nmm.tasks import Stack, Task
-    from nmm.trajectory import Trajectory
 
 #: Options by the arguments of `nmm.load`.
 _OPTIONS = {"platform": "--platform", "lock": "--lock", "axle": "--axle", "package_dirs": "--package-dir"}
@@ -115,10 +115,10 @@ def _opened(
 ) -> tuple[Trajectory | None, Scenario | None, Robot]:
     """The run, the scenario and the robot of SOURCE; run and scenario where it is one."""
     from nmm.bundled import bundled_robots, bundled_scenarios
-    from nmm.loading import load
+    from nmm.robots.loading import load
+    from nmm.runs.trajectory import Trajectory
     from nmm.scenario import Scenario
     from nmm.scenario.scenario import SUFFIXES
-    from nmm.trajectory import Trajectory
 
     path = Path(source).expanduser()
     of_scenario = source in bundled_scenarios() or path.suffix in SUFFIXES
@@ -147,7 +147,7 @@ def _opened(
 
 def _check_folder(source: str, path: Path) -> None:
     """`InputError` for a folder that is no run's; it names the runs inside, which `nmm compare` leaves."""
-    from nmm.storage import is_run
+    from nmm.runs.storage import is_run
 
     if is_run(path):
         return

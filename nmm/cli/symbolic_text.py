@@ -8,15 +8,15 @@ from dataclasses import replace
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
-from nmm.analysis.minors import Columns, chosen_columns, minor_name
+from nmm.analysis.singular.minors import Columns, chosen_columns, minor_name
 from nmm.cli.singularity_words import block, header, say
 from nmm.errors import InputError
 from nmm.words import listed
 
 if TYPE_CHECKING:
-    from nmm.analysis.symbolic import Bound, Claim, SymbolicAnalysis
+    from nmm.analysis.formulas import Bound, Claim, SymbolicAnalysis
     from nmm.cli.subjects import Studied
-    from nmm.robot import Robot
+    from nmm.robots.robot import Robot
 
 #: Reasons for more minors than these are not given.
 MANY_REASONS = 12
@@ -33,8 +33,8 @@ def formulas(given: Studied) -> tuple[SymbolicAnalysis | None, str]:
     """
     if find_spec("sympy") is None:
         raise InputError("symbolic: needs SymPy: pip install nmm[symbolic]")
-    from nmm.analysis.jacobians import Jacobians
-    from nmm.analysis.symbolic import symbolic
+    from nmm.analysis.formulas import symbolic
+    from nmm.analysis.singular.jacobians import Jacobians
 
     Jacobians(given.subject)  # complains about what is wrong with the input, formulas or not
     try:
@@ -127,7 +127,7 @@ def _zero(analysis: SymbolicAnalysis) -> list[str]:
 
 def _claims(given: Studied, analysis: SymbolicAnalysis) -> Iterator[str]:
     """Where J loses rank, also without the first length of the file, and which minors never vanish."""
-    from nmm.analysis.symbolic import lower_bound, singular_set
+    from nmm.analysis.formulas import lower_bound, singular_set
 
     bound = lower_bound(analysis)
     if bound is None:
@@ -159,7 +159,7 @@ def _because(steps: Sequence[str]) -> Iterator[str]:
 
 def _may_be_zero(robot: Robot, argument: str) -> bool:
     """Whether the robot's file takes 0 for an argument: an arm without an upper arm is none."""
-    from nmm.loading import load
+    from nmm.robots.loading import load
 
     try:
         load(robot.source, arguments={**robot.arguments, argument: "0"})
@@ -217,7 +217,7 @@ def _value(condition: Any) -> str | None:
 
 def _minors(analysis: SymbolicAnalysis) -> Iterator[str]:
     """Which minors never vanish, and when; which do somewhere."""
-    from nmm.analysis.symbolic import never_zero, vanishing
+    from nmm.analysis.formulas import never_zero, vanishing
 
     nonzero = [columns for columns, form in analysis.minor_forms.items() if form.number]
     if len(nonzero) < 2:  # the only one vanishes where J is singular

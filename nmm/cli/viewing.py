@@ -22,8 +22,8 @@ def view_robot(
     frames: bool,
 ) -> int:
     """Show a robot until Ctrl-C; shapes whose meshes are missing are left out, with a warning."""
-    from nmm.loading import load
     from nmm.playback import view
+    from nmm.robots.loading import load
 
     robot = load(
         source, platform=platform, lock=lock, axle=axle, package_dirs=package_dirs, missing_meshes="skip"

@@ -16,7 +16,7 @@ from nmm.errors import InputError
 from nmm.figures import curves, style
 from nmm.figures.motion import Scene, stroboscopic
 from nmm.figures.objective import draw_best_objective, has_objective, objective_comparison
-from nmm.trajectory import Trajectory
+from nmm.runs.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from nmm.playback.ellipsoids import Wanted

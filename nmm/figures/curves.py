@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from nmm.arrays import Array
 from nmm.figures import style
-from nmm.trajectory import Trajectory
+from nmm.runs.trajectory import Trajectory
 
 #: Errors below this fraction of the largest are rounding, and say nothing of the rate of decay.
 _FLOOR = 1e-9

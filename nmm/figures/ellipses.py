@@ -8,7 +8,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
-from nmm.analysis.parts import WHOLE
+from nmm.analysis.singular.parts import WHOLE
 from nmm.arrays import Array
 from nmm.errors import InputError
 from nmm.figures import style
@@ -27,7 +27,7 @@ from nmm.playback.ellipsoids import (
 )
 from nmm.playback.keyframes import ghost_samples
 from nmm.playback.motion import Motion
-from nmm.trajectory import Trajectory
+from nmm.runs.trajectory import Trajectory
 
 #: At most and at least so many instants with ellipses, and at how many of them the robot is drawn.
 MOST, LEAST, ROBOTS = 12, 6, 5

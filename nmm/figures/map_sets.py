@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patheffects import withStroke
 
-from nmm.analysis.mapping.result import Map
-from nmm.analysis.mapping.singular_set import SingularSet
+from nmm.analysis.maps.result import Map
+from nmm.analysis.maps.singular_set import SingularSet
 from nmm.arrays import Array
 from nmm.figures import style
 

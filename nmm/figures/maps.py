@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
 
-from nmm.analysis.mapping.extremes import EVERYWHERE
-from nmm.analysis.mapping.measures import MEASURES
-from nmm.analysis.mapping.result import Map
+from nmm.analysis.maps.extremes import EVERYWHERE
+from nmm.analysis.maps.measures import MEASURES
+from nmm.analysis.maps.result import Map
 from nmm.arrays import Array
 from nmm.errors import InputError, unknown
 from nmm.figures import style

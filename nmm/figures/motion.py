@@ -17,7 +17,7 @@ from nmm.figures import style
 from nmm.figures.silhouette import Pose, Silhouette
 from nmm.figures.views import ABOVE, SIDE, View, Viewed, page
 from nmm.playback.placements import base_position
-from nmm.trajectory import Trajectory
+from nmm.runs.trajectory import Trajectory
 
 #: Distance of a time's label from what it belongs to, m.
 _LABEL = 0.12

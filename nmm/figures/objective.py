@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from nmm.arrays import Array
 from nmm.errors import InputError
 from nmm.figures import style
-from nmm.trajectory import Trajectory
+from nmm.runs.trajectory import Trajectory
 
 #: A logarithmic axis shows H down to this fraction of its largest value.
 _FLOOR = 1e-8

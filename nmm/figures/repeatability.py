@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from nmm.analysis.redundant.laps import Laps, Repeatability
+from nmm.analysis.redundancy.laps import Laps, Repeatability
 from nmm.arrays import Array
 from nmm.errors import InputError
 from nmm.figures import style

@@ -14,11 +14,11 @@ import numpy as np
 import pinocchio as pin
 
 from nmm.arrays import Array
-from nmm.configuration import Configuration
 from nmm.figures.solids import Solid, body_wheels, neutral_outline, platform_shapes, tyre, wheel_points
 from nmm.playback.placements import Placements
 from nmm.playback.rolling import Rolling
-from nmm.robot import Robot
+from nmm.robots.configuration import Configuration
+from nmm.robots.robot import Robot
 
 #: A joint that is not farther beside its link's axis than this stands on a column, m.
 _COLUMN = 0.01

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from nmm.arrays import Array
-from nmm.loading.joint_kinds import axis
-from nmm.robot import Robot, Wheel
+from nmm.robots.loading.joint_kinds import axis
+from nmm.robots.robot import Robot, Wheel
 
 #: Directions, spread evenly over the sphere, in which a mesh's outermost points are kept.
 _DIRECTIONS = 200

@@ -12,7 +12,7 @@ from nmm.paper.cases import CASES, DT, RESOLVERS, Case
 from nmm.paper.claims import claims
 from nmm.paper.numbers import smallest_determinant, table
 from nmm.paper.results import CaseResult
-from nmm.trajectory import Outcome, Trajectory
+from nmm.runs.trajectory import Outcome, Trajectory
 
 if TYPE_CHECKING:
     from nmm.scenario import Scenario

@@ -24,7 +24,7 @@ from nmm.paper.numbers import (
 from nmm.paper.results import Claim
 
 if TYPE_CHECKING:
-    from nmm.trajectory import Trajectory
+    from nmm.runs.trajectory import Trajectory
 
 #: Deviations from exact exponential decay below this are RK4's own at a step of 5 ms (m or rad): they are
 #: 3e-6 at most, in case 3, and fall with the fourth power of the step.

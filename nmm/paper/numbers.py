@@ -9,11 +9,11 @@ import numpy as np
 
 from nmm.arrays import Array
 from nmm.paper.results import Row
-from nmm.summary import lateral_slip
+from nmm.runs.summary import lateral_slip
 
 if TYPE_CHECKING:
-    from nmm.controller import Controller
-    from nmm.trajectory import Trajectory
+    from nmm.control.controller import Controller
+    from nmm.runs.trajectory import Trajectory
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")

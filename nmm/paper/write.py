@@ -14,7 +14,7 @@ from nmm.errors import InputError
 from nmm.paper.cases import CASES
 from nmm.paper.processes import share_out
 from nmm.paper.results import CaseResult, Claim
-from nmm.storage import replaced_folder
+from nmm.runs.storage import replaced_folder
 
 #: Marks a folder as one of ours.
 FORMAT = "nmm paper 1"

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nmm.arrays import positive, vector
-from nmm.compiled import Kernel
 from nmm.errors import InputError, unknown
+from nmm.kernels.compiled import Kernel
 from nmm.platforms.layout import Layout
 
 Array = NDArray[np.float64]

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import positive
-from nmm.compiled import PLATFORM, Kernel, kernel
 from nmm.errors import InputError
+from nmm.kernels.compiled import PLATFORM, Kernel, kernel
 from nmm.platforms.base import Array, Platform
 from nmm.platforms.layout import Layout, Pivot
 from nmm.platforms.measuring import (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nmm.compiled import PLATFORM, Kernel, kernel
+from nmm.kernels.compiled import PLATFORM, Kernel, kernel
 from nmm.platforms.base import Array, Platform
 
 

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import positive, scalar
-from nmm.compiled import PLATFORM, Kernel, kernel
 from nmm.errors import InputError
+from nmm.kernels.compiled import PLATFORM, Kernel, kernel
 from nmm.platforms.base import Array, Platform
 from nmm.platforms.layout import Layout
 from nmm.platforms.own_joints import coordinates_with

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from nmm.compiled import PLATFORM, Kernel, kernel
+from nmm.kernels.compiled import PLATFORM, Kernel, kernel
 from nmm.platforms.base import Array, Platform
 
 

@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from nmm.arrays import Array
 from nmm.errors import RobotError
-from nmm.robot import Robot
+from nmm.robots.robot import Robot
 
 # Inputs move a body when they do at one of so many configurations: a steered body stands still at some.
 _PROBES = 4

@@ -14,7 +14,7 @@ from nmm.playback.keyframes import Keyframes
 from nmm.playback.placements import Placements, position_and_quaternion
 from nmm.playback.shapes import shapes
 from nmm.playback.sticks import appearance
-from nmm.robot import Robot
+from nmm.robots.robot import Robot
 
 Rgb = tuple[float, float, float]
 Command = dict[str, Any]

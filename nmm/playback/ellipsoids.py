@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nmm.analysis.ellipsoids import Ellipsoids, Sizes, carried_frame, ellipsoids_along, frame_of
-from nmm.analysis.parts import WHOLE
+from nmm.analysis.singular.ellipsoids import Ellipsoids, Sizes, carried_frame, ellipsoids_along, frame_of
+from nmm.analysis.singular.parts import WHOLE
 from nmm.arrays import Array, positive
 from nmm.errors import InputError
 from nmm.playback.drawing import Command, Drawing, Rgb, animation, page_times
@@ -17,7 +17,7 @@ from nmm.playback.keyframes import Keyframes
 from nmm.playback.motion import Motion
 from nmm.playback.placements import position_and_quaternion
 from nmm.playback.rolling import Rolling
-from nmm.robot import Robot
+from nmm.robots.robot import Robot
 
 ARM = "arm"
 #: Colours of the arm's, and of the legend's entry for robots of several colours.
@@ -43,7 +43,7 @@ class EllipsoidOptions:
     Attributes
     ----------
     frame : the frame; the one that the task positions when not given, or the arm's tip
-    sizes : how much of each input counts as 1 (see `nmm.analysis.ellipsoids.ellipsoids_along`)
+    sizes : how much of each input counts as 1 (see `nmm.analysis.singular.ellipsoids.ellipsoids_along`)
     scale : metres drawn for each m/s; when not given, so that the largest is up to a third of the robot's
         extent
 

@@ -10,7 +10,7 @@ import pinocchio as pin
 from nmm.arrays import Array
 from nmm.playback.placements import Placements
 from nmm.playback.sticks import appearance
-from nmm.robot import Robot
+from nmm.robots.robot import Robot
 
 _CORNERS = np.array(list(itertools.product((0, 1), repeat=3)))
 

@@ -21,7 +21,7 @@ from nmm.playback.rolling import Rolling
 from nmm.playback.scene import live_scene, playback_scene
 from nmm.playback.server import PageServer
 from nmm.playback.sticks import appearance
-from nmm.robot import Robot
+from nmm.robots.robot import Robot
 
 if TYPE_CHECKING:
     from nmm.playback.ellipsoids import Wanted

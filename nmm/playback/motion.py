@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from nmm.arrays import Array, array, matrix, vector
 from nmm.errors import InputError
-from nmm.robot import Robot
+from nmm.robots.robot import Robot
 
 
 @dataclass(frozen=True, eq=False)

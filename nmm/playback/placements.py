@@ -7,7 +7,7 @@ import pinocchio as pin
 
 from nmm.arrays import Array
 from nmm.errors import RobotError
-from nmm.robot import Robot
+from nmm.robots.robot import Robot
 
 
 def rolling_joints(robot: Robot) -> tuple[str, ...]:

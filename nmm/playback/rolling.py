@@ -10,7 +10,7 @@ from nmm.playback.carriers import Carriers, at_point
 from nmm.playback.motion import Motion
 from nmm.playback.placements import rolling_joints
 from nmm.playback.swivels import Swivel
-from nmm.robot import Robot
+from nmm.robots.robot import Robot
 
 
 class Rolling:

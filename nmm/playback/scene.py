@@ -17,7 +17,7 @@ from nmm.playback.motion import Motion
 from nmm.playback.placements import base_position
 from nmm.playback.rolling import wheel_angles
 from nmm.playback.shapes import Y_TO_Z, cylinder, sphere
-from nmm.robot import Robot
+from nmm.robots.robot import Robot
 
 if TYPE_CHECKING:
     from nmm.playback.ellipsoids import SceneEllipsoids, Wanted

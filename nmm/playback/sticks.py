@@ -14,9 +14,9 @@ import pinocchio as pin
 
 from nmm.arrays import Array
 from nmm.errors import RobotError
-from nmm.loading.joint_kinds import axis, is_revolute, kind
-from nmm.loading.provenance import parts_of
-from nmm.robot import Robot, Wheel
+from nmm.robots.loading.joint_kinds import axis, is_revolute, kind
+from nmm.robots.loading.provenance import parts_of
+from nmm.robots.robot import Robot, Wheel
 
 fcl = pin.hppfcl
 

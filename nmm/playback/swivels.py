@@ -10,10 +10,10 @@ import numpy as np
 import pinocchio as pin
 
 from nmm.arrays import Array
-from nmm.loading.joint_kinds import axis
 from nmm.playback.carriers import Carriers, at_point
 from nmm.playback.caster import caster_step
-from nmm.robot import Robot, Wheel
+from nmm.robots.loading.joint_kinds import axis
+from nmm.robots.robot import Robot, Wheel
 
 # A wheel whose centre is nearer to its swivel's axis than this part of its radius does not trail.
 _NO_TRAIL = 1e-4

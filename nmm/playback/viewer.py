@@ -11,7 +11,7 @@ from nmm.playback.live import serve
 from nmm.playback.page import socket_page
 from nmm.playback.server import PageServer
 from nmm.playback.viewer_scene import viewer_scene
-from nmm.robot import Robot
+from nmm.robots.robot import Robot
 
 SCRIPTS = ("viewer_joints.js", "viewer_labels.js", "viewer_frames.js")
 STYLES = ("viewer.css",)

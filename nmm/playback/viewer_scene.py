@@ -9,13 +9,13 @@ import numpy as np
 import pinocchio as pin
 
 from nmm.arrays import Array
-from nmm.loading.tips import first_tip, tips
 from nmm.playback.drawing import Command, Drawing, DrawnRobot, segment
 from nmm.playback.extent import robot_boxes
 from nmm.playback.placements import position_and_quaternion
 from nmm.playback.rolling import Rolling
 from nmm.playback.scene import live_scene
-from nmm.robot import Robot
+from nmm.robots.loading.tips import first_tip, tips
+from nmm.robots.robot import Robot
 
 #: Limits beyond this, m or rad, are none.
 UNBOUNDED = 1e3

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, Integers, array, vector
-from nmm.compiled import Kernel
 from nmm.errors import InputError
+from nmm.kernels.compiled import Kernel
 
 
 class Status(IntEnum):

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array
-from nmm.compiled import RESOLVER, Kernel, kernel
 from nmm.errors import InputError
-from nmm.linear_algebra import residual_norm
+from nmm.kernels.compiled import RESOLVER, Kernel, kernel
+from nmm.kernels.linear_algebra import residual_norm
 from nmm.resolvers.base import Resolver, Setup, Shape, Status
 
 

@@ -8,9 +8,9 @@ from typing import ClassVar
 import numpy as np
 
 from nmm.arrays import Array, positive
-from nmm.compiled import RESOLVER, Kernel, kernel
 from nmm.errors import InputError
-from nmm.linear_algebra import eliminate, orthonormal_rows, residual_norm
+from nmm.kernels.compiled import RESOLVER, Kernel, kernel
+from nmm.kernels.linear_algebra import eliminate, orthonormal_rows, residual_norm
 from nmm.resolvers.base import Resolver, Setup, Shape
 
 

@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from nmm.arrays import Array, positive
-from nmm.compiled import RESOLVER, Kernel, kernel
-from nmm.linear_algebra import closest_solution, orthonormal_rows, residual_norm
+from nmm.kernels.compiled import RESOLVER, Kernel, kernel
+from nmm.kernels.linear_algebra import closest_solution, orthonormal_rows, residual_norm
 from nmm.resolvers.base import Resolver, Setup, Shape
 from nmm.resolvers.weights import Weights, weight_matrix
 

@@ -10,9 +10,9 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from nmm.arrays import Array, positive
-from nmm.compiled import RESOLVER, Kernel, compiled, kernel
 from nmm.errors import InputError, unknown
-from nmm.linear_algebra import eliminate, orthonormal_rows, residual_norm
+from nmm.kernels.compiled import RESOLVER, Kernel, compiled, kernel
+from nmm.kernels.linear_algebra import eliminate, orthonormal_rows, residual_norm
 from nmm.resolvers.base import FREE, OVERDUE, Resolver, Setup, Shape
 from nmm.resolvers.weights import Weights, weight_diagonal
 

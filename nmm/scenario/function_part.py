@@ -12,8 +12,8 @@ from nmm.scenario.keys import Part
 from nmm.scenario.numbers import numbers_by_name, shown
 
 if TYPE_CHECKING:
-    from nmm.function import Function
-    from nmm.robot import Robot
+    from nmm.functions.function import Function
+    from nmm.robots.robot import Robot
 
 Unit = Literal["m", "rad", "1"]
 

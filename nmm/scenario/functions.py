@@ -35,8 +35,8 @@ from nmm.scenario.robot_functions import (
 )
 
 if TYPE_CHECKING:
-    from nmm.function import Function
-    from nmm.robot import Robot
+    from nmm.functions.function import Function
+    from nmm.robots.robot import Robot
 
 POINT = (
     "three numbers, m, or a mapping with a kind: of time (circle, spline...), or a point of the robot "
@@ -55,7 +55,7 @@ class BearingPart(FunctionPart):
     towards: NumberList = Field(description="the fixed point, 2 numbers, m (a third, z, is only drawn)")
 
     def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.references.bearing import Bearing
+        from nmm.functions.references.bearing import Bearing
 
         with at("of"):
             of = self.of.build(robot, "m")
@@ -72,7 +72,7 @@ class PointingPart(FunctionPart):
     axis: Direction = Field("z", description="x, y, z or three numbers, in the frame's axes")
 
     def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.tasks.pointing import Pointing
+        from nmm.functions.tasks.pointing import Pointing
 
         check_frames(self, robot)
         with at("at"):
@@ -88,7 +88,7 @@ class DistancePart(FunctionPart):
     to: Reference = Field(description=f"the point: {POINT}")
 
     def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.tasks.distance import Distance
+        from nmm.functions.tasks.distance import Distance
 
         check_frames(self, robot)
         with at("to"):
@@ -107,7 +107,7 @@ class PoseReferencePart(FunctionPart):
     )
 
     def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.references.pose import PoseReference
+        from nmm.functions.references.pose import PoseReference
 
         with at("position"):
             position = self.position.build(robot, "m")

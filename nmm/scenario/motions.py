@@ -14,8 +14,8 @@ from nmm.scenario.numbers import Number, NumberList, Numbers, Positive, Whole, n
 
 if TYPE_CHECKING:
     from nmm.arrays import Array
-    from nmm.function import Function
-    from nmm.robot import Robot
+    from nmm.functions.function import Function
+    from nmm.robots.robot import Robot
 
 
 class CirclePart(FunctionPart):
@@ -29,7 +29,7 @@ class CirclePart(FunctionPart):
     plane: Literal["xy", "yz", "zx"] = Field("xy", description="for a center in space: xy, yz or zx")
 
     def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.references.circle import Circle
+        from nmm.functions.references.circle import Circle
 
         return Circle(self.center, self.radius, self.rate, self.phase, self.plane)
 
@@ -50,7 +50,7 @@ class LinePart(_WithUnit):
     )
 
     def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.references.polynomial import Line
+        from nmm.functions.references.polynomial import Line
 
         return Line(self.start, self.end, self.duration, self.profile, self.unit or unit)
 
@@ -62,7 +62,7 @@ class ConstantPart(_WithUnit):
     value: Numbers = Field(description="a number a row of the task")
 
     def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.references.polynomial import Constant
+        from nmm.functions.references.polynomial import Constant
 
         return Constant(self.value, self.unit or unit)
 
@@ -93,7 +93,7 @@ class PolynomialPart(_WithUnit):
         return self
 
     def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.references.polynomial import Polynomial
+        from nmm.functions.references.polynomial import Polynomial
 
         if self.times is not None and self.points is not None:
             return Polynomial.through(self.times, self.points, self.unit or unit)
@@ -115,7 +115,7 @@ class SplinePart(_WithUnit):
     )
 
     def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.references.polynomial import Spline
+        from nmm.functions.references.polynomial import Spline
 
         return Spline(self.times, self.points, self.degree, self.ends, self.unit or unit)
 
@@ -160,14 +160,14 @@ class RotationPart(FunctionPart):
         return self
 
     def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.references.polynomial import Constant
+        from nmm.functions.references.polynomial import Constant
 
         return Constant(self.rotation_vector(), "rad")
 
     def rotation_vector(self) -> Array:
         """The rotation vector (3,), rad."""
         from nmm.arrays import vector
-        from nmm.references.orientation import rotation_vector
+        from nmm.functions.references.orientation import rotation_vector
 
         with self.own_keys():
             if self.vector is not None:
@@ -206,7 +206,7 @@ class SlerpPart(FunctionPart):
     )
 
     def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.references.orientation import Slerp
+        from nmm.functions.references.orientation import Slerp
 
         with at("start"):
             start = self.start.rotation_vector()
@@ -228,7 +228,7 @@ class TurnPart(FunctionPart):
     )
 
     def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.references.orientation import Turn
+        from nmm.functions.references.orientation import Turn
 
         if self.start is None:
             return Turn(self.axis, self.rate)

@@ -12,8 +12,8 @@ from nmm.scenario.keys import Part, at, kind_of
 from nmm.scenario.numbers import Number, NumberList, Positive
 
 if TYPE_CHECKING:
-    from nmm.objectives import Objective
-    from nmm.robot import Robot
+    from nmm.functions.objectives import Objective
+    from nmm.robots.robot import Robot
 
 
 class ObjectivePart(Part):
@@ -51,7 +51,7 @@ class QuadraticPart(ObjectivePart):
     terms: list[TermPart] = Field(description="the squares that are added up", min_length=1)
 
     def make(self, robot: Robot) -> Objective:
-        from nmm.objectives import Quadratic, Square
+        from nmm.functions.objectives import Quadratic, Square
 
         for i, term in enumerate(self.terms):
             with at("terms", i, "of"):
@@ -68,7 +68,7 @@ class JointRangePart(ObjectivePart):
     upper: NumberList | None = Field(None, description="upper limits")
 
     def make(self, robot: Robot) -> Objective:
-        from nmm.objectives import JointRange
+        from nmm.functions.objectives import JointRange
 
         with at("joints"):
             for name in self.joints or ():
@@ -90,7 +90,7 @@ class ManipulabilityPart(ObjectivePart):
     maximise: bool = Field(True, description="whether to maximise it")
 
     def make(self, robot: Robot) -> Objective:
-        from nmm.objectives import Manipulability
+        from nmm.functions.objectives import Manipulability
 
         with at("frame"):
             robot.frame_id(self.frame)

@@ -16,7 +16,7 @@ from nmm.scenario.numbers import Number, number, numbers, numbers_by_name, shown
 
 if TYPE_CHECKING:
     from nmm.platforms import Platform
-    from nmm.robot import Robot
+    from nmm.robots.robot import Robot
 
 #: The absolute path of a file that is named at a place of the scenario.
 Absolute = Callable[[str, Place], Path]
@@ -134,7 +134,7 @@ class RobotPart(Part):
 
     def build(self, absolute: Absolute, place: Place) -> Robot:
         """The robot; `place` is where this part stands in the scenario."""
-        from nmm.loading import load
+        from nmm.robots.loading import load
 
         data = self.explicit(absolute, place)
         keywords = {key: data[key] for key in type(self).model_fields if key not in ("source", "platform")}
@@ -178,7 +178,7 @@ class ArmPart(Part):
 
     def mount_on(self, platform: Robot, absolute: Absolute, place: Place) -> Robot:
         """The platform with this arm."""
-        from nmm.loading import mount
+        from nmm.robots.loading import mount
 
         with at("arm"):
             arm = self.arm.build(absolute, (*place, "arm"))

@@ -11,8 +11,8 @@ from nmm.scenario.keys import at
 from nmm.scenario.numbers import nested
 
 if TYPE_CHECKING:
-    from nmm.function import Function
-    from nmm.robot import Robot
+    from nmm.functions.function import Function
+    from nmm.robots.robot import Robot
 
 #: A direction by its name or as three numbers.
 Direction = Annotated[str | list[float], BeforeValidator(lambda v: v if isinstance(v, str) else nested(v))]
@@ -37,7 +37,7 @@ class PositionPart(FunctionPart):
     relative_to: str | None = Field(None, description=RELATIVE_TO)
 
     def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.tasks.position import Position
+        from nmm.functions.tasks.position import Position
 
         check_frames(self, robot)
         return Position(self.frame, self.axes, self.relative_to)
@@ -52,7 +52,7 @@ class OrientationPart(FunctionPart):
     relative_to: str | None = Field(None, description=RELATIVE_TO)
 
     def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.tasks.orientation import Orientation
+        from nmm.functions.tasks.orientation import Orientation
 
         check_frames(self, robot)
         return Orientation(self.frame, self.relative_to)
@@ -67,7 +67,7 @@ class PosePart(FunctionPart):
     relative_to: str | None = Field(None, description=RELATIVE_TO)
 
     def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.tasks.pose import Pose
+        from nmm.functions.tasks.pose import Pose
 
         check_frames(self, robot)
         return Pose(self.frame, self.relative_to)
@@ -84,7 +84,7 @@ class HeadingPart(FunctionPart):
     about: str = Field("z", description="world axis x, y or z about which the angle is measured")
 
     def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.tasks.heading import Heading
+        from nmm.functions.tasks.heading import Heading
 
         check_frames(self, robot)
         return Heading(self.frame, self.direction, self.about)
@@ -102,7 +102,7 @@ class CoordinatesPart(FunctionPart):
     )
 
     def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.tasks.coordinates import Coordinates
+        from nmm.functions.tasks.coordinates import Coordinates
 
         with at("of"):
             for item in self.of:
@@ -119,7 +119,7 @@ class PosturePart(FunctionPart):
     )
 
     def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.tasks.posture import Posture
+        from nmm.functions.tasks.posture import Posture
 
         with at("of"):
             for name in self.of or ():
@@ -134,6 +134,6 @@ class CenterOfMassPart(FunctionPart):
     axes: str = Field("xyz", description="some of x, y, z in the order wanted, as xy")
 
     def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.tasks.center_of_mass import CenterOfMass
+        from nmm.functions.tasks.center_of_mass import CenterOfMass
 
         return CenterOfMass(self.axes)

@@ -16,9 +16,9 @@ from nmm.scenario.resolvers import PARTS
 from nmm.scenario.schema import ScenarioPart
 
 if TYPE_CHECKING:
-    from nmm.controller import Controller
-    from nmm.robot import Robot
-    from nmm.trajectory import Trajectory
+    from nmm.control.controller import Controller
+    from nmm.robots.robot import Robot
+    from nmm.runs.trajectory import Trajectory
 
 SUFFIXES = (".yaml", ".yml")
 
@@ -116,7 +116,7 @@ class Scenario:
         ----------
         progress : called with the fraction done, about a hundred times
         """
-        from nmm.simulation import simulate
+        from nmm.runs.simulation import simulate
 
         controller, parts = self.controller(), self.parts
         try:

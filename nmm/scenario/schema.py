@@ -17,8 +17,8 @@ from nmm.scenario.robot import RobotChoice
 from nmm.scenario.tasks import CoordinatesTask, TaskList, build_tasks, listed
 
 if TYPE_CHECKING:
-    from nmm.controller import Controller
-    from nmm.robot import Robot
+    from nmm.control.controller import Controller
+    from nmm.robots.robot import Robot
 
 
 def _coordinates(value: object) -> dict[str, float] | list[Nested]:
@@ -58,7 +58,7 @@ class ScenarioPart(Part):
 
     def build(self, robot: Robot) -> Controller:
         """The controller, after a check of q0; errors know their key."""
-        from nmm.controller import Controller
+        from nmm.control.controller import Controller
 
         with at("q0"):
             for name in self.q0 if isinstance(self.q0, dict) else ():

@@ -25,9 +25,9 @@ from nmm.scenario.robot_functions import (
 from nmm.scenario.tasks import TASKS
 
 if TYPE_CHECKING:
-    from nmm.function import Function
-    from nmm.robot import Robot
-    from nmm.tasks import Task
+    from nmm.functions.function import Function
+    from nmm.functions.tasks import Task
+    from nmm.robots.robot import Robot
 
 #: What a text may be.
 EXPECTED = "KIND:FRAME:AXES, as in position:ee:xy, or a mapping as in a scenario"
@@ -120,7 +120,7 @@ def _from_words(text: str, robot: Robot) -> dict[str, Any]:
 
 
 def _tip(robot: Robot, text: str) -> str:
-    from nmm.loading.tips import tips
+    from nmm.robots.loading.tips import tips
 
     ends = tips(robot)
     if len(ends) != 1:
@@ -133,7 +133,7 @@ def _tip(robot: Robot, text: str) -> str:
 
 def _moving_axes(data: dict[str, Any], robot: Robot) -> str:
     """Those of x, y, z along which some input moves the point at some of a few configurations."""
-    from nmm.configuration import Configuration
+    from nmm.robots.configuration import Configuration
 
     function = _by_kind(_PARTS)[data["kind"]].model_validate(data | {"axes": "xyz"}).build(robot)
     lower, upper = np.clip(robot.q_limits, -np.pi, np.pi).T

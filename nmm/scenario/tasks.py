@@ -22,9 +22,9 @@ from nmm.scenario.robot_functions import (
 )
 
 if TYPE_CHECKING:
-    from nmm.function import Row
-    from nmm.robot import Robot
-    from nmm.tasks import Task
+    from nmm.functions.function import Row
+    from nmm.functions.tasks import Task
+    from nmm.robots.robot import Robot
 
 
 class TaskPart(FunctionPart):
@@ -42,7 +42,7 @@ class TaskPart(FunctionPart):
 
     def build_task(self, robot: Robot) -> Task:
         """The task; errors know their key."""
-        from nmm.tasks import Task
+        from nmm.functions.tasks import Task
 
         function = self.build(robot)
         rows = function.rows(robot)

@@ -23,9 +23,9 @@ import math
 import numpy as np
 
 from nmm.arrays import Array
-from nmm.compiled import PLATFORM, compiled, kernel
-from nmm.linear_algebra import eliminate
-from nmm.packing import section
+from nmm.kernels.compiled import PLATFORM, compiled, kernel
+from nmm.kernels.linear_algebra import eliminate
+from nmm.kernels.packing import section
 
 BODIES, TERMS, RATES, CLOSURES, COMMON, SIZE = range(6)
 _AXIS = 4

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, vector
-from nmm.compiled import Kernel
 from nmm.errors import InputError
-from nmm.packing import pack
+from nmm.kernels.compiled import Kernel
+from nmm.kernels.packing import pack
 from nmm.platforms.base import Platform
 from nmm.platforms.layout import Layout
 from nmm.platforms.wheeled.descriptions import MAIN, FixedWheel, Hitch, OmniWheel, Wheel

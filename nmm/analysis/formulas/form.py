@@ -1,0 +1,300 @@
+"""From a trigonometric polynomial to the form that a person would write."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from fractions import Fraction
+from math import gcd
+
+from nmm.analysis.formulas.constants import is_constant
+from nmm.analysis.formulas.expansion import Expansion, Gaussian, Key, Ring
+from nmm.analysis.formulas.factor import factors_of
+from nmm.analysis.formulas.tree import ZERO, Node, Product, Sum, Symbol, Trig
+
+#: Names of factors that several minors have, in the order in which they are given.
+FACTOR_NAMES = ("Lambda", "Gamma", "Phi", "Psi", "Omega")
+#: A factor gets a name when at least so many minors have it.
+_OFTEN = 3
+#: So many cosines and sines of sums are tried as products.
+_MANY = 4
+#: More waves than that are not tried together.
+_LONG = 100
+
+
+def factored(value: Expansion) -> Product:
+    """The value as a product; sums of angles inside sums are split where that is shorter.
+
+    Raises
+    ------
+    TooLarge : see `factors_of`
+    """
+    if not value:
+        return ZERO
+    number, scalars, factors = factors_of(value)
+    result = Product(number)
+    for key in scalars:
+        result = result.times(_scalars(value, key))
+    parts = []
+    for factor, power in factors:
+        part = as_sum(factor)
+        for _ in range(power):
+            parts.append(part)
+    for part in sorted(parts, key=_length):
+        result = result.times(part)
+    return tidy(result)
+
+
+def expanded(product: Product, ring: Ring) -> Expansion:
+    """The polynomial that a product was written from; no factor in it may have a name."""
+    total = ring.number(product.number)
+    for factor, power in product.factors:
+        if isinstance(factor, Symbol):
+            total = total * ring.scalar(factor.name, power)
+            continue
+        if isinstance(factor, Sum):
+            one = ring.number(0)
+            for term in factor.terms:
+                one = one + expanded(term, ring)
+        else:
+            angle = {ring.variable(name, True): n for name, n in factor.angle}
+            one = ring.cos(angle) if factor.kind == "cos" else ring.sin(angle)
+        total = total * one.power(power)
+    return total
+
+
+def named(
+    products: Sequence[Product], taken: Collection[str], lengths: Collection[str]
+) -> tuple[dict[str, Product], list[Product]]:
+    """Names, none of those taken, for sums that several products have as a factor; the products in them.
+
+    Sums of lengths alone come last.
+    """
+    names: dict[str, Product] = {}
+    products = list(products)
+    for name in FACTOR_NAMES:
+        if name in taken:
+            continue
+        counts: Counter[Sum] = Counter()
+        for product in products:
+            counts.update(set(_sums(product)))
+        often = [
+            (not is_constant(node, lengths), count, _size(node), node)
+            for node, count in counts.items()
+            if count >= _OFTEN
+        ]
+        if not often:
+            break
+        node = max(often, key=lambda entry: entry[:3])[3]
+        names[name] = Product(Fraction(1), ((node, 1),))
+        products = [_replaced(product, node, Symbol(name)) for product in products]
+    return names, products
+
+
+def in_names(product: Product, names: Mapping[str, Product]) -> Product:
+    """A product with the factors that have names written as these."""
+    for name, form in names.items():
+        node = form.factors[0][0]
+        if isinstance(node, Sum):
+            product = _replaced(product, node, Symbol(name))
+    return product
+
+
+def as_sum(value: Expansion) -> Product:
+    """A value without looking for factors, as a product of a number and one sum (or one cosine)."""
+    if not value:
+        return ZERO
+    ring = value.ring
+    by_scalars: dict[Key, dict[Key, tuple[Fraction, Fraction]]] = {}
+    for key, coefficient in value.terms.items():
+        lengths = tuple((i, n) for i, n in key if not ring.is_angle[i])
+        angles = tuple((i, n) for i, n in key if ring.is_angle[i])
+        by_scalars.setdefault(lengths, {})[angles] = coefficient
+    terms: list[Product] = []
+    for lengths, waves in sorted(by_scalars.items()):
+        part = Expansion(ring, waves)
+        plain = _terms(part)
+        if len(by_scalars) > 1 and len(plain) > 1:
+            product = factored(part)
+            if _length(product) <= sum(map(_length, plain)):
+                plain = [product]
+        if len(plain) >= _MANY:
+            split = _split(part)
+            if split is not None and sum(map(_length, split)) < sum(map(_length, plain)):
+                plain = split
+        terms += [tidy(_scalars(value, lengths).times(term)) for term in plain]
+    if len(by_scalars) > 1 and len(terms) >= _MANY and len(value.terms) <= _LONG:
+        split = _split(value)
+        if split is not None and _length(_written(split)) <= _length(_written(terms)):
+            terms = split
+    return _written(terms)
+
+
+def _written(terms: list[Product]) -> Product:
+    """A sum with what is common taken out."""
+    return _normalised(_collected(terms))
+
+
+def _split(value: Expansion) -> list[Product] | None:
+    """C cos φ + S sin φ + R, for the angle that leaves the fewest waves; None when none leaves fewer."""
+    found: list[tuple[int, int, tuple[Expansion, Expansion, Expansion]]] = []
+    for angle in value.variables():
+        if value.ring.is_angle[angle] and all(abs(dict(key).get(angle, 0)) <= 1 for key in value.terms):
+            parts = _harmonics(value, angle)
+            found.append((sum(len(part.terms) for part in parts), angle, parts))
+    if not found:
+        return None
+    left, angle, (cosine, sine, rest) = min(found, key=lambda one: one[:2])
+    if left >= len(value.terms):
+        return None
+    name = ((value.ring.names[angle], 1),)
+    split = [
+        tidy(factored(part).times(Product(Fraction(1), ((Trig(kind, name), 1),))))
+        for kind, part in (("cos", cosine), ("sin", sine))
+        if part
+    ]
+    return [*split, factored(rest)] if rest else split
+
+
+def _harmonics(value: Expansion, angle: int) -> tuple[Expansion, Expansion, Expansion]:
+    """C, S and R of C cos φ + S sin φ + R; φ occurs once in each wave or not at all."""
+    cosine: dict[Key, Gaussian] = {}
+    sine: dict[Key, Gaussian] = {}
+    for key, (re, im) in value.terms.items():
+        n = dict(key).get(angle, 0)
+        if n:
+            # (a e^{ir}) e^{iφ} and its conjugate: C gets a e^{ir}, S gets i a e^{ir}, and their conjugates.
+            other = tuple((i, k) for i, k in key if i != angle)
+            for table, term in ((cosine, (re, im)), (sine, (-n * im, n * re))):
+                old = table.get(other, (Fraction(0), Fraction(0)))
+                table[other] = (old[0] + term[0], old[1] + term[1])
+    made = [
+        Expansion(value.ring, {key: part for key, part in table.items() if part[0] or part[1]})
+        for table in (cosine, sine)
+    ]
+    return made[0], made[1], value.without({angle})
+
+
+def _terms(value: Expansion) -> list[Product]:
+    """The cosines and sines of an expansion, each with its number and scalars."""
+    ring, terms = value.ring, []
+    for key, (re, im) in value.terms.items():
+        angle = [(i, n) for i, n in key if ring.is_angle[i]]
+        lengths = _scalars(value, tuple((i, n) for i, n in key if not ring.is_angle[i]))
+        if not angle:
+            terms.append(lengths.times(Product(re)))
+            continue
+        total = sum(n for _, n in angle)
+        if total < 0 or (total == 0 and angle[0][1] < 0):
+            continue  # the conjugate
+        named_angle = tuple((ring.names[i], n) for i, n in angle)
+        for kind, number in (("cos", 2 * re), ("sin", -2 * im)):
+            if number:
+                terms.append(lengths.times(Product(number, ((Trig(kind, named_angle), 1),))))
+    return sorted(terms, key=_rank)
+
+
+def _scalars(value: Expansion, key: Key) -> Product:
+    return Product(Fraction(1), tuple((Symbol(value.ring.names[i]), n) for i, n in sorted(key)))
+
+
+def _collected(terms: list[Product]) -> list[Product]:
+    """Terms with the most frequent common cosine or sine taken out: d + c1 (l2 s2 + l3 s23)."""
+    counts = Counter(f for term in terms for f, n in term.factors if not isinstance(f, Symbol) and n > 0)
+    shared = [f for f, count in counts.most_common() if count > 1]
+    if not shared or counts[shared[0]] == len(terms):
+        return sorted(terms, key=_rank)
+    common = shared[0]
+    inside = [_without(term, common) for term in terms if common in dict(term.factors)]
+    outside = [term for term in terms if common not in dict(term.factors)]
+    bracket = _normalised(_collected(inside))
+    return sorted([*outside, tidy(Product(Fraction(1), ((common, 1),)).times(bracket))], key=_rank)
+
+
+def _without(term: Product, factor: Node) -> Product:
+    return term.times(Product(Fraction(1), ((factor, -1),)))
+
+
+def _normalised(terms: list[Product]) -> Product:
+    """A sum with whole coprime coefficients, the first one positive, times what was taken out."""
+    if len(terms) == 1:
+        return terms[0]
+    over = 1
+    for term in terms:
+        over = over * term.number.denominator // gcd(over, term.number.denominator)
+    content = 0
+    for term in terms:
+        content = gcd(content, int(term.number * over))
+    number = Fraction(content, over) * (-1 if terms[0].number < 0 else 1)
+    shared = [
+        (f, min(dict(term.factors).get(f, 0) for term in terms))
+        for f, _ in terms[0].factors
+        if isinstance(f, Symbol)
+    ]
+    front = Product(number, tuple((f, n) for f, n in shared if n))
+    back = Product(1 / number, tuple((f, -n) for f, n in front.factors))
+    return front.times(Product(Fraction(1), ((Sum(tuple(term.times(back) for term in terms)), 1),)))
+
+
+def _rank(term: Product) -> tuple[int, int, str]:
+    """Constants first, then by the number of joints in the angle."""
+    angles = [sum(abs(n) for _, n in f.angle) if isinstance(f, Trig) else 9 for f, _ in term.factors
+              if not isinstance(f, Symbol)]  # fmt: skip
+    return (len(angles), sum(angles), "")
+
+
+def _length(product: Product) -> int:
+    """How many letters, roughly, a product takes."""
+    total = 0
+    for factor, n in product.factors:
+        if isinstance(factor, Sum):
+            total += abs(n) * sum(_length(term) + 1 for term in factor.terms)
+        else:
+            total += 1
+    return total
+
+
+def _size(node: Sum) -> int:
+    return sum(_length(term) + 1 for term in node.terms)
+
+
+def _sums(product: Product) -> Iterator[Sum]:
+    """Sums that are factors in a product, or in the terms of its sums."""
+    for factor, _ in product.factors:
+        if isinstance(factor, Sum):
+            yield factor
+            for term in factor.terms:
+                yield from _sums(term)
+
+
+def _replaced(product: Product, node: Sum, symbol: Symbol) -> Product:
+    """The product with a sum (or its terms among those of a larger one) written as a symbol."""
+    factors: list[tuple[Node, int]] = []
+    for factor, power in product.factors:
+        if factor == node:
+            factors.append((symbol, power))
+            continue
+        if isinstance(factor, Sum):
+            terms = [_replaced(term, node, symbol) for term in factor.terms]
+            for sign in (1, -1):
+                part = [Product(term.number * sign, term.factors) for term in node.terms]
+                if all(term in terms for term in part):
+                    rest = [term for term in terms if term not in part]
+                    terms = [*rest, Product(Fraction(sign), ((symbol, 1),))]
+            factors.append((Sum(tuple(terms)), power))
+            continue
+        factors.append((factor, power))
+    return tidy(Product(product.number, tuple(factors)))
+
+
+def tidy(product: Product) -> Product:
+    """Factors in the usual order: lengths, names, cosines and sines by their joints, sums."""
+    return Product(product.number, tuple(sorted(product.factors, key=lambda entry: _place(entry[0]))))
+
+
+def _place(factor: Node) -> tuple[int, int, str]:
+    if isinstance(factor, Symbol):
+        return (1 if factor.name in FACTOR_NAMES else 0, 0, "")
+    if isinstance(factor, Trig):
+        return (2, len(factor.angle), factor.angle[0][0])
+    return (3, 0, "")

@@ -1,0 +1,163 @@
+"""Values of rows and auxiliary quantities, written; headings as sums of angles where they are such."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+from nmm.analysis.formulas.expansion import Expansion
+from nmm.analysis.formulas.form import as_sum, factored
+from nmm.analysis.formulas.row import Arc, Auxiliary, Linear, Share, Turn, Value
+from nmm.analysis.formulas.tree import Product, Sum, Symbol, latex, text, to_sympy
+
+
+class Written(NamedTuple):
+    """A formula in three forms."""
+
+    expression: Any
+    text: str
+    latex: str
+
+
+#: Names of a rotation vector's components; as functions of the matrix' nine entries, row by row.
+ROTATION_VECTOR = tuple(f"rotation_vector_{axis}" for axis in "xyz")
+
+
+def written(value: Value, symbols: Mapping[str, Any]) -> Written:
+    """A row's value; the value of an angle is not wrapped."""
+    import sympy
+
+    if isinstance(value, Expansion):
+        return _of(factored(value), symbols)
+    if isinstance(value, Linear):
+        return _of(_sum([Product(n, ((Symbol(name), 1),)) for name, n in value.terms]), symbols)
+    if isinstance(value, Share):
+        return _of(Product(Fraction(1), ((Symbol(value.angle), 1),)).times(factored(value.factor)), symbols)
+    if isinstance(value, Turn):
+        axis = "xyz"[value.part]
+        return Written(
+            sympy.Function(ROTATION_VECTOR[value.part])(*_matrix(value, symbols)),
+            f"log({value.name}).{axis}",
+            rf"\log({value.name})_{axis}",
+        )
+    plain = _plain_angle(value)
+    if plain is not None:
+        terms, quarters = plain
+        angle = _of(_sum([Product(Fraction(n), ((Symbol(name), 1),)) for name, n in terms]), symbols)
+        if not quarters:
+            return angle
+        turn = {1: " + pi/2", 2: " + pi", -1: " - pi/2"}[quarters]
+        return Written(
+            angle.expression + quarters * sympy.pi / 2,
+            angle.text + turn,
+            angle.latex + turn.replace("pi/2", r"\frac{\pi}{2}").replace("+ pi", r"+ \pi"),
+        )
+    sine, cosine = (_of(factored(part), symbols) for part in (value.sine, value.cosine))
+    return Written(
+        sympy.atan2(sine.expression, cosine.expression),
+        f"atan2({sine.text}, {cosine.text})",
+        rf"\mathrm{{atan2}}({sine.latex}, {cosine.latex})",
+    )
+
+
+def matrix_text(turn: Turn) -> str:
+    """A rotation as a product of turns: Rz(theta + q1) Ry(q2)."""
+    return _turns_written(turn, text, "R{axis}({angle})", "pi/2", "pi")
+
+
+def matrix_latex(turn: Turn) -> str:
+    """The same as LaTeX."""
+    return _turns_written(turn, latex, "R_{axis}({angle})", r"\frac{\pi}{2}", r"\pi")
+
+
+def _turns_written(turn: Turn, style: Callable[[Product], str], form: str, half: str, whole: str) -> str:
+    written = []
+    for axis, angle, quarters in turn.product:
+        inside = (
+            style(_sum([Product(Fraction(n), ((Symbol(name), 1),)) for name, n in angle])) if angle else ""
+        )
+        constant = {0: "", 1: f" + {half}", 2: f" + {whole}", 3: f" - {half}"}[quarters]
+        if not inside:
+            constant = constant.replace(" + ", "").replace(" - ", "-")
+        written.append(form.replace("{axis}", "xyz"[axis]).replace("{angle}", inside + constant))
+    return " ".join(written) or "1"
+
+
+def _matrix(turn: Turn, symbols: Mapping[str, Any]) -> Any:
+    """A rotation as a SymPy matrix."""
+    import sympy
+
+    product = sympy.eye(3)
+    for axis, angle, quarters in turn.product:
+        total = sympy.Add(*(n * symbols[name] for name, n in angle), quarters * sympy.pi / 2)
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        matrix = sympy.eye(3)
+        matrix[i, i] = matrix[j, j] = sympy.cos(total)
+        matrix[i, j], matrix[j, i] = -sympy.sin(total), sympy.sin(total)
+        product = product * matrix
+    return product
+
+
+def auxiliary_written(auxiliary: Auxiliary, symbols: Mapping[str, Any]) -> Written:
+    """What an auxiliary symbol stands for."""
+    import sympy
+
+    a, b, *rest = [_of(as_sum(argument), symbols) for argument in auxiliary.arguments]
+    everything = [a, b, *rest]
+    if auxiliary.kind == "length":
+        return Written(
+            sympy.sqrt(sympy.Add(*(one.expression**2 for one in everything))),
+            f"hypot({', '.join(one.text for one in everything)})",
+            r"\sqrt{" + " + ".join(f"({one.latex})^2" for one in everything) + "}",
+        )
+    if auxiliary.kind == "bearing":
+        up, along = b, a
+    elif auxiliary.kind == "elevation":
+        up, along = rest[0], _hypot(a, b)
+    else:
+        up, along = _hypot(b, rest[0]), a
+    angle = Written(
+        sympy.atan2(up.expression, along.expression),
+        f"atan2({up.text}, {along.text})",
+        rf"\mathrm{{atan2}}({up.latex}, {along.latex})",
+    )
+    if auxiliary.kind != "over sine":
+        return angle
+    return Written(
+        1 / sympy.sinc(angle.expression),
+        f"a/sin(a), a = {angle.text}",
+        rf"a / \sin a, \; a = {angle.latex}",
+    )
+
+
+def _hypot(a: Written, b: Written) -> Written:
+    import sympy
+
+    return Written(
+        sympy.sqrt(a.expression**2 + b.expression**2),
+        f"hypot({a.text}, {b.text})",
+        rf"\sqrt{{({a.latex})^2 + ({b.latex})^2}}",
+    )
+
+
+def _of(product: Product, symbols: Mapping[str, Any]) -> Written:
+    return Written(to_sympy(product, symbols), text(product), latex(product))
+
+
+def _sum(terms: list[Product]) -> Product:
+    return terms[0] if len(terms) == 1 else Product(Fraction(1), ((Sum(tuple(terms)), 1),))
+
+
+def _plain_angle(arc: Arc) -> tuple[list[tuple[str, int]], int] | None:
+    """k·q and a number of quarter turns, where cosine and sine are those of such an angle."""
+    ring = arc.cosine.ring
+    half = Fraction(1, 2)
+    turns = {(half, 0): 0, (0, half): 1, (-half, 0): 2, (0, -half): -1}
+    if not len(arc.cosine.terms) == len(arc.sine.terms) == 2:
+        return None
+    for key, (re, im) in arc.cosine.terms.items():
+        whole = (re, im) in turns and all(ring.is_angle[i] for i, _ in key)
+        if whole and arc.sine.terms.get(key) == (im, -re):  # β = -i α
+            return [(ring.names[i], n) for i, n in key], turns[re, im]
+    return None

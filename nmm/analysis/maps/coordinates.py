@@ -1,0 +1,178 @@
+"""Maps of singularity and manipulability over two coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Unpack
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.analysis.maps.evaluation import Evaluator, Judged, Progress, Smallness, between
+from nmm.analysis.maps.result import About, Map
+from nmm.analysis.maps.singular_set import SingularSet, singular_set
+from nmm.analysis.singular.jacobians import Subject
+from nmm.arrays import Array, counted, vector
+from nmm.errors import InputError
+from nmm.robots.robot import Robot
+
+#: Most nodes of a map in all; for more there is no picture, and soon no memory.
+MOST_NODES = 4000 * 4000
+#: How far to both sides a coordinate without limits is mapped when no range is given, m.
+SIDE = 1.0
+
+
+def singularity_map(
+    subject: Subject,
+    over: Sequence[str] = ("q1", "q2"),
+    *,
+    ranges: Mapping[str, Sequence[float]] | None = None,
+    samples: int | Sequence[int] = (200, 200),
+    at: ArrayLike | Mapping[str, float] | None = None,
+    progress: Progress | None = None,
+    **judged: Unpack[Judged],
+) -> Map:
+    """Measures of J over two coordinates, the others held, and where J and the arm's part of it lose rank.
+
+    Parameters
+    ----------
+    subject : a controller, or (robot, task)
+    over : two coordinates, along the columns and along the rows
+    ranges : (lower, upper) of either, m or rad, both ends included; without, the limits, of an angle not
+        more than one turn: -π to π where it may; of a length without limits 1 m to both sides
+    samples : how many along each, or (along the first, along the second); at least 2
+    at : the coordinates held, (n,) or by name; without, the configuration nearest to zero
+    progress : called with the fraction done
+    measures : some of sigma_min (without, this), inverse_condition, manipulability, arm_manipulability,
+        platform_manipulability, weighted, eccentricity (`nmm.analysis.maps.measures.MEASURES`)
+    part : whose columns of J: "robot" (without, this), "platform", "arm" or an arm's name
+    t : s; without, 0
+    alpha : the arm's share in "weighted", in [0, 1]; without, 0.5
+    weights : W > 0 of the inputs, by input or group ("platform", "arm"): the measures are of J W^(-1/2)
+    length, sizes : as `analyse`; an input's limit as its size makes its top speed count as 1
+
+    Raises
+    ------
+    InputError : an unknown coordinate, measure or part, a part without inputs, a coordinate given twice, a
+        range of one that is not mapped, a value of one that is, an empty range, fewer than two samples or
+        more than `MOST_NODES` in all, a task of more rows than inputs
+    """
+    evaluator = Evaluator(subject, **judged)
+    robot = evaluator.robot
+    held = robot.rest if at is None else robot.q(at)
+    names, columns = coordinates(over, robot)
+    if isinstance(at, Mapping):
+        check_held(at, names, "at")
+    axes = grid_axes(robot, names, held, ranges, sample_counts(samples))
+    shape = len(axes[1]), len(axes[0])
+
+    def placed(points: Array) -> Array:
+        q = np.tile(held, (len(points), 1))
+        q[:, columns] = points
+        return q
+
+    points = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
+    found = evaluator(placed(points), between(progress, 0.0, 0.8), arm=evaluator.arm_beside)
+    full = len(evaluator.jacobians.rows)
+
+    def singular(name: str, those: Smallness, report: Progress | None) -> SingularSet:
+        J_of = evaluator.part_of(name)
+        smallness = (those.sigma.reshape(shape), those.volume.reshape(shape))
+        rank = those.rank.reshape(shape)
+        return singular_set(lambda x: J_of(placed(x)), smallness, rank, full, axes, report)
+
+    whole = singular(evaluator.part, found.own, between(progress, 0.8, 0.1))
+    arm = None if found.arm is None else singular("arm", found.arm, between(progress, 0.9, 0.1))
+    if progress is not None:
+        progress(1.0)
+    return Map(
+        kind="coordinates",
+        about=About.of(evaluator),
+        names=names,
+        units=(robot.q_units[columns[0]], robot.q_units[columns[1]]),
+        axes=axes,
+        values={name: values.reshape(shape) for name, values in found.values.items()},
+        rank=found.own.rank.reshape(shape),
+        singular=whole,
+        arm_singular=arm,
+        q=held,
+    )
+
+
+def coordinates(over: Sequence[str], robot: Robot) -> tuple[tuple[str, str], list[int]]:
+    """Two coordinates and their places in q."""
+    given = [over] if isinstance(over, str) else list(over)
+    if len(given) != 2:
+        raise InputError(f"over: expected two coordinates, as in ('q1', 'q2'), got {over!r}")
+    columns = [robot.coordinate(name) for name in given]
+    if columns[0] == columns[1]:
+        raise InputError(f"over: expected two different coordinates, got {given[0]} twice")
+    return (given[0], given[1]), columns
+
+
+def check_held(
+    given: Iterable[str], varied: Sequence[str], what: str, how: str = "on an axis of the map"
+) -> None:
+    """`InputError` for a coordinate that is given one value and is varied: that value would not count."""
+    for name in given:
+        if name in varied:
+            raise InputError(f"{what}: {name} is {how} ({', '.join(varied)})")
+
+
+def sample_counts(samples: int | Sequence[int]) -> tuple[int, int]:
+    """How many along the first and the second axis."""
+    if isinstance(samples, str) or not isinstance(samples, Sequence):
+        samples = [samples, samples]
+    if len(samples) != 2:
+        raise InputError(f"samples: expected a whole number, or two, got {samples!r}")
+    columns, rows = counted(samples[0], "samples", 2), counted(samples[1], "samples", 2)
+    if columns * rows > MOST_NODES:
+        raise InputError(
+            f"samples: expected at most {MOST_NODES} in all, as in 4000 x 4000, got {columns} x {rows}"
+        )
+    return columns, rows
+
+
+def grid_axes(
+    robot: Robot,
+    names: tuple[str, str],
+    held: Array,
+    ranges: Mapping[str, Sequence[float]] | None,
+    counts: tuple[int, int],
+) -> tuple[Array, Array]:
+    """The coordinates of columns and rows."""
+    given = dict(ranges or {})
+    for name in given:
+        if name not in names:
+            robot.coordinate(name)  # names the ones there are
+            raise InputError(f"ranges: {name} is not on an axis of the map ({', '.join(names)})")
+    first, second = (
+        np.linspace(
+            *(checked_range(given[name], name) if name in given else usual_range(robot, name, held)), count
+        )
+        for name, count in zip(names, counts, strict=True)
+    )
+    return first, second
+
+
+def checked_range(given: Sequence[float], name: str) -> tuple[float, float]:
+    """(lower, upper) with room between them."""
+    lower, upper = vector(given, 2, f"range of {name}")
+    if not lower < upper:
+        raise InputError(f"range of {name}: expected lower below upper, got {lower:g} to {upper:g}")
+    return float(lower), float(upper)
+
+
+def usual_range(robot: Robot, name: str, held: Array) -> tuple[float, float]:
+    """The limits; of an angle at most one turn, of a length without limits `SIDE` to both sides."""
+    index = robot.coordinate(name)
+    lower, upper = robot.q_limits[index]
+    if robot.q_units[index] == "m":
+        from_lower, to_upper = robot.limited[index]
+        lower = lower if from_lower else min(held[index], upper) - SIDE
+        upper = upper if to_upper else max(held[index], lower) + SIDE
+    if robot.q_units[index] == "m" or upper - lower <= 2.0 * np.pi:
+        # A joint that cannot move has a range all the same: the value that it is held at, with some room.
+        return (float(lower), float(upper)) if lower < upper else (lower - 0.5, lower + 0.5)
+    start = min(max(lower, -np.pi), upper - 2.0 * np.pi)
+    return float(start), float(start + 2.0 * np.pi)

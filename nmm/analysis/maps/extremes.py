@@ -1,0 +1,97 @@
+"""The smallest and the largest value of a map's measure, also between its cells, where it is singular."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from nmm.analysis.maps.singular_set import SingularSet
+from nmm.analysis.singular.parts import WHOLE
+
+if TYPE_CHECKING:
+    from nmm.analysis.maps.result import Map
+
+#: What a measure of the part is where the part's J loses rank.
+WHERE_SINGULAR: Mapping[str, float] = {
+    "sigma_min": 0.0,
+    "inverse_condition": 0.0,
+    "manipulability": 0.0,
+    "eccentricity": 1.0,
+}
+#: Measures that are zero where the whole robot is singular: a part is there, too.
+OF_PARTS = ("arm_manipulability", "platform_manipulability", "weighted")
+#: Smallest and largest that differ by less than this, of the largest in size, differ by rounding.
+SAME = 1e-9
+EVERYWHERE = "everywhere"
+
+
+class Extreme(NamedTuple):
+    """A value, where on the map it is, and on what: a singular set, in words, "everywhere" where the map has
+    no other value (no place then says more than the others), or "" for a cell's sample.
+    """
+
+    value: float
+    at: tuple[float, float]
+    on: str = ""
+
+
+def extremes(made: Map, measure: str, *, worst: bool = False) -> dict[str, Extreme]:
+    """ "smallest" and "largest" value of a measure; NaN in a map without any number.
+
+    A grid misses the singular places between its nodes. There the value is known without a sample.
+
+    Parameters
+    ----------
+    worst : of a workspace's worst postures. The best ones are not those that are singular, so only of the
+        worst the singular places tell a value
+    """
+    values = made.worst[measure] if worst else made.values[measure]
+    found = {}
+    for name, pick in (("smallest", np.nanargmin), ("largest", np.nanargmax)):
+        if np.all(np.isnan(values)):
+            found[name] = Extreme(np.nan, (np.nan, np.nan))
+            continue
+        row, column = np.unravel_index(pick(values), values.shape)
+        where = float(made.axes[0][column]), float(made.axes[1][row])
+        found[name] = Extreme(float(values[row, column]), where)
+    known = _known(made, measure)
+    constant = [value for those, _, value in known if those.everywhere]
+    between = [one for one in known if made.kind == "coordinates" or worst]
+    seen = [found["smallest"].value, found["largest"].value, *(value for *_, value in between)]
+    if constant or max(seen) - min(seen) <= SAME * max(map(abs, seen)):
+        return {
+            end: Extreme(constant[0] if constant else one.value, one.at, EVERYWHERE)
+            for end, one in found.items()
+        }
+    for those, whose, value in between[:1]:
+        end = "largest" if value > 0.0 else "smallest"
+        found[end] = Extreme(value, _first_of(those), _words(those, whose))
+    return found
+
+
+def _known(made: Map, measure: str) -> list[tuple[SingularSet, str, float]]:
+    """(set, whose, value on it) of the singular sets that were found and tell of a measure."""
+    part, found = made.about.part, []
+    if measure in WHERE_SINGULAR:
+        found.append((made.singular, "", WHERE_SINGULAR[measure]))
+    if measure in OF_PARTS and part == WHOLE:
+        found.append((made.singular, "", 0.0))
+    if measure == "arm_manipulability":
+        own = made.singular if part == "arm" else made.arm_singular
+        if own is not None:
+            found.insert(0, (own, "arm's ", 0.0))
+    return [one for one in found if not one[0].empty]
+
+
+def _first_of(those: SingularSet) -> tuple[float, float]:
+    points = those.lines[0] if those.lines else those.points
+    return float(points[0, 0]), float(points[0, 1])
+
+
+def _words(those: SingularSet, whose: str) -> str:
+    """ "the singular lines", "the arm's singular lines and point"."""
+    n = len(those.points)
+    kinds = ["lines"] * bool(those.lines) + [f"point{'s' * (n > 1)}"] * bool(n)
+    return f"the {whose}singular {' and '.join(kinds)}"

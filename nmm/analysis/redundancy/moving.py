@@ -1,0 +1,261 @@
+"""Self-motion: the robot moves along J's null space, there and back, while its task stays where it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.analysis.redundancy.motion_words import input_words, motion_text
+from nmm.analysis.redundancy.null_fields import (
+    NEARLY_SINGULAR,
+    Direction,
+    Ended,
+    Field,
+    expect_direction,
+    null_field,
+)
+from nmm.analysis.singular.jacobians import Jacobians, Subject, checked
+from nmm.analysis.singular.parts import rank_of
+from nmm.analysis.singular.reached import Reached
+from nmm.analysis.singular.singularity import TOLERANCE
+from nmm.arrays import Array, positive
+from nmm.control.controller import Controller, Step
+from nmm.errors import InputError, SingularError
+from nmm.functions.references.polynomial import Constant
+from nmm.functions.tasks.task import Stack, Task
+from nmm.resolvers.base import Status
+from nmm.resolvers.projected_gradient import ProjectedGradient
+from nmm.robots.configuration import Configuration
+from nmm.robots.robot import Robot
+from nmm.runs.integrators import RK4
+from nmm.runs.recording import Recorder
+from nmm.runs.trajectory import Outcome, Trajectory
+from nmm.words import listed
+
+#: How fast the task is brought back from the integrator's drift, 1/s.
+GAIN = 10.0
+#: A motion that must end early is done again this much shorter, so that it comes to rest before the end.
+SHORTER = 0.98
+#: The integration's steps are at most so long, s, and along the path, m and rad.
+STEP, STRIDE = 0.01, 0.005
+#: Half the range about q in which J's rank is looked at, m and rad.
+AROUND = 1e-2
+
+
+@dataclass(frozen=True, eq=False)
+class SelfMotion:
+    """A self-motion there and back.
+
+    Attributes
+    ----------
+    trajectory : its samples; the second half is the first one backwards, q to the last bit, inputs negated
+    text : in words, as it begins, the largest rate 1
+    length : of the way there, ∫‖u‖ dt, in m and rad
+    ended : why the way there is shorter than asked; "" where it is not
+    """
+
+    trajectory: Trajectory
+    text: str
+    length: float
+    ended: str
+
+    @property
+    def turning(self) -> int:
+        """The sample at which it turns back."""
+        return len(self.trajectory) // 2
+
+
+def self_motion(
+    subject: Subject,
+    q: ArrayLike | Mapping[str, float],
+    *,
+    direction: Direction = 0,
+    duration: float = 4.0,
+    speed: float = 0.5,
+    dt: float = 0.01,
+    t: float = 0.0,
+) -> SelfMotion:
+    """Move along J's null space from q, then back, holding the task at its value at (t, q).
+
+    The inputs are u = ṡ(t) n(q) + J⁺ K (e - e0): n, of length 1, lies in null J and is continuous, the path
+    length s begins and ends at rest, and the feedback takes out the integrator's drift of the task's error e
+    (fourth-order Runge-Kutta). For the number of a readable null vector, n is the null vector of its few
+    inputs alone, at every q (unless they depend on each other only at the q given); for wished inputs w it is
+    (I - J⁺ J) w.
+
+    Parameters
+    ----------
+    subject : a controller, or (robot, task); a reference that moves in time is held at rest
+    q : (n,) m and rad, or by name; within the limits
+    direction : number of a vector of `redundancy(subject, q).readable`, or wished inputs: a name, numbers by
+        name, or (m,)
+    duration : of the way there, s; that back takes as long
+    speed : the largest ‖u‖, m/s and rad/s together
+    dt : s between samples
+    t : s, of the references
+
+    Raises
+    ------
+    InputError : no such direction, one that moves the task, numbers that are not above zero, q outside limits
+    SingularError : J is singular at q, though not nearby: its null space there is not that of the motion; or
+        the motion cannot begin, at a limit
+    """
+    jacobians = Jacobians(subject)
+    t, q = checked(jacobians, t, q)
+    robot = jacobians.robot
+    duration, speed = positive(duration, "duration"), positive(speed, "speed")
+    dt = positive(dt, "dt")
+    if dt > duration / 4.0:
+        raise InputError(f"dt: expected at most a quarter of the duration, {duration / 4.0:g} s, got {dt:g}")
+    robot.check_limits(q)
+    J = jacobians.J(t, q)
+    rank = rank_of(J, TOLERANCE)
+    expect_direction(robot, J, rank, direction)
+    nearby = _nearby(jacobians, t, q, rank)
+    motion = _Motion(robot, held(jacobians, t, q), t, q, null_field(robot, J, nearby, rank, direction), rank)
+    length = 2.0 * speed * duration / np.pi
+    steps = max(4, round(duration / dt))
+    times = np.linspace(0.0, duration, steps + 1)
+    samples, ended = motion.run(times, length)
+    while ended:
+        reached = length * (1.0 - np.cos(np.pi * times[len(samples) - 1] / duration)) / 2.0
+        if len(samples) < 3 or reached < 1e-3 * 2.0 * speed * duration / np.pi:
+            raise SingularError(
+                f"the self-motion cannot begin: {ended} (the other way may be free: the inputs negated)"
+            )
+        length = SHORTER * reached
+        why = ended
+        samples, ended = motion.run(times, length)
+        if not ended:
+            return motion.there_and_back(samples, times, length, why)
+    return motion.there_and_back(samples, times, length, "")
+
+
+def held(jacobians: Jacobians, t: float, q: Array) -> Stack:
+    """The task with its values at q as targets; references that depend on the configuration stay."""
+    tasks = []
+    configuration = Configuration(jacobians.robot, q)
+    for task in jacobians.task:
+        reference = task.reference
+        moves = not isinstance(reference, Reached) and bool(
+            np.any(reference.evaluate(t, configuration).value_q != 0.0)
+        )
+        if not moves:
+            rows = task.rows(jacobians.robot)
+            value = task.function.evaluate(t, configuration).value
+            reference = Constant(value, rows[0].unit)
+        tasks.append(Task(task.function, reference, GAIN))
+    return Stack(tuple(tasks))
+
+
+def _nearby(jacobians: Jacobians, t: float, q: Array, rank: int) -> Array:
+    """J (k, s, m) at some configurations about q, where its rank is the same."""
+    near = q + AROUND * np.random.default_rng(0).uniform(-1.0, 1.0, (8, q.size))
+    found = jacobians.batch(near, t)
+    found = found[np.isfinite(found).all(axis=(1, 2))]
+    most = max((rank_of(J, TOLERANCE) for J in found), default=rank)
+    if most > rank:
+        raise SingularError(
+            f"J has rank {rank} at q and {most} nearby: q is singular, and a motion that leaves "
+            "the task at rest there moves it a little further on; expected a q that is not singular"
+        )
+    return found
+
+
+class _Motion:
+    """The way there: a field followed with the task held."""
+
+    def __init__(self, robot: Robot, task: Stack, t: float, q: Array, field: Field, rank: int) -> None:
+        self.robot, self.t, self.q, self.field, self.rank = robot, t, q, field, rank
+        self.controller = Controller(robot, task, ProjectedGradient())
+        self.e0 = self.controller.evaluate(t, q).error
+        self.angular = np.array([row.angular for row in task.rows(robot)])
+        self.last = np.zeros(robot.n_u)
+
+    def run(self, times: Array, length: float) -> tuple[list[Step], str]:
+        """Samples at the times, or as far as the motion goes, and why it ended."""
+        duration, dt = float(times[-1]), float(times[1])
+        substeps = int(np.ceil(max(dt / STEP, dt * length * np.pi / (2.0 * duration) / STRIDE) - 1e-9))
+        self.last = np.zeros(self.robot.n_u)
+
+        def rate(time: float) -> float:
+            return float(length * np.pi / (2.0 * duration) * np.sin(np.pi * time / duration))
+
+        samples: list[Step] = []
+        q = self.q
+        try:
+            for k, time in enumerate(times):
+                sample, along = self._step(float(time), q, rate(float(time)))
+                self._check(sample)
+                samples.append(sample)
+                if k + 1 == len(times):
+                    break
+                for h in range(substeps):
+                    self.last = along
+                    q = RK4.advance(
+                        lambda s, at: self._step(s, at, rate(s))[0].q_dot,
+                        sample.t, q, sample.q_dot, sample.u, dt / substeps,
+                    )  # fmt: skip
+                    later = float(time) + (h + 1) * dt / substeps
+                    sample, along = self._step(later, q, rate(later))
+        except Ended as ended:
+            return samples, str(ended)
+        return samples, ""
+
+    def _step(self, time: float, q: Array, rate: float) -> tuple[Step, Array]:
+        found = self.controller.evaluate(self.t, q)
+        J, error = found.J, found.error - self.e0
+        turned = error[self.angular]
+        error[self.angular] = turned - 2.0 * np.pi * np.round(turned / (2.0 * np.pi))
+        if not np.all(np.isfinite(J)):
+            raise Ended(self.robot.platform.problem(q[: self.robot.platform.n_p]) or "the task is undefined")
+        U, values, Vt = np.linalg.svd(J)
+        rank = self.rank
+        if rank and values[rank - 1] < NEARLY_SINGULAR * values[0]:
+            raise Ended("J comes close to a singular configuration")
+        along = self.field(J, self.last)
+        back = Vt[:rank].T @ ((U[:, :rank].T @ (GAIN * error)) / values[:rank])
+        u = rate * along + back
+        return replace(
+            found,
+            t=time,
+            target=found.r + error,
+            error=error,
+            rate=GAIN * error,
+            u=u,
+            q_dot=self.robot.S(q) @ u,
+            residual=float(np.linalg.norm(J @ u - GAIN * error)),
+            status=Status.SOLVED,
+        ), along
+
+    def _check(self, sample: Step) -> None:
+        lower, upper = self.robot.q_limits.T
+        beyond = np.flatnonzero((sample.q < lower - 1e-9) | (sample.q > upper + 1e-9))
+        if beyond.size:
+            raise Ended(f"{listed([self.robot.q_names[i] for i in beyond])} at the limit")
+        problem = self.robot.platform.problem(sample.q[: self.robot.platform.n_p])
+        if problem is not None:
+            raise Ended(problem)
+
+    def there_and_back(self, samples: list[Step], times: Array, length: float, ended: str) -> SelfMotion:
+        """The way there and the same way back: q at mirrored times, the inputs negated."""
+        back = [
+            replace(sample, t=2.0 * float(times[-1]) - sample.t, u=-sample.u, q_dot=-sample.q_dot)
+            for sample in samples[-2::-1]
+        ]
+        every = [*samples, *back]
+        recorder = Recorder(self.controller, np.array([sample.t for sample in every]))
+        for sample in every:
+            recorder.add(sample)
+        if ended:
+            recorder.warnings.append(f"the self-motion turns back early: {ended}")
+        robot = self.robot
+        first = self.field(samples[0].J, np.zeros(robot.n_u))
+        words = input_words(robot, self.q)
+        text = motion_text(first / np.abs(first).max(), robot.u_names, robot.u_units, words, robot.platform.p)
+        trajectory = recorder.trajectory(Outcome.COMPLETED, "", float(times[1]), "rk4")
+        # The task rests: there is no path that it should follow.
+        return SelfMotion(replace(trajectory, resolver="self-motion", desired=None), text, length, ended)

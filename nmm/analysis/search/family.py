@@ -1,0 +1,201 @@
+"""Families of singular configurations: what is free, what is pinned, and what is tied together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from nmm.analysis.search.text import combination_text, values_text
+from nmm.arrays import Array
+from nmm.words import listed
+
+#: Values of the same kind that differ by less are the same, rad or m.
+SAME_VALUE = 1e-4
+#: More free coordinates than these are not named in a line.
+MANY = 4
+
+
+@dataclass(frozen=True)
+class Relation:
+    """Whole multiples of coordinates whose sum has a fixed value, as q1 + q2 = ±π/2.
+
+    Attributes
+    ----------
+    coefficients : by coordinate; one of them alone is a pinned coordinate
+    values : any of these, rad or m; an angle's from -π to π where whole turns do not matter
+    unit : rad or m
+    circular : whole turns do not matter
+    """
+
+    coefficients: Mapping[str, int]
+    values: tuple[float, ...]
+    unit: str
+    circular: bool
+
+    @property
+    def text(self) -> str:
+        """ "q1 + q2 = ±π/2"."""
+        return f"{combination_text(self.coefficients)} = {values_text(self.values, self.unit, self.circular)}"
+
+    @property
+    def kind(self) -> tuple[tuple[str, int], ...]:
+        """What is tied, without the values."""
+        return tuple(self.coefficients.items())
+
+    def holds(self, values: Mapping[str, float]) -> bool:
+        """Whether it does at these coordinates, within 1e-4."""
+        total = sum(number * values[name] for name, number in self.coefficients.items())
+        return any(self._apart(total - value) <= SAME_VALUE for value in self.values)
+
+    def same_values(self, other: Relation) -> bool:
+        """Whether both have the same values."""
+        return len(self.values) == len(other.values) and all(
+            any(self._apart(mine - its) <= SAME_VALUE for its in other.values) for mine in self.values
+        )
+
+    def _apart(self, difference: float) -> float:
+        return abs(np.remainder(difference + np.pi, 2.0 * np.pi) - np.pi if self.circular else difference)
+
+
+@dataclass(frozen=True, eq=False)
+class SingularFamily:
+    """Singular configurations that differ in what does not matter, or move along one equation.
+
+    Pieces that tie the same coordinates by different equations count as one family. What lies in a family
+    may lose more rank where it meets another one.
+
+    Attributes
+    ----------
+    free : coordinates that may take any value
+    constraints : what is pinned, and simple sums that are; all combinations of their values are singular,
+        found by a start, or half a turn from one that was and proved by random members
+    related : coordinates tied by the equations, those of `constraints` that are sums among them
+    dimension : of this part of the singular set, of `moving` coordinates
+    moving : how many coordinates the search moved
+    rank, full_rank : of J in the family, and elsewhere
+    lost : the task's directions that are lost at the first example
+    examples (E, n) : configurations
+    starts : how many starts ended here
+    names : of the coordinates that the examples have, in their order
+    """
+
+    free: tuple[str, ...]
+    constraints: tuple[Relation, ...]
+    related: tuple[str, ...]
+    dimension: int
+    moving: int
+    rank: int
+    full_rank: int
+    lost: tuple[str, ...]
+    examples: Array
+    starts: int
+    names: tuple[str, ...]
+
+    @property
+    def pinned(self) -> dict[str, tuple[float, ...]]:
+        """Isolated values, any of them, by coordinate, rad or m; every combination is singular."""
+        return {
+            next(iter(one.coefficients)): one.values for one in self.constraints if len(one.coefficients) == 1
+        }
+
+    @property
+    def relations(self) -> tuple[Relation, ...]:
+        """Sums of coordinates that are pinned."""
+        return tuple(one for one in self.constraints if len(one.coefficients) > 1)
+
+    @property
+    def codimension(self) -> int:
+        """How many independent conditions make it."""
+        return self.moving - self.dimension
+
+    @property
+    def equations(self) -> int:
+        """How many conditions tie `related`, beside the sums in `relations`."""
+        return self.codimension - len(self.constraints)
+
+    @property
+    def conditions(self) -> str:
+        """ "q2 = 0 or ±π; q3, q4 and q5 tied by an equation"."""
+        texts = [one.text for one in self.constraints]
+        if self.equations > 0:
+            count = "an equation" if self.equations == 1 else f"{self.equations} equations"
+            texts.append(f"{listed(self.related)} tied by {count}")
+        return "; ".join(texts) or "everywhere"
+
+    @property
+    def free_text(self) -> str:
+        """ "q1 and q3 free", "all else free" where they are many, "nothing free"."""
+        if len(self.free) > MANY:
+            return "all else free"
+        return f"{listed(self.free)} free" if self.free else "nothing free"
+
+    @property
+    def text(self) -> str:
+        """One line: "q2 = 0 or ±π; q1 free; loses ee.x; 200 starts"."""
+        lost = f"loses {listed(self.lost)}" if len(self.lost) == 1 else f"loses {len(self.lost)} directions"
+        return f"{self.conditions}; {self.free_text}; {lost} (rank {self.rank}); {of_starts(self.starts)}"
+
+    def contains(self, q: Array) -> bool:
+        """Whether q (n,) satisfies `constraints`; the equations of what is tied are not looked at."""
+        values = dict(zip(self.names, q, strict=True))
+        return all(one.holds(values) for one in self.constraints)
+
+    @property
+    def kind(self) -> object:
+        """The same for families that differ in values alone."""
+        kinds = tuple(relation.kind for relation in self.constraints)
+        return self.free, self.related, self.rank, self.dimension, kinds
+
+    def same_as(self, other: SingularFamily) -> bool:
+        """Whether both are the same, by kind and values."""
+        return self.kind == other.kind and not _different(self, other)
+
+
+def of_starts(count: int) -> str:
+    """ "1 start", "3 starts"."""
+    return f"{count} start{'' if count == 1 else 's'}"
+
+
+def _different(one: SingularFamily, other: SingularFamily) -> list[int]:
+    """Which constraints of two families of one kind have different values."""
+    pairs = enumerate(zip(one.constraints, other.constraints, strict=True))
+    return [i for i, (mine, its) in pairs if not mine.same_values(its)]
+
+
+def merged(families: list[SingularFamily]) -> list[SingularFamily]:
+    """Families that differ in the values of one constraint alone become one with all these values."""
+    found = list(families)
+    i = 0
+    while i < len(found):
+        for j in range(i + 1, len(found)):
+            both = _together(found[i], found[j])
+            if both is not None:
+                found[i] = both
+                del found[j]
+                i = -1  # from the start: what is one now may go with an earlier one
+                break
+        i += 1
+    return found
+
+
+def _together(one: SingularFamily, other: SingularFamily) -> SingularFamily | None:
+    if one.kind != other.kind:
+        return None
+    different = _different(one, other)
+    if len(different) > 1:
+        return None
+    constraints = list(one.constraints)
+    for i in different:
+        mine, its = one.constraints[i], other.constraints[i].values
+        new = [
+            value for value in its if not any(mine._apart(value - old) <= SAME_VALUE for old in mine.values)
+        ]
+        constraints[i] = replace(mine, values=tuple(sorted([*mine.values, *new])))
+    return replace(
+        one,
+        constraints=tuple(constraints),
+        examples=np.concatenate([one.examples, other.examples]),
+        starts=one.starts + other.starts,
+    )

@@ -1,0 +1,231 @@
+"""Where J loses rank: singular configurations found from many starts, told as families."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.analysis.search.descent import descend
+from nmm.analysis.search.family import SingularFamily, of_starts
+from nmm.analysis.search.measure import Measure
+from nmm.analysis.search.minimum import LocalMinimum, followed, lowest
+from nmm.analysis.search.sorting import everywhere, families_of
+from nmm.analysis.search.space import Space, search_space
+from nmm.analysis.search.text import value_text
+from nmm.analysis.singular.jacobians import Jacobians, Subject
+from nmm.analysis.singular.parts import WHOLE
+from nmm.arrays import Array, counted, positive, scalar
+from nmm.errors import SingularError
+from nmm.words import listed
+
+#: Singular values this small beside the largest are zero.
+TOLERANCE = 1e-8
+#: Cheap samples for each start of the better half.
+SAMPLES = 20
+
+
+@dataclass(frozen=True, eq=False)
+class SingularitySearch:
+    """What a search found.
+
+    That nothing was found is no proof: `starts` local minimisations ended elsewhere, `smallest` says where.
+
+    Attributes
+    ----------
+    robot, part : names; the part whose columns of J were searched
+    rows : names of the task's rows
+    full_rank : of the part's J, where it is not singular
+    families : the thickest first
+    starts, seed : local minimisations, and what drew them
+    converged : how many of them ended at a singular configuration
+    smallest : the lowest of the local minima of σ_min that are not singular; None without one
+    ranges : (lower, upper) of the coordinates that were searched, m or rad
+    indifferent : coordinates that may move and on which J's singular values do not depend: always free
+    fixed : coordinates that did not move, and where they stood
+    units : of all coordinates, rad or m
+    tolerance : singular values this small beside the largest are zero
+    """
+
+    robot: str
+    part: str
+    rows: tuple[str, ...]
+    full_rank: int
+    families: tuple[SingularFamily, ...]
+    starts: int
+    seed: int
+    converged: int
+    smallest: LocalMinimum | None
+    ranges: Mapping[str, tuple[float, float]]
+    units: Mapping[str, str]
+    indifferent: tuple[str, ...]
+    fixed: Mapping[str, float]
+    tolerance: float
+
+    @property
+    def found(self) -> bool:
+        """Whether there is a singular configuration."""
+        return self.converged > 0
+
+    @property
+    def everywhere(self) -> bool:
+        """Whether J is singular wherever one looks."""
+        return any(not family.codimension for family in self.families)
+
+    @property
+    def unsorted(self) -> int:
+        """Starts that ended at singular configurations where families meet, so that none could be told."""
+        return self.converged - sum(family.starts for family in self.families)
+
+    @property
+    def summary(self) -> str:
+        """One line: how many families, or that none was found, and from how many starts."""
+        whose = "J" if self.part == WHOLE else f"J's columns of the {self.part}"
+        if self.everywhere:
+            return (
+                f"{whose} lose rank everywhere: {self.families[0].rank}, where rows and inputs allow "
+                f"{self.full_rank}"
+                if self.part != WHOLE
+                else f"J is singular everywhere: rank {self.families[0].rank}, not {self.full_rank}"
+            )
+        if not self.converged:
+            return f"no singular configuration of {whose} found from {self.starts} starts"
+        count = len(self.families)
+        return (
+            f"{count} famil{'y' if count == 1 else 'ies'} of singular configurations of {whose} "
+            f"(rank below {self.full_rank}), found by {self.converged} of {self.starts} starts"
+        )
+
+    @property
+    def searched_text(self) -> str:
+        """Where was searched: "q1 from -π to π; q2 from 0 to π/2"."""
+        texts = [
+            f"{name} from {value_text(lower, self.units[name])} to {value_text(upper, self.units[name])}"
+            for name, (lower, upper) in self.ranges.items()
+        ]
+        return "; ".join(texts) or "nothing that matters may move"
+
+    def text(self) -> str:
+        """Everything, in lines."""
+        lines = [self.summary, *(f"  {family.text}" for family in self.families)]
+        if self.unsorted:
+            lines.append(f"{of_starts(self.unsorted)} ended where families meet")
+        if self.smallest is not None:
+            lines.append(self.smallest.text)
+        lines.append(f"searched: {self.searched_text}")
+        if self.indifferent:
+            lines.append(f"its singular values do not depend on {listed(self.indifferent)}")
+        if self.fixed:
+            stood = [f"{name} = {value_text(value, self.units[name])}" for name, value in self.fixed.items()]
+            lines.append(f"not moved: {listed(stood)}")
+        return "\n".join(lines)
+
+
+def find_singularities(
+    subject: Subject,
+    *,
+    starts: int = 200,
+    seed: int = 0,
+    ranges: Mapping[str, tuple[float, float]] | None = None,
+    among: Sequence[str] | None = None,
+    at: ArrayLike | Mapping[str, float] | None = None,
+    part: str = WHOLE,
+    length: float | None = None,
+    sizes: Mapping[str, float] | None = None,
+    tolerance: float = TOLERANCE,
+    t: float = 0.0,
+    progress: Callable[[float], None] | None = None,
+) -> SingularitySearch:
+    """Search the singular configurations of the task's J_bar (paper, eq. 13) inside the limits.
+
+    From each start σ_min is minimised; what ends at zero is sorted into families, and random members of each
+    family are tried. Half the starts are drawn uniformly, half are each the best of 20 samples. The same
+    seed gives the same result.
+
+    Parameters
+    ----------
+    subject : a controller, or (robot, task); functions without targets are enough
+    starts : local minimisations
+    seed : of the random numbers
+    ranges : (lower, upper) by coordinate, m or rad, whatever the limits. Else the limits; where there are
+        none, or they make more than a turn, angles from -π to π, and lengths about the robot's reach either
+        way from `at`
+    among : coordinates that may move; None for all
+    at : where the others stay, and examples have what is free; None for the configuration nearest to zero
+    part : "robot", "arm", "platform" or an arm's name: whose columns of J. An arm's families that are none
+        of the robot's are those that the platform removes
+    length, sizes : as in `analyse`; they hardly matter for what is singular, but for σ_min
+    tolerance : singular values this small beside the largest of the whole J are zero
+    t : s
+    progress : called with the fraction done
+
+    Raises
+    ------
+    InputError : a number of starts below 1; an unknown coordinate or part; an empty range; a task of more
+        rows than the robot has inputs
+    SingularError : there is no J anywhere in the ranges
+    """
+    jacobians = Jacobians(subject)
+    measure = Measure(jacobians, part, length, sizes, scalar(t, "t"))
+    starts, seed = counted(starts, "starts"), counted(seed, "seed", 0)
+    tolerance = positive(tolerance, "tolerance")
+    robot, rng = measure.robot, np.random.default_rng(seed)
+    stand = robot.rest if at is None else robot.q(at)
+    units = np.where([unit == "m" for unit in robot.q_units], 1.0 if length is None else float(length), 1.0)
+    space = search_space(measure, stand, among, ranges, units, rng)
+    first, singular = _starts(measure, space, starts, tolerance, rng)
+    families: tuple[SingularFamily, ...]
+    if singular:
+        families = (everywhere(measure, space, first[0], tolerance, starts),)
+        converged, bottom = starts, None
+    else:
+        share = None if progress is None else _share(progress, 0.6)
+        z, ratio = descend(measure, space, first, progress=share)
+        ends = followed(measure, space, z[ratio > tolerance])
+        _, of_ends = measure.sigma(space.q(ends))
+        found = np.concatenate([z[ratio <= tolerance], ends[of_ends <= tolerance]])
+        converged, bottom = len(found), lowest(measure, space, ends[of_ends > tolerance])
+        families = families_of(measure, space, found, tolerance, rng)
+    if progress is not None:
+        progress(1.0)
+    names = robot.q_names
+    return SingularitySearch(
+        robot=robot.name,
+        part=part,
+        rows=jacobians.row_names,
+        full_rank=measure.full_rank,
+        families=families,
+        starts=starts,
+        seed=seed,
+        converged=converged,
+        smallest=bottom,
+        ranges={names[j]: (float(space.lower[j]), float(space.upper[j])) for j in space.axes},
+        units=dict(zip(names, robot.q_units, strict=True)),
+        indifferent=tuple(names[j] for j in space.indifferent),
+        fixed={names[j]: float(stand[j]) for j in range(robot.n) if j not in space.moving},
+        tolerance=tolerance,
+    )
+
+
+def _starts(
+    measure: Measure, space: Space, starts: int, tolerance: float, rng: np.random.Generator
+) -> tuple[Array, bool]:
+    """Starts (starts, a) that have a J, and whether all samples are singular."""
+    pool = space.draw(rng, max(SAMPLES * ((starts + 1) // 2), 2 * SAMPLES))
+    sigma, ratio = measure.sigma(space.q(pool))
+    exists = np.isfinite(sigma)
+    if not exists.any():
+        raise SingularError("the wheels cannot roll, or the task is undefined, everywhere in these ranges")
+    best = sigma.reshape(-1, SAMPLES).argmin(axis=1) + SAMPLES * np.arange(len(pool) // SAMPLES)
+    good = [int(i) for i in best if exists[i]][: (starts + 1) // 2]
+    plain = np.flatnonzero(exists)
+    rest = plain[rng.permutation(len(plain))[: starts - len(good)]]
+    chosen = np.concatenate([np.array(good, dtype=np.int64), rest])
+    chosen = np.resize(chosen, starts)  # again from the first, where hardly any have a J
+    return pool[chosen], bool(np.all(ratio[exists] <= tolerance))
+
+
+def _share(progress: Callable[[float], None], part: float) -> Callable[[float], None]:
+    return lambda fraction: progress(part * fraction)

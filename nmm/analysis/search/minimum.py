@@ -1,0 +1,89 @@
+"""Where σ is smallest without being zero: what the starts that found no singularity ended at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import Bounds, minimize
+
+from nmm.analysis.search.measure import Measure
+from nmm.analysis.search.space import Space
+from nmm.arrays import Array
+
+#: So many of the lowest ends are followed to the bottom.
+FOLLOWED = 3
+#: Below this beside the largest, σ_min may well be meant to be zero.
+NEARLY = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class LocalMinimum:
+    """A configuration beside which σ_min does not get smaller, and is not zero.
+
+    Attributes
+    ----------
+    q (n,) : m and rad
+    sigma_min : smallest singular value, in the sizes of the search
+    ratio : beside the largest of the whole J
+    """
+
+    q: Array
+    sigma_min: float
+    ratio: float
+
+    @property
+    def text(self) -> str:
+        """One line."""
+        text = (
+            f"smallest σ_min at a local minimum that is not singular: {self.sigma_min:.4g} "
+            f"({self.ratio:.2g} of the largest)"
+        )
+        if self.ratio < NEARLY:
+            text += (
+                "; nearly singular, as where a file writes pi/2 as 1.5708, or beside a target: a larger "
+                "tolerance counts it as singular"
+            )
+        return text
+
+
+def followed(measure: Measure, space: Space, z: Array) -> Array:
+    """The lowest of the ends z (N, a), each brought to its minimum of σ, (FOLLOWED or fewer, a)."""
+    if not len(z) or not len(space.axes):
+        return z[:FOLLOWED]
+    sigma, _ = measure.sigma(space.q(z))
+    order = np.argsort(sigma, kind="stable")
+    order = order[np.isfinite(sigma[order])][:FOLLOWED]
+    return np.array([_bottom(measure, space, z[i]) for i in order]).reshape(-1, z.shape[1])
+
+
+def _bottom(measure: Measure, space: Space, z: Array) -> Array:
+    def sigma(point: Array) -> tuple[float, Array]:
+        _, C, values = measure.equations(
+            space.q(point[np.newaxis]), space.axes, space.units[space.axes], corank=1
+        )
+        return float(values[0, -1]), C[0, 0]
+
+    lower, upper = space.bounds
+    found = minimize(
+        sigma,
+        z,
+        jac=True,
+        method="L-BFGS-B",
+        bounds=Bounds(lower, upper),
+        options={"gtol": 1e-9, "ftol": 1e-14},
+    ).x
+    both = np.array([z, found])
+    return np.asarray(both[np.argmin(measure.sigma(space.q(both))[0])])
+
+
+def lowest(measure: Measure, space: Space, z: Array) -> LocalMinimum | None:
+    """Of points z (N, a) that with the smallest σ; None without points."""
+    if not len(z):
+        return None
+    q = space.q(z)
+    sigma, ratio = measure.sigma(q)
+    best = int(np.argmin(sigma))
+    if not np.isfinite(sigma[best]):
+        return None
+    return LocalMinimum(space.fold(q[best]), float(sigma[best]), float(ratio[best]))

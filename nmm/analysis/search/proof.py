@@ -1,0 +1,103 @@
+"""Families held against random members: those told by a walk, and their twins half a turn away."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from nmm.analysis.search.family import Relation, SingularFamily
+from nmm.analysis.search.local import localised, stay_singular
+from nmm.analysis.search.measure import Flags, Measure
+from nmm.analysis.search.space import Space
+from nmm.arrays import Array
+
+#: Random members that prove a family, and how much less exact than a point that has converged they are.
+MEMBERS, SLACK = 16, 100.0
+
+
+def holds(
+    measure: Measure, space: Space, family: SingularFamily, points: Array, free: Flags, tolerance: float,
+    rng: np.random.Generator,
+) -> bool:  # fmt: skip
+    """Whether J's rank is as low at random members, far away: all members, where nothing else ties them."""
+    names = space.robot.q_names
+    told = {name for one in family.constraints for name in one.coefficients} | set(family.free)
+    silent = {names[j] for j in space.moving} - told
+    if family.equations < 0 or (silent and not family.equations) or (family.equations and not family.related):
+        return False
+    drawn = space.draw(rng, MEMBERS)
+    if family.equations:
+        own = points[rng.integers(len(points), size=MEMBERS)]
+        q = space.q(np.where(free, drawn, own))
+    else:
+        q = space.q(drawn)
+        for relation in family.constraints:
+            (name, first), *others = relation.coefficients.items()
+            total = relation.values[0] - sum(
+                number * q[:, space.robot.coordinate(other)] for other, number in others
+            )
+            q[:, space.robot.coordinate(name)] = total / first
+    rank = np.full(MEMBERS, family.rank)
+    return bool(np.all(stay_singular(measure, space, space.z(q), rank, tolerance * SLACK)))
+
+
+def completed(
+    measure: Measure,
+    space: Space,
+    found: list[SingularFamily],
+    tolerance: float,
+    rng: np.random.Generator,
+) -> list[SingularFamily]:
+    """With the families where a pinned angle or sum has the opposite value, or that and half a turn.
+
+    Where no start ended there: random members prove that they are singular, and as free as those found.
+    """
+    every = list(found)
+    for family in every:  # it grows meanwhile
+        for i, relation in enumerate(family.constraints):
+            for value in _twins(relation):
+                constraints = list(family.constraints)
+                constraints[i] = replace(relation, values=(value,))
+                twin = replace(
+                    family,
+                    constraints=tuple(constraints),
+                    examples=_moved(space, family.examples, relation, value),
+                    starts=0,
+                )
+                if not any(one.same_as(twin) for one in every) and _proved(
+                    measure, space, twin, tolerance, rng
+                ):
+                    every.append(twin)
+    return every
+
+
+def _twins(relation: Relation) -> list[float]:
+    """-v, v + π and π - v of an angle that makes the whole turn, from -π to π."""
+    if not relation.circular:
+        return []
+    (value,) = relation.values
+    return [
+        float(np.pi - np.mod(np.pi - other, 2.0 * np.pi)) for other in (-value, value + np.pi, np.pi - value)
+    ]
+
+
+def _moved(space: Space, q: Array, relation: Relation, value: float) -> Array:
+    """Configurations (N, n) that satisfy a relation with another value, by its first coordinate."""
+    name, number = next(iter(relation.coefficients.items()))
+    moved = q.copy()
+    moved[:, space.robot.coordinate(name)] += (value - relation.values[0]) / number
+    return space.fold(moved)
+
+
+def _proved(
+    measure: Measure, space: Space, family: SingularFamily, tolerance: float, rng: np.random.Generator
+) -> bool:
+    """Whether its examples and random members are singular, with the same freedom and no more."""
+    z = space.z(family.examples)
+    free = np.array([space.robot.q_names[j] in family.free for j in space.axes])
+    if not holds(measure, space, family, z, free, tolerance, rng):
+        return False
+    drawn = np.where(free, space.draw(rng, len(z)), z)
+    local = localised(measure, space, drawn, tolerance * SLACK, rng)
+    return bool(np.all(local.free == free) and np.all(local.rank == family.rank))

@@ -1,0 +1,140 @@
+"""Singularities of the resolvers' own matrices: EJ's J_e and RG's Ja may lose rank where J does not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from nmm.analysis.singular.directions import readable_basis
+from nmm.analysis.singular.minors import determinants
+from nmm.analysis.singular.parts import Ranked, ranks, singular_values
+from nmm.arrays import Array, Integers
+
+
+@dataclass(frozen=True, eq=False)
+class ExtendedSingularity(Ranked):
+    """The extended Jacobian J_e = [J; Jc] (m, m) beside J.
+
+    Attributes
+    ----------
+    rows : names of J's rows and of the constraint's
+    determinant : of J_e, as it is
+    singular_values (m,) : of J_e with the sizes counted in
+    rank : of J_e
+    angle_measure : |det J_e| / sqrt(det J Jᵀ det Jc Jcᵀ), from 0 to 1 (Fischer's inequality): 1 when the
+        constraint moves only what the task leaves free, 0 when it asks for what the task already fixes; not a
+        number where J or Jc has itself lost rank
+    lost (m - rank, m) : combinations of the rows that no input moves: what task and constraint both speak of
+    kinematic : J itself lost rank
+    constraint_singular : Jc itself lost rank
+    """
+
+    rows: tuple[str, ...]
+    determinant: float
+    singular_values: Array
+    rank: int
+    angle_measure: float
+    lost: Array
+    kinematic: bool
+    constraint_singular: bool
+
+    @property
+    def algorithmic(self) -> bool:
+        """J_e lost rank though J did not: EJ fails where other resolvers do not."""
+        return not self.kinematic and self.rank < len(self.rows)
+
+
+@dataclass(frozen=True, eq=False)
+class PartitionSingularities:
+    """The blocks Ja of the reduced gradient, one a candidate, beside J.
+
+    Attributes
+    ----------
+    names : the inputs of each candidate
+    determinants (count,) : det Ja
+    ratios (count,) : |det Ja| / sqrt(det J Jᵀ), from 0 to 1 (Cauchy-Binet), RG's measure with automatic
+        partitions; zeros where J lost rank
+    singular (count,) : whether Ja lost rank (σ_min(Ja) at most `tolerance` times J's largest singular value)
+    kinematic : J itself lost rank, and with it every Ja
+    """
+
+    names: tuple[tuple[str, ...], ...]
+    determinants: Array
+    ratios: Array
+    singular: Array
+    kinematic: bool
+
+    @property
+    def algorithmic(self) -> tuple[tuple[str, ...], ...]:
+        """Candidates whose Ja is singular though J is not."""
+        if self.kinematic:
+            return ()
+        return tuple(name for name, lost in zip(self.names, self.singular, strict=True) if lost)
+
+    @property
+    def best(self) -> tuple[str, ...] | None:
+        """The candidate with the largest |det Ja|; None when all are singular."""
+        if not self.names or np.all(self.singular):
+            return None
+        return self.names[int(np.argmax(np.where(self.singular, -1.0, np.abs(self.determinants))))]
+
+    @property
+    def exhausted(self) -> bool:
+        """No candidate is left though J has full rank: RG fails where other resolvers do not."""
+        return not self.kinematic and bool(self.names) and self.best is None
+
+
+def volume(J: Array) -> Array:
+    """sqrt(det J Jᵀ) of J (..., s, m): the product of its singular values."""
+    return np.prod(singular_values(J), axis=-1)
+
+
+def extended_singularity(
+    J: Array, Jc: Array, sizes: tuple[Array, Array, Array], rows: tuple[str, ...], tolerance: float
+) -> ExtendedSingularity:
+    """From J (s, m) and Jc (m - s, m) as they are; sizes of rows, constraint rows and inputs."""
+    row_sizes, constraint_sizes, input_sizes = sizes
+    s = len(J)
+    extended = np.vstack([J, Jc])
+    scaled = extended * input_sizes / np.concatenate([row_sizes, constraint_sizes])[:, np.newaxis]
+    values = singular_values(scaled)
+    U = np.linalg.svd(scaled)[0]
+    rank = int(ranks(values, values[0], tolerance))
+
+    def lost_rank(block: Array) -> bool:
+        own = singular_values(block)
+        return len(block) > 0 and int(ranks(own, own[0], tolerance)) < len(block)
+
+    kinematic, constraint_singular = lost_rank(scaled[:s]), lost_rank(scaled[s:])
+    measure = np.nan
+    if not (kinematic or constraint_singular):
+        measure = float(np.prod(values) / (volume(scaled[:s]) * volume(scaled[s:])))
+    return ExtendedSingularity(
+        rows=rows,
+        determinant=float(np.linalg.det(extended)),
+        singular_values=values,
+        rank=rank,
+        angle_measure=measure,
+        lost=readable_basis(U[:, rank:].T),
+        kinematic=kinematic,
+        constraint_singular=constraint_singular,
+    )
+
+
+def partition_singularities(
+    J: Array, columns: Integers, inputs: tuple[str, ...], kinematic: bool, tolerance: float
+) -> PartitionSingularities:
+    """From J (s, m) as it is and the candidates' columns (count, s)."""
+    values = singular_values(np.moveaxis(J[:, columns], 1, 0))
+    dets = determinants(J, columns)
+    # Judged beside J: a block of nothing but rounding may have a fine condition number of its own.
+    singular = values[:, -1] <= tolerance * singular_values(J)[0]
+    whole = 0.0 if kinematic else float(volume(J))
+    return PartitionSingularities(
+        names=tuple(tuple(inputs[j] for j in row) for row in columns),
+        determinants=dets,
+        ratios=np.abs(dets) / whole if whole > 0.0 else np.zeros(len(dets)),
+        singular=singular,
+        kinematic=kinematic,
+    )

@@ -1,0 +1,263 @@
+"""Manipulability ellipsoids: how fast a frame can move in each direction, by the robot and by its parts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import permutations, product
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.analysis.singular.parts import WHOLE, groups
+from nmm.arrays import Array, array, positive
+from nmm.errors import InputError, unknown
+from nmm.robots.configuration import kinematics_updater
+from nmm.robots.loading.tips import first_tip
+from nmm.robots.robot import Robot
+
+#: How much of each input counts as 1: by name (1 of its unit where not named), or "limits" for its own.
+Sizes = Mapping[str, float] | str | None
+
+#: Radii nearer to each other than this, beside the largest, are one: their axes are any in that plane.
+EQUAL = 1e-9
+
+#: The turns of a cube that keep it right-handed, (24, 3, 3): all ways to name three axes.
+_TURNS = np.array(
+    [
+        turned
+        for order in permutations(range(3))
+        for signs in product((1.0, -1.0), repeat=3)
+        if np.linalg.det(turned := np.eye(3)[:, order] * signs) > 0.0
+    ]
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Ellipses:
+    """Projections of ellipsoids onto a plane: centre (N, 2) m, columns axes (N, 2, 2), radii (N, 2) m/s."""
+
+    center: Array
+    axes: Array
+    radii: Array
+
+    def outline(self, scale: float = 1.0, points: int = 96) -> Array:
+        """Closed outlines, (N, points, 2), m, drawn with `scale` metres for each m/s."""
+        angles = np.linspace(0.0, 2.0 * np.pi, points)
+        circle = np.array([np.cos(angles), np.sin(angles)])
+        drawn: Array = self.center[:, None] + scale * np.swapaxes(
+            (self.axes * self.radii[:, None]) @ circle, 1, 2
+        )
+        return drawn
+
+
+@dataclass(frozen=True, eq=False)
+class Ellipsoids:
+    """{J_v u : ‖u / input_sizes‖ <= 1} at N configurations: the velocities that a frame can have.
+
+    J_v = (∂p/∂q) S, columns of the part's inputs, is that of the frame's origin in world axes; the radii are
+    the singular values of J_v diag(input_sizes), the axes its left singular vectors (Yoshikawa 1985).
+
+    Attributes
+    ----------
+    frame : the frame whose origin moves; part : "robot", "arm", "platform" or an arm by its name
+    inputs : names of the part's k inputs; input_sizes (k,) : how much of each counts as 1, in its unit
+    center (N, 3) : the frame's origin, m
+    axes (N, 3, 3) : orthonormal, right-handed columns; at the first sample by falling radius, then each as
+        near as can be to where it was, so that radii may cross but axes neither swap nor flip
+    radii (N, 3) : m/s along each axis; 0 where the part cannot move the frame, NaN where the wheels cannot
+        roll (the axes stay as they were)
+    """
+
+    frame: str
+    part: str
+    inputs: tuple[str, ...]
+    input_sizes: Array
+    center: Array
+    axes: Array
+    radii: Array
+
+    def __len__(self) -> int:
+        return len(self.center)
+
+    @property
+    def matrices(self) -> Array:
+        """J_v diag(input_sizes)² J_vᵀ, (N, 3, 3), m²/s²: vᵀ M⁻¹ v <= 1 inside, where M is regular."""
+        halves = self.axes * self.radii[:, None]
+        product_: Array = halves @ np.swapaxes(halves, 1, 2)
+        return product_
+
+    def support(self, directions: ArrayLike) -> Array:
+        """Largest velocity along each direction (k, 3), (N, k) m/s: sqrt(dᵀ M d)."""
+        along = array(directions, "directions").reshape(-1, 3)
+        reached: Array = np.linalg.norm((along @ self.axes) * self.radii[:, None], axis=2)
+        return reached
+
+    def half_extents(self) -> Array:
+        """Half the sides of the boxes around them along the world's axes, (N, 3) m/s."""
+        return self.support(np.eye(3))
+
+    def projected(self, view: tuple[int, int] = (0, 1)) -> Ellipses:
+        """Their shadows on the plane of two world axes: what can be seen from there, not a section."""
+        halves = (self.axes * self.radii[:, None])[:, view]
+        known = np.isfinite(halves).all(axis=(1, 2))
+        axes, radii = np.tile(np.eye(2), (len(self), 1, 1)), np.full((len(self), 2), np.nan)
+        axes[known], radii[known], _ = np.linalg.svd(halves[known])
+        return Ellipses(self.center[:, view], axes, radii)
+
+
+def ellipsoids_along(
+    robot: Robot,
+    frame: str | None,
+    q: ArrayLike | Mapping[str, float],
+    part: str = WHOLE,
+    sizes: Sizes = None,
+) -> Ellipsoids:
+    """Manipulability ellipsoids of a frame's origin along a motion.
+
+    Parameters
+    ----------
+    frame : the frame; None for the arm's tip, or the root link without an arm
+    q : (N, n) m and rad, in the order of time; (n,) or by name for a single configuration
+    part : "robot", "arm", "platform", or an arm by its name: whose inputs move, the others rest
+    sizes : how much of an input counts as 1, by its name: 1 m/s or 1 rad/s where not named; "limits" for the
+        limits of each (`robot.u_limits`)
+
+    Raises
+    ------
+    InputError : an unknown frame, part or input; q of another shape; a size that is not above zero; an input
+        without a limit
+    """
+    frame = frame_of(robot, frame)
+    columns = groups(robot)
+    if part not in columns:
+        raise InputError(unknown("part", part, columns, f"robot {robot.name}"))
+    chosen = columns[part]
+    points = _points(robot, q)
+    size = input_sizes(robot, sizes, chosen)
+    center, J = velocity_jacobians(robot, frame, points)
+    axes, radii = _followed(J[:, :, chosen] * size)
+    names = tuple(robot.u_names[column] for column in chosen)
+    return Ellipsoids(frame, part, names, size, center, axes, radii)
+
+
+def velocity_jacobians(robot: Robot, frame: str, q: Array) -> tuple[Array, Array]:
+    """Origin of a frame (N, 3) m and J_v = (∂p/∂q) S (N, 3, m) at q (N, n), world axes.
+
+    Not a task's J: a task has no more rows than there are inputs, and two wheels move a point too.
+    """
+    placements, jacobians = np.empty((1, 3, 4)), np.empty((1, 6, robot.n))
+    update = kinematics_updater(robot, (frame,), placements, jacobians, np.empty(0))
+    center, J = np.empty((len(q), 3)), np.empty((len(q), 3, robot.n_u))
+    n_p = robot.platform.n_p
+    for k, point in enumerate(q):
+        update(0.0, point)
+        center[k] = placements[0, :, 3]
+        rolls = robot.platform.problem(point[:n_p]) is None
+        J[k] = jacobians[0, :3] @ robot.S(point) if rolls else np.nan
+    return center, J
+
+
+def frame_of(robot: Robot, frame: str | None) -> str:
+    """The frame asked for, or the arm's tip, or the platform's root link without an arm.
+
+    Raises
+    ------
+    InputError : there is none of that name
+    """
+    if frame is None:
+        frame = first_tip(robot) or _root(robot)
+    robot.frame_id(frame)
+    return frame
+
+
+def carried_frame(robot: Robot, frame: str | None) -> str:
+    """A task's frame where the arm carries it; else as `frame_of` without one: a frame of the platform shows
+    nothing of the arm."""
+    frame = frame_of(robot, frame)
+    joint = robot.model.frames[robot.frame_id(frame)].parentJoint
+    below = robot.model.names[joint] in ("universe", *robot.q_names[: robot.platform.n_p])
+    return frame_of(robot, None) if below else frame
+
+
+def _root(robot: Robot) -> str:
+    """The root link, or what else the platform carries."""
+    model, joint = robot.model, robot.model.getJointId("theta") if robot.platform.n_p else 0
+    carried = [frame.name for frame in model.frames if frame.parentJoint == joint]
+    return next((name for name in carried if name not in ("theta", "universe")), robot.frames[-1])
+
+
+def input_sizes(robot: Robot, sizes: Sizes, columns: list[int]) -> Array:
+    """How much of some inputs counts as 1, (k,), in their units; see `ellipsoids_along`."""
+    if isinstance(sizes, str):
+        if sizes != "limits":
+            raise InputError(f"sizes: expected sizes by the inputs' names, or 'limits', got {sizes!r}")
+        limits: Array = robot.u_limits[columns]
+        free = [robot.u_names[j] for j in columns if not np.isfinite(robot.u_limits[j])]
+        if free:
+            raise InputError(f"sizes: {robot.name} has no limits of {', '.join(free)}; give their sizes")
+        return limits
+    found = np.ones(robot.n_u)
+    for name, value in (sizes or {}).items():
+        found[robot.input(name)] = positive(value, f"size of {name}")
+    return found[columns]
+
+
+def _points(robot: Robot, q: ArrayLike | Mapping[str, float]) -> Array:
+    """Configurations (N, n), checked; one alone as (1, n)."""
+    if isinstance(q, Mapping) or np.ndim(q) == 1:
+        return robot.q(q)[np.newaxis]
+    points = array(q, "q")
+    if points.ndim != 2 or points.shape[1] != robot.n:
+        raise InputError(
+            f"q: expected rows of {robot.n} numbers ({', '.join(robot.q_names)}), got shape {points.shape}"
+        )
+    return points
+
+
+def _followed(A: Array) -> tuple[Array, Array]:
+    """Axes (N, 3, 3) and radii (N, 3) of A (N, 3, k), each sample's named as the one's before."""
+    count, known = len(A), np.asarray(np.isfinite(A).all(axis=(1, 2)))
+    axes, radii = np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3))
+    if A.shape[2]:
+        axes[known], values, _ = np.linalg.svd(A[known])
+        radii[known, : values.shape[1]] = values
+        axes[:, :, 2] *= np.sign(np.linalg.det(axes))[:, np.newaxis]
+    before = None
+    for k in range(count):
+        if known[k]:
+            before = _readable(axes[k]) if before is None else before
+            axes[k] = _nearest(axes[k], radii[k], before)
+            radii[k] = np.linalg.norm(axes[k].T @ A[k], axis=1)
+            before = axes[k]
+        else:
+            radii[k] = np.nan
+            axes[k] = np.eye(3) if before is None else before
+    return axes, radii
+
+
+def _readable(axes: Array) -> Array:
+    """The same axes with the first two pointing the way of their largest component."""
+    signs = np.sign(axes[np.abs(axes).argmax(axis=0), range(3)])
+    signs[2] = signs[0] * signs[1]
+    return axes * signs
+
+
+def _nearest(axes: Array, radii: Array, before: Array) -> Array:
+    """The axes (3, 3) of the same ellipsoid that are nearest to those before: named, signed, and where
+    radii (3,) are equal turned in their plane."""
+    # Radii fall: those that are equal are neighbours.
+    equal = [bool(gap <= EQUAL * radii[0]) for gap in radii[:-1] - radii[1:]]
+    if all(equal):
+        return before
+    turn = _TURNS[np.einsum("ji,jl,tli->t", before, axes, _TURNS).argmax()]
+    named: Array = axes @ turn
+    if any(equal):
+        alone = int(np.abs(turn[2 if equal[0] else 0]).argmax())
+        plane = [i for i in range(3) if i != alone]
+        # The turn R in the plane for which the trace of Rᵀ X is largest.
+        X = named[:, plane].T @ before[:, plane]
+        angle = np.arctan2(X[1, 0] - X[0, 1], X[0, 0] + X[1, 1])
+        c, s = np.cos(angle), np.sin(angle)
+        named[:, plane] = named[:, plane] @ np.array([[c, -s], [s, c]])
+    return named

@@ -1,0 +1,185 @@
+"""What is analysed: the task's J_bar and a constraint's, evaluated anywhere, with names, units and sizes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.analysis.singular.reached import Tasks as Tasks
+from nmm.analysis.singular.reached import stacked
+from nmm.arrays import Array, array, positive, scalar, vector
+from nmm.control.controller import Controller
+from nmm.errors import InputError, SingularError, unknown
+from nmm.functions.function import Row
+from nmm.functions.tasks.task import Stack
+from nmm.platforms.base import Platform
+from nmm.resolvers.projected_gradient import ProjectedGradient
+from nmm.resolvers.reduced_gradient import Partition
+from nmm.robots.robot import Robot
+
+#: What can be analysed: a controller, or a robot and its task (functions are enough, without targets).
+Subject: TypeAlias = Controller | tuple[Robot, Tasks]
+#: Candidates for RG's partition: "automatic" or lists of inputs; None for the controller's own.
+Candidates: TypeAlias = str | Sequence[Partition] | None
+
+#: Step of the central differences, m and rad: the cube root of the machine's precision.
+STEP = float(np.cbrt(np.finfo(float).eps))
+
+
+class Jacobians:
+    """J (s, m) of the task and Jc (k, m) of the constraint at any (t, q).
+
+    The subject's own controller is never run, so that its partition stays as it is.
+
+    Parameters
+    ----------
+    subject : a controller, or (robot, task)
+    constraint : EJ's added task; None for the controller's own, if it has one
+
+    Raises
+    ------
+    InputError : the subject is neither; a task of more rows than the robot has inputs; a
+        constraint that does not make J_e square
+    """
+
+    def __init__(self, subject: Subject, constraint: Tasks | None = None) -> None:
+        self.resolver = None
+        if isinstance(subject, Controller):
+            self.robot, self.task, self.resolver = subject.robot, subject.task, subject.resolver
+            added = subject.constraint if constraint is None else stacked(constraint)
+        elif isinstance(subject, tuple) and len(subject) == 2 and isinstance(subject[0], Robot):
+            self.robot, self.task = subject[0], stacked(subject[1])
+            added = Stack() if constraint is None else stacked(constraint)
+        else:
+            raise InputError(f"analysis: expected a Controller or (robot, task), got {subject!r}")
+        self._of_task = Controller(self.robot, self.task, ProjectedGradient())
+        self._of_constraint = Controller(self.robot, added, ProjectedGradient()) if len(added) else None
+        self.rows: tuple[Row, ...] = self._of_task.rows
+        self.constraint_rows: tuple[Row, ...] = self._of_constraint.rows if self._of_constraint else ()
+        free = self.robot.n_u - len(self.rows)
+        if self.constraint_rows and len(self.constraint_rows) != free:
+            raise InputError(
+                f"constraint: expected {free} rows ({self.robot.n_u} inputs less {len(self.rows)} rows of "
+                f"the task), got {len(self.constraint_rows)}"
+            )
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """Names of the task's rows."""
+        return tuple(row.name for row in self.rows)
+
+    def J(self, t: float, q: Array) -> Array:
+        """J_bar of the task (s, m), paper, eq. 13.
+
+        Raises
+        ------
+        SingularError : there is none at q: the wheels cannot roll, or the task is undefined there
+        """
+        return self._finite(self._of_task, t, q)
+
+    def Jc(self, t: float, q: Array) -> Array:
+        """J_bar of the constraint (k, m); no rows without one."""
+        if self._of_constraint is None:
+            return np.zeros((0, self.robot.n_u))
+        return self._finite(self._of_constraint, t, q)
+
+    def along(self, t: float, q: Array, directions: Array) -> Array:
+        """dJ/dε at q + ε directions[:, j] and the same t, shape (columns, s, m), by central differences."""
+        found = [
+            (self.J(t, q + STEP * direction) - self.J(t, q - STEP * direction)) / (2.0 * STEP)
+            for direction in directions.T
+        ]
+        return np.array(found).reshape(directions.shape[1], len(self.rows), self.robot.n_u)
+
+    def batch(self, q: Array, t: float = 0.0, progress: Callable[[float], None] | None = None) -> Array:
+        """J (N, s, m) at N configurations (N, n) and one time, some microseconds each.
+
+        Where there is none (the wheels cannot roll, the task is undefined), it is not a number.
+
+        Parameters
+        ----------
+        progress : called with the fraction done, about a hundred times
+        """
+        solve, found = self._of_task.equation_solver()
+        platform = self.robot.platform
+        rolls = type(platform).problem is Platform.problem
+        points = np.ascontiguousarray(q, dtype=np.float64)
+        J = np.empty((len(points), len(self.rows), self.robot.n_u))
+        every = max(1, len(points) // 100)
+        for k, point in enumerate(points):
+            solve(t, point)
+            J[k] = found
+            if not rolls and platform.problem(point[: platform.n_p]) is not None:
+                J[k] = np.nan
+            if progress is not None and k % every == 0:
+                progress(k / len(points))
+        J[~np.isfinite(J).all(axis=(1, 2))] = np.nan
+        return J
+
+    def history(self, t: Array, q: Array) -> tuple[Array, Array]:
+        """J (N, s, m) and Jc (N, k, m) at N samples."""
+        m = self.robot.n_u
+        J = np.empty((len(t), len(self.rows), m))
+        Jc = np.empty((len(t), len(self.constraint_rows), m))
+        for k in range(len(t)):
+            J[k] = self.J(t[k], q[k])
+            if self._of_constraint is not None:
+                Jc[k] = self.Jc(t[k], q[k])
+        return J, Jc
+
+    def sizes(self, length: float | None, sizes: Mapping[str, float] | None) -> tuple[Array, Array, Array]:
+        """How much of each row (s,), constraint row (k,) and input (m,) counts as 1, in their own units.
+
+        Raises
+        ------
+        InputError : a size that is not above zero, or of something that is neither row nor input
+        """
+        L = 1.0 if length is None else positive(length, "length")
+        given = {} if sizes is None else dict(sizes)
+        names = (*self.row_names, *(row.name for row in self.constraint_rows), *self.robot.u_names)
+        for name, value in given.items():
+            if name not in names:
+                raise InputError(unknown("row or input", name, names, "sizes"))
+            given[name] = positive(value, f"size of {name}")
+
+        def of(named: Sequence[tuple[str, str]]) -> Array:
+            return np.array(
+                [given.get(name, L if unit.split("/")[0] == "m" else 1.0) for name, unit in named]
+            )
+
+        return (
+            of([(row.name, row.unit) for row in self.rows]),
+            of([(row.name, row.unit) for row in self.constraint_rows]),
+            of(list(zip(self.robot.u_names, self.robot.u_units, strict=True))),
+        )
+
+    def samples(self, t: ArrayLike, q: ArrayLike) -> tuple[Array, Array]:
+        """Times (N,), increasing, and configurations (N, n), checked."""
+        times, points = vector(t, None, "t"), array(q, "q")
+        if points.shape != (times.size, self.robot.n) or not times.size:
+            raise InputError(
+                f"q: expected a row of {self.robot.n} numbers ({', '.join(self.robot.q_names)}) for each of "
+                f"{max(times.size, 1)} times, got shape {points.shape}"
+            )
+        if np.any(np.diff(times) <= 0.0):
+            raise InputError("t: expected increasing times")
+        return times, points
+
+    def _finite(self, controller: Controller, t: float, q: Array) -> Array:
+        J = controller.evaluate(t, q).J
+        problem = self.robot.platform.problem(q[: self.robot.platform.n_p])
+        if problem is not None or not np.all(np.isfinite(J)):
+            raise SingularError(
+                f"at t = {t:g} s: {problem or 'the task or its reference is undefined there'}"
+            )
+        return J
+
+
+def checked(jacobians: Jacobians, t: float, q: ArrayLike | Mapping[str, float] | None) -> tuple[float, Array]:
+    """(t, q) as numbers; `InputError` says what is wrong with them."""
+    if q is None:
+        raise InputError(f"q: expected {jacobians.robot.n} numbers, got None")
+    return scalar(t, "t"), jacobians.robot.q(q)

@@ -1,0 +1,247 @@
+"""Where a robot stands with a task: rank, what is lost and how it comes back, at one configuration."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.analysis.singular.algorithmic import (
+    ExtendedSingularity,
+    PartitionSingularities,
+    extended_singularity,
+    partition_singularities,
+)
+from nmm.analysis.singular.directions import direction_text, direction_texts
+from nmm.analysis.singular.jacobians import Candidates, Jacobians, Subject, Tasks, checked
+from nmm.analysis.singular.minors import (
+    MOST_MINORS,
+    Choice,
+    Minors,
+    chosen_columns,
+    determinant_rates,
+    determinants,
+)
+from nmm.analysis.singular.parts import WHOLE, Part, given_back, groups, part
+from nmm.analysis.singular.restoration import Restoration, restoration
+from nmm.arrays import Array, Integers, positive
+from nmm.resolvers.base import Shape
+from nmm.resolvers.reduced_gradient import ReducedGradient
+
+#: Singular values this small beside the largest are zero; the resolvers' own tolerance.
+TOLERANCE = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class SingularityReport:
+    """The task's J at (t, q), taken apart. Parts, restorations and lost directions are those of `scaled_J`.
+
+    Attributes
+    ----------
+    t, q (n,) : where
+    rows, inputs : names of J's rows and columns, with `row_units`, `input_units`
+    J (s, m) : J_bar as it is (paper, eq. 13); J_u (m, s, m) : its derivative along each input, per m or rad
+    row_sizes (s,), input_sizes (m,) : how much of each counts as 1
+    parts : "platform", "arm", the arms by name, "robot": who can do what
+    weakest (s,) : the task's direction that moves least, a left singular vector of σ_min
+    given_back (k, s) : directions that the arm has lost and the platform gives back
+    minors : of J as it is, by the names of their columns
+    by_input, by_coordinate : which motions bring back what is lost; those along the coordinates include
+        motions that the wheels do not admit
+    extended : J_e beside J; None without a constraint
+    partitions : every candidate's Ja beside J
+    tolerance : singular values this small beside the largest are zero
+    """
+
+    t: float
+    q: Array
+    rows: tuple[str, ...]
+    row_units: tuple[str, ...]
+    inputs: tuple[str, ...]
+    input_units: tuple[str, ...]
+    J: Array
+    J_u: Array
+    row_sizes: Array
+    input_sizes: Array
+    parts: Mapping[str, Part]
+    weakest: Array
+    given_back: Array
+    minors: Minors
+    by_input: Restoration
+    by_coordinate: Restoration
+    extended: ExtendedSingularity | None
+    partitions: PartitionSingularities
+    tolerance: float
+
+    @property
+    def whole(self) -> Part:
+        """All inputs together."""
+        return self.parts[WHOLE]
+
+    @property
+    def scaled_J(self) -> Array:
+        """J_ij * input_sizes[j] / row_sizes[i]."""
+        return self.J * self.input_sizes / self.row_sizes[:, np.newaxis]
+
+    @property
+    def rank(self) -> int:
+        """Rank of J."""
+        return self.whole.rank
+
+    @property
+    def singular(self) -> bool:
+        """Whether J lost rank: a kinematic singularity, for every resolver."""
+        return self.rank < len(self.rows)
+
+    @property
+    def singular_values(self) -> Array:
+        """(s,), falling."""
+        return self.whole.singular_values
+
+    @property
+    def sigma_min(self) -> float:
+        """Smallest singular value."""
+        return self.whole.sigma_min
+
+    @property
+    def condition(self) -> float:
+        """Condition number; infinite where J lost rank."""
+        return self.whole.condition
+
+    @property
+    def lost(self) -> Array:
+        """(s - rank, s): orthonormal task directions that no input moves."""
+        return self.whole.lost
+
+    @property
+    def lost_text(self) -> tuple[str, ...]:
+        """`lost` in the rows' names: "0.71 ee.x - 0.71 ee.y"."""
+        return self.whole.lost_text
+
+    @property
+    def weakest_text(self) -> str:
+        """`weakest` in the rows' names."""
+        return direction_text(self.weakest, self.rows)
+
+    @property
+    def given_back_text(self) -> tuple[str, ...]:
+        """`given_back` in the rows' names."""
+        return direction_texts(self.given_back, self.rows)
+
+    @cached_property
+    def minor_rates(self) -> Minors:
+        """Derivatives of the minors along each input, per m or rad: an item is (m,).
+
+        Where J lost one rank, a motion brings it back exactly when some minor of all changes along it.
+        """
+        rates = determinant_rates(self.J, self.J_u, self.minors.columns)
+        return Minors(self.minors.columns, rates, self.inputs)
+
+
+def candidates(jacobians: Jacobians, partitions: Candidates) -> Integers:
+    """Columns (count, s) of RG's candidates: those given, the controller's own, or all."""
+    resolver = jacobians.resolver
+    if partitions is None and isinstance(resolver, ReducedGradient):
+        own = resolver
+    else:
+        own = ReducedGradient(partitions="automatic" if partitions is None else partitions)
+    s, robot = len(jacobians.rows), jacobians.robot
+    options = own.setup(Shape(s, 0, robot.u_names, robot.groups)).options
+    return options[2:].reshape(-1, s)  # after the two flags
+
+
+def analyse(
+    subject: Subject,
+    q: ArrayLike | Mapping[str, float],
+    t: float = 0.0,
+    *,
+    length: float | None = None,
+    sizes: Mapping[str, float] | None = None,
+    minors: Choice = True,
+    most_minors: int = MOST_MINORS,
+    constraint: Tasks | None = None,
+    partitions: Candidates = None,
+    tolerance: float = TOLERANCE,
+) -> SingularityReport:
+    """Analyse the task's J_bar at (t, q).
+
+    Singular values compare what different units measure. Without `length` and `sizes`, 1 m, 1 rad, 1 m/s
+    and 1 rad/s count as equal. With a characteristic length L, rows in m and inputs in m/s count in L: the
+    matrix is then free of units, and its σ_min and condition do not depend on the unit of length. A good L
+    is the arm's reach. Rank, minors and which motions restore do not depend on it; lost directions are
+    written in those sizes.
+
+    Parameters
+    ----------
+    subject : a controller, or (robot, task); the controller is not run and keeps its partition
+    q : (n,) m and rad, or by name
+    t : s
+    length : characteristic length L, m
+    sizes : what counts as 1 of a row or an input, by name, in its unit; before `length`
+    minors : True for all, False for none, or a list of those wanted, ["v, q1", ("v", "omega")]
+    most_minors : `InputError` when there are more
+    constraint : EJ's added task; None for the controller's own
+    partitions : RG's candidates: lists of inputs or "automatic"; None for those of the controller's RG, or
+        else, those of the minors
+    tolerance : singular values this small beside the largest are zero
+
+    Raises
+    ------
+    InputError : a task of more rows than inputs, q of another length, an unknown name, too many minors
+    SingularError : there is no J: the wheels cannot roll there, or the task is undefined
+    """
+    jacobians = Jacobians(subject, constraint)
+    t, q = checked(jacobians, t, q)
+    tolerance = positive(tolerance, "tolerance")
+    robot, rows = jacobians.robot, jacobians.row_names
+    columns = chosen_columns(minors, robot.u_names, len(rows), most_minors)
+    all_sizes = row_sizes, _, input_sizes = jacobians.sizes(length, sizes)
+    blocks = partition_columns(jacobians, partitions, minors, columns)
+
+    def scaled(matrix: Array) -> Array:
+        return matrix * input_sizes / row_sizes[:, np.newaxis]
+
+    J, Jc = jacobians.J(t, q), jacobians.Jc(t, q)
+    scaled_J = scaled(J)
+    J_u, J_q = jacobians.along(t, q, robot.S(q)), jacobians.along(t, q, np.eye(robot.n))
+    parts = {name: part(name, scaled_J, own, robot, rows, tolerance) for name, own in groups(robot).items()}
+    whole = parts[WHOLE]
+    singular = whole.rank < len(rows)
+    weakest = np.linalg.svd(scaled_J)[0][:, -1]
+    return SingularityReport(
+        t=t,
+        q=q,
+        rows=rows,
+        row_units=tuple(row.unit for row in jacobians.rows),
+        inputs=robot.u_names,
+        input_units=robot.u_units,
+        J=J,
+        J_u=J_u,
+        row_sizes=row_sizes,
+        input_sizes=input_sizes,
+        parts=parts,
+        weakest=weakest * np.sign(weakest[np.argmax(np.abs(weakest))]),
+        given_back=given_back(parts["arm"], whole),
+        minors=Minors(columns, determinants(J, columns), robot.u_names),
+        by_input=restoration(scaled_J, scaled(J_u), robot.u_names, whole.rank),
+        by_coordinate=restoration(scaled_J, scaled(J_q), robot.q_names, whole.rank),
+        extended=extended_singularity(
+            J, Jc, all_sizes, (*rows, *(row.name for row in jacobians.constraint_rows)), tolerance
+        )
+        if len(Jc)
+        else None,
+        partitions=partition_singularities(J, blocks, robot.u_names, singular, tolerance),
+        tolerance=tolerance,
+    )
+
+
+def partition_columns(
+    jacobians: Jacobians, partitions: Candidates, minors: Choice, columns: Integers
+) -> Integers:
+    """RG's candidates; those of the minors listed when neither they nor RG's are given."""
+    if partitions is None and minors is not True and not isinstance(jacobians.resolver, ReducedGradient):
+        return columns
+    return candidates(jacobians, partitions)

@@ -1,0 +1,1 @@
+"""J u = rate and h from functions, then u: the object that users call."""

@@ -1,0 +1,81 @@
+"""Inputs that a task does not feel: columns of J that are zero wherever the robot stands."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.arrays import Array
+from nmm.control.controller import Controller
+
+#: How many configurations are looked at: one where a column is zero by chance would say nothing.
+CONFIGURATIONS = 8
+#: Half of the range about the start from which coordinates are drawn, m and rad.
+AROUND = 1.0
+#: A column this much smaller than J is zero.
+ZERO = 1e-12
+
+
+def unfelt_inputs(controller: Controller, q0: ArrayLike | None = None) -> tuple[str, ...]:
+    """Names of the inputs whose column of J (s, n_u) is zero, as a car's steering rate is for a position.
+
+    To first order such an input does not move the task, so that only the objective can use it. The columns
+    are compared at random configurations about `q0`, within the limits, always the same ones. The
+    controller's partition stays as it is.
+
+    Parameters
+    ----------
+    controller : evaluated at t = 0 s
+    q0 : (n,) m and rad, where the coordinates are drawn around; zero when not given
+
+    Returns
+    -------
+    Names as in `robot.u_names`; none when J could not be evaluated (a user's function raised, say)
+    """
+    return _zero_columns(controller, q0, lambda controller: controller.derivatives[:1])
+
+
+def idle_inputs(controller: Controller, q0: ArrayLike | None = None) -> tuple[str, ...]:
+    """Names of the inputs that neither the task nor the constraint nor the objective feels: they stay 0.
+
+    Parameters and result as for `unfelt_inputs`.
+    """
+    return _zero_columns(controller, q0, lambda controller: controller.derivatives)
+
+
+def _zero_columns(
+    controller: Controller, q0: ArrayLike | None, matrices: Callable[[Controller], Sequence[Array]]
+) -> tuple[str, ...]:
+    """Inputs whose columns are zero, wherever the robot stands, in all matrices (rows, n_u)."""
+    largest = np.zeros(controller.robot.n_u)
+    looked = False
+    state = controller._state.copy()
+    try:
+        for q in _configurations(controller, controller.robot.q(q0)):
+            controller.evaluate(0.0, q)
+            for matrix in matrices(controller):
+                size = float(np.linalg.norm(matrix))
+                if np.isfinite(size) and size > 0.0:
+                    largest = np.maximum(largest, np.linalg.norm(matrix, axis=0) / size)
+                    looked = True
+    except Exception:  # a user's function may raise anything, where it was not made for
+        return ()
+    finally:
+        controller._state[:] = state
+    if not looked:
+        return ()
+    return tuple(
+        name for name, column in zip(controller.robot.u_names, largest, strict=True) if column <= ZERO
+    )
+
+
+def _configurations(controller: Controller, q0: Array) -> Array:
+    """Configurations about q0 and within the limits, (K, n); q0 itself may be a singular one."""
+    lower, upper = controller.robot.q_limits.T
+    lower, upper = np.maximum(lower, q0 - AROUND), np.minimum(upper, q0 + AROUND)
+    # A start outside its limits is somebody else's complaint.
+    lower, upper = np.minimum(lower, upper), np.maximum(lower, upper)
+    rng = np.random.default_rng(0)
+    return rng.uniform(lower, upper, (CONFIGURATIONS, controller.robot.n))

@@ -1,0 +1,1 @@
+"""Differentiable functions of (t, q): tasks, references, objectives, and how a list of them runs."""

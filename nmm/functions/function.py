@@ -1,0 +1,99 @@
+"""Differentiable functions of time and configuration, phi(t, q): what tasks, references and
+objectives are made of.
+
+A task's f(q), a reference's g(t, q) and an objective's H(q) are one kind of thing: a vector, its
+partial derivative in time and its Jacobian in the coordinates. Each says which rows it has and
+which kernels compute them; how they are run is `program.py`'s business.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nmm.kernels.compiled import Kernel
+from nmm.robots.robot import Robot
+
+if TYPE_CHECKING:
+    from nmm.robots.configuration import Configuration
+
+Array = NDArray[np.float64]
+
+
+class Row(NamedTuple):
+    """One component of a function: its name, its unit, and whether it is an angle whose differences wrap."""
+
+    name: str
+    unit: str
+    angular: bool = False
+
+
+class Evaluation(NamedTuple):
+    """A function's value (s,), its partial time derivative (s,) and its Jacobian (s, n) in q."""
+
+    value: Array
+    value_t: Array
+    value_q: Array
+
+
+Callback = Callable[[float, "Configuration"], Evaluation]
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """A kernel with what it reads. The stages of a function run in order on the same rows.
+
+    Attributes
+    ----------
+    kernel : of signature `compiled.FUNCTION`
+    rows : how many rows it reads or writes
+    before : how many of the rows that come before the function's own it sees too, above them
+    frames : names of the frames whose placement and Jacobian it reads
+    parameters : the numbers that it reads
+    hessians : whether it reads the frames' kinematic Hessians
+    callback : a user's Python function, run before the kernels; its results are the parameters
+    """
+
+    kernel: Kernel
+    rows: int
+    frames: tuple[str, ...] = ()
+    parameters: Array = field(default_factory=lambda: np.zeros(0))
+    hessians: bool = False
+    callback: Callback | None = None
+    before: int = 0
+
+
+class Function(ABC):
+    """phi(t, q). To add one, write in a file of its own a kernel and a subclass that implements:
+
+    1. `rows(robot)`: names, units and angularity of the components; raises `InputError` for
+       what the robot does not have;
+    2. `stages(robot)`: the kernels that compute value, time derivative and Jacobian.
+
+    `comparison` is for values that cannot be subtracted (orientations, poses): a kernel of signature
+    `compiled.FUNCTION` that sees the rows [value, target, error], s of each, with their derivatives, and
+    writes those of the error. Without it the error is target - value, wrapped where a row is an angle.
+    """
+
+    comparison: Kernel | None = None
+
+    @abstractmethod
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """The components, in order."""
+
+    @abstractmethod
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        """The kernels that compute them, in order."""
+
+    def evaluate(self, t: float, configuration: Configuration) -> Evaluation:
+        """Value, partial time derivative and Jacobian at time t (s) and a configuration."""
+        from nmm.functions.program import Program
+
+        program = Program(configuration.robot, (self,))
+        program.pack()
+        return program.evaluate(t, configuration.q)[0]

@@ -1,0 +1,90 @@
+"""Objectives H(q), minimised: one row each, added and scaled like numbers."""
+
+from __future__ import annotations
+
+from nmm.arrays import Array, scalar
+from nmm.errors import InputError
+from nmm.functions.function import Function, Row, Stage
+from nmm.robots.configuration import Configuration
+from nmm.robots.robot import Robot
+
+
+class Objective(Function):
+    """H(q), a function with one row. It is minimised: to maximise w, minimise `-w`.
+
+    `a + b`, `2.0 * a` and `-a` make sums and multiples.
+    """
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        return (Row("H", "1"),)
+
+    def terms(self) -> tuple[tuple[float, Function], ...]:
+        """The weighted functions, of one row each, that add up to H."""
+        return ((1.0, self),)
+
+    def terms_on(self, robot: Robot) -> tuple[tuple[float, Function], ...]:
+        """The terms, checked against a robot; `InputError` for one that has more rows than one."""
+        for _, function in self.terms():
+            rows = function.rows(robot)
+            if len(rows) != 1:
+                names = ", ".join(row.name for row in rows)
+                raise InputError(f"objective: expected terms of one row, got one with {len(rows)} ({names})")
+        return self.terms()
+
+    def value(self, configuration: Configuration) -> float:
+        """H(q)."""
+        return sum(
+            weight * float(function.evaluate(0.0, configuration).value[0])
+            for weight, function in self.terms_on(configuration.robot)
+        )
+
+    def gradient(self, configuration: Configuration) -> Array:
+        """∂H/∂q, shape (n,): ordinary partial derivatives in the coordinates."""
+        parts = [
+            weight * function.evaluate(0.0, configuration).value_q[0]
+            for weight, function in self.terms_on(configuration.robot)
+        ]
+        gradient: Array = sum(parts[1:], parts[0])
+        return gradient
+
+    def __add__(self, other: Objective) -> Objective:
+        return Sum((1.0, self), (1.0, other))
+
+    def __radd__(self, other: object) -> Objective:
+        """So that Python's `sum` of objectives, which begins with 0, is their sum."""
+        if other == 0:
+            return self
+        raise InputError(f"objective: expected an objective to add, got {other!r}")
+
+    def __mul__(self, factor: float) -> Objective:
+        return Sum((factor, self))
+
+    __rmul__ = __mul__
+
+    def __neg__(self) -> Objective:
+        return -1.0 * self
+
+    def __sub__(self, other: Objective) -> Objective:
+        return self + -other
+
+
+class Sum(Objective):
+    """A weighted sum of objectives, or of other functions of one row: `Sum((2.0, a), (-1.0, b))`."""
+
+    def __init__(self, *terms: tuple[float, Function]) -> None:
+        if not terms:
+            raise InputError("sum of objectives: expected at least one")
+        for _, function in terms:
+            if not isinstance(function, Function):
+                raise InputError(f"objective: expected an objective to add, got {function!r}")
+        self._terms = tuple(
+            (scalar(weight, "weight") * inner, part)
+            for weight, function in terms
+            for inner, part in (function.terms() if isinstance(function, Objective) else ((1.0, function),))
+        )
+
+    def terms(self) -> tuple[tuple[float, Function], ...]:
+        return self._terms
+
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        raise InputError("sum of objectives: expected as an objective, it is no task of its own")

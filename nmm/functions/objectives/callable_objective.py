@@ -1,0 +1,43 @@
+"""A user's own H(q), written in Python."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from numpy.typing import ArrayLike
+
+from nmm.functions.callbacks import differentiated, stage
+from nmm.functions.function import Stage
+from nmm.functions.objectives.base import Objective
+from nmm.robots.configuration import Configuration
+from nmm.robots.robot import Robot
+
+
+class CallableObjective(Objective):
+    """H from a Python function of a `Configuration`.
+
+    Parameters
+    ----------
+    function : configuration -> H
+    gradient : configuration -> ∂H/∂q, shape (n,); central differences when not given
+    """
+
+    def __init__(
+        self,
+        function: Callable[[Configuration], float],
+        gradient: Callable[[Configuration], ArrayLike] | None = None,
+    ) -> None:
+        self.function = function
+        self._gradient = gradient
+
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        function, gradient = self.function, self._gradient
+        callback = differentiated(
+            lambda t, configuration: function(configuration),
+            None,
+            None if gradient is None else lambda t, configuration: gradient(configuration),
+            1,
+            "callable objective",
+            depends_on_time=False,
+        )
+        return (stage(1, robot.n, callback),)

@@ -1,0 +1,62 @@
+"""Bearing of a moving point towards a fixed one (paper, section VI, cases 2 and 3)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.arrays import Array, vector
+from nmm.errors import InputError
+from nmm.functions.function import Function, Row, Stage
+from nmm.kernels.compiled import FUNCTION, kernel
+from nmm.robots.robot import Robot
+
+
+@kernel(FUNCTION)
+def bearing(
+    t: float, q: Array, placements: Array, jacobians: Array, hessians: Array, G: Array, G_q: Array,
+    slots: Array, parameters: Array, value: Array, value_t: Array, value_q: Array,
+) -> None:  # fmt: skip
+    """atan2(T - p) by the chain rule, in place: the first two rows hold p and its derivatives."""
+    dx = parameters[0] - value[0]
+    dy = parameters[1] - value[1]
+    square = dx * dx + dy * dy
+    value_t[0] = (dy * value_t[0] - dx * value_t[1]) / square
+    for j in range(q.shape[0]):
+        value_q[0, j] = (dy * value_q[0, j] - dx * value_q[1, j]) / square
+    value[0] = math.atan2(dy, dx)
+
+
+class Bearing(Function):
+    """Angle (rad) from the world's x axis at which a fixed point is seen from a moving one.
+
+    Parameters
+    ----------
+    of : the moving point, whose first two components are its x and y: a reference of time such
+        as `Circle` (case 2), or a point of the robot, `Position("link2", "xy")` (case 3), in
+        which case the bearing is a function of the configuration
+    towards : (2,) the fixed point, m
+    """
+
+    def __init__(self, of: Function, towards: ArrayLike) -> None:
+        self.of = of
+        self.towards = vector(towards, None, "towards")
+        if self.towards.size not in (2, 3):
+            raise InputError(
+                f"towards: expected 2 numbers (or 3, of which z is not read), got {self.towards.size}"
+            )
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        seen_from = self.of.rows(robot)
+        if len(seen_from) < 2 or any(row.unit != "m" for row in seen_from[:2]):
+            raise InputError(
+                f"bearing: expected the point it is taken from to have x and y in m, got "
+                f"{', '.join(f'{row.name} ({row.unit})' for row in seen_from)}"
+            )
+        return (Row("bearing", "rad", angular=True),)
+
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        self.rows(robot)
+        return (*self.of.stages(robot), Stage(bearing, 2, (), np.array(self.towards[:2])))

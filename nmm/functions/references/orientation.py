@@ -1,0 +1,185 @@
+"""Orientations as references: rotation vectors from other notations, and turns in time."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.arrays import Array, matrix, positive, scalar, vector
+from nmm.errors import InputError, unknown
+from nmm.functions.function import Function, Row, Stage
+from nmm.kernels.compiled import FUNCTION, kernel
+from nmm.kernels.rotations import between3, compose3, exp3, left_jacobian_inverse3, log3, transposed_times3
+from nmm.robots.robot import Robot
+
+#: How far RᵀR may be from the identity, and a quaternion from length 1.
+SLACK = 1e-6
+ROWS = tuple(Row(name, "rad") for name in ("rx", "ry", "rz"))
+
+
+@kernel(FUNCTION)
+def turning(
+    t: float, q: Array, placements: Array, jacobians: Array, hessians: Array, G: Array, G_q: Array,
+    slots: Array, parameters: Array, value: Array, value_t: Array, value_q: Array,
+) -> None:  # fmt: skip
+    """φ = log(exp(φ0) exp(a s)), φ_dot = Jr(φ)⁻¹ a s_dot; s(t) a polynomial, at rest outside [t0, t1].
+
+    parameters = [φ0, a, t0, t1, coefficients of s, highest power first].
+    """
+    outside = t < parameters[6] or t > parameters[7]
+    local = min(max(t, parameters[6]), parameters[7])
+    s = 0.0
+    s_t = 0.0
+    for k in range(8, parameters.shape[0]):
+        s_t = s_t * local + s
+        s = s * local + parameters[k]
+    axis, rate = np.empty(3), np.empty(3)
+    for i in range(3):
+        axis[i] = parameters[3 + i] * s
+        rate[i] = 0.0 if outside else parameters[3 + i] * s_t
+    first, turn, R = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    exp3(parameters[:3], first)
+    exp3(axis, turn)
+    compose3(first, turn, R)
+    log3(R, value)
+    left_jacobian_inverse3(value, turn)
+    transposed_times3(turn, rate, value_t)
+
+
+class Turn(Function):
+    """An orientation that turns at constant rate: R(t) = R0 exp(a rate t), as a rotation vector, rad.
+
+    Parameters
+    ----------
+    axis : (3,) a, in the axes of the orientation itself; its length is not read
+    rate : rad/s
+    start : (3,) rotation vector of R0, at t = 0 (see `rotation_vector`)
+    """
+
+    def __init__(self, axis: ArrayLike, rate: float, start: ArrayLike = (0.0, 0.0, 0.0)) -> None:
+        direction = vector(axis, 3, "axis")
+        length = float(np.linalg.norm(direction))
+        if length == 0.0:
+            raise InputError("axis: expected a vector that is not zero")
+        coefficients = [scalar(rate, "rate"), 0.0]
+        self._numbers = np.concatenate(
+            [vector(start, 3, "start"), direction / length, [-np.inf, np.inf], coefficients]
+        )
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        return ROWS
+
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        return (Stage(turning, 3, (), self._numbers),)
+
+
+class Slerp(Function):
+    """From one orientation to another by the shortest turn, then at rest, as a rotation vector, rad.
+
+    R(t) = R0 exp(log(R0ᵀR1) s(t)), s from 0 to 1. Between orientations that are π apart exactly there are two
+    shortest turns; one of them is taken.
+
+    Parameters
+    ----------
+    start, end : (3,) rotation vectors of R0 and R1 (see `rotation_vector`)
+    duration : s, above 0
+    profile : "constant" rate, or "smooth": a fifth-degree polynomial that starts and stops at rest with
+        zero acceleration
+    """
+
+    def __init__(
+        self,
+        start: ArrayLike,
+        end: ArrayLike,
+        duration: float,
+        profile: Literal["constant", "smooth"] = "constant",
+    ) -> None:
+        first, last = vector(start, 3, "start"), vector(end, 3, "end")
+        T = positive(duration, "duration")
+        profiles = {"constant": [1 / T, 0.0], "smooth": [6 / T**5, -15 / T**4, 10 / T**3, 0.0, 0.0, 0.0]}
+        if profile not in profiles:
+            raise InputError(unknown("profile", profile, profiles))
+        R0, R1, between = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+        turn = np.empty(3)
+        exp3(first, R0)
+        exp3(last, R1)
+        between3(R0, R1, between)
+        log3(between, turn)
+        self._numbers = np.concatenate([first, turn, [0.0, T], profiles[profile]])
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        return ROWS
+
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        return (Stage(turning, 3, (), self._numbers),)
+
+
+def rotation_vector(
+    *,
+    rpy: ArrayLike | None = None,
+    quaternion: ArrayLike | None = None,
+    matrix: ArrayLike | None = None,
+) -> Array:
+    """The rotation vector φ (3,), rad, |φ| <= π, of an orientation in another notation.
+
+    Parameters
+    ----------
+    rpy : (3,) roll, pitch, yaw, rad: R = Rz(yaw) Ry(pitch) Rx(roll), as in URDF
+    quaternion : (4,) x, y, z, w, of length 1
+    matrix : (3, 3) R
+
+    Raises
+    ------
+    InputError : not exactly one of them, a quaternion of another length, a matrix that is no rotation
+
+    Examples
+    --------
+    >>> rotation_vector(rpy=[0, 0, 0.5])
+    array([0. , 0. , 0.5])
+    """
+    given = {"rpy": rpy, "quaternion": quaternion, "matrix": matrix}
+    names = [name for name, value in given.items() if value is not None]
+    if len(names) != 1:
+        raise InputError(
+            f"orientation: expected one of {', '.join(given)}, got {' and '.join(names) or 'none'}"
+        )
+    phi = np.empty(3)
+    if rpy is not None:
+        log3(_from_rpy(vector(rpy, 3, "rpy")), phi)
+    elif quaternion is not None:
+        log3(_from_quaternion(vector(quaternion, 4, "quaternion")), phi)
+    elif matrix is not None:
+        log3(_rotation(matrix), phi)
+    return phi
+
+
+def _from_rpy(rpy: Array) -> Array:
+    R = np.eye(3)
+    turn = np.empty((3, 3))
+    for axis, angle in zip(np.eye(3), rpy, strict=True):
+        exp3(axis * angle, turn)
+        R = turn @ R
+    return np.ascontiguousarray(R)
+
+
+def _from_quaternion(xyzw: Array) -> Array:
+    length = float(np.linalg.norm(xyzw))
+    if abs(length - 1.0) > SLACK:
+        raise InputError(f"quaternion: expected x, y, z, w of length 1, got length {length:g}")
+    x, y, z, w = xyzw / length
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def _rotation(given: ArrayLike) -> Array:
+    R = matrix(given, (3, 3), "matrix")
+    if np.abs(R.T @ R - np.eye(3)).max() > SLACK or np.linalg.det(R) < 0.0:
+        raise InputError("matrix: expected a rotation (orthonormal columns, determinant 1)")
+    return R

@@ -1,0 +1,86 @@
+"""Heading: the absolute angle of a link about a world axis (paper, sections V-A and VI-3)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.arrays import Array, vector
+from nmm.errors import InputError, unknown
+from nmm.functions.function import Function, Row, Stage
+from nmm.kernels.compiled import FUNCTION, kernel
+from nmm.robots.robot import Robot
+
+UNIT = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+#: For each world axis, the two that span the plane in which the angle is measured, right-handed.
+PLANES = {"x": ("y", "z"), "y": ("z", "x"), "z": ("x", "y")}
+
+
+@kernel(FUNCTION)
+def heading(
+    t: float, q: Array, placements: Array, jacobians: Array, hessians: Array, G: Array, G_q: Array,
+    slots: Array, parameters: Array, value: Array, value_t: Array, value_q: Array,
+) -> None:  # fmt: skip
+    """ψ = atan2(e2·d, e1·d), d = R a, with d_dot = ω × d; parameters = [a, e1, e2]."""
+    frame = slots[0]
+    d = np.empty(3)
+    for i in range(3):
+        d[i] = 0.0
+        for j in range(3):
+            d[i] += placements[frame, i, j] * parameters[j]
+    c = 0.0
+    s = 0.0
+    for i in range(3):
+        c += parameters[3 + i] * d[i]
+        s += parameters[6 + i] * d[i]
+    value[0] = math.atan2(s, c)
+    square = c * c + s * s
+    for k in range(q.shape[0]):
+        wx = jacobians[frame, 3, k]
+        wy = jacobians[frame, 4, k]
+        wz = jacobians[frame, 5, k]
+        dx = wy * d[2] - wz * d[1]
+        dy = wz * d[0] - wx * d[2]
+        dz = wx * d[1] - wy * d[0]
+        c_q = parameters[3] * dx + parameters[4] * dy + parameters[5] * dz
+        s_q = parameters[6] * dx + parameters[7] * dy + parameters[8] * dz
+        value_q[0, k] = (c * s_q - s * c_q) / square
+
+
+class Heading(Function):
+    """Angle ψ (rad, in (-π, π]) of a direction fixed in `frame`, about a world axis.
+
+    For a planar robot's link it is θ + q1 + ... , the link's absolute orientation.
+
+    Parameters
+    ----------
+    frame : a frame of the robot
+    direction : (3,) vector or "x", "y", "z", in the frame's axes; its angle is taken
+    about : world axis "x", "y" or "z" about which the angle is measured, from the next axis in
+        the cyclic order x, y, z (about z: from x towards y)
+    """
+
+    def __init__(self, frame: str, direction: str | ArrayLike = "x", about: str = "z") -> None:
+        self.frame = frame
+        if isinstance(direction, str):
+            if direction not in UNIT:
+                raise InputError(unknown("direction", direction, UNIT))
+            direction = UNIT[direction]
+        self.direction = vector(direction, 3, "direction")
+        length = float(np.linalg.norm(self.direction))
+        if length == 0.0:
+            raise InputError("direction: expected a vector that is not zero")
+        self.direction /= length
+        if about not in PLANES:
+            raise InputError(unknown("axis", about, PLANES))
+        self.about = about
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        robot.frame_id(self.frame)
+        return (Row(f"{self.frame}.heading", "rad", angular=True),)
+
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        e1, e2 = (UNIT[axis] for axis in PLANES[self.about])
+        return (Stage(heading, 1, (self.frame,), np.concatenate([self.direction, e1, e2])),)

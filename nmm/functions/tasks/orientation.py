@@ -1,0 +1,89 @@
+"""Orientation of a frame, compared on the rotations themselves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nmm.arrays import Array
+from nmm.functions.function import Function, Row, Stage
+from nmm.functions.tasks.frame_pose import PARTS, pose_rows, pose_stage
+from nmm.kernels.compiled import FUNCTION, kernel
+from nmm.kernels.rotations import (
+    between3,
+    exp3,
+    left_jacobian3,
+    left_jacobian_inverse3,
+    log3,
+    times3,
+    transposed_times3,
+)
+from nmm.robots.robot import Robot
+
+TURNS = PARTS[3:]
+
+
+@kernel(FUNCTION)
+def orientation_error(
+    t: float, q: Array, placements: Array, jacobians: Array, hessians: Array, G: Array, G_q: Array,
+    slots: Array, parameters: Array, value: Array, value_t: Array, value_q: Array,
+) -> None:  # fmt: skip
+    """e = log(RᵀR_d), R = exp(φ), R_d = exp(g), from the rows [φ, g, e]: see `Orientation`.
+
+    With the body rates ω = J(φ)ᵀ φ_dot and ω_d = J(g)ᵀ g_dot, each in its own axes:
+    e_dot = Jr(e)⁻¹ ω_d - Jl(e)⁻¹ ω, of which Jr(e) = Jl(e)ᵀ.
+    """
+    R, target, turn = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    J, J_target, J_error = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    exp3(value[:3], R)
+    exp3(value[3:6], target)
+    between3(R, target, turn)
+    log3(turn, value[6:])
+    left_jacobian3(value[:3], J)
+    left_jacobian3(value[3:6], J_target)
+    left_jacobian_inverse3(value[6:], J_error)
+    rate, omega, omega_target = np.empty(3), np.empty(3), np.empty(3)
+    forward, backward = np.empty(3), np.empty(3)
+    for k in range(-1, q.shape[0]):  # -1: the time
+        for i in range(3):
+            rate[i] = value_t[i] if k < 0 else value_q[i, k]
+        transposed_times3(J, rate, omega)
+        for i in range(3):
+            rate[i] = value_t[3 + i] if k < 0 else value_q[3 + i, k]
+        transposed_times3(J_target, rate, omega_target)
+        transposed_times3(J_error, omega_target, forward)
+        times3(J_error, omega, backward)
+        for i in range(3):
+            if k < 0:
+                value_t[6 + i] = forward[i] - backward[i]
+            else:
+                value_q[6 + i, k] = forward[i] - backward[i]
+
+
+class Orientation(Function):
+    """Orientation of a frame as its rotation vector φ (3,), rad: R = exp(φ^), |φ| at most π.
+
+    φ jumps where the angle passes π; the task does not: its error is not g - φ but e = log(RᵀR_d), the
+    rotation vector of the turn that is left, in the frame's own axes (in which e and RᵀR_d e are the same).
+    It depends on the rotations R = exp(φ^) and R_d = exp(g^) only, so any three numbers are a
+    reference: g and another vector of the same rotation give the same error. With a gain K that is a number,
+    the frame turns about one axis onto a target at rest and e decays as exp(-K t).
+
+    An error of π exactly has two shortest ways; one of them is taken.
+
+    Parameters
+    ----------
+    frame : a frame of the robot
+    relative_to : a frame of the robot in whose axes R is taken; the world's when None
+    """
+
+    comparison = orientation_error
+
+    def __init__(self, frame: str, relative_to: str | None = None) -> None:
+        self.frame = frame
+        self.relative_to = relative_to
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        return pose_rows(robot, self.frame, self.relative_to, TURNS)
+
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        return (pose_stage(self.frame, self.relative_to, TURNS),)

@@ -1,0 +1,123 @@
+"""Pointing an axis of a frame at a point that rests, moves, or is a part of the robot."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.arrays import Array, vector
+from nmm.errors import InputError, unknown
+from nmm.functions.function import Function, Row, Stage
+from nmm.functions.tasks.heading import UNIT
+from nmm.functions.tasks.position import as_point, check_point
+from nmm.kernels.compiled import FUNCTION, kernel
+from nmm.kernels.rotations import transposed_times3
+from nmm.robots.robot import Robot
+
+
+@kernel(FUNCTION)
+def pointing(
+    t: float, q: Array, placements: Array, jacobians: Array, hessians: Array, G: Array, G_q: Array,
+    slots: Array, parameters: Array, value: Array, value_t: Array, value_q: Array,
+) -> None:  # fmt: skip
+    """y_i = (α / s) s_i by the chain rule, in place: the first three rows hold the point and its derivatives.
+
+    With l, the point as the frame sees it: s_i = b_i·l, s² = s_1² + s_2², c = a·l, α = atan2(s, c);
+    parameters = [a, b_1, b_2]. With k = α/s and r² = s² + c²:
+    dy_i = k ds_i + s_i (m (s_1 ds_1 + s_2 ds_2) - dc / r²), m = (c / r² - k) / s².
+    """
+    frame = placements[slots[0]]
+    d, seen, x = np.empty(3), np.empty(3), np.empty(3)
+    for i in range(3):
+        d[i] = value[i] - frame[i, 3]
+    transposed_times3(frame, d, seen)
+    c, s1, s2 = 0.0, 0.0, 0.0
+    for i in range(3):
+        c += parameters[i] * seen[i]
+        s1 += parameters[3 + i] * seen[i]
+        s2 += parameters[6 + i] * seen[i]
+    square = s1 * s1 + s2 * s2
+    s = math.sqrt(square)
+    r2 = square + c * c
+    nowhere = s == 0.0 and c <= 0.0  # straight behind, or in the frame's origin: no derivative exists
+    if c > 0.0 and square < 1e-10 * c * c:  # α / s by its series in s / c
+        k = (1.0 - square / (3.0 * c * c)) / c
+        m = (-2.0 / 3.0 + 0.8 * square / (c * c)) / (c * c * c)
+    elif nowhere:
+        k, m = 0.0, 0.0
+    else:
+        k = math.atan2(s, c) / s
+        m = (c / r2 - k) / square
+    value[0] = math.pi if nowhere else k * s1
+    value[1] = k * s2
+    for column in range(-1, q.shape[0]):  # -1: the time
+        if column < 0:
+            for i in range(3):
+                x[i] = value_t[i]
+        else:
+            j = jacobians[slots[0]]
+            wx, wy, wz = j[3, column], j[4, column], j[5, column]
+            x[0] = value_q[0, column] - j[0, column] - (wy * d[2] - wz * d[1])
+            x[1] = value_q[1, column] - j[1, column] - (wz * d[0] - wx * d[2])
+            x[2] = value_q[2, column] - j[2, column] - (wx * d[1] - wy * d[0])
+        transposed_times3(frame, x, seen)
+        dc, ds1, ds2 = 0.0, 0.0, 0.0
+        for i in range(3):
+            dc += parameters[i] * seen[i]
+            ds1 += parameters[3 + i] * seen[i]
+            ds2 += parameters[6 + i] * seen[i]
+        common = 0.0 if nowhere else m * (s1 * ds1 + s2 * ds2) - dc / r2
+        if column < 0:
+            value_t[0] = k * ds1 + s1 * common
+            value_t[1] = k * ds2 + s2 * common
+        else:
+            value_q[0, column] = k * ds1 + s1 * common
+            value_q[1, column] = k * ds2 + s2 * common
+
+
+class Pointing(Function):
+    """How far an axis of a frame points past a point: y (2,), rad, 0 when it points at it.
+
+    |y| is the angle α between the axis a and the direction from the frame's origin to the point, and y
+    says which way the point lies: along b_1 and b_2, which complete a to right-handed axes of the frame
+    (for a = z: x and y). The turn about a itself is free. As a task: `Task(Pointing(...), [0, 0])`.
+
+    y is smooth wherever α < π. With the point straight behind, y = (π, 0); there, and with the point
+    in the frame's origin, no derivative exists: zeros stand for it, so that resolvers report a singular
+    matrix instead of choosing a way.
+
+    Parameters
+    ----------
+    frame : a frame of the robot
+    at : the point, world axes, m: three numbers, the name of a frame (its origin), or a function with
+        three rows, of time (`Circle`, `Spline`, ...) or of the configuration (`Position`, `CenterOfMass`)
+    axis : "x", "y", "z", or (3,) in the frame's axes
+    """
+
+    def __init__(self, frame: str, at: Function | str | ArrayLike, axis: str | ArrayLike = "z") -> None:
+        self.frame = frame
+        self.at = as_point(at, "at")
+        if isinstance(axis, str):
+            if axis not in UNIT:
+                raise InputError(unknown("axis", axis, UNIT))
+            axis = UNIT[axis]
+        direction = vector(axis, 3, "axis")
+        length = float(np.linalg.norm(direction))
+        if length == 0.0:
+            raise InputError("axis: expected a vector that is not zero")
+        self.axis = direction / length
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        robot.frame_id(self.frame)
+        check_point(self.at, self.frame, robot, "at")
+        return (Row(f"{self.frame}.pointing_1", "rad"), Row(f"{self.frame}.pointing_2", "rad"))
+
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        self.rows(robot)
+        b1 = np.eye(3)[np.argmin(np.abs(self.axis))]
+        b1 = b1 - (b1 @ self.axis) * self.axis
+        b1 /= np.linalg.norm(b1)
+        axes = np.concatenate([self.axis, b1, np.cross(self.axis, b1)])
+        return (*self.at.stages(robot), Stage(pointing, 3, (self.frame,), axes))

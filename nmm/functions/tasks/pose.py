@@ -1,0 +1,105 @@
+"""Pose of a frame: position and orientation as one motion of space."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nmm.arrays import Array
+from nmm.functions.function import Function, Row, Stage
+from nmm.functions.tasks.frame_pose import PARTS, pose_rows, pose_stage
+from nmm.kernels.compiled import FUNCTION, kernel
+from nmm.kernels.rotations import (
+    between3,
+    cross3,
+    exp3,
+    left_jacobian3,
+    log6,
+    log6_jacobian,
+    transposed_times3,
+)
+from nmm.robots.robot import Robot
+
+
+@kernel(FUNCTION)
+def pose_error(
+    t: float, q: Array, placements: Array, jacobians: Array, hessians: Array, G: Array, G_q: Array,
+    slots: Array, parameters: Array, value: Array, value_t: Array, value_q: Array,
+) -> None:  # fmt: skip
+    """e = log6(T⁻¹T_d) from the rows [p, φ, p_d, g, e]: see `Pose`.
+
+    Each pose moves with a body velocity [Rᵀ p_dot, J(φ)ᵀ φ_dot] in its own axes; that of E = T⁻¹T_d is
+    V_E = V_d - Ad(E⁻¹) V, and e_dot = Jlog6(E) V_E.
+    """
+    R, target, turn = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    exp3(value[3:6], R)
+    exp3(value[9:12], target)
+    between3(R, target, turn)
+    shift, x, y = np.empty(3), np.empty(3), np.empty(3)
+    for i in range(3):
+        x[i] = value[6 + i] - value[i]
+    transposed_times3(R, x, shift)  # E = (turn, shift)
+    log6(turn, shift, value[12:])
+    J, J_target, A, B = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    left_jacobian3(value[3:6], J)
+    left_jacobian3(value[9:12], J_target)
+    log6_jacobian(value[12:], shift, A, B)
+    v, w, v_target, w_target = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    rate = np.empty(12)
+    for k in range(-1, q.shape[0]):  # -1: the time
+        for i in range(12):
+            rate[i] = value_t[i] if k < 0 else value_q[i, k]
+        transposed_times3(R, rate[:3], v)
+        transposed_times3(J, rate[3:6], w)
+        transposed_times3(target, rate[6:9], v_target)
+        transposed_times3(J_target, rate[9:], w_target)
+        cross3(shift, w, x)  # Ad(E⁻¹) [v, w] = [turnᵀ (v - shift × w), turnᵀ w]
+        for i in range(3):
+            x[i] = v[i] - x[i]
+        transposed_times3(turn, x, y)
+        transposed_times3(turn, w, x)
+        for i in range(3):
+            v[i] = v_target[i] - y[i]
+            w[i] = w_target[i] - x[i]
+        for i in range(3):
+            linear = 0.0
+            angular = 0.0
+            for j in range(3):
+                linear += A[i, j] * v[j] + B[i, j] * w[j]
+                angular += A[i, j] * w[j]
+            if k < 0:
+                value_t[12 + i] = linear
+                value_t[15 + i] = angular
+            else:
+                value_q[12 + i, k] = linear
+                value_q[15 + i, k] = angular
+
+
+class Pose(Function):
+    """Pose T of a frame, (6,): position p (m) over rotation vector φ (rad), R = exp(φ^), |φ| at most π.
+
+    The task's error is e = log6(T⁻¹T_d): the body velocity, linear (m) over angular (rad) in the frame's own
+    axes, that kept up for unit time carries the frame onto its target. Its rate takes the right Jacobian
+    of the logarithm; with a gain K that is a number, e decays exactly as exp(-K t), along one screw motion
+    when the target is at rest. (A position that shall move in a straight line is another task: `Position`
+    beside `Orientation`.) The reference has six rows, [p_d, g]; see `PoseReference`.
+
+    An angle between T and T_d of π exactly has two shortest ways; one of them is taken.
+
+    Parameters
+    ----------
+    frame : a frame of the robot
+    relative_to : a frame of the robot that T is relative to (two arms that hold one thing); the world when
+        None
+    """
+
+    comparison = pose_error
+
+    def __init__(self, frame: str, relative_to: str | None = None) -> None:
+        self.frame = frame
+        self.relative_to = relative_to
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        return pose_rows(robot, self.frame, self.relative_to, PARTS)
+
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        return (pose_stage(self.frame, self.relative_to, PARTS),)

@@ -1,0 +1,88 @@
+"""Position of a frame's origin along any of the world's axes (paper, eq. 14), or of another frame's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.arrays import Array, vector
+from nmm.errors import InputError
+from nmm.functions.function import Function, Row, Stage
+from nmm.functions.references.polynomial import Constant
+from nmm.functions.tasks.frame_pose import pose_rows, pose_stage
+from nmm.kernels.compiled import FUNCTION, kernel
+from nmm.robots.robot import Robot
+
+AXES = {"x": 0, "y": 1, "z": 2}
+
+
+@kernel(FUNCTION)
+def position(
+    t: float, q: Array, placements: Array, jacobians: Array, hessians: Array, G: Array, G_q: Array,
+    slots: Array, parameters: Array, value: Array, value_t: Array, value_q: Array,
+) -> None:  # fmt: skip
+    """p(q) and its Jacobian, rows picked by `parameters` (0, 1, 2 for x, y, z)."""
+    frame = slots[0]
+    for i in range(parameters.shape[0]):
+        axis = int(parameters[i])
+        value[i] = placements[frame, axis, 3]
+        for j in range(q.shape[0]):
+            value_q[i, j] = jacobians[frame, axis, j]
+
+
+def picked_axes(axes: str | Sequence[str]) -> tuple[str, ...]:
+    """Some of x, y, z, each once."""
+    picked = tuple(axes)
+    if not picked or len(set(picked)) != len(picked) or not set(picked) <= set(AXES):
+        raise InputError(f"axes: expected some of x, y, z, each once (as in 'xy'), got {axes!r}")
+    return picked
+
+
+class Position(Function):
+    """Position (m) of the origin of `frame`, in world axes or as another frame sees it.
+
+    Parameters
+    ----------
+    frame : a frame of the robot
+    axes : any of "x", "y", "z", in the order wanted: "xy", "xyz", "z", ("x", "z")
+    relative_to : a frame of the robot from whose origin and in whose axes the position is taken; the world's
+        when None
+    """
+
+    def __init__(self, frame: str, axes: str | Sequence[str] = "xyz", relative_to: str | None = None) -> None:
+        self.frame = frame
+        self.axes = picked_axes(axes)
+        self.relative_to = relative_to
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        return pose_rows(robot, self.frame, self.relative_to, self.axes)
+
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        if self.relative_to is not None:
+            return (pose_stage(self.frame, self.relative_to, self.axes),)
+        picked = np.array([float(AXES[axis]) for axis in self.axes])
+        return (Stage(position, len(self.axes), (self.frame,), picked),)
+
+
+def as_point(given: Function | str | ArrayLike, name: str) -> Function:
+    """A point of space: a function with 3 rows as it is, a frame's origin by its name, three numbers, m."""
+    if isinstance(given, Function):
+        return given
+    if isinstance(given, str):
+        return Position(given)
+    return Constant(vector(given, 3, name))
+
+
+def check_point(point: Function, frame: str, robot: Robot, name: str) -> None:
+    """`InputError` when the function has not x, y and z in world axes, or is the origin of `frame` itself."""
+    rows = point.rows(robot)
+    if len(rows) != 3 or any(row.unit == "rad" for row in rows):
+        came = ", ".join(f"{row.name} ({row.unit})" for row in rows)
+        raise InputError(f"{name}: expected a point with x, y and z in m, got {came}")
+    if isinstance(point, Position):
+        if point.relative_to is not None:
+            raise InputError(f"{name}: expected a point in world axes, got one in {point.relative_to}'s")
+        if robot.frame_id(point.frame) == robot.frame_id(frame):
+            raise InputError(f"{name}: expected another point than the origin of {frame} itself")

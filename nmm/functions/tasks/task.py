@@ -1,0 +1,98 @@
+"""A task: a function f(q) that shall follow a reference g(t, q), with a gain on its error."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.arrays import Array, array, one_line
+from nmm.errors import InputError
+from nmm.functions.function import Function, Row
+from nmm.functions.references.polynomial import Constant
+from nmm.robots.robot import Robot
+
+
+class Task:
+    """f(q) follows g(t, q): J_bar u = ∂g/∂t + K e, J_bar = (∂f/∂q - ∂g/∂q) S, e = g - f (paper, eq. 13).
+
+    Parameters
+    ----------
+    function : f, with s rows
+    reference : g, with as many rows: a function of time, of the configuration, or of both;
+        numbers stand for a constant
+    gain : K in 1/s: a number, s numbers, or an (s, s) matrix with a positive definite symmetric
+        part; None for planning mode, without feedback
+    """
+
+    def __init__(
+        self, function: Function, reference: Function | ArrayLike, gain: ArrayLike | None = 1.0
+    ) -> None:
+        if not isinstance(function, Function):
+            raise InputError(f"task: expected a function of the robot, as Position('ee'), got {function!r}")
+        self.function = function
+        self.reference = reference if isinstance(reference, Function) else Constant(np.atleast_1d(reference))
+        self.gain = gain
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """The rows of f; `InputError` when g has another number of them."""
+        rows = self.function.rows(robot)
+        targets = self.reference.rows(robot)
+        if len(targets) != len(rows):
+            raise InputError(
+                f"task {', '.join(row.name for row in rows)}: expected a reference with {len(rows)} "
+                f"components, got {type(self.reference).__name__} with {len(targets)}"
+            )
+        return rows
+
+    def gain_matrix(self, robot: Robot) -> Array:
+        """K as an (s, s) matrix; zero in planning mode."""
+        rows = self.rows(robot)
+        name = f"gain of task {', '.join(row.name for row in rows)}"
+        s = len(rows)
+        if self.gain is None:
+            return np.zeros((s, s))
+        gain = array(self.gain, name)
+        if gain.ndim == 0:
+            gain = gain * np.eye(s)
+        elif gain.shape == (s,):
+            gain = np.diag(gain)
+        elif gain.shape != (s, s):
+            raise InputError(
+                f"{name}: expected a number, {s} numbers or a {s} x {s} matrix, got shape {gain.shape}"
+            )
+        if np.linalg.eigvalsh(gain + gain.T).min() <= 0.0:
+            came = one_line(array(self.gain, name))
+            raise InputError(
+                f"{name}: expected positive definite (above 0; None for planning mode), got {came}"
+            )
+        return gain
+
+
+@dataclass(frozen=True, eq=False)
+class Stack:
+    """Tasks executed together, one above the other, each with its own reference and gain."""
+
+    tasks: tuple[Task, ...] = field(default=())
+
+    @classmethod
+    def of(cls, tasks: Task | Stack | Sequence[Task]) -> Stack:
+        """A stack from a task, a stack or a sequence of tasks."""
+        if isinstance(tasks, Stack):
+            return tasks
+        stacked = (tasks,) if isinstance(tasks, Task) else tasks
+        if not isinstance(stacked, Sequence) or not all(isinstance(task, Task) for task in stacked):
+            raise InputError(f"expected a Task or a list of Tasks, got {tasks!r}")
+        return cls(tuple(stacked))
+
+    def __iter__(self) -> Iterator[Task]:
+        return iter(self.tasks)
+
+    def __len__(self) -> int:
+        return len(self.tasks)
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        """The rows of all tasks, in order."""
+        return tuple(row for task in self.tasks for row in task.rows(robot))

@@ -1,0 +1,1 @@
+"""Compiled code: kernels and how they are called, packed arrays, small linear algebra, rotations."""

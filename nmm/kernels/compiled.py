@@ -1,0 +1,218 @@
+"""Kernels: plain functions on arrays that run as they stand and, fused by numba, in a 1 kHz loop.
+
+A *kernel* is a module-level function with one of the signatures below, written in the subset of
+Python that numba compiles. The decorator compiles it (cached on disk) and notes its address, so
+that a compiled program can call whatever kernels a user combined, as a C program calls through
+function pointers: no code is generated, no combination is compiled anew, and a new kernel is one
+new function in one new file.
+
+The same function runs as it stands: `Kernel.plain` is the undecorated function, and a program run
+in plain Python (`NUMBA_DISABLE_JIT=1`, or `program.py_func`) calls the plain kernels.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import shutil
+from collections.abc import Callable
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Any
+
+import numba
+import platformdirs
+from numba import types
+from numba.core import cgutils
+from numba.core.dispatcher import Dispatcher
+from numba.extending import intrinsic, overload
+
+Plain = Callable[..., None]
+
+_scalar = types.float64
+_vector = types.float64[::1]
+_matrix = types.float64[:, ::1]
+_stack = types.float64[:, :, ::1]
+_stack4 = types.float64[:, :, :, ::1]
+_integers = types.int64[::1]
+
+#: y = phi(t, q), its partial derivative in time and its Jacobian in the coordinates:
+#: (t, q, placements, jacobians, hessians, G, G_q, slots, parameters, value, value_t, value_q)
+#: with frame k of the function at placements[slots[k]] (3, 4) = [R | p], jacobians[slots[k]] (6, n),
+#: hessians[slots[k]] (6, n, n); value_t and value_q (rows, n) come filled with zeros.
+FUNCTION = types.void(
+    _scalar, _vector, _stack, _stack, _stack4, _matrix, _stack, _integers, _vector, _vector, _vector, _matrix
+)
+#: qp_dot = G(qp) up: (qp, parameters, G, G_q) with G_q[i, j, k] = dG[i, j] / dqp[k]
+PLATFORM = types.void(_vector, _vector, _matrix, _stack)
+#: u from J u = rate and the gradient h: (J, rate, Jc, rate_c, h, parameters, options, state, u, report)
+RESOLVER = types.void(
+    _matrix, _vector, _matrix, _vector, _vector, _vector, _integers, _integers, _vector, _vector
+)
+
+
+class Kernel:
+    """A function in its two forms: `plain` Python, and `compiled`, which calling the kernel calls.
+
+    It is compiled (or its compiled form read from the cache) when first called or when its
+    `address` is first asked for: a run pays for the kernels that it uses.
+    """
+
+    def __init__(self, plain: Plain, signature: Any) -> None:
+        self.plain = plain
+        self.compiled = compiled(plain)
+        self._signature = signature
+
+    def __call__(self, *arguments: Any) -> None:
+        self.compiled(*arguments)
+
+    @cached_property
+    def address(self) -> int:
+        """Where the machine code of the compiled form begins: what compiled programs call it by."""
+        if isinstance(self.compiled, Dispatcher):
+            self.compiled.compile(self._signature.args)
+            result = self.compiled.overloads[self._signature.args]
+            address = int(result.library.get_pointer_to_function(result.fndesc.llvm_func_name))
+        else:  # NUMBA_DISABLE_JIT=1: run as it stands
+            address = id(self.plain)
+        _plain_by_address[address] = self.plain
+        return address
+
+
+#: How many folders of compiled kernels are kept.
+KEPT_CACHES = 8
+
+_plain_by_address: dict[int, Plain] = {}
+
+
+@cache
+def cache_folder() -> str:
+    """Folder of numba's cache for this very text of nmm's kernels.
+
+    numba notices a change of the file that holds a compiled function, but not of the files that
+    hold what it calls; a digest of all sources that hold compiled functions does.
+    """
+    digest = hashlib.sha256(numba.__version__.encode())
+    for source in sorted(Path(__file__).parents[1].rglob("*.py")):
+        text = source.read_bytes()
+        if b"nmm.kernels.compiled import" in text or source == Path(__file__):
+            digest.update(text)
+    folder = Path(platformdirs.user_cache_dir("nmm")) / digest.hexdigest()[:16]
+    if not folder.exists():
+        _forget_old_caches(folder.parent)
+    return str(folder)
+
+
+def _forget_old_caches(parent: Path) -> None:
+    """Keep the latest few: each text of the kernels, each version of nmm, leaves a folder behind."""
+    siblings = [path for path in parent.glob("*") if path.is_dir()]
+    siblings.sort(key=lambda path: path.stat().st_mtime, reverse=True)
+    for old in siblings[KEPT_CACHES - 1 :]:
+        shutil.rmtree(old, ignore_errors=True)
+
+
+def compiled(function: Callable[..., Any]) -> Any:
+    """`numba.njit` with nmm's options and nmm's cache folder; `.py_func` is the plain function.
+
+    Divisions by zero give inf and nan as in numpy (`error_model`): a singular matrix is a case
+    that the resolvers report, not an exception out of compiled code.
+    """
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = cache_folder()
+    try:
+        return numba.njit(cache=True, error_model="numpy")(function)
+    finally:
+        numba.config.CACHE_DIR = before
+
+
+#: Decorator for helpers of compiled functions that stay plain Python when called from Python.
+inlined = numba.extending.register_jitable
+
+
+def kernel(signature: Any) -> Callable[[Plain], Kernel]:
+    """Decorator: make a function of one of this module's signatures a `Kernel`."""
+
+    def decorate(function: Plain) -> Kernel:
+        return Kernel(function, signature)
+
+    return decorate
+
+
+def view(memory: Any, first: int, shape: tuple[int, ...]) -> Any:
+    """A view of contiguous `memory` from its element `first` on, of the given shape.
+
+    Compiled, it is a pointer, a shape and strides, and no more: no bounds are checked and no
+    references counted, which slices and `reshape` do, at half the cost of a control step. Whoever
+    calls the compiled code holds the memory while it runs.
+    """
+    return memory.reshape(-1)[first : first + math.prod(shape)].reshape(shape)
+
+
+@intrinsic
+def _view_compiled(context: Any, memory: Any, first: Any, shape: Any) -> Any:
+    result = types.Array(memory.dtype, len(shape), "C")
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        owner = context.make_array(signature.args[0])(context, builder, values[0])
+        extents = cgutils.unpack_tuple(builder, values[2])
+        size = context.get_abi_sizeof(context.get_data_type(memory.dtype))
+        strides: list[Any] = []
+        stride = context.get_constant(types.intp, size)
+        for extent in reversed(extents):
+            strides.insert(0, stride)
+            stride = builder.mul(stride, extent)
+        array = context.make_array(result)(context, builder)
+        context.populate_array(
+            array,
+            data=builder.gep(owner.data, [values[1]]),
+            shape=extents,
+            strides=strides,
+            itemsize=context.get_constant(types.intp, size),
+            meminfo=None,
+        )
+        return array._getvalue()
+
+    return result(memory, types.int64, types.UniTuple(types.int64, len(shape))), generate
+
+
+@overload(view)
+def _view_overload(memory: Any, first: Any, shape: Any) -> Any:
+    def through(memory: Any, first: Any, shape: Any) -> Any:
+        return _view_compiled(memory, first, shape)
+
+    return through
+
+
+def _caller(signature: Any) -> Callable[..., None]:
+    """A function `call(address, *arguments)` for kernels of one signature, plain and compiled."""
+
+    def call(address: int, *arguments: Any) -> None:
+        _plain_by_address[address](*arguments)
+
+    @intrinsic
+    def through_pointer(context: Any, address: Any, arguments: Any) -> Any:
+        def generate(context: Any, builder: Any, signature_here: Any, values: Any) -> Any:
+            convention = context.call_conv
+            pointer_type = convention.get_function_type(types.none, signature.args).as_pointer()
+            function = builder.inttoptr(values[0], pointer_type)
+            unpacked = cgutils.unpack_tuple(builder, values[1])
+            status, _ = convention.call_function(builder, function, types.none, signature.args, unpacked)
+            with cgutils.if_unlikely(builder, status.is_error):
+                convention.return_status_propagate(builder, status)
+            return context.get_dummy_value()
+
+        return types.void(types.int64, types.Tuple(signature.args)), generate
+
+    @overload(call)
+    def call_compiled(address: Any, *arguments: Any) -> Any:
+        def through(address: Any, *arguments: Any) -> None:
+            through_pointer(address, arguments)
+
+        return through
+
+    return call
+
+
+call_function = _caller(FUNCTION)
+call_platform = _caller(PLATFORM)
+call_resolver = _caller(RESOLVER)

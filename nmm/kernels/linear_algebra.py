@@ -1,0 +1,158 @@
+"""Small dense linear algebra as plain loops: at a dozen rows they beat a call into LAPACK, and fuse.
+
+Two decompositions serve every resolver: orthonormal rows (J = Pᵀ L Q, the transpose of a pivoted
+QR), from which come minimum-norm solutions, projections, rank and det J Jᵀ; and Gaussian
+elimination with partial pivoting for square systems.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from nmm.arrays import Array
+from nmm.kernels.compiled import compiled
+
+
+@compiled
+def orthonormal_rows(J: Array, order: Array, L: Array, Q: Array) -> float:
+    """J[order] = L Q, L lower triangular with L[i, i] > 0 falling, Q Qᵀ = I. Returns L[s-1, s-1] / L[0, 0].
+
+    Gram-Schmidt on the rows, the largest remainder first, twice over so that Q is orthonormal to
+    machine precision whatever J's condition. The ratio is 0 for a J without full row rank (to
+    machine precision) and estimates 1 / cond(J). J (s, m), order (s,) integers, L (s, s), Q (s, m).
+    """
+    s, m = J.shape
+    for i in range(s):
+        order[i] = i
+        for j in range(m):
+            Q[i, j] = J[i, j]
+        for j in range(s):
+            L[i, j] = 0.0
+    for i in range(s):
+        largest = -1.0
+        pivot = i
+        for k in range(i, s):
+            square = 0.0
+            for j in range(m):
+                square += Q[k, j] * Q[k, j]
+            if square > largest:
+                largest = square
+                pivot = k
+        if pivot != i:
+            order[i], order[pivot] = order[pivot], order[i]
+            for j in range(m):
+                Q[i, j], Q[pivot, j] = Q[pivot, j], Q[i, j]
+            for j in range(i):
+                L[i, j], L[pivot, j] = L[pivot, j], L[i, j]
+        for k in range(i):  # the second pass
+            overlap = 0.0
+            for j in range(m):
+                overlap += Q[i, j] * Q[k, j]
+            L[i, k] += overlap
+            for j in range(m):
+                Q[i, j] -= overlap * Q[k, j]
+        norm = 0.0
+        for j in range(m):
+            norm += Q[i, j] * Q[i, j]
+        norm = math.sqrt(norm)
+        L[i, i] = norm
+        if norm <= 1e-15 * L[0, 0] or norm == 0.0:
+            return 0.0
+        for j in range(m):
+            Q[i, j] /= norm
+        for k in range(i + 1, s):
+            overlap = 0.0
+            for j in range(m):
+                overlap += Q[k, j] * Q[i, j]
+            L[k, i] = overlap
+            for j in range(m):
+                Q[k, j] -= overlap * Q[i, j]
+    return L[s - 1, s - 1] / L[0, 0]
+
+
+@compiled
+def closest_solution(rate: Array, u0: Array, order: Array, L: Array, Q: Array, u: Array) -> None:
+    """The solution of J u = rate closest to u0, J⁺ rate + (I - J⁺ J) u0, from `orthonormal_rows`.
+
+    u = u0 + Qᵀ (y - Q u0) with L y = rate[order].
+    """
+    s, m = Q.shape
+    y = np.empty(s)
+    for j in range(m):
+        u[j] = u0[j]
+    for i in range(s):
+        y[i] = rate[order[i]]
+        for j in range(i):
+            y[i] -= L[i, j] * y[j]
+        y[i] /= L[i, i]
+    for i in range(s):
+        missing = y[i]
+        for j in range(m):
+            missing -= Q[i, j] * u0[j]
+        for j in range(m):
+            u[j] += missing * Q[i, j]
+
+
+@compiled
+def pseudoinverse_transposed(order: Array, L: Array, Q: Array, X: Array) -> None:
+    """X = (J⁺)ᵀ, shape (s, m), from `orthonormal_rows`: Lᵀ X[order] = Q."""
+    s, m = Q.shape
+    for i in range(s - 1, -1, -1):
+        for j in range(m):
+            x = Q[i, j]
+            for k in range(i + 1, s):
+                x -= L[k, i] * X[order[k], j]
+            X[order[i], j] = x / L[i, i]
+
+
+@compiled
+def eliminate(M: Array) -> tuple[float, float]:
+    """Solve A X = B in place: M = [A B], shape (s, s + k), becomes [*, X].
+
+    Gaussian elimination with partial pivoting. Returns det A and the ratio of the smallest to the
+    largest pivot; when a pivot is zero both are 0 and there is no solution.
+    """
+    s, width = M.shape
+    determinant = 1.0
+    smallest = math.inf
+    largest = 0.0
+    for i in range(s):
+        pivot = i
+        for row in range(i + 1, s):
+            if abs(M[row, i]) > abs(M[pivot, i]):
+                pivot = row
+        size = abs(M[pivot, i])
+        if size == 0.0:
+            return 0.0, 0.0
+        smallest = min(smallest, size)
+        largest = max(largest, size)
+        if pivot != i:
+            determinant = -determinant
+            for j in range(i, width):
+                M[i, j], M[pivot, j] = M[pivot, j], M[i, j]
+        determinant *= M[i, i]
+        for row in range(i + 1, s):
+            factor = M[row, i] / M[i, i]
+            for j in range(i + 1, width):
+                M[row, j] -= factor * M[i, j]
+    for i in range(s - 1, -1, -1):
+        for j in range(s, width):
+            x = M[i, j]
+            for row in range(i + 1, s):
+                x -= M[i, row] * M[row, j]
+            M[i, j] = x / M[i, i]
+    return determinant, smallest / largest if largest > 0.0 else math.nan
+
+
+@compiled
+def residual_norm(J: Array, u: Array, rate: Array) -> float:
+    """‖J u - rate‖, the certificate of a resolver's answer."""
+    square = 0.0
+    for i in range(J.shape[0]):
+        difference = -rate[i]
+        for j in range(J.shape[1]):
+            difference += J[i, j] * u[j]
+        square += difference * difference
+    return math.sqrt(square)

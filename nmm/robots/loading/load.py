@@ -1,0 +1,100 @@
+"""`load`: a robot from a name, a file or a Pinocchio model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Literal
+
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from nmm.errors import InputError, RobotError
+from nmm.platforms import Platform, platform_by_name
+from nmm.robots.loading.models import Options, robot_from
+from nmm.robots.loading.source import read_file, read_model
+from nmm.robots.loading.text import printable
+from nmm.robots.robot import Robot
+
+
+def load(
+    source: str | Path | pin.Model,
+    *,
+    arguments: Mapping[str, object] | None = None,
+    platform: Platform | str | None = None,
+    package_dirs: Sequence[str | Path] = (),
+    wheels: Sequence[str] | Mapping[str, float] | None = None,
+    lock: Mapping[str, float] | None = None,
+    axle: str | ArrayLike | None = None,
+    name: str | None = None,
+    limits: Mapping[str, float] | None = None,
+    missing_meshes: Literal["error", "skip"] = "error",
+    visual_model: pin.GeometryModel | None = None,
+    collision_model: pin.GeometryModel | None = None,
+) -> Robot:
+    """Load a mobile manipulator, or an arm that is put on a platform.
+
+    The robot gets the coordinates x, y (m) and theta (rad, not wrapped) above its root link, which is the
+    platform's reference point (REP-103: x forward, z up; on the ground, midway between the wheels) unless
+    `axle` says where that is. A platform without coordinates is a fixed base. Continuous joints become one
+    unbounded angle. Wheels that only roll are no coordinates. Mimic joints must follow a locked one.
+
+    Parameters
+    ----------
+    source : a bundled robot's name, the path of a .urdf or .xacro file, or package://PACKAGE/PATH; or a
+        Pinocchio model: of a fixed base, with a planar or free-flyer root joint (which is replaced), or
+        with joints x, y, theta first
+    arguments : values of the xacro file's arguments
+    platform : the platform, or its name, by which it is measured in the file; by default what the file
+        declares, `<nmm platform="car"/>` below <robot>, or else a unicycle
+    package_dirs : folders that are, or hold, the ROS packages that the file speaks of
+    wheels : joints that only roll, or the radius (m) of each; `()` for none. By default those with "wheel"
+        in the joint's or link's name, with a level axis and no joint below them; on a fixed base they
+        stand still
+    lock : joints to fix, and their values (rad or m), within their limits
+    axle : the platform's reference point in the root link: a frame, whose yaw counts too, or x, y(, z) in m
+    name : the robot's name; by default that of the file or model
+    limits : largest absolute values of the platform's inputs, by name, in their units
+    missing_meshes : "error", or "skip" to leave out, with a note, the shapes whose mesh is not there
+    visual_model, collision_model : the shapes, with a Pinocchio model
+
+    Returns
+    -------
+    Robot : with `notes` on what was done to the file. Its collision pairs are the model's, or for a file all
+        but those within one body or of two that a joint connects
+
+    Raises
+    ------
+    RobotError : unknown name, missing or malformed file; one line with the file and every cause
+    InputError : the platform is none, or does not have the robot's coordinates
+
+    Examples
+    --------
+    >>> load("unicycle_2r").q_names
+    ('x', 'y', 'theta', 'q1', 'q2')
+    """
+    if isinstance(platform, str):
+        platform_by_name(platform)  # before anything is read
+    elif platform is not None and not isinstance(platform, Platform):
+        raise InputError(f"platform: expected a Platform or its name, got {platform!r}")
+    folders = [package_dirs] if isinstance(package_dirs, str | Path) else package_dirs
+    try:
+        if lock is not None and not isinstance(lock, Mapping):
+            raise RobotError(f"lock: expected a value for each joint's name, got {lock!r}")
+        if name is not None and not isinstance(name, str):
+            raise RobotError(f"name: expected a string, got {name!r}")
+        if limits is not None and not isinstance(limits, Mapping):
+            raise RobotError(f"limits: expected a value for each input's name, got {limits!r}")
+        options = Options(platform, wheels, lock or {}, axle, name, limits or {})
+        if isinstance(source, pin.Model):
+            if arguments or folders:
+                raise RobotError("arguments and package_dirs are for files, the source is a pin.Model")
+            return robot_from(read_model(source, visual_model, collision_model), options)
+        if visual_model is not None or collision_model is not None:
+            raise RobotError(
+                "visual_model and collision_model are for a pin.Model, a file holds its own shapes"
+            )
+        return robot_from(read_file(source, arguments, folders, options.lock, missing_meshes), options)
+    except RobotError as error:
+        # Names in files and of files may hold anything, a message is one line.
+        raise RobotError(printable(str(error))) from None

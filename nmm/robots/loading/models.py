@@ -1,0 +1,184 @@
+"""From what was read to a `Robot`: joints locked, reference point, platform, wheels, in this order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from nmm.errors import InputError, RobotError, unknown
+from nmm.platforms import Layout, Platform, Unicycle, platform_by_name
+from nmm.robots.loading.axle import axle_placement, told
+from nmm.robots.loading.chain import CHAIN, Rebuilt, rebuild
+from nmm.robots.loading.collision_pairs import add_pairs
+from nmm.robots.loading.layout import measure_layout
+from nmm.robots.loading.locking import with_locked
+from nmm.robots.loading.provenance import Parts
+from nmm.robots.loading.reduction import reduced
+from nmm.robots.loading.source import Source
+from nmm.robots.loading.wheels import find_wheels, held_joints
+from nmm.robots.robot import Robot, Wheel
+from nmm.robots.slip import told as told_slip
+
+#: Adds its pairs to the collision shapes on a model.
+AddPairs = Callable[[pin.Model, pin.GeometryModel], None]
+
+
+@dataclass(frozen=True)
+class Options:
+    """What `load` was asked for, of any source."""
+
+    platform: Platform | str | None = None
+    wheels: Sequence[str] | Mapping[str, float] | None = None
+    lock: Mapping[str, float] = field(default_factory=dict)
+    axle: str | ArrayLike | None = None
+    name: str | None = None
+    limits: Mapping[str, float] = field(default_factory=dict)
+    add_pairs: AddPairs | None = None
+
+
+def robot_from(source: Source, options: Options) -> Robot:
+    """The robot that a source makes.
+
+    Raises
+    ------
+    RobotError : a joint that we cannot take, a name that is no joint or frame, a platform that does not fit
+    """
+    where = source.where
+    rebuilt = rebuild(source.model, (source.visual_model, source.collision_model), where)
+    rebuilt.model.name = options.name or source.name
+    stated = options.platform.coordinates[len(CHAIN) :] if isinstance(options.platform, Platform) else ()
+    locked = with_locked(rebuilt, options.lock, source.mimics, where, stated)
+    rebuilt = locked.rebuilt
+    if options.axle is not None:
+        placement = axle_placement(rebuilt.model, options.axle, where)
+        moved = rebuild(rebuilt.model, rebuilt.geometries, where, root=placement.inverse())
+        rebuilt = replace(moved, notes=(*rebuilt.notes, told(placement)))
+    platform, origin = _platform(rebuilt, source, options)
+    if options.limits:
+        try:
+            platform = platform.with_limits(options.limits)
+        except InputError as error:
+            raise RobotError(f"{where}: {error}") from None
+    own = _own_joints(platform, rebuilt.model, locked.values, where)
+    display = _on_platform(rebuilt, platform, own, where)
+    if not platform.coordinates:
+        display = _with_held_wheels(display, options.wheels, where)
+    notes = (*source.notes, *display.notes)
+    provenance = replace(source.provenance, locked=locked.values, mimicked=locked.followers, platform=origin)
+    return _without_wheels(
+        display, platform, own, source, options, Parts(display.geometries[1], notes, provenance)
+    )
+
+
+def _platform(rebuilt: Rebuilt, source: Source, options: Options) -> tuple[Platform, str]:
+    """The platform, and who chose its kind."""
+    given = options.platform
+    if isinstance(given, Platform):
+        return given, "given"
+    name, origin = (source.platform, "file") if given is None else (given, "given")
+    if name is None:
+        return Unicycle(), "default"
+    kind = platform_by_name(name)
+    if not kind.coordinates:
+        return kind.fit(Layout(source.name)), origin  # there is nothing to measure for a fixed base
+    visual, collision = rebuilt.geometries
+    layout = measure_layout(rebuilt.model, (collision, visual), options.wheels, source.where)
+    try:
+        return kind.fit(layout), origin
+    except InputError as error:
+        raise RobotError(f"{source.where}: {error}") from None
+
+
+def _own_joints(
+    platform: Platform, model: pin.Model, lock: Mapping[str, float], where: str
+) -> tuple[str, ...]:
+    """The platform's own joints: its coordinates after x, y, theta."""
+    own = platform.coordinates[len(CHAIN) :]
+    joints = [str(name) for name in model.names][len(CHAIN) + 1 :]
+    for name in own:
+        if name in lock:
+            raise RobotError(f"{where}: lock: {name} is a coordinate of the {platform.name} platform")
+        if name not in joints:
+            raise RobotError(unknown("platform joint", name, joints, where))
+    return own
+
+
+def _on_platform(rebuilt: Rebuilt, platform: Platform, own: Sequence[str], where: str) -> Rebuilt:
+    """The model with the platform's own joints first; without x, y, theta where the base is fixed."""
+    model = rebuilt.model
+    if not platform.coordinates:
+        made = rebuild(model, rebuilt.geometries, where, root=model.jointPlacements[1], head=())
+    else:
+        made = rebuild(model, rebuilt.geometries, where, first=own) if own else rebuilt
+    return replace(made, notes=rebuilt.notes)
+
+
+def _without_wheels(
+    display: Rebuilt, platform: Platform, own: Sequence[str], source: Source, options: Options, parts: Parts
+) -> Robot:
+    """The robot, with its wheels on the display model only."""
+    whole, (shown, solid) = display.model, display.geometries
+    wheels, notes = _wheels(display, platform, own, source.where, options.wheels)
+    names = list(dict.fromkeys(name for wheel in wheels for name in (wheel.swivel, wheel.joint) if name))
+    model = whole
+    if names:
+        notes.append(f"wheels that only roll, left out of q: {', '.join(names)}")
+        ids = [whole.getJointId(name) for name in names]
+        model, (solid,) = reduced(whole, (solid,), ids, np.zeros(whole.nq))
+    elif source.all_pairs or options.add_pairs:
+        solid = solid.copy()
+    if model.nq == platform.n_p:
+        notes.append("no arm: the platform is all that moves" if model.nq else "nothing moves")
+    add = options.add_pairs or (add_pairs if source.all_pairs else None)
+    if add is not None:
+        add(model, solid)
+        if len(solid.collisionPairs):
+            notes.append(
+                f"{len(solid.collisionPairs)} collision pairs: none within a body or across one joint"
+            )
+    model.name = whole.name = options.name or source.name
+    robot = Robot(
+        name=model.name,
+        model=model,
+        collision_model=solid,
+        display_model=whole,
+        visual_model=shown,
+        platform=platform,
+        wheels=wheels,
+        source=source.label,
+        arguments=dict(source.arguments),
+        notes=(*parts.notes, *notes),
+        parts=replace(parts, provenance=replace(parts.provenance, reduced=tuple(names))),
+    )
+    return replace(robot, notes=(*robot.notes, *told_slip(robot)))
+
+
+def _with_held_wheels(
+    display: Rebuilt, asked: Sequence[str] | Mapping[str, float] | None, where: str
+) -> Rebuilt:
+    """The model of a base that does not move, with its wheels fixed."""
+    names, notes = held_joints(display.model, asked, where)
+    if not names:
+        return replace(display, notes=(*display.notes, *notes))
+    ids = [display.model.getJointId(name) for name in names]
+    model, geometries = reduced(display.model, display.geometries, ids, np.zeros(display.model.nq))
+    note = f"wheels of a fixed base, which stand still: {', '.join(names)}"
+    return Rebuilt(model, geometries, (*display.notes, *notes, note))
+
+
+def _wheels(
+    display: Rebuilt,
+    platform: Platform,
+    own: Sequence[str],
+    where: str,
+    asked: Sequence[str] | Mapping[str, float] | None,
+) -> tuple[tuple[Wheel, ...], list[str]]:
+    if not platform.coordinates:
+        return (), []
+    shown, solid = display.geometries
+    wheels, notes = find_wheels(display.model, (solid, shown), asked, where, own, platform.roller)
+    return wheels, list(notes)

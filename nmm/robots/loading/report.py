@@ -1,0 +1,270 @@
+"""`report`: everything there is to say about a URDF or xacro file before it is used."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from nmm.errors import InputError, RobotError
+from nmm.robots.loading.advice import advice, joints_by_type
+from nmm.robots.loading.check import find_problems
+from nmm.robots.loading.check_mimics import leaders_to_lock
+from nmm.robots.loading.description import Description, argument_texts, describe
+from nmm.robots.loading.findings import Problem, child, children
+from nmm.robots.loading.load import load
+from nmm.robots.loading.packages import Packages
+from nmm.robots.loading.provenance import provenance_of
+from nmm.robots.loading.second_opinion import second_opinion
+from nmm.robots.loading.text import one_line, printable
+from nmm.robots.loading.wheel_advice import wheel_advice
+from nmm.robots.loading.xacro_file import expand
+from nmm.robots.loading.xml_tree import Element, parse
+from nmm.robots.robot import Robot
+
+_LINE = re.compile(r"(?:.*: )?line (\d+): ", re.DOTALL)
+_NOWHERE = "/(package not found)"
+_FIND = re.compile(r"\$\(find ([^)]*)\)")
+
+
+@dataclass(frozen=True)
+class Report:
+    """What is wrong with a description, what is odd, and what it holds.
+
+    Attributes
+    ----------
+    file : the file
+    expanded : whether xacro wrote the text that the lines count in
+    text : that text: the file's own, or the expanded one
+    problems : why it cannot be loaded; none when it can
+    warnings : what `load` takes, or takes with an option that the warning names
+    facts : what it holds, in words, by label
+    """
+
+    file: Path
+    expanded: bool = False
+    text: str = ""
+    problems: tuple[Problem, ...] = ()
+    warnings: tuple[Problem, ...] = ()
+    facts: Mapping[str, str] = field(default_factory=dict)
+
+
+def report(
+    path: str | Path,
+    arguments: Mapping[str, object] | None = None,
+    package_dirs: Sequence[str | Path] = (),
+) -> Report:
+    """Look at a .urdf or .xacro file from all sides; every problem is named, not only the first.
+
+    Without problems the file was loaded, with what the warnings say: mimic joints' leaders locked, shapes
+    left out whose meshes are missing.
+
+    Parameters
+    ----------
+    path : the file
+    arguments : values of its `xacro:arg`s
+    package_dirs : folders that are, or hold, the ROS packages that the file speaks of
+
+    Raises
+    ------
+    RobotError : there is no such file, it is none, or an argument or folder is wrong
+    """
+    file = Path(path).expanduser()
+    try:
+        description = describe(file, arguments, package_dirs)
+    except RobotError as error:
+        if not file.is_file() or file.suffix.lower() not in (".urdf", ".xacro") or _is_callers(str(error)):
+            raise
+        return _unread(file, error, arguments, package_dirs)
+    return _Report(description, arguments, package_dirs).made()
+
+
+def _is_callers(message: str) -> bool:
+    """Whether an error is about what the caller gave, not about the file."""
+    ours = ("package_dirs: expected", "unknown xacro argument", "are for .xacro files", "arguments: expected")
+    return any(text in message for text in ours)
+
+
+def _unread(
+    file: Path,
+    error: RobotError,
+    arguments: Mapping[str, object] | None,
+    package_dirs: Sequence[str | Path],
+) -> Report:
+    """The report of a file that xacro or the decoder stops at: with every package that is missing."""
+    cause = str(error).removeprefix(f"{file.absolute()}: ").removeprefix(f"{file}: ")
+    line = _LINE.match(cause)
+    problems = [Problem(printable(cause), None)]
+    if line is not None and line.end() < len(cause) and cause.startswith("line "):
+        problems = [Problem(printable(cause[line.end() :]), int(line[1]))]
+    if "$(find " not in cause:
+        return Report(file, problems=tuple(problems))
+    packages = _Going(file, package_dirs)
+    description = None
+    # What is included from a package that is not there is not there either.
+    with suppress(RobotError):
+        xml, used, _ = expand(file.absolute(), argument_texts(arguments), packages)
+        description = Description(xml, file, packages, True, used, ())
+    problems = [
+        _not_found(name, f"$(find {name})", packages)
+        for name, folder in packages.found.items()
+        if folder is None
+    ]
+    if description is None:
+        return Report(file, problems=tuple(problems))
+    return _Report(description, arguments, package_dirs).made(problems)
+
+
+class _Going(Packages):
+    """Packages of which those that are missing are named at the end, not at the first."""
+
+    def find(self, package: str) -> Path | None:
+        return super().find(package) or Path(_NOWHERE, package)
+
+
+def _not_found(package: str, by: str, packages: Packages) -> Problem:
+    searched = ", ".join(map(str, dict.fromkeys(packages.searched)))
+    return Problem(
+        f"{by}: package {package!r} not found (give its folder in package_dirs); looked in {searched}"
+    )
+
+
+class _Report:
+    """The steps of `report` for a description that could be read."""
+
+    def __init__(
+        self,
+        description: Description,
+        arguments: Mapping[str, object] | None,
+        package_dirs: Sequence[str | Path],
+    ) -> None:
+        self.description, self.packages = description, description.packages
+        self.arguments, self.package_dirs = arguments, package_dirs
+        self.meshes: dict[str, Path | str] = {}
+        self.warnings: list[Problem] = [Problem(note) for note in description.notes]
+        self.facts: dict[str, str] = {}
+
+    def made(self, found: Sequence[Problem] = ()) -> Report:
+        """The report, with problems that were found before."""
+        text = self.description.xml
+        problems = find_problems(text, self._mesh)
+        root = None
+        if not any("XML" in p.message for p in problems[:1]):
+            root = _root(text)
+        if root is not None:
+            lock = leaders_to_lock(children(root, "joint")).values
+            self.meshes.clear()
+            problems = find_problems(text, self._mesh, lock)
+            problems += [*found, *_left_over(root)]
+            self._count(root)
+            self._about_meshes(root)
+            if not problems:
+                self.warnings += advice(root)
+                problems += self._load(root, lock)
+        return Report(
+            self.description.path,
+            self.description.expanded,
+            text,
+            tuple(sorted(problems, key=_by_line)),
+            tuple(sorted(self.warnings, key=_by_line)),
+            self.facts,
+        )
+
+    def _mesh(self, name: str) -> Path | str | None:
+        """A mesh's file; one that is not there leaves its shape out, and is a warning."""
+        self.meshes[name] = found = self.packages.mesh(name)
+        return None if isinstance(found, str) else found
+
+    def _about_meshes(self, root: Element) -> None:
+        missing: dict[str, Element] = {}
+        for mesh in root.iter("mesh"):
+            name = mesh.get("filename", "")
+            lost = isinstance(self.meshes.get(name), str) and _NOWHERE not in name
+            if lost and isinstance(mesh, Element):
+                missing.setdefault(name, mesh)
+        for name, mesh in missing.items():
+            self.warnings.append(
+                Problem(
+                    f"mesh {name!r}: {self.meshes[name]}: refused unless missing_meshes='skip'", mesh.line
+                )
+            )
+        for package, folder in self.packages.found.items():
+            if folder is None and not isinstance(self.packages, _Going):
+                self.warnings.append(_not_found(package, f"package://{package}", self.packages))
+        found = sum(isinstance(file, Path) for file in self.meshes.values())
+        self.facts["meshes"] = f"{found} of {len(self.meshes)} found" if self.meshes else "none"
+        folders = [
+            f"{name} in {folder}" for name, folder in self.packages.found.items() if folder is not None
+        ]
+        if folders:
+            self.facts["packages"] = "; ".join(folders)
+
+    def _count(self, root: Element) -> None:
+        kinds = ", ".join(f"{count} {kind}" for kind, count in joints_by_type(root).items())
+        self.facts["robot"] = root.get("name", "")
+        if self.description.arguments:
+            used = ", ".join(f"{name}={value}" for name, value in self.description.arguments.items())
+            self.facts["xacro arguments"] = used
+        self.facts["links"] = str(len(children(root, "link")))
+        self.facts["joints"] = f"{len(children(root, 'joint'))}: {kinds}" if kinds else "none"
+
+    def _load(self, root: Element, lock: Mapping[str, float]) -> list[Problem]:
+        """Load it, to see that it loads; what is wrong then."""
+        try:
+            robot = load(
+                self.description.path,
+                arguments=self.arguments,
+                package_dirs=self.package_dirs,
+                lock=lock,
+                missing_meshes="skip",
+            )
+        except InputError as error:
+            return [Problem(str(error).removeprefix(f"{self.description.path}: "))]
+        except Exception as error:  # a library's, which `load` did not foresee: a report comes all the same
+            return [Problem(f"cannot be loaded: {type(error).__name__}: {one_line(str(error))}")]
+        self.warnings += [Problem(text) for text in wheel_advice(robot, _top(root))]
+        self.warnings += [Problem(text) for text in second_opinion(self.description.xml)]
+        self._about(robot)
+        return []
+
+    def _about(self, robot: Robot) -> None:
+        locked = ", ".join(f"{name} at {value:g}" for name, value in provenance_of(robot).locked.items())
+        self.facts["platform"] = robot.platform.name
+        self.facts["coordinates"] = f"{robot.n}: {', '.join(robot.q_names)}"
+        self.facts["wheels"] = ", ".join(wheel.joint for wheel in robot.wheels) or "none"
+        self.facts["mass"] = f"{sum(inertia.mass for inertia in robot.model.inertias):.4g} kg"
+        if locked:
+            self.facts["locked to load it"] = locked
+
+
+def _root(text: str) -> Element | None:
+    try:
+        root = parse(text)
+    except Exception:  # which `find_problems` has named
+        return None
+    return root if root.tag == "robot" and not any(e.tag.startswith("xacro:") for e in root.iter()) else None
+
+
+def _left_over(root: Element) -> list[Problem]:
+    """$(find pkg) that nobody expands: a URDF is taken as it stands."""
+    problems = []
+    for element in root.iter():
+        for value in element.attrib.values():
+            if isinstance(element, Element) and (found := _FIND.search(value)) is not None:
+                message = f"<{element.tag}>: holds xacro, $(find {found[1]}): name the file .xacro"
+                problems.append(Problem(message, element.line))
+    return problems
+
+
+def _top(root: Element) -> str:
+    """The root link's name, in a tree without problems."""
+    below = {
+        end.get("link") for joint in children(root, "joint") if (end := child(joint, "child")) is not None
+    }
+    return next(name for link in children(root, "link") if (name := link.get("name", "")) not in below)
+
+
+def _by_line(problem: Problem) -> int:
+    return problem.line or 0

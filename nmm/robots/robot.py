@@ -1,0 +1,277 @@
+"""What a robot is: Pinocchio models, a platform, and the names of coordinates and inputs."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from nmm.arrays import scalar, vector
+from nmm.errors import InputError, unknown
+from nmm.platforms.base import Platform
+
+Array = NDArray[np.float64]
+
+
+#: Stands for the robot's centre of mass where a function names a frame (`tasks.CenterOfMass`).
+CENTER_OF_MASS = "<center of mass>"
+#: A limit this large is none, m or rad.
+UNLIMITED = 1e6
+
+
+@dataclass(frozen=True, eq=False)
+class Wheel:
+    """A wheel that only rolls: not a coordinate (its angle follows from the motion), turned in playback.
+
+    A wheel may hang on a swivel, an upright joint that is no coordinate either: a caster's, or that of a
+    steered wheel whose angle follows from that of others (Ackermann).
+
+    Attributes
+    ----------
+    joint : name of its joint in the display model
+    center : (3,) wheel centre in the carrier's frame with the swivel at zero, m
+    axis : (3,) unit spin axis in the carrier's frame with the swivel at zero, level
+    radius : m
+    carrier : name of the movable joint of `model` that carries it; "theta" for the root link's body
+    swivel : name of the swivel's joint in the display model, or "" without
+    pivot : (3,) a point of the swivel's axis in the carrier's frame, m
+    roller : angle γ of its rollers, rad (see `Platform.roller`)
+    """
+
+    joint: str
+    center: Array
+    axis: Array
+    radius: float
+    carrier: str = "theta"
+    swivel: str = ""
+    pivot: Array = field(default_factory=lambda: np.zeros(3))
+    roller: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A manipulator on a wheeled platform. Made by `nmm.load`; nothing in it changes afterwards.
+
+    Attributes
+    ----------
+    name : the robot's name
+    model : kinematics: joints x, y, theta, then the arm, in Pinocchio's order; nq = nv = n
+    collision_model : collision shapes, on `model`
+    display_model : as `model`, with the wheels as joints
+    visual_model : visual shapes, on `display_model`
+    platform : states G(qp)
+    wheels : the wheels that playback turns
+    source : the file, the bundled name, or "pin.Model"
+    arguments : the xacro arguments that the file was read with
+    notes : what loading did to the file, a sentence each
+    arms : the joints of each arm by the arm's name, when several were mounted or one was named
+    parts : what loading keeps for mounting and for reports (`nmm.robots.loading.provenance.Parts`)
+    """
+
+    name: str
+    model: pin.Model = field(repr=False)
+    collision_model: pin.GeometryModel = field(repr=False)
+    display_model: pin.Model = field(repr=False)
+    visual_model: pin.GeometryModel = field(repr=False)
+    platform: Platform
+    wheels: tuple[Wheel, ...] = ()
+    source: str = ""
+    arguments: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    arms: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    parts: Any = field(default=None, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        if self.model.nq != self.model.nv:
+            raise InputError(
+                f"{self.name}: expected one number per joint, got nq {self.model.nq}, nv {self.model.nv}"
+            )
+        shared = [name for name in self.q_names[self.platform.n_p :] if name in self.platform.inputs]
+        if shared:
+            raise InputError(
+                f"{self.name}: joints have the names of inputs of the {self.platform.name} platform: "
+                f"{', '.join(shared)}"
+            )
+        head = self.q_names[: self.platform.n_p]
+        if head != self.platform.coordinates:
+            raise InputError(
+                f"{self.name}: the {self.platform.name} platform expects the first coordinates to be "
+                f"{', '.join(self.platform.coordinates)}, the model has {', '.join(head)}"
+            )
+
+    @cached_property
+    def q_names(self) -> tuple[str, ...]:
+        """Names of the n coordinates: the platform's, then the arm's joints."""
+        model = self.model
+        names = [""] * model.nq
+        for joint in range(1, model.njoints):
+            names[model.joints[joint].idx_q] = model.names[joint]
+        return tuple(names)
+
+    @cached_property
+    def u_names(self) -> tuple[str, ...]:
+        """Names of the p + n_m inputs: the platform's, then the arm's joints."""
+        return self.platform.inputs + self.q_names[self.platform.n_p :]
+
+    @cached_property
+    def q_units(self) -> tuple[str, ...]:
+        """Unit of each coordinate: m or rad."""
+        model = self.model
+        units = [""] * model.nq
+        for joint in range(1, model.njoints):
+            kind = model.joints[joint].shortname()
+            units[model.joints[joint].idx_q] = "m" if "JointModelP" in kind else "rad"
+        return tuple(units)
+
+    @cached_property
+    def u_units(self) -> tuple[str, ...]:
+        """Unit of each input."""
+        return self.platform.input_units + tuple(f"{unit}/s" for unit in self.q_units[self.platform.n_p :])
+
+    @cached_property
+    def q_limits(self) -> Array:
+        """Lower and upper limit of each coordinate, (n, 2), m or rad; infinite where there is none."""
+        limits = np.column_stack([self.model.lowerPositionLimit, self.model.upperPositionLimit])
+        own = self.platform.coordinate_limits
+        limits[: len(own), 0] = np.maximum(limits[: len(own), 0], own[:, 0])
+        limits[: len(own), 1] = np.minimum(limits[: len(own), 1], own[:, 1])
+        limits.flags.writeable = False
+        return limits
+
+    @cached_property
+    def limited(self) -> NDArray[np.bool_]:
+        """Whether each lower and upper limit of `q_limits` is one, (n, 2): finite and below 1e6 in size.
+
+        URDF asks for two numbers at every sliding joint, so files write ±1e9 or the largest float for
+        "none". No joint slides a thousand kilometres or turns 160 000 times.
+        """
+        limited = np.isfinite(self.q_limits) & (np.abs(self.q_limits) < UNLIMITED)
+        limited.flags.writeable = False
+        return np.asarray(limited)
+
+    @cached_property
+    def u_limits(self) -> Array:
+        """Largest absolute value of each input, (n_u,): the platform's, then the joints' velocity limits."""
+        arm = np.array(self.model.velocityLimit[self.platform.n_p :])
+        limits = np.concatenate([self._platform_limits(), np.where(arm > 0.0, arm, np.inf)])
+        limits.flags.writeable = False
+        return limits
+
+    def _platform_limits(self) -> Array:
+        """Those of the platform, and of its own joints where an input is one's rate (a steering rate)."""
+        platform = self.platform
+        limits = platform.input_limits
+        if platform.n_p > 3:
+            G = platform.G(np.zeros(platform.n_p))
+            for column in range(platform.p):
+                (rows,) = np.nonzero(G[:, column])
+                if len(rows) == 1 and rows[0] >= 3 and G[rows[0], column] == 1.0:
+                    own = float(self.model.velocityLimit[rows[0]])
+                    limits[column] = min(limits[column], own if own > 0.0 else np.inf)
+        return limits
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """A digest of coordinates, inputs, geometry and platform: the same for robots that move alike."""
+        model, platform = self.model, self.platform
+        numbers = [placement.homogeneous.ravel() for placement in model.jointPlacements]
+        numbers += [frame.placement.homogeneous.ravel() for frame in model.frames] + [platform.parameters]
+        names = [*self.q_names, *self.u_names, platform.name, *(frame.name for frame in model.frames)]
+        # Rounded: another machine's last digit is no other robot.
+        text = "\n".join([*names, *(f"{number:.6f}" for number in np.concatenate(numbers) + 0.0)])
+        return hashlib.sha256(text.replace("-0.000000", "0.000000").encode()).hexdigest()[:16]
+
+    @cached_property
+    def groups(self) -> Mapping[str, tuple[str, ...]]:
+        """Inputs that are spoken of together: "platform", "arm" (all joints), and each arm by its name."""
+        p = self.platform.p
+        return {"platform": self.u_names[:p], "arm": self.u_names[p:], **self.arms}
+
+    @property
+    def n(self) -> int:
+        """Number of coordinates."""
+        return int(self.model.nq)
+
+    @property
+    def n_u(self) -> int:
+        """Number of inputs, p + n_m."""
+        return self.n - self.platform.n_p + self.platform.p
+
+    @property
+    def frames(self) -> tuple[str, ...]:
+        """Names of the frames that a task may speak of, in the model's order."""
+        seen = dict.fromkeys(frame.name for frame in self.model.frames)
+        return tuple(name for name in seen if name != "universe")
+
+    def frame_id(self, name: str) -> int:
+        """Pinocchio's index of a frame; of the link's where a link and a joint share the name."""
+        for kind in (pin.FrameType.BODY, pin.FrameType.OP_FRAME):
+            if self.model.existFrame(name, kind):
+                return int(self.model.getFrameId(name, kind))
+        if name == "universe" or not self.model.existFrame(name):
+            raise InputError(unknown("frame", name, self.frames, f"robot {self.name}"))
+        return int(self.model.getFrameId(name))
+
+    def check_limits(self, q: ArrayLike) -> None:
+        """`InputError` names every coordinate of q (n,) that is outside its limits, and what they are."""
+        q = self.q(q)
+        slack = 1e-9
+        outside = [
+            f"{name} = {value:g} {unit} (from {lower:g} to {upper:g})"
+            for name, value, unit, (lower, upper) in zip(
+                self.q_names, q, self.q_units, self.q_limits, strict=True
+            )
+            if not lower - slack <= value <= upper + slack
+        ]
+        complaints = [f"outside its limits: {', '.join(outside)}"] if outside else []
+        problem = self.platform.problem(q[: self.platform.n_p])
+        if problem is not None:
+            complaints.append(problem)
+        if complaints:
+            raise InputError(f"{self.name}: {'; '.join(complaints)}")
+
+    def coordinate(self, name: str) -> int:
+        """Index of a coordinate in q; `InputError` lists the names."""
+        if name not in self.q_names:
+            raise InputError(unknown("coordinate", name, self.q_names, f"robot {self.name}"))
+        return self.q_names.index(name)
+
+    def input(self, name: str) -> int:
+        """Index of an input in u; `InputError` lists the names."""
+        if name not in self.u_names:
+            raise InputError(unknown("input", name, self.u_names, f"robot {self.name}"))
+        return self.u_names.index(name)
+
+    def q(self, values: Mapping[str, float] | ArrayLike | None = None) -> Array:
+        """A configuration: from a vector, or by name with zero for what is not named."""
+        if values is None:
+            return np.zeros(self.n)
+        if isinstance(values, Mapping):
+            q = np.zeros(self.n)
+            for name, value in values.items():
+                q[self.coordinate(name)] = scalar(value, name)
+            return q
+        try:
+            return vector(values, self.n, "q")
+        except InputError as error:
+            raise InputError(f"{error} (robot {self.name} has q = {', '.join(self.q_names)})") from None
+
+    @property
+    def rest(self) -> Array:
+        """The configuration nearest to zero within the limits, (n,)."""
+        lower, upper = self.q_limits.T
+        return np.asarray(np.clip(np.zeros(self.n), lower, upper))
+
+    def S(self, q: ArrayLike) -> Array:
+        """S = blkdiag(G(qp), I), shape (n, n_u): q_dot = S(q) u (paper, eqs. 2 and 3)."""
+        n_p, p = self.platform.n_p, self.platform.p
+        S = np.zeros((self.n, self.n_u))
+        S[:n_p, :p] = self.platform.G(self.q(q)[:n_p])
+        S[n_p:, p:] = np.eye(self.n - n_p)
+        return S

@@ -1,0 +1,1 @@
+"""The loop closed: integrated, judged, recorded, written."""

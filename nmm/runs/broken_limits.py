@@ -1,0 +1,47 @@
+"""Where a motion goes beyond the limits of its robot: said, not prevented."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nmm.arrays import Array
+from nmm.robots.robot import Robot
+
+#: Beyond a limit by less than this part of it is rounding.
+SLACK = 1e-6
+
+
+def excesses(robot: Robot, t: Array, q: Array, u: Array) -> list[str]:
+    """A sentence for the coordinates, and one for the inputs, that leave their limits.
+
+    Parameters
+    ----------
+    t (N,) s, q (N, n), u (N, n_u) : the motion
+    """
+    lower, upper = robot.q_limits.T
+    beyond = np.maximum(q - upper, lower - q)
+    coordinates = [
+        f"{name} at {t[k]:.3g} s ({q[k, i]:.4g} {unit}; from {lower[i]:.4g} to {upper[i]:.4g})"
+        for i, (name, unit) in enumerate(zip(robot.q_names, robot.q_units, strict=True))
+        if (k := _first(beyond[:, i], max(1.0, abs(lower[i]), abs(upper[i])))) is not None
+    ]
+    limits = robot.u_limits
+    inputs = [
+        f"{name} ({np.abs(u[:, i]).max():.3g} {unit}; at most {limits[i]:.3g})"
+        for i, (name, unit) in enumerate(zip(robot.u_names, robot.u_units, strict=True))
+        if _first(np.abs(u[:, i]) - limits[i], limits[i]) is not None
+    ]
+    sentences = []
+    if coordinates:
+        sentences.append(f"coordinates leave their limits: {', '.join(coordinates)}")
+    if inputs:
+        sentences.append(f"inputs exceed their limits: {', '.join(inputs)}")
+    return sentences
+
+
+def _first(beyond: Array, size: float) -> int | None:
+    """The first sample that is beyond a limit of that size, if there is a limit and one is."""
+    if not np.isfinite(size):
+        size = 1.0
+    found = np.flatnonzero(beyond > SLACK * size)
+    return int(found[0]) if found.size else None

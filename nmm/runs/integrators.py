@@ -1,0 +1,150 @@
+"""Integration of the closed loop q_dot = S(q) u(t, q) from one sample to the next.
+
+Methods are data: an explicit Runge-Kutta method is its tableau and its stability polynomial.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+
+from nmm.arrays import Array
+from nmm.errors import InputError, RunError, unknown
+from nmm.kernels.compiled import call_platform, compiled
+from nmm.robots.robot import Robot
+
+Velocity = Callable[[float, Array], Array]
+
+
+class Integrator(Protocol):
+    """Takes one sample of the closed loop to the next."""
+
+    @property
+    def stability(self) -> tuple[float, ...]:
+        """Coefficients c of the stability polynomial R(z) = Σ c_k z^k, lowest first; () if steps adapt."""
+
+    def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
+        """q at t + dt, from q, q_dot and u at t."""
+
+
+@compiled
+def combined(q: Array, dt: float, weights: Array, slopes: Array) -> Array:
+    """q + dt Σ weights[k] slopes[k]; the slopes are summed first, so that q is rounded once."""
+    ahead = np.empty_like(q)
+    for i in range(q.shape[0]):
+        total = 0.0
+        for k in range(weights.shape[0]):
+            total += weights[k] * slopes[k, i]
+        ahead[i] = q[i] + dt * total
+    return ahead
+
+
+class RungeKutta:
+    """An explicit method: nodes c, rows of the matrix A, weights b, stability polynomial."""
+
+    def __init__(
+        self,
+        nodes: tuple[float, ...],
+        matrix: tuple[tuple[float, ...], ...],
+        weights: tuple[float, ...],
+        stability: tuple[float, ...],
+    ) -> None:
+        self.stability = stability
+        self._stages = [(node, np.array(row)) for node, row in zip(nodes, matrix, strict=True)]
+        self._weights = np.array(weights)
+
+    def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
+        slopes = np.empty((self._weights.size, q.size))
+        slopes[0] = q_dot
+        for k, (node, row) in enumerate(self._stages, start=1):
+            slopes[k] = velocity(t + node * dt, combined(q, dt, row, slopes))
+        ahead: Array = combined(q, dt, self._weights, slopes)
+        return ahead
+
+
+EULER = RungeKutta((), (), (1.0,), (1.0, 1.0))
+MIDPOINT = RungeKutta((0.5,), ((0.5,),), (0.0, 1.0), (1.0, 1.0, 1 / 2))
+RK4 = RungeKutta(
+    (0.5, 0.5, 1.0),
+    ((0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)),
+    (1 / 6, 1 / 3, 1 / 3, 1 / 6),
+    (1.0, 1.0, 1 / 2, 1 / 6, 1 / 24),
+)
+
+
+class Adaptive:
+    """SciPy's DOP853 between the samples, with a step that keeps the local error below `tolerance`."""
+
+    stability: tuple[float, ...] = ()
+
+    def __init__(self, tolerance: float) -> None:
+        self.tolerance = tolerance
+
+    def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
+        from scipy.integrate import DOP853  # here: a quarter of a second that other methods need not pay
+
+        solver = DOP853(
+            velocity, t, q, t + dt, rtol=max(self.tolerance, 1e-13), atol=self.tolerance, first_step=dt
+        )
+        while solver.status == "running":
+            message = solver.step()
+            if solver.status == "failed":
+                raise RunError(
+                    f"at t = {solver.t:g} s: {message.rstrip('.')}: the inputs change without bound "
+                    "there, as near a singular configuration"
+                )
+        ahead: Array = solver.y
+        return ahead
+
+
+@compiled
+def drive(kernel: int, parameters: Array, n_p: int, p: int, q: Array, u: Array, dt: float) -> Array:
+    """q after dt with the inputs held constant: RK4 on q_dot = S(q) u (the arm's part is exact)."""
+    ahead = q.copy()
+    ahead[n_p:] += dt * u[p:]
+    G = np.zeros((n_p, p))
+    G_q = np.zeros((n_p, p, n_p))
+    stage = q[:n_p].copy()
+    slope = np.zeros(n_p)
+    for k in range(4):
+        if k > 0:
+            stage[:] = q[:n_p] + (dt if k == 3 else 0.5 * dt) * slope
+        G[:] = 0.0
+        call_platform(kernel, stage, parameters, G, G_q)
+        for i in range(n_p):
+            slope[i] = 0.0
+            for j in range(p):
+                slope[i] += G[i, j] * u[j]
+            ahead[i] += dt * slope[i] / (6.0 if k == 0 or k == 3 else 3.0)
+    return ahead
+
+
+class ZeroOrderHold:
+    """The inputs stay constant over dt, as on a robot with a sampled controller."""
+
+    stability: tuple[float, ...] = (1.0, 1.0)
+
+    def __init__(self, robot: Robot) -> None:
+        platform = robot.platform
+        self._platform = (platform.velocity_map.address, platform.parameters, platform.n_p, platform.p)
+
+    def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
+        ahead: Array = drive(*self._platform, q, u, dt)
+        return ahead
+
+
+METHODS = ("rk4", "midpoint", "euler", "zoh", "adaptive")
+
+
+def integrator(method: str, robot: Robot, tolerance: float) -> Integrator:
+    """The integrator of that name; `InputError` lists the names."""
+    fixed = {"rk4": RK4, "midpoint": MIDPOINT, "euler": EULER}
+    if method in fixed:
+        return fixed[method]
+    if method == "zoh":
+        return ZeroOrderHold(robot)
+    if method == "adaptive":
+        return Adaptive(tolerance)
+    raise InputError(unknown("method", method, METHODS))

@@ -1,0 +1,203 @@
+"""Recording: the samples of a run collected, and what people look at in them worked out."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nmm.arrays import Array
+from nmm.control.controller import Controller, Step
+from nmm.functions.program import Program
+from nmm.functions.references.bearing import Bearing
+from nmm.functions.references.polynomial import Constant
+from nmm.functions.tasks.orientation import Orientation
+from nmm.functions.tasks.pointing import Pointing
+from nmm.functions.tasks.pose import Pose
+from nmm.functions.tasks.position import AXES, Position
+from nmm.robots.robot import Robot
+from nmm.runs.broken_limits import excesses
+from nmm.runs.trajectory import Outcome, Trajectory
+
+#: Below this ratio of smallest to largest singular value a run is warned about.
+NEARLY_SINGULAR = 1e-3
+#: The task error grows by less than this in one step, times 1 + its size (m, rad): feedback lets it fall.
+JUMP = 0.01
+
+
+class Recorder:
+    """Collects the samples of a run."""
+
+    def __init__(self, controller: Controller, times: Array) -> None:
+        self._controller = controller
+        self._times = times
+        robot, s = controller.robot, len(controller.rows)
+        count = len(times)
+        self.q = np.empty((count, robot.n))
+        self._u = np.empty((count, robot.n_u))
+        self._q_dot = np.empty((count, robot.n))
+        self._rows = np.empty((3, count, s))
+        self._scalars = np.empty((2, count))
+        self._J = np.empty((count, s, robot.n_u))
+        self._partition = np.empty((count, s), dtype=np.int64)
+        self._count = 0
+        self.warnings: list[str] = []
+
+    def __len__(self) -> int:
+        return self._count
+
+    @property
+    def t(self) -> Array:
+        """The times recorded so far."""
+        return self._times[: self._count]
+
+    @property
+    def reached(self) -> float:
+        """The time of the last sample."""
+        return float(self._times[self._count - 1]) if self._count else 0.0
+
+    @property
+    def keeps_erring(self) -> bool:
+        """Whether the task error of the second half is still of the size of the first half's."""
+        error = np.linalg.norm(self._rows[2, : self._count], axis=1)
+        half = self._count // 2
+        return bool(half and error[half:].max() > 0.1 * error[:half].max())
+
+    @property
+    def jump(self) -> str | None:
+        """Where the task error grew in one step as no feedback lets it, unless the target itself jumped."""
+        r_d, error = self._rows[1, : self._count], np.linalg.norm(self._rows[2, : self._count], axis=1)
+        grown = np.diff(error) - np.linalg.norm(np.diff(r_d, axis=0), axis=1)
+        jumps = np.flatnonzero(grown >= JUMP * (1.0 + error[:-1]))
+        if not jumps.size:
+            return None
+        k = int(jumps[0])
+        again = f" (and {jumps.size - 1} times later)" if jumps.size > 1 else ""
+        return (
+            f"at t = {self._times[k]:.4g} s the task error jumped from {error[k]:.3g} to {error[k + 1]:.3g} "
+            f"in one step{again}: a singular configuration was passed between two samples"
+        )
+
+    def add(self, sample: Step) -> None:
+        """Record one sample."""
+        self._write(self._count, sample)
+        self._count += 1
+
+    def replace_last(self, sample: Step) -> None:
+        """Record a sample in the place of the last one."""
+        self._write(self._count - 1, sample)
+
+    def _write(self, k: int, sample: Step) -> None:
+        self.q[k] = sample.q
+        self._u[k] = sample.u
+        self._q_dot[k] = sample.q_dot
+        self._rows[0, k] = sample.r
+        self._rows[1, k] = sample.target
+        self._rows[2, k] = sample.error
+        self._scalars[0, k] = sample.objective
+        self._scalars[1, k] = sample.residual
+        self._J[k] = sample.J
+        self._partition[k] = sample.partition
+
+    def warn_of_partition(self, sample: Step) -> None:
+        """Ja became singular after this sample, and no candidate was better: said once a run."""
+        names = ", ".join(self._controller.robot.u_names[column] for column in sample.partition)
+        warning = f"the block Ja of [{names}] became singular and no other candidate was better"
+        if not any(warning in said for said in self.warnings):
+            automatic = getattr(self._controller.resolver, "automatic", False)
+            advice = "J itself is close to losing rank" if automatic else "give more partitions"
+            self.warnings.append(f"at t = {sample.t:.3g} s {warning}: {advice}")
+
+    def _warn_of_singularities(self, singular_values: Array) -> None:
+        if not len(singular_values):
+            return
+        ratio = singular_values[:, -1] / singular_values[:, 0]
+        worst = int(np.argmin(ratio))
+        if ratio[worst] < NEARLY_SINGULAR:
+            self.warnings.append(
+                f"at t = {self._times[worst]:.3g} s the task Jacobian is nearly singular (condition "
+                f"number {1.0 / max(ratio[worst], 1e-300):.2g}); inputs reach "
+                f"{np.abs(self._u[: self._count]).max():.3g}"
+            )
+
+    def trajectory(self, outcome: Outcome, message: str, dt: float, method: str) -> Trajectory:
+        """What was recorded."""
+        count, controller = self._count, self._controller
+        robot, rows = controller.robot, controller.rows
+        singular_values = np.linalg.svd(self._J[:count], compute_uv=False).astype(np.float64)
+        if outcome is not Outcome.SINGULAR:  # which says so itself
+            self._warn_of_singularities(singular_values)
+        if outcome in (Outcome.COMPLETED, Outcome.INTERRUPTED):  # of one that failed it goes without saying
+            self.warnings += excesses(robot, self.t, self.q[:count], self._u[:count])
+        frame, columns, target = _shown(controller)
+        path, desired = None, None
+        if frame is not None:
+            path = _frame_path(robot, frame, self.q[:count])
+            desired = path.copy()
+            for axis, column in columns.items():
+                desired[:, axis] = self._rows[1, :count, column]
+            desired = desired if columns else None
+        if target is not None and path is not None and len(path) and target.size == 2:
+            target = np.array([*target, path[0, 2]])
+        return Trajectory(
+            robot=robot,
+            t=self.t.copy(),
+            q=self.q[:count].copy(),
+            u=self._u[:count].copy(),
+            q_dot=self._q_dot[:count].copy(),
+            r=self._rows[0, :count].copy(),
+            r_d=self._rows[1, :count].copy(),
+            error=self._rows[2, :count].copy(),
+            objective=self._scalars[0, :count].copy(),
+            sigma_min=singular_values[:, -1],
+            partition=self._partition[:count].copy(),
+            residual=self._scalars[1, :count].copy(),
+            r_names=tuple(row.name for row in rows),
+            r_units=tuple(row.unit for row in rows),
+            resolver=controller.resolver.name,
+            method=method,
+            dt=dt,
+            outcome=outcome,
+            message=message,
+            warnings=tuple(self.warnings),
+            frame=frame,
+            path=path,
+            desired=desired,
+            target=target if path is not None else None,
+        )
+
+
+def _shown(controller: Controller) -> tuple[str | None, dict[int, int], Array | None]:
+    """The positioned frame, for each world axis the task's row that holds it, and the target looked at.
+
+    Where no task positions a frame, the one that a task turns.
+    """
+    frame: str | None = None
+    turned: str | None = None
+    columns: dict[int, int] = {}
+    target: Array | None = None
+    row = 0
+    for task in controller.task:
+        function = task.function
+        if isinstance(function, Position | Pose) and function.relative_to is None:
+            if frame in (None, function.frame):
+                frame = function.frame
+                axes = function.axes if isinstance(function, Position) else tuple(AXES)
+                columns |= {AXES[axis]: row + i for i, axis in enumerate(axes)}
+        elif isinstance(function, Orientation | Pointing):
+            turned = turned or function.frame
+        if isinstance(task.reference, Bearing):
+            target = task.reference.towards
+        if isinstance(function, Pointing) and isinstance(function.at, Constant):
+            target = function.at.value
+        row += len(task.rows(controller.robot))
+    return frame or turned, columns, target
+
+
+def _frame_path(robot: Robot, frame: str, q: Array) -> Array:
+    """Position of a frame's origin at each configuration, (N, 3)."""
+    program = Program(robot, (Position(frame, "xyz"),))
+    program.pack()
+    path = np.empty((len(q), 3))
+    for k in range(len(q)):
+        program.prepare(0.0, q[k])
+        path[k] = program.buffers.placements[0, :, 3]
+    return path

@@ -1,0 +1,226 @@
+"""A run's folder: written whole or not at all, read back without pickle."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import yaml
+
+from nmm.errors import InputError, RobotError
+from nmm.runs.summary import FORMAT
+
+if TYPE_CHECKING:
+    from nmm.playback.ellipsoids import Wanted
+    from nmm.robots.robot import Robot
+    from nmm.runs.trajectory import Trajectory
+
+ARRAYS = ("t", "q", "u", "q_dot", "r", "r_d", "error", "objective", "sigma_min", "partition", "residual")
+OPTIONAL_ARRAYS = ("path", "desired", "target")
+
+
+@contextmanager
+def replaced_folder(folder: str | Path, is_ours: Callable[[Path], bool]) -> Iterator[Path]:
+    """A temporary folder beside `folder` that takes its place when the block ends without an error.
+
+    Raises
+    ------
+    InputError : `folder` exists and is not one of ours, or cannot be written
+    """
+    final = Path(folder)
+    check_replaceable(final, is_ours)
+    try:
+        final.parent.mkdir(parents=True, exist_ok=True)
+        temporary = Path(tempfile.mkdtemp(prefix=f".{final.name}-", dir=final.parent))
+    except OSError as error:
+        raise InputError(f"{final}: cannot be written: {error.strerror}") from None
+    try:
+        temporary.chmod(0o755)
+        yield temporary
+        old: Path | None = None
+        if final.exists():
+            old = Path(tempfile.mkdtemp(prefix=f".{final.name}-old-", dir=final.parent))
+            final.rename(old / final.name)
+        temporary.rename(final)
+        if old is not None:
+            shutil.rmtree(old, ignore_errors=True)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def check_replaceable(folder: str | Path, is_ours: Callable[[Path], bool]) -> None:
+    """`InputError` when `folder` exists, holds something, and is not one of ours."""
+    final = Path(folder)
+    if final.is_dir() and (not any(final.iterdir()) or is_ours(final)):
+        return
+    if final.exists() or final.is_symlink():
+        raise InputError(
+            f"{final}: exists and is not what this writes; expected a new or an empty folder, or one that "
+            "this wrote before"
+        )
+
+
+def is_run(folder: Path) -> bool:
+    """Whether a folder holds a run that nmm wrote."""
+    return has_format(folder / "summary.json", FORMAT)
+
+
+def has_format(file: Path, expected: str) -> bool:
+    """Whether a JSON file of ours says that its folder is of that format."""
+    return _format(file) == expected
+
+
+def _format(file: Path) -> object:
+    try:
+        summary = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return summary.get("format") if isinstance(summary, dict) else None
+
+
+def save(
+    trajectory: Trajectory,
+    folder: str | Path,
+    *,
+    figures: bool = True,
+    html: bool = False,
+    ellipsoids: Wanted = False,
+) -> Path:
+    """Write trajectory.npz, trajectory.csv, summary.json, scenario.yaml, figures and playback.html.
+
+    Parameters
+    ----------
+    folder : a new folder, or one of nmm's, which is replaced
+    figures : whether to draw the figures (PNG)
+    html : whether to write playback.html
+    ellipsoids : whether manipulability ellipsoids are drawn, in ellipses.png and playback.html, or how
+        (`nmm.playback.ellipsoids.EllipsoidOptions`)
+
+    Raises
+    ------
+    InputError : the folder exists and is not ours, or cannot be written; ellipsoids of a frame or with
+        sizes that the robot does not have
+    """
+    with replaced_folder(folder, is_run) as temporary:
+        np.savez(temporary / "trajectory.npz", **_arrays(trajectory))  # compressing gains little on doubles
+        _write_csv(trajectory, temporary / "trajectory.csv")
+        summary = trajectory.summary()
+        (temporary / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+        if trajectory.scenario is not None:
+            text = yaml.safe_dump(trajectory.scenario, sort_keys=False, allow_unicode=True)
+            (temporary / "scenario.yaml").write_text(text, encoding="utf-8")
+        if figures and len(trajectory) > 1:
+            from nmm.figures import write_run_figures
+
+            write_run_figures(trajectory, temporary, ellipsoids=ellipsoids)
+        if html and len(trajectory):
+            from nmm.playback import write_html
+
+            title = trajectory.robot.name if trajectory.scenario is None else str(trajectory.scenario["name"])
+            page = temporary / "playback.html"
+            write_html([trajectory.motion()], page, title=title, ellipsoids=ellipsoids)
+    return Path(folder)
+
+
+#: What to do about a robot that was put together in Python.
+_ASK = "give the robot that it ran on: Trajectory.load(folder, robot)"
+
+
+def load(folder: str | Path, robot: Robot | None = None) -> Trajectory:
+    """Read a run's folder.
+
+    Parameters
+    ----------
+    folder : written by `save`
+    robot : the robot of the run; needed where it was neither a scenario's nor loaded from one file alone
+        (mounted, with locked joints, on a platform that was given)
+
+    Raises
+    ------
+    InputError : names what is missing, or says that the robot is another
+    """
+    from nmm.runs.trajectory import Outcome, Trajectory
+    from nmm.scenario import Scenario
+
+    folder = Path(folder)
+    if not is_run(folder):
+        raise InputError(f"{folder}: expected a run's folder (with trajectory.npz and nmm's summary.json)")
+    summary: dict[str, Any] = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    try:
+        with np.load(folder / "trajectory.npz", allow_pickle=False) as file:
+            arrays = {name: file[name] for name in ARRAYS}
+            arrays |= {name: file.get(name) for name in OPTIONAL_ARRAYS}
+    except (OSError, ValueError, KeyError) as error:
+        raise InputError(f"{folder / 'trajectory.npz'}: cannot be read: {error}") from None
+    scenario = None
+    if (folder / "scenario.yaml").exists():
+        loaded = Scenario.load(folder / "scenario.yaml")
+        scenario = loaded.resolved()
+        robot = loaded.robot() if robot is None else robot
+    elif robot is None:
+        robot = _from_its_file(folder, summary["robot"])
+    if robot.fingerprint != summary["robot"].get("fingerprint", robot.fingerprint):
+        raise InputError(f"{folder}: {robot.name} is another robot than the run's ({_ASK})")
+    return Trajectory(
+        robot=robot,
+        r_names=tuple(summary["r_names"]),
+        r_units=tuple(summary["r_units"]),
+        resolver=summary["resolver"],
+        method=summary["method"],
+        dt=summary["dt"],
+        outcome=Outcome(summary["outcome"]),
+        message=summary["message"],
+        warnings=tuple(summary["warnings"]),
+        frame=summary["frame"],
+        scenario=scenario,
+        **arrays,
+    )
+
+
+def _from_its_file(folder: Path, said: dict[str, Any]) -> Robot:
+    """The robot of the file that a run names."""
+    from nmm.robots.loading import load as load_robot
+
+    try:
+        return load_robot(said["source"], arguments=said["arguments"])
+    except RobotError as error:
+        raise InputError(f"{folder}: its robot {said['name']} cannot be loaded ({_ASK}): {error}") from None
+
+
+def _arrays(trajectory: Trajectory) -> dict[str, Any]:
+    arrays = {name: getattr(trajectory, name) for name in ARRAYS}
+    arrays |= {
+        name: getattr(trajectory, name) for name in OPTIONAL_ARRAYS if getattr(trajectory, name) is not None
+    }
+    arrays["q_names"] = np.array(trajectory.robot.q_names)
+    arrays["u_names"] = np.array(trajectory.robot.u_names)
+    arrays["r_names"] = np.array(trajectory.r_names)
+    return arrays
+
+
+def _write_csv(trajectory: Trajectory, path: Path) -> None:
+    robot, rows = trajectory.robot, trajectory.r_names
+    columns = [
+        ("t", trajectory.t),
+        *((name, trajectory.q[:, i]) for i, name in enumerate(robot.q_names)),
+        *((f"u_{name}", trajectory.u[:, i]) for i, name in enumerate(robot.u_names)),
+        *((f"r_{name}", trajectory.r[:, i]) for i, name in enumerate(rows)),
+        *((f"r_d_{name}", trajectory.r_d[:, i]) for i, name in enumerate(rows)),
+        *((f"error_{name}", trajectory.error[:, i]) for i, name in enumerate(rows)),
+        ("objective", trajectory.objective),
+        ("sigma_min", trajectory.sigma_min),
+        *((f"partition_{i}", trajectory.partition[:, i]) for i in range(len(rows))),
+        ("residual", trajectory.residual),
+    ]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file, lineterminator="\n").writerow([name for name, _ in columns])
+        # Numbers need no quotes: joined by hand they are written in two thirds of the writer's time.
+        lines = zip(*(map(repr, values.tolist()) for _, values in columns), strict=True)
+        file.writelines(f"{','.join(line)}\n" for line in lines)

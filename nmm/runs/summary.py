@@ -1,0 +1,83 @@
+"""A run in numbers: what summary.json holds and the command line's table shows."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from nmm.runs.trajectory import Trajectory
+
+#: Marks a folder as one of ours.
+FORMAT = "nmm run 1"
+
+
+def summarise(trajectory: Trajectory) -> dict[str, Any]:
+    """Numbers of a run, ready for JSON: outcome, errors, objective, singular values, lateral slip."""
+    from nmm import __version__
+
+    robot, count = trajectory.robot, len(trajectory)
+    redundancy = {
+        "static": robot.n - len(trajectory.r_names),
+        "kinematic": robot.n_u - len(trajectory.r_names),
+    }
+    summary: dict[str, Any] = {
+        "format": FORMAT,
+        "nmm": __version__,
+        "outcome": str(trajectory.outcome),
+        "complete": trajectory.complete,
+        "message": trajectory.message,
+        "warnings": list(trajectory.warnings),
+        "robot": {
+            "name": robot.name,
+            "source": robot.source,
+            "arguments": dict(robot.arguments),
+            "fingerprint": robot.fingerprint,
+        },
+        "platform": robot.platform.name,
+        "resolver": trajectory.resolver,
+        "method": trajectory.method,
+        "dt": trajectory.dt,
+        "samples": count,
+        "redundancy": redundancy,
+        "r_names": list(trajectory.r_names),
+        "r_units": list(trajectory.r_units),
+        "frame": trajectory.frame,
+    }
+    if count:
+        norm = trajectory.error_norm
+        half = trajectory.t >= 0.5 * (trajectory.t[0] + trajectory.t[-1])
+        summary |= {
+            "t_end": float(trajectory.t[-1]),
+            "error_initial": float(norm[0]),
+            "error_final": float(norm[-1]),
+            "error_max_second_half": float(norm[half].max()),
+            "objective_initial": float(trajectory.objective[0]),
+            "objective_final": float(trajectory.objective[-1]),
+            "objective_mean_second_half": float(trajectory.objective[half].mean()),
+            "objective_max_second_half": float(trajectory.objective[half].max()),
+            "sigma_min": float(trajectory.sigma_min.min()),
+            "residual_max": float(trajectory.residual.max()),
+            "lateral_slip_max": lateral_slip(trajectory),
+            "partition_switches": trajectory.switches,
+            "u_max": {
+                name: float(value)
+                for name, value in zip(robot.u_names, np.abs(trajectory.u).max(axis=0), strict=True)
+            },
+        }
+    if redundancy["kinematic"] == 0:
+        summary["warnings"].append(
+            "the task has as many rows as there are inputs: no redundancy is left to resolve"
+        )
+    return summary
+
+
+def lateral_slip(trajectory: Trajectory) -> float:
+    """The largest |A(qp) qp_dot| of the run, m/s: how much the motion violates the wheels' constraints."""
+    platform = trajectory.robot.platform
+    rates = [
+        platform.pfaffian(q) @ q_dot
+        for q, q_dot in zip(trajectory.q[:, : platform.n_p], trajectory.q_dot[:, : platform.n_p], strict=True)
+    ]
+    return float(np.abs(rates).max(initial=0.0))

@@ -1,0 +1,173 @@
+"""A trajectory: what a run recorded, with the names, the outcome and what people look at in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nmm.arrays import Array, Integers
+from nmm.robots.robot import Robot
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from nmm.playback import Motion
+    from nmm.playback.ellipsoids import Wanted
+
+
+class Outcome(StrEnum):
+    """How a run ended."""
+
+    COMPLETED = "completed"
+    SINGULAR = "singular"
+    DIVERGED = "diverged"
+    UNSTABLE = "unstable"
+    FAILED = "failed"
+    INTERRUPTED = "interrupted"
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """N samples of a closed loop, both ends included.
+
+    Attributes
+    ----------
+    robot : the robot that moved
+    t (N,) s; q (N, n); u (N, n_u): times, coordinates, inputs, in `robot.q_units`, `robot.u_units`
+    q_dot (N, n): S(q) u, per second
+    r, r_d, error (N, s): task value, target and error (angles wrapped), in `r_units`
+    objective (N,): H(q)
+    sigma_min (N,): smallest singular value of J_bar
+    partition (N, s): columns of Ja (RG), -1 elsewhere
+    residual (N,): ‖J u - rate‖
+    r_names, r_units : the task's rows
+    resolver, method, dt : how it was made
+    outcome, message, warnings : how it ended and why
+    frame : the end-effector frame that the task positions, if any
+    path, desired (N, 3): its path and, where the task says, the desired one, m in the world
+    target (3,): the fixed point that a bearing looks at, if any
+    scenario : the scenario as resolved, if it came from one
+    """
+
+    robot: Robot
+    t: Array
+    q: Array
+    u: Array
+    q_dot: Array
+    r: Array
+    r_d: Array
+    error: Array
+    objective: Array
+    sigma_min: Array
+    partition: Integers
+    residual: Array
+    r_names: tuple[str, ...]
+    r_units: tuple[str, ...]
+    resolver: str
+    method: str
+    dt: float
+    outcome: Outcome = Outcome.COMPLETED
+    message: str = ""
+    warnings: tuple[str, ...] = ()
+    frame: str | None = None
+    path: Array | None = None
+    desired: Array | None = None
+    target: Array | None = None
+    scenario: dict[str, Any] | None = field(default=None)
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __repr__(self) -> str:
+        end = f"{self.t[-1]:g} s in {len(self)} samples" if len(self) else "no samples"
+        return f"Trajectory({self.robot.name}, {self.resolver}, {self.outcome}, {end})"
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run reached its end as asked."""
+        return self.outcome is Outcome.COMPLETED
+
+    @property
+    def error_norm(self) -> Array:
+        """‖e‖ at each sample, (N,), in the mixed units of the rows."""
+        norm: Array = np.linalg.norm(self.error, axis=1)
+        return norm
+
+    @property
+    def switches(self) -> int:
+        """How often RG changed its partition."""
+        if len(self) < 2:
+            return 0
+        return int(np.sum(np.any(np.diff(self.partition, axis=0) != 0, axis=1)))
+
+    def with_scenario(self, scenario: dict[str, Any]) -> Trajectory:
+        """The same trajectory with the scenario that it came from."""
+        return replace(self, scenario=scenario)
+
+    def summary(self) -> dict[str, Any]:
+        """The run in numbers, ready for JSON."""
+        from nmm.runs.summary import summarise
+
+        return summarise(self)
+
+    def save(
+        self, folder: str | Path, *, figures: bool = True, html: bool = False, ellipsoids: Wanted = False
+    ) -> Path:
+        """Write the run's folder (see `runs.storage.save`): arrays, tables, summary, figures, playback."""
+        from nmm.runs.storage import save
+
+        return save(self, folder, figures=figures, html=html, ellipsoids=ellipsoids)
+
+    @staticmethod
+    def load(folder: str | Path, robot: Robot | None = None) -> Trajectory:
+        """Read a run's folder; with the robot it ran on, if that was put together in Python.
+
+        Raises
+        ------
+        InputError : it is no run's folder, or its robot cannot be loaded, or is another one
+        """
+        from nmm.runs.storage import load
+
+        return load(folder, robot)
+
+    def plot(self) -> Figure:
+        """One figure that shows the run: the motion from above, errors, objective, inputs."""
+        from nmm.figures import overview
+
+        return overview(self)
+
+    def plot_ellipses(self, path: str | Path | None = None, options: Wanted = True) -> Figure:
+        """The end-effector's path with manipulability ellipses (see `nmm.figures.ellipses`); also as PNG."""
+        from nmm.figures.ellipses import ellipses
+        from nmm.figures.style import save
+
+        made = ellipses(self, options)
+        if path is not None:
+            save(made, path)
+        return made
+
+    def motion(self, label: str | None = None) -> Motion:
+        """What playback shows of it."""
+        from nmm.playback import Motion
+
+        return Motion(
+            robot=self.robot,
+            t=self.t,
+            q=self.q,
+            u=self.u,
+            path=self.path,
+            desired=self.desired,
+            target=self.target,
+            label=self.resolver.upper() if label is None else label,
+            frame=self.frame,
+        )
+
+    def play(self, *, port: int | None = None, open_browser: bool = True, ellipsoids: Wanted = False) -> None:
+        """Play the motion in a browser with MeshCat; returns when the user ends it (Ctrl-C)."""
+        from nmm.playback import play
+
+        play([self.motion()], port=port, open_browser=open_browser, ellipsoids=ellipsoids)
