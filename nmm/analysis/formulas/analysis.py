@@ -163,8 +163,8 @@ def symbolic(
     robot : on any platform but one described by its wheels
     task : functions of `nmm.functions.tasks` but a user's own, or tasks made of them, one or several. A
         task's reference counts where it depends on the configuration (`Bearing` of a `Position`, or one of
-        these functions): J is then J_bar = (∂f/∂q - ∂g/∂q) S (paper, eq. 13). `Orientation` and `Pose` are taken
-        without a reference: J is that of the error 0, velocities in the frame's own axes
+        these functions): J is then J_bar = (∂f/∂q - ∂g/∂q) S (paper, eq. 13). `Orientation` and `Pose` are
+        taken without a reference: J is that of the error 0, velocities in the frame's own axes
     geometry : "symbols" for the robot's lengths that are not zero, or "numbers"
     arguments : names for lengths by their label, {"x_q2": "l1"} for the offset of joint q2 along x; by
         default the names of the xacro file's arguments, for which the file is read again
