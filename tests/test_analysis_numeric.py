@@ -362,9 +362,9 @@ def test_the_ratio_is_rgs_own_measure(robot_2r: Robot, rng: np.random.Generator)
         q = rng.uniform(-2, 2, 5)
         controller.reset()
         step = controller.evaluate(0.0, q)
-        partition = controller._state.copy()
+        partition = controller.state.snapshot()
         found = analyse(controller, q).partitions
-        np.testing.assert_array_equal(controller._state, partition)
+        np.testing.assert_array_equal(controller.state.memory, partition)
         names = tuple(robot_2r.u_names[j] for j in step.partition)
         assert found.best == names
         assert found.ratios[found.names.index(names)] == pytest.approx(step.measure)

@@ -23,8 +23,15 @@ from nmm.functions.program import Program
 from nmm.functions.tasks import Coordinates, Task
 from nmm.functions.tasks.comparison import Comparison
 from nmm.kernels.compiled import Kernel
-from nmm.resolvers import CallableResolver, ExtendedJacobian, ProjectedGradient, ReducedGradient, Resolver
-from nmm.resolvers.base import REPORT, Shape
+from nmm.resolvers import (
+    CallableResolver,
+    ExtendedJacobian,
+    Problem,
+    ProjectedGradient,
+    ReducedGradient,
+    Resolver,
+)
+from nmm.resolvers.answer import AnswerArrays
 from nmm.robots.configuration import Configuration
 from nmm.robots.loading import load
 from nmm.robots.robot import CENTER_OF_MASS, Robot
@@ -145,21 +152,23 @@ RESOLVERS = [
     ProjectedGradient(3.0),
     ProjectedGradient(3.0, [1, 2, 3, 4]),
     ExtendedJacobian(),
-    CallableResolver(lambda J, rate, h: h),
+    CallableResolver(lambda problem: problem.h),
 ]
 
 
 @pytest.mark.parametrize("resolver", RESOLVERS, ids=lambda r: r.name)
 def test_resolver_kernels(resolver: Resolver, rng: np.random.Generator) -> None:
     for J in (rng.normal(size=(2, 4)), np.ones((2, 4)), np.array([[1.0, 0, 0, 0], [0, 1e-20, 1, 1]])):
-        Jc = rng.normal(size=(2 if resolver.uses_constraint else 0, 4))
-        rate, rate_c, h = rng.normal(size=2), rng.normal(size=len(Jc)), rng.normal(size=4)
-        setup = resolver.setup(Shape(2, len(Jc), ("u0", "u1", "u2", "u3")))
+        added = 2 if resolver.takes_added_task else 0
+        more = {"added_J": rng.normal(size=(added, 4)), "added_rate": rng.normal(size=added)}
+        problem = Problem(J, rng.normal(size=2), rng.normal(size=4), row_scales=[0.5, 2.0], **more)
+        setup = resolver.setup(problem.dimensions)
         both = []
         for form in (resolver.kernel.plain, resolver.kernel):
-            u, report, state = np.zeros(4), np.zeros(REPORT), setup.state.copy()
-            form(J, rate, Jc, rate_c, h, setup.parameters, setup.options, state, u, report)
-            both.append(np.concatenate([u, report, state]))
+            answer = AnswerArrays(np.zeros(4), *np.zeros((4, 1)))
+            state = resolver.start(problem.dimensions)
+            form(problem.arrays, setup.numbers, setup.options, state.memory, answer)
+            both.append(np.concatenate([*answer, state.memory]))
         assert_same(*both)
 
 
@@ -203,7 +212,7 @@ def answers() -> dict[str, Array]:
             "automatic": case.controller(robot, ReducedGradient()),
             "pg": case.controller(robot, ProjectedGradient()),
             "weighted": case.controller(robot, ProjectedGradient(weights={"v": 3.0})),
-            "ej": Controller(robot, case.tasks, ExtendedJacobian(), constraint=added),
+            "ej": Controller(robot, case.tasks, ExtendedJacobian(), added_task=added),
         }
         for kind, controller in controllers.items():
             for t in (0.0, 1.0, 12.0):

@@ -123,7 +123,7 @@ def test_extended_jacobian_does_both_tasks(robot_2r: Robot, rng: np.random.Gener
     added = Task(
         Coordinates("q2", {"theta": 1, "q1": 1, "q2": 1}), Line([0, 1], [1, -1], 9.0), gain=[2.0, 0.5]
     )
-    controller = Controller(robot_2r, TIP, ExtendedJacobian(), constraint=added)
+    controller = Controller(robot_2r, TIP, ExtendedJacobian(), added_task=added)
     for t in rng.uniform(0, 9, 50):
         q = random_configuration(robot_2r, rng)
         J, rate, _ = twin.case_1(t, q)
@@ -161,7 +161,7 @@ def test_gains(robot_2r: Robot, rng: np.random.Generator) -> None:
         close(found.rate, speed + K @ error, 1e-14)
         close(found.error, error, 1e-14)
         close(found.r, r_d - error, 1e-14)
-        close(found.target, r_d, 1e-14)
+        close(found.r_d, r_d, 1e-14)
     planning = Task(Position("ee", "xy"), CIRCLE, None)
     close(Controller(robot_2r, planning, ProjectedGradient()).evaluate(t, q).rate, speed, 1e-15)
 

@@ -65,9 +65,9 @@ REFUSED: list[tuple[Callable[[Robot], Any], str]] = [
     (made(Task(Heading("link1"), CIRCLE)), "task link1.heading: .*with 1 components, got Circle with 2"),
     (made(TOO_MANY), r"5 rows for 4 inputs \(v, omega, q1, q2\); expected at most 4"),
     (made([]), "expected at least one row"),
-    (made(TIP, PG, constraint=Task(Coordinates("q1"), REST)), "constraint: resolver pg takes none"),
-    (made(TIP, EJ), "constraint: expected 2 rows .*got 0"),
-    (made(TIP, EJ, constraint=Task(Coordinates("q1"), REST)), "constraint: expected 2 rows .*got 1"),
+    (made(TIP, PG, added_task=Task(Coordinates("q1"), REST)), "added_task: resolver pg takes none"),
+    (made(TIP, EJ), "added_task: expected 2 rows .*got 0"),
+    (made(TIP, EJ, added_task=Task(Coordinates("q1"), REST)), "added_task: expected 2 rows .*got 1"),
     (made(Task(Position("ee", "xy"), CIRCLE, 0.0)), "gain of task ee.x, ee.y: expected positive definite"),
     (made(Task(Position("ee", "xy"), CIRCLE, [1, 2, 3])), "gain .*: expected a number, 2 numbers or a 2 x 2"),
     (made(Task(Position("ee", "xy"), CIRCLE, [[1, 3], [0, 1]])), "gain .*: expected positive definite"),
@@ -162,7 +162,7 @@ def test_a_singular_configuration_is_an_error_with_the_time(kind: Resolver, plac
 
 def test_an_algorithmic_singularity_is_another_error(robot_2r: Robot) -> None:
     ask_twice = [Task(Position("ee", "x"), [1.0]), Task(Coordinates("q1"), [0.0])]
-    controller = Controller(robot_2r, TIP, EJ, constraint=ask_twice)
+    controller = Controller(robot_2r, TIP, EJ, added_task=ask_twice)
     with pytest.raises(SingularError, match="extended Jacobian J_e is singular though J is not"):
         controller(0.0, np.zeros(5))
 
@@ -190,7 +190,7 @@ def test_what_is_undefined_is_an_error_too(kind: str, k: int, robot_2r: Robot) -
         "callable": CallableResolver(lambda J, rate, h: np.linalg.pinv(J) @ rate),
     }[kind]
     if kind == "ej":
-        more = {"constraint": Task(Coordinates(*("q1", "q2", "theta")[: 4 - s]), np.zeros(4 - s))}
+        more = {"added_task": Task(Coordinates(*("q1", "q2", "theta")[: 4 - s]), np.zeros(4 - s))}
     controller = Controller(robot_2r, task, resolver, **more)
     with pytest.raises(SingularError, match=r"not finite|lost rank"):
         controller(0.0, np.zeros(5))

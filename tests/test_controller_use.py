@@ -17,7 +17,7 @@ from nmm.control.equations import step
 from nmm.functions.objectives import CallableObjective, Objective
 from nmm.functions.references import CallableReference
 from nmm.functions.tasks import CallableFunction, Task
-from nmm.resolvers import CallableResolver, ProjectedGradient, ReducedGradient
+from nmm.resolvers import CallableResolver, Problem, ProjectedGradient, ReducedGradient
 from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -90,7 +90,8 @@ def test_a_users_resolver_gives_the_built_in_inputs(
 ) -> None:
     robot = robots[case.robot]
 
-    def projected(J: Array, rate: Array, h: Array) -> Array:
+    def projected(problem: Problem) -> Array:
+        J, rate, h = problem.arrays.J, problem.arrays.rate, problem.arrays.h
         inverse = np.linalg.pinv(J)
         found: Array = inverse @ rate - 10.0 * (h - inverse @ (J @ h))
         return found
@@ -126,13 +127,11 @@ def test_the_partition_is_kept_reset_and_held(robot_2r: Robot) -> None:
     assert list(controller.evaluate(0.0, beside).partition) == second
     controller.reset()
     controller.evaluate(0.0, ahead)
-    controller.hold_partition(True)
     nearly = at + np.array([0, 0, 0, 1e-3, 0])  # Δ13 = -0.0008, below the threshold
-    assert list(controller.evaluate(0.0, nearly).partition) == first
-    controller.hold_partition(False)
+    with controller.state.held():
+        assert list(controller.evaluate(0.0, nearly).partition) == first
     assert list(controller.evaluate(0.0, nearly).partition) == second
     assert list(controller.evaluate(0.0, ahead).partition) == second
-    controller.hold_partition(True)
     controller.reset()
     assert list(controller.evaluate(0.0, ahead).partition) == first
 

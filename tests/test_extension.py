@@ -19,9 +19,12 @@ from nmm.functions.function import Function, Row, Stage
 from nmm.functions.objectives import Manipulability, Sum
 from nmm.functions.references import Line
 from nmm.functions.tasks import CallableFunction, Task
-from nmm.kernels.compiled import FUNCTION, PLATFORM, RESOLVER, Kernel, kernel
+from nmm.kernels.compiled import FUNCTION, PLATFORM, Kernel, kernel
 from nmm.platforms import Platform
-from nmm.resolvers import ProjectedGradient, ReducedGradient, Resolver, Setup, Shape
+from nmm.resolvers import Dimensions, Problem, ProjectedGradient, ReducedGradient, Resolver, Setup, State
+from nmm.resolvers.answer import AnswerArrays, certify
+from nmm.resolvers.base import RESOLVER
+from nmm.resolvers.problem import ProblemArrays
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 
@@ -164,19 +167,18 @@ def test_function_with_its_own_kernel(robot_3r: Robot, rng: np.random.Generator)
 
 @kernel(RESOLVER)
 def steepest(
-    J: Array, rate: Array, Jc: Array, rate_c: Array, h: Array,
-    parameters: Array, options: Array, state: Array, u: Array, report: Array,
-) -> None:  # fmt: skip
-    """One row: u = J' rate / |J|^2; counts its calls in state[1]."""
+    problem: ProblemArrays, numbers: Array, options: Array, state: Array, answer: AnswerArrays
+) -> None:
+    """One row: u = J' rate / |J|^2; counts its calls."""
+    J = problem.J
     square = 0.0
     for j in range(J.shape[1]):
         square += J[0, j] * J[0, j]
     for j in range(J.shape[1]):
-        u[j] = J[0, j] * rate[0] / square
-    state[1] += 1
-    report[0] = 0.0
-    report[1] = 0.0
-    report[2] = square
+        answer.u[j] = J[0, j] * problem.rate[0] / square
+    state[0] += 1
+    answer.measure[0] = square
+    certify(problem, answer)
 
 
 class Steepest(Resolver):
@@ -186,9 +188,12 @@ class Steepest(Resolver):
     def kernel(self) -> Kernel:
         return steepest
 
-    def setup(self, shape: Shape) -> Setup:
-        self.check(shape)
-        return Setup(np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros(2, dtype=np.int64))
+    def setup(self, dimensions: Dimensions) -> Setup:
+        self.check(dimensions)
+        return Setup(np.zeros(0), np.zeros(0, dtype=np.int64))
+
+    def start(self, dimensions: Dimensions) -> State:
+        return State([0])
 
 
 def test_resolver_with_its_own_kernel(robot_2r: Robot, rng: np.random.Generator) -> None:
@@ -198,8 +203,11 @@ def test_resolver_with_its_own_kernel(robot_2r: Robot, rng: np.random.Generator)
     expected = Controller(robot_2r, task, ProjectedGradient())(0.0, q)
     for calls in (1, 2, 3):
         np.testing.assert_allclose(controller(0.0, q), expected, rtol=1e-13)
-        assert controller.evaluate(0.0, q).partition[0] == 2 * calls
+        assert controller.state.memory[0] == calls
     controller.reset()
-    assert controller.evaluate(0.0, q).partition[0] == 1
+    assert controller.evaluate(0.0, q).partition[0] == -1
+    assert controller.state.memory[0] == 1
+    alone = Steepest().resolve(Problem([[1.0, 2.0]], [5.0], np.zeros(2)))
+    np.testing.assert_allclose(alone.u, [1.0, 2.0])
     with pytest.raises(InputError, match="resolver steepest takes none"):
-        Controller(robot_2r, task, Steepest(), constraint=TIP)
+        Controller(robot_2r, task, Steepest(), added_task=TIP)

@@ -37,7 +37,7 @@ def test_what_the_objective_feels_is_not_idle(car: Robot) -> None:
 def test_what_a_constraint_feels_is_not_idle(car: Robot) -> None:
     task = nmm.Task(nmm.Position("ee"), TIP)
     held = nmm.Task(nmm.Coordinates("steering", "x", "q4", "q5"), [0.1, 0, 0.6, 0])
-    extended = nmm.Controller(car, task, nmm.ExtendedJacobian(), constraint=held)
+    extended = nmm.Controller(car, task, nmm.ExtendedJacobian(), added_task=held)
     assert unfelt_inputs(extended, car.q(START)) == ("steering_rate", "q5")
     assert idle_inputs(extended, car.q(START)) == ()
 

@@ -31,7 +31,7 @@ def with_condition(shape: tuple[int, int], condition: float, rng: np.random.Gene
 def decomposed(J: Array) -> tuple[float, NDArray[np.int64], Array, Array]:
     s, m = J.shape
     order, L, Q = np.full(s, -1), np.full((s, s), np.nan), np.full((s, m), np.nan)
-    return orthonormal_rows(J, order, L, Q), order, L, Q
+    return orthonormal_rows(J, np.ones(s), order, L, Q), order, L, Q
 
 
 @each_shape
@@ -48,9 +48,9 @@ def test_orthonormal_rows(shape: tuple[int, int], condition: float, rng: np.rand
         diagonal = np.diag(L)
         assert np.all(diagonal > 0)
         assert np.all(np.diff(diagonal) <= 1e-14 * scale)
-        assert ratio == diagonal[-1] / diagonal[0]
+        assert ratio == diagonal[-1] / max(1.0, diagonal[0])
         # Pivoted, its diagonal overestimates the smallest singular value by 2^(s-1) sqrt(s) at most.
-        true = 1.0 / condition if s > 1 else 1.0
+        true = (1.0 / condition if s > 1 else 1.0) * min(1.0, scale)
         assert true * (1 - 1e-6) <= ratio <= true * 2.0 ** (s - 1) * np.sqrt(s)
         # det J Jᵀ forgets the small singular values; the product of them all does not.
         volume = np.prod(np.linalg.svd(J, compute_uv=False))
@@ -95,13 +95,32 @@ def test_closest_solution_and_pseudoinverse(
     np.testing.assert_allclose(X, inverse.T, rtol=0, atol=tolerance)
 
 
+@each_shape
+def test_rows_are_judged_in_their_scales(shape: tuple[int, int], rng: np.random.Generator) -> None:
+    """Rows in other units, with their scales in these units: the same pivots, the same judgement."""
+    s, m = shape
+    J, scales = rng.normal(size=shape), rng.uniform(0.5, 2.0, s)
+    units = 2.0 ** rng.integers(-20, 20, s)  # which round nothing
+    answers = []
+    for rows, sizes in ((J, scales), (units[:, None] * J, units * scales)):
+        order, L, Q = np.zeros(s, dtype=np.int64), np.zeros((s, s)), np.zeros((s, m))
+        regular = orthonormal_rows(np.ascontiguousarray(rows), sizes, order, L, Q)
+        M = np.hstack([rows[:, :s], np.eye(s) * (rows / J)[:, :1]])
+        answers.append([order, Q, regular, *eliminate(M, sizes.copy())[1:], M[:, s:]])
+        scaled = L[range(s), range(s)] / sizes[order]
+        assert np.all(np.diff(scaled) <= 1e-14)
+        assert regular == pytest.approx(scaled[-1] / max(1.0, scaled[0]))
+    for one, other in zip(*answers, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12)
+
+
 @pytest.mark.parametrize("s", [1, 2, 3, 5, 8, 12])
 @pytest.mark.parametrize("k", [0, 1, 4])
 def test_eliminate(s: int, k: int, rng: np.random.Generator) -> None:
     for _ in range(20):
         A, B = rng.normal(size=(s, s)), rng.normal(size=(s, k))
         M = np.hstack([A, B])
-        determinant, ratio = eliminate(M)
+        determinant, ratio = eliminate(M, np.ones(len(M)))
         assert determinant == pytest.approx(np.linalg.det(A), rel=1e-12 * np.linalg.cond(A))
         assert 0.0 < ratio <= 1.0
         np.testing.assert_allclose(
@@ -112,23 +131,23 @@ def test_eliminate(s: int, k: int, rng: np.random.Generator) -> None:
 def test_eliminate_needs_its_pivots() -> None:
     """A zero in the first place, and an odd permutation: the determinant's sign."""
     M = np.array([[0.0, 2.0, 0.0, 2.0], [3.0, 0.0, 0.0, 3.0], [0.0, 0.0, 5.0, 5.0]])
-    assert eliminate(M) == (-30.0, 2.0 / 5.0)
+    assert eliminate(M, np.ones(len(M))) == (-30.0, 2.0 / 5.0)
     np.testing.assert_array_equal(M[:, 3], np.ones(3))
     # Without pivoting the tiny first entry swamps the solution.
     M = np.array([[1e-20, 1.0, 1.0], [1.0, 1.0, 2.0]])
-    eliminate(M)
+    eliminate(M, np.ones(len(M)))
     np.testing.assert_allclose(M[:, 2], [1.0, 1.0], rtol=1e-15)
 
 
 @pytest.mark.parametrize("A", [np.zeros((1, 1)), np.zeros((3, 3)), np.ones((2, 2)), np.diag([1.0, 0.0, 2.0])])
 def test_eliminate_tells_a_singular_matrix(A: Array) -> None:
-    assert eliminate(np.hstack([A, np.ones((len(A), 1))])) == (0.0, 0.0)
+    assert eliminate(np.hstack([A, np.ones((len(A), 1))]), np.ones(len(A))) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("A", [[[1.0, np.nan], [2.0, 1.0]], np.full((2, 2), np.nan)], ids=["one", "all"])
 def test_eliminate_with_nan_is_not_a_number(A: Array) -> None:
     M = np.hstack([A, np.ones((2, 1))])
-    determinant, _ = eliminate(M)
+    determinant, _ = eliminate(M, np.ones(len(M)))
     assert np.isnan(determinant)
     assert np.all(np.isnan(M[:, 2]))
 

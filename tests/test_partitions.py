@@ -12,8 +12,16 @@ import twin
 from numpy.typing import NDArray
 
 from nmm.errors import InputError
-from nmm.resolvers import ExtendedJacobian, ProjectedGradient, ReducedGradient, Status
-from nmm.resolvers.base import FREE, HELD, OVERDUE, Shape
+from nmm.resolvers import (
+    Answer,
+    Dimensions,
+    ExtendedJacobian,
+    Problem,
+    ProjectedGradient,
+    ReducedGradient,
+    Status,
+)
+from nmm.resolvers.partitions import COLUMNS, HELD, MODE, OVERDUE, PartitionState
 
 Array = NDArray[np.float64]
 
@@ -33,14 +41,18 @@ def measures(J: Array) -> dict[tuple[int, ...], float]:
 def test_measures_lie_between_0_and_1_and_their_squares_add_up_to_1(
     shape: tuple[int, int], rng: np.random.Generator
 ) -> None:
-    s, m = shape
+    s = shape[0]
     J, rg = rng.normal(size=shape), ReducedGradient()
     total = 0.0
     for basic, expected in measures(J).items():
-        held = np.array([1, *basic])
-        found = rg.resolve(J, np.zeros(s), np.zeros(m), state=held)
-        below = found.measure < rg.threshold
-        assert tuple(found.state) == (OVERDUE if below else HELD, *basic)
+        state = PartitionState(s)
+        state.memory[COLUMNS:] = basic
+        with state.held():
+            found, _ = resolved_with(rg, J, state)
+            below = found.measure < rg.threshold
+            assert state.memory[MODE] == (OVERDUE if below else HELD)
+        assert state.may_stand(state.snapshot()) == (not below)
+        assert basic_columns(state) == basic
         assert 0.0 <= found.measure <= 1.0 + 1e-12
         assert found.measure == pytest.approx(expected, rel=1e-9, abs=1e-12)
         total += found.measure**2
@@ -49,19 +61,33 @@ def test_measures_lie_between_0_and_1_and_their_squares_add_up_to_1(
 
 @each_shape
 def test_the_first_partition_is_the_best(shape: tuple[int, int], rng: np.random.Generator) -> None:
-    s, m = shape
+    s = shape[0]
     for _ in range(20):
         J = rng.normal(size=shape)
         every = measures(J)
         best = max(every, key=lambda basic: every[basic])
-        found = ReducedGradient().resolve(J, np.zeros(s), np.zeros(m))
-        assert tuple(found.state) == (0, *best)
+        found, state = resolved_with(ReducedGradient(), J)
+        assert basic_columns(state) == best
         # The largest of C(m, s) numbers whose squares add up to 1.
         assert found.measure >= len(every) ** -0.5 - 1e-12
         # Neither the task's units nor its variables decide.
-        mixed = ReducedGradient().resolve(rng.normal(size=(s, s)) @ J, np.zeros(s), np.zeros(m))
-        assert tuple(mixed.state) == (0, *best)
+        mixed, state = resolved_with(ReducedGradient(), rng.normal(size=(s, s)) @ J)
+        assert basic_columns(state) == best
         assert mixed.measure == pytest.approx(found.measure, rel=1e-8)
+
+
+def resolved_with(
+    rg: ReducedGradient, J: Array, state: PartitionState | None = None, **given: Any
+) -> tuple[Answer, PartitionState]:
+    """The answer for a rate and a gradient of zeros, and the state after it."""
+    s, m = np.shape(J)
+    problem = Problem(**({"J": J, "rate": np.zeros(s), "h": np.zeros(m)} | given))
+    state = rg.start(problem.dimensions) if state is None else state
+    return rg.resolve(problem, state), state
+
+
+def basic_columns(state: PartitionState) -> tuple[int, ...]:
+    return tuple(state.memory[COLUMNS:].tolist())
 
 
 def walk(rng: np.random.Generator, count: int, shape: tuple[int, int]) -> list[Array]:
@@ -86,20 +112,23 @@ def test_automatic_partitions_are_kept_until_below_the_threshold(
         elif every[kept] < threshold:
             switches += kept != best
             kept = best
-        found = rg.resolve(J, np.ones(s), np.ones(m), state=state)
-        assert tuple(found.state[1:]) == kept
+        found, state = resolved_with(rg, J, state, rate=np.ones(s), h=np.ones(m))
+        assert basic_columns(state) == kept
         assert found.status is Status.SOLVED
         assert found.residual < 1e-9
-        state = found.state
     assert switches >= 3
 
 
-def test_a_step_does_not_change_the_state_that_it_was_given(rng: np.random.Generator) -> None:
+def test_what_is_remembered_can_be_restored(rng: np.random.Generator) -> None:
     rg = ReducedGradient()
-    before = rg.resolve(rng.normal(size=(2, 4)), np.zeros(2), np.zeros(4)).state
-    copy = before.copy()
-    rg.resolve(np.eye(4)[[3, 2]], np.zeros(2), np.zeros(4), state=before)
-    np.testing.assert_array_equal(before, copy)
+    _, state = resolved_with(rg, rng.normal(size=(2, 4)))
+    before = state.snapshot()
+    resolved_with(rg, np.eye(4)[[3, 2]], state)
+    assert not np.array_equal(state.memory, before)
+    state.restore(before)
+    np.testing.assert_array_equal(state.memory, before)
+    state.reset()
+    assert basic_columns(state) == (-1, -1)
 
 
 PAPER = [("v", "q1"), ("v", "omega")]
@@ -111,10 +140,16 @@ def planar(d13: float, d12: float) -> Array:
     return np.array([[1.0, 0.3, -0.2, 0.1], [0.0, d12, d13, 0.4]])
 
 
-def chosen(J: Array, state: Any = None, **options: Any) -> tuple[tuple[int, ...], NDArray[np.int64]]:
+def chosen(
+    J: Array, before: PartitionState | None = None, **options: Any
+) -> tuple[tuple[int, ...], PartitionState]:
+    """The columns of Ja, and the state, which `before` is left as it was for."""
     rg = ReducedGradient(partitions=PAPER, **options)
-    found = rg.resolve(J, [0.3, 0.1], np.zeros(4), inputs=NAMES, state=state)
-    return tuple(found.state[1:]), found.state
+    state = PartitionState(2)
+    if before is not None:
+        state.restore(before.snapshot())
+    resolved_with(rg, J, state, rate=[0.3, 0.1], inputs=NAMES)
+    return basic_columns(state), state
 
 
 def test_the_papers_rule() -> None:
@@ -149,20 +184,39 @@ def test_the_papers_rule_on_the_paper_robot(rng: np.random.Generator) -> None:
 
 
 def test_a_held_partition_stays() -> None:
-    """state[0] = 1 is how an integrator keeps one right-hand side through a step."""
+    """So an integrator keeps one right-hand side through a step."""
+    rg = ReducedGradient(partitions=PAPER)
     _, state = chosen(planar(0.5, 0.4))
-    state[0] = HELD
-    basic, held = chosen(planar(0.5, 0.4), state)
-    assert basic == (0, 2)
-    assert held[0] == HELD
-    basic, held = chosen(planar(0.001, 0.4), held)
-    assert basic == (0, 2)
-    assert held[0] == OVERDUE
-    held[0] = FREE
-    assert chosen(planar(0.001, 0.4), held)[0] == (0, 1)
+    before = state.snapshot()
+    with state.held():
+        resolved_with(rg, planar(0.5, 0.4), state, inputs=NAMES)
+        assert basic_columns(state) == (0, 2)
+    assert state.may_stand(before)
+    with state.held():
+        resolved_with(rg, planar(0.001, 0.4), state, inputs=NAMES)
+        assert basic_columns(state) == (0, 2)
+    assert not state.may_stand(before)
+    resolved_with(rg, planar(0.001, 0.4), state, inputs=NAMES)
+    assert basic_columns(state) == (0, 1)
     # One that is held may become singular; that is reported, not evaded.
-    found = ReducedGradient().resolve(np.eye(4)[:2], [1, 1], np.zeros(4), state=np.array([1, 2, 3]))
+    state.memory[COLUMNS:] = 2, 3
+    with state.held():
+        found, _ = resolved_with(ReducedGradient(), np.eye(4)[:2], state, rate=[1, 1])
     assert found.status is Status.SINGULAR_JA
+
+
+def test_a_step_over_a_singular_block_may_not_stand() -> None:
+    """det Ja has another sign after it."""
+    _, state = chosen(planar(0.5, 0.4))
+    before = state.snapshot()
+    resolved_with(ReducedGradient(partitions=PAPER), planar(-0.5, 0.4), state, inputs=NAMES)
+    assert not state.may_stand(before)
+    assert "Ja of [v, q1] became singular" in state.reservation(before, NAMES)
+    assert state.may_stand(state.snapshot())
+    assert state.reservation(state.snapshot(), NAMES) == ""
+    resolved_with(ReducedGradient(partitions=PAPER), planar(0.001, 0.4), state, inputs=NAMES)
+    assert basic_columns(state) == (0, 1)
+    assert state.may_stand(before)  # another block
 
 
 def test_the_arm_alone_as_basis_is_the_papers_special_case(rng: np.random.Generator) -> None:
@@ -174,7 +228,7 @@ def test_the_arm_alone_as_basis_is_the_papers_special_case(rng: np.random.Genera
         # The platform's Jacobian: x and y carry the arm along, theta turns it as omega does.
         Jp = np.column_stack([np.eye(2), J[:, 1]])
         expected = twin.reduced_gradient_on_arm(Jp, J[:, 2:], twin.G(q), rate, gradient[:3], gradient[3:])
-        found = rg.resolve(J, rate, twin.S(q).T @ gradient, inputs=NAMES)
+        found, _ = resolved_with(rg, J, rate=rate, h=twin.S(q).T @ gradient, inputs=NAMES)
         tolerance = 1e-14 * np.linalg.cond(J[:, 2:]) ** 2
         scale = np.abs(expected).max(initial=1.0)
         np.testing.assert_allclose(found.u, expected, rtol=0, atol=tolerance * scale)
@@ -183,7 +237,8 @@ def test_the_arm_alone_as_basis_is_the_papers_special_case(rng: np.random.Genera
 def resolved(resolver: Any, shape: tuple[int, int] = (2, 4), **changed: Any) -> Callable[[], Any]:
     s, m = shape
     J = np.random.default_rng(0).normal(size=shape)
-    return lambda: resolver.resolve(**({"J": J, "rate": np.ones(s), "h": np.zeros(m)} | changed))
+    given = {"J": J, "rate": np.ones(s), "h": np.zeros(m)}
+    return lambda: resolver.resolve(Problem(**(given | changed)))
 
 
 RG, PG, EJ = ReducedGradient(), ProjectedGradient(), ExtendedJacobian()
@@ -198,12 +253,17 @@ REFUSED: list[tuple[Callable[[], Any], str]] = [
     (resolved(PG, h=np.zeros(3)), r"h: expected 4 numbers, got shape \(3,\)"),
     (resolved(PG, h="steep"), "h: expected numbers, got 'steep'"),
     (resolved(PG, inputs=("a", "b")), "inputs: expected 4 names.*got 2"),
-    (resolved(RG, state=[0, 1, 2, 3]), "state: expected one of 2 rows and 4 inputs"),
-    (resolved(RG, state=[0, 1, 9]), "state: expected one of 2 rows and 4 inputs"),
-    (resolved(EJ), r"constraint: expected 2 rows \(4 inputs less 2 rows of the task\), got 0"),
-    (resolved(EJ, Jc=np.ones((2, 3)), rate_c=[0, 0]), "Jc: expected 4 columns"),
-    (resolved(EJ, Jc=np.ones((2, 4)), rate_c=[0]), r"rate_c: expected 2 numbers, got shape \(1,\)"),
-    (resolved(EJ, Jc=np.ones((2, 4))), r"rate_c: expected 2 numbers, got shape \(0,\)"),
+    (resolved(PG, row_scales=[1.0, 0.0]), "row_scales: expected numbers above 0, got 0"),
+    (resolved(PG, row_scales=[1.0]), r"row_scales: expected 2 numbers, got shape \(1,\)"),
+    (resolved(PG, levels=[1, 2]), r"levels: expected numbers of rows that add up to 2, got \[1, 2\]"),
+    (resolved(PG, levels=[1, 1]), "levels: resolver pg does all rows at one level, got 2"),
+    (resolved(PG, limit_rows=np.eye(3)), "limit_rows: expected 4 columns"),
+    (resolved(PG, limit_rows=np.eye(4), upper=[1, 2]), "upper: expected 4 numbers"),
+    (resolved(PG, before=np.ones(3)), r"before: expected 4 numbers, got shape \(3,\)"),
+    (resolved(EJ), r"added_task: expected 2 rows \(4 inputs less 2 rows of the task\), got 0"),
+    (resolved(EJ, added_J=np.ones((2, 3)), added_rate=[0, 0]), "added_J: expected 4 columns"),
+    (resolved(EJ, added_J=np.ones((2, 4)), added_rate=[0]), r"added_rate: expected 2 numbers, got shape"),
+    (resolved(EJ, added_J=np.ones((2, 4))), r"added_rate: expected 2 numbers, got shape \(0,\)"),
     (resolved(ProjectedGradient(weights=[1, 2, 3])), r"weights: expected 4 numbers or a 4 x 4 matrix, got"),
     (resolved(ProjectedGradient(weights=2.0)), "weights: expected 4 numbers"),
     (resolved(ProjectedGradient(weights=[1, 2, 0, 3])), "weights: expected numbers above 0"),
@@ -228,7 +288,7 @@ REFUSED: list[tuple[Callable[[], Any], str]] = [
     (lambda: ProjectedGradient(alpha=0.0), "alpha: expected a number above 0, got 0"),
     (lambda: ProjectedGradient(tolerance=np.nan), "tolerance: expected finite"),
     (lambda: ExtendedJacobian(tolerance=-1e-9), "tolerance: expected a number above 0"),
-    (lambda: RG.setup(Shape(10, 0, tuple(map(str, range(20))))), "184756 candidates are too many"),
+    (lambda: RG.setup(Dimensions(10, 0, tuple(map(str, range(20))))), "184756 candidates are too many"),
 ]  # fmt: skip
 
 

@@ -82,7 +82,7 @@ def circle_from(q0: Array) -> Circle:
 def test_the_extended_jacobian_of_a_fixed_base_is_cyclic(arm: Robot) -> None:
     """(r, y) fix q locally (Baillieul 1985): from the first lap on, where it begins on the path."""
     held = Task(Coordinates({"q2": 1.0, "q3": -1.0}), Q0[1] - Q0[2])
-    extended = Controller(arm, Task(TIP, circle_from(Q0)), ExtendedJacobian(), constraint=held)
+    extended = Controller(arm, Task(TIP, circle_from(Q0)), ExtendedJacobian(), added_task=held)
     (found,) = repeatability(({"ej": extended}, Q0), laps=3, dt=0.01).laps
     assert np.ptp(found.trajectory.q, axis=0).min() > 0.1
     assert np.abs(found.drift).max() < 1e-8
@@ -137,7 +137,7 @@ def trailer(robot: Robot, radius: float, theta: float = 0.3) -> tuple[Controller
     xy = hitch - LENGTH * np.array([np.cos(theta), np.sin(theta)])
     constraint = [Task(Heading("link2"), heading), Task(Coordinates("q1"), 0.0)]
     task = Task(TIP, Circle([1.0, 0.0], radius, 2 * pi / PERIOD))
-    controller = Controller(robot, task, ExtendedJacobian(), constraint=constraint)
+    controller = Controller(robot, task, ExtendedJacobian(), added_task=constraint)
     return controller, np.array([*xy, theta, 0.0, heading - theta])
 
 

@@ -81,7 +81,7 @@ def run_of(base: str, arm: str, kind: str, resolver: Resolver) -> nmm.Trajectory
     task = tasks(robot, frame, q0, kind)
     if isinstance(resolver, nmm.ExtendedJacobian):
         held = constraint(robot, task, q0)
-        controller = nmm.Controller(robot, task, resolver, constraint=held)
+        controller = nmm.Controller(robot, task, resolver, added_task=held)
     else:
         controller = nmm.Controller(robot, task, resolver, posture(robot, q0))
     return nmm.simulate(controller, q0, DURATION, 0.02)

@@ -181,8 +181,8 @@ def test_no_objective(tmp_path: Path) -> None:
 def test_resolvers(tmp_path: Path, text: str, expected: nmm.Resolver) -> None:
     found = scenario(tmp_path, resolver=text).controller().resolver
     assert type(found) is type(expected)
-    shape = nmm.resolvers.Shape(2, 0, ("v", "omega", "q1", "q2"))
-    for ours, theirs in zip(found.setup(shape), expected.setup(shape), strict=True):
+    dimensions = nmm.resolvers.Dimensions(2, 0, ("v", "omega", "q1", "q2"))
+    for ours, theirs in zip(found.setup(dimensions), expected.setup(dimensions), strict=True):
         assert np.array_equal(ours, theirs)
 
 
@@ -229,10 +229,10 @@ def test_the_constraint_is_made_from_the_objective(robot_2r: nmm.Robot) -> None:
     given = Scenario.load("unicycle_2r_position", {"resolver.kind": "ej", "resolver.gain": 3})
     controller = given.controller()
     here = Configuration(robot_2r, [0.1, -0.3, 0.5, 0.7, 1.1])
-    values = [task.function.evaluate(0.0, here).value[0] for task in controller.constraint]
+    values = [task.function.evaluate(0.0, here).value[0] for task in controller.added_task]
     assert values == [pytest.approx(0.5 + 0.7 + 1.1), 0.7]
-    assert [task.reference.evaluate(0.0, here).value[0] for task in controller.constraint] == [PI / 2, PI / 4]
-    assert [task.gain for task in controller.constraint] == [3.0, 3.0]
+    assert [task.reference.evaluate(0.0, here).value[0] for task in controller.added_task] == [PI / 2, PI / 4]
+    assert [task.gain for task in controller.added_task] == [3.0, 3.0]
 
 
 def test_the_extended_jacobian_does_in_case_2_what_the_reduced_gradient_does() -> None:

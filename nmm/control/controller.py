@@ -9,32 +9,36 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, Integers
-from nmm.control.equations import PLAIN, WRAPPED, Results, drive, results, step
+from nmm.control.equations import PLAIN, WRAPPED, Results, drive, results, stated, step
 from nmm.errors import InputError, SingularError
-from nmm.functions.function import Row
+from nmm.functions.function import Row, row_scales
 from nmm.functions.objectives.base import Objective
 from nmm.functions.program import Program
 from nmm.functions.tasks.comparison import Comparison
 from nmm.functions.tasks.task import Stack, Task
-from nmm.resolvers.base import FREE, HELD, OVERDUE, REPORT, Resolver, Shape, Status
+from nmm.resolvers.answer import Status
+from nmm.resolvers.base import Resolver
+from nmm.resolvers.problem import Dimensions
+from nmm.resolvers.state import State
 from nmm.robots.robot import Robot
 
 FLOAT64 = np.dtype(np.float64)
+_FAILED = float(Status.SINGULAR_J)
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
     """Everything that a controller found at (t, q): copies, in the units of the task's rows.
 
-    r, target, error, rate (s,), J (s, m) of J_bar u = rate; objective H and gradient h (m,);
-    u (m,), q_dot = S u (n,); residual ‖J u - rate‖; status; measure (see `Resolution`); partition
-    (s,) the columns of Ja, -1 where there is none.
+    r, r_d, error, rate (s,), J (s, m) of J_bar u = rate; objective H and gradient h (m,);
+    u (m,), q_dot = S u (n,); status, scale (levels,), residual ‖J u - rate‖ and measure: see `Answer`;
+    partition (s,) the columns of Ja, -1 where there is none.
     """
 
     t: float
     q: Array
     r: Array
-    target: Array
+    r_d: Array
     error: Array
     rate: Array
     J: Array
@@ -42,8 +46,9 @@ class Step:
     h: Array
     u: Array
     q_dot: Array
-    residual: float
     status: Status
+    scale: Array
+    residual: float
     measure: float
     partition: Integers
 
@@ -57,12 +62,12 @@ class Controller:
     task : a `Task`, or several, done together
     resolver : how the redundancy is resolved
     objective : H(q) to minimise; None for the plain solution
-    constraint : the added task y = h(q) of the extended Jacobian
+    added_task : the added task y = h(q) of the extended Jacobian
 
     Raises
     ------
-    InputError : a frame, coordinate or input that the robot lacks; more rows than inputs; a
-        constraint with a resolver that takes none, or none with one that does
+    InputError : a frame, coordinate or input that the robot lacks; more rows than inputs; an
+        added task with a resolver that takes none, or none with one that does
     """
 
     def __init__(
@@ -71,7 +76,7 @@ class Controller:
         task: Task | Stack | Sequence[Task],
         resolver: Resolver,
         objective: Objective | None = None,
-        constraint: Task | Stack | Sequence[Task] | None = None,
+        added_task: Task | Stack | Sequence[Task] | None = None,
     ) -> None:
         _expect(robot, Robot, "robot")
         _expect(resolver, Resolver, "resolver")
@@ -81,13 +86,13 @@ class Controller:
         self.task = Stack.of(task)
         self.resolver = resolver
         self.objective = objective
-        self.constraint = Stack() if constraint is None else Stack.of(constraint)
-        if self.constraint.tasks and not resolver.uses_constraint:
-            raise InputError(f"constraint: resolver {resolver.name} takes none, ej does")
+        self.added_task = Stack() if added_task is None else Stack.of(added_task)
+        if self.added_task.tasks and not resolver.takes_added_task:
+            raise InputError(f"added_task: resolver {resolver.name} takes none, ej does")
         self.rows: tuple[Row, ...] = self.task.rows(robot)
-        constraint_rows = self.constraint.rows(robot)
+        added_rows = self.added_task.rows(robot)
 
-        every = (*self.task, *self.constraint)
+        every = (*self.task, *self.added_task)
         weighted = () if objective is None else objective.terms_on(robot)
         functions = [f for task in every for f in (task.function, task.reference, Comparison(task))]
         program = Program(robot, [*functions, *(function for _, function in weighted)])
@@ -97,23 +102,26 @@ class Controller:
             for i, task in enumerate(every)
             for j, row in enumerate(task.rows(robot))
         ]
-        s, k, m = len(self.rows), len(constraint_rows), robot.n_u
-        setup = resolver.setup(Shape(s, k, robot.u_names, robot.groups))
+        s, k, m = len(self.rows), len(added_rows), robot.n_u
+        self._dimensions = dimensions = Dimensions(s, k, robot.u_names, robot.groups, (s,))
+        setup = resolver.setup(dimensions)
         program.pack(
-            [[s, k, m, resolver.kernel.address], table, first[3 * len(every) :], setup.options],
+            [[s, k, m, resolver.kernel.address], table, first[3 * len(every) :], setup.options, [s]],
             [
                 _gains(self.task, robot),
-                _gains(self.constraint, robot),
+                _gains(self.added_task, robot),
                 [weight for weight, _ in weighted],
-                setup.parameters,
+                setup.numbers,
+                row_scales(self.rows, robot),
+                row_scales(added_rows, robot),
             ],
-            [np.zeros((s + k) * (4 + m) + 1 + 2 * m + REPORT + robot.n)],
+            [np.zeros((s + k) * (4 + m) + 2 + 3 * m + 4 + robot.n)],
         )
         self._program = program
-        self._start = setup.state
-        self._state = setup.state.copy()
+        self.state: State = resolver.start(dimensions)
         self._results: Results = results(program.tables, program.memory)
-        self._u = self._results.u
+        self._results.dt[0] = np.nan
+        self._u = self._results.answer.u
         self._shape = (robot.n,)
         self._solve = self._solver()
 
@@ -133,7 +141,7 @@ class Controller:
             or not q.flags.carray
         ):
             q = self._copied(q)
-        if self._solve(float(t), q):
+        if self._solve(float(t), q) >= _FAILED:
             self._fail(t, q)
         return self._u.copy()
 
@@ -144,11 +152,12 @@ class Controller:
 
     def __reduce__(self) -> tuple[object, ...]:
         """Copies and pickles are built anew: views of memory and addresses of kernels do not travel."""
-        return type(self), (self.robot, self.task, self.resolver, self.objective, self.constraint)
+        return type(self), (self.robot, self.task, self.resolver, self.objective, self.added_task)
 
     def _solver(self) -> Callable[[float, Array], float]:
         """solve(t, q) -> status, with everything it needs at hand."""
-        program, state, found, resolver = self._program, self._state, self._results, self.resolver
+        program, found, resolver = self._program, self._results, self.resolver
+        state, dimensions = self.state.memory, self._dimensions
         prepare, tables, numbers, memory = program.prepare, program.tables, program.numbers, program.memory
 
         def solve(t: float, q: Array) -> float:
@@ -157,23 +166,23 @@ class Controller:
 
         def solve_and_finish(t: float, q: Array) -> float:
             solve(t, q)
-            resolver.finish(found.task.J, found.task.rate, found.h, found.u, found.report)
-            drive(found.u, program.buffers.G, found.q_dot)
-            return float(found.report[0])
+            resolver.finish(stated(found, tables, numbers), dimensions, found.answer)
+            drive(found.answer.u, program.buffers.G, found.q_dot)
+            return float(found.answer.status[0])
 
         return solve if type(resolver).finish is Resolver.finish else solve_and_finish
 
     def _fail(self, t: float, q: Array) -> None:
         self.robot.q(q)  # a q that is not finite is the caller's error
         problem = self.robot.platform.problem(q[: self.robot.platform.n_p])
-        status = Status(int(self._results.report[0]))
+        status = Status(int(self._results.answer.status[0]))
         also = "" if problem is None else f"; {problem}"
         raise SingularError(f"at t = {t:g} s: {status.meaning}{also}")
 
     def evaluate(self, t: float, q: ArrayLike) -> Step:
         """All quantities at (t, q); a singular matrix is reported in `status`, not raised.
 
-        Like a call, it may choose another partition (see `reset`).
+        Like a call, it may change what the resolver remembers (see `reset`).
         """
         q = self._copied(q)
         self._solve(float(t), q)
@@ -182,23 +191,24 @@ class Controller:
     def last(self, t: float, q: Array) -> Step:
         """The quantities of the call just made at (t, q), as copies."""
         found = self._results
-        task = found.task
+        task, answer = found.task, found.answer
         return Step(
             t=float(t),
             q=q.copy(),
             r=task.r.copy(),
-            target=task.target.copy(),
+            r_d=task.r_d.copy(),
             error=task.error.copy(),
             rate=task.rate.copy(),
             J=task.J.copy(),
             objective=float(found.H[0]),
             h=found.h.copy(),
-            u=found.u.copy(),
+            u=answer.u.copy(),
             q_dot=found.q_dot.copy(),
-            residual=float(found.report[1]),
-            status=Status(int(found.report[0])),
-            measure=abs(float(found.report[2])),
-            partition=self._state[1:].copy(),
+            status=Status(int(answer.status[0])),
+            scale=answer.scale.copy(),
+            residual=float(answer.residual[0]),
+            measure=float(answer.measure[0]),
+            partition=self.state.partition(len(self.rows)),
         )
 
     def velocity(self, t: float, q: ArrayLike) -> Array:
@@ -207,34 +217,19 @@ class Controller:
         return self._results.q_dot.copy()
 
     def reset(self) -> None:
-        """Forget the partition: the next call chooses it anew."""
-        self._state[:] = self._start
-
-    def hold_partition(self, hold: bool) -> None:
-        """Keep the partition through the calls that follow (the stages of an integration step), or not."""
-        self._state[0] = HELD if hold else FREE
+        """Forget what the resolver remembers: the next call decides anew."""
+        self.state.reset()
 
     @property
     def derivatives(self) -> tuple[Array, Array, Array]:
-        """What the inputs move, in the last call, as views: J (s, m), the constraint's (k, m), h (1, m)."""
+        """What the inputs move, in the last call, as views: J (s, m), the added task's (k, m), h (1, m)."""
         found = self._results
-        return found.task.J, found.constraint.J, found.h[np.newaxis]
+        return found.task.J, found.added.J, found.h[np.newaxis]
 
     def equation_solver(self) -> tuple[Callable[[float, Array], float], Array]:
         """(solve, J) for loops over many configurations: solve(t, q) does a step, whose matrix is then in the
         view J (s, m). q is (n,), float64, contiguous; nothing is checked."""
         return self._solve, self._results.task.J
-
-    @property
-    def partition_sign(self) -> int:
-        """Sign of det Ja in the last call (0 without a partition): between two signs Ja is singular."""
-        determinant = self._results.report[2] if self._state[1] >= 0 else 0.0
-        return int(determinant > 0.0) - int(determinant < 0.0)
-
-    @property
-    def partition_overdue(self) -> bool:
-        """Whether a call since `hold_partition(True)` kept a partition that is below its threshold."""
-        return bool(self._state[0] == OVERDUE)
 
 
 def _expect(given: object, kind: type, name: str) -> None:

@@ -13,16 +13,18 @@ import numpy as np
 
 from nmm.arrays import Array
 from nmm.functions.program import MEMORY, NUMBERS, SIZES, TABLES, Buffers, run
-from nmm.kernels.compiled import call_resolver, compiled, inlined, view
+from nmm.kernels.compiled import compiled, inlined, view
 from nmm.kernels.packing import section
-from nmm.resolvers.base import REPORT
+from nmm.resolvers.answer import NOT_FINITE, AnswerArrays
+from nmm.resolvers.base import call_resolver
+from nmm.resolvers.problem import ProblemArrays
 
 
 class Equation(NamedTuple):
-    """J u = rate for a stack of tasks: value r (s,), target (s,), error (s,), rate (s,), J (s, m)."""
+    """J u = rate for a stack of tasks: r (s,), desired r_d (s,), error (s,), rate (s,), J (s, m)."""
 
     r: Array
-    target: Array
+    r_d: Array
     error: Array
     rate: Array
     J: Array
@@ -31,25 +33,27 @@ class Equation(NamedTuple):
 class Results(NamedTuple):
     """What one step leaves behind, as views of one block of memory.
 
-    task, constraint : their equations
+    task, added : the equations of the task and of the extended Jacobian's added task
     H (1,), h (m,) : the objective and its gradient seen by the inputs
-    u (m,) : the inputs
-    report : [status, residual, measure]
+    before (m,), dt (1,) : the inputs of the step before, and for how long those of this one will stand, s
+    answer : the resolver's
     q_dot (n,) : S u
     """
 
     task: Equation
-    constraint: Equation
+    added: Equation
     H: Array
     h: Array
-    u: Array
-    report: Array
+    before: Array
+    dt: Array
+    answer: AnswerArrays
     q_dot: Array
 
 
 # Sections of the packed vectors, after the program's own.
-SHAPE, ROWS, TERMS, OPTIONS = TABLES, TABLES + 1, TABLES + 2, TABLES + 3
-GAINS, CONSTRAINT_GAINS, WEIGHTS, RESOLVER = NUMBERS, NUMBERS + 1, NUMBERS + 2, NUMBERS + 3
+SHAPE, ROWS, TERMS, OPTIONS, ENDS = TABLES, TABLES + 1, TABLES + 2, TABLES + 3, TABLES + 4
+GAINS, ADDED_GAINS, WEIGHTS, RESOLVER = NUMBERS, NUMBERS + 1, NUMBERS + 2, NUMBERS + 3
+SCALES, ADDED_SCALES = NUMBERS + 4, NUMBERS + 5
 BLOCK = MEMORY
 
 #: Instead of the row of an error that is computed: the error is target - value; an angle's, wrapped.
@@ -76,15 +80,23 @@ def results(tables: Array, memory: Array) -> Results:
     a = int(memory[BLOCK])
     b = a + s * (4 + m)
     c = b + k * (4 + m)
-    d = c + 1 + 2 * m
+    d = c + 2 + 2 * m
+    levels = section(tables, ENDS).shape[0]
     return Results(
         equation_views(s, m, memory, a),
         equation_views(k, m, memory, b),
         view(memory, c, (1,)),
         view(memory, c + 1, (m,)),
         view(memory, c + 1 + m, (m,)),
-        view(memory, d, (REPORT,)),
-        view(memory, d + REPORT, (section(tables, SIZES)[0],)),
+        view(memory, c + 1 + 2 * m, (1,)),
+        AnswerArrays(
+            view(memory, d, (m,)),
+            view(memory, d + m, (1,)),
+            view(memory, d + m + 1, (levels,)),
+            view(memory, d + m + 1 + levels, (1,)),
+            view(memory, d + m + 2 + levels, (1,)),
+        ),
+        view(memory, d + m + 3 + levels, (section(tables, SIZES)[0],)),
     )
 
 
@@ -126,7 +138,7 @@ def write_equation(rows: Array, gain: Array, b: Buffers, e: Equation) -> None:
         g = rows[3 * i + 1]
         compared = rows[3 * i + 2]
         e.r[i] = b.value[f]
-        e.target[i] = b.value[g]
+        e.r_d[i] = b.value[g]
         if compared >= 0:
             e.error[i] = b.value[compared]
             e.rate[i] = b.value_t[compared]
@@ -159,7 +171,7 @@ def step(t: float, q: Array, tables: Array, numbers: Array, memory: Array, state
     shape = section(tables, SHAPE)
     rows = section(tables, ROWS)
     write_equation(rows, section(numbers, GAINS), b, e.task)
-    write_equation(rows[3 * shape[0] :], section(numbers, CONSTRAINT_GAINS), b, e.constraint)
+    write_equation(rows[3 * shape[0] :], section(numbers, ADDED_GAINS), b, e.added)
     terms = section(tables, TERMS)
     weights = section(numbers, WEIGHTS)
     gradient = np.zeros((1, q.shape[0]))
@@ -169,22 +181,37 @@ def step(t: float, q: Array, tables: Array, numbers: Array, memory: Array, state
         for j in range(q.shape[0]):
             gradient[0, j] += weights[i] * b.value_q[terms[i], j]
     times_S(gradient, 0, b.G, e.h)
-    for j in range(e.u.shape[0]):
-        e.u[j] = math.nan  # what a resolver that finds no solution leaves behind
-    for j in range(e.report.shape[0]):
-        e.report[j] = math.nan
-    call_resolver(
-        shape[3],
+    answer = e.answer
+    for j in range(answer.u.shape[0]):
+        answer.u[j] = math.nan
+    answer.status[0] = NOT_FINITE
+    for level in range(answer.scale.shape[0]):
+        answer.scale[level] = 1.0
+    answer.residual[0] = math.nan
+    answer.measure[0] = math.nan
+    problem = stated(e, tables, numbers)
+    call_resolver(shape[3], problem, section(numbers, RESOLVER), section(tables, OPTIONS), state, answer)
+    drive(answer.u, b.G, e.q_dot)
+    return answer.status[0]
+
+
+@inlined
+def stated(e: Results, tables: Array, numbers: Array) -> ProblemArrays:
+    """The problem that the resolver gets; it has no limits."""
+    m = e.h.shape[0]
+    none = view(e.h, 0, (0,))
+    return ProblemArrays(
         e.task.J,
         e.task.rate,
-        e.constraint.J,
-        e.constraint.rate,
+        section(numbers, SCALES),
+        section(tables, ENDS),
+        e.added.J,
+        e.added.rate,
+        section(numbers, ADDED_SCALES),
         e.h,
-        section(numbers, RESOLVER),
-        section(tables, OPTIONS),
-        state,
-        e.u,
-        e.report,
+        view(e.h, 0, (0, m)),
+        none,
+        none,
+        e.before,
+        e.dt[0],
     )
-    drive(e.u, b.G, e.q_dot)
-    return e.report[0]

@@ -51,7 +51,7 @@ def _zero_columns(
     """Inputs whose columns are zero, wherever the robot stands, in all matrices (rows, n_u)."""
     largest = np.zeros(controller.robot.n_u)
     looked = False
-    state = controller._state.copy()
+    remembered = controller.state.snapshot()
     try:
         for q in _configurations(controller, controller.robot.q(q0)):
             controller.evaluate(0.0, q)
@@ -63,7 +63,7 @@ def _zero_columns(
     except Exception:  # a user's function may raise anything, where it was not made for
         return ()
     finally:
-        controller._state[:] = state
+        controller.state.restore(remembered)
     if not looked:
         return ()
     return tuple(

@@ -9,7 +9,7 @@ which kernels compute them; how they are run is `program.py`'s business.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -26,11 +26,24 @@ Array = NDArray[np.float64]
 
 
 class Row(NamedTuple):
-    """One component of a function: its name, its unit, and whether it is an angle whose differences wrap."""
+    """One component of a function.
+
+    name, unit : for people, and to tell metres from radians
+    angular : whether it is an angle whose differences wrap
+    scale : its natural size in its unit, against which ranks are judged; None for the robot's reach in
+        metres, and 1 in any other unit
+    """
 
     name: str
     unit: str
     angular: bool = False
+    scale: float | None = None
+
+
+def row_scales(rows: Sequence[Row], robot: Robot) -> Array:
+    """The natural size of each row in its unit, (s,): what a lost rank is measured by."""
+    natural = {"m": robot.reach}
+    return np.array([natural.get(row.unit, 1.0) if row.scale is None else row.scale for row in rows])
 
 
 class Evaluation(NamedTuple):

@@ -29,26 +29,23 @@ from numba.extending import intrinsic, overload
 
 Plain = Callable[..., None]
 
-_scalar = types.float64
-_vector = types.float64[::1]
-_matrix = types.float64[:, ::1]
+#: What the arguments of kernels are made of.
+SCALAR = types.float64
+VECTOR = types.float64[::1]
+MATRIX = types.float64[:, ::1]
 _stack = types.float64[:, :, ::1]
 _stack4 = types.float64[:, :, :, ::1]
-_integers = types.int64[::1]
+INTEGERS = types.int64[::1]
 
 #: y = phi(t, q), its partial derivative in time and its Jacobian in the coordinates:
 #: (t, q, placements, jacobians, hessians, G, G_q, slots, parameters, value, value_t, value_q)
 #: with frame k of the function at placements[slots[k]] (3, 4) = [R | p], jacobians[slots[k]] (6, n),
 #: hessians[slots[k]] (6, n, n); value_t and value_q (rows, n) come filled with zeros.
 FUNCTION = types.void(
-    _scalar, _vector, _stack, _stack, _stack4, _matrix, _stack, _integers, _vector, _vector, _vector, _matrix
+    SCALAR, VECTOR, _stack, _stack, _stack4, MATRIX, _stack, INTEGERS, VECTOR, VECTOR, VECTOR, MATRIX
 )
 #: qp_dot = G(qp) up: (qp, parameters, G, G_q) with G_q[i, j, k] = dG[i, j] / dqp[k]
-PLATFORM = types.void(_vector, _vector, _matrix, _stack)
-#: u from J u = rate and the gradient h: (J, rate, Jc, rate_c, h, parameters, options, state, u, report)
-RESOLVER = types.void(
-    _matrix, _vector, _matrix, _vector, _vector, _vector, _integers, _integers, _vector, _vector
-)
+PLATFORM = types.void(VECTOR, VECTOR, MATRIX, _stack)
 
 
 class Kernel:
@@ -183,7 +180,7 @@ def _view_overload(memory: Any, first: Any, shape: Any) -> Any:
     return through
 
 
-def _caller(signature: Any) -> Callable[..., None]:
+def caller(signature: Any) -> Callable[..., None]:
     """A function `call(address, *arguments)` for kernels of one signature, plain and compiled."""
 
     def call(address: int, *arguments: Any) -> None:
@@ -213,6 +210,5 @@ def _caller(signature: Any) -> Callable[..., None]:
     return call
 
 
-call_function = _caller(FUNCTION)
-call_platform = _caller(PLATFORM)
-call_resolver = _caller(RESOLVER)
+call_function = caller(FUNCTION)
+call_platform = caller(PLATFORM)

@@ -16,14 +16,19 @@ from nmm.kernels.compiled import compiled
 
 
 @compiled
-def orthonormal_rows(J: Array, order: Array, L: Array, Q: Array) -> float:
-    """J[order] = L Q, L lower triangular with L[i, i] > 0 falling, Q Qᵀ = I. Returns L[s-1, s-1] / L[0, 0].
+def orthonormal_rows(J: Array, row_scales: Array, order: Array, L: Array, Q: Array) -> float:
+    """J[order] = L Q, L lower triangular with L[i, i] > 0, Q Qᵀ = I. Returns how regular J is.
 
     Gram-Schmidt on the rows, the largest remainder first, twice over so that Q is orthonormal to
-    machine precision whatever J's condition. The ratio is 0 for a J without full row rank (to
-    machine precision) and estimates 1 / cond(J). J (s, m), order (s,) integers, L (s, s), Q (s, m).
+    machine precision whatever J's condition. Rows are compared in their scales: the pivots L[i, i] /
+    row_scales[order[i]] fall, and the last of them, over the first if that is above 1, is returned. It is
+    0 for a J without full row rank (to machine precision), and about σ_min of the scaled J where its
+    largest singular value is below 1, or 1 / cond.
+    J (s, m), row_scales (s,), order (s,) integers, L (s, s), Q (s, m).
     """
     s, m = J.shape
+    first = 0.0
+    last = 0.0
     for i in range(s):
         order[i] = i
         for j in range(m):
@@ -37,6 +42,7 @@ def orthonormal_rows(J: Array, order: Array, L: Array, Q: Array) -> float:
             square = 0.0
             for j in range(m):
                 square += Q[k, j] * Q[k, j]
+            square /= row_scales[order[k]] * row_scales[order[k]]
             if square > largest:
                 largest = square
                 pivot = k
@@ -58,7 +64,10 @@ def orthonormal_rows(J: Array, order: Array, L: Array, Q: Array) -> float:
             norm += Q[i, j] * Q[i, j]
         norm = math.sqrt(norm)
         L[i, i] = norm
-        if norm <= 1e-15 * L[0, 0] or norm == 0.0:
+        last = norm / row_scales[order[i]]
+        if i == 0:
+            first = last
+        if last <= 1e-15 * first or norm == 0.0:
             return 0.0
         for j in range(m):
             Q[i, j] /= norm
@@ -69,7 +78,7 @@ def orthonormal_rows(J: Array, order: Array, L: Array, Q: Array) -> float:
             L[k, i] = overlap
             for j in range(m):
                 Q[k, j] -= overlap * Q[i, j]
-    return L[s - 1, s - 1] / L[0, 0]
+    return last / max(1.0, first)
 
 
 @compiled
@@ -108,11 +117,12 @@ def pseudoinverse_transposed(order: Array, L: Array, Q: Array, X: Array) -> None
 
 
 @compiled
-def eliminate(M: Array) -> tuple[float, float]:
+def eliminate(M: Array, row_scales: Array) -> tuple[float, float]:
     """Solve A X = B in place: M = [A B], shape (s, s + k), becomes [*, X].
 
-    Gaussian elimination with partial pivoting. Returns det A and the ratio of the smallest to the
-    largest pivot; when a pivot is zero both are 0 and there is no solution.
+    Gaussian elimination with partial pivoting, rows compared in their scales. Returns det A, and how
+    regular A is: its smallest pivot in its row's scale, over the largest if that is above 1; when a pivot
+    is zero both are 0 and there is no solution. row_scales (s,) is put into the pivots' order.
     """
     s, width = M.shape
     determinant = 1.0
@@ -121,15 +131,16 @@ def eliminate(M: Array) -> tuple[float, float]:
     for i in range(s):
         pivot = i
         for row in range(i + 1, s):
-            if abs(M[row, i]) > abs(M[pivot, i]):
+            if abs(M[row, i]) * row_scales[pivot] > abs(M[pivot, i]) * row_scales[row]:
                 pivot = row
-        size = abs(M[pivot, i])
+        size = abs(M[pivot, i]) / row_scales[pivot]
         if size == 0.0:
             return 0.0, 0.0
         smallest = min(smallest, size)
         largest = max(largest, size)
         if pivot != i:
             determinant = -determinant
+            row_scales[i], row_scales[pivot] = row_scales[pivot], row_scales[i]
             for j in range(i, width):
                 M[i, j], M[pivot, j] = M[pivot, j], M[i, j]
         determinant *= M[i, i]
@@ -143,7 +154,9 @@ def eliminate(M: Array) -> tuple[float, float]:
             for row in range(i + 1, s):
                 x -= M[i, row] * M[row, j]
             M[i, j] = x / M[i, i]
-    return determinant, smallest / largest if largest > 0.0 else math.nan
+    if math.isnan(determinant):
+        return math.nan, math.nan
+    return determinant, smallest / max(1.0, largest)
 
 
 @compiled

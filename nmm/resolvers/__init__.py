@@ -1,10 +1,13 @@
 """Resolvers: one file each. `RESOLVERS` finds them by name."""
 
-from nmm.resolvers.base import Resolution, Resolver, Setup, Shape, Status
+from nmm.resolvers.answer import Answer, Status
+from nmm.resolvers.base import Resolver, Setup
 from nmm.resolvers.callable_resolver import CallableResolver
 from nmm.resolvers.extended_jacobian import ExtendedJacobian
+from nmm.resolvers.problem import Dimensions, Problem
 from nmm.resolvers.projected_gradient import ProjectedGradient
 from nmm.resolvers.reduced_gradient import ReducedGradient
+from nmm.resolvers.state import State
 
 RESOLVERS: dict[str, type[Resolver]] = {
     kind.name: kind for kind in (ReducedGradient, ProjectedGradient, ExtendedJacobian)
@@ -12,13 +15,15 @@ RESOLVERS: dict[str, type[Resolver]] = {
 
 __all__ = [
     "RESOLVERS",
+    "Answer",
     "CallableResolver",
+    "Dimensions",
     "ExtendedJacobian",
+    "Problem",
     "ProjectedGradient",
     "ReducedGradient",
-    "Resolution",
     "Resolver",
     "Setup",
-    "Shape",
+    "State",
     "Status",
 ]

@@ -8,54 +8,67 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array
+from nmm.arrays import Array, Integers
 from nmm.errors import InputError
-from nmm.kernels.compiled import RESOLVER, Kernel, kernel
-from nmm.kernels.linear_algebra import residual_norm
-from nmm.resolvers.base import Resolver, Setup, Shape, Status
+from nmm.kernels.compiled import Kernel, kernel
+from nmm.resolvers.answer import Answer, AnswerArrays, Status, certify
+from nmm.resolvers.base import NO_OPTIONS, RESOLVER, Resolver, Setup
+from nmm.resolvers.problem import Dimensions, Problem, ProblemArrays
 
 
 @kernel(RESOLVER)
 def left_to_python(
-    J: Array, rate: Array, Jc: Array, rate_c: Array, h: Array,
-    parameters: Array, options: Array, state: Array, u: Array, report: Array,
-) -> None:  # fmt: skip
-    """Nothing: the compiled step stops short of the inputs, and `CallableResolver.finish` finds them."""
-    u[:] = 0.0
-    report[0] = 0.0
+    problem: ProblemArrays, numbers: Array, options: Integers, state: Integers, answer: AnswerArrays
+) -> None:
+    """No inputs yet: the compiled step stops short of them, and `CallableResolver.finish` finds them."""
+    for j in range(answer.u.shape[0]):
+        answer.u[j] = 0.0
 
 
 class CallableResolver(Resolver):
-    """u from a Python function of (J, rate, h): arrays of shapes (s, m), (s,), (m,), to one of (m,).
+    """u from a Python function of a `Problem` (problem.J, .rate, .h, ...): (m,) inputs, or an `Answer`.
+
+    J u is compared with the rate: an answer that differs is INEXACT, which a run tells. A function that
+    scales or damps the rate on purpose says so: it returns an `Answer` with status RELAXED and its scale.
 
     Parameters
     ----------
-    function : (J, rate, h) -> u; it may raise `numpy.linalg.LinAlgError` when J is singular
+    function : problem -> u; it may raise `numpy.linalg.LinAlgError` when J is singular
     """
 
     name: ClassVar[str] = "callable"
 
-    def __init__(self, function: Callable[[Array, Array, Array], ArrayLike]) -> None:
+    def __init__(self, function: Callable[[Problem], ArrayLike | Answer]) -> None:
         self.function = function
 
     @property
     def kernel(self) -> Kernel:
         return left_to_python
 
-    def setup(self, shape: Shape) -> Setup:
-        self.check(shape)
-        return Setup(np.zeros(0), np.zeros(0, dtype=np.int64), np.full(1 + shape.s, -1, dtype=np.int64))
+    def setup(self, dimensions: Dimensions) -> Setup:
+        self.check(dimensions)
+        return Setup(np.zeros(0), NO_OPTIONS)
 
-    def finish(self, J: Array, rate: Array, h: Array, u: Array, report: Array) -> None:
-        report[:] = (0.0, np.nan, np.nan)
-        try:
-            found = np.asarray(self.function(J.copy(), rate.copy(), h.copy()), dtype=np.float64)
-        except np.linalg.LinAlgError:
-            report[0] = Status.SINGULAR_J
+    def finish(self, problem: ProblemArrays, dimensions: Dimensions, answer: AnswerArrays) -> None:
+        answer.measure[0] = np.nan
+        if not all(np.all(np.isfinite(given)) for given in (problem.J, problem.rate, problem.h)):
+            answer.status[0] = Status.NOT_FINITE
             return
-        if found.shape != u.shape:
-            raise InputError(f"callable resolver: expected u of shape {u.shape}, got {found.shape}")
-        u[:] = found
-        report[1] = residual_norm(J, u, rate)
-        if not np.isfinite(report[1]):
-            report[0] = Status.NOT_FINITE
+        given = {name: value for name, value in problem._asdict().items() if name != "ends"}
+        levels = np.diff(problem.ends, prepend=0).tolist()
+        asked = Problem(**given, inputs=dimensions.inputs, groups=dimensions.groups, levels=levels)
+        try:
+            found = self.function(asked)
+        except np.linalg.LinAlgError:
+            answer.status[0] = Status.SINGULAR_J
+            return
+        u = np.asarray(found.u if isinstance(found, Answer) else found, dtype=np.float64)
+        if u.shape != answer.u.shape:
+            raise InputError(f"callable resolver: expected u of shape {answer.u.shape}, got {u.shape}")
+        answer.u[:] = u
+        certify(problem, answer)
+        if isinstance(found, Answer):
+            answer.measure[0] = found.measure
+            if found.status is not Status.SOLVED and answer.status[0] < Status.SINGULAR_J:
+                answer.status[0] = found.status
+                answer.scale[:] = found.scale

@@ -1,58 +1,63 @@
-"""Extended Jacobian: as many added constraints as there is redundancy, then one inverse (paper, III-A)."""
+"""Extended Jacobian: as many added rows as there is redundancy, then one inverse (paper, III-A)."""
 
 from __future__ import annotations
 
-import math
 from typing import ClassVar
 
 import numpy as np
 
-from nmm.arrays import Array, positive
+from nmm.arrays import Array, Integers, positive
 from nmm.errors import InputError
-from nmm.kernels.compiled import RESOLVER, Kernel, kernel
-from nmm.kernels.linear_algebra import eliminate, orthonormal_rows, residual_norm
-from nmm.resolvers.base import Resolver, Setup, Shape
+from nmm.kernels.compiled import Kernel, kernel
+from nmm.kernels.linear_algebra import eliminate, orthonormal_rows
+from nmm.resolvers.answer import SINGULAR_J, SINGULAR_JE, AnswerArrays, certify
+from nmm.resolvers.base import NO_OPTIONS, RESOLVER, Resolver, Setup
+from nmm.resolvers.problem import Dimensions, ProblemArrays
+
+TOLERANCE = 0
 
 
 @kernel(RESOLVER)
 def extended_jacobian(
-    J: Array, rate: Array, Jc: Array, rate_c: Array, h: Array,
-    parameters: Array, options: Array, state: Array, u: Array, report: Array,
-) -> None:  # fmt: skip
-    """[J; Jc] u = [rate; rate_c]; parameters = [tolerance]."""
+    problem: ProblemArrays, numbers: Array, options: Integers, state: Integers, answer: AnswerArrays
+) -> None:
+    """[J; J_added] u = [rate; rate_added]."""
+    J = problem.J
     s, m = J.shape
     M = np.empty((m, m + 1))
+    scales = np.empty(m)
     for i in range(m):
         for j in range(m):
-            M[i, j] = J[i, j] if i < s else Jc[i - s, j]
-        M[i, m] = rate[i] if i < s else rate_c[i - s]
-    _, ratio = eliminate(M)
-    report[2] = ratio
-    if ratio <= parameters[0]:
+            M[i, j] = J[i, j] if i < s else problem.added_J[i - s, j]
+        M[i, m] = problem.rate[i] if i < s else problem.added_rate[i - s]
+        scales[i] = problem.row_scales[i] if i < s else problem.added_row_scales[i - s]
+    _, answer.measure[0] = eliminate(M, scales)
+    if answer.measure[0] <= numbers[TOLERANCE]:
         order = np.empty(s, dtype=np.int64)
         L = np.empty((s, s))
         Q = np.empty((s, m))
-        report[0] = 1.0 if orthonormal_rows(J, order, L, Q) <= parameters[0] else 3.0
+        regular = orthonormal_rows(J, problem.row_scales, order, L, Q) > numbers[TOLERANCE]
+        answer.status[0] = SINGULAR_JE if regular else SINGULAR_J
         return
     for j in range(m):
-        u[j] = M[j, m]
-    report[1] = residual_norm(J, u, rate)
-    report[0] = 0.0 if math.isfinite(report[1]) else 4.0
+        answer.u[j] = M[j, m]
+    certify(problem, answer)
 
 
 class ExtendedJacobian(Resolver):
-    """u = J_e⁻¹ [rate; y_dot + K_y (y_d - y)] with the constraint y = h(q) (paper, section III-A).
+    """u = J_e⁻¹ [rate; y_dot + K_y (y_d - y)] with the added task y = h(q) (paper, section III-A).
 
-    The constraint is a second task with as many rows as the first leaves free, k = p + n_m - s;
-    the controller takes it (`Controller(..., constraint=...)`).
+    The added task has as many rows as the first leaves free, k = p + n_m - s; the controller takes it
+    (`Controller(..., added_task=...)`).
 
     Parameters
     ----------
-    tolerance : J_e counts as singular below this ratio of smallest to largest pivot
+    tolerance : J_e counts as singular where its last pivot, rows in their natural scales, is below this,
+        times the largest pivot if that is above 1
     """
 
     name: ClassVar[str] = "ej"
-    uses_constraint: ClassVar[bool] = True
+    takes_added_task: ClassVar[bool] = True
 
     def __init__(self, tolerance: float = 1e-10) -> None:
         self.tolerance = positive(tolerance, "tolerance")
@@ -61,12 +66,12 @@ class ExtendedJacobian(Resolver):
     def kernel(self) -> Kernel:
         return extended_jacobian
 
-    def setup(self, shape: Shape) -> Setup:
-        self.check(shape)
-        if shape.s + shape.k != shape.m:
+    def setup(self, dimensions: Dimensions) -> Setup:
+        self.check(dimensions)
+        free = dimensions.m - dimensions.s
+        if dimensions.k != free:
             raise InputError(
-                f"constraint: expected {shape.m - shape.s} rows ({shape.m} inputs less {shape.s} rows of "
-                f"the task), got {shape.k}"
+                f"added_task: expected {free} rows ({dimensions.m} inputs less {dimensions.s} rows of the "
+                f"task), got {dimensions.k}"
             )
-        state = np.full(1 + shape.s, -1, dtype=np.int64)
-        return Setup(np.array([self.tolerance]), np.zeros(0, dtype=np.int64), state)
+        return Setup(np.array([self.tolerance]), NO_OPTIONS)

@@ -2,61 +2,65 @@
 
 from __future__ import annotations
 
-import math
 from typing import ClassVar
 
 import numpy as np
 
-from nmm.arrays import Array, positive
-from nmm.kernels.compiled import RESOLVER, Kernel, kernel
-from nmm.kernels.linear_algebra import closest_solution, orthonormal_rows, residual_norm
-from nmm.resolvers.base import Resolver, Setup, Shape
+from nmm.arrays import Array, Integers, positive
+from nmm.kernels.compiled import Kernel, kernel, view
+from nmm.kernels.linear_algebra import closest_solution, orthonormal_rows
+from nmm.resolvers.answer import SINGULAR_J, AnswerArrays, certify
+from nmm.resolvers.base import NO_OPTIONS, RESOLVER, Resolver, Setup
+from nmm.resolvers.problem import Dimensions, ProblemArrays
 from nmm.resolvers.weights import Weights, weight_matrix
+
+#: Numbers: α, the tolerance and, with weights, C row after row.
+ALPHA, TOLERANCE, C = 0, 1, 2
 
 
 @kernel(RESOLVER)
 def projected_gradient(
-    J: Array, rate: Array, Jc: Array, rate_c: Array, h: Array,
-    parameters: Array, options: Array, state: Array, u: Array, report: Array,
-) -> None:  # fmt: skip
+    problem: ProblemArrays, numbers: Array, options: Integers, state: Integers, answer: AnswerArrays
+) -> None:
     """u = J⁺ rate - α (I - J⁺ J) h, with J⁺ J = Qᵀ Q from J's orthonormal rows.
 
     With weights, in the coordinates ũ = C⁻¹ u in which the weighted norm is the Euclidean one.
-    parameters = [α, tolerance, C row after row], options = [weighted].
     """
+    J, h, u = problem.J, problem.h, answer.u
     s, m = J.shape
+    alpha = numbers[ALPHA]
     order = np.empty(s, dtype=np.int64)
     L = np.empty((s, s))
     Q = np.empty((s, m))
     u0 = np.empty(m)
-    if options[0] == 0:
+    if numbers.shape[0] == C:
         for j in range(m):
-            u0[j] = -parameters[0] * h[j]
-        report[2] = orthonormal_rows(J, order, L, Q)
-        if report[2] > parameters[1]:
-            closest_solution(rate, u0, order, L, Q, u)
+            u0[j] = -alpha * h[j]
+        answer.measure[0] = orthonormal_rows(J, problem.row_scales, order, L, Q)
+        if answer.measure[0] <= numbers[TOLERANCE]:
+            answer.status[0] = SINGULAR_J
+            return
+        closest_solution(problem.rate, u0, order, L, Q, u)
     else:
-        C = parameters[2:].reshape((m, m))
+        W = view(numbers, C, (m, m))
         weighted_J = np.zeros((s, m))
-        solution = np.empty(m)
         for j in range(m):
             u0[j] = 0.0
             for k in range(m):
-                u0[j] -= parameters[0] * C[k, j] * h[k]
+                u0[j] -= alpha * W[k, j] * h[k]
                 for i in range(s):
-                    weighted_J[i, j] += J[i, k] * C[k, j]
-        report[2] = orthonormal_rows(weighted_J, order, L, Q)
-        if report[2] > parameters[1]:
-            closest_solution(rate, u0, order, L, Q, solution)
-            for j in range(m):
-                u[j] = 0.0
-                for k in range(m):
-                    u[j] += C[j, k] * solution[k]
-    if report[2] <= parameters[1]:
-        report[0] = 1.0
-        return
-    report[1] = residual_norm(J, u, rate)
-    report[0] = 0.0 if math.isfinite(report[1]) else 4.0
+                    weighted_J[i, j] += J[i, k] * W[k, j]
+        answer.measure[0] = orthonormal_rows(weighted_J, problem.row_scales, order, L, Q)
+        if answer.measure[0] <= numbers[TOLERANCE]:
+            answer.status[0] = SINGULAR_J
+            return
+        solution = np.empty(m)
+        closest_solution(problem.rate, u0, order, L, Q, solution)
+        for j in range(m):
+            u[j] = 0.0
+            for k in range(m):
+                u[j] += W[j, k] * solution[k]
+    certify(problem, answer)
 
 
 class ProjectedGradient(Resolver):
@@ -72,8 +76,8 @@ class ProjectedGradient(Resolver):
     weights : None; m positive numbers; a mapping from names of inputs or of their groups ("platform",
         "arm"), 1 for the rest: a large weight spares the input; or a symmetric positive definite
         (m, m) matrix
-    tolerance : J counts as singular below this ratio of smallest to largest pivot, whatever the
-        rows' units: rows of very different size want to be scaled first
+    tolerance : J counts as singular where its last pivot, rows in their natural scales, is below this,
+        times the first pivot if that is above 1
     """
 
     name: ClassVar[str] = "pg"
@@ -92,11 +96,9 @@ class ProjectedGradient(Resolver):
     def kernel(self) -> Kernel:
         return projected_gradient
 
-    def setup(self, shape: Shape) -> Setup:
-        self.check(shape)
-        state = np.full(1 + shape.s, -1, dtype=np.int64)
-        head = np.array([self.alpha, self.tolerance])
-        if self.weights is None:
-            return Setup(head, np.zeros(1, dtype=np.int64), state)
-        C = np.linalg.inv(np.linalg.cholesky(weight_matrix(self.weights, shape))).T
-        return Setup(np.concatenate([head, C.ravel()]), np.ones(1, dtype=np.int64), state)
+    def setup(self, dimensions: Dimensions) -> Setup:
+        self.check(dimensions)
+        C = np.zeros(0)
+        if self.weights is not None:
+            C = np.linalg.inv(np.linalg.cholesky(weight_matrix(self.weights, dimensions))).T
+        return Setup(np.array([self.alpha, self.tolerance, *C.ravel()]), NO_OPTIONS)

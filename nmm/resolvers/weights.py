@@ -9,13 +9,13 @@ from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, array, scalar
 from nmm.errors import InputError, unknown
-from nmm.resolvers.base import Shape
+from nmm.resolvers.problem import Dimensions
 
 #: Numbers above 0: by input or by group ("platform", "arm"), an input's own deciding; 1 for the rest.
 Weights = ArrayLike | Mapping[str, float]
 
 
-def weight_matrix(weights: Weights, shape: Shape) -> Array:
+def weight_matrix(weights: Weights, dimensions: Dimensions) -> Array:
     """W (m, m), symmetric positive definite, of the norm sqrt(uᵀ W u).
 
     Raises
@@ -23,37 +23,38 @@ def weight_matrix(weights: Weights, shape: Shape) -> Array:
     InputError : an unknown name, a wrong number of weights, weights that are not positive (definite)
     """
     if isinstance(weights, Mapping):
-        W = np.diag(_by_name(weights, shape))
+        W = np.diag(_by_name(weights, dimensions))
     else:
         given = array(weights, "weights")
         W = np.diag(given) if given.ndim == 1 else given
-    if W.shape != (shape.m, shape.m):
-        raise InputError(
-            f"weights: expected {shape.m} numbers or a {shape.m} x {shape.m} matrix, got {W.shape}"
-        )
+    m = dimensions.m
+    if W.shape != (m, m):
+        raise InputError(f"weights: expected {m} numbers or a {m} x {m} matrix, got {W.shape}")
     if not np.array_equal(W, W.T) or np.linalg.eigvalsh(W).min() <= 0.0:
         raise InputError("weights: expected numbers above 0, or a symmetric positive definite matrix")
     return W
 
 
-def weight_diagonal(weights: Weights, shape: Shape) -> Array:
+def weight_diagonal(weights: Weights, dimensions: Dimensions) -> Array:
     """The diagonal of W, (m,); `InputError` also for a W that is not diagonal, which couples the inputs."""
-    W = weight_matrix(weights, shape)
+    W = weight_matrix(weights, dimensions)
     diagonal = np.diag(W).copy()
     if np.any(np.diag(diagonal) != W):
         raise InputError("weights: expected a number for each input (a matrix that couples inputs is for pg)")
     return diagonal
 
 
-def _by_name(weights: Mapping[str, float], shape: Shape) -> Array:
-    diagonal = np.ones(shape.m)
+def _by_name(weights: Mapping[str, float], dimensions: Dimensions) -> Array:
+    diagonal = np.ones(dimensions.m)
     for name in weights:
-        if name not in shape.inputs and name not in shape.groups:
-            raise InputError(unknown("input or group", name, [*shape.inputs, *shape.groups], "weights"))
+        if name not in dimensions.inputs and name not in dimensions.groups:
+            raise InputError(
+                unknown("input or group", name, [*dimensions.inputs, *dimensions.groups], "weights")
+            )
     # An input's own weight has the last word, a smaller group's the one before.
-    order = sorted(weights, key=lambda name: name in shape.inputs or -len(shape.groups[name]))
+    order = sorted(weights, key=lambda name: name in dimensions.inputs or -len(dimensions.groups[name]))
     for name in order:
-        members = (name,) if name in shape.inputs else shape.groups[name]
+        members = (name,) if name in dimensions.inputs else dimensions.groups[name]
         for member in members:
-            diagonal[shape.inputs.index(member)] = scalar(weights[name], f"weight of {name}")
+            diagonal[dimensions.inputs.index(member)] = scalar(weights[name], f"weight of {name}")
     return diagonal

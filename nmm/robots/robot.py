@@ -262,6 +262,32 @@ class Robot:
         except InputError as error:
             raise InputError(f"{error} (robot {self.name} has q = {', '.join(self.q_names)})") from None
 
+    @cached_property
+    def reach(self) -> float:
+        """How far the arms reach from their first joints at most, m: the natural length of the robot.
+
+        The longest sum of lengths from joint to joint and on to a frame, with what prismatic joints add
+        within their limits; 1 for a robot without arms.
+        """
+        model, first = self.model, self.platform.n_p
+        sums = np.zeros(model.njoints)
+        for joint in range(1, model.njoints):
+            index, parent = model.joints[joint].idx_q, int(model.parents[joint])
+            if index < first:
+                continue
+            on_arm = parent > 0 and model.joints[parent].idx_q >= first
+            offset = float(np.linalg.norm(model.jointPlacements[joint].translation)) if on_arm else 0.0
+            travel = 0.0
+            if self.q_units[index] == "m" and np.all(self.limited[index]):
+                travel = float(np.abs(self.q_limits[index]).max())
+            sums[joint] = (sums[parent] if on_arm else 0.0) + offset + travel
+        ends = [
+            sums[frame.parentJoint] + float(np.linalg.norm(frame.placement.translation))
+            for frame in model.frames
+            if frame.parentJoint > 0 and model.joints[frame.parentJoint].idx_q >= first
+        ]
+        return max(ends, default=0.0) or 1.0
+
     @property
     def rest(self) -> Array:
         """The configuration nearest to zero within the limits, (n,)."""

@@ -90,21 +90,17 @@ class Recorder:
         self._u[k] = sample.u
         self._q_dot[k] = sample.q_dot
         self._rows[0, k] = sample.r
-        self._rows[1, k] = sample.target
+        self._rows[1, k] = sample.r_d
         self._rows[2, k] = sample.error
         self._scalars[0, k] = sample.objective
         self._scalars[1, k] = sample.residual
         self._J[k] = sample.J
         self._partition[k] = sample.partition
 
-    def warn_of_partition(self, sample: Step) -> None:
-        """Ja became singular after this sample, and no candidate was better: said once a run."""
-        names = ", ".join(self._controller.robot.u_names[column] for column in sample.partition)
-        warning = f"the block Ja of [{names}] became singular and no other candidate was better"
-        if not any(warning in said for said in self.warnings):
-            automatic = getattr(self._controller.resolver, "automatic", False)
-            advice = "J itself is close to losing rank" if automatic else "give more partitions"
-            self.warnings.append(f"at t = {sample.t:.3g} s {warning}: {advice}")
+    def warn_once(self, t: float, warning: str) -> None:
+        """A warning about the time t, s, said once a run; an empty one is none."""
+        if warning and not any(warning in said for said in self.warnings):
+            self.warnings.append(f"at t = {t:.3g} s {warning}")
 
     def _warn_of_singularities(self, singular_values: Array) -> None:
         if not len(singular_values):

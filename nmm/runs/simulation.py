@@ -38,9 +38,9 @@ def simulate(
 ) -> Trajectory:
     """Integrate q_dot = S(q) u(t, q) from q0 over `duration`, sampled every dt.
 
-    The partition of the reduced gradient is decided at the samples and kept between them, as a
-    sampled controller does, so that an integration step sees one smooth right-hand side. A step on
-    which the partition falls below its threshold is taken again, with the best one at its beginning.
+    What a resolver decides from call to call (the reduced gradient's partition) is decided at the samples
+    and kept between them, as a sampled controller does, so that an integration step sees one smooth
+    right-hand side. A step on which that does not hold is taken again, decided anew at its beginning.
 
     Parameters
     ----------
@@ -94,8 +94,6 @@ def simulate(
         outcome, message = Outcome.FAILED, str(error)
     except KeyboardInterrupt:
         outcome, message = Outcome.INTERRUPTED, f"interrupted after {recorder.reached:g} s of {duration:g} s"
-    finally:
-        controller.hold_partition(False)
     try:
         unstable, examined = _examine(controller, recorder, advance, dt)
     except KeyboardInterrupt:  # the motion is there; what is lost is advice
@@ -124,34 +122,51 @@ def _integrate(
 ) -> None:
     """From sample to sample, recording each.
 
-    A step on which the partition became singular is taken again with the best one at its beginning:
-    one that fell below its threshold at a stage, or whose determinant has another sign after it.
+    A step that the resolver's state does not let stand is taken again, decided anew at its beginning; if
+    that may not stand either, it is taken with the decisions free at its stages.
     """
-    steps = len(times) - 1
-    sample, sign = _sample(controller, float(times[0]), q), controller.partition_sign
+    state, steps = controller.state, len(times) - 1
+    sample = _sample(controller, float(times[0]), q)
     recorder.add(sample)
     for k in range(steps):
-        t, dt = float(times[k + 1]), float(times[k + 1] - times[k])
-        q, singular = _advance(controller, advance, sample, dt)
-        if not singular:
-            ahead = _sample(controller, t, q)
-            singular = sign * controller.partition_sign < 0 and np.array_equal(
-                ahead.partition, sample.partition
-            )
-        if singular:
-            controller.reset()
-            sample, sign = _sample(controller, sample.t, sample.q), controller.partition_sign
+        t = float(times[k + 1])
+        ahead = _advanced(controller, advance, sample, t)
+        if ahead is None:
+            state.reset()
+            sample = _sample(controller, sample.t, sample.q)
             recorder.replace_last(sample)
-            q, _ = _advance(controller, advance, sample, dt)
-            ahead = _sample(controller, t, q)
-            if sign * controller.partition_sign < 0 and np.array_equal(ahead.partition, sample.partition):
-                recorder.warn_of_partition(sample)
-        sample, sign = ahead, controller.partition_sign
+            before = state.snapshot()
+            ahead = _advanced(controller, advance, sample, t)
+            if ahead is None:
+                recorder.warn_once(sample.t, state.reservation(before, controller.robot.u_names))
+                ahead = _sample(controller, t, _integrated(controller, advance, sample, t))
+        sample = ahead
         recorder.add(sample)
         if progress is not None and k % max(1, steps // 100) == 0:
             progress(k / steps)
     if progress is not None:
         progress(1.0)
+
+
+def _advanced(controller: Controller, advance: Integrator, sample: Step, t: float) -> Step | None:
+    """The next sample, at t; None where the step to it may not stand."""
+    state = controller.state
+    before = state.snapshot()
+    try:
+        with state.held():
+            q = _integrated(controller, advance, sample, t)
+    except SingularError:
+        if state.may_stand(before):
+            raise
+        return None
+    if not state.may_stand(before):
+        return None
+    ahead = _sample(controller, t, q)
+    return ahead if state.may_stand(before) else None
+
+
+def _integrated(controller: Controller, advance: Integrator, sample: Step, t: float) -> Array:
+    return advance.advance(controller.velocity, sample.t, sample.q, sample.q_dot, sample.u, t - sample.t)
 
 
 def _sample(controller: Controller, t: float, q: Array) -> Step:
@@ -162,20 +177,6 @@ def _sample(controller: Controller, t: float, q: Array) -> Step:
     if not sample.u.dot(sample.u) < BOUND**2:
         raise DivergedError(f"at t = {t:g} s the motion has diverged: the inputs are beyond {BOUND:g}")
     return sample
-
-
-def _advance(controller: Controller, advance: Integrator, sample: Step, dt: float) -> tuple[Array, bool]:
-    """The next q, and whether the partition held through the step fell below its threshold at a stage."""
-    controller.hold_partition(True)
-    try:
-        ahead = advance.advance(controller.velocity, sample.t, sample.q, sample.q_dot, sample.u, dt)
-        return ahead, controller.partition_overdue
-    except SingularError:
-        if not controller.partition_overdue:
-            raise
-        return sample.q, True
-    finally:
-        controller.hold_partition(False)
 
 
 def _examine(

@@ -34,16 +34,13 @@ class Instability:
 def linearisation(controller: Controller, t: float, q: Array) -> Array:
     """F = ∂(S u)/∂q of the closed loop at (t, q), shape (n, n), with the partition of (t, q) kept."""
     controller.velocity(t, q)
-    controller.hold_partition(True)
-    try:
-        F = np.empty((q.size, q.size))
+    F = np.empty((q.size, q.size))
+    with controller.state.held():
         for j in range(q.size):
             offset = np.zeros(q.size)
             offset[j] = STEP
             difference = controller.velocity(t, q + offset) - controller.velocity(t, q - offset)
             F[:, j] = difference / (2 * offset[j])
-    finally:
-        controller.hold_partition(False)
     return F
 
 

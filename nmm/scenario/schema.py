@@ -81,7 +81,7 @@ class ScenarioPart(Part):
                     constraint = build_tasks(self._constraint(), robot)
                     self._check_constraint(sum(len(item.rows(robot)) for item in constraint), robot.n_u - s)
             with self.resolver.own_keys():
-                return Controller(robot, task, resolver, objective, constraint)
+                return Controller(robot, task, resolver, objective, added_task=constraint)
 
     def _constraint(self) -> list[Any]:
         """The constraint of the extended Jacobian: as given, or the objective's terms at their targets."""

@@ -13,7 +13,7 @@ from nmm.analysis.singular.parts import WHOLE, groups, ranks
 from nmm.analysis.singular.singularity import TOLERANCE
 from nmm.arrays import Array, Integers, scalar
 from nmm.errors import InputError, unknown
-from nmm.resolvers.base import Shape
+from nmm.resolvers.problem import Dimensions
 from nmm.resolvers.weights import Weights, weight_diagonal
 
 #: So many configurations' J are held at a time.
@@ -114,8 +114,8 @@ class Evaluator:
             raise InputError(f"alpha: expected a number from 0 to 1, got {self.alpha:g}")
         self.length, self.sizes = length, dict(sizes or {})
         rows, _, inputs = self.jacobians.sizes(length, sizes)
-        shape = Shape(len(rows), 0, robot.u_names, robot.groups)
-        self.weights = np.ones(robot.n_u) if weights is None else weight_diagonal(weights, shape)
+        dimensions = Dimensions(len(rows), 0, robot.u_names, robot.groups)
+        self.weights = np.ones(robot.n_u) if weights is None else weight_diagonal(weights, dimensions)
         self._factors = inputs / np.sqrt(self.weights) / rows[:, np.newaxis]
         self.scaled = length is not None or bool(self.sizes)
 

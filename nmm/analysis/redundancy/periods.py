@@ -35,7 +35,7 @@ def common_period(controllers: Iterable[Controller], q: Array) -> float:
     periods: list[float] = []
     for controller in controllers:
         configuration = Configuration(controller.robot, q)
-        for task in (*controller.task, *controller.constraint):
+        for task in (*controller.task, *controller.added_task):
             periods += _periods(task.reference, configuration)
     if not periods:
         raise InputError(
@@ -73,7 +73,7 @@ def expect_periodic(controller: Controller, q: Array, T: float, laps: int) -> No
     """`InputError` where a reference is elsewhere a period later, at any time of the laps."""
     configuration = Configuration(controller.robot, q)
     starts = T * np.array([0.0, 0.1234, 0.3579, 0.61803, 0.9])
-    for task in (*controller.task, *controller.constraint):
+    for task in (*controller.task, *controller.added_task):
         rows, turns = task.rows(controller.robot), task.function.comparison is not None
         angular = [row.angular for row in rows]
         values = [task.reference.evaluate(t, configuration).value for t in starts]

@@ -28,7 +28,8 @@ from nmm.analysis.singular.minors import (
 from nmm.analysis.singular.parts import WHOLE, Part, given_back, groups, part
 from nmm.analysis.singular.restoration import Restoration, restoration
 from nmm.arrays import Array, Integers, positive
-from nmm.resolvers.base import Shape
+from nmm.resolvers.partitions import candidate_columns
+from nmm.resolvers.problem import Dimensions
 from nmm.resolvers.reduced_gradient import ReducedGradient
 
 #: Singular values this small beside the largest are zero; the resolvers' own tolerance.
@@ -149,8 +150,7 @@ def candidates(jacobians: Jacobians, partitions: Candidates) -> Integers:
     else:
         own = ReducedGradient(partitions="automatic" if partitions is None else partitions)
     s, robot = len(jacobians.rows), jacobians.robot
-    options = own.setup(Shape(s, 0, robot.u_names, robot.groups)).options
-    return options[2:].reshape(-1, s)  # after the two flags
+    return candidate_columns(own.partitions, Dimensions(s, 0, robot.u_names, robot.groups)).reshape(-1, s)
 
 
 def analyse(

@@ -47,7 +47,7 @@ def manipulability(
     order = np.empty(s, dtype=np.int64)
     L = np.empty((s, s))
     Q = np.empty((s, m))
-    if orthonormal_rows(J, order, L, Q) <= 1e-12:  # zero to rounding
+    if orthonormal_rows(J, np.ones(s), order, L, Q) <= 1e-12:  # zero to rounding
         value[0] = 0.0
         return
     w = 1.0

@@ -197,8 +197,8 @@ def wheeled(qp: Array, parameters: Array, G: Array, G_q: Array) -> None:
     common_speeds(qp, section(parameters, COMMON), M, M_q)
     for i in range(n):
         M[i, n + i] = 1.0
-    _, ratio = eliminate(M)
-    if not (ratio > SINGULAR and share <= CONTRADICTION):
+    _, regular = eliminate(M, np.ones(n))
+    if not (regular > SINGULAR and share <= CONTRADICTION):
         for i in range(n):
             for j in range(p):
                 G[i, j] = math.nan

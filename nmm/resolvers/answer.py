@@ -1,0 +1,127 @@
+"""What a resolver gives back: the inputs, how it went, and the certificate."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import NamedTuple
+
+from numba import types
+
+from nmm.arrays import Array
+from nmm.kernels.compiled import VECTOR, compiled
+from nmm.kernels.linear_algebra import residual_norm
+from nmm.resolvers.problem import ProblemArrays
+
+
+class Status(IntEnum):
+    """How a resolution went. Those below `SINGULAR_J` come with inputs, those from there on without."""
+
+    SOLVED = 0
+    RELAXED = 1
+    INEXACT = 2
+    SINGULAR_J = 3
+    SINGULAR_JA = 4
+    SINGULAR_JE = 5
+    NOT_FINITE = 6
+
+    @property
+    def usable(self) -> bool:
+        """Whether there are inputs."""
+        return self < Status.SINGULAR_J
+
+    @property
+    def meaning(self) -> str:
+        """A sentence for people, with advice."""
+        return _MEANINGS[self]
+
+
+_MEANINGS = {
+    Status.SOLVED: "solved",
+    Status.RELAXED: "the task's rate was scaled or damped on purpose",
+    Status.INEXACT: "J u differs from the rate that the task asks for, and nobody said that it should",
+    Status.SINGULAR_J: "the task Jacobian J lost rank: the task asks for a motion that no input gives here",
+    Status.SINGULAR_JA: "the block Ja of the reduced gradient is singular though J is not: "
+    "give more partitions, or partitions: automatic",
+    Status.SINGULAR_JE: "the extended Jacobian J_e is singular though J is not (algorithmic singularity): "
+    "the added task asks here for what the task already fixes",
+    Status.NOT_FINITE: "an input is not finite: the task, its reference or the objective is undefined here",
+}
+
+#: For kernels, which write numbers.
+SOLVED, RELAXED, INEXACT = (int(status) for status in (Status.SOLVED, Status.RELAXED, Status.INEXACT))
+SINGULAR_J, SINGULAR_JA = int(Status.SINGULAR_J), int(Status.SINGULAR_JA)
+SINGULAR_JE, NOT_FINITE = int(Status.SINGULAR_JE), int(Status.NOT_FINITE)
+
+#: J u may differ from the rate by this much, times 1 + ‖rate‖, in the rows' units: rounding.
+EXACT = 1e-9
+
+
+class AnswerArrays(NamedTuple):
+    """An `Answer` as kernels write it: u (m,); status, residual and measure (1,); scale (levels,).
+
+    Before the kernel is called u, residual and measure are not numbers, status is NOT_FINITE and scale 1.
+    """
+
+    u: Array
+    status: Array
+    scale: Array
+    residual: Array
+    measure: Array
+
+
+ANSWER = types.BaseTuple.from_types((VECTOR,) * 5, AnswerArrays)
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """A resolver's answer, with its certificate.
+
+    Attributes
+    ----------
+    u : (m,) the inputs; not numbers where the status is not `usable`
+    status : how it went
+    scale : (levels,) the share of each level's rate that is given; below 1 where the status is RELAXED
+    residual : ‖J u - rate‖
+    measure : of the matrix inverted: PG and EJ, its last pivot (rows in their scales) over its first, or
+        over 1 if that is larger; RG, |det Ja|, divided by sqrt(det J Jᵀ) with automatic partitions
+    """
+
+    u: Array
+    status: Status
+    scale: Array
+    residual: float
+    measure: float
+
+    @property
+    def singular(self) -> bool:
+        """Whether there are no inputs, as the matrix to invert lost rank or something is not finite."""
+        return not self.status.usable
+
+    @classmethod
+    def of(cls, written: AnswerArrays) -> Answer:
+        """A copy of what a kernel wrote."""
+        return cls(
+            written.u.copy(),
+            Status(int(written.status[0])),
+            written.scale.copy(),
+            float(written.residual[0]),
+            float(written.measure[0]),
+        )
+
+
+@compiled
+def certify(problem: ProblemArrays, answer: AnswerArrays) -> None:
+    """Residual and status of the u that was written: solved, inexact, or not finite."""
+    residual = residual_norm(problem.J, answer.u, problem.rate)
+    answer.residual[0] = residual
+    square = 0.0
+    for i in range(problem.rate.shape[0]):
+        square += problem.rate[i] * problem.rate[i]
+    if not math.isfinite(residual):
+        answer.status[0] = NOT_FINITE
+    elif residual > EXACT * (1.0 + math.sqrt(square)):
+        answer.status[0] = INEXACT
+    else:
+        answer.status[0] = SOLVED

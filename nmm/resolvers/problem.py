@@ -1,0 +1,183 @@
+"""What a resolver gets: the problem of one control step, as one record."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numba import types
+from numpy.typing import ArrayLike
+
+from nmm.arrays import Array, Integers, array, scalar, vector
+from nmm.errors import InputError
+from nmm.kernels.compiled import INTEGERS, MATRIX, SCALAR, VECTOR
+
+
+class ProblemArrays(NamedTuple):
+    """A `Problem` as kernels read it: s rows in levels, k added rows, l rows of limits, m inputs.
+
+    J (s, m), rate (s,) : J u = rate, one level of priority below the other
+    row_scales (s,) : the natural size of each row, in its unit
+    ends (levels,) : the row after the last of each level
+    added_J (k, m), added_rate (k,), added_row_scales (k,) : the added task of the extended Jacobian
+    h (m,) : the objective's gradient, seen by the inputs
+    limit_rows (l, m), lower (l,), upper (l,) : lower <= limit_rows u <= upper
+    before (m,) : the inputs of the step before
+    dt : the time that u will stand, s; not a number where it is not known
+    """
+
+    J: Array
+    rate: Array
+    row_scales: Array
+    ends: Integers
+    added_J: Array
+    added_rate: Array
+    added_row_scales: Array
+    h: Array
+    limit_rows: Array
+    lower: Array
+    upper: Array
+    before: Array
+    dt: float
+
+
+PROBLEM = types.BaseTuple.from_types(
+    (
+        *(MATRIX, VECTOR, VECTOR, INTEGERS, MATRIX, VECTOR, VECTOR, VECTOR),
+        *(MATRIX, VECTOR, VECTOR, VECTOR, SCALAR),
+    ),
+    ProblemArrays,
+)
+
+
+class Dimensions(NamedTuple):
+    """What stays the same from step to step: rows of the task and of the added task, names of the inputs.
+
+    groups : inputs that are spoken of together, by the group's name ("platform", "arm")
+    levels : the rows of each level of priority; one level when empty
+    """
+
+    s: int
+    k: int
+    inputs: tuple[str, ...]
+    groups: Mapping[str, tuple[str, ...]] = {}
+    levels: tuple[int, ...] = ()
+
+    @property
+    def m(self) -> int:
+        """Number of inputs."""
+        return len(self.inputs)
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Find u with J u = rate that is good for the objective: everything that a resolver is told.
+
+    Parameters
+    ----------
+    J : (s, m) task Jacobian; rate : (s,) task velocity, in the rows' units per second
+    h : (m,) gradient of the objective seen by the inputs, Sᵀ ∂H/∂q
+    inputs : names of the inputs, for partitions and weights given by name; u0, u1, ... when not given
+    groups : inputs by the name of their group
+    row_scales : (s,) natural size of each row in its unit (the robot's reach for metres, 1 for radians),
+        against which pivots are judged; 1 when not given
+    levels : rows of each level of priority, from the highest on; one level when not given
+    added_J, added_rate, added_row_scales : (k, m), (k,) and (k,), the added task of the extended Jacobian
+    limit_rows, lower, upper : (l, m), (l,) and (l,): lower <= limit_rows u <= upper
+    before : (m,) the inputs of the step before, 0 when not given
+    dt : the time that u will stand, s; not a number where it is not known
+
+    Raises
+    ------
+    InputError : shapes that do not fit, numbers that are not finite
+    """
+
+    J: ArrayLike
+    rate: ArrayLike
+    h: ArrayLike
+    inputs: Sequence[str] | None = None
+    groups: Mapping[str, tuple[str, ...]] | None = None
+    row_scales: ArrayLike | None = None
+    levels: Sequence[int] | None = None
+    added_J: ArrayLike | None = None
+    added_rate: ArrayLike | None = None
+    added_row_scales: ArrayLike | None = None
+    limit_rows: ArrayLike | None = None
+    lower: ArrayLike | None = None
+    upper: ArrayLike | None = None
+    before: ArrayLike | None = None
+    dt: float = float("nan")
+
+    def __post_init__(self) -> None:
+        J = array(self.J, "J")
+        if J.ndim != 2:
+            raise InputError(f"J: expected a matrix, got shape {J.shape}")
+        s, m = J.shape
+        names = tuple(f"u{i}" for i in range(m)) if self.inputs is None else tuple(self.inputs)
+        if len(names) != m:
+            raise InputError(f"inputs: expected {m} names, as J has columns, got {len(names)}")
+        levels = (s,) if self.levels is None else tuple(int(rows) for rows in self.levels)
+        if sum(levels) != s or min(levels, default=0) < 0:
+            raise InputError(f"levels: expected numbers of rows that add up to {s}, got {list(levels)}")
+        added_J = np.zeros((0, m)) if self.added_J is None else _rows(self.added_J, m, "added_J")
+        limit_rows = np.zeros((0, m)) if self.limit_rows is None else _rows(self.limit_rows, m, "limit_rows")
+        k, count = len(added_J), len(limit_rows)
+        given = {
+            "J": J,
+            "rate": vector(self.rate, s, "rate"),
+            "h": vector(self.h, m, "h"),
+            "inputs": names,
+            "groups": dict(self.groups or {}),
+            "row_scales": _scales(self.row_scales, s, "row_scales"),
+            "levels": levels,
+            "added_J": added_J,
+            "added_rate": vector(() if self.added_rate is None else self.added_rate, k, "added_rate"),
+            "added_row_scales": _scales(self.added_row_scales, k, "added_row_scales"),
+            "limit_rows": limit_rows,
+            "lower": _bounds(self.lower, count, "lower", -np.inf),
+            "upper": _bounds(self.upper, count, "upper", np.inf),
+            "before": np.zeros(m) if self.before is None else vector(self.before, m, "before"),
+            "dt": float("nan") if np.isnan(self.dt) else scalar(self.dt, "dt"),
+        }
+        for name, value in given.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def dimensions(self) -> Dimensions:
+        """What of the problem stays the same from step to step."""
+        arrays, inputs = self.arrays, tuple(self.inputs or ())
+        return Dimensions(
+            *(len(arrays.J), len(arrays.added_J), inputs), dict(self.groups or {}), tuple(self.levels or ())
+        )
+
+    @property
+    def arrays(self) -> ProblemArrays:
+        """The numbers, as kernels read them."""
+        names = [name for name in ProblemArrays._fields if name != "ends"]
+        ends = np.cumsum(self.levels or (), dtype=np.int64)
+        return ProblemArrays(ends=ends, **{name: getattr(self, name) for name in names})
+
+
+def _rows(value: ArrayLike, m: int, name: str) -> Array:
+    rows = array(value, name)
+    if rows.ndim != 2 or rows.shape[1] != m:
+        raise InputError(f"{name}: expected {m} columns, got shape {rows.shape}")
+    return rows
+
+
+def _scales(value: ArrayLike | None, count: int, name: str) -> Array:
+    scales = np.ones(count) if value is None else vector(value, count, name)
+    if np.any(scales <= 0.0):
+        raise InputError(f"{name}: expected numbers above 0, got {scales.min():g}")
+    return scales
+
+
+def _bounds(value: ArrayLike | None, count: int, name: str, none: float) -> Array:
+    if value is None:
+        return np.full(count, none)
+    bounds = np.array(value, dtype=np.float64)
+    if bounds.shape != (count,) or np.any(np.isnan(bounds)):
+        raise InputError(f"{name}: expected {count} numbers (infinite for none), got {bounds}")
+    return bounds
