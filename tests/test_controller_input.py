@@ -187,7 +187,7 @@ def test_what_is_undefined_is_an_error_too(kind: str, k: int, robot_2r: Robot) -
         "rg": RG,
         "listed rg": ReducedGradient(partitions=[range(s), range(1, s + 1)]),
         "ej": EJ,
-        "callable": CallableResolver(lambda J, rate, h: np.linalg.pinv(J) @ rate),
+        "callable": CallableResolver(lambda problem: np.linalg.pinv(problem.J) @ problem.rate),
     }[kind]
     if kind == "ej":
         more = {"added_task": Task(Coordinates(*("q1", "q2", "theta")[: 4 - s]), np.zeros(4 - s))}

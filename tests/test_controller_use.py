@@ -33,7 +33,7 @@ def close(found: Array, expected: Array, tolerance: float) -> None:
 def task_by_hand(task: Task, robot: Robot, derivatives: bool) -> Task:
     """The task with Python functions in place of its function and reference."""
     f, g = task.function, task.reference
-    names, units, angular = zip(*task.rows(robot), strict=True)
+    names, units, angular, _ = zip(*task.rows(robot), strict=True)
     if not derivatives:
         return Task(
             CallableFunction(lambda c: f.evaluate(0.0, c).value, names, units=units, angular=angular),

@@ -156,4 +156,7 @@ def test_eliminate_with_nan_is_not_a_number(A: Array) -> None:
 def test_residual_norm(shape: tuple[int, int], rng: np.random.Generator) -> None:
     s, m = shape
     J, u, rate = rng.normal(size=shape), rng.normal(size=m), rng.normal(size=s)
-    assert residual_norm(J, u, rate) == pytest.approx(np.linalg.norm(J @ u - rate), rel=1e-13)
+    residual, rounding = residual_norm(J, u, rate)
+    assert residual == pytest.approx(np.linalg.norm(J @ u - rate), rel=1e-13)
+    expected = np.finfo(float).eps * np.linalg.norm(np.abs(J) @ np.abs(u) + np.abs(rate))
+    assert rounding == pytest.approx(expected, rel=1e-13)

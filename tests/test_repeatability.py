@@ -18,7 +18,7 @@ from nmm.errors import InputError
 from nmm.figures.repeatability import laps as laps_figure
 from nmm.functions.references import Circle
 from nmm.functions.tasks import Coordinates, Heading, Position, Task
-from nmm.resolvers import CallableResolver, ExtendedJacobian, ProjectedGradient
+from nmm.resolvers import CallableResolver, ExtendedJacobian, Problem, ProjectedGradient
 from nmm.robots.robot import Robot
 from nmm.scenario import Scenario
 
@@ -250,11 +250,11 @@ def test_one_lap_tells_nothing_of_the_next(tmp_path: Path) -> None:
 def test_a_run_that_ends_early_keeps_its_laps(arm: Robot) -> None:
     stop = {"after": 1.6 * PERIOD, "calls": 0.0}
 
-    def resolve(J: Array, rate: Array, h: Array) -> Array:
+    def resolve(problem: Problem) -> Array:
         stop["calls"] += 1
         if stop["calls"] > 4 * stop["after"] / 0.02:
             raise np.linalg.LinAlgError
-        return np.linalg.pinv(J) @ rate
+        return np.linalg.pinv(problem.J) @ problem.rate
 
     own = Controller(arm, Task(TIP, circle_from(Q0)), CallableResolver(resolve))
     found = repeatability(({"own": own}, Q0), laps=3, dt=0.02)

@@ -206,8 +206,9 @@ def test_near_a_singularity_the_answer_is_as_good_as_numpys(
         size = np.linalg.norm(problem.J, 2)
         for resolver in three():
             found = problem.given(resolver)
-            rounding = found.residual > 1e-9 * (1.0 + np.linalg.norm(problem.rate))
-            assert found.status is (Status.INEXACT if rounding else Status.SOLVED)
+            exact = found.residual <= 1e-9 * (1.0 + np.linalg.norm(problem.rate))
+            large = np.linalg.norm(found.u) > 1e5  # more than rounding lets certify
+            assert found.status is Status.SOLVED if exact and not large else found.status.usable
             assert found.residual <= 1e-13 * size * np.linalg.norm(found.u)
         expected = twin.projected_gradient(problem.J, problem.rate, problem.h, np.eye(problem.m), 3.0)
         close(problem.given(ProjectedGradient(3.0)).u, expected, 1e-9)

@@ -45,7 +45,7 @@ def test_the_last_step_is_shorter_when_dt_does_not_divide_the_duration(robot_2r:
 def test_zero_order_hold_drives_exact_arcs(robot_2r: Robot) -> None:
     """With constant v and omega the unicycle drives a circle of radius v / omega."""
     v, omega = 0.7, 1.3
-    constant = nmm.CallableResolver(lambda J, rate, h: np.array([v, omega, 0.2, -0.1]))
+    constant = nmm.CallableResolver(lambda problem: np.array([v, omega, 0.2, -0.1]))
     run = nmm.simulate(nmm.Controller(robot_2r, TIP, constant), START, 2.0, 0.02, "zoh")
     angle = pi + omega * run.t
     centre = np.array([-1 - v / omega * np.sin(pi), -1 + v / omega * np.cos(pi)])

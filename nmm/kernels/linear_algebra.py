@@ -14,6 +14,8 @@ import numpy as np
 from nmm.arrays import Array
 from nmm.kernels.compiled import compiled
 
+EPSILON = float(np.finfo(float).eps)
+
 
 @compiled
 def orthonormal_rows(J: Array, row_scales: Array, order: Array, L: Array, Q: Array) -> float:
@@ -160,12 +162,21 @@ def eliminate(M: Array, row_scales: Array) -> tuple[float, float]:
 
 
 @compiled
-def residual_norm(J: Array, u: Array, rate: Array) -> float:
-    """‖J u - rate‖, the certificate of a resolver's answer."""
+def residual_norm(J: Array, u: Array, rate: Array) -> tuple[float, float]:
+    """‖J u - rate‖, the certificate of a resolver's answer, and how much of it rounding can hide.
+
+    The second number is the machine's precision times the norm of |J| |u| + |rate|: with a large u the
+    residual computed here may be zero by chance.
+    """
     square = 0.0
+    size = 0.0
     for i in range(J.shape[0]):
         difference = -rate[i]
+        weight = abs(rate[i])
         for j in range(J.shape[1]):
-            difference += J[i, j] * u[j]
+            product = J[i, j] * u[j]
+            difference += product
+            weight += abs(product)
         square += difference * difference
-    return math.sqrt(square)
+        size += weight * weight
+    return math.sqrt(square), EPSILON * math.sqrt(size)

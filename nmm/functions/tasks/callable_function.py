@@ -6,11 +6,13 @@ from collections.abc import Callable, Sequence
 
 from numpy.typing import ArrayLike
 
+from nmm.arrays import positive
 from nmm.errors import InputError
 from nmm.functions.callbacks import differentiated, stage
 from nmm.functions.function import Function, Row, Stage
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
+from nmm.words import listed
 
 
 class CallableFunction(Function):
@@ -23,6 +25,8 @@ class CallableFunction(Function):
     units : their units (1 when not given)
     angular : which of them are angles whose differences wrap (none when not given)
     jacobian : configuration -> df/dq, shape (s, n); central differences when not given
+    scales : the natural size of each component in its unit, by which a lost rank is judged (when not given,
+        the robot's reach for metres and 1 for the rest)
     """
 
     def __init__(
@@ -33,17 +37,23 @@ class CallableFunction(Function):
         units: Sequence[str] | None = None,
         angular: Sequence[bool] | None = None,
         jacobian: Callable[[Configuration], ArrayLike] | None = None,
+        scales: Sequence[float] | None = None,
     ) -> None:
         self.function = function
         self.jacobian = jacobian
         units = ["1"] * len(names) if units is None else units
         angular = [False] * len(names) if angular is None else angular
-        if not names or not len(names) == len(units) == len(angular):
+        given = {"units": len(units), "angular flags": len(angular)}
+        sizes: Sequence[float | None] = [None] * len(names)
+        if scales is not None:
+            given["scales"] = len(scales)
+            sizes = [positive(scale, "callable function: scale") for scale in scales]
+        if not names or any(count != len(names) for count in given.values()):
+            wanted, came = listed(list(given)), listed([f"{count} {what}" for what, count in given.items()])
             raise InputError(
-                f"callable function: expected as many units and angular flags as names ({len(names)}), "
-                f"got {len(units)} and {len(angular)}"
+                f"callable function: expected as many {wanted} as names ({len(names)}), got {came}"
             )
-        self._rows = tuple(Row(*row) for row in zip(names, units, angular, strict=True))
+        self._rows = tuple(Row(*row) for row in zip(names, units, angular, sizes, strict=True))
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         return self._rows
