@@ -128,7 +128,7 @@ class Controller:
         # Another kind of array would be compiled for anew, so anything but the plain kind is copied.
         if (
             type(q) is not np.ndarray
-            or q.dtype is not FLOAT64
+            or q.dtype != FLOAT64
             or q.shape != self._shape
             or not q.flags.carray
         ):
