@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, Integers
-from nmm.control.equations import PLAIN, WRAPPED, Results, drive, results, step
+from nmm.control.equations import PLAIN, WRAPPED, Laws, Results, drive, empty_results, step
 from nmm.errors import InputError, SingularError
 from nmm.functions.function import Row
 from nmm.functions.objectives.base import Objective
-from nmm.functions.program import Program
+from nmm.functions.program import BESIDE, Program
 from nmm.functions.tasks.comparison import Comparison
 from nmm.functions.tasks.task import Stack, Task
-from nmm.resolvers.base import FREE, HELD, OVERDUE, REPORT, Resolver, Shape, Status
+from nmm.kernels.memory import views
+from nmm.resolvers.base import FREE, HELD, OVERDUE, Resolver, Shape, Status
 from nmm.robots.robot import Robot
 
 FLOAT64 = np.dtype(np.float64)
@@ -92,27 +93,32 @@ class Controller:
         functions = [f for task in every for f in (task.function, task.reference, Comparison(task))]
         program = Program(robot, [*functions, *(function for _, function in weighted)])
         first = program.first_rows
-        table = [
+        listed = [
             (first[3 * i] + j, first[3 * i + 1] + j, _error_row(task, first[3 * i + 2], j, row))
             for i, task in enumerate(every)
             for j, row in enumerate(task.rows(robot))
         ]
+        table = np.array(listed, dtype=np.int64).reshape(-1, 3)
         s, k, m = len(self.rows), len(constraint_rows), robot.n_u
         setup = resolver.setup(Shape(s, k, robot.u_names, robot.groups))
-        program.pack(
-            [[s, k, m, resolver.kernel.address], table, first[3 * len(every) :], setup.options],
-            [
-                _gains(self.task, robot),
-                _gains(self.constraint, robot),
-                [weight for weight, _ in weighted],
-                setup.parameters,
-            ],
-            [np.zeros((s + k) * (4 + m) + 1 + 2 * m + REPORT + robot.n)],
+        program.lay_out(
+            Laws(
+                results=empty_results(s, k, m, robot.n),
+                rows=table[:s],
+                gain=_gains(self.task, robot),
+                constraint_rows=table[s:],
+                constraint_gain=_gains(self.constraint, robot),
+                terms=np.array(first[3 * len(every) :], dtype=np.int64),
+                weights=np.array([weight for weight, _ in weighted]),
+                resolver=resolver.kernel.address,
+                numbers=setup.parameters,
+                options=setup.options,
+            )
         )
         self._program = program
         self._start = setup.state
         self._state = setup.state.copy()
-        self._results: Results = results(program.tables, program.memory)
+        self._results: Results = views(Laws, *program.blocks, BESIDE).results
         self._u = self._results.u
         self._shape = (robot.n,)
         self._solve = self._solver()
@@ -126,12 +132,7 @@ class Controller:
         InputError : q has the wrong length or holds numbers that are not finite
         """
         # Another kind of array would be compiled for anew, so anything but the plain kind is copied.
-        if (
-            type(q) is not np.ndarray
-            or q.dtype != FLOAT64
-            or q.shape != self._shape
-            or not q.flags.carray
-        ):
+        if type(q) is not np.ndarray or q.dtype != FLOAT64 or q.shape != self._shape or not q.flags.carray:
             q = self._copied(q)
         if self._solve(float(t), q):
             self._fail(t, q)
@@ -149,11 +150,11 @@ class Controller:
     def _solver(self) -> Callable[[float, Array], float]:
         """solve(t, q) -> status, with everything it needs at hand."""
         program, state, found, resolver = self._program, self._state, self._results, self.resolver
-        prepare, tables, numbers, memory = program.prepare, program.tables, program.numbers, program.memory
+        prepare, (integers, floats) = program.prepare, program.blocks
 
         def solve(t: float, q: Array) -> float:
             prepare(t, q)
-            return step(t, q, tables, numbers, memory, state)
+            return step(t, q, integers, floats, state)
 
         def solve_and_finish(t: float, q: Array) -> float:
             solve(t, q)
@@ -249,7 +250,7 @@ def _error_row(task: Task, computed: int, component: int, row: Row) -> int:
 
 
 def _gains(stack: Stack, robot: Robot) -> Array:
-    """The block-diagonal gain of a stack, row after row."""
+    """The block-diagonal gain of a stack."""
     s = len(stack.rows(robot))
     K = np.zeros((s, s))
     first = 0
@@ -257,4 +258,4 @@ def _gains(stack: Stack, robot: Robot) -> Array:
         block = task.gain_matrix(robot)
         K[first : first + len(block), first : first + len(block)] = block
         first += len(block)
-    return K.ravel()
+    return K

@@ -11,25 +11,25 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nmm.arrays import Array
-from nmm.functions.program import MEMORY, NUMBERS, SIZES, TABLES, Buffers, run
-from nmm.kernels.compiled import call_resolver, compiled, inlined, view
-from nmm.kernels.packing import section
+from nmm.arrays import Array, Integers
+from nmm.functions.program import BESIDE, Buffers, run
+from nmm.kernels.compiled import call_resolver, compiled
+from nmm.kernels.memory import IntegerMatrix, IntegerVector, Matrix, Vector, views
 from nmm.resolvers.base import REPORT
 
 
 class Equation(NamedTuple):
     """J u = rate for a stack of tasks: value r (s,), target (s,), error (s,), rate (s,), J (s, m)."""
 
-    r: Array
-    target: Array
-    error: Array
-    rate: Array
-    J: Array
+    r: Vector
+    target: Vector
+    error: Vector
+    rate: Vector
+    J: Matrix
 
 
 class Results(NamedTuple):
-    """What one step leaves behind, as views of one block of memory.
+    """What one step leaves behind.
 
     task, constraint : their equations
     H (1,), h (m,) : the objective and its gradient seen by the inputs
@@ -40,52 +40,51 @@ class Results(NamedTuple):
 
     task: Equation
     constraint: Equation
-    H: Array
-    h: Array
-    u: Array
-    report: Array
-    q_dot: Array
+    H: Vector
+    h: Vector
+    u: Vector
+    report: Vector
+    q_dot: Vector
 
 
-# Sections of the packed vectors, after the program's own.
-SHAPE, ROWS, TERMS, OPTIONS = TABLES, TABLES + 1, TABLES + 2, TABLES + 3
-GAINS, CONSTRAINT_GAINS, WEIGHTS, RESOLVER = NUMBERS, NUMBERS + 1, NUMBERS + 2, NUMBERS + 3
-BLOCK = MEMORY
+class Laws(NamedTuple):
+    """What a step reads and writes beside its program's functions; its place in memory is `BESIDE`.
+
+    rows (s, 3), gain (s, s) : of the task: [row of f, row of g, row of e] among the program's rows
+    constraint_rows (k, 3), constraint_gain (k, k) : of the constraint
+    terms, weights : rows of the objective's terms, and what they count
+    resolver, numbers, options : the resolver's kernel and what it reads
+    """
+
+    results: Results
+    rows: IntegerMatrix
+    gain: Matrix
+    constraint_rows: IntegerMatrix
+    constraint_gain: Matrix
+    terms: IntegerVector
+    weights: Vector
+    resolver: int
+    numbers: Vector
+    options: IntegerVector
+
 
 #: Instead of the row of an error that is computed: the error is target - value; an angle's, wrapped.
 PLAIN, WRAPPED = -1, -2
 
 
-@inlined
-def equation_views(s: int, m: int, memory: Array, first: int) -> Equation:
-    """The views of s (4 + m) numbers."""
-    return Equation(
-        view(memory, first, (s,)),
-        view(memory, first + s, (s,)),
-        view(memory, first + 2 * s, (s,)),
-        view(memory, first + 3 * s, (s,)),
-        view(memory, first + 4 * s, (s, m)),
+def empty_results(s: int, k: int, m: int, n: int) -> Results:
+    """Room for the results of s rows of a task, k of a constraint, m inputs and n coordinates."""
+    task, constraint = (
+        Equation(
+            r=np.zeros(rows),
+            target=np.zeros(rows),
+            error=np.zeros(rows),
+            rate=np.zeros(rows),
+            J=np.zeros((rows, m)),
+        )
+        for rows in (s, k)
     )
-
-
-@inlined
-def results(tables: Array, memory: Array) -> Results:
-    """The views; shape = [s, k, m, ...]."""
-    shape = section(tables, SHAPE)
-    s, k, m = shape[0], shape[1], shape[2]
-    a = int(memory[BLOCK])
-    b = a + s * (4 + m)
-    c = b + k * (4 + m)
-    d = c + 1 + 2 * m
-    return Results(
-        equation_views(s, m, memory, a),
-        equation_views(k, m, memory, b),
-        view(memory, c, (1,)),
-        view(memory, c + 1, (m,)),
-        view(memory, c + 1 + m, (m,)),
-        view(memory, d, (REPORT,)),
-        view(memory, d + REPORT, (section(tables, SIZES)[0],)),
-    )
+    return Results(task, constraint, np.zeros(1), np.zeros(m), np.zeros(m), np.zeros(REPORT), np.zeros(n))
 
 
 @compiled
@@ -113,7 +112,7 @@ def drive(u: Array, G: Array, q_dot: Array) -> None:
 
 
 @compiled
-def write_equation(rows: Array, gain: Array, b: Buffers, e: Equation) -> None:
+def write_equation(rows: Integers, gain: Array, b: Buffers, e: Equation) -> None:
     """rate = ∂g/∂t + K e, J_bar = (∂f/∂q - ∂g/∂q) S; a row is [row of f, row of g, row of e].
 
     The row of e is PLAIN or WRAPPED where e = g - f, which then is not computed elsewhere. Where it is,
@@ -122,9 +121,9 @@ def write_equation(rows: Array, gain: Array, b: Buffers, e: Equation) -> None:
     s = e.r.shape[0]
     n = b.value_q.shape[1]
     for i in range(s):
-        f = rows[3 * i]
-        g = rows[3 * i + 1]
-        compared = rows[3 * i + 2]
+        f = rows[i, 0]
+        g = rows[i, 1]
+        compared = rows[i, 2]
         e.r[i] = b.value[f]
         e.target[i] = b.value[g]
         if compared >= 0:
@@ -144,44 +143,41 @@ def write_equation(rows: Array, gain: Array, b: Buffers, e: Equation) -> None:
         times_S(b.value_q, f, b.G, e.J[i])
     for i in range(s):
         for j in range(s):
-            e.rate[i] += gain[i * s + j] * e.error[j]
+            e.rate[i] += gain[i, j] * e.error[j]
 
 
 @compiled
-def step(t: float, q: Array, tables: Array, numbers: Array, memory: Array, state: Array) -> float:
+def step(t: float, q: Array, integers: Integers, floats: Array, state: Integers) -> float:
     """One control step: functions, equations, gradient, inputs. Returns the resolver's status.
 
-    Pinocchio's part is in `memory` already. shape = [s, k, m, resolver kernel]; terms: the rows
-    of the objective's terms.
+    Pinocchio's part is in memory already.
     """
-    b = run(t, q, tables, numbers, memory)
-    e = results(tables, memory)
-    shape = section(tables, SHAPE)
-    rows = section(tables, ROWS)
-    write_equation(rows, section(numbers, GAINS), b, e.task)
-    write_equation(rows[3 * shape[0] :], section(numbers, CONSTRAINT_GAINS), b, e.constraint)
-    terms = section(tables, TERMS)
-    weights = section(numbers, WEIGHTS)
+    b = run(t, q, integers, floats)
+    laws = views(Laws, integers, floats, BESIDE)
+    e = laws.results
+    write_equation(laws.rows, laws.gain, b, e.task)
+    write_equation(laws.constraint_rows, laws.constraint_gain, b, e.constraint)
     gradient = np.zeros((1, q.shape[0]))
     e.H[0] = 0.0
-    for i in range(terms.shape[0]):
-        e.H[0] += weights[i] * b.value[terms[i]]
+    for i in range(laws.terms.shape[0]):
+        term = laws.terms[i]
+        e.H[0] += laws.weights[i] * b.value[term]
         for j in range(q.shape[0]):
-            gradient[0, j] += weights[i] * b.value_q[terms[i], j]
+            gradient[0, j] += laws.weights[i] * b.value_q[term, j]
     times_S(gradient, 0, b.G, e.h)
     for j in range(e.u.shape[0]):
         e.u[j] = math.nan  # what a resolver that finds no solution leaves behind
     for j in range(e.report.shape[0]):
         e.report[j] = math.nan
     call_resolver(
-        shape[3],
+        laws.resolver,
         e.task.J,
         e.task.rate,
         e.constraint.J,
         e.constraint.rate,
         e.h,
-        section(numbers, RESOLVER),
-        section(tables, OPTIONS),
+        laws.numbers,
+        laws.options,
         state,
         e.u,
         e.report,

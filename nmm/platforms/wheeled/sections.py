@@ -1,28 +1,27 @@
-"""Several arrays as one: a compiled call costs about 0.1 µs an array, so a step's tables travel together.
+"""Lists of numbers as one vector, which is all that a platform's kernel is given.
 
-A packed vector begins with the offsets of its sections, so that compiled code finds them by number.
+The vector begins with the offsets of its sections, so that compiled code finds them by number.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nmm.arrays import Array
 from nmm.kernels.compiled import inlined, view
 
 
-def pack(sections: Sequence[Any], dtype: type) -> NDArray[Any]:
+def pack(sections: Sequence[Array]) -> Array:
     """[offsets of the sections and of the end, section after section], all flattened."""
-    flat: list[NDArray[Any]] = [np.asarray(section, dtype=dtype).ravel() for section in sections]
+    flat = [section.ravel() for section in sections]
     ends = len(flat) + 1 + np.cumsum([0, *(len(section) for section in flat)])
-    return np.concatenate([ends.astype(dtype), *flat])
+    return np.concatenate([ends.astype(np.float64), *flat])
 
 
 @inlined
-def section(packed: NDArray[Any], number: int) -> NDArray[Any]:
+def section(packed: Array, number: int) -> Array:
     """The view of one section."""
     first = int(packed[number])
     return view(packed, first, (int(packed[number + 1]) - first,))
