@@ -23,6 +23,7 @@ from nmm.functions.program import Program
 from nmm.functions.tasks import Coordinates, Task
 from nmm.functions.tasks.comparison import Comparison
 from nmm.kernels.compiled import Kernel
+from nmm.kernels.records import At, Frames, Rows
 from nmm.resolvers import (
     CallableResolver,
     ExtendedJacobian,
@@ -31,7 +32,7 @@ from nmm.resolvers import (
     ReducedGradient,
     Resolver,
 )
-from nmm.resolvers.answer import AnswerArrays
+from nmm.resolvers.answer import unanswered
 from nmm.robots.configuration import Configuration
 from nmm.robots.loading import load
 from nmm.robots.robot import CENTER_OF_MASS, Robot
@@ -67,25 +68,24 @@ def kinematics(frame: str, configuration: Configuration) -> tuple[Array, Array, 
     return placement, configuration.jacobian(frame), configuration.hessian(frame)
 
 
-def stage_arguments(stage: Stage, t: float, configuration: Configuration) -> list[Array]:
+def stage_arguments(stage: Stage, t: float, configuration: Configuration) -> tuple[At, Frames, Array]:
     """What the stage's kernel reads at (t, q), computed here without nmm's program."""
     robot = configuration.robot
-    frames = [kinematics(frame, configuration) for frame in stage.frames]
-    qp = configuration.q[: robot.platform.n_p]
+    found = [kinematics(frame, configuration) for frame in stage.frames]
+    q = configuration.q.copy()
+    qp = q[: robot.platform.n_p]
     G_q = np.stack([robot.platform.G_dot(qp, e) for e in np.eye(len(qp))], axis=-1)
-    parameters = stage.parameters
+    numbers = stage.numbers
     if stage.callback is not None:
-        parameters = np.concatenate([part.ravel() for part in stage.callback(t, configuration)])
+        numbers = np.concatenate([part.ravel() for part in stage.callback(t, configuration)])
     k, n = len(stage.frames), robot.n
-    return [
-        np.array([placement for placement, _, _ in frames]).reshape(k, 3, 4),
-        np.array([jacobian for _, jacobian, _ in frames]).reshape(k, 6, n),
-        np.array([hessian for _, _, hessian in frames]).reshape(k, 6, n, n),
-        robot.platform.G(qp),
-        np.ascontiguousarray(G_q),
+    frames = Frames(
         np.arange(k),
-        parameters,
-    ]
+        np.array([placement for placement, _, _ in found]).reshape(k, 3, 4),
+        np.array([jacobian for _, jacobian, _ in found]).reshape(k, 6, n),
+        np.array([hessian for _, _, hessian in found]).reshape(k, 6, n, n),
+    )
+    return At(t, q, robot.platform.G(qp), np.ascontiguousarray(G_q)), frames, numbers
 
 
 SINGLE = [entry for entry in ENTRIES if not isinstance(entry.function, Sum)]
@@ -104,7 +104,7 @@ def test_function_kernels(entry: Entry, robots: dict[str, Robot], rng: np.random
         for stage in stages:
             arguments = stage_arguments(stage, t, configuration)
             for form, outcome in zip((stage.kernel.plain, stage.kernel), outcomes, strict=True):
-                form(t, q, *arguments, *(array[: stage.rows] for array in outcome))
+                form(*arguments, Rows(*(array[: stage.rows] for array in outcome)))
         for plain, compiled in zip(*outcomes, strict=True):
             assert_same(plain, compiled)
         count = len(entry.function.rows(robot))
@@ -120,13 +120,13 @@ def test_comparison_kernels(entry: Entry, robots: dict[str, Robot], rng: np.rand
     """On values, targets and derivatives of any kind: a comparison is algebra on its rows."""
     robot, kernel = robots[entry.robots[0]], entry.function.comparison
     assert kernel is not None
-    s, q = len(entry.function.rows(robot)), np.zeros(robot.n)
-    nothing = stage_arguments(Stage(kernel, s), 0.0, Configuration(robot, q))
+    s = len(entry.function.rows(robot))
+    nothing = stage_arguments(Stage(kernel, s), 0.0, Configuration(robot, np.zeros(robot.n)))
     for _ in range(20):
         given = [rng.normal(size=shape) for shape in (3 * s, 3 * s, (3 * s, robot.n))]
         outcomes = [[part.copy() for part in given] for _ in range(2)]
         for form, outcome in zip((kernel.plain, kernel), outcomes, strict=True):
-            form(0.0, q, *nothing, *outcome)
+            form(*nothing, Rows(*outcome))
         for plain, compiled, before in zip(*outcomes, given, strict=True):
             assert_same(plain, compiled)
             assert np.array_equal(plain[: 2 * s], before[: 2 * s])
@@ -165,10 +165,10 @@ def test_resolver_kernels(resolver: Resolver, rng: np.random.Generator) -> None:
         setup = resolver.setup(problem.dimensions)
         both = []
         for form in (resolver.kernel.plain, resolver.kernel):
-            answer = AnswerArrays(np.zeros(4), *np.zeros((4, 1)))
+            answer = unanswered(4, 1)
             state = resolver.start(problem.dimensions)
             form(problem.arrays, setup.numbers, setup.options, state.memory, answer)
-            both.append(np.concatenate([*answer, state.memory]))
+            both.append(np.concatenate([*(np.atleast_1d(field) for field in answer), state.memory]))
         assert_same(*both)
 
 
@@ -200,7 +200,7 @@ def answers() -> dict[str, Array]:
         robot = robots[entry.robots[-1]]
         task = Task(entry.function, rng.normal(size=len(entry.function.rows(robot))))
         program = Program(robot, [task.function, task.reference, Comparison(task)])
-        program.pack()
+        program.lay_out()
         parts = program.evaluate(0.0, random_configuration(robot, rng))[2]
         found[f"error of {entry.name}"] = np.concatenate([part.ravel() for part in parts])
     for case in CASES:

@@ -222,3 +222,19 @@ def test_every_kind_of_array_and_number_is_taken(robot_2r: Robot) -> None:
         np.testing.assert_array_equal(controller.velocity(t, q), controller.evaluate(t, q).q_dot)
     compiled_for = getattr(step, "signatures", [()])  # absent in plain Python
     assert len(compiled_for) == 1, "another kind of argument was compiled for: seconds, in a control loop"
+
+
+def test_arrays_that_compiled_code_made_are_taken_as_they_are(robot_2r: Robot) -> None:
+    """Those read from disk give float64 in an object of its own: in every stage of a Runge-Kutta step."""
+
+    class Never(Controller):
+        def _copied(self, q: object) -> Array:
+            raise AssertionError("copied, and checked number by number")
+
+    controller = Never(robot_2r, TIP, ProjectedGradient())
+    float64 = pickle.loads(pickle.dumps(np.dtype(np.float64)))
+    q = np.array([-1.0, 2.0, 3.0, 0.0, 1.0], dtype=float64)
+    assert q.dtype is not np.dtype(np.float64)
+    np.testing.assert_array_equal(
+        controller(2.0, q), Controller(robot_2r, TIP, ProjectedGradient())(2.0, list(q))
+    )

@@ -90,7 +90,7 @@ def test_functions_laid_out_together_do_not_disturb_each_other(
     listed = [e.function for e in ENTRIES if name in e.robots and not isinstance(e.function, Sum)]
     functions = [listed[k] for k in rng.permutation(len(listed))]
     program = Program(robot, functions)
-    program.pack()
+    program.lay_out()
     for t in TIMES[:3]:
         q = random_configuration(robot, rng)
         for function, together in zip(functions, program.evaluate(t, q), strict=True):

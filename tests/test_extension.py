@@ -19,7 +19,8 @@ from nmm.functions.function import Function, Row, Stage
 from nmm.functions.objectives import Manipulability, Sum
 from nmm.functions.references import Line
 from nmm.functions.tasks import CallableFunction, Task
-from nmm.kernels.compiled import FUNCTION, PLATFORM, Kernel, kernel
+from nmm.kernels.compiled import PLATFORM, Kernel, kernel
+from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.platforms import Platform
 from nmm.resolvers import Dimensions, Problem, ProjectedGradient, ReducedGradient, Resolver, Setup, State
 from nmm.resolvers.answer import AnswerArrays, certify
@@ -123,18 +124,19 @@ def test_a_model_without_the_platforms_joints_is_refused(robot_3r: Robot) -> Non
 
 
 @kernel(FUNCTION)
-def square_distance(
-    t: float, q: Array, placements: Array, jacobians: Array, hessians: Array, G: Array, G_q: Array,
-    slots: Array, parameters: Array, value: Array, value_t: Array, value_q: Array,
-) -> None:  # fmt: skip
-    """Between two frames, with a beat in time; parameters = [frequency]."""
-    value[0] = math.sin(parameters[0] * t)
-    value_t[0] = parameters[0] * math.cos(parameters[0] * t)
+def square_distance(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
+    """Between two frames, with a beat in time; numbers = [frequency]."""
+    rows.value[0] = math.sin(numbers[0] * at.t)
+    rows.value_t[0] = numbers[0] * math.cos(numbers[0] * at.t)
     for i in range(3):
-        difference = placements[slots[0], i, 3] - placements[slots[1], i, 3]
-        value[0] += difference * difference
-        for j in range(q.shape[0]):
-            value_q[0, j] += 2 * difference * (jacobians[slots[0], i, j] - jacobians[slots[1], i, j])
+        difference = frames.placements[frames.slots[0], i, 3] - frames.placements[frames.slots[1], i, 3]
+        rows.value[0] += difference * difference
+        for j in range(at.q.shape[0]):
+            rows.value_q[0, j] += (
+                2
+                * difference
+                * (frames.jacobians[frames.slots[0], i, j] - frames.jacobians[frames.slots[1], i, j])
+            )
 
 
 class SquareDistance(Function):
@@ -177,7 +179,7 @@ def steepest(
     for j in range(J.shape[1]):
         answer.u[j] = J[0, j] * problem.rate[0] / square
     state[0] += 1
-    answer.measure[0] = square
+    answer.measure[()] = square
     certify(problem, answer)
 
 

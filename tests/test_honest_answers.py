@@ -91,10 +91,13 @@ def inverted(controller: nmm.Controller, step: nmm.Step) -> tuple[Array, Array]:
         return J[:, step.partition], rate
     if controller.resolver.name == "pg":
         return J, rate
-    added = controller._results.added
     rows = controller.added_task.rows(controller.robot)
     own = row_scales(rows, controller.robot)
-    return np.vstack([J, added.J / own[:, None]]), np.concatenate([rate, added.rate / own])
+    problem = controller._step.problem
+    return (
+        np.vstack([J, problem.added_J / own[:, None]]),
+        np.concatenate([rate, problem.added_rate / own]),
+    )
 
 
 def test_what_is_solved_is_solved(rng: np.random.Generator) -> None:

@@ -109,7 +109,7 @@ def test_center_of_mass_is_that_of_the_links(
 
 def error(task: Task, robot: Robot, t: float, q: Array) -> Evaluation:
     program = Program(robot, [task.function, task.reference, Comparison(task)])
-    program.pack()
+    program.lay_out()
     return program.evaluate(t, q)[2]
 
 

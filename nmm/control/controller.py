@@ -9,16 +9,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, Integers
-from nmm.control.equations import PLAIN, WRAPPED, Results, drive, results, stated, step
+from nmm.control.equations import PLAIN, WRAPPED, ControlStep, TaskRows, drive, step
 from nmm.errors import InputError, SingularError
 from nmm.functions.function import Row, row_scales
 from nmm.functions.objectives.base import Objective
-from nmm.functions.program import Program
+from nmm.functions.program import BESIDE, Program
 from nmm.functions.tasks.comparison import Comparison
 from nmm.functions.tasks.task import Stack, Task
-from nmm.resolvers.answer import Status
+from nmm.kernels.memory import views
+from nmm.resolvers.answer import Status, unanswered
 from nmm.resolvers.base import Resolver
-from nmm.resolvers.problem import Dimensions
+from nmm.resolvers.problem import Problem
 from nmm.resolvers.state import State
 from nmm.robots.robot import Robot
 
@@ -97,31 +98,47 @@ class Controller:
         functions = [f for task in every for f in (task.function, task.reference, Comparison(task))]
         program = Program(robot, [*functions, *(function for _, function in weighted)])
         first = program.first_rows
-        table = [
+        listed = [
             (first[3 * i] + j, first[3 * i + 1] + j, _error_row(task, first[3 * i + 2], j, row))
             for i, task in enumerate(every)
             for j, row in enumerate(task.rows(robot))
         ]
+        table = np.array(listed, dtype=np.int64).reshape(-1, 3)
         s, k, m = len(self.rows), len(added_rows), robot.n_u
-        self._dimensions = dimensions = Dimensions(s, k, robot.u_names, robot.groups, (s,))
+        problem = Problem(
+            J=np.zeros((s, m)),
+            rate=np.zeros(s),
+            h=np.zeros(m),
+            inputs=robot.u_names,
+            groups=robot.groups,
+            row_scales=row_scales(self.rows, robot),
+            added_J=np.zeros((k, m)),
+            added_rate=np.zeros(k),
+            added_row_scales=row_scales(added_rows, robot),
+        )
+        self._dimensions = dimensions = problem.dimensions
         setup = resolver.setup(dimensions)
-        program.pack(
-            [[s, k, m, resolver.kernel.address], table, first[3 * len(every) :], setup.options, [s]],
-            [
-                _gains(self.task, robot),
-                _gains(self.added_task, robot),
-                [weight for weight, _ in weighted],
-                setup.numbers,
-                row_scales(self.rows, robot),
-                row_scales(added_rows, robot),
-            ],
-            [np.zeros((s + k) * (4 + m) + 2 + 3 * m + 4 + robot.n)],
+        self.state: State = resolver.start(dimensions)
+        program.lay_out(
+            ControlStep(
+                task=_task_rows(self.task, robot, table[:s]),
+                added=_task_rows(self.added_task, robot, table[s:]),
+                terms=np.array(first[3 * len(every) :], dtype=np.int64),
+                weights=np.array([weight for weight, _ in weighted]),
+                H=np.array(0.0),
+                problem=problem.arrays,
+                resolver=resolver.kernel.address,
+                numbers=setup.numbers,
+                options=setup.options,
+                state=self.state.memory,
+                answer=unanswered(m, len(dimensions.levels)),
+                q_dot=np.zeros(robot.n),
+            )
         )
         self._program = program
-        self.state: State = resolver.start(dimensions)
-        self._results: Results = results(program.tables, program.memory)
-        self._results.dt[0] = np.nan
-        self._u = self._results.answer.u
+        self._step = views(ControlStep, *program.blocks, BESIDE)
+        self.state.memory = self._step.state
+        self._u = self._step.answer.u
         self._shape = (robot.n,)
         self._solve = self._solver()
 
@@ -134,12 +151,7 @@ class Controller:
         InputError : q has the wrong length or holds numbers that are not finite
         """
         # Another kind of array would be compiled for anew, so anything but the plain kind is copied.
-        if (
-            type(q) is not np.ndarray
-            or q.dtype is not FLOAT64
-            or q.shape != self._shape
-            or not q.flags.carray
-        ):
+        if type(q) is not np.ndarray or q.dtype != FLOAT64 or q.shape != self._shape or not q.flags.carray:
             q = self._copied(q)
         if self._solve(float(t), q) >= _FAILED:
             self._fail(t, q)
@@ -156,26 +168,25 @@ class Controller:
 
     def _solver(self) -> Callable[[float, Array], float]:
         """solve(t, q) -> status, with everything it needs at hand."""
-        program, found, resolver = self._program, self._results, self.resolver
-        state, dimensions = self.state.memory, self._dimensions
-        prepare, tables, numbers, memory = program.prepare, program.tables, program.numbers, program.memory
+        program, found, resolver = self._program, self._step, self.resolver
+        dimensions, prepare, (integers, floats) = self._dimensions, program.prepare, program.blocks
 
         def solve(t: float, q: Array) -> float:
             prepare(t, q)
-            return step(t, q, tables, numbers, memory, state)
+            return step(t, q, integers, floats)
 
         def solve_and_finish(t: float, q: Array) -> float:
             solve(t, q)
-            resolver.finish(stated(found, tables, numbers), dimensions, found.answer)
+            resolver.finish(found.problem, dimensions, found.answer)
             drive(found.answer.u, program.buffers.G, found.q_dot)
-            return float(found.answer.status[0])
+            return float(found.answer.status[()])
 
         return solve if type(resolver).finish is Resolver.finish else solve_and_finish
 
     def _fail(self, t: float, q: Array) -> None:
         self.robot.q(q)  # a q that is not finite is the caller's error
         problem = self.robot.platform.problem(q[: self.robot.platform.n_p])
-        status = Status(int(self._results.answer.status[0]))
+        status = Status(int(self._step.answer.status[()]))
         also = "" if problem is None else f"; {problem}"
         raise SingularError(f"at t = {t:g} s: {status.meaning}{also}")
 
@@ -190,31 +201,31 @@ class Controller:
 
     def last(self, t: float, q: Array) -> Step:
         """The quantities of the call just made at (t, q), as copies."""
-        found = self._results
-        task, answer = found.task, found.answer
+        found = self._step
+        task, problem, answer = found.task, found.problem, found.answer
         return Step(
             t=float(t),
             q=q.copy(),
             r=task.r.copy(),
             r_d=task.r_d.copy(),
             error=task.error.copy(),
-            rate=task.rate.copy(),
-            J=task.J.copy(),
-            objective=float(found.H[0]),
-            h=found.h.copy(),
+            rate=problem.rate.copy(),
+            J=problem.J.copy(),
+            objective=float(found.H[()]),
+            h=problem.h.copy(),
             u=answer.u.copy(),
             q_dot=found.q_dot.copy(),
-            status=Status(int(answer.status[0])),
+            status=Status(int(answer.status[()])),
             scale=answer.scale.copy(),
-            residual=float(answer.residual[0]),
-            measure=float(answer.measure[0]),
+            residual=float(answer.residual[()]),
+            measure=float(answer.measure[()]),
             partition=self.state.partition(len(self.rows)),
         )
 
     def velocity(self, t: float, q: ArrayLike) -> Array:
         """q_dot = S(q) u (n,) of the closed loop at (t, q); raises as a call does."""
         self(t, q)
-        return self._results.q_dot.copy()
+        return self._step.q_dot.copy()
 
     def reset(self) -> None:
         """Forget what the resolver remembers: the next call decides anew."""
@@ -223,13 +234,13 @@ class Controller:
     @property
     def derivatives(self) -> tuple[Array, Array, Array]:
         """What the inputs move, in the last call, as views: J (s, m), the added task's (k, m), h (1, m)."""
-        found = self._results
-        return found.task.J, found.added.J, found.h[np.newaxis]
+        problem = self._step.problem
+        return problem.J, problem.added_J, problem.h[np.newaxis]
 
     def equation_solver(self) -> tuple[Callable[[float, Array], float], Array]:
         """(solve, J) for loops over many configurations: solve(t, q) does a step, whose matrix is then in the
         view J (s, m). q is (n,), float64, contiguous; nothing is checked."""
-        return self._solve, self._results.task.J
+        return self._solve, self._step.problem.J
 
 
 def _expect(given: object, kind: type, name: str) -> None:
@@ -243,13 +254,13 @@ def _error_row(task: Task, computed: int, component: int, row: Row) -> int:
     return WRAPPED if row.angular else PLAIN
 
 
-def _gains(stack: Stack, robot: Robot) -> Array:
-    """The block-diagonal gain of a stack, row after row."""
-    s = len(stack.rows(robot))
+def _task_rows(stack: Stack, robot: Robot, table: Integers) -> TaskRows:
+    """A stack with its block-diagonal gain, and room for what a step finds."""
+    s = len(table)
     K = np.zeros((s, s))
     first = 0
     for task in stack:
         block = task.gain_matrix(robot)
         K[first : first + len(block), first : first + len(block)] = block
         first += len(block)
-    return K.ravel()
+    return TaskRows(table, K, *np.zeros((3, s)))

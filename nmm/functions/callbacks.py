@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array
 from nmm.errors import InputError
 from nmm.functions.function import Callback, Evaluation, Stage
-from nmm.kernels.compiled import FUNCTION, kernel
+from nmm.kernels.compiled import kernel
+from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.configuration import Configuration
 
 #: Step of the central differences: the cube root of the machine's precision balances truncation and rounding
@@ -21,17 +22,14 @@ TimeConfigurationFunction = Callable[[float, Configuration], ArrayLike]
 
 
 @kernel(FUNCTION)
-def provided(
-    t: float, q: Array, placements: Array, jacobians: Array, hessians: Array, G: Array, G_q: Array,
-    slots: Array, parameters: Array, value: Array, value_t: Array, value_q: Array,
-) -> None:  # fmt: skip
-    """What the callback found: parameters = [value, value_t, value_q row after row]."""
-    s, n = value_q.shape
+def provided(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
+    """What the callback found: numbers = [value, value_t, value_q row after row]."""
+    s, n = rows.value_q.shape
     for i in range(s):
-        value[i] = parameters[i]
-        value_t[i] = parameters[s + i]
+        rows.value[i] = numbers[i]
+        rows.value_t[i] = numbers[s + i]
         for j in range(n):
-            value_q[i, j] = parameters[2 * s + i * n + j]
+            rows.value_q[i, j] = numbers[2 * s + i * n + j]
 
 
 def stage(rows: int, n: int, callback: Callback) -> Stage:

@@ -63,19 +63,19 @@ class Stage:
 
     Attributes
     ----------
-    kernel : of signature `compiled.FUNCTION`
+    kernel : of signature `records.FUNCTION`
     rows : how many rows it reads or writes
     before : how many of the rows that come before the function's own it sees too, above them
     frames : names of the frames whose placement and Jacobian it reads
-    parameters : the numbers that it reads
+    numbers : the numbers that it reads
     hessians : whether it reads the frames' kinematic Hessians
-    callback : a user's Python function, run before the kernels; its results are the parameters
+    callback : a user's Python function, run before the kernels; its results are the numbers
     """
 
     kernel: Kernel
     rows: int
     frames: tuple[str, ...] = ()
-    parameters: Array = field(default_factory=lambda: np.zeros(0))
+    numbers: Array = field(default_factory=lambda: np.zeros(0))
     hessians: bool = False
     callback: Callback | None = None
     before: int = 0
@@ -89,7 +89,7 @@ class Function(ABC):
     2. `stages(robot)`: the kernels that compute value, time derivative and Jacobian.
 
     `comparison` is for values that cannot be subtracted (orientations, poses): a kernel of signature
-    `compiled.FUNCTION` that sees the rows [value, target, error], s of each, with their derivatives, and
+    `records.FUNCTION` that sees the rows [value, target, error], s of each, with their derivatives, and
     writes those of the error. Without it the error is target - value, wrapped where a row is an angle.
     """
 
@@ -108,5 +108,5 @@ class Function(ABC):
         from nmm.functions.program import Program
 
         program = Program(configuration.robot, (self,))
-        program.pack()
+        program.lay_out()
         return program.evaluate(t, configuration.q)[0]

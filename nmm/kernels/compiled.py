@@ -12,40 +12,27 @@ in plain Python (`NUMBA_DISABLE_JIT=1`, or `program.py_func`) calls the plain ke
 
 from __future__ import annotations
 
-import hashlib
 import math
-import shutil
 from collections.abc import Callable
-from functools import cache, cached_property
-from pathlib import Path
+from functools import cached_property
 from typing import Any
 
 import numba
-import platformdirs
 from numba import types
 from numba.core import cgutils
 from numba.core.dispatcher import Dispatcher
 from numba.extending import intrinsic, overload
 
+from nmm.kernels.cache import KernelCache
+
 Plain = Callable[..., None]
 
-#: What the arguments of kernels are made of.
-SCALAR = types.float64
-VECTOR = types.float64[::1]
-MATRIX = types.float64[:, ::1]
+_vector = types.float64[::1]
+_matrix = types.float64[:, ::1]
 _stack = types.float64[:, :, ::1]
-_stack4 = types.float64[:, :, :, ::1]
-INTEGERS = types.int64[::1]
 
-#: y = phi(t, q), its partial derivative in time and its Jacobian in the coordinates:
-#: (t, q, placements, jacobians, hessians, G, G_q, slots, parameters, value, value_t, value_q)
-#: with frame k of the function at placements[slots[k]] (3, 4) = [R | p], jacobians[slots[k]] (6, n),
-#: hessians[slots[k]] (6, n, n); value_t and value_q (rows, n) come filled with zeros.
-FUNCTION = types.void(
-    SCALAR, VECTOR, _stack, _stack, _stack4, MATRIX, _stack, INTEGERS, VECTOR, VECTOR, VECTOR, MATRIX
-)
 #: qp_dot = G(qp) up: (qp, parameters, G, G_q) with G_q[i, j, k] = dG[i, j] / dqp[k]
-PLATFORM = types.void(VECTOR, VECTOR, MATRIX, _stack)
+PLATFORM = types.void(_vector, _vector, _matrix, _stack)
 
 
 class Kernel:
@@ -76,36 +63,7 @@ class Kernel:
         return address
 
 
-#: How many folders of compiled kernels are kept.
-KEPT_CACHES = 8
-
 _plain_by_address: dict[int, Plain] = {}
-
-
-@cache
-def cache_folder() -> str:
-    """Folder of numba's cache for this very text of nmm's kernels.
-
-    numba notices a change of the file that holds a compiled function, but not of the files that
-    hold what it calls; a digest of all sources that hold compiled functions does.
-    """
-    digest = hashlib.sha256(numba.__version__.encode())
-    for source in sorted(Path(__file__).parents[1].rglob("*.py")):
-        text = source.read_bytes()
-        if b"nmm.kernels.compiled import" in text or source == Path(__file__):
-            digest.update(text)
-    folder = Path(platformdirs.user_cache_dir("nmm")) / digest.hexdigest()[:16]
-    if not folder.exists():
-        _forget_old_caches(folder.parent)
-    return str(folder)
-
-
-def _forget_old_caches(parent: Path) -> None:
-    """Keep the latest few: each text of the kernels, each version of nmm, leaves a folder behind."""
-    siblings = [path for path in parent.glob("*") if path.is_dir()]
-    siblings.sort(key=lambda path: path.stat().st_mtime, reverse=True)
-    for old in siblings[KEPT_CACHES - 1 :]:
-        shutil.rmtree(old, ignore_errors=True)
 
 
 def compiled(function: Callable[..., Any]) -> Any:
@@ -114,12 +72,10 @@ def compiled(function: Callable[..., Any]) -> Any:
     Divisions by zero give inf and nan as in numpy (`error_model`): a singular matrix is a case
     that the resolvers report, not an exception out of compiled code.
     """
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = cache_folder()
-    try:
-        return numba.njit(cache=True, error_model="numpy")(function)
-    finally:
-        numba.config.CACHE_DIR = before
+    made = numba.njit(error_model="numpy")(function)
+    if isinstance(made, Dispatcher):  # the function itself with NUMBA_DISABLE_JIT=1
+        made._cache = KernelCache(function)  # type: ignore[attr-defined]  # as `enable_caching` does with numba's own
+    return made
 
 
 #: Decorator for helpers of compiled functions that stay plain Python when called from Python.
@@ -145,6 +101,19 @@ def view(memory: Any, first: int, shape: tuple[int, ...]) -> Any:
     return memory.reshape(-1)[first : first + math.prod(shape)].reshape(shape)
 
 
+def array_at(context: Any, builder: Any, kind: Any, data: Any, extents: Any) -> Any:
+    """For intrinsics: the contiguous array at a pointer; no references are counted."""
+    itemsize = context.get_constant(types.intp, context.get_abi_sizeof(context.get_data_type(kind.dtype)))
+    strides: list[Any] = []
+    stride = itemsize
+    for extent in reversed(extents):
+        strides.insert(0, stride)
+        stride = builder.mul(stride, extent)
+    array = context.make_array(kind)(context, builder)
+    context.populate_array(array, data=data, shape=extents, strides=strides, itemsize=itemsize, meminfo=None)
+    return array._getvalue()
+
+
 @intrinsic
 def _view_compiled(context: Any, memory: Any, first: Any, shape: Any) -> Any:
     result = types.Array(memory.dtype, len(shape), "C")
@@ -152,22 +121,7 @@ def _view_compiled(context: Any, memory: Any, first: Any, shape: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         owner = context.make_array(signature.args[0])(context, builder, values[0])
         extents = cgutils.unpack_tuple(builder, values[2])
-        size = context.get_abi_sizeof(context.get_data_type(memory.dtype))
-        strides: list[Any] = []
-        stride = context.get_constant(types.intp, size)
-        for extent in reversed(extents):
-            strides.insert(0, stride)
-            stride = builder.mul(stride, extent)
-        array = context.make_array(result)(context, builder)
-        context.populate_array(
-            array,
-            data=builder.gep(owner.data, [values[1]]),
-            shape=extents,
-            strides=strides,
-            itemsize=context.get_constant(types.intp, size),
-            meminfo=None,
-        )
-        return array._getvalue()
+        return array_at(context, builder, result, builder.gep(owner.data, [values[1]]), extents)
 
     return result(memory, types.int64, types.UniTuple(types.int64, len(shape))), generate
 
@@ -210,5 +164,4 @@ def caller(signature: Any) -> Callable[..., None]:
     return call
 
 
-call_function = caller(FUNCTION)
 call_platform = caller(PLATFORM)

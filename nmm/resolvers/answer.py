@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple
 
-from numba import types
+import numpy as np
 
 from nmm.arrays import Array
-from nmm.kernels.compiled import VECTOR, compiled
+from nmm.kernels.compiled import compiled
 from nmm.kernels.linear_algebra import residual_norm
+from nmm.kernels.memory import Cell, Vector
 from nmm.resolvers.problem import ProblemArrays
 
 
@@ -59,19 +60,27 @@ EXACT = 1e-9
 
 
 class AnswerArrays(NamedTuple):
-    """An `Answer` as kernels write it: u (m,); status, residual and measure (1,); scale (levels,).
+    """An `Answer` as kernels write it: u (m,); status, residual and measure (); scale (levels,).
 
     Before the kernel is called u, residual and measure are not numbers, status is NOT_FINITE and scale 1.
     """
 
-    u: Array
-    status: Array
-    scale: Array
-    residual: Array
-    measure: Array
+    u: Vector
+    status: Cell
+    scale: Vector
+    residual: Cell
+    measure: Cell
 
 
-ANSWER = types.BaseTuple.from_types((VECTOR,) * 5, AnswerArrays)
+def unanswered(m: int, levels: int) -> AnswerArrays:
+    """What a kernel finds: room for m inputs and as many levels."""
+    return AnswerArrays(
+        u=np.full(m, np.nan),
+        status=np.array(float(NOT_FINITE)),
+        scale=np.ones(levels),
+        residual=np.array(np.nan),
+        measure=np.array(np.nan),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,10 +113,10 @@ class Answer:
         """A copy of what a kernel wrote."""
         return cls(
             written.u.copy(),
-            Status(int(written.status[0])),
+            Status(int(written.status[()])),
             written.scale.copy(),
-            float(written.residual[0]),
-            float(written.measure[0]),
+            float(written.residual[()]),
+            float(written.measure[()]),
         )
 
 
@@ -118,13 +127,13 @@ def certify(problem: ProblemArrays, answer: AnswerArrays) -> None:
     Inexact is also what rounding does not let certify, where u is some 1e7 times larger than the rate.
     """
     residual, rounding = residual_norm(problem.J, answer.u, problem.rate)
-    answer.residual[0] = residual
+    answer.residual[()] = residual
     square = 0.0
     for i in range(problem.rate.shape[0]):
         square += problem.rate[i] * problem.rate[i]
     if not math.isfinite(residual):
-        answer.status[0] = NOT_FINITE
+        answer.status[()] = NOT_FINITE
     elif residual + rounding > EXACT * (1.0 + math.sqrt(square)):
-        answer.status[0] = INEXACT
+        answer.status[()] = INEXACT
     else:
-        answer.status[0] = SOLVED
+        answer.status[()] = SOLVED

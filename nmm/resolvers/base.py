@@ -10,14 +10,21 @@ from numba import types
 
 from nmm.arrays import Array, Integers
 from nmm.errors import InputError
-from nmm.kernels.compiled import INTEGERS, VECTOR, Kernel, caller
-from nmm.resolvers.answer import ANSWER, NOT_FINITE, Answer, AnswerArrays
-from nmm.resolvers.problem import PROBLEM, Dimensions, Problem, ProblemArrays
+from nmm.kernels.compiled import Kernel, caller
+from nmm.kernels.memory import record_type
+from nmm.resolvers.answer import Answer, AnswerArrays, unanswered
+from nmm.resolvers.problem import Dimensions, Problem, ProblemArrays
 from nmm.resolvers.state import State
 
 #: A resolver's kernel: (problem, numbers, options, state, answer), of `ProblemArrays`, the numbers and
 #: options of its `Setup`, the integers of its `State`, and the `AnswerArrays` that it writes.
-RESOLVER = types.void(PROBLEM, VECTOR, INTEGERS, INTEGERS, ANSWER)
+RESOLVER = types.void(
+    record_type(ProblemArrays),
+    types.float64[::1],
+    types.int64[::1],
+    types.int64[::1],
+    record_type(AnswerArrays),
+)
 
 call_resolver = caller(RESOLVER)
 
@@ -80,12 +87,7 @@ class Resolver(ABC):
         dimensions, arrays = problem.dimensions, problem.arrays
         setup = self.setup(dimensions)
         state = self.start(dimensions) if state is None else state
-        answer = AnswerArrays(
-            np.full(dimensions.m, np.nan),
-            np.array([float(NOT_FINITE)]),
-            np.ones(len(arrays.ends)),
-            *(np.full(1, np.nan) for _ in range(2)),
-        )
+        answer = unanswered(dimensions.m, len(arrays.ends))
         self.kernel(arrays, setup.numbers, setup.options, state.memory, answer)
         self.finish(arrays, dimensions, answer)
         return Answer.of(answer)

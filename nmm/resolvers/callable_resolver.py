@@ -50,9 +50,9 @@ class CallableResolver(Resolver):
         return Setup(np.zeros(0), NO_OPTIONS)
 
     def finish(self, problem: ProblemArrays, dimensions: Dimensions, answer: AnswerArrays) -> None:
-        answer.measure[0] = np.nan
+        answer.measure[()] = np.nan
         if not all(np.all(np.isfinite(given)) for given in (problem.J, problem.rate, problem.h)):
-            answer.status[0] = Status.NOT_FINITE
+            answer.status[()] = Status.NOT_FINITE
             return
         given = {name: value for name, value in problem._asdict().items() if name != "ends"}
         levels = np.diff(problem.ends, prepend=0).tolist()
@@ -60,7 +60,7 @@ class CallableResolver(Resolver):
         try:
             found = self.function(asked)
         except np.linalg.LinAlgError:
-            answer.status[0] = Status.SINGULAR_J
+            answer.status[()] = Status.SINGULAR_J
             return
         u = np.asarray(found.u if isinstance(found, Answer) else found, dtype=np.float64)
         if u.shape != answer.u.shape:
@@ -68,7 +68,7 @@ class CallableResolver(Resolver):
         answer.u[:] = u
         certify(problem, answer)
         if isinstance(found, Answer):
-            answer.measure[0] = found.measure
-            if found.status is not Status.SOLVED and answer.status[0] < Status.SINGULAR_J:
-                answer.status[0] = found.status
+            answer.measure[()] = found.measure
+            if found.status is not Status.SOLVED and answer.status[()] < Status.SINGULAR_J:
+                answer.status[()] = found.status
                 answer.scale[:] = found.scale

@@ -31,13 +31,13 @@ def extended_jacobian(
             M[i, j] = J[i, j] if i < s else problem.added_J[i - s, j]
         M[i, m] = problem.rate[i] if i < s else problem.added_rate[i - s]
         scales[i] = problem.row_scales[i] if i < s else problem.added_row_scales[i - s]
-    _, answer.measure[0] = eliminate(M, scales)
-    if answer.measure[0] <= numbers[TOLERANCE]:
+    _, answer.measure[()] = eliminate(M, scales)
+    if answer.measure[()] <= numbers[TOLERANCE]:
         order = np.empty(s, dtype=np.int64)
         L = np.empty((s, s))
         Q = np.empty((s, m))
         regular = orthonormal_rows(J, problem.row_scales, order, L, Q) > numbers[TOLERANCE]
-        answer.status[0] = SINGULAR_JE if regular else SINGULAR_J
+        answer.status[()] = SINGULAR_JE if regular else SINGULAR_J
         return
     for j in range(m):
         answer.u[j] = M[j, m]

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, Integers, array, scalar, vector
+from nmm.arrays import Array, array, scalar, vector
 from nmm.errors import InputError
-from nmm.kernels.compiled import INTEGERS, MATRIX, SCALAR, VECTOR
+from nmm.kernels.memory import Cell, IntegerVector, Matrix, Vector
 
 
 class ProblemArrays(NamedTuple):
@@ -25,31 +24,22 @@ class ProblemArrays(NamedTuple):
     h (m,) : the objective's gradient, seen by the inputs
     limit_rows (l, m), lower (l,), upper (l,) : lower <= limit_rows u <= upper
     before (m,) : the inputs of the step before
-    dt : the time that u will stand, s; not a number where it is not known
+    dt () : the time that u will stand, s; not a number where it is not known
     """
 
-    J: Array
-    rate: Array
-    row_scales: Array
-    ends: Integers
-    added_J: Array
-    added_rate: Array
-    added_row_scales: Array
-    h: Array
-    limit_rows: Array
-    lower: Array
-    upper: Array
-    before: Array
-    dt: float
-
-
-PROBLEM = types.BaseTuple.from_types(
-    (
-        *(MATRIX, VECTOR, VECTOR, INTEGERS, MATRIX, VECTOR, VECTOR, VECTOR),
-        *(MATRIX, VECTOR, VECTOR, VECTOR, SCALAR),
-    ),
-    ProblemArrays,
-)
+    J: Matrix
+    rate: Vector
+    row_scales: Vector
+    ends: IntegerVector
+    added_J: Matrix
+    added_rate: Vector
+    added_row_scales: Vector
+    h: Vector
+    limit_rows: Matrix
+    lower: Vector
+    upper: Vector
+    before: Vector
+    dt: Cell
 
 
 class Dimensions(NamedTuple):
@@ -155,9 +145,9 @@ class Problem:
     @property
     def arrays(self) -> ProblemArrays:
         """The numbers, as kernels read them."""
-        names = [name for name in ProblemArrays._fields if name != "ends"]
         ends = np.cumsum(self.levels or (), dtype=np.int64)
-        return ProblemArrays(ends=ends, **{name: getattr(self, name) for name in names})
+        own = {name: np.asarray(getattr(self, name)) for name in ProblemArrays._fields if name != "ends"}
+        return ProblemArrays(ends=ends, **own)
 
 
 def _rows(value: ArrayLike, m: int, name: str) -> Array:

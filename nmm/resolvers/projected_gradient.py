@@ -36,9 +36,9 @@ def projected_gradient(
     if numbers.shape[0] == C:
         for j in range(m):
             u0[j] = -alpha * h[j]
-        answer.measure[0] = orthonormal_rows(J, problem.row_scales, order, L, Q)
-        if answer.measure[0] <= numbers[TOLERANCE]:
-            answer.status[0] = SINGULAR_J
+        answer.measure[()] = orthonormal_rows(J, problem.row_scales, order, L, Q)
+        if answer.measure[()] <= numbers[TOLERANCE]:
+            answer.status[()] = SINGULAR_J
             return
         closest_solution(problem.rate, u0, order, L, Q, u)
     else:
@@ -50,9 +50,9 @@ def projected_gradient(
                 u0[j] -= alpha * W[k, j] * h[k]
                 for i in range(s):
                     weighted_J[i, j] += J[i, k] * W[k, j]
-        answer.measure[0] = orthonormal_rows(weighted_J, problem.row_scales, order, L, Q)
-        if answer.measure[0] <= numbers[TOLERANCE]:
-            answer.status[0] = SINGULAR_J
+        answer.measure[()] = orthonormal_rows(weighted_J, problem.row_scales, order, L, Q)
+        if answer.measure[()] <= numbers[TOLERANCE]:
+            answer.status[()] = SINGULAR_J
             return
         solution = np.empty(m)
         closest_solution(problem.rate, u0, order, L, Q, solution)

@@ -53,14 +53,14 @@ def reduced_gradient(
     if options[NORMALISED] == 1:
         unit = volume(J, problem.row_scales, numbers[TOLERANCE])
         if unit == 0.0:
-            answer.status[0] = SINGULAR_J
+            answer.status[()] = SINGULAR_J
             return
     determinant, regular = partitioned(problem, J, unit, numbers, options, state, columns, M)
-    answer.measure[0] = abs(determinant) / unit
+    answer.measure[()] = abs(determinant) / unit
     state[SIGN] = int(determinant > 0.0) - int(determinant < 0.0)
     if regular <= numbers[TOLERANCE]:
         lost = volume(J, problem.row_scales, numbers[TOLERANCE]) == 0.0
-        answer.status[0] = SINGULAR_J if lost else SINGULAR_JA
+        answer.status[()] = SINGULAR_J if lost else SINGULAR_JA
         return
     u = answer.u
     for j in range(m):  # the reduced gradient; it is zero on Ja's own columns up to rounding

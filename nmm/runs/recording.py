@@ -191,7 +191,7 @@ def _shown(controller: Controller) -> tuple[str | None, dict[int, int], Array | 
 def _frame_path(robot: Robot, frame: str, q: Array) -> Array:
     """Position of a frame's origin at each configuration, (N, 3)."""
     program = Program(robot, (Position(frame, "xyz"),))
-    program.pack()
+    program.lay_out()
     path = np.empty((len(q), 3))
     for k in range(len(q)):
         program.prepare(0.0, q[k])

@@ -31,7 +31,7 @@ def pointing(function: Pointing, frames: Frames) -> list[SymbolicRow]:
             f"{', '.join(f'{value:g}' for value in function.axis)}"
         )
     # a, b1 and b2 as the task has them.
-    numbers = function.stages(frames.robot)[-1].parameters.reshape(3, 3)
+    numbers = function.stages(frames.robot)[-1].numbers.reshape(3, 3)
     axes = [[ring.number(exact(float(value))) for value in axis] for axis in numbers]
     steps = steps_to(frames.robot, function.frame)
     seen = _seen(function, frames)

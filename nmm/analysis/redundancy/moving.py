@@ -26,7 +26,7 @@ from nmm.control.controller import Controller, Step
 from nmm.errors import InputError, SingularError
 from nmm.functions.references.polynomial import Constant
 from nmm.functions.tasks.task import Stack, Task
-from nmm.resolvers.base import Status
+from nmm.resolvers.answer import Status
 from nmm.resolvers.projected_gradient import ProjectedGradient
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
@@ -222,7 +222,7 @@ class _Motion:
         return replace(
             found,
             t=time,
-            target=found.r + error,
+            r_d=found.r + error,
             error=error,
             rate=GAIN * error,
             u=u,

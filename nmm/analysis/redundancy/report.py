@@ -240,7 +240,7 @@ def coordinate_jacobian(jacobians: Jacobians, t: float, q: Array) -> Array:
     for task in jacobians.task:
         functions += [task.function, task.reference, Comparison(task)]
     program = Program(jacobians.robot, functions)
-    program.pack()
+    program.lay_out()
     found = program.evaluate(t, q)
     blocks = []
     for f, g, error in zip(found[::3], found[1::3], found[2::3], strict=True):

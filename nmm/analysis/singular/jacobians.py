@@ -49,7 +49,7 @@ class Jacobians:
         self.resolver = None
         if isinstance(subject, Controller):
             self.robot, self.task, self.resolver = subject.robot, subject.task, subject.resolver
-            added = subject.constraint if constraint is None else stacked(constraint)
+            added = subject.added_task if constraint is None else stacked(constraint)
         elif isinstance(subject, tuple) and len(subject) == 2 and isinstance(subject[0], Robot):
             self.robot, self.task = subject[0], stacked(subject[1])
             added = Stack() if constraint is None else stacked(constraint)

@@ -9,7 +9,8 @@ from nmm.arrays import Array
 from nmm.errors import InputError
 from nmm.functions.function import Function, Row, Stage
 from nmm.functions.tasks.task import Stack, Task
-from nmm.kernels.compiled import FUNCTION, kernel
+from nmm.kernels.compiled import kernel
+from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import Robot
 
 #: What an analysis takes as the task: functions f(q) are enough, it needs no targets.
@@ -17,15 +18,12 @@ Tasks: TypeAlias = Task | Function | Stack | Sequence[Task | Function]
 
 
 @kernel(FUNCTION)
-def stand_still(
-    t: float, q: Array, placements: Array, jacobians: Array, hessians: Array, G: Array, G_q: Array,
-    slots: Array, parameters: Array, value: Array, value_t: Array, value_q: Array,
-) -> None:  # fmt: skip
+def stand_still(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     """The value stays, its derivatives are 0."""
-    for i in range(value.shape[0]):
-        value_t[i] = 0.0
-        for j in range(value_q.shape[1]):
-            value_q[i, j] = 0.0
+    for i in range(rows.value.shape[0]):
+        rows.value_t[i] = 0.0
+        for j in range(rows.value_q.shape[1]):
+            rows.value_q[i, j] = 0.0
 
 
 class Reached(Function):

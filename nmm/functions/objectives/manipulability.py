@@ -11,66 +11,64 @@ from nmm.arrays import Array
 from nmm.errors import InputError, unknown
 from nmm.functions.function import Stage
 from nmm.functions.objectives.base import Objective
-from nmm.kernels.compiled import FUNCTION, kernel
+from nmm.kernels.compiled import kernel
 from nmm.kernels.linear_algebra import orthonormal_rows, pseudoinverse_transposed
+from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import Robot
 
 ROWS = {"x": 0, "y": 1, "z": 2, "rx": 3, "ry": 4, "rz": 5}
 
 
 @kernel(FUNCTION)
-def manipulability(
-    t: float, q: Array, placements: Array, jacobians: Array, hessians: Array, G: Array, G_q: Array,
-    slots: Array, parameters: Array, value: Array, value_t: Array, value_q: Array,
-) -> None:  # fmt: skip
+def manipulability(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     """w = sqrt(det(J Jᵀ)) and ∂w/∂q_k = w tr(J⁺ ∂J/∂q_k); where w = 0 it has no gradient, and 0 is given.
 
     J = (rows of the frame's Jacobian) S for the robot, its arm's columns for the arm;
-    ∂J/∂q_k = H_k S + J_q ∂S/∂q_k. parameters = [first column: 0 robot, 1 arm; rows...].
+    ∂J/∂q_k = H_k S + J_q ∂S/∂q_k. numbers = [first column: 0 robot, 1 arm; rows...].
     """
-    frame = slots[0]
-    n = q.shape[0]
-    n_p, p = G.shape
-    arm_only = parameters[0] > 0.0
-    s = parameters.shape[0] - 1
+    frame = frames.slots[0]
+    n = at.q.shape[0]
+    n_p, p = at.G.shape
+    arm_only = numbers[0] > 0.0
+    s = numbers.shape[0] - 1
     m = n - n_p if arm_only else n - n_p + p
     offset = 0 if arm_only else p
     J = np.zeros((s, m))
     for i in range(s):
-        row = int(parameters[1 + i])
+        row = int(numbers[1 + i])
         if not arm_only:
             for j in range(p):
                 for k in range(n_p):
-                    J[i, j] += jacobians[frame, row, k] * G[k, j]
+                    J[i, j] += frames.jacobians[frame, row, k] * at.G[k, j]
         for j in range(n - n_p):
-            J[i, offset + j] = jacobians[frame, row, n_p + j]
+            J[i, offset + j] = frames.jacobians[frame, row, n_p + j]
     order = np.empty(s, dtype=np.int64)
     L = np.empty((s, s))
     Q = np.empty((s, m))
     if orthonormal_rows(J, np.ones(s), order, L, Q) <= 1e-12:  # zero to rounding
-        value[0] = 0.0
+        rows.value[0] = 0.0
         return
     w = 1.0
     for i in range(s):
         w *= L[i, i]
-    value[0] = w
+    rows.value[0] = w
     X = np.empty((s, m))
     pseudoinverse_transposed(order, L, Q, X)
     for k in range(n):
         trace = 0.0
         for i in range(s):
-            row = int(parameters[1 + i])
+            row = int(numbers[1 + i])
             for j in range(m):
                 derivative = 0.0
                 if j >= offset:
-                    derivative = hessians[frame, row, n_p + j - offset, k]
+                    derivative = frames.hessians[frame, row, n_p + j - offset, k]
                 else:
                     for a in range(n_p):
-                        derivative += hessians[frame, row, a, k] * G[a, j]
+                        derivative += frames.hessians[frame, row, a, k] * at.G[a, j]
                         if k < n_p:
-                            derivative += jacobians[frame, row, a] * G_q[a, j, k]
+                            derivative += frames.jacobians[frame, row, a] * at.G_q[a, j, k]
                 trace += X[i, j] * derivative
-        value_q[0, k] = w * trace
+        rows.value_q[0, k] = w * trace
 
 
 class Manipulability(Objective):

@@ -12,26 +12,24 @@ from nmm.errors import InputError
 from nmm.functions.function import Stage
 from nmm.functions.objectives.base import Objective
 from nmm.functions.tasks.coordinates import Combination, coefficients, label
-from nmm.kernels.compiled import FUNCTION, kernel
+from nmm.kernels.compiled import kernel
+from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import Robot
 
 
 @kernel(FUNCTION)
-def half_sum_of_squares(
-    t: float, q: Array, placements: Array, jacobians: Array, hessians: Array, G: Array, G_q: Array,
-    slots: Array, parameters: Array, value: Array, value_t: Array, value_q: Array,
-) -> None:  # fmt: skip
-    """H = ½ Σ w (a·q - c)²; parameters = rows of [w, c, a...]."""
-    n = q.shape[0]
-    value[0] = 0.0
-    for row in range(parameters.shape[0] // (n + 2)):
-        weight = parameters[row * (n + 2)]
-        difference = -parameters[row * (n + 2) + 1]
+def half_sum_of_squares(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
+    """H = ½ Σ w (a·q - c)²; numbers = rows of [w, c, a...]."""
+    n = at.q.shape[0]
+    rows.value[0] = 0.0
+    for row in range(numbers.shape[0] // (n + 2)):
+        weight = numbers[row * (n + 2)]
+        difference = -numbers[row * (n + 2) + 1]
         for j in range(n):
-            difference += parameters[row * (n + 2) + 2 + j] * q[j]
-        value[0] += 0.5 * weight * difference * difference
+            difference += numbers[row * (n + 2) + 2 + j] * at.q[j]
+        rows.value[0] += 0.5 * weight * difference * difference
         for j in range(n):
-            value_q[0, j] += weight * difference * parameters[row * (n + 2) + 2 + j]
+            rows.value_q[0, j] += weight * difference * numbers[row * (n + 2) + 2 + j]
 
 
 @dataclass(frozen=True)

@@ -10,23 +10,21 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array, vector
 from nmm.errors import InputError
 from nmm.functions.function import Function, Row, Stage
-from nmm.kernels.compiled import FUNCTION, kernel
+from nmm.kernels.compiled import kernel
+from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import Robot
 
 
 @kernel(FUNCTION)
-def bearing(
-    t: float, q: Array, placements: Array, jacobians: Array, hessians: Array, G: Array, G_q: Array,
-    slots: Array, parameters: Array, value: Array, value_t: Array, value_q: Array,
-) -> None:  # fmt: skip
+def bearing(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     """atan2(T - p) by the chain rule, in place: the first two rows hold p and its derivatives."""
-    dx = parameters[0] - value[0]
-    dy = parameters[1] - value[1]
+    dx = numbers[0] - rows.value[0]
+    dy = numbers[1] - rows.value[1]
     square = dx * dx + dy * dy
-    value_t[0] = (dy * value_t[0] - dx * value_t[1]) / square
-    for j in range(q.shape[0]):
-        value_q[0, j] = (dy * value_q[0, j] - dx * value_q[1, j]) / square
-    value[0] = math.atan2(dy, dx)
+    rows.value_t[0] = (dy * rows.value_t[0] - dx * rows.value_t[1]) / square
+    for j in range(at.q.shape[0]):
+        rows.value_q[0, j] = (dy * rows.value_q[0, j] - dx * rows.value_q[1, j]) / square
+    rows.value[0] = math.atan2(dy, dx)
 
 
 class Bearing(Function):

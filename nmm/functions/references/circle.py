@@ -10,29 +10,27 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array, positive, scalar, vector
 from nmm.errors import InputError
 from nmm.functions.function import Function, Row, Stage
-from nmm.kernels.compiled import FUNCTION, kernel
+from nmm.kernels.compiled import kernel
+from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import Robot
 
 AXES = {"x": 0, "y": 1, "z": 2}
 
 
 @kernel(FUNCTION)
-def circle(
-    t: float, q: Array, placements: Array, jacobians: Array, hessians: Array, G: Array, G_q: Array,
-    slots: Array, parameters: Array, value: Array, value_t: Array, value_q: Array,
-) -> None:  # fmt: skip
-    """c + ρ (cos φ e1 + sin φ e2), φ = φ0 + rate t; parameters = [ρ, rate, φ0, i1, i2, c...]."""
-    radius = parameters[0]
-    rate = parameters[1]
-    phase = parameters[2] + rate * t
-    first = int(parameters[3])
-    second = int(parameters[4])
-    for i in range(value.shape[0]):
-        value[i] = parameters[5 + i]
-    value[first] += radius * math.cos(phase)
-    value[second] += radius * math.sin(phase)
-    value_t[first] = -radius * rate * math.sin(phase)
-    value_t[second] = radius * rate * math.cos(phase)
+def circle(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
+    """c + ρ (cos φ e1 + sin φ e2), φ = φ0 + rate t; numbers = [ρ, rate, φ0, i1, i2, c...]."""
+    radius = numbers[0]
+    rate = numbers[1]
+    phase = numbers[2] + rate * at.t
+    first = int(numbers[3])
+    second = int(numbers[4])
+    for i in range(rows.value.shape[0]):
+        rows.value[i] = numbers[5 + i]
+    rows.value[first] += radius * math.cos(phase)
+    rows.value[second] += radius * math.sin(phase)
+    rows.value_t[first] = -radius * rate * math.sin(phase)
+    rows.value_t[second] = radius * rate * math.cos(phase)
 
 
 class Circle(Function):

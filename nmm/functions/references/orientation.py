@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array, matrix, positive, scalar, vector
 from nmm.errors import InputError, unknown
 from nmm.functions.function import Function, Row, Stage
-from nmm.kernels.compiled import FUNCTION, kernel
+from nmm.kernels.compiled import kernel
+from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.kernels.rotations import between3, compose3, exp3, left_jacobian_inverse3, log3, transposed_times3
 from nmm.robots.robot import Robot
 
@@ -20,32 +21,29 @@ ROWS = tuple(Row(name, "rad") for name in ("rx", "ry", "rz"))
 
 
 @kernel(FUNCTION)
-def turning(
-    t: float, q: Array, placements: Array, jacobians: Array, hessians: Array, G: Array, G_q: Array,
-    slots: Array, parameters: Array, value: Array, value_t: Array, value_q: Array,
-) -> None:  # fmt: skip
+def turning(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     """φ = log(exp(φ0) exp(a s)), φ_dot = Jr(φ)⁻¹ a s_dot; s(t) a polynomial, at rest outside [t0, t1].
 
-    parameters = [φ0, a, t0, t1, coefficients of s, highest power first].
+    numbers = [φ0, a, t0, t1, coefficients of s, highest power first].
     """
-    outside = t < parameters[6] or t > parameters[7]
-    local = min(max(t, parameters[6]), parameters[7])
+    outside = at.t < numbers[6] or at.t > numbers[7]
+    local = min(max(at.t, numbers[6]), numbers[7])
     s = 0.0
     s_t = 0.0
-    for k in range(8, parameters.shape[0]):
+    for k in range(8, numbers.shape[0]):
         s_t = s_t * local + s
-        s = s * local + parameters[k]
+        s = s * local + numbers[k]
     axis, rate = np.empty(3), np.empty(3)
     for i in range(3):
-        axis[i] = parameters[3 + i] * s
-        rate[i] = 0.0 if outside else parameters[3 + i] * s_t
+        axis[i] = numbers[3 + i] * s
+        rate[i] = 0.0 if outside else numbers[3 + i] * s_t
     first, turn, R = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    exp3(parameters[:3], first)
+    exp3(numbers[:3], first)
     exp3(axis, turn)
     compose3(first, turn, R)
-    log3(R, value)
-    left_jacobian_inverse3(value, turn)
-    transposed_times3(turn, rate, value_t)
+    log3(R, rows.value)
+    left_jacobian_inverse3(rows.value, turn)
+    transposed_times3(turn, rate, rows.value_t)
 
 
 class Turn(Function):

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array, array, positive, vector
 from nmm.errors import InputError, unknown
 from nmm.functions.function import Function, Row, Stage
-from nmm.kernels.compiled import FUNCTION, kernel
+from nmm.kernels.compiled import kernel
+from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import Robot
 
 if TYPE_CHECKING:  # SciPy is imported where it is used: a third of a second that a circle need not pay
@@ -19,32 +20,29 @@ if TYPE_CHECKING:  # SciPy is imported where it is used: a third of a second tha
 
 
 @kernel(FUNCTION)
-def piecewise_polynomial(
-    t: float, q: Array, placements: Array, jacobians: Array, hessians: Array, G: Array, G_q: Array,
-    slots: Array, parameters: Array, value: Array, value_t: Array, value_q: Array,
-) -> None:  # fmt: skip
+def piecewise_polynomial(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     """Horner's rule in the piece that holds t; at rest before the first and after the last break.
 
-    parameters = [pieces, coefficients a piece, breaks..., coefficients (component, piece, power)],
+    numbers = [pieces, coefficients a piece, breaks..., coefficients (component, piece, power)],
     highest power first, in the time since the piece's beginning.
     """
-    pieces = int(parameters[0])
-    order = int(parameters[1])
-    breaks = parameters[2 : 3 + pieces]
+    pieces = int(numbers[0])
+    order = int(numbers[1])
+    breaks = numbers[2 : 3 + pieces]
     piece = 0
-    while piece < pieces - 1 and t >= breaks[piece + 1]:
+    while piece < pieces - 1 and at.t >= breaks[piece + 1]:
         piece += 1
-    outside = t < breaks[0] or t > breaks[pieces]
-    local = min(max(t, breaks[0]), breaks[pieces]) - breaks[piece]
-    for i in range(value.shape[0]):
+    outside = at.t < breaks[0] or at.t > breaks[pieces]
+    local = min(max(at.t, breaks[0]), breaks[pieces]) - breaks[piece]
+    for i in range(rows.value.shape[0]):
         first = 3 + pieces + (i * pieces + piece) * order
         y = 0.0
         y_t = 0.0
         for k in range(order):
             y_t = y_t * local + y
-            y = y * local + parameters[first + k]
-        value[i] = y
-        value_t[i] = 0.0 if outside else y_t
+            y = y * local + numbers[first + k]
+        rows.value[i] = y
+        rows.value_t[i] = 0.0 if outside else y_t
 
 
 class PiecewisePolynomial(Function):

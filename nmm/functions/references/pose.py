@@ -9,33 +9,31 @@ from nmm.arrays import Array, vector
 from nmm.errors import InputError
 from nmm.functions.function import Function, Row, Stage
 from nmm.functions.references.polynomial import Constant
-from nmm.kernels.compiled import FUNCTION, kernel
+from nmm.kernels.compiled import kernel
+from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import Robot
 
 
 @kernel(FUNCTION)
-def move_rows(
-    t: float, q: Array, placements: Array, jacobians: Array, hessians: Array, G: Array, G_q: Array,
-    slots: Array, parameters: Array, value: Array, value_t: Array, value_q: Array,
-) -> None:  # fmt: skip
+def move_rows(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     """The rows from `source` on become those from `target` on; then the first rows are zero.
 
-    parameters = [source, target, number of rows, number of first rows to clear].
+    numbers = [source, target, number of rows, number of first rows to clear].
     """
-    source, target, count = int(parameters[0]), int(parameters[1]), int(parameters[2])
-    n = q.shape[0]
+    source, target, count = int(numbers[0]), int(numbers[1]), int(numbers[2])
+    n = at.q.shape[0]
     step = 1 if target < source else -1  # so that none is overwritten before it is read
     for moved in range(count):
         i = moved if step > 0 else count - 1 - moved
-        value[target + i] = value[source + i]
-        value_t[target + i] = value_t[source + i]
+        rows.value[target + i] = rows.value[source + i]
+        rows.value_t[target + i] = rows.value_t[source + i]
         for k in range(n):
-            value_q[target + i, k] = value_q[source + i, k]
-    for i in range(int(parameters[3])):
-        value[i] = 0.0
-        value_t[i] = 0.0
+            rows.value_q[target + i, k] = rows.value_q[source + i, k]
+    for i in range(int(numbers[3])):
+        rows.value[i] = 0.0
+        rows.value_t[i] = 0.0
         for k in range(n):
-            value_q[i, k] = 0.0
+            rows.value_q[i, k] = 0.0
 
 
 class PoseReference(Function):

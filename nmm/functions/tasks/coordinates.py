@@ -9,7 +9,8 @@ import numpy as np
 from nmm.arrays import Array, scalar
 from nmm.errors import InputError
 from nmm.functions.function import Function, Row, Stage
-from nmm.kernels.compiled import FUNCTION, kernel
+from nmm.kernels.compiled import kernel
+from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import Robot
 
 #: A coordinate's name, or the coefficients of several.
@@ -17,17 +18,14 @@ Combination = str | Mapping[str, float]
 
 
 @kernel(FUNCTION)
-def linear(
-    t: float, q: Array, placements: Array, jacobians: Array, hessians: Array, G: Array, G_q: Array,
-    slots: Array, parameters: Array, value: Array, value_t: Array, value_q: Array,
-) -> None:  # fmt: skip
-    """y = A q; `parameters` holds A, row after row."""
-    n = q.shape[0]
-    for i in range(value.shape[0]):
-        value[i] = 0.0
+def linear(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
+    """y = A q; `numbers` holds A, row after row."""
+    n = at.q.shape[0]
+    for i in range(rows.value.shape[0]):
+        rows.value[i] = 0.0
         for j in range(n):
-            value[i] += parameters[i * n + j] * q[j]
-            value_q[i, j] = parameters[i * n + j]
+            rows.value[i] += numbers[i * n + j] * at.q[j]
+            rows.value_q[i, j] = numbers[i * n + j]
 
 
 def coefficients(combinations: Sequence[Combination], robot: Robot) -> Array:

@@ -10,29 +10,27 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array
 from nmm.functions.function import Function, Row, Stage
 from nmm.functions.tasks.position import as_point, check_point
-from nmm.kernels.compiled import FUNCTION, kernel
+from nmm.kernels.compiled import kernel
+from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import Robot
 
 
 @kernel(FUNCTION)
-def distance(
-    t: float, q: Array, placements: Array, jacobians: Array, hessians: Array, G: Array, G_q: Array,
-    slots: Array, parameters: Array, value: Array, value_t: Array, value_q: Array,
-) -> None:  # fmt: skip
+def distance(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     """|d|, d = point - p, by the chain rule, in place: the first three rows hold the point."""
     d = np.empty(3)
     for i in range(3):
-        d[i] = value[i] - placements[slots[0], i, 3]
+        d[i] = rows.value[i] - frames.placements[frames.slots[0], i, 3]
     length = math.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
     for i in range(3):  # at 0 no derivative exists
         d[i] = d[i] / length if length > 0.0 else 0.0
-    value[0] = length
-    value_t[0] = d[0] * value_t[0] + d[1] * value_t[1] + d[2] * value_t[2]
-    for k in range(q.shape[0]):
+    rows.value[0] = length
+    rows.value_t[0] = d[0] * rows.value_t[0] + d[1] * rows.value_t[1] + d[2] * rows.value_t[2]
+    for k in range(at.q.shape[0]):
         rate = 0.0
         for i in range(3):
-            rate += d[i] * (value_q[i, k] - jacobians[slots[0], i, k])
-        value_q[0, k] = rate
+            rate += d[i] * (rows.value_q[i, k] - frames.jacobians[frames.slots[0], i, k])
+        rows.value_q[0, k] = rate
 
 
 class Distance(Function):

@@ -7,7 +7,8 @@ import numpy as np
 from nmm.arrays import Array
 from nmm.errors import InputError
 from nmm.functions.function import Row, Stage
-from nmm.kernels.compiled import FUNCTION, compiled, kernel
+from nmm.kernels.compiled import compiled, kernel
+from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.kernels.rotations import between3, left_jacobian_inverse3, log3, transposed_times3
 from nmm.robots.robot import Robot
 
@@ -45,43 +46,40 @@ def relative_motion(
 
 
 @kernel(FUNCTION)
-def frame_pose(
-    t: float, q: Array, placements: Array, jacobians: Array, hessians: Array, G: Array, G_q: Array,
-    slots: Array, parameters: Array, value: Array, value_t: Array, value_q: Array,
-) -> None:  # fmt: skip
-    """Rows of [p, φ], φ = log R, picked by `parameters` (0 to 5); φ_q = J(φ)⁻¹ ω_q, J the left Jacobian.
+def frame_pose(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
+    """Rows of [p, φ], φ = log R, picked by `numbers` (0 to 5); φ_q = J(φ)⁻¹ ω_q, J the left Jacobian.
 
     slots = [frame], in world axes, or [frame, the frame that sees it].
     """
-    n = q.shape[0]
+    n = at.q.shape[0]
     R = np.empty((3, 3))
     p = np.empty(3)
     velocity = np.empty((6, n))
-    if slots.shape[0] == 2:
-        relative_motion(slots[0], slots[1], placements, jacobians, R, p, velocity)
+    if frames.slots.shape[0] == 2:
+        relative_motion(frames.slots[0], frames.slots[1], frames.placements, frames.jacobians, R, p, velocity)
     else:
         for i in range(3):
-            p[i] = placements[slots[0], i, 3]
+            p[i] = frames.placements[frames.slots[0], i, 3]
             for j in range(3):
-                R[i, j] = placements[slots[0], i, j]
+                R[i, j] = frames.placements[frames.slots[0], i, j]
         for i in range(6):
             for k in range(n):
-                velocity[i, k] = jacobians[slots[0], i, k]
+                velocity[i, k] = frames.jacobians[frames.slots[0], i, k]
     phi = np.empty(3)
     J = np.empty((3, 3))
     log3(R, phi)
     left_jacobian_inverse3(phi, J)
-    for row in range(parameters.shape[0]):
-        part = int(parameters[row])
+    for row in range(numbers.shape[0]):
+        part = int(numbers[row])
         if part < 3:
-            value[row] = p[part]
+            rows.value[row] = p[part]
             for k in range(n):
-                value_q[row, k] = velocity[part, k]
+                rows.value_q[row, k] = velocity[part, k]
         else:
             i = part - 3
-            value[row] = phi[i]
+            rows.value[row] = phi[i]
             for k in range(n):
-                value_q[row, k] = (
+                rows.value_q[row, k] = (
                     J[i, 0] * velocity[3, k] + J[i, 1] * velocity[4, k] + J[i, 2] * velocity[5, k]
                 )
 

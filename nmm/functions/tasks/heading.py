@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array, vector
 from nmm.errors import InputError, unknown
 from nmm.functions.function import Function, Row, Stage
-from nmm.kernels.compiled import FUNCTION, kernel
+from nmm.kernels.compiled import kernel
+from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import Robot
 
 UNIT = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -19,34 +20,31 @@ PLANES = {"x": ("y", "z"), "y": ("z", "x"), "z": ("x", "y")}
 
 
 @kernel(FUNCTION)
-def heading(
-    t: float, q: Array, placements: Array, jacobians: Array, hessians: Array, G: Array, G_q: Array,
-    slots: Array, parameters: Array, value: Array, value_t: Array, value_q: Array,
-) -> None:  # fmt: skip
-    """ψ = atan2(e2·d, e1·d), d = R a, with d_dot = ω × d; parameters = [a, e1, e2]."""
-    frame = slots[0]
+def heading(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
+    """ψ = atan2(e2·d, e1·d), d = R a, with d_dot = ω × d; numbers = [a, e1, e2]."""
+    frame = frames.slots[0]
     d = np.empty(3)
     for i in range(3):
         d[i] = 0.0
         for j in range(3):
-            d[i] += placements[frame, i, j] * parameters[j]
+            d[i] += frames.placements[frame, i, j] * numbers[j]
     c = 0.0
     s = 0.0
     for i in range(3):
-        c += parameters[3 + i] * d[i]
-        s += parameters[6 + i] * d[i]
-    value[0] = math.atan2(s, c)
+        c += numbers[3 + i] * d[i]
+        s += numbers[6 + i] * d[i]
+    rows.value[0] = math.atan2(s, c)
     square = c * c + s * s
-    for k in range(q.shape[0]):
-        wx = jacobians[frame, 3, k]
-        wy = jacobians[frame, 4, k]
-        wz = jacobians[frame, 5, k]
+    for k in range(at.q.shape[0]):
+        wx = frames.jacobians[frame, 3, k]
+        wy = frames.jacobians[frame, 4, k]
+        wz = frames.jacobians[frame, 5, k]
         dx = wy * d[2] - wz * d[1]
         dy = wz * d[0] - wx * d[2]
         dz = wx * d[1] - wy * d[0]
-        c_q = parameters[3] * dx + parameters[4] * dy + parameters[5] * dz
-        s_q = parameters[6] * dx + parameters[7] * dy + parameters[8] * dz
-        value_q[0, k] = (c * s_q - s * c_q) / square
+        c_q = numbers[3] * dx + numbers[4] * dy + numbers[5] * dz
+        s_q = numbers[6] * dx + numbers[7] * dy + numbers[8] * dz
+        rows.value_q[0, k] = (c * s_q - s * c_q) / square
 
 
 class Heading(Function):

@@ -7,7 +7,8 @@ import numpy as np
 from nmm.arrays import Array
 from nmm.functions.function import Function, Row, Stage
 from nmm.functions.tasks.frame_pose import PARTS, pose_rows, pose_stage
-from nmm.kernels.compiled import FUNCTION, kernel
+from nmm.kernels.compiled import kernel
+from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.kernels.rotations import (
     between3,
     exp3,
@@ -23,10 +24,7 @@ TURNS = PARTS[3:]
 
 
 @kernel(FUNCTION)
-def orientation_error(
-    t: float, q: Array, placements: Array, jacobians: Array, hessians: Array, G: Array, G_q: Array,
-    slots: Array, parameters: Array, value: Array, value_t: Array, value_q: Array,
-) -> None:  # fmt: skip
+def orientation_error(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     """e = log(RᵀR_d), R = exp(φ), R_d = exp(g), from the rows [φ, g, e]: see `Orientation`.
 
     With the body rates ω = J(φ)ᵀ φ_dot and ω_d = J(g)ᵀ g_dot, each in its own axes:
@@ -34,29 +32,29 @@ def orientation_error(
     """
     R, target, turn = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     J, J_target, J_error = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    exp3(value[:3], R)
-    exp3(value[3:6], target)
+    exp3(rows.value[:3], R)
+    exp3(rows.value[3:6], target)
     between3(R, target, turn)
-    log3(turn, value[6:])
-    left_jacobian3(value[:3], J)
-    left_jacobian3(value[3:6], J_target)
-    left_jacobian_inverse3(value[6:], J_error)
+    log3(turn, rows.value[6:])
+    left_jacobian3(rows.value[:3], J)
+    left_jacobian3(rows.value[3:6], J_target)
+    left_jacobian_inverse3(rows.value[6:], J_error)
     rate, omega, omega_target = np.empty(3), np.empty(3), np.empty(3)
     forward, backward = np.empty(3), np.empty(3)
-    for k in range(-1, q.shape[0]):  # -1: the time
+    for k in range(-1, at.q.shape[0]):  # -1: the time
         for i in range(3):
-            rate[i] = value_t[i] if k < 0 else value_q[i, k]
+            rate[i] = rows.value_t[i] if k < 0 else rows.value_q[i, k]
         transposed_times3(J, rate, omega)
         for i in range(3):
-            rate[i] = value_t[3 + i] if k < 0 else value_q[3 + i, k]
+            rate[i] = rows.value_t[3 + i] if k < 0 else rows.value_q[3 + i, k]
         transposed_times3(J_target, rate, omega_target)
         transposed_times3(J_error, omega_target, forward)
         times3(J_error, omega, backward)
         for i in range(3):
             if k < 0:
-                value_t[6 + i] = forward[i] - backward[i]
+                rows.value_t[6 + i] = forward[i] - backward[i]
             else:
-                value_q[6 + i, k] = forward[i] - backward[i]
+                rows.value_q[6 + i, k] = forward[i] - backward[i]
 
 
 class Orientation(Function):

@@ -12,32 +12,30 @@ from nmm.errors import InputError, unknown
 from nmm.functions.function import Function, Row, Stage
 from nmm.functions.tasks.heading import UNIT
 from nmm.functions.tasks.position import as_point, check_point
-from nmm.kernels.compiled import FUNCTION, kernel
+from nmm.kernels.compiled import kernel
+from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.kernels.rotations import transposed_times3
 from nmm.robots.robot import Robot
 
 
 @kernel(FUNCTION)
-def pointing(
-    t: float, q: Array, placements: Array, jacobians: Array, hessians: Array, G: Array, G_q: Array,
-    slots: Array, parameters: Array, value: Array, value_t: Array, value_q: Array,
-) -> None:  # fmt: skip
+def pointing(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     """y_i = (α / s) s_i by the chain rule, in place: the first three rows hold the point and its derivatives.
 
     With l, the point as the frame sees it: s_i = b_i·l, s² = s_1² + s_2², c = a·l, α = atan2(s, c);
-    parameters = [a, b_1, b_2]. With k = α/s and r² = s² + c²:
+    numbers = [a, b_1, b_2]. With k = α/s and r² = s² + c²:
     dy_i = k ds_i + s_i (m (s_1 ds_1 + s_2 ds_2) - dc / r²), m = (c / r² - k) / s².
     """
-    frame = placements[slots[0]]
+    frame = frames.placements[frames.slots[0]]
     d, seen, x = np.empty(3), np.empty(3), np.empty(3)
     for i in range(3):
-        d[i] = value[i] - frame[i, 3]
+        d[i] = rows.value[i] - frame[i, 3]
     transposed_times3(frame, d, seen)
     c, s1, s2 = 0.0, 0.0, 0.0
     for i in range(3):
-        c += parameters[i] * seen[i]
-        s1 += parameters[3 + i] * seen[i]
-        s2 += parameters[6 + i] * seen[i]
+        c += numbers[i] * seen[i]
+        s1 += numbers[3 + i] * seen[i]
+        s2 += numbers[6 + i] * seen[i]
     square = s1 * s1 + s2 * s2
     s = math.sqrt(square)
     r2 = square + c * c
@@ -50,31 +48,31 @@ def pointing(
     else:
         k = math.atan2(s, c) / s
         m = (c / r2 - k) / square
-    value[0] = math.pi if nowhere else k * s1
-    value[1] = k * s2
-    for column in range(-1, q.shape[0]):  # -1: the time
+    rows.value[0] = math.pi if nowhere else k * s1
+    rows.value[1] = k * s2
+    for column in range(-1, at.q.shape[0]):  # -1: the time
         if column < 0:
             for i in range(3):
-                x[i] = value_t[i]
+                x[i] = rows.value_t[i]
         else:
-            j = jacobians[slots[0]]
+            j = frames.jacobians[frames.slots[0]]
             wx, wy, wz = j[3, column], j[4, column], j[5, column]
-            x[0] = value_q[0, column] - j[0, column] - (wy * d[2] - wz * d[1])
-            x[1] = value_q[1, column] - j[1, column] - (wz * d[0] - wx * d[2])
-            x[2] = value_q[2, column] - j[2, column] - (wx * d[1] - wy * d[0])
+            x[0] = rows.value_q[0, column] - j[0, column] - (wy * d[2] - wz * d[1])
+            x[1] = rows.value_q[1, column] - j[1, column] - (wz * d[0] - wx * d[2])
+            x[2] = rows.value_q[2, column] - j[2, column] - (wx * d[1] - wy * d[0])
         transposed_times3(frame, x, seen)
         dc, ds1, ds2 = 0.0, 0.0, 0.0
         for i in range(3):
-            dc += parameters[i] * seen[i]
-            ds1 += parameters[3 + i] * seen[i]
-            ds2 += parameters[6 + i] * seen[i]
+            dc += numbers[i] * seen[i]
+            ds1 += numbers[3 + i] * seen[i]
+            ds2 += numbers[6 + i] * seen[i]
         common = 0.0 if nowhere else m * (s1 * ds1 + s2 * ds2) - dc / r2
         if column < 0:
-            value_t[0] = k * ds1 + s1 * common
-            value_t[1] = k * ds2 + s2 * common
+            rows.value_t[0] = k * ds1 + s1 * common
+            rows.value_t[1] = k * ds2 + s2 * common
         else:
-            value_q[0, column] = k * ds1 + s1 * common
-            value_q[1, column] = k * ds2 + s2 * common
+            rows.value_q[0, column] = k * ds1 + s1 * common
+            rows.value_q[1, column] = k * ds2 + s2 * common
 
 
 class Pointing(Function):

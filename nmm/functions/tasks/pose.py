@@ -7,7 +7,8 @@ import numpy as np
 from nmm.arrays import Array
 from nmm.functions.function import Function, Row, Stage
 from nmm.functions.tasks.frame_pose import PARTS, pose_rows, pose_stage
-from nmm.kernels.compiled import FUNCTION, kernel
+from nmm.kernels.compiled import kernel
+from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.kernels.rotations import (
     between3,
     cross3,
@@ -21,33 +22,30 @@ from nmm.robots.robot import Robot
 
 
 @kernel(FUNCTION)
-def pose_error(
-    t: float, q: Array, placements: Array, jacobians: Array, hessians: Array, G: Array, G_q: Array,
-    slots: Array, parameters: Array, value: Array, value_t: Array, value_q: Array,
-) -> None:  # fmt: skip
+def pose_error(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     """e = log6(T⁻¹T_d) from the rows [p, φ, p_d, g, e]: see `Pose`.
 
     Each pose moves with a body velocity [Rᵀ p_dot, J(φ)ᵀ φ_dot] in its own axes; that of E = T⁻¹T_d is
     V_E = V_d - Ad(E⁻¹) V, and e_dot = Jlog6(E) V_E.
     """
     R, target, turn = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    exp3(value[3:6], R)
-    exp3(value[9:12], target)
+    exp3(rows.value[3:6], R)
+    exp3(rows.value[9:12], target)
     between3(R, target, turn)
     shift, x, y = np.empty(3), np.empty(3), np.empty(3)
     for i in range(3):
-        x[i] = value[6 + i] - value[i]
+        x[i] = rows.value[6 + i] - rows.value[i]
     transposed_times3(R, x, shift)  # E = (turn, shift)
-    log6(turn, shift, value[12:])
+    log6(turn, shift, rows.value[12:])
     J, J_target, A, B = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    left_jacobian3(value[3:6], J)
-    left_jacobian3(value[9:12], J_target)
-    log6_jacobian(value[12:], shift, A, B)
+    left_jacobian3(rows.value[3:6], J)
+    left_jacobian3(rows.value[9:12], J_target)
+    log6_jacobian(rows.value[12:], shift, A, B)
     v, w, v_target, w_target = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     rate = np.empty(12)
-    for k in range(-1, q.shape[0]):  # -1: the time
+    for k in range(-1, at.q.shape[0]):  # -1: the time
         for i in range(12):
-            rate[i] = value_t[i] if k < 0 else value_q[i, k]
+            rate[i] = rows.value_t[i] if k < 0 else rows.value_q[i, k]
         transposed_times3(R, rate[:3], v)
         transposed_times3(J, rate[3:6], w)
         transposed_times3(target, rate[6:9], v_target)
@@ -67,11 +65,11 @@ def pose_error(
                 linear += A[i, j] * v[j] + B[i, j] * w[j]
                 angular += A[i, j] * w[j]
             if k < 0:
-                value_t[12 + i] = linear
-                value_t[15 + i] = angular
+                rows.value_t[12 + i] = linear
+                rows.value_t[15 + i] = angular
             else:
-                value_q[12 + i, k] = linear
-                value_q[15 + i, k] = angular
+                rows.value_q[12 + i, k] = linear
+                rows.value_q[15 + i, k] = angular
 
 
 class Pose(Function):

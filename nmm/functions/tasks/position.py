@@ -12,24 +12,22 @@ from nmm.errors import InputError
 from nmm.functions.function import Function, Row, Stage
 from nmm.functions.references.polynomial import Constant
 from nmm.functions.tasks.frame_pose import pose_rows, pose_stage
-from nmm.kernels.compiled import FUNCTION, kernel
+from nmm.kernels.compiled import kernel
+from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import Robot
 
 AXES = {"x": 0, "y": 1, "z": 2}
 
 
 @kernel(FUNCTION)
-def position(
-    t: float, q: Array, placements: Array, jacobians: Array, hessians: Array, G: Array, G_q: Array,
-    slots: Array, parameters: Array, value: Array, value_t: Array, value_q: Array,
-) -> None:  # fmt: skip
-    """p(q) and its Jacobian, rows picked by `parameters` (0, 1, 2 for x, y, z)."""
-    frame = slots[0]
-    for i in range(parameters.shape[0]):
-        axis = int(parameters[i])
-        value[i] = placements[frame, axis, 3]
-        for j in range(q.shape[0]):
-            value_q[i, j] = jacobians[frame, axis, j]
+def position(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
+    """p(q) and its Jacobian, rows picked by `numbers` (0, 1, 2 for x, y, z)."""
+    frame = frames.slots[0]
+    for i in range(numbers.shape[0]):
+        axis = int(numbers[i])
+        rows.value[i] = frames.placements[frame, axis, 3]
+        for j in range(at.q.shape[0]):
+            rows.value_q[i, j] = frames.jacobians[frame, axis, j]
 
 
 def picked_axes(axes: str | Sequence[str]) -> tuple[str, ...]:

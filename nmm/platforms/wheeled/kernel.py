@@ -25,7 +25,7 @@ import numpy as np
 from nmm.arrays import Array
 from nmm.kernels.compiled import PLATFORM, compiled, kernel
 from nmm.kernels.linear_algebra import eliminate
-from nmm.kernels.packing import section
+from nmm.platforms.wheeled.sections import section
 
 BODIES, TERMS, RATES, CLOSURES, COMMON, SIZE = range(6)
 _AXIS = 4

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array, vector
 from nmm.errors import InputError
 from nmm.kernels.compiled import Kernel
-from nmm.kernels.packing import pack
 from nmm.platforms.base import Platform
 from nmm.platforms.layout import Layout
 from nmm.platforms.wheeled.descriptions import MAIN, FixedWheel, Hitch, OmniWheel, Wheel
@@ -22,6 +21,7 @@ from nmm.platforms.wheeled.inputs import Input
 from nmm.platforms.wheeled.kernel import BODIES, SIZE, wheeled
 from nmm.platforms.wheeled.problem import contradiction, folded, singularity
 from nmm.platforms.wheeled.rates import WheelRate, wheel_rates
+from nmm.platforms.wheeled.sections import pack
 from nmm.platforms.wheeled.structure import Constraint, choose
 
 
@@ -183,7 +183,7 @@ class WheeledPlatform(Platform):
         for number, row in enumerate(rows):
             section, lines = row.packed(number)
             sections[section] += lines
-        return pack([np.array(section, dtype=float) for section in sections], float)
+        return pack([np.array(section, dtype=float) for section in sections])
 
 
 def _check_distinct(names: Sequence[str], what: str) -> None:

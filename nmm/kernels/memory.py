@@ -1,0 +1,217 @@
+"""Where numbers lie: records of named arrays, in one block of integers and one of floats.
+
+A compiled call costs about 0.1 µs an array, so all that a control step reads and writes travels as these two.
+What lies where in them is worked out here and nowhere else. A *record* is a NamedTuple whose fields say what
+they are:
+
+    class Problem(NamedTuple):
+        J: Matrix                  # a view, (s, m)
+        rate: Vector               # a view, (s,)
+        state: IntegerVector       # a view of the integers
+        residual: Cell             # a view of one number: problem.residual[()] = 0.0
+        kernel: int                # a number, to be read only
+        answer: Answer             # a record in the record
+
+It is laid out by an example that holds the values to begin with, and read by name, compiled or not:
+
+    memory = Memory()
+    place = memory.add(Problem(np.zeros((s, m)), np.zeros(s), ...))
+    integers, floats = memory.blocks()
+    problem = views(Problem, integers, floats, place)
+
+The contract:
+
+1. A record's header begins at `integers[place]`: for each array [where its numbers begin in its block, its
+   extents...], for each `int` the number itself, for a record in the record its own header. Its length is
+   `header_length(Problem)`, the same for all shapes: what is added first has place 0, the next one the length
+   of the first, and compiled code may hold such places as constants. A list of records is an IntegerVector of
+   their places.
+2. `views` costs a few loads. What it returns in compiled code are pointers and extents: no bounds are checked
+   and no references counted. Whoever calls the compiled code holds the blocks while it runs.
+3. The numbers of a record lie one behind the other in the order of its fields, records in the order in which
+   they were added. Nothing but this file may rely on it.
+4. Records are also what kernels take as arguments (`record_type`), where a field may be a `float`. Fields are
+   read by name, never by position or by unpacking, so that a field more touches no reader.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+from typing import Annotated, Any, NamedTuple, TypeAlias, TypeVar, get_args, get_origin, get_type_hints
+
+import numpy as np
+from numba import types
+from numba.extending import intrinsic, overload
+
+from nmm.arrays import Array, Integers
+from nmm.kernels.compiled import array_at, view
+
+
+class Kind(NamedTuple):
+    """What an array of a record holds: the type of its numbers and how many extents it has."""
+
+    dtype: type
+    ndim: int
+
+
+Cell: TypeAlias = Annotated[Array, Kind(np.float64, 0)]
+Vector: TypeAlias = Annotated[Array, Kind(np.float64, 1)]
+Matrix: TypeAlias = Annotated[Array, Kind(np.float64, 2)]
+Matrices: TypeAlias = Annotated[Array, Kind(np.float64, 3)]
+Tensors: TypeAlias = Annotated[Array, Kind(np.float64, 4)]
+IntegerCell: TypeAlias = Annotated[Integers, Kind(np.int64, 0)]
+IntegerVector: TypeAlias = Annotated[Integers, Kind(np.int64, 1)]
+IntegerMatrix: TypeAlias = Annotated[Integers, Kind(np.int64, 2)]
+
+R = TypeVar("R", bound=tuple[Any, ...])
+
+
+class Blocks(NamedTuple):
+    """The two arrays that compiled code is called with."""
+
+    integers: Integers
+    floats: Array
+
+
+class Memory:
+    """Records collected, then laid out in two blocks.
+
+    Raises
+    ------
+    TypeError : a field that is none of this module's kinds, or an array of another kind than its field's
+    """
+
+    def __init__(self) -> None:
+        self._fields: list[tuple[Any, Any]] = []
+        self._length = 0
+
+    def add(self, record: tuple[Any, ...]) -> int:
+        """Lay out a record like this one, beginning with its values; returns its place."""
+        place = self._length
+        self._fields += _flat(type(record), record)
+        self._length += header_length(type(record))
+        return place
+
+    def blocks(self) -> Blocks:
+        """The blocks, with copies of all values."""
+        header: list[int] = []
+        parts: dict[type, list[Any]] = {np.int64: [], np.float64: []}
+        ends = {np.int64: self._length, np.float64: 0}
+        for field, value in self._fields:
+            if field is int:
+                header.append(value)
+                continue
+            numbers = np.asarray(value, dtype=field.dtype)
+            header += [ends[field.dtype], *numbers.shape]
+            parts[field.dtype].append(numbers.ravel())
+            ends[field.dtype] += numbers.size
+        integers = np.concatenate([np.array(header, dtype=np.int64), *parts[np.int64]])
+        return Blocks(integers, np.concatenate([np.zeros(0), *parts[np.float64]]))
+
+
+def views(record: type[R], integers: Integers, floats: Array, place: int) -> R:
+    """The record whose header begins at `integers[place]`, its arrays as views of the blocks."""
+    parts: list[Any] = []
+    for field in _fields(record):
+        if isinstance(field, Kind):
+            block: Any = integers if field.dtype is np.int64 else floats
+            extents = tuple(int(extent) for extent in integers[place + 1 : place + 1 + field.ndim])
+            parts.append(view(block, int(integers[place]), extents))
+        else:
+            parts.append(int(integers[place]) if field is int else views(field, integers, floats, place))
+        place += _length(field)
+    return record(*parts)
+
+
+def header_length(record: type) -> int:
+    """How many integers the header of such a record takes."""
+    return sum(_length(field) for field in _fields(record))
+
+
+def record_type(record: type) -> Any:
+    """The type that numba knows such a record by."""
+    parts = []
+    for field in _fields(record):
+        if isinstance(field, Kind):
+            parts.append(
+                types.Array(types.int64 if field.dtype is np.int64 else types.float64, field.ndim, "C")
+            )
+        else:
+            parts.append({int: types.int64, float: types.float64}.get(field) or record_type(field))
+    return types.BaseTuple.from_types(parts, record)
+
+
+@cache
+def _fields(record: type) -> tuple[Any, ...]:
+    """What the fields are, in order: a `Kind`, `int`, `float` or another record."""
+    found: list[Any] = []
+    for name, hint in get_type_hints(record, include_extras=True).items():
+        kind = get_args(hint)[-1] if get_origin(hint) is Annotated else hint
+        if not (isinstance(kind, Kind) or kind in (int, float) or hasattr(kind, "_fields")):
+            raise TypeError(
+                f"{record.__name__}.{name}: expected a kind of array, int or a record, got {hint}"
+            )
+        found.append(kind)
+    return tuple(found)
+
+
+def _length(field: Any) -> int:
+    if field is float:
+        raise TypeError("a float of a record is handed over, not laid out: expected a Cell")
+    if isinstance(field, Kind):
+        return 1 + field.ndim
+    return 1 if field is int else header_length(field)
+
+
+def _flat(record: type, values: tuple[Any, ...]) -> Iterator[tuple[Any, Any]]:
+    """The fields that are no records, with their values."""
+    for name, field, value in zip(record._fields, _fields(record), values, strict=True):  # type: ignore[attr-defined]
+        if field is not int and not isinstance(field, Kind):
+            yield from _flat(field, value)
+            continue
+        if isinstance(field, Kind) and np.ndim(value) != field.ndim:
+            raise TypeError(f"{record.__name__}.{name}: expected {field.ndim} extents, got {np.shape(value)}")
+        yield field, value
+
+
+@intrinsic
+def _views_compiled(context: Any, record: Any, integers: Any, floats: Any, place: Any) -> Any:
+    result = record_type(record.instance_class)
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        blocks: dict[type, Any] = {
+            dtype: context.make_array(kind)(context, builder, value).data
+            for dtype, kind, value in zip(
+                (np.int64, np.float64), signature.args[1:3], values[1:3], strict=True
+            )
+        }
+        position = values[3]
+
+        def read() -> Any:
+            nonlocal position
+            value = builder.load(builder.gep(blocks[np.int64], [position]))
+            position = builder.add(position, context.get_constant(types.int64, 1))
+            return value
+
+        def build(kind: type, built: Any) -> Any:
+            parts = []
+            for field, part in zip(_fields(kind), built.types, strict=True):
+                if isinstance(field, Kind):
+                    data = builder.gep(blocks[field.dtype], [read()])
+                    parts.append(array_at(context, builder, part, data, [read() for _ in range(field.ndim)]))
+                else:
+                    parts.append(read() if field is int else build(field, part))
+            return context.make_tuple(builder, built, parts)
+
+        return build(record.instance_class, result)
+
+    return result(record, integers, floats, types.int64), generate
+
+
+@overload(views)
+def _views_overload(record: Any, integers: Any, floats: Any, place: Any) -> Any:
+    def through(record: Any, integers: Any, floats: Any, place: Any) -> Any:
+        return _views_compiled(record, integers, floats, place)
+
+    return through

@@ -1,0 +1,65 @@
+"""What a function's kernel gets: records of what it reads and of what it writes.
+
+    @kernel(FUNCTION)
+    def height(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
+        frame = frames.slots[0]
+        rows.value[0] = frames.placements[frame, 2, 3]
+        for k in range(at.q.shape[0]):
+            rows.value_q[0, k] = frames.jacobians[frame, 2, k]
+
+A quantity that kernels come to need becomes a field here and in `program.py`, and touches no kernel.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from numba import types
+
+from nmm.kernels.compiled import caller
+from nmm.kernels.memory import IntegerVector, Matrices, Matrix, Tensors, Vector, record_type
+
+
+class At(NamedTuple):
+    """Where: time t (s), coordinates q (n,), m and rad, and the platform there.
+
+    G (n_p, p) : its velocity map, qp_dot = G up
+    G_q (n_p, p, n_p) : dG[i, j] / dqp[k]
+    """
+
+    t: float
+    q: Vector
+    G: Matrix
+    G_q: Matrices
+
+
+class Frames(NamedTuple):
+    """Kinematics at q, world axes: frame k of those that the stage names is number slots[k] of all.
+
+    slots : (frames of the stage,)
+    placements : (..., 3, 4) = [R | p], m
+    jacobians : (..., 6, n), linear over angular velocity
+    hessians : (..., 6, n, n), dJ[i, j] / dq[k]; there are none unless some stage asks for them
+    """
+
+    slots: IntegerVector
+    placements: Matrices
+    jacobians: Matrices
+    hessians: Tensors
+
+
+class Rows(NamedTuple):
+    """The stage's rows of y = phi(t, q): value (rows,), value_t (rows,) = ∂y/∂t, value_q (rows, n) = ∂y/∂q.
+
+    The first stage of a function finds zeros, the next what those before it wrote.
+    """
+
+    value: Vector
+    value_t: Vector
+    value_q: Matrix
+
+
+#: y = phi(t, q) with its partial derivatives: (at, frames, numbers, rows), the numbers being the stage's own.
+FUNCTION = types.void(record_type(At), record_type(Frames), types.float64[::1], record_type(Rows))
+
+call_function = caller(FUNCTION)
