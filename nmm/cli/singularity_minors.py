@@ -31,7 +31,7 @@ def show_minors(report: SingularityReport, left_out: int) -> None:
         return
     if len(minors):
         found = partition_singularities(
-            report.J, minors.columns, report.inputs, report.singular, report.tolerance
+            report.J, report.row_scales, minors.columns, report.inputs, report.singular, report.tolerance
         )
         folded = _folded(report, found) if len(minors) == count else ()
         rows = [

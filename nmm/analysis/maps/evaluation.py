@@ -116,6 +116,7 @@ class Evaluator:
         rows, _, inputs = self.jacobians.sizes(length, sizes)
         dimensions = Dimensions(len(rows), 0, robot.u_names, robot.groups)
         self.weights = np.ones(robot.n_u) if weights is None else weight_diagonal(weights, dimensions)
+        self._natural = self.jacobians.natural(rows)
         self._factors = inputs / np.sqrt(self.weights) / rows[:, np.newaxis]
         self.scaled = length is not None or bool(self.sizes)
 
@@ -154,7 +155,7 @@ class Evaluator:
 
         def smallness(name: str) -> Smallness:
             values = spectra.of(name)
-            rank = np.where(spectra.undefined, full, ranks(values, largest, TOLERANCE))
+            rank = np.where(spectra.undefined, full, ranks(values, largest, TOLERANCE, self._natural))
             return Smallness(values[:, -1], volume(spectra, name), rank)
 
         values = {name: measure.of(spectra, self.part, self.alpha) for name, measure in self.measures.items()}

@@ -18,7 +18,6 @@ from nmm.analysis.redundancy.null_fields import (
     null_field,
 )
 from nmm.analysis.singular.jacobians import Jacobians, Subject, checked
-from nmm.analysis.singular.parts import rank_of
 from nmm.analysis.singular.reached import Reached
 from nmm.analysis.singular.singularity import TOLERANCE
 from nmm.arrays import Array, positive
@@ -112,7 +111,7 @@ def self_motion(
         raise InputError(f"dt: expected at most a quarter of the duration, {duration / 4.0:g} s, got {dt:g}")
     robot.check_limits(q)
     J = jacobians.J(t, q)
-    rank = rank_of(J, TOLERANCE)
+    rank = jacobians.rank(J, TOLERANCE)
     expect_direction(robot, J, rank, direction)
     nearby = _nearby(jacobians, t, q, rank)
     motion = _Motion(robot, held(jacobians, t, q), t, q, null_field(robot, J, nearby, rank, direction), rank)
@@ -156,7 +155,7 @@ def _nearby(jacobians: Jacobians, t: float, q: Array, rank: int) -> Array:
     near = q + AROUND * np.random.default_rng(0).uniform(-1.0, 1.0, (8, q.size))
     found = jacobians.batch(near, t)
     found = found[np.isfinite(found).all(axis=(1, 2))]
-    most = max((rank_of(J, TOLERANCE) for J in found), default=rank)
+    most = max((jacobians.rank(J, TOLERANCE) for J in found), default=rank)
     if most > rank:
         raise SingularError(
             f"J has rank {rank} at q and {most} nearby: q is singular, and a motion that leaves "

@@ -205,7 +205,7 @@ def redundancy(
     tolerance = positive(tolerance, "tolerance")
     robot, p = jacobians.robot, jacobians.robot.platform.p
     J, F, S = jacobians.J(t, q), coordinate_jacobian(jacobians, t, q), robot.S(q)
-    rank_J, rank_F = rank_of(J, tolerance), rank_of(F, tolerance)
+    rank_J, rank_F = jacobians.rank(J, tolerance), jacobians.rank(F, tolerance)
     readable = readable_null_space(J, rank_J, [1] * p + [0] * (robot.n_u - p))
     words = input_words(robot, q)
     withheld, texts = _withheld(robot, q, F, rank_F, readable @ S.T)
@@ -280,7 +280,7 @@ def _by_brackets(jacobians: Jacobians, t: float, q: Array, rank: int) -> int | N
 
     def fields(at: Array) -> Array:
         J = jacobians.J(t, at)
-        if rank_of(J, 1e-8) != rank:
+        if jacobians.rank(J, 1e-8) != rank:
             raise SingularError("the rank of J changes")
         field: Array = jacobians.robot.S(at) @ projector(J, rank) @ c
         return field

@@ -64,6 +64,7 @@ class Measure:
         self._scale = input_sizes / row_sizes[:, np.newaxis]
         self.rows, self.inputs = len(row_sizes), len(self.columns)
         self.full_rank = min(self.rows, self.inputs)
+        self.natural = jacobians.natural(row_sizes)
         self.typical = np.inf
 
     def settle(self, q: Array) -> None:
@@ -88,8 +89,8 @@ class Measure:
     def values(self, q: Array) -> tuple[Array, Array]:
         """The part's k singular values (N, k), falling, and what they stand beside (N,).
 
-        That is the largest of the whole J, but no more than ten times its median over the space. Where it
-        is far more than that, J counts as none.
+        That is the largest of the whole J, but no more than ten times its median over the space and no less
+        than a row of natural size. Where it is far more than that, J counts as none.
         """
         whole = self.whole_J(q)
         exists = np.isfinite(whole).all(axis=(1, 2))
@@ -101,7 +102,8 @@ class Measure:
         # Beside the target of a bearing J grows without bound: that takes no rank away.
         exists &= largest <= BLOWN * self.typical
         values[~exists] = np.inf
-        return values, np.asarray(np.where(exists, np.minimum(largest, self.typical), 1.0))
+        beside = np.maximum(np.minimum(largest, self.typical), self.natural)
+        return values, np.asarray(np.where(exists, beside, 1.0))
 
     def ranks(self, q: Array, tolerance: float) -> Integers:
         """Rank of the part's J (N,), beside the largest singular value of the whole J."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nmm.analysis.singular.directions import readable_basis
 from nmm.analysis.singular.minors import determinants
@@ -55,14 +56,15 @@ class PartitionSingularities:
     determinants (count,) : det Ja
     ratios (count,) : |det Ja| / sqrt(det J Jᵀ), from 0 to 1 (Cauchy-Binet), RG's measure with automatic
         partitions; zeros where J lost rank
-    singular (count,) : whether Ja lost rank (σ_min(Ja) at most `tolerance` times J's largest singular value)
+    singular (count,) : whether Ja lost rank (σ_min(Ja) at most `tolerance` times J's largest singular value
+        or, rows in their natural sizes, times 1)
     kinematic : J itself lost rank, and with it every Ja
     """
 
     names: tuple[tuple[str, ...], ...]
     determinants: Array
     ratios: Array
-    singular: Array
+    singular: NDArray[np.bool_]
     kinematic: bool
 
     @property
@@ -91,7 +93,12 @@ def volume(J: Array) -> Array:
 
 
 def extended_singularity(
-    J: Array, Jc: Array, sizes: tuple[Array, Array, Array], rows: tuple[str, ...], tolerance: float
+    J: Array,
+    Jc: Array,
+    sizes: tuple[Array, Array, Array],
+    rows: tuple[str, ...],
+    tolerance: float,
+    natural: float,
 ) -> ExtendedSingularity:
     """From J (s, m) and Jc (m - s, m) as they are; sizes of rows, constraint rows and inputs."""
     row_sizes, constraint_sizes, input_sizes = sizes
@@ -100,11 +107,11 @@ def extended_singularity(
     scaled = extended * input_sizes / np.concatenate([row_sizes, constraint_sizes])[:, np.newaxis]
     values = singular_values(scaled)
     U = np.linalg.svd(scaled)[0]
-    rank = int(ranks(values, values[0], tolerance))
+    rank = int(ranks(values, values[0], tolerance, natural))
 
     def lost_rank(block: Array) -> bool:
         own = singular_values(block)
-        return len(block) > 0 and int(ranks(own, own[0], tolerance)) < len(block)
+        return len(block) > 0 and int(ranks(own, own[0], tolerance, natural)) < len(block)
 
     kinematic, constraint_singular = lost_rank(scaled[:s]), lost_rank(scaled[s:])
     measure = np.nan
@@ -123,18 +130,24 @@ def extended_singularity(
 
 
 def partition_singularities(
-    J: Array, columns: Integers, inputs: tuple[str, ...], kinematic: bool, tolerance: float
+    J: Array,
+    scales: Array,
+    columns: Integers,
+    inputs: tuple[str, ...],
+    kinematic: bool,
+    tolerance: float,
 ) -> PartitionSingularities:
-    """From J (s, m) as it is and the candidates' columns (count, s)."""
-    values = singular_values(np.moveaxis(J[:, columns], 1, 0))
+    """From J (s, m) as it is, the natural sizes of its rows (s,) and the candidates' columns (count, s)."""
+    natural = J / scales[:, np.newaxis]
+    values = singular_values(np.moveaxis(natural[:, columns], 1, 0))
     dets = determinants(J, columns)
     # Judged beside J: a block of nothing but rounding may have a fine condition number of its own.
-    singular = values[:, -1] <= tolerance * singular_values(J)[0]
+    lost = np.asarray(ranks(values, singular_values(natural)[0], tolerance) < len(J))
     whole = 0.0 if kinematic else float(volume(J))
     return PartitionSingularities(
         names=tuple(tuple(inputs[j] for j in row) for row in columns),
         determinants=dets,
         ratios=np.abs(dets) / whole if whole > 0.0 else np.zeros(len(dets)),
-        singular=singular,
+        singular=lost,
         kinematic=kinematic,
     )

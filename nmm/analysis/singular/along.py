@@ -124,7 +124,7 @@ def analyse_along(
     J, Jc = jacobians.history(t, q)
     scale = input_sizes / row_sizes[:, np.newaxis]
     values = singular_values(J * scale)
-    rank = ranks(values, values[:, 0], tolerance)
+    rank = ranks(values, values[:, 0], tolerance, jacobians.natural(row_sizes))
     sigma = {name: singular_values((J * scale)[..., own])[:, -1] for name, own in groups(robot).items()}
     low = LOW * float(values.max()) if threshold is None else positive(threshold, "threshold")
     found = determinants(J, columns)

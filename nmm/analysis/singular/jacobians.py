@@ -8,12 +8,13 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from nmm.analysis.singular.parts import rank_of
 from nmm.analysis.singular.reached import Tasks as Tasks
 from nmm.analysis.singular.reached import stacked
 from nmm.arrays import Array, array, positive, scalar, vector
 from nmm.control.controller import Controller
 from nmm.errors import InputError, SingularError, unknown
-from nmm.functions.function import Row
+from nmm.functions.function import Row, row_scales
 from nmm.functions.tasks.task import Stack
 from nmm.platforms.base import Platform
 from nmm.resolvers.projected_gradient import ProjectedGradient
@@ -58,6 +59,7 @@ class Jacobians:
         self._of_task = Controller(self.robot, self.task, ProjectedGradient())
         self._of_constraint = Controller(self.robot, added, ProjectedGradient()) if len(added) else None
         self.rows: tuple[Row, ...] = self._of_task.rows
+        self.scales = row_scales(self.rows, self.robot)
         self.constraint_rows: tuple[Row, ...] = self._of_constraint.rows if self._of_constraint else ()
         free = self.robot.n_u - len(self.rows)
         if self.constraint_rows and len(self.constraint_rows) != free:
@@ -155,6 +157,15 @@ class Jacobians:
             of([(row.name, row.unit) for row in self.constraint_rows]),
             of(list(zip(self.robot.u_names, self.robot.u_units, strict=True))),
         )
+
+    def natural(self, sizes: Array) -> float:
+        """The least natural size of a row, of those that count as 1 by `sizes` (s,): what singular values are
+        judged beside where the largest of them is smaller still, as a J of one row has no other."""
+        return float(np.min(self.scales / sizes))
+
+    def rank(self, J: Array, tolerance: float) -> int:
+        """Rank of a matrix (s, any) of the task's rows as they are, rows in their natural sizes."""
+        return rank_of(J / self.scales[:, np.newaxis], tolerance)
 
     def samples(self, t: ArrayLike, q: ArrayLike) -> tuple[Array, Array]:
         """Times (N,), increasing, and configurations (N, n), checked."""

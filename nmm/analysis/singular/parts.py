@@ -85,13 +85,17 @@ def singular_values(J: Array) -> Array:
     return found
 
 
-def ranks(values: Array, largest: Array, tolerance: float) -> Integers:
-    """How many singular values (..., s) exceed tolerance * largest (...)."""
-    return np.sum(values > tolerance * np.asarray(largest)[..., np.newaxis], axis=-1, dtype=np.int64)
+def ranks(values: Array, largest: Array, tolerance: float, natural: float = 1.0) -> Integers:
+    """How many singular values (..., s) exceed tolerance * largest (...), or * natural if that is more.
+
+    natural : what rows of natural size would make of them (see `Jacobians.natural`)
+    """
+    beside = np.maximum(largest, natural)
+    return np.sum(values > tolerance * beside[..., np.newaxis], axis=-1, dtype=np.int64)
 
 
 def rank_of(matrix: Array, tolerance: float) -> int:
-    """How many singular values of one matrix exceed `tolerance` times the largest."""
+    """How many singular values of one matrix exceed `tolerance` times the largest, or 1 if that is more."""
     values = singular_values(matrix)
     return int(ranks(values, np.array(values.max(initial=0.0)), tolerance))
 
@@ -110,12 +114,18 @@ def groups(robot: Robot) -> dict[str, list[int]]:
 
 
 def part(
-    name: str, J: Array, columns: Sequence[int], robot: Robot, rows: Sequence[str], tolerance: float
+    name: str,
+    J: Array,
+    columns: Sequence[int],
+    robot: Robot,
+    rows: Sequence[str],
+    tolerance: float,
+    natural: float,
 ) -> Part:
-    """The part made of some columns of J (s, m), its rank judged beside the whole J."""
+    """The part made of some columns of J (s, m), its rank judged beside the whole J and natural rows."""
     own = J[:, list(columns)]
     values = singular_values(own)
-    rank = int(ranks(values, singular_values(J)[0], tolerance))
+    rank = int(ranks(values, singular_values(J)[0], tolerance, natural))
     U = np.linalg.svd(own)[0] if len(columns) else np.eye(len(J))
     return Part(
         name,

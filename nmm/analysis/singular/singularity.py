@@ -45,6 +45,7 @@ class SingularityReport:
     t, q (n,) : where
     rows, inputs : names of J's rows and columns, with `row_units`, `input_units`
     J (s, m) : J_bar as it is (paper, eq. 13); J_u (m, s, m) : its derivative along each input, per m or rad
+    row_scales (s,) : natural sizes of the rows, in which lost ranks are judged
     row_sizes (s,), input_sizes (m,) : how much of each counts as 1
     parts : "platform", "arm", the arms by name, "robot": who can do what
     weakest (s,) : the task's direction that moves least, a left singular vector of σ_min
@@ -54,7 +55,7 @@ class SingularityReport:
         motions that the wheels do not admit
     extended : J_e beside J; None without a constraint
     partitions : every candidate's Ja beside J
-    tolerance : singular values this small beside the largest are zero
+    tolerance : singular values this small beside the largest, or beside a row of natural size, are zero
     """
 
     t: float
@@ -65,6 +66,7 @@ class SingularityReport:
     input_units: tuple[str, ...]
     J: Array
     J_u: Array
+    row_scales: Array
     row_sizes: Array
     input_sizes: Array
     parts: Mapping[str, Part]
@@ -186,7 +188,7 @@ def analyse(
     constraint : EJ's added task; None for the controller's own
     partitions : RG's candidates: lists of inputs or "automatic"; None for those of the controller's RG, or
         else, those of the minors
-    tolerance : singular values this small beside the largest are zero
+    tolerance : singular values this small beside the largest, or beside a row of natural size, are zero
 
     Raises
     ------
@@ -207,7 +209,11 @@ def analyse(
     J, Jc = jacobians.J(t, q), jacobians.Jc(t, q)
     scaled_J = scaled(J)
     J_u, J_q = jacobians.along(t, q, robot.S(q)), jacobians.along(t, q, np.eye(robot.n))
-    parts = {name: part(name, scaled_J, own, robot, rows, tolerance) for name, own in groups(robot).items()}
+    natural = jacobians.natural(row_sizes)
+    parts = {
+        name: part(name, scaled_J, own, robot, rows, tolerance, natural)
+        for name, own in groups(robot).items()
+    }
     whole = parts[WHOLE]
     singular = whole.rank < len(rows)
     weakest = np.linalg.svd(scaled_J)[0][:, -1]
@@ -220,6 +226,7 @@ def analyse(
         input_units=robot.u_units,
         J=J,
         J_u=J_u,
+        row_scales=jacobians.scales,
         row_sizes=row_sizes,
         input_sizes=input_sizes,
         parts=parts,
@@ -229,11 +236,11 @@ def analyse(
         by_input=restoration(scaled_J, scaled(J_u), robot.u_names, whole.rank),
         by_coordinate=restoration(scaled_J, scaled(J_q), robot.q_names, whole.rank),
         extended=extended_singularity(
-            J, Jc, all_sizes, (*rows, *(row.name for row in jacobians.constraint_rows)), tolerance
+            J, Jc, all_sizes, (*rows, *(row.name for row in jacobians.constraint_rows)), tolerance, natural
         )
         if len(Jc)
         else None,
-        partitions=partition_singularities(J, blocks, robot.u_names, singular, tolerance),
+        partitions=partition_singularities(J, jacobians.scales, blocks, robot.u_names, singular, tolerance),
         tolerance=tolerance,
     )
 
