@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from nmm.analysis.maps.coordinates import singularity_map
-from nmm.analysis.maps.result import is_map
 from nmm.analysis.maps.singular_set import SingularSet
 from nmm.analysis.maps.workspace import workspace_map
 from nmm.errors import InputError
 from nmm.figures.map_sets import thinned
+from nmm.folders.map import is_map
 from nmm.functions.tasks import Heading, Position
 from nmm.robots.loading import load
 from nmm.robots.robot import Robot

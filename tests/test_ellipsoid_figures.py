@@ -12,14 +12,16 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
+from nmm.analysis.singular.drawn_ellipsoids import drawn_ellipsoids, drawn_scale
 from nmm.analysis.singular.ellipsoids import ellipsoids_along
 from nmm.arrays import Array
 from nmm.cli.app import status_of
 from nmm.errors import InputError
 from nmm.figures.ellipses import ellipses
-from nmm.playback.ellipsoids import CLOSE, EllipsoidOptions, SceneEllipsoids, between_error, extent_of
+from nmm.playback.ellipsoids import CLOSE, EllipsoidOptions, SceneEllipsoids, between_error
+from nmm.playback.extent import extent_of
 from nmm.playback.keyframes import Keyframes
-from nmm.playback.motion import Motion
+from nmm.robots.motion import Motion
 
 # What the page shows between its frames
 
@@ -98,13 +100,13 @@ def test_figures_of_short_and_strange_runs() -> None:
 def test_the_scale_is_readable_and_round() -> None:
     trajectory = run(PAPER[0])
     robot = trajectory.robot
-    found = EllipsoidOptions().ellipsoids(robot, "ee", trajectory.q)
+    found = drawn_ellipsoids(EllipsoidOptions(), robot, "ee", trajectory.q)
     extent = extent_of(robot, trajectory.q[0])
-    scale = EllipsoidOptions().drawn_scale(extent, [found])
+    scale = drawn_scale(EllipsoidOptions(), extent, [found])
     assert 0.15 * extent < scale * found["robot"].radii.max() <= extent / 3.0
     assert f"{scale:.0e}"[0] in "12345"
     assert float(f"{scale:.0e}") == pytest.approx(scale)
-    assert EllipsoidOptions(scale=0.07).drawn_scale(extent, [found]) == 0.07
+    assert drawn_scale(EllipsoidOptions(scale=0.07), extent, [found]) == 0.07
 
 
 # Where they are asked for

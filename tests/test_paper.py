@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 
 from nmm.errors import InputError, RunError
+from nmm.folders.run import is_run
 from nmm.paper import PaperReport, write, write_paper
 from nmm.paper.cases import CASES
 from nmm.paper.claims import claims
 from nmm.paper.numbers import decay_rate, ripple, settling_time, smallest_determinant, text
 from nmm.paper.page import render
 from nmm.paper.results import CaseResult, Claim, Row
-from nmm.runs.storage import is_run
 from nmm.runs.trajectory import Trajectory
 from nmm.scenario import Scenario
 

@@ -12,7 +12,8 @@ import pytest
 import yaml
 
 import nmm
-from nmm.runs.storage import ARRAYS, replaced_folder
+from nmm.folders.run import ARRAYS
+from nmm.folders.whole import replaced_folder
 
 
 @pytest.fixture(scope="module")

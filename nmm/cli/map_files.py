@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from nmm.cli.options import values_of
 from nmm.cli.output import progress, show_table
-from nmm.cli.runs import check_folder
 from nmm.cli.subjects import studied
 from nmm.errors import InputError
+from nmm.folders.map import is_map
+from nmm.folders.whole import check_folder
 
 if TYPE_CHECKING:
     from nmm.analysis.maps.result import Map
@@ -43,7 +44,6 @@ def make_map(
 ) -> int:
     """Compute a map, write its folder, print its table; see `nmm.cli.mapping` for the options' meaning."""
     from nmm.analysis.maps.coordinates import check_held, singularity_map
-    from nmm.analysis.maps.result import is_map
 
     counts = counts_of(samples)
     bounds = ranges_of(ranges)

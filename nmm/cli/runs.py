@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-import json
-import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nmm.cli.output import complain, progress, shielded, show_table
 from nmm.cli.report import describe, show_run
 from nmm.errors import InputError
-from nmm.runs.storage import check_replaceable, has_format, is_run, replaced_folder
+from nmm.folders import comparison
+from nmm.folders.run import is_run
+from nmm.folders.whole import check_folder
 from nmm.scenario import Scenario
 
 if TYPE_CHECKING:
-    from nmm.playback.ellipsoids import Wanted
+    from nmm.runs.ellipsoid_options import Wanted
     from nmm.runs.trajectory import Trajectory
 
-#: Marks a folder of `nmm compare`.
-COMPARISON = "nmm comparison 1"
 OK, FAILED = 0, 1
 
 
@@ -58,7 +56,7 @@ def compare_resolvers(
     """Run a scenario with several resolvers; write and print how they compare."""
     scenarios = [_load(name, kind, settings) for kind in kinds]
     folder = out or Path("runs") / f"{scenarios[0].name}-compare"
-    check_folder(folder, _is_comparison)
+    check_folder(folder, comparison.is_comparison)
     for scenario in scenarios:
         scenario.controller()  # what is wrong with the last one shows before the first one runs
     trajectories: list[Trajectory] = []
@@ -67,7 +65,7 @@ def compare_resolvers(
         if trajectories[-1].outcome == "interrupted":
             break
     with shielded():
-        _write_comparison(scenarios[0].name, trajectories, folder, ellipsoids)
+        comparison.save(trajectories, folder, scenarios[0].name, ellipsoids=ellipsoids)
     table = [dict(describe(trajectory, folder / trajectory.resolver)) for trajectory in trajectories]
     labels = list(dict.fromkeys(label for column in table for label in column))
     show_table(
@@ -104,10 +102,7 @@ def play_folder(folder: Path, port: int | None, *, open_browser: bool, ellipsoid
     from nmm.playback import play
     from nmm.runs.trajectory import Trajectory
 
-    if _is_comparison(folder):
-        folders = [folder / kind for kind in json.loads((folder / "summary.json").read_text("utf-8"))["runs"]]
-    else:
-        folders = [folder]
+    folders = comparison.runs_of(folder) if comparison.is_comparison(folder) else [folder]
     motions = [
         trajectory.motion() for trajectory in (Trajectory.load(path) for path in folders) if len(trajectory)
     ]
@@ -126,7 +121,7 @@ def ellipsoids_of(wanted: bool, scale: float | None) -> Wanted:
     """
     if scale is None:
         return wanted
-    from nmm.playback.ellipsoids import EllipsoidOptions
+    from nmm.runs.ellipsoid_options import EllipsoidOptions
 
     return EllipsoidOptions(scale=scale)
 
@@ -152,39 +147,3 @@ def _status(command: str, trajectories: Sequence[Trajectory], folder: Path) -> i
             f"the part that was computed is in {folder}",
         )
     return FAILED if failed else OK
-
-
-def check_folder(folder: Path, is_ours: Callable[[Path], bool]) -> None:
-    """`InputError` for a folder that must not, or cannot, be written: before anything is computed."""
-    check_replaceable(folder, is_ours)
-    parent = folder.absolute().parent
-    while not parent.exists():
-        parent = parent.parent
-    if not parent.is_dir() or not os.access(parent, os.W_OK | os.X_OK):
-        raise InputError(f"{folder}: cannot be written: {parent} is not a folder where you may write")
-
-
-def _is_comparison(folder: Path) -> bool:
-    return has_format(folder / "summary.json", COMPARISON)
-
-
-def _write_comparison(
-    title: str, trajectories: Sequence[Trajectory], folder: Path, ellipsoids: Wanted
-) -> None:
-    with replaced_folder(folder, _is_comparison) as temporary:
-        for trajectory in trajectories:
-            trajectory.save(temporary / trajectory.resolver, figures=False)
-        summary = {
-            "format": COMPARISON,
-            "complete": all(trajectory.complete for trajectory in trajectories),
-            "runs": {trajectory.resolver: trajectory.summary() for trajectory in trajectories},
-        }
-        (temporary / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-        shown = [trajectory for trajectory in trajectories if len(trajectory) > 1]
-        if shown:
-            from nmm.figures import comparison
-            from nmm.playback import write_html
-
-            comparison(shown).savefig(temporary / "comparison.png")
-            motions = [trajectory.motion() for trajectory in shown]
-            write_html(motions, temporary / "playback.html", title=title, ellipsoids=ellipsoids)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,10 +15,8 @@ from nmm.errors import InputError
 from nmm.figures import curves, style
 from nmm.figures.motion import Scene, stroboscopic
 from nmm.figures.objective import draw_best_objective, has_objective, objective_comparison
+from nmm.runs.ellipsoid_options import Wanted
 from nmm.runs.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    from nmm.playback.ellipsoids import Wanted
 
 #: Width of a figure of two columns and of its left column, in.
 _WIDTH, _VIEW = 10.4, 4.8
@@ -146,7 +143,7 @@ def write_run_figures(
     ----------
     trajectory : a run of at least one sample
     folder : an existing folder
-    ellipsoids : whether ellipses.png is written too, or how (`nmm.playback.ellipsoids.EllipsoidOptions`)
+    ellipsoids : whether ellipses.png is written too, or how (`nmm.playback.EllipsoidOptions`)
 
     Returns
     -------

@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
+from nmm.analysis.singular.drawn_ellipsoids import (
+    NAMES,
+    SHARE,
+    drawn_ellipsoids,
+    drawn_frame,
+    drawn_scale,
+    largest_radius,
+    scale_text,
+)
 from nmm.analysis.singular.parts import WHOLE
 from nmm.arrays import Array
 from nmm.errors import InputError
@@ -15,18 +26,10 @@ from nmm.figures import style
 from nmm.figures.motion import hull
 from nmm.figures.silhouette import Pose, Silhouette
 from nmm.figures.views import ABOVE, SIDE, View, Viewed, page
-from nmm.playback.ellipsoids import (
-    NAMES,
-    SHARE,
-    EllipsoidOptions,
-    Wanted,
-    extent_of,
-    largest_radius,
-    options_of,
-    scale_text,
-)
+from nmm.playback.extent import extent_of
 from nmm.playback.keyframes import ghost_samples
-from nmm.playback.motion import Motion
+from nmm.robots.motion import Motion
+from nmm.runs.ellipsoid_options import EllipsoidOptions, Wanted, options_of
 from nmm.runs.trajectory import Trajectory
 
 #: At most and at least so many instants with ellipses, and at how many of them the robot is drawn.
@@ -44,7 +47,7 @@ _LINE = 0.2
 _BODY, _EDGE, _FILL, _RIM, _ARM = "#EEF0F3", "#BFC5CE", style.SKY, style.BLUE, style.VERMILLION
 
 
-def ellipses(trajectory: Trajectory, options: Wanted = True) -> Figure:
+def ellipses(trajectory: Trajectory, options: Wanted = True, path: str | Path | None = None) -> Figure:
     """The end-effector's path with the ellipses of its velocities at instants spread evenly along the way.
 
     An ellipse holds the velocities, seen in that view, that inputs of size 1 give the frame: the shadow of
@@ -55,6 +58,7 @@ def ellipses(trajectory: Trajectory, options: Wanted = True) -> Figure:
     ----------
     trajectory : the run, of at least one sample
     options : frame, sizes of the inputs, and scale; True for the task's frame, 1, and a readable one
+    path : of a PNG to write, too
 
     Raises
     ------
@@ -66,6 +70,8 @@ def ellipses(trajectory: Trajectory, options: Wanted = True) -> Figure:
         style.LEFT / style.PAGE, 1.0 - 0.5 * _LINE / float(made.get_size_inches()[1]), scene.text,
         fontsize=style.SMALL, color=style.GREY, va="top",
     )  # fmt: skip
+    if path is not None:
+        style.save(made, path)
     return made
 
 
@@ -76,10 +82,10 @@ class _Ellipses(Viewed):
         if not len(trajectory):
             raise InputError("figure of the ellipses: expected a run with at least one sample, got none")
         robot = trajectory.robot
-        self.frame = options.frame_on(robot, trajectory.frame)
+        self.frame = drawn_frame(options, robot, trajectory.frame)
         kept = np.unique(np.linspace(0, len(trajectory) - 1, min(len(trajectory), _POINTS)).astype(int))
         q = trajectory.q[kept]
-        along = options.ellipsoids(robot, self.frame, q)
+        along = drawn_ellipsoids(options, robot, self.frame, q)
         self.path = along[WHOLE].center
         motion = Motion(robot, trajectory.t[kept], q, trajectory.u[kept], path=self.path)
         silhouette = Silhouette(robot, self.frame)
@@ -90,7 +96,7 @@ class _Ellipses(Viewed):
         extent = extent_of(robot, q[0])
         # On a short way smaller ones than the page's, that leave each other room.
         room = float(np.clip(way / (LEAST - 1) / SHARE, _SMALLEST * extent, extent))
-        self.scale = options.drawn_scale(room, [along])
+        self.scale = drawn_scale(options, room, [along])
         apart = _APART * self.scale * largest
         count = int(np.clip(1 + way // apart, LEAST, MOST)) if apart > 0.0 else LEAST
         samples = ghost_samples(motion, count) or [0]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import textwrap
 from collections.abc import Iterable
+from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -30,13 +31,19 @@ MOST_NAMED = 6
 WORST = "worst posture"
 
 
-def map_figure(drawn: Map, measure: str) -> Figure:
+def map_figure(drawn: Map, measure: str | None = None, path: str | Path | None = None) -> Figure:
     """The figure of a measure: over two coordinates one map; of a workspace the best and the worst beside it.
+
+    Parameters
+    ----------
+    measure : the map's first one when not given
+    path : of a PNG to write, too
 
     Raises
     ------
     InputError : the map has no such measure
     """
+    measure = next(iter(drawn.values)) if measure is None else measure
     if measure not in drawn.values:
         raise InputError(unknown("measure", measure, drawn.values, "map"))
     layers = {"": drawn.values[measure]}
@@ -65,6 +72,8 @@ def map_figure(drawn: Map, measure: str) -> Figure:
     _write_title(made, lines)
     if legend:
         set_legend(made.axes[0], 0.2 if len(layers) > 1 else 0.0)
+    if path is not None:
+        style.save(made, path)
     return made
 
 

@@ -11,10 +11,10 @@ from pathlib import Path
 
 from nmm import __version__
 from nmm.errors import InputError
+from nmm.folders.whole import has_format, replaced_folder
 from nmm.paper.cases import CASES
 from nmm.paper.processes import share_out
 from nmm.paper.results import CaseResult, Claim
-from nmm.runs.storage import replaced_folder
 
 #: Marks a folder as one of ours.
 FORMAT = "nmm paper 1"
@@ -95,11 +95,7 @@ def write_paper(
 
 def is_paper(folder: Path) -> bool:
     """Whether a folder was written by `write_paper`."""
-    try:
-        content = json.loads((folder / _MARKER).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return False
-    return isinstance(content, dict) and content.get("format") == FORMAT
+    return has_format(folder / _MARKER, FORMAT)
 
 
 def _case(number: int, progress: Callable[[float], None], folder: Path) -> CaseResult:

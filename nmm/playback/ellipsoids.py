@@ -2,115 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 
-from nmm.analysis.singular.ellipsoids import Ellipsoids, Sizes, carried_frame, ellipsoids_along, frame_of
+from nmm.analysis.singular.drawn_ellipsoids import (
+    ARM,
+    NAMES,
+    drawn_ellipsoids,
+    drawn_frame,
+    drawn_scale,
+    largest_radius,
+    scale_text,
+)
+from nmm.analysis.singular.ellipsoids import Ellipsoids
 from nmm.analysis.singular.parts import WHOLE
-from nmm.arrays import Array, positive
-from nmm.errors import InputError
+from nmm.arrays import Array
 from nmm.playback.drawing import Command, Drawing, Rgb, animation, page_times
-from nmm.playback.extent import robot_boxes
+from nmm.playback.extent import extent_of
 from nmm.playback.keyframes import Keyframes
-from nmm.playback.motion import Motion
 from nmm.playback.placements import position_and_quaternion
-from nmm.playback.rolling import Rolling
-from nmm.robots.robot import Robot
+from nmm.robots.motion import Motion
+from nmm.runs.ellipsoid_options import EllipsoidOptions
 
-ARM = "arm"
 #: Colours of the arm's, and of the legend's entry for robots of several colours.
 ARM_COLOR: Rgb = (0.93, 0.62, 0.02)
 SEVERAL: Rgb = (0.36, 0.44, 0.54)
 OPACITY = {WHOLE: 0.24, ARM: 0.55}
-NAMES = {WHOLE: "whole robot", ARM: "arm alone"}
-
-#: The largest radius as drawn, beside the robot's extent, at most.
-SHARE = 1.0 / 3.0
 #: The least radius as drawn, beside the largest: a flat ellipsoid is seen, but its number stays 0.
 THINNEST = 0.012
 #: Between two frames the page may be off by this much of the largest radius, in shape and in place; frames
 #: are put in between, in so many rounds at most.
 CLOSE = 0.01
 ROUNDS = 5
-
-
-@dataclass(frozen=True)
-class EllipsoidOptions:
-    """How ellipsoids are drawn.
-
-    Attributes
-    ----------
-    frame : the frame; the one that the task positions when not given, or the arm's tip
-    sizes : how much of each input counts as 1 (see `nmm.analysis.singular.ellipsoids.ellipsoids_along`)
-    scale : metres drawn for each m/s; when not given, so that the largest is up to a third of the robot's
-        extent
-
-    Raises
-    ------
-    InputError : a scale that is not above zero
-    """
-
-    frame: str | None = None
-    sizes: Sizes = None
-    scale: float | None = None
-
-    def __post_init__(self) -> None:
-        if self.scale is not None:
-            positive(self.scale, "scale of the ellipsoids")
-
-    def frame_on(self, robot: Robot, frame: str | None) -> str:
-        """The frame asked for, or a motion's own if the arm carries it, or the arm's tip."""
-        return carried_frame(robot, frame) if self.frame is None else frame_of(robot, self.frame)
-
-    def ellipsoids(self, robot: Robot, frame: str, q: Array) -> dict[str, Ellipsoids]:
-        """Those of the whole robot and, where a platform moves it too, of the arm alone."""
-        both = robot.platform.p > 0 and robot.n_u > robot.platform.p
-        parts = (WHOLE, ARM) if both else (WHOLE,)
-        return {part: ellipsoids_along(robot, frame, q, part, self.sizes) for part in parts}
-
-    def drawn_scale(self, extent: float, ellipsoids: Sequence[Mapping[str, Ellipsoids]]) -> float:
-        """Metres drawn for each m/s, for robots of that extent, m."""
-        largest = largest_radius(ellipsoids)
-        if self.scale is not None or not largest > 0.0:
-            return 1.0 if self.scale is None else float(self.scale)
-        return _nice(SHARE * extent / largest)
-
-
-#: What drawing functions take: whether to, and how.
-Wanted = bool | EllipsoidOptions
-
-
-def options_of(wanted: Wanted) -> EllipsoidOptions | None:
-    """The options, default ones for True; None for False.
-
-    Raises
-    ------
-    InputError : something else
-    """
-    if isinstance(wanted, EllipsoidOptions):
-        return wanted
-    if not isinstance(wanted, bool):
-        raise InputError(f"ellipsoids: expected True, False or EllipsoidOptions(...), got {wanted!r}")
-    return EllipsoidOptions() if wanted else None
-
-
-def largest_radius(ellipsoids: Sequence[Mapping[str, Ellipsoids]]) -> float:
-    """The largest radius of all, m/s; 0 where nothing moves."""
-    radii = [one.radii[np.isfinite(one.radii)] for parts in ellipsoids for one in parts.values()]
-    return max((float(known.max(initial=0.0)) for known in radii), default=0.0)
-
-
-def extent_of(robot: Robot, q: Array) -> float:
-    """Diagonal of the box around a robot at q (n,), m."""
-    box = robot_boxes(robot, q[np.newaxis], Rolling(robot).settled(q)[np.newaxis])[0]
-    return float(np.linalg.norm(np.ptp(box, axis=0)))
-
-
-def scale_text(scale: float) -> str:
-    """The scale in words."""
-    return f"1 m/s is drawn as {scale:.3g} m"
 
 
 class SceneEllipsoids:
@@ -134,14 +58,14 @@ class SceneEllipsoids:
         frames: Sequence[Keyframes],
         options: EllipsoidOptions,
     ) -> None:
-        self.names = [options.frame_on(motion.robot, motion.frame) for motion in motions]
+        self.names = [drawn_frame(options, motion.robot, motion.frame) for motion in motions]
         robots = [motion.robot for motion in motions]
         first = [
-            options.ellipsoids(*each)
+            drawn_ellipsoids(options, *each)
             for each in zip(robots, self.names, [frame.q for frame in frames], strict=True)
         ]
         extent = max(extent_of(motion.robot, motion.q[0]) for motion in motions)
-        self.scale = options.drawn_scale(extent, first)
+        self.scale = drawn_scale(options, extent, first)
         largest = largest_radius(first)
         self.thinnest = self.scale * largest * THINNEST if largest > 0.0 else THINNEST * extent
         room = max(self.scale * largest, self.thinnest)
@@ -151,7 +75,7 @@ class SceneEllipsoids:
             t, q = frame.t, frame.q
             for _ in range(ROUNDS):
                 middle = 0.5 * (q[1:] + q[:-1])
-                exact = options.ellipsoids(robot, name, middle) if len(middle) else {}
+                exact = drawn_ellipsoids(options, robot, name, middle) if len(middle) else {}
                 bad = np.zeros(len(middle), dtype=bool)
                 for part, there in exact.items():
                     bad |= between_error(parts[part], there, self.scale) > CLOSE * room
@@ -159,7 +83,7 @@ class SceneEllipsoids:
                     break
                 at = np.flatnonzero(bad) + 1
                 t, q = np.insert(t, at, 0.5 * (t[1:] + t[:-1])[bad]), np.insert(q, at, middle[bad], axis=0)
-                parts = options.ellipsoids(robot, name, q)
+                parts = drawn_ellipsoids(options, robot, name, q)
             self.t.append(t)
             self.parts.append(parts)
 
@@ -247,11 +171,3 @@ def between_error(at: Ellipsoids, exact: Ellipsoids, scale: float) -> Array:
     place = np.linalg.norm(0.5 * (at.center[1:] + at.center[:-1]) - exact.center, axis=1)
     error: Array = shape + place
     return error
-
-
-def _nice(value: float) -> float:
-    """The largest of 1, 2, 3, 4, 5 times a power of ten that is not above `value`."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(
-        power * max(step for step in (1.0, 2.0, 3.0, 4.0, 5.0) if step * power <= value * (1.0 + 1e-9))
-    )

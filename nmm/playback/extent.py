@@ -9,6 +9,7 @@ import pinocchio as pin
 
 from nmm.arrays import Array
 from nmm.playback.placements import Placements
+from nmm.playback.rolling import Rolling
 from nmm.playback.sticks import appearance
 from nmm.robots.robot import Robot
 
@@ -42,6 +43,12 @@ def robot_boxes(robot: Robot, q: Array, wheels: Array) -> Array:
         everything = np.vstack(points or [data.oMi[i].translation for i in range(model.njoints)])
         boxes[k] = everything.min(axis=0), everything.max(axis=0)
     return boxes
+
+
+def extent_of(robot: Robot, q: Array) -> float:
+    """Diagonal of the box around a robot at q (n,), m."""
+    box = robot_boxes(robot, q[np.newaxis], Rolling(robot).settled(q)[np.newaxis])[0]
+    return float(np.linalg.norm(np.ptp(box, axis=0)))
 
 
 def _local(geometry: pin.GeometryObject) -> Array | None:

@@ -6,15 +6,12 @@ import os
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from nmm.errors import InputError
-from nmm.playback.motion import Motion
 from nmm.playback.page import file_page
 from nmm.playback.scene import playback_scene
-
-if TYPE_CHECKING:
-    from nmm.playback.ellipsoids import Wanted
+from nmm.robots.motion import Motion
+from nmm.runs.ellipsoid_options import Wanted
 
 
 def write_html(

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from nmm.arrays import Array
-from nmm.playback.motion import Motion
 from nmm.playback.placements import base_position
 from nmm.playback.rolling import wheel_angles
+from nmm.robots.motion import Motion
 
 #: No part may turn further than this between two frames, rad: half a turn would be played backwards.
 LARGEST_TURN = 1.0

@@ -8,23 +8,20 @@ import threading
 import webbrowser
 from collections.abc import Sequence
 from types import TracebackType
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import vector
 from nmm.playback.encoding import encode
-from nmm.playback.motion import Motion
 from nmm.playback.page import socket_page
 from nmm.playback.rolling import Rolling
 from nmm.playback.scene import live_scene, playback_scene
 from nmm.playback.server import PageServer
 from nmm.playback.sticks import appearance
+from nmm.robots.motion import Motion
 from nmm.robots.robot import Robot
-
-if TYPE_CHECKING:
-    from nmm.playback.ellipsoids import Wanted
+from nmm.runs.ellipsoid_options import Wanted
 
 
 def play(

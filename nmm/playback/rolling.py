@@ -7,9 +7,9 @@ from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, vector
 from nmm.playback.carriers import Carriers, at_point
-from nmm.playback.motion import Motion
 from nmm.playback.placements import rolling_joints
 from nmm.playback.swivels import Swivel
+from nmm.robots.motion import Motion
 from nmm.robots.robot import Robot
 
 

@@ -13,14 +13,15 @@ from nmm.playback.drawing import Command, Drawing, DrawnRobot, Rgb
 from nmm.playback.encoding import packed
 from nmm.playback.extent import corners, robot_boxes
 from nmm.playback.keyframes import Keyframes, ghost_samples, keyframes
-from nmm.playback.motion import Motion
 from nmm.playback.placements import base_position
 from nmm.playback.rolling import wheel_angles
 from nmm.playback.shapes import Y_TO_Z, cylinder, sphere
+from nmm.robots.motion import Motion
 from nmm.robots.robot import Robot
+from nmm.runs.ellipsoid_options import Wanted, options_of
 
 if TYPE_CHECKING:
-    from nmm.playback.ellipsoids import SceneEllipsoids, Wanted
+    from nmm.playback.ellipsoids import SceneEllipsoids
 
 #: Colours of the motions: told apart by readers with any colour vision.
 COLORS: tuple[Rgb, ...] = (
@@ -174,7 +175,7 @@ def _ellipsoids(
     if wanted is False:
         return None
     # Not before: with it comes the whole of the analysis.
-    from nmm.playback.ellipsoids import SceneEllipsoids, options_of
+    from nmm.playback.ellipsoids import SceneEllipsoids
 
     options = options_of(wanted)
     return None if options is None else SceneEllipsoids(motions, frames, options)

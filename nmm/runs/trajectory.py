@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nmm.arrays import Array, Integers
+from nmm.doors import door
+from nmm.robots.motion import Motion
 from nmm.robots.robot import Robot
+from nmm.runs.ellipsoid_options import Wanted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from nmm.playback import Motion
-    from nmm.playback.ellipsoids import Wanted
 
 
 class Outcome(StrEnum):
@@ -110,17 +110,13 @@ class Trajectory:
 
     def summary(self) -> dict[str, Any]:
         """The run in numbers, ready for JSON."""
-        from nmm.runs.summary import summarise
-
-        return summarise(self)
+        return door("nmm.runs.summary:summarise")(self)
 
     def save(
         self, folder: str | Path, *, figures: bool = True, html: bool = False, ellipsoids: Wanted = False
     ) -> Path:
-        """Write the run's folder (see `runs.storage.save`): arrays, tables, summary, figures, playback."""
-        from nmm.runs.storage import save
-
-        return save(self, folder, figures=figures, html=html, ellipsoids=ellipsoids)
+        """Write the run's folder (see `nmm.folders.run.save`): arrays, tables, summary, figures, playback."""
+        return door("nmm.folders.run:save")(self, folder, figures=figures, html=html, ellipsoids=ellipsoids)
 
     @staticmethod
     def load(folder: str | Path, robot: Robot | None = None) -> Trajectory:
@@ -130,30 +126,18 @@ class Trajectory:
         ------
         InputError : it is no run's folder, or its robot cannot be loaded, or is another one
         """
-        from nmm.runs.storage import load
-
-        return load(folder, robot)
+        return door("nmm.folders.run:load")(folder, robot)
 
     def plot(self) -> Figure:
         """One figure that shows the run: the motion from above, errors, objective, inputs."""
-        from nmm.figures import overview
-
-        return overview(self)
+        return door("nmm.figures:overview")(self)
 
     def plot_ellipses(self, path: str | Path | None = None, options: Wanted = True) -> Figure:
         """The end-effector's path with manipulability ellipses (see `nmm.figures.ellipses`); also as PNG."""
-        from nmm.figures.ellipses import ellipses
-        from nmm.figures.style import save
-
-        made = ellipses(self, options)
-        if path is not None:
-            save(made, path)
-        return made
+        return door("nmm.figures.ellipses:ellipses")(self, options, path)
 
     def motion(self, label: str | None = None) -> Motion:
         """What playback shows of it."""
-        from nmm.playback import Motion
-
         return Motion(
             robot=self.robot,
             t=self.t,
@@ -168,6 +152,6 @@ class Trajectory:
 
     def play(self, *, port: int | None = None, open_browser: bool = True, ellipsoids: Wanted = False) -> None:
         """Play the motion in a browser with MeshCat; returns when the user ends it (Ctrl-C)."""
-        from nmm.playback import play
-
-        play([self.motion()], port=port, open_browser=open_browser, ellipsoids=ellipsoids)
+        door("nmm.playback:play")(
+            [self.motion()], port=port, open_browser=open_browser, ellipsoids=ellipsoids
+        )

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from nmm.analysis.maps.singular_set import SingularSet
 from nmm.analysis.singular.parts import WHOLE
-
-if TYPE_CHECKING:
-    from nmm.analysis.maps.result import Map
+from nmm.arrays import Array
 
 #: What a measure of the part is where the part's J loses rank.
 WHERE_SINGULAR: Mapping[str, float] = {
@@ -37,28 +35,35 @@ class Extreme(NamedTuple):
     on: str = ""
 
 
-def extremes(made: Map, measure: str, *, worst: bool = False) -> dict[str, Extreme]:
-    """ "smallest" and "largest" value of a measure; NaN in a map without any number.
+class Known(NamedTuple):
+    """What a measure is on a singular set: the set, whose it is ("" or "arm's "), the value."""
 
-    A grid misses the singular places between its nodes. There the value is known without a sample.
+    those: SingularSet
+    whose: str
+    value: float
+
+
+def extremes(
+    values: Array, axes: tuple[Array, Array], known: Sequence[Known], between: Sequence[Known]
+) -> dict[str, Extreme]:
+    """ "smallest" and "largest" of a map's values; NaN where there is no number.
 
     Parameters
     ----------
-    worst : of a workspace's worst postures. The best ones are not those that are singular, so only of the
-        worst the singular places tell a value
+    values : (rows, columns), NaN where there is none
+    axes : the columns' (columns,) and the rows' (rows,) coordinates
+    known : what the measure is on the singular sets that were found
+    between : those of them that count, beside the cells, where they are no more than lines and points
     """
-    values = made.worst[measure] if worst else made.values[measure]
     found = {}
     for name, pick in (("smallest", np.nanargmin), ("largest", np.nanargmax)):
         if np.all(np.isnan(values)):
             found[name] = Extreme(np.nan, (np.nan, np.nan))
             continue
         row, column = np.unravel_index(pick(values), values.shape)
-        where = float(made.axes[0][column]), float(made.axes[1][row])
+        where = float(axes[0][column]), float(axes[1][row])
         found[name] = Extreme(float(values[row, column]), where)
-    known = _known(made, measure)
     constant = [value for those, _, value in known if those.everywhere]
-    between = [one for one in known if made.kind == "coordinates" or worst]
     seen = [found["smallest"].value, found["largest"].value, *(value for *_, value in between)]
     if constant or max(seen) - min(seen) <= SAME * max(map(abs, seen)):
         return {
@@ -71,18 +76,18 @@ def extremes(made: Map, measure: str, *, worst: bool = False) -> dict[str, Extre
     return found
 
 
-def _known(made: Map, measure: str) -> list[tuple[SingularSet, str, float]]:
-    """(set, whose, value on it) of the singular sets that were found and tell of a measure."""
-    part, found = made.about.part, []
+def known_on(measure: str, part: str, singular: SingularSet, arm_singular: SingularSet | None) -> list[Known]:
+    """What is known of a measure on the singular sets that were found, of the part's J and the arm's."""
+    found = []
     if measure in WHERE_SINGULAR:
-        found.append((made.singular, "", WHERE_SINGULAR[measure]))
+        found.append(Known(singular, "", WHERE_SINGULAR[measure]))
     if measure in OF_PARTS and part == WHOLE:
-        found.append((made.singular, "", 0.0))
+        found.append(Known(singular, "", 0.0))
     if measure == "arm_manipulability":
-        own = made.singular if part == "arm" else made.arm_singular
+        own = singular if part == "arm" else arm_singular
         if own is not None:
-            found.insert(0, (own, "arm's ", 0.0))
-    return [one for one in found if not one[0].empty]
+            found.insert(0, Known(own, "arm's ", 0.0))
+    return [one for one in found if not one.those.empty]
 
 
 def _first_of(those: SingularSet) -> tuple[float, float]:

@@ -1,8 +1,7 @@
-"""A map: measures over a plane, with where they are singular, and how it is written and drawn."""
+"""A map: measures over a plane, with where they are singular."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,17 +10,14 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from nmm.analysis.maps.evaluation import Evaluator
-from nmm.analysis.maps.extremes import EVERYWHERE, Extreme, extremes
-from nmm.analysis.maps.measures import MEASURES, unit_of
+from nmm.analysis.maps.extremes import Extreme, extremes, known_on
+from nmm.analysis.maps.measures import unit_of
 from nmm.analysis.maps.singular_set import SingularSet
 from nmm.arrays import Array, Integers
-from nmm.runs.storage import has_format, replaced_folder
+from nmm.doors import door
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-#: Marks a folder of a map.
-FORMAT = "nmm map 1"
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,8 +126,18 @@ class Map:
         return q
 
     def extremes(self, measure: str, *, worst: bool = False) -> dict[str, Extreme]:
-        """ "smallest" and "largest" value of a measure, with where; see `nmm.analysis.maps.extremes`."""
-        return extremes(self, measure, worst=worst)
+        """ "smallest" and "largest" value of a measure, with where; NaN in a map without any number.
+
+        A grid misses the singular places between its nodes. There the value is known without a sample.
+
+        Parameters
+        ----------
+        worst : of a workspace's worst postures. The best ones are not those that are singular, so only of the
+            worst the singular places tell a value
+        """
+        known = known_on(measure, self.about.part, self.singular, self.arm_singular)
+        between = known if self.kind == "coordinates" or worst else []
+        return extremes((self.worst if worst else self.values)[measure], self.axes, known, between)
 
     @property
     def held(self) -> dict[str, float]:
@@ -149,71 +155,11 @@ class Map:
 
     def summary(self) -> dict[str, Any]:
         """What was computed, in plain data."""
-        about = self.about
-        return {
-            "format": FORMAT,
-            "kind": self.kind,
-            "robot": about.robot,
-            "task": list(about.task),
-            "part": about.part,
-            "t": about.t,
-            "alpha": about.alpha,
-            "weights": dict(about.weights),
-            "sizes": about.sizes,
-            "axes": [
-                {
-                    "name": name,
-                    "unit": unit,
-                    "from": float(axis[0]),
-                    "to": float(axis[-1]),
-                    "samples": len(axis),
-                }
-                for name, unit, axis in zip(self.names, self.units, self.axes, strict=True)
-            ],
-            "held": self.held,
-            "frame": self.frame or None,
-            "height": None if self.height is None else list(self.height),
-            "measures": {
-                name: {
-                    "symbol": MEASURES[name].symbol,
-                    "about": MEASURES[name].about,
-                    "unit": about.units[name],
-                    **_ends(self.extremes(name)),
-                    **({"worst": _ends(self.extremes(name, worst=True))} if name in self.worst else {}),
-                }
-                for name in self.values
-            },
-            "singular": _found(self.singular),
-            "arm_singular": None if self.arm_singular is None else _found(self.arm_singular),
-        }
-
-    def arrays(self) -> dict[str, Array | Integers]:
-        """As map.npz holds them. Lines follow one another, a row of NaN between them."""
-        found: dict[str, Any] = {
-            "axis_0": self.axes[0],
-            "axis_1": self.axes[1],
-            "rank": self.rank,
-            "q": self.q,
-            "q_names": np.array(self.about.q_names),
-        }
-        found |= self.values
-        for prefix, layer in (("worst", self.worst), ("best_q", self.best_q), ("worst_q", self.worst_q)):
-            found |= {f"{prefix}_{name}": values for name, values in layer.items()}
-        for prefix, those in (("singular", self.singular), ("arm_singular", self.arm_singular)):
-            if those is not None:
-                found[f"{prefix}_points"] = those.points
-                found[f"{prefix}_lines"] = joined(those.lines)
-        return found
+        return door("nmm.folders.map:summary")(self)
 
     def plot(self, measure: str | None = None, path: str | Path | None = None) -> Figure:
         """The figure of a measure (the first one by default), written as PNG where a path is given."""
-        from nmm.figures import style
-        from nmm.figures.maps import map_figure
-
-        made = map_figure(self, next(iter(self.values)) if measure is None else measure)
-        if path is not None:
-            style.save(made, path)
-        return made
+        return door("nmm.figures.maps:map_figure")(self, measure, path)
 
     def save(self, folder: str | Path) -> Path:
         """Write map.npz, map.json and a PNG a measure.
@@ -226,42 +172,4 @@ class Map:
         ------
         InputError : the folder exists and is not a map's, or cannot be written
         """
-        with replaced_folder(folder, is_map) as temporary:
-            np.savez_compressed(temporary / "map.npz", **self.arrays())  # type: ignore[arg-type]  # arrays by name
-            text = json.dumps(self.summary(), indent=2, ensure_ascii=False)
-            (temporary / "map.json").write_text(text + "\n", encoding="utf-8")
-            for measure in self.values:
-                self.plot(measure, temporary / f"{measure}.png")
-        return Path(folder)
-
-
-def is_map(folder: Path) -> bool:
-    """Whether a folder holds a map that nmm wrote."""
-    return has_format(folder / "map.json", FORMAT)
-
-
-def joined(lines: tuple[Array, ...]) -> Array:
-    """Curves (k, 2) as one, a row of NaN after each."""
-    gap = np.full((1, 2), np.nan)
-    return np.vstack([piece for line in lines for piece in (line, gap)]) if lines else np.zeros((0, 2))
-
-
-def _found(those: SingularSet) -> dict[str, Any]:
-    # Pieces of lines that cross, and both ends of a turn, make no count of lines.
-    return {"lines": bool(those.lines), "points": len(those.points), "everywhere": those.everywhere}
-
-
-def _ends(found: Mapping[str, Extreme]) -> dict[str, Any]:
-    """Extremes in plain data; "on" says whether a cell has the value or a singular set between cells."""
-    return {
-        end: {
-            "value": _plain(value),
-            "at": None if on == EVERYWHERE else [_plain(x) for x in at],
-            "on": on or "cell",
-        }
-        for end, (value, at, on) in found.items()
-    }
-
-
-def _plain(value: float) -> float | None:
-    return value if np.isfinite(value) else None
+        return door("nmm.folders.map:save")(self, folder)

@@ -205,7 +205,7 @@ def repeatability(
     InputError : the task's references do not repeat themselves with a period, or one has to be given
     """
     laps = counted(laps, "laps")
-    from nmm.scenario import Scenario  # a room further down: only those who have one need it
+    from nmm.scenario import Scenario  # imported by those who have one: it brings pydantic
 
     scenarios: dict[str, Scenario] = {}
     controllers: Mapping[str, Controller]

@@ -15,9 +15,7 @@ from nmm.errors import InputError, unknown
 from nmm.robots.configuration import kinematics_updater
 from nmm.robots.loading.tips import first_tip
 from nmm.robots.robot import Robot
-
-#: How much of each input counts as 1: by name (1 of its unit where not named), or "limits" for its own.
-Sizes = Mapping[str, float] | str | None
+from nmm.runs.ellipsoid_options import Sizes
 
 #: Radii nearer to each other than this, beside the largest, are one: their axes are any in that plane.
 EQUAL = 1e-9

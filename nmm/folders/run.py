@@ -1,13 +1,9 @@
-"""A run's folder: written whole or not at all, read back without pickle."""
+"""A run's folder: its arrays, tables, figures and playback, read back without pickle."""
 
 from __future__ import annotations
 
 import csv
 import json
-import shutil
-import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,74 +11,21 @@ import numpy as np
 import yaml
 
 from nmm.errors import InputError, RobotError
+from nmm.folders.whole import has_format, replaced_folder
 from nmm.runs.summary import FORMAT
 
 if TYPE_CHECKING:
-    from nmm.playback.ellipsoids import Wanted
     from nmm.robots.robot import Robot
+    from nmm.runs.ellipsoid_options import Wanted
     from nmm.runs.trajectory import Trajectory
 
 ARRAYS = ("t", "q", "u", "q_dot", "r", "r_d", "error", "objective", "sigma_min", "partition", "residual")
 OPTIONAL_ARRAYS = ("path", "desired", "target")
 
 
-@contextmanager
-def replaced_folder(folder: str | Path, is_ours: Callable[[Path], bool]) -> Iterator[Path]:
-    """A temporary folder beside `folder` that takes its place when the block ends without an error.
-
-    Raises
-    ------
-    InputError : `folder` exists and is not one of ours, or cannot be written
-    """
-    final = Path(folder)
-    check_replaceable(final, is_ours)
-    try:
-        final.parent.mkdir(parents=True, exist_ok=True)
-        temporary = Path(tempfile.mkdtemp(prefix=f".{final.name}-", dir=final.parent))
-    except OSError as error:
-        raise InputError(f"{final}: cannot be written: {error.strerror}") from None
-    try:
-        temporary.chmod(0o755)
-        yield temporary
-        old: Path | None = None
-        if final.exists():
-            old = Path(tempfile.mkdtemp(prefix=f".{final.name}-old-", dir=final.parent))
-            final.rename(old / final.name)
-        temporary.rename(final)
-        if old is not None:
-            shutil.rmtree(old, ignore_errors=True)
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-
-
-def check_replaceable(folder: str | Path, is_ours: Callable[[Path], bool]) -> None:
-    """`InputError` when `folder` exists, holds something, and is not one of ours."""
-    final = Path(folder)
-    if final.is_dir() and (not any(final.iterdir()) or is_ours(final)):
-        return
-    if final.exists() or final.is_symlink():
-        raise InputError(
-            f"{final}: exists and is not what this writes; expected a new or an empty folder, or one that "
-            "this wrote before"
-        )
-
-
 def is_run(folder: Path) -> bool:
     """Whether a folder holds a run that nmm wrote."""
     return has_format(folder / "summary.json", FORMAT)
-
-
-def has_format(file: Path, expected: str) -> bool:
-    """Whether a JSON file of ours says that its folder is of that format."""
-    return _format(file) == expected
-
-
-def _format(file: Path) -> object:
-    try:
-        summary = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-    return summary.get("format") if isinstance(summary, dict) else None
 
 
 def save(
@@ -101,7 +44,7 @@ def save(
     figures : whether to draw the figures (PNG)
     html : whether to write playback.html
     ellipsoids : whether manipulability ellipsoids are drawn, in ellipses.png and playback.html, or how
-        (`nmm.playback.ellipsoids.EllipsoidOptions`)
+        (`nmm.playback.EllipsoidOptions`)
 
     Raises
     ------

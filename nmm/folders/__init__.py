@@ -1,0 +1,5 @@
+"""What is written whole or not at all, and read back: the folders of a run, a comparison, laps and a map.
+
+whole       a folder that takes the place of an older one when all of it is written
+run, comparison, laps, map    a file a kind of folder: its marker, its files, how they are written and read
+"""

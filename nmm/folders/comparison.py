@@ -1,0 +1,63 @@
+"""A comparison's folder: a run a resolver, and one summary, figure and playback of all."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from nmm.folders.whole import has_format, replaced_folder
+
+if TYPE_CHECKING:
+    from nmm.runs.ellipsoid_options import Wanted
+    from nmm.runs.trajectory import Trajectory
+
+#: Marks a folder of a comparison.
+FORMAT = "nmm comparison 1"
+
+
+def is_comparison(folder: Path) -> bool:
+    """Whether a folder holds a comparison that nmm wrote."""
+    return has_format(folder / "summary.json", FORMAT)
+
+
+def runs_of(folder: Path) -> list[Path]:
+    """The folders of a comparison's runs."""
+    return [folder / kind for kind in json.loads((folder / "summary.json").read_text("utf-8"))["runs"]]
+
+
+def save(
+    trajectories: Sequence[Trajectory], folder: str | Path, title: str, *, ellipsoids: Wanted = False
+) -> Path:
+    """Write each run's folder, summary.json, comparison.png and playback.html.
+
+    Parameters
+    ----------
+    trajectories : a run a resolver
+    folder : a new folder, or one of a comparison, which is replaced
+    title : of the playback
+    ellipsoids : whether the playback shows manipulability ellipsoids, or how
+
+    Raises
+    ------
+    InputError : the folder exists and is not a comparison's, or cannot be written
+    """
+    with replaced_folder(folder, is_comparison) as temporary:
+        for trajectory in trajectories:
+            trajectory.save(temporary / trajectory.resolver, figures=False)
+        summary = {
+            "format": FORMAT,
+            "complete": all(trajectory.complete for trajectory in trajectories),
+            "runs": {trajectory.resolver: trajectory.summary() for trajectory in trajectories},
+        }
+        (temporary / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+        shown = [trajectory for trajectory in trajectories if len(trajectory) > 1]
+        if shown:
+            from nmm.figures import comparison
+            from nmm.playback import write_html
+
+            comparison(shown).savefig(temporary / "comparison.png")
+            motions = [trajectory.motion() for trajectory in shown]
+            write_html(motions, temporary / "playback.html", title=title, ellipsoids=ellipsoids)
+    return Path(folder)

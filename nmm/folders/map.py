@@ -1,0 +1,134 @@
+"""A map's folder: its arrays, what was computed in plain data, and a figure a measure."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nmm.analysis.maps.extremes import EVERYWHERE, Extreme
+from nmm.analysis.maps.measures import MEASURES
+from nmm.arrays import Array, Integers
+from nmm.folders.whole import has_format, replaced_folder
+
+if TYPE_CHECKING:
+    from nmm.analysis.maps.result import Map
+    from nmm.analysis.maps.singular_set import SingularSet
+
+#: Marks a folder of a map.
+FORMAT = "nmm map 1"
+
+
+def is_map(folder: Path) -> bool:
+    """Whether a folder holds a map that nmm wrote."""
+    return has_format(folder / "map.json", FORMAT)
+
+
+def save(made: Map, folder: str | Path) -> Path:
+    """Write map.npz, map.json and a PNG a measure.
+
+    Parameters
+    ----------
+    folder : a new folder, or one of a map, which is replaced
+
+    Raises
+    ------
+    InputError : the folder exists and is not a map's, or cannot be written
+    """
+    with replaced_folder(folder, is_map) as temporary:
+        np.savez_compressed(temporary / "map.npz", **_arrays(made))  # type: ignore[arg-type]  # arrays by name
+        text = json.dumps(summary(made), indent=2, ensure_ascii=False)
+        (temporary / "map.json").write_text(text + "\n", encoding="utf-8")
+        for measure in made.values:
+            made.plot(measure, temporary / f"{measure}.png")
+    return Path(folder)
+
+
+def summary(made: Map) -> dict[str, Any]:
+    """What was computed, in plain data."""
+    about = made.about
+    return {
+        "format": FORMAT,
+        "kind": made.kind,
+        "robot": about.robot,
+        "task": list(about.task),
+        "part": about.part,
+        "t": about.t,
+        "alpha": about.alpha,
+        "weights": dict(about.weights),
+        "sizes": about.sizes,
+        "axes": [
+            {
+                "name": name,
+                "unit": unit,
+                "from": float(axis[0]),
+                "to": float(axis[-1]),
+                "samples": len(axis),
+            }
+            for name, unit, axis in zip(made.names, made.units, made.axes, strict=True)
+        ],
+        "held": made.held,
+        "frame": made.frame or None,
+        "height": None if made.height is None else list(made.height),
+        "measures": {
+            name: {
+                "symbol": MEASURES[name].symbol,
+                "about": MEASURES[name].about,
+                "unit": about.units[name],
+                **_ends(made.extremes(name)),
+                **({"worst": _ends(made.extremes(name, worst=True))} if name in made.worst else {}),
+            }
+            for name in made.values
+        },
+        "singular": _found(made.singular),
+        "arm_singular": None if made.arm_singular is None else _found(made.arm_singular),
+    }
+
+
+def _arrays(made: Map) -> dict[str, Array | Integers]:
+    """As map.npz holds them. Lines follow one another, a row of NaN between them."""
+    found: dict[str, Any] = {
+        "axis_0": made.axes[0],
+        "axis_1": made.axes[1],
+        "rank": made.rank,
+        "q": made.q,
+        "q_names": np.array(made.about.q_names),
+    }
+    found |= made.values
+    for prefix, layer in (("worst", made.worst), ("best_q", made.best_q), ("worst_q", made.worst_q)):
+        found |= {f"{prefix}_{name}": values for name, values in layer.items()}
+    for prefix, those in (("singular", made.singular), ("arm_singular", made.arm_singular)):
+        if those is not None:
+            found[f"{prefix}_points"] = those.points
+            found[f"{prefix}_lines"] = _joined(those.lines)
+    return found
+
+
+def _joined(lines: tuple[Array, ...]) -> Array:
+    """Curves (k, 2) as one, a row of NaN after each."""
+    gap = np.full((1, 2), np.nan)
+    return np.vstack([piece for line in lines for piece in (line, gap)]) if lines else np.zeros((0, 2))
+
+
+def _found(those: SingularSet) -> dict[str, Any]:
+    # Pieces of lines that cross, and both ends of a turn, make no count of lines.
+    return {"lines": bool(those.lines), "points": len(those.points), "everywhere": those.everywhere}
+
+
+def _ends(found: Mapping[str, Extreme]) -> dict[str, Any]:
+    """Extremes in plain data; "on" says whether a cell has the value or a singular set between cells."""
+    return {
+        end: {
+            "value": _plain(value),
+            "at": None if on == EVERYWHERE else [_plain(x) for x in at],
+            "on": on or "cell",
+        }
+        for end, (value, at, on) in found.items()
+    }
+
+
+def _plain(value: float) -> float | None:
+    return value if np.isfinite(value) else None
