@@ -16,7 +16,7 @@ import pytest
 import xacro
 import yourdfpy
 from numpy.typing import NDArray
-from test_bundled_robots import coincident, reach_down, surface
+from surfaces import coincident, reach_down, surface
 
 from nmm.platforms import Car, DifferentialDrive, Layout, Mecanum, Tractor
 from nmm.robots.loading.layout import measure_layout

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from command_line import Result
-from test_playback_live import listening
+from ports import listening
 from urdf_parts import AXIS, LIMIT, inertial, joint, link, robot, shape, write
 
 import nmm

@@ -8,10 +8,10 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from derivatives import assert_close, check_equation, check_function, partials
 from function_grid import random_configuration
 from numpy.typing import NDArray
 from paper_cases import CASES, H1, TIP, Case
-from test_derivatives import assert_close, check_equation, check_function, partials
 
 from nmm.control.controller import Controller
 from nmm.errors import InputError

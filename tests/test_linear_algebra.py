@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from conditioned import with_condition
 from numpy.typing import NDArray
 
 from nmm.kernels.linear_algebra import (
@@ -18,14 +19,6 @@ Array = NDArray[np.float64]
 
 SHAPES = [(1, 1), (1, 5), (2, 2), (2, 4), (3, 4), (3, 5), (4, 4), (5, 11), (6, 6), (6, 8), (6, 12)]
 each_shape = pytest.mark.parametrize("shape", SHAPES, ids=str)
-
-
-def with_condition(shape: tuple[int, int], condition: float, rng: np.random.Generator) -> Array:
-    """A random matrix with singular values from 1 down to 1 / condition."""
-    s, m = shape
-    U = np.linalg.qr(rng.normal(size=(s, s)))[0]
-    V = np.linalg.qr(rng.normal(size=(m, m)))[0]
-    return np.ascontiguousarray(U @ np.diag(np.geomspace(1.0, 1.0 / condition, s)) @ V[:s])
 
 
 def decomposed(J: Array) -> tuple[float, NDArray[np.int64], Array, Array]:

@@ -23,7 +23,7 @@ from playback_browser import small_robot as small_robot
 from playback_browser import window as window
 from playback_robot import drive, hand_built_robot
 from playwright.sync_api import Page
-from test_playback_live import listening, start_player
+from ports import listening, start_player
 
 import nmm
 from nmm.playback import LiveViewer, Motion

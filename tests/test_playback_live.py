@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import signal
 import socket
-import subprocess
-import sys
-import textwrap
 import threading
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from playback_robot import drive, hand_built_robot, straight
+from ports import free_port, listening, start_player, wait_for
 
 from nmm.errors import InputError, RunError
 from nmm.playback import LiveViewer, play, wheel_angles
@@ -26,24 +23,6 @@ from nmm.robots.robot import Robot
 @pytest.fixture(scope="module")
 def robot(tmp_path_factory: pytest.TempPathFactory) -> Robot:
     return hand_built_robot(tmp_path_factory.mktemp("robot"))
-
-
-def listening() -> dict[int, str]:
-    """Ports that something on this machine listens on, with the address, as the kernel says."""
-    found = {}
-    for table in ("/proc/net/tcp", "/proc/net/tcp6"):
-        for line in Path(table).read_text(encoding="ascii").splitlines()[1:]:
-            _, local, _, state = line.split()[:4]
-            if state == "0A":
-                address, port = local.split(":")
-                found[int(port, 16)] = address
-    return found
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def test_the_server_listens_on_loopback_only_and_ends(robot: Robot) -> None:
@@ -126,39 +105,8 @@ def test_playing_ends_when_asked(robot: Robot) -> None:
     assert port not in listening()
 
 
-def wait_for(condition: Callable[[], bool], timeout: float = 20.0) -> None:
-    end = time.monotonic() + timeout
-    while not condition():
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.05)
-
-
 def children(pid: int) -> list[str]:
     return Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii").split()
-
-
-PLAYER = """
-    import sys
-    from pathlib import Path
-    sys.path.insert(0, {tests!r})
-    from playback_robot import drive, hand_built_robot
-    from nmm.playback import play
-    play([drive(hand_built_robot(Path({folder!r})), duration=1.0)], port={port}, open_browser=False)
-    print("returned")
-"""
-
-
-def start_player(folder: Path) -> tuple[subprocess.Popen[str], int]:
-    """A process that plays live, and its port."""
-    port = free_port()
-    code = textwrap.dedent(PLAYER).format(tests=str(Path(__file__).parent), folder=str(folder), port=port)
-    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
-    # It listens before it says where: ended in between, it would have said nothing.
-    assert process.stdout is not None
-    said = process.stdout.readline()
-    assert f"http://127.0.0.1:{port}/" in said
-    assert listening().get(port) == "0100007F"
-    return process, port
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 import twin
+from conditioned import with_condition
 from numpy.typing import NDArray
-from test_linear_algebra import with_condition
 
 from nmm.errors import InputError
 from nmm.resolvers import (

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from numpy import pi
 from numpy.typing import NDArray
+from planar_arms import planar_arm
 from robot_grid import built, frame_of, start
 from spatial_arms import UR5
-from test_repeatability import planar_arm
 
 import nmm
 from nmm.analysis.redundancy.moving import SelfMotion, self_motion

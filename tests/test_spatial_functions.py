@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
+from derivatives import check_function
 from function_grid import random_configuration
 from numpy import pi
 from numpy.typing import NDArray
 from spatial_arms import MOVING, UR5
-from test_derivatives import check_function
 
 import nmm
 from nmm.functions.function import Function, Row, Stage

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
+from derivatives import assert_close, check_function, derivative, partials
 from function_grid import random_configuration
 from numpy import pi
 from numpy.typing import NDArray
 from spatial_arms import MOVING, UR5, pose
-from test_derivatives import assert_close, check_function, derivative, partials
 
 from nmm.functions.function import Evaluation, Function
 from nmm.functions.program import Program

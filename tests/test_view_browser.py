@@ -17,7 +17,7 @@ from playback_browser import browser as browser
 from playback_browser import window as window
 from playback_robot import hand_built_robot
 from playwright.sync_api import Page
-from test_playback_live import free_port, listening, wait_for
+from ports import free_port, listening, wait_for
 
 import nmm
 from nmm.playback import view

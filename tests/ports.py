@@ -1,0 +1,60 @@
+"""Ports that a process listens on, and a process that plays."""
+
+from __future__ import annotations
+
+import socket
+import subprocess
+import sys
+import textwrap
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+
+def listening() -> dict[int, str]:
+    """Ports that something on this machine listens on, with the address, as the kernel says."""
+    found = {}
+    for table in ("/proc/net/tcp", "/proc/net/tcp6"):
+        for line in Path(table).read_text(encoding="ascii").splitlines()[1:]:
+            _, local, _, state = line.split()[:4]
+            if state == "0A":
+                address, port = local.split(":")
+                found[int(port, 16)] = address
+    return found
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def wait_for(condition: Callable[[], bool], timeout: float = 20.0) -> None:
+    end = time.monotonic() + timeout
+    while not condition():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.05)
+
+
+PLAYER = """
+    import sys
+    from pathlib import Path
+    sys.path.insert(0, {tests!r})
+    from playback_robot import drive, hand_built_robot
+    from nmm.playback import play
+    play([drive(hand_built_robot(Path({folder!r})), duration=1.0)], port={port}, open_browser=False)
+    print("returned")
+"""
+
+
+def start_player(folder: Path) -> tuple[subprocess.Popen[str], int]:
+    """A process that plays live, and its port."""
+    port = free_port()
+    code = textwrap.dedent(PLAYER).format(tests=str(Path(__file__).parent), folder=str(folder), port=port)
+    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    # It listens before it says where: ended in between, it would have said nothing.
+    assert process.stdout is not None
+    said = process.stdout.readline()
+    assert f"http://127.0.0.1:{port}/" in said
+    assert listening().get(port) == "0100007F"
+    return process, port
