@@ -11,6 +11,7 @@ from nmm.errors import InputError
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 
 def array(value: ArrayLike, name: str) -> Array:

@@ -1,8 +1,12 @@
-"""Words that sentences for people are made of."""
+"""Words that sentences for people are made of: lists, sums of names, values with their units."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from math import degrees, pi
+
+#: Values this near a fraction of pi are written as one: files write pi/2 as 1.5708.
+NEAR_PI = 5e-5
 
 
 def listed(phrases: Sequence[str], word: str = "and") -> str:
@@ -10,3 +14,36 @@ def listed(phrases: Sequence[str], word: str = "and") -> str:
     if len(phrases) < 2:
         return "".join(phrases)
     return f"{', '.join(phrases[:-1])} {word} {phrases[-1]}"
+
+
+def signed_sum(terms: Iterable[tuple[float, str]]) -> str:
+    """ "a + 2 b", "-2 b - a" of terms: a number whose sign counts, and what is written after the sign."""
+    text = ""
+    for number, term in terms:
+        sign = "-" if number < 0 else "+"
+        text += f" {sign} {term}" if text else f"{sign.strip('+')}{term}"
+    return text
+
+
+def fraction_of_pi(value: float, parts: Sequence[int] = (1, 2, 3, 4, 6)) -> str:
+    """ "0", "π", "-π/2", "3π/4"; "" for what is no multiple of π over one of the parts."""
+    for part in parts:
+        times = round(value * part / pi)
+        if abs(value - times * pi / part) <= NEAR_PI:
+            if times == 0:
+                return "0"
+            number = "" if abs(times) == 1 else str(abs(times))
+            return f"{'-' if times < 0 else ''}{number}π{'' if part == 1 else f'/{part}'}"
+    return ""
+
+
+def measured(value: float, unit: str) -> str:
+    """A number of four digits with its unit, an angle in degrees too: "0.3 m", "0.5236 rad (30°)"."""
+    return f"{value:.4g} {unit}" + (f" ({degrees(value):.4g}°)" if unit == "rad" else "")
+
+
+def value_text(value: float, unit: str) -> str:
+    """A coordinate with its unit; an angle as a fraction of π where it is one."""
+    if unit != "rad":
+        return measured(value if abs(value) > NEAR_PI else 0.0, unit)
+    return fraction_of_pi(value) or measured(value, unit)

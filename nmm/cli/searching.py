@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from nmm.cli.output import progress, show_table, show_text
-from nmm.words import listed
+from nmm.words import listed, value_text
 
 if TYPE_CHECKING:
     from nmm.analysis.search.family import SingularFamily
@@ -120,8 +120,6 @@ def _row(number: int, family: SingularFamily) -> tuple[str, ...]:
 
 
 def _value(value: float, unit: str) -> str:
-    from nmm.analysis.search.text import value_text
-
     return value_text(float(value), unit)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import groupby
-from math import degrees, isfinite
+from math import isfinite
 from textwrap import fill
 from typing import TYPE_CHECKING
 
@@ -14,6 +14,7 @@ from nmm.analysis.singular.directions import SMALL, direction_text
 from nmm.analysis.singular.reached import stacked
 from nmm.arrays import Array
 from nmm.cli.output import console, show_text
+from nmm.words import measured
 
 if TYPE_CHECKING:
     from nmm.cli.subjects import Studied
@@ -52,8 +53,7 @@ def configuration(given: Studied) -> str:
     parts = []
     for name, value, unit in zip(robot.q_names, given.q, robot.q_units, strict=True):
         if value:
-            turned = f" ({degrees(value):.4g}°)" if unit == "rad" else ""
-            parts.append(f"{name} = {value:.4g} {unit}{turned}")
+            parts.append(f"{name} = {measured(value, unit)}")
     if len(parts) < robot.n:
         parts.append("the rest 0" if parts else "every coordinate 0")
     time = f"at t = {given.t:g} s, " if given.t else ""

@@ -20,6 +20,7 @@ from nmm.arrays import Array
 from nmm.errors import InputError, unknown
 from nmm.figures import style
 from nmm.figures.map_sets import draw_sets, set_legend
+from nmm.words import fraction_of_pi
 
 #: Even steps of the value are even steps to the eye, also to colour-blind ones.
 COLORS = "viridis"
@@ -141,21 +142,15 @@ def _dress(axes: Axes, drawn: Map, *, named: bool) -> None:
             if span > 4.0 * np.pi:
                 part = float(np.ceil(span / (4.0 * np.pi))) * 2.0
             axis.set_major_locator(MultipleLocator(part * np.pi / 2))
-            axis.set_major_formatter(FuncFormatter(lambda value, _: in_pi(value)))
+            axis.set_major_formatter(FuncFormatter(lambda value, _: _in_pi(value)))
         else:
             axis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 2.5, 5, 10]))
             axis.set_major_formatter(style.plain())
 
 
-def in_pi(value: float) -> str:
-    """An angle as a multiple of π: −π/2, 0, 3π/4."""
-    eighths = round(value / np.pi * 16)
-    if eighths == 0:
-        return "0"
-    divisor = int(np.gcd(abs(eighths), 16))
-    over, under = abs(eighths) // divisor, 16 // divisor
-    sign = "−" if eighths < 0 else ""
-    return f"{sign}{'' if over == 1 else over}π{'' if under == 1 else f'/{under}'}"
+def _in_pi(value: float) -> str:
+    """An angle of a tick as a multiple of π: −π/2, 0, 3π/4."""
+    return fraction_of_pi(value, (1, 2, 4, 8, 16)).replace("-", "−")
 
 
 def _dress_bar(axes: Axes, drawn: Map, measure: str) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,12 +11,11 @@ from nmm.paper.cases import CASES, DT, RESOLVERS, Case
 from nmm.paper.claims import claims
 from nmm.paper.numbers import smallest_determinant, table
 from nmm.paper.results import CaseResult
+from nmm.progress import Progress, between
 from nmm.runs.trajectory import Outcome, Trajectory
 
 if TYPE_CHECKING:
     from nmm.scenario import Scenario
-
-Progress = Callable[[float], None]
 
 
 def run_case(number: int, folder: Path, progress: Progress) -> CaseResult:
@@ -30,11 +28,7 @@ def run_case(number: int, folder: Path, progress: Progress) -> CaseResult:
     """
     began = time.perf_counter()
     case = CASES[number - 1]
-
-    def running(fraction: float) -> None:
-        progress(0.3 * fraction)
-
-    rg, pg = _runs(case, running)
+    rg, pg = _runs(case, between(progress, 0.0, 0.3))
     determinant = smallest_determinant(rg, _scenario(case, "rg").controller())
     rows, found = table(rg, pg, determinant), claims(case, rg, pg, determinant)
     own = folder / case.folder
@@ -55,14 +49,11 @@ def _scenario(case: Case, resolver: str) -> Scenario:
     return Scenario.load(case.scenario, {"dt": DT}).with_resolver(resolver)
 
 
-def _runs(case: Case, progress: Progress) -> list[Trajectory]:
+def _runs(case: Case, progress: Progress | None) -> list[Trajectory]:
     found: list[Trajectory] = []
-    for resolver in RESOLVERS:
-
-        def advance(fraction: float) -> None:
-            progress((len(found) + fraction) / len(RESOLVERS))
-
-        trajectory = _scenario(case, resolver).run(progress=advance)
+    for k, resolver in enumerate(RESOLVERS):
+        share = between(progress, k / len(RESOLVERS), 1.0 / len(RESOLVERS))
+        trajectory = _scenario(case, resolver).run(share)
         if trajectory.outcome is Outcome.INTERRUPTED:
             raise KeyboardInterrupt
         if not trajectory.complete:

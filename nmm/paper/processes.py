@@ -18,6 +18,7 @@ from multiprocessing.context import SpawnProcess
 from typing import Any, Protocol, TypeVar
 
 from nmm.errors import NmmError, RunError
+from nmm.progress import Progress
 
 Result = TypeVar("Result", covariant=True)
 #: How long a child may take to end when it is told to, s.
@@ -27,7 +28,7 @@ PATIENCE = 5.0
 class Job(Protocol[Result]):
     """Something to do, by number, that reports the fraction done."""
 
-    def __call__(self, number: int, progress: Callable[[float], None], /) -> Result: ...
+    def __call__(self, number: int, progress: Progress, /) -> Result: ...
 
 
 @dataclass(frozen=True)

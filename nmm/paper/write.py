@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -15,6 +14,7 @@ from nmm.folders.whole import has_format, replaced_folder
 from nmm.paper.cases import CASES
 from nmm.paper.processes import share_out
 from nmm.paper.results import CaseResult, Claim
+from nmm.progress import Progress
 
 #: Marks a folder as one of ours.
 FORMAT = "nmm paper 1"
@@ -48,9 +48,7 @@ class PaperReport:
         return all(claim.holds for claim in self.claims)
 
 
-def write_paper(
-    folder: str | Path, progress: Callable[[float], None] | None = None, jobs: int = 2
-) -> PaperReport:
+def write_paper(folder: str | Path, progress: Progress | None = None, jobs: int = 2) -> PaperReport:
     """Run the paper's four cases with RG and PG, and write figures, numbers, playback and index.html.
 
     Parameters
@@ -98,7 +96,7 @@ def is_paper(folder: Path) -> bool:
     return has_format(folder / _MARKER, FORMAT)
 
 
-def _case(number: int, progress: Callable[[float], None], folder: Path) -> CaseResult:
+def _case(number: int, progress: Progress, folder: Path) -> CaseResult:
     # Imported where it is done: a process that only shares the cases out needs none of it.
     from nmm.paper.case_run import run_case
 

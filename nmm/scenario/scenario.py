@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
 from nmm.errors import ScenarioError, unknown
+from nmm.progress import Progress
 from nmm.scenario.document import Document, read_file
 from nmm.scenario.keys import KeyedError, as_written, at, first_error
 from nmm.scenario.resolvers import PARTS
@@ -109,7 +110,7 @@ class Scenario:
         except KeyedError as error:
             raise self._located(error) from None
 
-    def run(self, progress: Callable[[float], None] | None = None) -> Trajectory:
+    def run(self, progress: Progress | None = None) -> Trajectory:
         """Run it; a run that fails or is interrupted (Ctrl-C) returns what it has, and says so.
 
         Parameters

@@ -8,12 +8,13 @@ from typing import Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.analysis.maps.evaluation import Evaluator, Judged, Progress, Smallness, between
+from nmm.analysis.maps.evaluation import Evaluator, Judged, Smallness
 from nmm.analysis.maps.result import About, Map
 from nmm.analysis.maps.singular_set import SingularSet, singular_set
 from nmm.analysis.singular.jacobians import Subject
 from nmm.arrays import Array, counted, vector
 from nmm.errors import InputError
+from nmm.progress import Progress, between
 from nmm.robots.robot import Robot
 
 #: Most nodes of a map in all; for more there is no picture, and soon no memory.

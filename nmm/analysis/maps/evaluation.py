@@ -13,13 +13,12 @@ from nmm.analysis.singular.parts import WHOLE, groups, ranks
 from nmm.analysis.singular.singularity import TOLERANCE
 from nmm.arrays import Array, Integers, scalar
 from nmm.errors import InputError, unknown
+from nmm.progress import Progress, between
 from nmm.resolvers.problem import Dimensions
 from nmm.resolvers.weights import Weights, weight_diagonal
 
 #: So many configurations' J are held at a time.
 CHUNK = 1 << 14
-
-Progress = Callable[[float], None]
 
 
 class Smallness(NamedTuple):
@@ -167,8 +166,3 @@ def _joined(parts: Sequence[Smallness]) -> Smallness:
     """Chunks in one."""
     sigma, volume, rank = (np.concatenate(pieces) for pieces in zip(*parts, strict=True))
     return Smallness(sigma, volume, rank)
-
-
-def between(progress: Progress | None, first: float, share: float) -> Progress | None:
-    """A progress function for a part of the work."""
-    return None if progress is None else lambda fraction: progress(min(1.0, first + share * fraction))

@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nmm.analysis.maps.coordinates import checked_range, usual_range
-from nmm.analysis.maps.evaluation import Progress
-from nmm.arrays import Array, Integers
+from nmm.arrays import Array, Flags, Integers
 from nmm.errors import InputError, unknown
+from nmm.progress import Progress
 from nmm.robots.configuration import kinematics_updater
 from nmm.robots.robot import Robot
 
 AXES = "xyz"
-Flags = NDArray[np.bool_]
 #: Newton steps onto a place, and the longest of them, rad or m: a stretched arm would leap.
 STEPS, LEAP = 12, 0.5
 

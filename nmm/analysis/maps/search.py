@@ -7,10 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from nmm.analysis.maps.cells import Grid, Layer
-from nmm.analysis.maps.evaluation import Evaluator, Progress, between
-from nmm.analysis.maps.reach import Flags, Reach
-from nmm.arrays import Array, Integers
+from nmm.analysis.maps.evaluation import Evaluator
+from nmm.analysis.maps.reach import Reach
+from nmm.arrays import Array, Flags, Integers
 from nmm.errors import InputError
+from nmm.progress import Progress, between
 
 #: Sides of the blocks, in cells, through which good postures spread. Of large ones also to the blocks beside
 #: them, where the value is better by a hundredth, twice; of small ones, which are many, where it is by a

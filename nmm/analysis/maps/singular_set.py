@@ -15,10 +15,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from nmm.analysis.maps.evaluation import Progress
 from nmm.analysis.maps.lines import curves_and_points
 from nmm.analysis.singular.singularity import TOLERANCE
 from nmm.arrays import Array, Integers
+from nmm.progress import Progress
 
 #: Central differences, in cells of the grid.
 STEP = 1e-4

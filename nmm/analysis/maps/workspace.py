@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.analysis.maps.coordinates import check_held, checked_range, sample_counts
-from nmm.analysis.maps.evaluation import Evaluator, Judged, Progress, between
+from nmm.analysis.maps.evaluation import Evaluator, Judged
 from nmm.analysis.maps.lines import curves_and_points
 from nmm.analysis.maps.reach import AXES, Reach
 from nmm.analysis.maps.result import About, Map
@@ -18,6 +18,7 @@ from nmm.analysis.maps.singular_set import SingularSet, polish
 from nmm.analysis.singular.jacobians import Subject
 from nmm.arrays import Array, Integers, counted
 from nmm.errors import InputError
+from nmm.progress import Progress, between
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 

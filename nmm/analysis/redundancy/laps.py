@@ -10,7 +10,7 @@ itself, round one smaller than the trailer's length it turns on and on (Foote, L
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias, Union
 
@@ -21,6 +21,7 @@ from nmm.analysis.redundancy.periods import common_period, expect_periodic
 from nmm.arrays import Array, Integers, counted, positive
 from nmm.control.controller import Controller
 from nmm.errors import InputError, unknown
+from nmm.progress import Progress, between
 from nmm.robots.robot import Robot
 from nmm.runs.simulation import simulate
 from nmm.runs.trajectory import Outcome, Trajectory
@@ -187,7 +188,7 @@ def repeatability(
     resolvers: Sequence[str] = ("rg", "pg"),
     period: float | None = None,
     dt: float | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Repeatability:
     """Go round a closed path several times, with each resolver.
 
@@ -229,11 +230,7 @@ def repeatability(
     samples = max(1, math.ceil(T / positive(step, "dt") - 1e-9))
     found = []
     for k, (name, controller) in enumerate(controllers.items()):
-
-        def report(fraction: float, done: int = k) -> None:
-            if progress is not None:
-                progress((done + fraction) / len(controllers))
-
+        report = between(progress, k / len(controllers), 1.0 / len(controllers))
         if name in scenarios:
             timed = scenarios[name].override("duration", laps * T).override("dt", T / samples)
             trajectory = timed.run(report)

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from nmm.analysis.singular.parts import null_space
 from nmm.arrays import Array, Integers
 
 #: Singular values and components this small beside the largest belong to a smaller set of columns.
@@ -18,15 +19,9 @@ NEW = 1e-3
 MOST_SETS = 20_000
 
 
-def orthonormal_null_space(J: Array, rank: int) -> Array:
-    """Orthonormal rows (m - rank, m) with J v = 0, J (s, m) of that rank."""
-    basis: Array = np.linalg.svd(J)[2][rank:] if J.size else np.eye(J.shape[1])
-    return basis
-
-
 def projector(J: Array, rank: int) -> Array:
     """The orthogonal projector (m, m) on the null space of J, I - J⁺ J."""
-    N = orthonormal_null_space(J, rank)
+    N = null_space(J, rank)
     return N.T @ N
 
 

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.analysis.redundancy.motion_words import coordinate_words, input_words, motion_text
-from nmm.analysis.redundancy.null_space import orthonormal_null_space, projector, readable_null_space
+from nmm.analysis.redundancy.null_space import projector, readable_null_space
 from nmm.analysis.singular.directions import direction_text
 from nmm.analysis.singular.jacobians import Jacobians, Subject, checked
-from nmm.analysis.singular.parts import rank_of
+from nmm.analysis.singular.parts import null_space, rank_of
 from nmm.analysis.singular.singularity import TOLERANCE
 from nmm.arrays import Array, positive
 from nmm.control.controller import Controller
@@ -219,7 +219,7 @@ def redundancy(
         S=S,
         rank_F=rank_F,
         rank_J=rank_J,
-        null=orthonormal_null_space(J, rank_J),
+        null=null_space(J, rank_J),
         readable=readable,
         texts=tuple(motion_text(one, robot.u_names, robot.u_units, words, p) for one in readable),
         unfelt=unfelt_inputs(Controller(robot, jacobians.task, ProjectedGradient()), q),
@@ -276,7 +276,7 @@ def _by_brackets(jacobians: Jacobians, t: float, q: Array, rank: int) -> int | N
     The fields are X_a(q) = S(q) P(q) c_a, with P the projector on null J and c_a an orthonormal basis of it
     at q; [X_a, X_b] = ∂X_b/∂q X_a - ∂X_a/∂q X_b by central differences.
     """
-    c = orthonormal_null_space(jacobians.J(t, q), rank).T
+    c = null_space(jacobians.J(t, q), rank).T
 
     def fields(at: Array) -> Array:
         J = jacobians.J(t, at)

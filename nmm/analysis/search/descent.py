@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
-from nmm.analysis.search.measure import ROUNDING, Flags, Measure
+from nmm.analysis.search.measure import ROUNDING, Measure
 from nmm.analysis.search.space import Space
-from nmm.arrays import Array
+from nmm.arrays import Array, Flags
+from nmm.progress import Progress
 
 #: Lengths of a step that are tried.
 FACTORS = np.array([1.0, 0.5, 0.2, 0.04])
@@ -51,7 +50,7 @@ def descend(
     z: Array,
     *,
     iterations: int = 60,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> tuple[Array, Array]:
     """Local minima of σ from the starts z (N, a): where each ended (N, a), and σ beside the largest (N,).
 

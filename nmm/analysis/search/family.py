@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nmm.analysis.search.text import combination_text, values_text
 from nmm.arrays import Array
-from nmm.words import listed
+from nmm.words import NEAR_PI, listed, signed_sum, value_text
 
 #: Values of the same kind that differ by less are the same, rad or m.
 SAME_VALUE = 1e-4
@@ -37,7 +36,8 @@ class Relation:
     @property
     def text(self) -> str:
         """ "q1 + q2 = ±π/2"."""
-        return f"{combination_text(self.coefficients)} = {values_text(self.values, self.unit, self.circular)}"
+        terms = [(k, name if abs(k) == 1 else f"{abs(k)} {name}") for name, k in self.coefficients.items()]
+        return f"{signed_sum(terms)} = {values_text(self.values, self.unit, self.circular)}"
 
     @property
     def kind(self) -> tuple[tuple[str, int], ...]:
@@ -199,3 +199,19 @@ def _together(one: SingularFamily, other: SingularFamily) -> SingularFamily | No
         examples=np.concatenate([one.examples, other.examples]),
         starts=one.starts + other.starts,
     )
+
+
+def values_text(values: Iterable[float], unit: str, circular: bool = False) -> str:
+    """Several values: "0 or ±π", "±π/2". A circular π is ±π."""
+    found: list[str] = []
+    left = sorted(values, key=lambda value: (round(abs(value), 6), -value))
+    while left:
+        value = left.pop(0)
+        opposite = next((other for other in left if abs(other + value) <= 2.0 * NEAR_PI), None)
+        both = opposite is not None and abs(value) > NEAR_PI
+        if both:
+            left.remove(opposite)  # type: ignore[arg-type]  # one was found
+        text = value_text(abs(value) if both else value, unit)
+        whole_turn = circular and unit == "rad" and abs(abs(value) - np.pi) <= NEAR_PI
+        found.append(f"±{text.lstrip('-')}" if both or whole_turn else text)
+    return listed(found, "or")

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from nmm.analysis.search.descent import descend
-from nmm.analysis.search.measure import Flags, Measure
+from nmm.analysis.search.measure import Measure
 from nmm.analysis.search.space import Space
-from nmm.arrays import Array, Integers
+from nmm.analysis.singular.parts import null_space
+from nmm.arrays import Array, Flags, Integers
 
 #: Slopes this small beside those of J itself are none.
 FLAT = 3e-5
@@ -118,7 +119,7 @@ def tangents(
     """
     a = len(z)
     normals = normal_spaces(measure, space, z[np.newaxis], measure.full_rank - rank)[0]
-    by_slopes = null_space(normals, a)
+    by_slopes = null_space(normals, len(normals))
     around, ratio = descend(measure, space, z + BESIDE * rng.standard_normal((2 * a + 4, a)), iterations=30)
     D = around[(ratio <= tolerance) & (np.max(np.abs(around - z), axis=1) < 10.0 * BESIDE)] - z
     if len(D) < a:
@@ -126,11 +127,6 @@ def tangents(
     _, sizes, rows = np.linalg.svd(D)
     extended = rows[: int(np.sum(sizes > 0.1 * BESIDE * np.sqrt(len(D))))]
     return extended if len(extended) < len(by_slopes) else by_slopes
-
-
-def null_space(rows: Array, a: int) -> Array:
-    """Orthonormal rows (a - k, a) orthogonal to k orthonormal rows."""
-    return np.linalg.svd(rows, full_matrices=True)[2][len(rows) :] if len(rows) else np.eye(a)
 
 
 def walk(
@@ -166,7 +162,7 @@ def walk(
             spaces = normal_spaces(measure, space, walkers, measure.full_rank - rank)
             same = [_same_piece(*pair, len(normals)) for pair in zip(spaces, directions, strict=True)]
             walkers = walkers[same]
-            directions = [null_space(own, len(z)) for own, ok in zip(spaces, same, strict=True) if ok]
+            directions = [null_space(own, len(own)) for own, ok in zip(spaces, same, strict=True) if ok]
         if not len(walkers):
             break
         found.append(walkers)

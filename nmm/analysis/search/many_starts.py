@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,12 +14,12 @@ from nmm.analysis.search.measure import Measure
 from nmm.analysis.search.minimum import LocalMinimum, followed, lowest
 from nmm.analysis.search.sorting import everywhere, families_of
 from nmm.analysis.search.space import Space, search_space
-from nmm.analysis.search.text import value_text
 from nmm.analysis.singular.jacobians import Jacobians, Subject
 from nmm.analysis.singular.parts import WHOLE
 from nmm.arrays import Array, counted, positive, scalar
 from nmm.errors import SingularError
-from nmm.words import listed
+from nmm.progress import Progress, between
+from nmm.words import listed, value_text
 
 #: Singular values this small beside the largest are zero.
 TOLERANCE = 1e-8
@@ -136,7 +136,7 @@ def find_singularities(
     sizes: Mapping[str, float] | None = None,
     tolerance: float = TOLERANCE,
     t: float = 0.0,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> SingularitySearch:
     """Search the singular configurations of the task's J_bar (paper, eq. 13) inside the limits.
 
@@ -181,8 +181,7 @@ def find_singularities(
         families = (everywhere(measure, space, first[0], tolerance, starts),)
         converged, bottom = starts, None
     else:
-        share = None if progress is None else _share(progress, 0.6)
-        z, ratio = descend(measure, space, first, progress=share)
+        z, ratio = descend(measure, space, first, progress=between(progress, 0.0, 0.6))
         ends = followed(measure, space, z[ratio > tolerance])
         _, of_ends = measure.sigma(space.q(ends))
         found = np.concatenate([z[ratio <= tolerance], ends[of_ends <= tolerance]])
@@ -225,7 +224,3 @@ def _starts(
     chosen = np.concatenate([np.array(good, dtype=np.int64), rest])
     chosen = np.resize(chosen, starts)  # again from the first, where hardly any have a J
     return pool[chosen], bool(np.all(ratio[exists] <= tolerance))
-
-
-def _share(progress: Callable[[float], None], part: float) -> Callable[[float], None]:
-    return lambda fraction: progress(part * fraction)

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nmm.analysis.singular.directions import direction_texts, readable_basis
 from nmm.analysis.singular.jacobians import STEP, Jacobians
@@ -15,7 +13,6 @@ from nmm.arrays import Array, Integers
 from nmm.errors import InputError, unknown
 
 #: Yes or no, for each of many.
-Flags: TypeAlias = NDArray[np.bool_]
 
 #: Singular values beside the largest, at a point that has converged: what is above it is not zero.
 ROUNDING = 1e-13

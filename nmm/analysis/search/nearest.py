@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,10 +15,11 @@ from nmm.analysis.search.measure import Measure
 from nmm.analysis.search.slide import slide
 from nmm.analysis.search.sorting import family_at
 from nmm.analysis.search.space import Space, search_space
-from nmm.analysis.search.text import listed, value_text
 from nmm.analysis.singular.jacobians import Jacobians, Subject, checked
 from nmm.analysis.singular.parts import WHOLE
 from nmm.arrays import Array, counted, positive
+from nmm.progress import Progress
+from nmm.words import listed, value_text
 
 #: Nearest candidates that are followed to the end.
 KEPT = 8
@@ -128,7 +129,7 @@ def nearest_singularity(
     sizes: Mapping[str, float] | None = None,
     tolerance: float = TOLERANCE,
     t: float = 0.0,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> SingularPoint | None:
     """The singular configuration nearest to q, inside the limits; None when none was found.
 
@@ -204,7 +205,7 @@ def _nearest(
     z: Array,
     goal: Array,
     tolerance: float,
-    progress: Callable[[float], None] | None,
+    progress: Progress | None,
 ) -> Array:
     """The nearest to the goal of singular points z (N, a), each slid towards it; (a,)."""
     for turn, (rounds, kept) in enumerate([(3, 4 * KEPT), (8, KEPT), (150, 1)]):

@@ -8,9 +8,9 @@ import numpy as np
 
 from nmm.analysis.search.family import Relation, SingularFamily
 from nmm.analysis.search.local import localised, stay_singular
-from nmm.analysis.search.measure import Flags, Measure
+from nmm.analysis.search.measure import Measure
 from nmm.analysis.search.space import Space
-from nmm.arrays import Array
+from nmm.arrays import Array, Flags
 
 #: Random members that prove a family, and how much less exact than a point that has converged they are.
 MEMBERS, SLACK = 16, 100.0

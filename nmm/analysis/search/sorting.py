@@ -9,10 +9,10 @@ import numpy as np
 
 from nmm.analysis.search.family import Relation, SingularFamily, merged
 from nmm.analysis.search.local import Local, localised, shaken, tangents, walk
-from nmm.analysis.search.measure import Flags, Measure
+from nmm.analysis.search.measure import Measure
 from nmm.analysis.search.proof import completed, holds
 from nmm.analysis.search.space import Space
-from nmm.arrays import Array
+from nmm.arrays import Array, Flags
 
 #: What spreads less than this along a walk stays, in units.
 STAYS = 5e-5

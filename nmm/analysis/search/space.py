@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nmm.analysis.search.measure import Flags, Measure
-from nmm.arrays import Array, Integers, vector
+from nmm.analysis.search.measure import Measure
+from nmm.arrays import Array, Flags, Integers, vector
 from nmm.errors import InputError, SingularError
 from nmm.robots.robot import Robot
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from nmm.arrays import Array
+from nmm.words import signed_sum
 
 #: A component this small beside a unit vector is not written.
 SMALL = 1e-6
@@ -31,16 +32,12 @@ def readable_basis(basis: Array) -> Array:
 
 def direction_text(direction: Array, names: Sequence[str]) -> str:
     """A vector as a combination of names: "0.71 ee.x - 0.71 ee.y"; "ee.x" for an axis, "0" for none."""
-    text = ""
-    for value, name in zip(direction, names, strict=True):
-        if abs(value) <= SMALL:
-            continue
-        size = f"{abs(value):.2g} " if abs(abs(value) - 1.0) > SMALL else ""
-        if text:
-            text += f" {'-' if value < 0 else '+'} {size}{name}"
-        else:
-            text = f"{'-' if value < 0 else ''}{size}{name}"
-    return text or "0"
+    terms = [
+        (value, f"{abs(value):.2g} {name}" if abs(abs(value) - 1.0) > SMALL else name)
+        for value, name in zip(direction, names, strict=True)
+        if abs(value) > SMALL
+    ]
+    return signed_sum(terms) or "0"
 
 
 def direction_texts(directions: Array, names: Sequence[str]) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -17,6 +17,7 @@ from nmm.errors import InputError, SingularError, unknown
 from nmm.functions.function import Row, row_scales
 from nmm.functions.tasks.task import Stack
 from nmm.platforms.base import Platform
+from nmm.progress import Progress
 from nmm.resolvers.projected_gradient import ProjectedGradient
 from nmm.resolvers.reduced_gradient import Partition
 from nmm.robots.robot import Robot
@@ -96,7 +97,7 @@ class Jacobians:
         ]
         return np.array(found).reshape(directions.shape[1], len(self.rows), self.robot.n_u)
 
-    def batch(self, q: Array, t: float = 0.0, progress: Callable[[float], None] | None = None) -> Array:
+    def batch(self, q: Array, t: float = 0.0, progress: Progress | None = None) -> Array:
         """J (N, s, m) at N configurations (N, n) and one time, some microseconds each.
 
         Where there is none (the wheels cannot roll, the task is undefined), it is not a number.

@@ -100,6 +100,12 @@ def rank_of(matrix: Array, tolerance: float) -> int:
     return int(ranks(values, np.array(values.max(initial=0.0)), tolerance))
 
 
+def null_space(J: Array, rank: int) -> Array:
+    """Orthonormal rows (m - rank, m) with J v = 0, J (s, m) of that rank."""
+    basis: Array = np.linalg.svd(J)[2][rank:] if J.size else np.eye(J.shape[1])
+    return basis
+
+
 def condition_numbers(values: Array, rank: Integers) -> Array:
     """Largest over smallest of singular values (..., s); infinite where the rank (...) is below s."""
     full = rank == values.shape[-1]

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nmm.analysis.singular.directions import direction_text
 from nmm.arrays import Array, Integers
 
 #: A rate this small beside the largest singular value is rounding of the differences.
@@ -44,11 +43,6 @@ class Restoration:
         """The motions that bring something back; where nothing is lost, those that change σ_min."""
         useful = (np.abs(self.rates) > self.threshold) | (self.regained > 0)
         return tuple(name for name, yes in zip(self.names, useful, strict=True) if yes)
-
-    @property
-    def best_text(self) -> str:
-        """`best` in the motions' names."""
-        return direction_text(self.best, self.names)
 
 
 def restoration(J: Array, dJ: Array, names: Sequence[str], rank: int) -> Restoration:

@@ -15,7 +15,7 @@ from nmm.analysis.singular.algorithmic import (
     extended_singularity,
     partition_singularities,
 )
-from nmm.analysis.singular.directions import direction_text, direction_texts
+from nmm.analysis.singular.directions import direction_texts
 from nmm.analysis.singular.jacobians import Candidates, Jacobians, Subject, Tasks, checked
 from nmm.analysis.singular.minors import (
     MOST_MINORS,
@@ -123,11 +123,6 @@ class SingularityReport:
     def lost_text(self) -> tuple[str, ...]:
         """`lost` in the rows' names: "0.71 ee.x - 0.71 ee.y"."""
         return self.whole.lost_text
-
-    @property
-    def weakest_text(self) -> str:
-        """`weakest` in the rows' names."""
-        return direction_text(self.weakest, self.rows)
 
     @property
     def given_back_text(self) -> tuple[str, ...]:

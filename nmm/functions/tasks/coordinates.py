@@ -12,6 +12,7 @@ from nmm.functions.function import Function, Row, Stage
 from nmm.kernels.compiled import kernel
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import Robot
+from nmm.words import signed_sum
 
 #: A coordinate's name, or the coefficients of several.
 Combination = str | Mapping[str, float]
@@ -42,12 +43,10 @@ def label(combination: Combination) -> str:
     """How a combination is written: "theta + q1 - 2 q2"."""
     if isinstance(combination, str):
         return combination
-    text = ""
-    for name, value in combination.items():
-        size = "" if abs(value) == 1.0 else f"{abs(value):g} "
-        sign = "-" if value < 0 else "+"
-        text += f" {sign} {size}{name}" if text else f"{'-' if value < 0 else ''}{size}{name}"
-    return text
+    return signed_sum(
+        (value, name if abs(value) == 1.0 else f"{abs(value):g} {name}")
+        for name, value in combination.items()
+    )
 
 
 class Coordinates(Function):
