@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import re
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -102,3 +103,16 @@ def test_the_errors_have_one_root() -> None:
         thing = getattr(nmm, name)
         if isinstance(thing, type) and issubclass(thing, Exception):
             assert issubclass(thing, nmm.NmmError), name
+
+
+def test_the_table_of_rooms_is_the_order_of_the_imports() -> None:
+    """docs/architecture.md lists every room, in the order that pyproject.toml states."""
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"][
+        "contracts"
+    ]
+    (rooms,) = (contract for contract in contracts if contract["name"] == "Rooms")
+    stated = [sorted(layer.split(" : ")) for layer in reversed(rooms["layers"])]
+    text = (ROOT / "docs" / "architecture.md").read_text("utf-8")
+    table = text[text.index("| room |") :].split("\n\n")[0].splitlines()[2:]
+    listed = [sorted(re.findall(r"`(\w+)/?`", row.split("|")[1])) for row in table]
+    assert listed == stated
