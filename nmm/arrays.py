@@ -25,6 +25,12 @@ def array(value: ArrayLike, name: str) -> Array:
     return result
 
 
+def interpolated(times: Array | float, t: Array, values: Array) -> Array:
+    """Columns of values (N, k), given at t (N,), linear in between at the times: (k,), or (T, k) for (T,)."""
+    columns = np.array([np.interp(times, t, column) for column in values.T])
+    return np.ascontiguousarray(columns.T).reshape(*np.shape(times), values.shape[1])
+
+
 def one_line(value: Array) -> str:
     """An array for an error message."""
     return " ".join(np.array2string(value, threshold=20).split())

@@ -7,9 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from nmm.arrays import Array, scalar
+from nmm.arrays import Array, interpolated, scalar
 from nmm.cli.options import arguments_of, settings_of, values_of
 from nmm.errors import InputError, unknown
 
@@ -162,7 +160,7 @@ def _then(run: Trajectory, t: float) -> Array:
         raise InputError(
             f"--time: expected an instant of the run, {run.t[0]:g} to {run.t[-1]:g} s, got {t:g}"
         )
-    return np.array([np.interp(t, run.t, column) for column in run.q.T])
+    return interpolated(t, run.t, run.q)
 
 
 def _start(robot: Robot, run: Trajectory | None, scenario: Scenario | None) -> Array:

@@ -17,7 +17,7 @@ from nmm.analysis.singular.drawn_ellipsoids import (
 )
 from nmm.analysis.singular.ellipsoids import Ellipsoids
 from nmm.analysis.singular.parts import WHOLE
-from nmm.arrays import Array
+from nmm.arrays import Array, interpolated
 from nmm.playback.drawing import Command, Drawing, Rgb, animation, page_times
 from nmm.playback.extent import extent_of
 from nmm.playback.keyframes import Keyframes
@@ -98,8 +98,7 @@ class SceneEllipsoids:
             for part, found in parts.items():
                 half = np.linalg.norm(found.axes * self.radii(i, part)[:, None], axis=2)
                 low, high = (
-                    np.column_stack([np.interp(times, t, column) for column in corner.T])
-                    for corner in (found.center - half, found.center + half)
+                    interpolated(times, t, corner) for corner in (found.center - half, found.center + half)
                 )
                 enlarged[i, :, 0] = np.minimum(enlarged[i, :, 0], low)
                 enlarged[i, :, 1] = np.maximum(enlarged[i, :, 1], high)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.arrays import Array, interpolated
 from nmm.playback.placements import base_position
 from nmm.playback.rolling import wheel_angles
 from nmm.robots.motion import Motion
@@ -48,8 +48,8 @@ def keyframes(motion: Motion, fps: float = 60.0) -> Keyframes:
     if np.any(between > 1):
         grid = [np.arange(k) / k + i for i, k in enumerate(between)]
         at = np.concatenate([*grid, [len(times) - 1.0]])
-        index = np.arange(len(times))
-        everything = np.column_stack([np.interp(at, index, column) for column in everything.T])
+        index = np.arange(len(times), dtype=np.float64)
+        everything = interpolated(at, index, everything)
         times = np.interp(at, index, times)
     n = motion.robot.n
     return Keyframes(times, everything[:, :n], everything[:, n:])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.arrays import Array, interpolated
 from nmm.errors import InputError
 from nmm.playback.drawing import Command, Drawing, DrawnRobot, Rgb
 from nmm.playback.encoding import packed
@@ -233,7 +233,11 @@ def _boxes(motions: Sequence[Motion], frames: Sequence[Keyframes], times: Array)
     """Boxes around the robots at the times, (motions, times, 2, 3)."""
     return np.array(
         [
-            robot_boxes(motion.robot, _at(times, frame, frame.q), _at(times, frame, frame.wheels))
+            robot_boxes(
+                motion.robot,
+                interpolated(times, frame.t, frame.q),
+                interpolated(times, frame.t, frame.wheels),
+            )
             for motion, frame in zip(motions, frames, strict=True)
         ]
     )
@@ -242,16 +246,11 @@ def _boxes(motions: Sequence[Motion], frames: Sequence[Keyframes], times: Array)
 def _middle(motions: Sequence[Motion], frames: Sequence[Keyframes], times: Array) -> Array:
     """Midpoint of the platforms at the times, (times, 2)."""
     places = [
-        _at(times, frame, base_position(motion.robot, frame.q))
+        interpolated(times, frame.t, base_position(motion.robot, frame.q))
         for motion, frame in zip(motions, frames, strict=True)
     ]
     middle: Array = np.mean(places, axis=0)
     return middle
-
-
-def _at(times: Array, frames: Keyframes, values: Array) -> Array:
-    columns = [np.interp(times, frames.t, column) for column in values.T]
-    return np.array(columns).T.reshape(len(times), values.shape[1])
 
 
 def _view(boxes: Array, motions: Sequence[Motion]) -> Array:

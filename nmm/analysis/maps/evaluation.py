@@ -9,10 +9,10 @@ import numpy as np
 
 from nmm.analysis.maps.measures import Spectra, chosen, volume
 from nmm.analysis.singular.jacobians import Jacobians, Subject
-from nmm.analysis.singular.parts import WHOLE, groups, ranks
+from nmm.analysis.singular.parts import WHOLE, expect_inputs, groups, ranks
 from nmm.analysis.singular.singularity import TOLERANCE
 from nmm.arrays import Array, Integers, scalar
-from nmm.errors import InputError, unknown
+from nmm.errors import InputError
 from nmm.progress import Progress, between
 from nmm.resolvers.problem import Dimensions
 from nmm.resolvers.weights import Weights, weight_diagonal
@@ -100,13 +100,10 @@ class Evaluator:
         self.t = scalar(t, "t")
         self.measures = chosen(measures)
         self.columns = groups(robot)
-        if part not in self.columns:
-            raise InputError(unknown("part", part, self.columns, f"robot {robot.name}"))
-        if not self.columns[part]:
-            raise InputError(f"part: {part} of robot {robot.name} has no inputs")
+        expect_inputs(robot, part)
         for name, measure in self.measures.items():
-            if measure.needs and not self.columns[measure.needs]:
-                raise InputError(f"measure {name}: {measure.needs} of robot {robot.name} has no inputs")
+            if measure.needs:
+                expect_inputs(robot, measure.needs, f"measure {name}")
         self.part = part
         self.alpha = scalar(alpha, "alpha")
         if not 0.0 <= self.alpha <= 1.0:

@@ -10,7 +10,7 @@ from nmm.analysis.maps.coordinates import checked_range, usual_range
 from nmm.arrays import Array, Flags, Integers
 from nmm.errors import InputError, unknown
 from nmm.progress import Progress
-from nmm.robots.configuration import kinematics_updater
+from nmm.robots.frame_path import FramePath
 from nmm.robots.robot import Robot
 
 AXES = "xyz"
@@ -56,10 +56,7 @@ class Reach:
                 raise InputError(unknown("joint", name, names, "ranges"))
         limits = [checked_range(given[name], name) if name in given else self._usual(name) for name in names]
         self.lower, self.upper = np.array(limits).reshape(-1, 2).T
-        self._placements, self._jacobians = np.empty((1, 3, 4)), np.empty((1, 6, robot.n))
-        self._update = kinematics_updater(
-            robot, (frame,), self._placements, self._jacobians, np.empty((0, 6, robot.n, robot.n))
-        )
+        self._path = FramePath(robot, frame)
 
     def _usual(self, name: str) -> tuple[float, float]:
         index = self.robot.coordinate(name)
@@ -83,15 +80,7 @@ class Reach:
 
     def positions(self, q: Array, progress: Progress | None = None) -> Array:
         """Where the frame is, (N, 3), m."""
-        found = np.empty((len(q), 3))
-        update, origin = self._update, self._placements[0, :, 3]
-        every = max(1, len(q) // 50)
-        for k, point in enumerate(q):
-            update(0.0, point)
-            found[k] = origin
-            if progress is not None and k % every == 0:
-                progress(k / len(q))
-        return found
+        return self._path.positions(q, progress)
 
     def held(self, points: Array) -> Flags:
         """Whether each point (N, 3) is in the slab."""
@@ -137,12 +126,7 @@ class Reach:
 
     def _rates(self, q: Array) -> tuple[Array, Array]:
         """Where the frame is (N, 3), and the derivatives (N, s, k) of what counts of that by the joints."""
-        points, jacobians = np.empty((len(q), 3)), np.empty((len(q), 3, self.robot.n))
-        update, origin, jacobian = self._update, self._placements[0, :, 3], self._jacobians[0, :3]
-        for k, point in enumerate(q):
-            update(0.0, point)
-            points[k] = origin
-            jacobians[k] = jacobian
+        points, jacobians = self._path.jacobians(q)
         rows = [*self.in_plane, *([] if self.slab is None else [self.third])]
         return points, jacobians[:, rows][:, :, self.moving]
 

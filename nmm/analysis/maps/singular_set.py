@@ -115,9 +115,7 @@ def _finer(
     """Axes with more nodes, at least twice as many, and σ_min and w there."""
     columns, rows = (np.linspace(axis[0], axis[-1], max(FINEST, 2 * len(axis))) for axis in axes)
     J = J_of(np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2))
-    values = np.full((len(J), J.shape[1]), np.nan)
-    finite = np.isfinite(J).all(axis=(1, 2))
-    values[finite] = np.linalg.svd(J[finite], compute_uv=False)
+    values = _singular_values(J)
     shape = len(rows), len(columns)
     return (columns, rows), [values[:, -1].reshape(shape), np.prod(values, axis=1).reshape(shape)]
 
@@ -181,8 +179,8 @@ def polish(
             shorter = np.minimum(1.0, reach[going] / np.where(length == 0.0, 1.0, length))
             trial = here + step * shorter[:, np.newaxis]
             J_trial = J_of(trial)
-            volume = _volumes(J_trial)
-            better = volume < best_volume
+            volume = np.prod(_singular_values(J_trial), axis=1)
+            better = volume < best_volume  # not where there is no J
             best[better], best_J[better], best_volume[better] = trial[better], J_trial[better], volume[better]
         moved = np.linalg.norm(best - here, axis=1)
         x[going], J = best, best_J
@@ -193,11 +191,11 @@ def polish(
     return x[done]
 
 
-def _volumes(J: Array) -> Array:
-    """Products of the singular values of J (N, s, m); infinite where there is none."""
-    found = np.full(len(J), np.inf)
+def _singular_values(J: Array) -> Array:
+    """Those of J (N, s, m), s at most m: (N, s), falling; not a number where there is no J."""
+    found = np.full(J.shape[:2], np.nan)
     finite = np.isfinite(J).all(axis=(1, 2))
-    found[finite] = np.prod(np.linalg.svd(J[finite], compute_uv=False), axis=1)
+    found[finite] = np.linalg.svd(J[finite], compute_uv=False)
     return found
 
 

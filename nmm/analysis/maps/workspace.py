@@ -19,8 +19,7 @@ from nmm.analysis.singular.jacobians import Subject
 from nmm.arrays import Array, Integers, counted
 from nmm.errors import InputError
 from nmm.progress import Progress, between
-from nmm.robots.configuration import Configuration
-from nmm.robots.robot import Robot
+from nmm.robots.frame_path import FramePath
 
 #: Postures drawn, and how many of them are led to a singular one each to draw these.
 CONFIGURATIONS, SINGULAR_STARTS = 1 << 16, 1 << 9
@@ -170,7 +169,7 @@ def _moving(evaluator: Evaluator, frame: str, held: Array) -> Integers:
     q[:, n_p:] += np.random.default_rng(0).uniform(-1.0, 1.0, (8, robot.n - n_p))
     felt = np.abs(np.nan_to_num(evaluator.jacobians.batch(q, evaluator.t)))[:, :, robot.platform.p :]
     moved = np.max(felt, axis=(0, 1)) > 1e-9
-    moved |= _moves(robot, frame, q)
+    moved |= np.max(np.abs(FramePath(robot, frame).jacobians(q)[1]), axis=(0, 1))[n_p:] > 1e-9
     if not moved.any():
         raise InputError(f"workspace map: the arm of {robot.name} moves {frame} in no way")
     return np.asarray(n_p + np.flatnonzero(moved), dtype=np.int64)
@@ -189,12 +188,6 @@ def _check_plane(reach: Reach) -> None:
     where = "a horizontal plane" if AXES[flat[0]] == "z" else "a vertical plane"
     other = AXES.replace(AXES[flat[0]], "")
     raise InputError(f"{reach.frame} moves in {where}, {held} only; try --workspace {other}")
-
-
-def _moves(robot: Robot, frame: str, q: Array) -> Array:
-    """Which joints of the arm move a frame's origin, (n_m,)."""
-    found = [np.abs(Configuration(robot, point).jacobian(frame)[:3]).max(axis=0) for point in q]
-    return np.max(found, axis=0)[robot.platform.n_p :] > 1e-9
 
 
 def _singular_places(evaluator: Evaluator, reach: Reach, part: str, progress: Progress | None) -> SingularSet:

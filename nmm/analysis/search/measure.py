@@ -8,11 +8,8 @@ import numpy as np
 
 from nmm.analysis.singular.directions import direction_texts, readable_basis
 from nmm.analysis.singular.jacobians import STEP, Jacobians
-from nmm.analysis.singular.parts import WHOLE, groups, singular_values
+from nmm.analysis.singular.parts import WHOLE, expect_inputs, singular_values
 from nmm.arrays import Array, Integers
-from nmm.errors import InputError, unknown
-
-#: Yes or no, for each of many.
 
 #: Singular values beside the largest, at a point that has converged: what is above it is not zero.
 ROUNDING = 1e-13
@@ -50,12 +47,7 @@ class Measure:
         sizes: Mapping[str, float] | None = None,
         t: float = 0.0,
     ) -> None:
-        of_parts = groups(jacobians.robot)
-        if part not in of_parts:
-            raise InputError(unknown("part", part, of_parts, f"robot {jacobians.robot.name}"))
-        self.columns = of_parts[part]
-        if not self.columns:
-            raise InputError(f"part: {part} of robot {jacobians.robot.name} has no inputs")
+        self.columns = expect_inputs(jacobians.robot, part)
         self.jacobians, self.robot, self.part, self.t = jacobians, jacobians.robot, part, t
         row_sizes, _, input_sizes = jacobians.sizes(length, sizes)
         self._scale = input_sizes / row_sizes[:, np.newaxis]

@@ -22,7 +22,7 @@ from nmm.analysis.singular.minors import (
 )
 from nmm.analysis.singular.parts import WHOLE, condition_numbers, groups, ranks, singular_values
 from nmm.analysis.singular.singularity import TOLERANCE
-from nmm.arrays import Array, Integers, positive
+from nmm.arrays import Array, Integers, interpolated, positive
 from nmm.errors import InputError
 from nmm.runs.trajectory import Trajectory
 
@@ -131,12 +131,12 @@ def analyse_along(
     whole = volume(J)[:, np.newaxis]
 
     def sigma_at(time: float) -> float:
-        return float(singular_values(jacobians.J(time, _between(t, q, time)) * scale)[-1])
+        return float(singular_values(jacobians.J(time, interpolated(time, t, q)) * scale)[-1])
 
     extended_scale = input_sizes / np.concatenate([row_sizes, constraint_sizes])[:, np.newaxis]
 
     def extended_at(time: float) -> float:
-        here = _between(t, q, time)
+        here = interpolated(time, t, q)
         rows = np.vstack([jacobians.J(time, here), jacobians.Jc(time, here)])
         return float(singular_values(rows * extended_scale)[-1])
 
@@ -161,8 +161,3 @@ def analyse_along(
         extended_dips=() if extended is None else dips(t, extended, low, extended_at),
         threshold=low,
     )
-
-
-def _between(t: Array, q: Array, time: float) -> Array:
-    """q (n,) at a time, linear between the samples."""
-    return np.array([np.interp(time, t, column) for column in q.T])

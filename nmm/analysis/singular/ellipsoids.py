@@ -9,10 +9,10 @@ from itertools import permutations, product
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.analysis.singular.parts import WHOLE, groups
+from nmm.analysis.singular.parts import WHOLE, columns_of
 from nmm.arrays import Array, array, positive
-from nmm.errors import InputError, unknown
-from nmm.robots.configuration import kinematics_updater
+from nmm.errors import InputError
+from nmm.robots.frame_path import FramePath
 from nmm.robots.loading.tips import first_tip
 from nmm.robots.robot import Robot
 from nmm.runs.ellipsoid_options import Sizes
@@ -127,10 +127,7 @@ def ellipsoids_along(
         without a limit
     """
     frame = frame_of(robot, frame)
-    columns = groups(robot)
-    if part not in columns:
-        raise InputError(unknown("part", part, columns, f"robot {robot.name}"))
-    chosen = columns[part]
+    chosen = columns_of(robot, part)
     points = _points(robot, q)
     size = input_sizes(robot, sizes, chosen)
     center, J = velocity_jacobians(robot, frame, points)
@@ -144,15 +141,12 @@ def velocity_jacobians(robot: Robot, frame: str, q: Array) -> tuple[Array, Array
 
     Not a task's J: a task has no more rows than there are inputs, and two wheels move a point too.
     """
-    placements, jacobians = np.empty((1, 3, 4)), np.empty((1, 6, robot.n))
-    update = kinematics_updater(robot, (frame,), placements, jacobians, np.empty(0))
-    center, J = np.empty((len(q), 3)), np.empty((len(q), 3, robot.n_u))
+    center, jacobians = FramePath(robot, frame).jacobians(q)
+    J = np.empty((len(q), 3, robot.n_u))
     n_p = robot.platform.n_p
     for k, point in enumerate(q):
-        update(0.0, point)
-        center[k] = placements[0, :, 3]
         rolls = robot.platform.problem(point[:n_p]) is None
-        J[k] = jacobians[0, :3] @ robot.S(point) if rolls else np.nan
+        J[k] = jacobians[k] @ robot.S(point) if rolls else np.nan
     return center, J
 
 

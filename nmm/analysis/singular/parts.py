@@ -9,6 +9,7 @@ import numpy as np
 
 from nmm.analysis.singular.directions import direction_texts, readable_basis
 from nmm.arrays import Array, Integers
+from nmm.errors import InputError, unknown
 from nmm.robots.robot import Robot
 
 WHOLE = "robot"
@@ -117,6 +118,22 @@ def groups(robot: Robot) -> dict[str, list[int]]:
     """Columns of each part: "platform", "arm", the arms by name, "robot" last."""
     columns = {name: [robot.input(one) for one in inputs] for name, inputs in robot.groups.items()}
     return {**columns, WHOLE: list(range(robot.n_u))}
+
+
+def columns_of(robot: Robot, part: str) -> list[int]:
+    """Columns of a part; `InputError` names the parts that the robot has."""
+    columns = groups(robot)
+    if part not in columns:
+        raise InputError(unknown("part", part, columns, f"robot {robot.name}"))
+    return columns[part]
+
+
+def expect_inputs(robot: Robot, part: str, what: str = "part") -> list[int]:
+    """Columns of a part that has some; `what` needs them."""
+    columns = columns_of(robot, part)
+    if not columns:
+        raise InputError(f"{what}: {part} of robot {robot.name} has no inputs")
+    return columns
 
 
 def part(
