@@ -88,24 +88,3 @@ def thinned(line: Array, tolerance: Array) -> Array:
             kept[middle] = True
             pieces += [(first, middle), (middle, last)]
     return np.asarray(line[kept])
-
-
-def set_legend(axes: Axes, lift: float) -> None:
-    """Above the map."""
-    handles, names = axes.get_legend_handles_labels()
-    height = float(axes.get_window_extent().height) / style.DPI
-    axes.legend(
-        handles,
-        names,
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0 + lift / height),
-        ncols=max(len(names), 1),
-        frameon=False,
-        fontsize=style.SMALL,
-        labelcolor=style.BLACK,
-        borderaxespad=0.25,
-        borderpad=0.0,
-        handlelength=1.9,
-        handletextpad=0.5,
-        columnspacing=1.4,
-    )

@@ -19,7 +19,7 @@ from nmm.analysis.maps.result import Map
 from nmm.arrays import Array
 from nmm.errors import InputError, unknown
 from nmm.figures import style
-from nmm.figures.map_sets import draw_sets, set_legend
+from nmm.figures.map_sets import draw_sets
 from nmm.words import fraction_of_pi
 
 #: Even steps of the value are even steps to the eye, also to colour-blind ones.
@@ -72,7 +72,7 @@ def map_figure(drawn: Map, measure: str | None = None, path: str | Path | None =
     _dress_bar(bar.ax, drawn, measure)
     _write_title(made, lines)
     if legend:
-        set_legend(made.axes[0], 0.2 if len(layers) > 1 else 0.0)
+        style.legend(made.axes[0], np.inf, lift=0.2 if len(layers) > 1 else 0.0)
     if path is not None:
         style.save(made, path)
     return made

@@ -184,18 +184,19 @@ def power(value: float) -> str:
     return f"10{str(round(np.log10(value))).translate(_SUPERSCRIPTS)}" if value > 0.0 else ""
 
 
-def legend(axes: Axes, width: float | None = None) -> None:
-    """A legend above the axes, where no curve can be, in as few rows as fit into a width, in."""
+def legend(axes: Axes, width: float | None = None, *, lift: float = 0.0) -> None:
+    """A legend `lift` in above the axes, where no curve can be, in as few rows as fit into a width, in."""
     handles, names = axes.get_legend_handles_labels()
     if not handles:
         return
+    height = float(axes.get_window_extent().height) / DPI
     if width is None:
         width = float(axes.get_window_extent().width) / DPI
     axes.legend(
         handles,
         names,
         loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
+        bbox_to_anchor=(0.0, 1.0 + lift / height),
         ncols=legend_columns(names, width),
         frameon=False,
         fontsize=SMALL,

@@ -1,1 +1,1 @@
-"""The loop closed: integrated, judged, recorded, written."""
+"""The loop closed: integrated, judged and recorded."""

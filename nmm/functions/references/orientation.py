@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, matrix, positive, scalar, vector
-from nmm.errors import InputError, unknown
+from nmm.errors import InputError
 from nmm.functions.function import Function, Row, Stage
+from nmm.functions.references.polynomial import Profile, share_of_way
 from nmm.kernels.compiled import kernel
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.kernels.rotations import between3, compose3, exp3, left_jacobian_inverse3, log3, transposed_times3
@@ -92,20 +91,18 @@ class Slerp(Function):
         start: ArrayLike,
         end: ArrayLike,
         duration: float,
-        profile: Literal["constant", "smooth"] = "constant",
+        profile: Profile = "constant",
     ) -> None:
         first, last = vector(start, 3, "start"), vector(end, 3, "end")
         T = positive(duration, "duration")
-        profiles = {"constant": [1 / T, 0.0], "smooth": [6 / T**5, -15 / T**4, 10 / T**3, 0.0, 0.0, 0.0]}
-        if profile not in profiles:
-            raise InputError(unknown("profile", profile, profiles))
+        share = share_of_way(profile, T)
         R0, R1, between = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
         turn = np.empty(3)
         exp3(first, R0)
         exp3(last, R1)
         between3(R0, R1, between)
         log3(between, turn)
-        self._numbers = np.concatenate([first, turn, [0.0, T], profiles[profile]])
+        self._numbers = np.concatenate([first, turn, [0.0, T], share])
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         return ROWS

@@ -125,6 +125,23 @@ class Polynomial(PiecewisePolynomial):
         return cls(derivatives / factorials[:, None], float(breaks[-1]), unit)
 
 
+#: How a way is gone: at a constant rate, or from rest to rest.
+Profile = Literal["constant", "smooth"]
+
+
+def share_of_way(profile: Profile, T: float) -> list[float]:
+    """Coefficients, of the highest power of t first, of the share of the way gone at t, from 0 to 1 at T.
+
+    Raises
+    ------
+    InputError : an unknown profile
+    """
+    profiles = {"constant": [1 / T, 0.0], "smooth": [6 / T**5, -15 / T**4, 10 / T**3, 0.0, 0.0, 0.0]}
+    if profile not in profiles:
+        raise InputError(unknown("profile", profile, profiles))
+    return profiles[profile]
+
+
 class Line(PiecewisePolynomial):
     """A straight line from `start` to `end` in `duration` s, then at rest.
 
@@ -141,16 +158,13 @@ class Line(PiecewisePolynomial):
         start: ArrayLike,
         end: ArrayLike,
         duration: float,
-        profile: Literal["constant", "smooth"] = "constant",
+        profile: Profile = "constant",
         unit: str = "m",
     ) -> None:
         a = vector(np.atleast_1d(array(start, "start")), None, "start")
         b = vector(np.atleast_1d(array(end, "end")), a.size, "end")
         T = positive(duration, "duration")
-        profiles = {"constant": [1 / T, 0.0], "smooth": [6 / T**5, -15 / T**4, 10 / T**3, 0.0, 0.0, 0.0]}
-        if profile not in profiles:
-            raise InputError(unknown("profile", profile, profiles))
-        coefficients = np.array(profiles[profile])[:, None, None] * (b - a)
+        coefficients = np.array(share_of_way(profile, T))[:, None, None] * (b - a)
         coefficients[-1, 0] += a
         super().__init__([0.0, T], coefficients, unit)
 
