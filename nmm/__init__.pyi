@@ -14,6 +14,7 @@ from .functions.objectives import Manipulability as Manipulability
 from .functions.objectives import Objective as Objective
 from .functions.objectives import Quadratic as Quadratic
 from .functions.objectives import Square as Square
+from .functions.program import evaluate as evaluate
 from .functions.references import Bearing as Bearing
 from .functions.references import CallableReference as CallableReference
 from .functions.references import Circle as Circle

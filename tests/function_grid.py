@@ -28,6 +28,7 @@ from nmm.functions.objectives import (
     Square,
     Sum,
 )
+from nmm.functions.program import evaluate
 from nmm.functions.references import (
     Bearing,
     CallableReference,
@@ -236,12 +237,12 @@ def _objectives() -> Iterator[Entry]:
 ENTRIES = (*_tasks(), *_spatial_tasks(), *_references(), *_pose_references(), *_objectives())
 
 
-def evaluate(function: Function, t: float, configuration: Configuration) -> Evaluation:
+def evaluated(function: Function, t: float, configuration: Configuration) -> Evaluation:
     """Value and derivatives, of an objective too (a sum is evaluated by its terms)."""
     if isinstance(function, Objective):
         gradient = function.gradient(configuration)
         return Evaluation(np.array([function.value(configuration)]), np.zeros(1), gradient[None])
-    return function.evaluate(t, configuration)
+    return evaluate(function, t, configuration)
 
 
 def random_configuration(robot: Robot, rng: np.random.Generator) -> Array:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from function_grid import ENTRIES, TIMES, Entry, evaluate, modules, random_configuration
+from function_grid import ENTRIES, TIMES, Entry, evaluated, modules, random_configuration
 from numba.core.dispatcher import Dispatcher
 from numpy.typing import NDArray
 from paper_cases import CASES, TIP
@@ -19,7 +19,7 @@ from platform_grid import EXAMPLES, random_qp
 from nmm.control.controller import Controller
 from nmm.functions.function import Stage
 from nmm.functions.objectives import Sum
-from nmm.functions.program import Program
+from nmm.functions.program import Program, evaluate
 from nmm.functions.tasks import Coordinates, Task
 from nmm.functions.tasks.comparison import Comparison
 from nmm.kernels.compiled import Kernel
@@ -109,7 +109,7 @@ def test_function_kernels(entry: Entry, robots: dict[str, Robot], rng: np.random
         for plain, compiled in zip(*outcomes, strict=True):
             assert_same(plain, compiled)
         count = len(entry.function.rows(robot))
-        for plain, found in zip(outcomes[0], entry.function.evaluate(t, configuration), strict=True):
+        for plain, found in zip(outcomes[0], evaluate(entry.function, t, configuration), strict=True):
             assert_same(plain[:count], found)
 
 
@@ -193,7 +193,7 @@ def answers() -> dict[str, Array]:
     for entry in ENTRIES:
         robot = robots[entry.robots[-1]]
         configuration = Configuration(robot, random_configuration(robot, rng))
-        parts = evaluate(entry.function, 0.37, configuration)
+        parts = evaluated(entry.function, 0.37, configuration)
         found[entry.name] = np.concatenate([part.ravel() for part in parts])
     for name, platform in EXAMPLES.items():
         found[f"platform {name}"] = platform.G(random_qp(platform, rng, 3.0)).ravel()

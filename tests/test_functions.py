@@ -14,6 +14,7 @@ from scipy.interpolate import PPoly
 
 from nmm.functions.function import Evaluation, Function
 from nmm.functions.objectives import JointRange, Manipulability, Quadratic, Square, Sum
+from nmm.functions.program import evaluate
 from nmm.functions.references import Bearing, Circle, Constant, Line, PiecewisePolynomial, Polynomial, Spline
 from nmm.functions.tasks import Coordinates, Heading, Position
 from nmm.robots.configuration import Configuration
@@ -33,10 +34,10 @@ At = Callable[[Function, float], Evaluation]
 def at(robot_2r: Robot) -> At:
     configuration = Configuration(robot_2r, np.zeros(5))
 
-    def evaluate(reference: Function, t: float) -> Evaluation:
-        return reference.evaluate(t, configuration)
+    def evaluated(reference: Function, t: float) -> Evaluation:
+        return evaluate(reference, t, configuration)
 
-    return evaluate
+    return evaluated
 
 
 def motion(at: At, spline: Spline, t: float, order: int) -> Array:
@@ -148,18 +149,18 @@ def test_position_and_heading(robot_3r: Robot, rng: np.random.Generator) -> None
         configuration = Configuration(robot_3r, random_configuration(robot_3r, rng))
         pose = configuration.placement("ee")
         for picked, indices in (("x", [0]), ("zy", [2, 1]), ("xyz", [0, 1, 2])):
-            found = Position("ee", picked).evaluate(0.0, configuration).value
+            found = evaluate(Position("ee", picked), 0.0, configuration).value
             np.testing.assert_array_equal(found, pose.translation[indices])
         direction = np.array([0.6, -0.3, 0.7])
         for about, (first, second) in {"z": (0, 1), "x": (1, 2), "y": (2, 0)}.items():
             d = pose.rotation @ direction
-            found = Heading("ee", direction, about).evaluate(0.0, configuration).value[0]
+            found = evaluate(Heading("ee", direction, about), 0.0, configuration).value[0]
             assert found == pytest.approx(np.arctan2(d[second], d[first]), abs=1e-13)
 
 
 def test_coordinates(robot_2r: Robot) -> None:
     task = Coordinates("q2", {"theta": 1, "q1": -2}, {"x": 0.5, "theta": 1})
-    found = task.evaluate(0.0, Configuration(robot_2r, [1, 2, 30, 4, 5]))
+    found = evaluate(task, 0.0, Configuration(robot_2r, [1, 2, 30, 4, 5]))
     np.testing.assert_array_equal(found.value, [5.0, 22.0, 30.5])
     rows = task.rows(robot_2r)
     assert [row.name for row in rows] == ["q2", "theta - 2 q1", "0.5 x + theta"]

@@ -11,16 +11,14 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nmm.kernels.compiled import Kernel
+from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
-
-if TYPE_CHECKING:
-    from nmm.robots.configuration import Configuration
 
 Array = NDArray[np.float64]
 
@@ -54,7 +52,7 @@ class Evaluation(NamedTuple):
     value_q: Array
 
 
-Callback = Callable[[float, "Configuration"], Evaluation]
+Callback = Callable[[float, Configuration], Evaluation]
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,11 +100,3 @@ class Function(ABC):
     @abstractmethod
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
         """The kernels that compute them, in order."""
-
-    def evaluate(self, t: float, configuration: Configuration) -> Evaluation:
-        """Value, partial time derivative and Jacobian at time t (s) and a configuration."""
-        from nmm.functions.program import Program
-
-        program = Program(configuration.robot, (self,))
-        program.lay_out()
-        return program.evaluate(t, configuration.q)[0]

@@ -191,6 +191,20 @@ class Program:
         ]
 
 
+def evaluate(function: Function, t: float, configuration: Configuration) -> Evaluation:
+    """phi (s,), ∂phi/∂t (s,) and ∂phi/∂q (s, n) at time t, s, and a configuration, in the units of its rows.
+
+    It is laid out for this one call; a loop over many configurations holds a `Program` or a controller.
+
+    Raises
+    ------
+    InputError : a frame or coordinate that the robot lacks; a sum of objectives, which is its terms'
+    """
+    program = Program(configuration.robot, (function,))
+    program.lay_out()
+    return program.evaluate(t, configuration.q)[0]
+
+
 def _with_callbacks(
     robot: Robot, update: Callable[[float, Array], None], callbacks: Sequence[tuple[Callback, Array]]
 ) -> Callable[[float, Array], None]:
