@@ -9,8 +9,9 @@ which kernels compute them; how they are run is `program.py`'s business.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -79,12 +80,29 @@ class Stage:
     before: int = 0
 
 
+class Shown(NamedTuple):
+    """What a function is about, for those who draw a run.
+
+    positions : the frame whose origin it puts somewhere in the world
+    axes : the world axes ("x", "y", "z") along which it does, each with the row that holds it, in m
+    turns : the frame that it turns
+    looks_at : the fixed point that it looks at, (2,) or (3,), m, world axes
+    """
+
+    positions: str | None = None
+    axes: Mapping[str, int] = MappingProxyType({})
+    turns: str | None = None
+    looks_at: Array | None = None
+
+
 class Function(ABC):
     """phi(t, q). To add one, write in a file of its own a kernel and a subclass that implements:
 
     1. `rows(robot)`: names, units and angularity of the components; raises `InputError` for
        what the robot does not have;
     2. `stages(robot)`: the kernels that compute value, time derivative and Jacobian.
+
+    Where it moves a frame or looks at a point, `shown()` says so, for figures and playback.
 
     `comparison` is for values that cannot be subtracted (orientations, poses): a kernel of signature
     `records.FUNCTION` that sees the rows [value, target, error], s of each, with their derivatives, and
@@ -100,3 +118,7 @@ class Function(ABC):
     @abstractmethod
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
         """The kernels that compute them, in order."""
+
+    def shown(self) -> Shown:
+        """What figures and playback draw of it; nothing unless it says so."""
+        return Shown()
