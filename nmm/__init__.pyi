@@ -23,6 +23,7 @@ from .functions.references import Line as Line
 from .functions.references import PiecewisePolynomial as PiecewisePolynomial
 from .functions.references import Polynomial as Polynomial
 from .functions.references import PoseReference as PoseReference
+from .functions.references import Signal as Signal
 from .functions.references import Slerp as Slerp
 from .functions.references import Spline as Spline
 from .functions.references import Turn as Turn

@@ -38,6 +38,7 @@ from nmm.functions.references import (
     PiecewisePolynomial,
     Polynomial,
     PoseReference,
+    Signal,
     Slerp,
     Spline,
     Turn,
@@ -191,6 +192,18 @@ def _references() -> Iterator[Entry]:
     )
 
 
+def _signals() -> Iterator[Entry]:
+    moved = Signal([0.0, 0.0, 9.0])
+    moved.set([1.2, -0.7, 0.4], rate=[0.3, -0.2, 0.9], t=0.8)
+    turned = Signal([0.1, -0.4, 0.3], "rad")
+    yield Entry("signal", Signal([1.0, -2.0]))
+    yield Entry("signal that moves on", moved)
+    yield Entry("bearing of a signal", Bearing(moved, _TARGET))
+    yield Entry("pointing at a signal", Pointing("ee", moved))
+    yield Entry("distance from a signal", Distance("ee", moved))
+    yield Entry("pose of signals", PoseReference(moved, turned))
+
+
 def _pose_references() -> Iterator[Entry]:
     yield Entry("turn", Turn([0.2, -0.3, 0.9], 0.4, [0.3, 0.1, -0.5]))
     for profile in ("constant", "smooth"):
@@ -234,7 +247,7 @@ def _objectives() -> Iterator[Entry]:
     yield Entry("difference", 2.0 * h1 - Manipulability("ee", "xy") * 0.3)
 
 
-ENTRIES = (*_tasks(), *_spatial_tasks(), *_references(), *_pose_references(), *_objectives())
+ENTRIES = (*_tasks(), *_spatial_tasks(), *_references(), *_signals(), *_pose_references(), *_objectives())
 
 
 def evaluated(function: Function, t: float, configuration: Configuration) -> Evaluation:

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nmm.functions.live import LiveNumbers
 from nmm.kernels.compiled import Kernel
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
@@ -69,6 +70,7 @@ class Stage:
     numbers : the numbers that it reads
     hessians : whether it reads the frames' kinematic Hessians
     callback : a user's Python function, run before the kernels; its results are the numbers
+    live : what sets the numbers from outside, between two steps
     """
 
     kernel: Kernel
@@ -78,6 +80,7 @@ class Stage:
     hessians: bool = False
     callback: Callback | None = None
     before: int = 0
+    live: LiveNumbers | None = None
 
 
 class Shown(NamedTuple):

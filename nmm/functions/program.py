@@ -169,9 +169,14 @@ class Program:
         self.prepare = update = kinematics_updater(
             robot, tuple(self._frames), found.placements, found.jacobians, found.hessians
         )
+        stages = [stage for stage, _ in self._stages]
+        self._numbers = [views(LaidOutStage, *self.blocks, int(place)).numbers for place in places]
+        for stage, block in zip(stages, self._numbers, strict=True):
+            if stage.live is not None:
+                stage.live.read_by(block)
         callbacks = [
-            (stage.callback, views(LaidOutStage, *self.blocks, int(place)).numbers)
-            for (stage, _), place in zip(self._stages, places, strict=True)
+            (stage.callback, block)
+            for stage, block in zip(stages, self._numbers, strict=True)
             if stage.callback is not None
         ]
         if callbacks:
