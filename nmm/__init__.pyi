@@ -14,6 +14,7 @@ from .functions.objectives import Manipulability as Manipulability
 from .functions.objectives import Objective as Objective
 from .functions.objectives import Quadratic as Quadratic
 from .functions.objectives import Square as Square
+from .functions.program import evaluate as evaluate
 from .functions.references import Bearing as Bearing
 from .functions.references import CallableReference as CallableReference
 from .functions.references import Circle as Circle
@@ -22,6 +23,7 @@ from .functions.references import Line as Line
 from .functions.references import PiecewisePolynomial as PiecewisePolynomial
 from .functions.references import Polynomial as Polynomial
 from .functions.references import PoseReference as PoseReference
+from .functions.references import Signal as Signal
 from .functions.references import Slerp as Slerp
 from .functions.references import Spline as Spline
 from .functions.references import Turn as Turn

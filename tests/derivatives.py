@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from function_grid import evaluate
+from function_grid import evaluated
 from numpy.typing import NDArray
 
 from nmm.control.controller import Controller
@@ -49,11 +49,11 @@ def continuous(values: Array, near: Array, angular: list[bool]) -> Array:
 
 
 def check_function(function: Function, robot: Robot, t: float, q: Array) -> None:
-    found = evaluate(function, t, Configuration(robot, q))
+    found = evaluated(function, t, Configuration(robot, q))
     angular = [row.angular for row in function.rows(robot)]
 
     def value(t: float, q: Array) -> Array:
-        return continuous(evaluate(function, t, Configuration(robot, q)).value, found.value, angular)
+        return continuous(evaluated(function, t, Configuration(robot, q)).value, found.value, angular)
 
     assert_close(found.value_t, derivative(lambda h: value(t + h, q)))
     assert_close(found.value_q, partials(lambda q: value(t, q), q))

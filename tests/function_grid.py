@@ -28,6 +28,7 @@ from nmm.functions.objectives import (
     Square,
     Sum,
 )
+from nmm.functions.program import evaluate
 from nmm.functions.references import (
     Bearing,
     CallableReference,
@@ -37,6 +38,7 @@ from nmm.functions.references import (
     PiecewisePolynomial,
     Polynomial,
     PoseReference,
+    Signal,
     Slerp,
     Spline,
     Turn,
@@ -190,6 +192,18 @@ def _references() -> Iterator[Entry]:
     )
 
 
+def _signals() -> Iterator[Entry]:
+    moved = Signal([0.0, 0.0, 9.0])
+    moved.set([1.2, -0.7, 0.4], rate=[0.3, -0.2, 0.9], t=0.8)
+    turned = Signal([0.1, -0.4, 0.3], "rad")
+    yield Entry("signal", Signal([1.0, -2.0]))
+    yield Entry("signal that moves on", moved)
+    yield Entry("bearing of a signal", Bearing(moved, _TARGET))
+    yield Entry("pointing at a signal", Pointing("ee", moved))
+    yield Entry("distance from a signal", Distance("ee", moved))
+    yield Entry("pose of signals", PoseReference(moved, turned))
+
+
 def _pose_references() -> Iterator[Entry]:
     yield Entry("turn", Turn([0.2, -0.3, 0.9], 0.4, [0.3, 0.1, -0.5]))
     for profile in ("constant", "smooth"):
@@ -233,15 +247,15 @@ def _objectives() -> Iterator[Entry]:
     yield Entry("difference", 2.0 * h1 - Manipulability("ee", "xy") * 0.3)
 
 
-ENTRIES = (*_tasks(), *_spatial_tasks(), *_references(), *_pose_references(), *_objectives())
+ENTRIES = (*_tasks(), *_spatial_tasks(), *_references(), *_signals(), *_pose_references(), *_objectives())
 
 
-def evaluate(function: Function, t: float, configuration: Configuration) -> Evaluation:
+def evaluated(function: Function, t: float, configuration: Configuration) -> Evaluation:
     """Value and derivatives, of an objective too (a sum is evaluated by its terms)."""
     if isinstance(function, Objective):
         gradient = function.gradient(configuration)
         return Evaluation(np.array([function.value(configuration)]), np.zeros(1), gradient[None])
-    return function.evaluate(t, configuration)
+    return evaluate(function, t, configuration)
 
 
 def random_configuration(robot: Robot, rng: np.random.Generator) -> Array:

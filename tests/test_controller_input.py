@@ -14,6 +14,7 @@ from paper_cases import CIRCLE, H1, TIP
 from nmm.control.controller import Controller
 from nmm.errors import InputError, NmmError, SingularError
 from nmm.functions.objectives import CallableObjective, JointRange, Manipulability, Quadratic, Square, Sum
+from nmm.functions.program import evaluate
 from nmm.functions.references import Bearing, CallableReference, Circle, Constant, PiecewisePolynomial, Spline
 from nmm.functions.tasks import CallableFunction, Coordinates, Heading, Position, Task
 from nmm.resolvers import (
@@ -87,9 +88,11 @@ REFUSED: list[tuple[Callable[[Robot], Any], str]] = [
     (with_callable(lambda c: [1, 2, 3], names=["a"]), r"expected a value of shape \(1,\), got shape \(3,\)"),
     (with_callable(lambda c: "far", names=["a"]), "expected a value of shape .*got 'far'"),
     (
-        lambda robot: CallableFunction(
-            lambda c: c.q[:2], ["a", "b"], jacobian=lambda c: np.eye(5)[:, :2]
-        ).evaluate(0.0, Configuration(robot, np.zeros(5))),
+        lambda robot: evaluate(
+            CallableFunction(lambda c: c.q[:2], ["a", "b"], jacobian=lambda c: np.eye(5)[:, :2]),
+            0.0,
+            Configuration(robot, np.zeros(5)),
+        ),
         r"expected a Jacobian of shape \(2, 5\), got shape \(5, 2\)",
     ),
     (lambda _: CallableFunction(lambda c: 0, ["a", "b"], units=["m"]), "as many units and angular flags"),

@@ -15,6 +15,7 @@ from paper_cases import CASES, TIP, Case
 from nmm.control.controller import Controller
 from nmm.control.equations import step
 from nmm.functions.objectives import CallableObjective, Objective
+from nmm.functions.program import evaluate
 from nmm.functions.references import CallableReference
 from nmm.functions.tasks import CallableFunction, Task
 from nmm.resolvers import CallableResolver, Problem, ProjectedGradient, ReducedGradient
@@ -36,23 +37,23 @@ def task_by_hand(task: Task, robot: Robot, derivatives: bool) -> Task:
     names, units, angular, _ = zip(*task.rows(robot), strict=True)
     if not derivatives:
         return Task(
-            CallableFunction(lambda c: f.evaluate(0.0, c).value, names, units=units, angular=angular),
-            CallableReference(lambda t, c: g.evaluate(t, c).value, len(names), of_configuration=True),
+            CallableFunction(lambda c: evaluate(f, 0.0, c).value, names, units=units, angular=angular),
+            CallableReference(lambda t, c: evaluate(g, t, c).value, len(names), of_configuration=True),
             task.gain,
         )
     return Task(
         CallableFunction(
-            lambda c: f.evaluate(0.0, c).value,
+            lambda c: evaluate(f, 0.0, c).value,
             names,
             units=units,
             angular=angular,
-            jacobian=lambda c: f.evaluate(0.0, c).value_q,
+            jacobian=lambda c: evaluate(f, 0.0, c).value_q,
         ),
         CallableReference(
-            lambda t, c: g.evaluate(t, c).value,
+            lambda t, c: evaluate(g, t, c).value,
             len(names),
-            rate=lambda t, c: g.evaluate(t, c).value_t,
-            jacobian=lambda t, c: g.evaluate(t, c).value_q,
+            rate=lambda t, c: evaluate(g, t, c).value_t,
+            jacobian=lambda t, c: evaluate(g, t, c).value_q,
             of_configuration=True,
         ),
         task.gain,

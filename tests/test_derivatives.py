@@ -21,7 +21,7 @@ from platform_grid import EXAMPLES, random_qp
 from nmm.analysis.singular.reached import Reached
 from nmm.functions.function import Function
 from nmm.functions.objectives import Objective, Sum
-from nmm.functions.program import Program
+from nmm.functions.program import Program, evaluate
 from nmm.functions.references import CallableReference
 from nmm.functions.tasks.comparison import Comparison
 from nmm.robots.configuration import Configuration
@@ -56,7 +56,7 @@ def test_functions_laid_out_together_do_not_disturb_each_other(
     for t in TIMES[:3]:
         q = random_configuration(robot, rng)
         for function, together in zip(functions, program.evaluate(t, q), strict=True):
-            alone = function.evaluate(t, Configuration(robot, q))
+            alone = evaluate(function, t, Configuration(robot, q))
             for a, b in zip(together, alone, strict=True):
                 np.testing.assert_array_equal(a, b, err_msg=repr(function))
 
@@ -67,7 +67,7 @@ def test_an_objective_as_a_function_is_its_value_and_gradient(
     configuration = Configuration(robot_3r, random_configuration(robot_3r, rng))
     for function in (entry.function for entry in ENTRIES):
         if isinstance(function, Objective) and not isinstance(function, Sum):
-            found = function.evaluate(0.0, configuration)
+            found = evaluate(function, 0.0, configuration)
             assert found.value[0] == function.value(configuration)
             np.testing.assert_array_equal(found.value_q[0], function.gradient(configuration))
 
@@ -80,7 +80,7 @@ def test_differences_of_callables_stay_good_late_and_far_away(robot_2r: Robot) -
         1,
         of_configuration=True,
     )
-    found = late.evaluate(3600.0, Configuration(robot_2r, q))
+    found = evaluate(late, 3600.0, Configuration(robot_2r, q))
     assert found.value_t[0] == pytest.approx(6 * np.cos(6 * 3600.0), rel=1e-6)
     slope = -np.sin(q[2] + 2 * q[3])
     expected = [3 * np.cos(3 * q[0]), 0.0, slope, 2 * slope, 0.0]

@@ -15,7 +15,7 @@ from paper_cases import CASES, H1, TIP, Case
 
 from nmm.control.controller import Controller
 from nmm.errors import InputError
-from nmm.functions.function import Function, Row, Stage
+from nmm.functions.function import Function, Row, Shown, Stage
 from nmm.functions.objectives import Manipulability, Sum
 from nmm.functions.references import Line
 from nmm.functions.tasks import CallableFunction, Task
@@ -28,6 +28,8 @@ from nmm.resolvers.base import RESOLVER
 from nmm.resolvers.problem import ProblemArrays
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
+from nmm.runs.simulation import simulate
+from nmm.runs.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
@@ -165,6 +167,51 @@ def test_function_with_its_own_kernel(robot_3r: Robot, rng: np.random.Generator)
         task = Task(function, Line(0.5, 1.5, 3.0))
         inputs.append(Controller(robot_3r, task, ProjectedGradient(), objective)(1.0, q))
     np.testing.assert_allclose(*inputs, rtol=0, atol=1e-8)
+
+
+class Beacon(CallableFunction):
+    """A joint over a position whose y comes first, and a point that is looked at."""
+
+    def __init__(self, said: Shown) -> None:
+        super().__init__(
+            lambda c: [c.q[3], *c.placement("ee").translation[1::-1]],
+            ["q1", "y", "x"],
+            units=["rad", "m", "m"],
+        )
+        self.said = said
+
+    def shown(self) -> Shown:
+        return self.said
+
+
+def test_figures_show_what_a_users_task_says(robot_2r: Robot) -> None:
+    start = np.array([0.0, 0.0, 0.3, 0.4, 0.9])
+    target = Line([0.4, 0.2, 0.9], [0.7, -0.3, 1.1], 1.0)
+
+    def run(said: Shown) -> Trajectory:
+        task = Task(Beacon(said), target)
+        return simulate(Controller(robot_2r, task, ProjectedGradient()), start, duration=0.4, dt=0.1)
+
+    found = run(Shown("ee", {"y": 1, "x": 2}, looks_at=np.array([1.0, 2.0])))
+    path = [Configuration(robot_2r, q).placement("ee").translation for q in found.q]
+    assert found.frame == "ee"
+    np.testing.assert_allclose(found.path, path, rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(found.desired, np.c_[found.r_d[:, [2, 1]], found.path[:, 2]])
+    np.testing.assert_array_equal(found.target, [1.0, 2.0, found.path[0, 2]])
+
+    turned = run(Shown(turns="link1"))
+    assert (turned.frame, turned.desired, turned.target) == ("link1", None, None)
+    silent = run(Shown())
+    assert (silent.frame, silent.path, silent.desired, silent.target) == (None, None, None, None)
+    np.testing.assert_array_equal(silent.q, found.q)
+    for said, complaint in (
+        (Shown("hand"), "unknown frame 'hand'"),
+        (Shown("ee", {"x": 3}), r"Beacon.shown: expected axes from x, y, z with rows from 0 to 2"),
+        (Shown("ee", {"rx": 0}), r"Beacon.shown: expected axes from x, y, z"),
+        (Shown("ee", looks_at=np.zeros(4)), "Beacon.shown: expected 2 or 3 numbers as looks_at"),
+    ):
+        with pytest.raises(InputError, match=complaint):
+            run(said)
 
 
 @kernel(RESOLVER)

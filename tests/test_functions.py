@@ -8,14 +8,15 @@ from math import pi
 
 import numpy as np
 import pytest
-from function_grid import random_configuration
+from function_grid import ENTRIES, random_configuration
 from numpy.typing import NDArray
 from scipy.interpolate import PPoly
 
 from nmm.functions.function import Evaluation, Function
 from nmm.functions.objectives import JointRange, Manipulability, Quadratic, Square, Sum
+from nmm.functions.program import evaluate
 from nmm.functions.references import Bearing, Circle, Constant, Line, PiecewisePolynomial, Polynomial, Spline
-from nmm.functions.tasks import Coordinates, Heading, Position
+from nmm.functions.tasks import Coordinates, Heading, Orientation, Pointing, Pose, Position
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 
@@ -33,10 +34,10 @@ At = Callable[[Function, float], Evaluation]
 def at(robot_2r: Robot) -> At:
     configuration = Configuration(robot_2r, np.zeros(5))
 
-    def evaluate(reference: Function, t: float) -> Evaluation:
-        return reference.evaluate(t, configuration)
+    def evaluated(reference: Function, t: float) -> Evaluation:
+        return evaluate(reference, t, configuration)
 
-    return evaluate
+    return evaluated
 
 
 def motion(at: At, spline: Spline, t: float, order: int) -> Array:
@@ -148,18 +149,44 @@ def test_position_and_heading(robot_3r: Robot, rng: np.random.Generator) -> None
         configuration = Configuration(robot_3r, random_configuration(robot_3r, rng))
         pose = configuration.placement("ee")
         for picked, indices in (("x", [0]), ("zy", [2, 1]), ("xyz", [0, 1, 2])):
-            found = Position("ee", picked).evaluate(0.0, configuration).value
+            found = evaluate(Position("ee", picked), 0.0, configuration).value
             np.testing.assert_array_equal(found, pose.translation[indices])
         direction = np.array([0.6, -0.3, 0.7])
         for about, (first, second) in {"z": (0, 1), "x": (1, 2), "y": (2, 0)}.items():
             d = pose.rotation @ direction
-            found = Heading("ee", direction, about).evaluate(0.0, configuration).value[0]
+            found = evaluate(Heading("ee", direction, about), 0.0, configuration).value[0]
             assert found == pytest.approx(np.arctan2(d[second], d[first]), abs=1e-13)
+
+
+def test_what_is_shown_of_a_function_is_where_it_is(
+    robots: dict[str, Robot], rng: np.random.Generator
+) -> None:
+    """The rows that are said to hold a frame's position along world axes do."""
+    positioned, turned = set(), set()
+    for entry in ENTRIES:
+        said = entry.function.shown()
+        configuration = Configuration(robots["unicycle_3r"], random_configuration(robots["unicycle_3r"], rng))
+        if said.positions is not None:
+            positioned.add(type(entry.function))
+            found = evaluate(entry.function, 0.0, configuration).value
+            place = configuration.placement(said.positions).translation
+            assert said.axes
+            for axis, row in said.axes.items():
+                assert found[row] == place["xyz".index(axis)]
+        if said.turns is not None:
+            turned.add(type(entry.function))
+            configuration.robot.frame_id(said.turns)
+    assert positioned == {Position, Pose}
+    assert turned == {Orientation, Pointing}
+    for seen in (Position("ee", relative_to="link1"), Pose("ee", "link1"), Pointing("ee", "link1")):
+        assert (seen.shown().positions, seen.shown().looks_at) == (None, None)
+    np.testing.assert_array_equal(Pointing("ee", [6, 2, 1]).shown().looks_at, [6, 2, 1])
+    np.testing.assert_array_equal(Bearing(Constant([1, 2]), [6, 2]).shown().looks_at, [6, 2])
 
 
 def test_coordinates(robot_2r: Robot) -> None:
     task = Coordinates("q2", {"theta": 1, "q1": -2}, {"x": 0.5, "theta": 1})
-    found = task.evaluate(0.0, Configuration(robot_2r, [1, 2, 30, 4, 5]))
+    found = evaluate(task, 0.0, Configuration(robot_2r, [1, 2, 30, 4, 5]))
     np.testing.assert_array_equal(found.value, [5.0, 22.0, 30.5])
     rows = task.rows(robot_2r)
     assert [row.name for row in rows] == ["q2", "theta - 2 q1", "0.5 x + theta"]

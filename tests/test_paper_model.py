@@ -12,6 +12,7 @@ from numpy import pi
 from numpy.typing import NDArray
 from paper_cases import CASES, Case
 
+from nmm.functions.program import evaluate
 from nmm.functions.tasks import Heading, Position
 from nmm.robots.configuration import Configuration
 from nmm.robots.loading import load
@@ -53,7 +54,7 @@ def configurations(robot: Robot, rng: np.random.Generator) -> list[Configuration
 
 def jacobian(configuration: Configuration, *functions: Position | Heading) -> Array:
     """J = (df/dq) S of functions stacked."""
-    rows = [function.evaluate(0.0, configuration).value_q for function in functions]
+    rows = [evaluate(function, 0.0, configuration).value_q for function in functions]
     return np.vstack(rows) @ configuration.S
 
 
@@ -86,7 +87,7 @@ def check_position(
     """f, J and every minor."""
     for configuration in configurations(robot, rng):
         q = configuration.q
-        close(tip.evaluate(0.0, configuration).value, paper.f(q))
+        close(evaluate(tip, 0.0, configuration).value, paper.f(q))
         J = jacobian(configuration, tip)
         close(J, paper.J(q))
         assert_minors(J, paper.minors(q))
@@ -101,7 +102,7 @@ def test_planar_with_orientation(planar: tuple[Robot, twin.Planar], rng: np.rand
     for configuration in configurations(robot, rng):
         q = configuration.q
         for frame, angle in (("link1", q[2] + q[3]), ("link2", q[2:].sum()), ("ee", q[2:].sum())):
-            found = Heading(frame).evaluate(0.0, configuration).value[0]
+            found = evaluate(Heading(frame), 0.0, configuration).value[0]
             assert -pi < found <= pi
             assert twin.wrapped(found - angle) == pytest.approx(0.0, abs=1e-13)
         J = jacobian(configuration, Position("ee", "xy"), Heading("link2"))

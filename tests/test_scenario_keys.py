@@ -28,7 +28,7 @@ from nmm.scenario.tasks import TASKS as TASK_PARTS
 
 def evaluated(robot: nmm.Robot, function: nmm.Function, t: float) -> tuple[np.ndarray, ...]:
     q = np.random.default_rng(7).uniform(-1, 1, robot.n)
-    return tuple(function.evaluate(t, Configuration(robot, q)))
+    return tuple(nmm.evaluate(function, t, Configuration(robot, q)))
 
 
 PI = math.pi
@@ -190,7 +190,7 @@ def test_every_function_of_the_library_can_be_asked_for() -> None:
     """A new task, reference, objective or resolver without a key in the scenario shows here."""
     kinds = {section.title.split()[-1] for section in sections()}
     python_only = {"Callable", "PiecewisePolynomial", "Sum", "Square", "Stack", "Task", "Objective"}
-    python_only |= {"rotation_vector"}
+    python_only |= {"rotation_vector", "Signal"}
     for module in (nmm.functions.tasks, nmm.functions.references, nmm.functions.objectives):
         for name in module.__all__:
             if not any(name.startswith(word) for word in python_only):
@@ -229,9 +229,12 @@ def test_the_constraint_is_made_from_the_objective(robot_2r: nmm.Robot) -> None:
     given = Scenario.load("unicycle_2r_position", {"resolver.kind": "ej", "resolver.gain": 3})
     controller = given.controller()
     here = Configuration(robot_2r, [0.1, -0.3, 0.5, 0.7, 1.1])
-    values = [task.function.evaluate(0.0, here).value[0] for task in controller.added_task]
+    values = [nmm.evaluate(task.function, 0.0, here).value[0] for task in controller.added_task]
     assert values == [pytest.approx(0.5 + 0.7 + 1.1), 0.7]
-    assert [task.reference.evaluate(0.0, here).value[0] for task in controller.added_task] == [PI / 2, PI / 4]
+    assert [nmm.evaluate(task.reference, 0.0, here).value[0] for task in controller.added_task] == [
+        PI / 2,
+        PI / 4,
+    ]
     assert [task.gain for task in controller.added_task] == [3.0, 3.0]
 
 

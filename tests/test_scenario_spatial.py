@@ -45,7 +45,7 @@ def assert_same(robot: nmm.Robot, ours: nmm.Function, theirs: nmm.Function) -> N
     assert [row.unit for row in ours.rows(robot)] == [row.unit for row in theirs.rows(robot)]
     here = Configuration(robot, np.random.default_rng(7).uniform(-1, 1, robot.n))
     for t in (0.0, 0.7):
-        for a, b in zip(ours.evaluate(t, here), theirs.evaluate(t, here), strict=True):
+        for a, b in zip(nmm.evaluate(ours, t, here), nmm.evaluate(theirs, t, here), strict=True):
             assert np.array_equal(a, b)
 
 

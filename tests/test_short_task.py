@@ -14,6 +14,7 @@ from nmm import Scenario
 from nmm.cli.subjects import studied
 from nmm.errors import InputError
 from nmm.functions.function import Function
+from nmm.functions.program import evaluate
 from nmm.functions.tasks import (
     CenterOfMass,
     Coordinates,
@@ -44,8 +45,8 @@ def same(found: Function | Task, expected: Function, robot: Robot) -> None:
     assert found.rows(robot) == expected.rows(robot)
     q = np.random.default_rng(1).uniform(-1.0, 1.0, robot.n)
     for one, other in zip(
-        found.evaluate(0.0, Configuration(robot, q)),
-        expected.evaluate(0.0, Configuration(robot, q)),
+        evaluate(found, 0.0, Configuration(robot, q)),
+        evaluate(expected, 0.0, Configuration(robot, q)),
         strict=True,
     ):
         np.testing.assert_array_equal(one, other)
@@ -97,7 +98,7 @@ def test_with_a_reference_it_is_a_task(robot_2r: Robot) -> None:
     task = short_task("{kind: position, frame: ee, axes: xy, reference: [1, 2], gain: 3}", robot_2r)
     assert isinstance(task, Task)
     here = Configuration(robot_2r, np.zeros(5))
-    np.testing.assert_array_equal(task.reference.evaluate(0.0, here).value, [1.0, 2.0])
+    np.testing.assert_array_equal(evaluate(task.reference, 0.0, here).value, [1.0, 2.0])
     np.testing.assert_array_equal(np.asarray(task.gain) * np.eye(2), 3.0 * np.eye(2))
     text = "{kind: position, frame: link2, axes: xy}"
     bearing = short_task(
@@ -105,7 +106,7 @@ def test_with_a_reference_it_is_a_task(robot_2r: Robot) -> None:
         robot_2r,
     )
     assert isinstance(bearing, Task)
-    assert np.any(bearing.reference.evaluate(0.0, here).value_q != 0.0)
+    assert np.any(evaluate(bearing.reference, 0.0, here).value_q != 0.0)
 
 
 # tasks that are none

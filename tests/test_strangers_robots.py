@@ -74,7 +74,7 @@ def test_the_centre_of_mass_of_a_fixed_base_counts_its_foot(name: str, rng: np.r
         [(weighed(q + h * e) - weighed(q - h * e)) / (2 * h) for e in np.eye(fixed.n)]
     )
     np.testing.assert_allclose(jacobian, differences, atol=1e-9)
-    compiled = nmm.CenterOfMass().evaluate(0.0, Configuration(fixed, q))
+    compiled = nmm.evaluate(nmm.CenterOfMass(), 0.0, Configuration(fixed, q))
     np.testing.assert_array_equal(compiled.value, centre)
     np.testing.assert_array_equal(compiled.value_q, jacobian)
 
@@ -158,6 +158,6 @@ def test_a_robot_of_one_joint(function: nmm.Function, tmp_path: Path) -> None:
     one = nmm.load(write(tmp_path / "one.urdf", robot(*parts)), platform="fixed")
     assert one.q_names == ("q1",)
     step = 1e-6
-    ahead, behind = (function.evaluate(0.0, Configuration(one, [0.4 + way])) for way in (step, -step))
-    here = function.evaluate(0.0, Configuration(one, [0.4]))
+    ahead, behind = (nmm.evaluate(function, 0.0, Configuration(one, [0.4 + way])) for way in (step, -step))
+    here = nmm.evaluate(function, 0.0, Configuration(one, [0.4]))
     np.testing.assert_allclose(here.value_q[:, 0], (ahead.value - behind.value) / (2 * step), atol=1e-9)

@@ -9,18 +9,18 @@ which kernels compute them; how they are run is `program.py`'s business.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nmm.functions.live import LiveNumbers
 from nmm.kernels.compiled import Kernel
+from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
-
-if TYPE_CHECKING:
-    from nmm.robots.configuration import Configuration
 
 Array = NDArray[np.float64]
 
@@ -54,7 +54,7 @@ class Evaluation(NamedTuple):
     value_q: Array
 
 
-Callback = Callable[[float, "Configuration"], Evaluation]
+Callback = Callable[[float, Configuration], Evaluation]
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +70,7 @@ class Stage:
     numbers : the numbers that it reads
     hessians : whether it reads the frames' kinematic Hessians
     callback : a user's Python function, run before the kernels; its results are the numbers
+    live : what sets the numbers from outside, between two steps
     """
 
     kernel: Kernel
@@ -79,6 +80,22 @@ class Stage:
     hessians: bool = False
     callback: Callback | None = None
     before: int = 0
+    live: LiveNumbers | None = None
+
+
+class Shown(NamedTuple):
+    """What a function is about, for those who draw a run.
+
+    positions : the frame whose origin it puts somewhere in the world
+    axes : the world axes ("x", "y", "z") along which it does, each with the row that holds it, in m
+    turns : the frame that it turns
+    looks_at : the fixed point that it looks at, (2,) or (3,), m, world axes
+    """
+
+    positions: str | None = None
+    axes: Mapping[str, int] = MappingProxyType({})
+    turns: str | None = None
+    looks_at: Array | None = None
 
 
 class Function(ABC):
@@ -87,6 +104,8 @@ class Function(ABC):
     1. `rows(robot)`: names, units and angularity of the components; raises `InputError` for
        what the robot does not have;
     2. `stages(robot)`: the kernels that compute value, time derivative and Jacobian.
+
+    Where it moves a frame or looks at a point, `shown()` says so, for figures and playback.
 
     `comparison` is for values that cannot be subtracted (orientations, poses): a kernel of signature
     `records.FUNCTION` that sees the rows [value, target, error], s of each, with their derivatives, and
@@ -103,10 +122,6 @@ class Function(ABC):
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
         """The kernels that compute them, in order."""
 
-    def evaluate(self, t: float, configuration: Configuration) -> Evaluation:
-        """Value, partial time derivative and Jacobian at time t (s) and a configuration."""
-        from nmm.functions.program import Program
-
-        program = Program(configuration.robot, (self,))
-        program.lay_out()
-        return program.evaluate(t, configuration.q)[0]
+    def shown(self) -> Shown:
+        """What figures and playback draw of it; nothing unless it says so."""
+        return Shown()

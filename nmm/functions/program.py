@@ -169,9 +169,14 @@ class Program:
         self.prepare = update = kinematics_updater(
             robot, tuple(self._frames), found.placements, found.jacobians, found.hessians
         )
+        stages = [stage for stage, _ in self._stages]
+        self._numbers = [views(LaidOutStage, *self.blocks, int(place)).numbers for place in places]
+        for stage, block in zip(stages, self._numbers, strict=True):
+            if stage.live is not None:
+                stage.live.read_by(block)
         callbacks = [
-            (stage.callback, views(LaidOutStage, *self.blocks, int(place)).numbers)
-            for (stage, _), place in zip(self._stages, places, strict=True)
+            (stage.callback, block)
+            for stage, block in zip(stages, self._numbers, strict=True)
             if stage.callback is not None
         ]
         if callbacks:
@@ -189,6 +194,20 @@ class Program:
                 (first, first + length) for first, length in zip(self.first_rows, self._lengths, strict=True)
             )
         ]
+
+
+def evaluate(function: Function, t: float, configuration: Configuration) -> Evaluation:
+    """phi (s,), ∂phi/∂t (s,) and ∂phi/∂q (s, n) at time t, s, and a configuration, in the units of its rows.
+
+    It is laid out for this one call; a loop over many configurations holds a `Program` or a controller.
+
+    Raises
+    ------
+    InputError : a frame or coordinate that the robot lacks; a sum of objectives, which is its terms'
+    """
+    program = Program(configuration.robot, (function,))
+    program.lay_out()
+    return program.evaluate(t, configuration.q)[0]
 
 
 def _with_callbacks(

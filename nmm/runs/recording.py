@@ -6,12 +6,9 @@ import numpy as np
 
 from nmm.arrays import Array
 from nmm.control.controller import Controller, Step
+from nmm.errors import InputError
+from nmm.functions.function import Function, Shown
 from nmm.functions.program import Program
-from nmm.functions.references.bearing import Bearing
-from nmm.functions.references.polynomial import Constant
-from nmm.functions.tasks.orientation import Orientation
-from nmm.functions.tasks.pointing import Pointing
-from nmm.functions.tasks.pose import Pose
 from nmm.functions.tasks.position import AXES, Position
 from nmm.robots.robot import Robot
 from nmm.runs.broken_limits import excesses
@@ -29,6 +26,7 @@ class Recorder:
     def __init__(self, controller: Controller, times: Array) -> None:
         self._controller = controller
         self._times = times
+        self._shown = _shown(controller)
         robot, s = controller.robot, len(controller.rows)
         count = len(times)
         self.q = np.empty((count, robot.n))
@@ -123,7 +121,7 @@ class Recorder:
             self._warn_of_singularities(singular_values)
         if outcome in (Outcome.COMPLETED, Outcome.INTERRUPTED):  # of one that failed it goes without saying
             self.warnings += excesses(robot, self.t, self.q[:count], self._u[:count])
-        frame, columns, target = _shown(controller)
+        frame, columns, target = self._shown
         path, desired = None, None
         if frame is not None:
             path = _frame_path(robot, frame, self.q[:count])
@@ -164,7 +162,7 @@ class Recorder:
 def _shown(controller: Controller) -> tuple[str | None, dict[int, int], Array | None]:
     """The positioned frame, for each world axis the task's row that holds it, and the target looked at.
 
-    Where no task positions a frame, the one that a task turns.
+    Where no task positions a frame, the one that a task turns. `InputError` for what cannot be drawn.
     """
     frame: str | None = None
     turned: str | None = None
@@ -172,20 +170,31 @@ def _shown(controller: Controller) -> tuple[str | None, dict[int, int], Array | 
     target: Array | None = None
     row = 0
     for task in controller.task:
-        function = task.function
-        if isinstance(function, Position | Pose) and function.relative_to is None:
-            if frame in (None, function.frame):
-                frame = function.frame
-                axes = function.axes if isinstance(function, Position) else tuple(AXES)
-                columns |= {AXES[axis]: row + i for i, axis in enumerate(axes)}
-        elif isinstance(function, Orientation | Pointing):
-            turned = turned or function.frame
-        if isinstance(task.reference, Bearing):
-            target = task.reference.towards
-        if isinstance(function, Pointing) and isinstance(function.at, Constant):
-            target = function.at.value
-        row += len(task.rows(controller.robot))
+        count = len(task.rows(controller.robot))
+        said = _said(task.function, controller.robot, count)
+        if said.positions is not None and frame in (None, said.positions):
+            frame = said.positions
+            columns |= {AXES[axis]: row + i for axis, i in said.axes.items()}
+        turned = turned or said.turns
+        for part in (_said(task.reference, controller.robot, count), said):
+            target = target if part.looks_at is None else np.array(part.looks_at, dtype=np.float64)
+        row += count
     return frame or turned, columns, target
+
+
+def _said(function: Function, robot: Robot, rows: int) -> Shown:
+    """What the function shows, checked before the run that is to be shown."""
+    said, name = function.shown(), f"{type(function).__name__}.shown"
+    for frame in (said.positions, said.turns):
+        if frame is not None:
+            robot.frame_id(frame)
+    if not all(axis in AXES and row in range(rows) for axis, row in said.axes.items()):
+        raise InputError(
+            f"{name}: expected axes from x, y, z with rows from 0 to {rows - 1}, got {dict(said.axes)}"
+        )
+    if said.looks_at is not None and np.shape(said.looks_at) not in ((2,), (3,)):
+        raise InputError(f"{name}: expected 2 or 3 numbers as looks_at, got {said.looks_at!r}")
+    return said
 
 
 def _frame_path(robot: Robot, frame: str, q: Array) -> Array:

@@ -133,6 +133,7 @@ def _tip(robot: Robot, text: str) -> str:
 
 def _moving_axes(data: dict[str, Any], robot: Robot) -> str:
     """Those of x, y, z along which some input moves the point at some of a few configurations."""
+    from nmm.functions.program import evaluate
     from nmm.robots.configuration import Configuration
 
     function = _by_kind(_PARTS)[data["kind"]].model_validate(data | {"axes": "xyz"}).build(robot)
@@ -141,5 +142,5 @@ def _moving_axes(data: dict[str, Any], robot: Robot) -> str:
     moved = np.zeros(3)
     for _ in range(4):
         here = Configuration(robot, rng.uniform(lower, upper))
-        moved = np.maximum(moved, np.abs(function.evaluate(0.0, here).value_q @ here.S).max(axis=1))
+        moved = np.maximum(moved, np.abs(evaluate(function, 0.0, here).value_q @ here.S).max(axis=1))
     return "".join(axis for axis, motion in zip("xyz", moved, strict=True) if motion > 1e-9) or "xyz"

@@ -23,6 +23,7 @@ from nmm.analysis.singular.singularity import TOLERANCE
 from nmm.arrays import Array, positive
 from nmm.control.controller import Controller, Step
 from nmm.errors import InputError, SingularError
+from nmm.functions.program import evaluate
 from nmm.functions.references.polynomial import Constant
 from nmm.functions.tasks.task import Stack, Task
 from nmm.resolvers.answer import Status
@@ -140,11 +141,11 @@ def held(jacobians: Jacobians, t: float, q: Array) -> Stack:
     for task in jacobians.task:
         reference = task.reference
         moves = not isinstance(reference, Reached) and bool(
-            np.any(reference.evaluate(t, configuration).value_q != 0.0)
+            np.any(evaluate(reference, t, configuration).value_q != 0.0)
         )
         if not moves:
             rows = task.rows(jacobians.robot)
-            value = task.function.evaluate(t, configuration).value
+            value = evaluate(task.function, t, configuration).value
             reference = Constant(value, rows[0].unit)
         tasks.append(Task(task.function, reference, GAIN))
     return Stack(tuple(tasks))

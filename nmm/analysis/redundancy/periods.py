@@ -11,6 +11,7 @@ from nmm.arrays import Array
 from nmm.control.controller import Controller
 from nmm.errors import InputError
 from nmm.functions.function import Function
+from nmm.functions.program import evaluate
 from nmm.functions.references import Bearing, Circle, PoseReference
 from nmm.kernels.rotations import exp3
 from nmm.robots.configuration import Configuration
@@ -60,7 +61,7 @@ def _periods(reference: Function, configuration: Configuration) -> list[float]:
         return _periods(reference.of, configuration)
     if isinstance(reference, PoseReference):
         return _periods(reference.position, configuration) + _periods(reference.orientation, configuration)
-    values = [reference.evaluate(t, configuration).value for t in (0.0, 0.37, 1.7, 7.3, 31.0)]
+    values = [evaluate(reference, t, configuration).value for t in (0.0, 0.37, 1.7, 7.3, 31.0)]
     if all(np.array_equal(values[0], value) for value in values[1:]):
         return []
     raise InputError(
@@ -76,11 +77,11 @@ def expect_periodic(controller: Controller, q: Array, T: float, laps: int) -> No
     for task in (*controller.task, *controller.added_task):
         rows, turns = task.rows(controller.robot), task.function.comparison is not None
         angular = [row.angular for row in rows]
-        values = [task.reference.evaluate(t, configuration).value for t in starts]
+        values = [evaluate(task.reference, t, configuration).value for t in starts]
         first = [_comparable(value, angular, turns) for value in values]
         for lap in range(1, laps + 1):
             for k, t in enumerate(starts[:1] if lap == laps else starts):
-                value = task.reference.evaluate(t + lap * T, configuration).value
+                value = evaluate(task.reference, t + lap * T, configuration).value
                 moved = np.abs(_comparable(value, angular, turns) - first[k]).max()
                 if not moved < SAME:
                     raise InputError(

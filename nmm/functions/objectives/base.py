@@ -5,6 +5,7 @@ from __future__ import annotations
 from nmm.arrays import Array, scalar
 from nmm.errors import InputError
 from nmm.functions.function import Function, Row, Stage
+from nmm.functions.program import evaluate
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 
@@ -34,14 +35,14 @@ class Objective(Function):
     def value(self, configuration: Configuration) -> float:
         """H(q)."""
         return sum(
-            weight * float(function.evaluate(0.0, configuration).value[0])
+            weight * float(evaluate(function, 0.0, configuration).value[0])
             for weight, function in self.terms_on(configuration.robot)
         )
 
     def gradient(self, configuration: Configuration) -> Array:
         """∂H/∂q, shape (n,): ordinary partial derivatives in the coordinates."""
         parts = [
-            weight * function.evaluate(0.0, configuration).value_q[0]
+            weight * evaluate(function, 0.0, configuration).value_q[0]
             for weight, function in self.terms_on(configuration.robot)
         ]
         gradient: Array = sum(parts[1:], parts[0])

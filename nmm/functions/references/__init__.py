@@ -6,6 +6,7 @@ from nmm.functions.references.circle import Circle
 from nmm.functions.references.orientation import Slerp, Turn, rotation_vector
 from nmm.functions.references.polynomial import Constant, Line, PiecewisePolynomial, Polynomial, Spline
 from nmm.functions.references.pose import PoseReference
+from nmm.functions.references.signal import Signal
 
 __all__ = [
     "Bearing",
@@ -16,6 +17,7 @@ __all__ = [
     "PiecewisePolynomial",
     "Polynomial",
     "PoseReference",
+    "Signal",
     "Slerp",
     "Spline",
     "Turn",

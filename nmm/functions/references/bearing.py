@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, vector
 from nmm.errors import InputError
-from nmm.functions.function import Function, Row, Stage
+from nmm.functions.function import Function, Row, Shown, Stage
 from nmm.kernels.compiled import kernel
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import Robot
@@ -58,3 +58,6 @@ class Bearing(Function):
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
         self.rows(robot)
         return (*self.of.stages(robot), Stage(bearing, 2, (), np.array(self.towards[:2])))
+
+    def shown(self) -> Shown:
+        return Shown(looks_at=self.towards)

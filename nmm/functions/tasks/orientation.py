@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from nmm.arrays import Array
-from nmm.functions.function import Function, Row, Stage
+from nmm.functions.function import Function, Row, Shown, Stage
 from nmm.functions.tasks.frame_pose import PARTS, pose_rows, pose_stage
 from nmm.kernels.compiled import kernel
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
@@ -85,3 +85,6 @@ class Orientation(Function):
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
         return (pose_stage(self.frame, self.relative_to, TURNS),)
+
+    def shown(self) -> Shown:
+        return Shown(turns=self.frame)

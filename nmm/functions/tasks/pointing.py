@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, vector
 from nmm.errors import InputError, unknown
-from nmm.functions.function import Function, Row, Stage
+from nmm.functions.function import Function, Row, Shown, Stage
+from nmm.functions.references.polynomial import Constant
 from nmm.functions.tasks.heading import UNIT
 from nmm.functions.tasks.position import as_point, check_point
 from nmm.kernels.compiled import kernel
@@ -119,3 +120,6 @@ class Pointing(Function):
         b1 /= np.linalg.norm(b1)
         axes = np.concatenate([self.axis, b1, np.cross(self.axis, b1)])
         return (*self.at.stages(robot), Stage(pointing, 3, (self.frame,), axes))
+
+    def shown(self) -> Shown:
+        return Shown(turns=self.frame, looks_at=self.at.value if isinstance(self.at, Constant) else None)

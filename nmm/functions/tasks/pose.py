@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from nmm.arrays import Array
-from nmm.functions.function import Function, Row, Stage
+from nmm.functions.function import Function, Row, Shown, Stage
 from nmm.functions.tasks.frame_pose import PARTS, pose_rows, pose_stage
 from nmm.kernels.compiled import kernel
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
@@ -101,3 +101,8 @@ class Pose(Function):
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
         return (pose_stage(self.frame, self.relative_to, PARTS),)
+
+    def shown(self) -> Shown:
+        if self.relative_to is not None:
+            return Shown()
+        return Shown(self.frame, {axis: row for row, axis in enumerate(PARTS[:3])})

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, vector
 from nmm.errors import InputError
-from nmm.functions.function import Function, Row, Stage
+from nmm.functions.function import Function, Row, Shown, Stage
 from nmm.functions.references.polynomial import Constant
 from nmm.functions.tasks.frame_pose import pose_rows, pose_stage
 from nmm.kernels.compiled import kernel
@@ -62,6 +62,11 @@ class Position(Function):
             return (pose_stage(self.frame, self.relative_to, self.axes),)
         picked = np.array([float(AXES[axis]) for axis in self.axes])
         return (Stage(position, len(self.axes), (self.frame,), picked),)
+
+    def shown(self) -> Shown:
+        if self.relative_to is not None:
+            return Shown()
+        return Shown(self.frame, {axis: row for row, axis in enumerate(self.axes)})
 
 
 def as_point(given: Function | str | ArrayLike, name: str) -> Function:
