@@ -1179,7 +1179,7 @@ def test_names_and_sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_loads_quickly() -> None:
-    """A bundled robot takes about 55 ms of a processor where this was written; ten times that is a mistake."""
+    """A bundled robot takes about 55 ms of a processor (where this was written); not ten times that."""
     load("unicycle_3r")
     taken = []
     for _ in range(3):

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 from weakref import WeakValueDictionary
 
 import numpy as np
@@ -23,6 +23,13 @@ from nmm.words import one_line, printable
 _IN_USE: WeakValueDictionary[tuple[object, ...], Any] = WeakValueDictionary()
 _LOCK = threading.RLock()
 _SHOWN = 12
+
+
+class Shapes(NamedTuple):
+    """A robot's shapes, some of whose meshes may not be read yet."""
+
+    visual_model: pin.GeometryModel
+    collision_model: pin.GeometryModel
 
 
 def leave_unread(shape: pin.GeometryObject, file: str, scale: Sequence[float]) -> None:

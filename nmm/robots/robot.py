@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from nmm.arrays import scalar, vector
 from nmm.errors import InputError, unknown
 from nmm.platforms.base import Platform
-from nmm.robots.meshes import MeshesWhenAsked
+from nmm.robots.meshes import MeshesWhenAsked, Shapes
 
 Array = NDArray[np.float64]
 
@@ -53,13 +53,6 @@ class Wheel:
     swivel: str = ""
     pivot: Array = field(default_factory=lambda: np.zeros(3))
     roller: float = 0.0
-
-
-class Shapes(NamedTuple):
-    """A robot's shapes, some of whose meshes may not be read yet (`nmm.robots.meshes`)."""
-
-    visual_model: pin.GeometryModel
-    collision_model: pin.GeometryModel
 
 
 @dataclass(frozen=True, eq=False)
