@@ -1,4 +1,4 @@
-"""Words that sentences for people are made of: lists, sums of names, values with their units."""
+"""Words that sentences for people are made of: lists, sums, values with units, text on one line."""
 
 from __future__ import annotations
 
@@ -47,3 +47,14 @@ def value_text(value: float, unit: str) -> str:
     if unit != "rad":
         return measured(value if abs(value) > NEAR_PI else 0.0, unit)
     return fraction_of_pi(value) or measured(value, unit)
+
+
+def printable(text: str) -> str:
+    """The text with control characters, line breaks among them, as escapes: names in files may hold any."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def one_line(text: str, limit: int = 300) -> str:
+    """The text with all white space as single spaces, cut after `limit` characters."""
+    joined = " ".join(text.split())
+    return joined if len(joined) <= limit else f"{joined[: limit - 1]}…"

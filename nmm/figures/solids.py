@@ -10,6 +10,7 @@ import numpy as np
 
 from nmm.arrays import Array
 from nmm.robots.loading.joint_kinds import axis
+from nmm.robots.meshes import read_meshes
 from nmm.robots.robot import Robot, Wheel
 
 #: Directions, spread evenly over the sphere, in which a mesh's outermost points are kept.
@@ -31,14 +32,14 @@ class Solid:
 def platform_shapes(robot: Robot, platform: Sequence[int]) -> list[Solid]:
     """The shapes that the platform's joints carry: what is seen, or else what collides."""
     names = {robot.model.names[joint]: joint for joint in platform}
-    for model, geometry in ((robot.display_model, robot.visual_model), (robot.model, robot.collision_model)):
-        solids = []
-        for shape in geometry.geometryObjects:
-            joint = names.get(model.names[shape.parentJoint])
-            if joint is not None:
-                solids.append(Solid(joint, _shape_points(shape)))
-        if solids:
-            return _outermost(solids)
+    visual, collision = robot.shapes
+    for model, geometry in ((robot.display_model, visual), (robot.model, collision)):
+        carried = [shape for shape in geometry.geometryObjects if model.names[shape.parentJoint] in names]
+        read_meshes(carried, robot.name)  # not the arm's, which is drawn as lines
+        if carried:
+            return _outermost(
+                [Solid(names[model.names[shape.parentJoint]], _shape_points(shape)) for shape in carried]
+            )
     return []
 
 

@@ -6,7 +6,7 @@ are drawn as a stick figure, from each joint to the next. A body with a visual l
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,7 @@ from nmm.arrays import Array
 from nmm.errors import RobotError
 from nmm.robots.loading.joint_kinds import axis, is_revolute, kind
 from nmm.robots.loading.provenance import parts_of
+from nmm.robots.meshes import read_meshes
 from nmm.robots.robot import Robot, Wheel
 
 fcl = pin.hppfcl
@@ -60,7 +61,7 @@ def appearance(robot: Robot) -> Appearance:
     bare = [joint for joint in range(_root(robot), model.njoints) if joint not in seen]
     if not bare:
         return Appearance(visuals)
-    solids = [geometry for geometry in _solids(robot) if geometry.parentJoint in bare]
+    solids = _solids(robot, bare)
     solid = {int(geometry.parentJoint) for geometry in solids}
     figure = _StickFigure(robot, [joint for joint in bare if joint not in solid])
     drawn = list(figure.shapes())
@@ -209,19 +210,23 @@ def _root(robot: Robot) -> int:
     return int(robot.display_model.getJointId("theta")) if robot.platform.n_p else 0
 
 
-def _solids(robot: Robot) -> Iterator[pin.GeometryObject]:
-    """The collision shapes, grey, on the display model."""
+def _solids(robot: Robot, joints: Container[int]) -> list[pin.GeometryObject]:
+    """The collision shapes of some joints, grey, on the display model."""
     display = robot.display_model
     try:
         names, collisions = display.names, parts_of(robot).collision_model
     except RobotError:  # made by hand: the wheels' shapes are those of what carries them
-        names, collisions = robot.model.names, robot.collision_model
-    for geometry in collisions.copy().geometryObjects:
-        name = names[geometry.parentJoint]
-        if display.existJointName(name):
-            geometry.parentJoint = display.getJointId(name)
-            geometry.meshColor, geometry.overrideMaterial = np.array(GREY), True
-            yield geometry
+        names, collisions = robot.model.names, robot.shapes.collision_model
+    places = {i: display.getJointId(name) for i, name in enumerate(names) if display.existJointName(name)}
+    drawn = [
+        geometry for geometry in collisions.geometryObjects if places.get(geometry.parentJoint) in joints
+    ]
+    read_meshes(drawn, robot.name)
+    solids = [pin.GeometryObject(geometry) for geometry in drawn]
+    for geometry in solids:
+        geometry.parentJoint = places[geometry.parentJoint]
+        geometry.meshColor, geometry.overrideMaterial = np.array(GREY), True
+    return solids
 
 
 def _links(robot: Robot, joints: set[int]) -> tuple[str, ...]:

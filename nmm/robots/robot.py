@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from nmm.arrays import scalar, vector
 from nmm.errors import InputError, unknown
 from nmm.platforms.base import Platform
+from nmm.robots.meshes import MeshesWhenAsked, Shapes
 
 Array = NDArray[np.float64]
 
@@ -62,9 +63,9 @@ class Robot:
     ----------
     name : the robot's name
     model : kinematics: joints x, y, theta, then the arm, in Pinocchio's order; nq = nv = n
-    collision_model : collision shapes, on `model`
+    collision_model : collision shapes, on `model`; their meshes are read when it is first asked for
     display_model : as `model`, with the wheels as joints
-    visual_model : visual shapes, on `display_model`
+    visual_model : visual shapes, on `display_model`; as for collisions
     platform : states G(qp)
     wheels : the wheels that playback turns
     source : the file, the bundled name, or "pin.Model"
@@ -104,6 +105,14 @@ class Robot:
                 f"{self.name}: the {self.platform.name} platform expects the first coordinates to be "
                 f"{', '.join(self.platform.coordinates)}, the model has {', '.join(head)}"
             )
+
+    @property
+    def shapes(self) -> Shapes:
+        """Its shapes without asking for their meshes: names, places, colours, pairs.
+
+        With `replace(robot, **robot.shapes._asdict(), ...)` they stay as they are: it asks for what it lacks.
+        """
+        return Shapes(vars(self)["visual_model"], vars(self)["collision_model"])
 
     @cached_property
     def q_names(self) -> tuple[str, ...]:
@@ -301,3 +310,8 @@ class Robot:
         S[:n_p, :p] = self.platform.G(self.q(q)[:n_p])
         S[n_p:, p:] = np.eye(self.n - n_p)
         return S
+
+
+# Set here, where the dataclass does not take them for defaults.
+Robot.collision_model = MeshesWhenAsked("collision_model")
+Robot.visual_model = MeshesWhenAsked("visual_model")

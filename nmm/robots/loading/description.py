@@ -11,8 +11,9 @@ import numpy as np
 
 from nmm.errors import RobotError
 from nmm.robots.loading.packages import Packages
-from nmm.robots.loading.text import one_line, read_text
+from nmm.robots.loading.text import read_text
 from nmm.robots.loading.xacro_file import expand
+from nmm.words import one_line
 
 SUFFIXES = (".urdf", ".xacro")
 

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from nmm.errors import unknown
-from nmm.robots.loading.text import one_line
 from nmm.robots.loading.xml_tree import Element
+from nmm.words import one_line
 
 # What the C++ reader takes: Python's float would also take nan, inf and 1_0.
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")

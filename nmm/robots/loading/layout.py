@@ -67,6 +67,18 @@ class Measured:
         """The joints after the root's, by name."""
         return {str(self.model.names[i]): i for i in range(self.root + 1, self.model.njoints)}
 
+    @cached_property
+    def links(self) -> dict[int, list[str]]:
+        """Names of the link right below each joint; not of those fixed to it: a camera on a wheel is none."""
+        below: dict[int, list[str]] = {}
+        frames = self.model.frames
+        for frame in frames:
+            joint = int(frame.parentJoint)
+            is_link = frame.type == pin.FrameType.BODY
+            if is_link and frames[frame.parentFrame].name == self.model.names[joint]:
+                below.setdefault(joint, []).append(frame.name)
+        return below
+
     def axis(self, joint: int) -> Array:
         """The joint's axis, in the root link's frame."""
         turned: Array = self.placements[joint].rotation @ axis(self.model.joints[joint], self.neutral)
@@ -79,12 +91,7 @@ class Measured:
     def is_named_wheel(self, joint: int) -> bool:
         """Whether "wheel" is in the joint's name, or in that of its child link; "caster" will do for a joint
         that can be one's wheel."""
-        names = [str(self.model.names[joint])]
-        for frame in self.model.frames:
-            # Links that are fixed to the child link do not count: a camera over the wheel is no wheel.
-            of_joint = self.model.frames[frame.parentFrame].name == names[0]
-            if frame.parentJoint == joint and frame.type == pin.FrameType.BODY and of_joint:
-                names.append(frame.name)
+        names = [str(self.model.names[joint]), *self.links.get(joint, ())]
         rolls = self.why_not_rolling(joint) is None
         return any("wheel" in name.lower() or (rolls and "caster" in name.lower()) for name in names)
 

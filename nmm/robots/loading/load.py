@@ -13,8 +13,8 @@ from nmm.errors import InputError, RobotError
 from nmm.platforms import Platform, platform_by_name
 from nmm.robots.loading.models import Options, robot_from
 from nmm.robots.loading.source import read_file, read_model
-from nmm.robots.loading.text import printable
 from nmm.robots.robot import Robot
+from nmm.words import printable
 
 
 def load(

@@ -154,7 +154,7 @@ def _without_wheels(
         notes=(*parts.notes, *notes),
         parts=replace(parts, provenance=replace(parts.provenance, reduced=tuple(names))),
     )
-    return replace(robot, notes=(*robot.notes, *told_slip(robot)))
+    return replace(robot, **robot.shapes._asdict(), notes=(*robot.notes, *told_slip(robot)))
 
 
 def _with_held_wheels(

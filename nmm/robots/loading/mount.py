@@ -20,8 +20,8 @@ from nmm.robots.loading.models import Options, robot_from
 from nmm.robots.loading.provenance import Parts, parts_of
 from nmm.robots.loading.reduction import reduced, told_apart
 from nmm.robots.loading.source import Source
-from nmm.robots.loading.text import printable
 from nmm.robots.robot import Robot
+from nmm.words import printable
 
 # Frames on which something is meant to be mounted.
 _PLACES = ("mount", "arm_mount", "top")
@@ -105,7 +105,7 @@ def _mounted(
     base: Robot, arm: Robot, at: str | None, pose: pin.SE3, prefix: str | None, name: str | None
 ) -> Robot:
     parts, arm_parts = parts_of(base), parts_of(arm)
-    platform = _Body(base.display_model, base.visual_model, parts.collision_model)
+    platform = _Body(base.display_model, base.shapes.visual_model, parts.collision_model)
     body = _arm_body(arm, arm_parts)
     if body.model.nq == 0:
         raise RobotError(f"{arm.name} has no movable joint, so it is no arm")
@@ -136,9 +136,9 @@ def _mounted(
         """Those of both robots, by the shapes' places, and those of the one's shapes with the other's."""
         geometry.removeAllCollisionPairs()
         count = platform.collision.ngeoms
-        for pair in base.collision_model.collisionPairs:
+        for pair in base.shapes.collision_model.collisionPairs:
             geometry.addCollisionPair(pair)
-        for pair in arm.collision_model.collisionPairs:
+        for pair in arm.shapes.collision_model.collisionPairs:
             geometry.addCollisionPair(pin.CollisionPair(pair.first + count, pair.second + count))
         add_pairs(model, geometry, count)
 
@@ -154,12 +154,12 @@ def _mounted(
             platform=provenance.platform,
         ),
     )
-    return replace(robot, arms={**base.arms, key: joints}, parts=kept)
+    return replace(robot, **robot.shapes._asdict(), arms={**base.arms, key: joints}, parts=kept)
 
 
 def _arm_body(arm: Robot, parts: Parts) -> _Body:
     """A copy of the arm alone: of a fixed base, with its wheels standing still."""
-    model, shapes = arm.display_model, (arm.visual_model, parts.collision_model)
+    model, shapes = arm.display_model, (arm.shapes.visual_model, parts.collision_model)
     wheels = dict.fromkeys(name for wheel in arm.wheels for name in (wheel.swivel, wheel.joint) if name)
     if wheels:
         ids = [model.getJointId(wheel) for wheel in wheels]

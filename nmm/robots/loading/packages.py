@@ -44,6 +44,7 @@ class Packages:
         self.folders = (*given, *_environment_folders(), *_share_folders())
         self.searched = (*self.folders, *self.file.parents)
         self.found: dict[str, Path | None] = {}
+        self._folders: dict[str, list[Path]] = {}
 
     def find(self, package: str) -> Path | None:
         """The folder of a package, or None."""
@@ -76,13 +77,16 @@ class Packages:
         return _first_file(folder / name for folder in folders) or "no such file"
 
     def _candidates(self, package: str) -> list[Path]:
-        folders: list[Path] = []
-        if package not in ("", ".", "..") and "/" not in package:
-            for folder in self.searched:
-                if folder.name == package:
-                    folders.append(folder)
-                if os.path.isdir(folder / package):
-                    folders.append(folder / package)
+        """The folders of that name, looked for once: a robot may have a hundred meshes in one package."""
+        folders = self._folders.get(package)
+        if folders is None:
+            folders = self._folders[package] = []
+            if package not in ("", ".", "..") and "/" not in package:
+                for folder in self.searched:
+                    if folder.name == package:
+                        folders.append(folder)
+                    if os.path.isdir(folder / package):
+                        folders.append(folder / package)
         self.found[package] = folders[0] if folders else None
         return folders
 

@@ -20,6 +20,7 @@ from nmm.robots.loading.joint_kinds import is_continuous, is_simple, kind
 from nmm.robots.loading.provenance import parts_of, provenance_of
 from nmm.robots.loading.reduction import reduced
 from nmm.robots.loading.root_layout import ROOTS, ChainRoot, RootLayout
+from nmm.robots.meshes import read_meshes
 from nmm.robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -39,7 +40,7 @@ class PinocchioModels(NamedTuple):
 
 def pinocchio_model(robot: Robot, root: Root | str = "planar") -> pin.Model:
     """The robot's kinematics and dynamics on another root joint; see `pinocchio_models`."""
-    return pinocchio_models(robot, root).model
+    return _models(robot, root).model
 
 
 def pinocchio_models(robot: Robot, root: Root | str = "planar") -> PinocchioModels:
@@ -54,9 +55,17 @@ def pinocchio_models(robot: Robot, root: Root | str = "planar") -> PinocchioMode
     ------
     InputError : no such root, or a robot of a fixed base on one that moves
     """
+    models = _models(robot, root)
+    for shapes in (models.visual_model, models.collision_model):
+        read_meshes(shapes.geometryObjects, robot.name)
+    return models
+
+
+def _models(robot: Robot, root: Root | str) -> PinocchioModels:
+    """The models, whose meshes need not be read yet."""
     if root not in ROOTS:
         raise InputError(unknown("root", root, ROOTS))
-    model, shapes = robot.display_model, (robot.visual_model, parts_of(robot).collision_model)
+    model, shapes = robot.display_model, (robot.shapes.visual_model, parts_of(robot).collision_model)
     names = dict.fromkeys(name for wheel in robot.wheels for name in (wheel.swivel, wheel.joint) if name)
     if names:
         ids = [model.getJointId(name) for name in names]
@@ -72,7 +81,7 @@ def pinocchio_models(robot: Robot, root: Root | str = "planar") -> PinocchioMode
     rebuilt = rebuild(model, shapes, robot.name, first=first, head=head)
     visual, collision = rebuilt.geometries
     collision.removeAllCollisionPairs()
-    for pair in robot.collision_model.collisionPairs:
+    for pair in robot.shapes.collision_model.collisionPairs:
         collision.addCollisionPair(pair)
     return PinocchioModels(rebuilt.model, visual, collision)
 

@@ -60,7 +60,7 @@ class Parts:
 
     Attributes
     ----------
-    collision_model : collision shapes on `display_model`, where the wheels still turn
+    collision_model : collision shapes on `display_model`, where the wheels still turn; as in `Robot.shapes`
     notes : what was done to the files before wheels were taken out of q
     provenance : what was found
     """
@@ -86,5 +86,5 @@ def parts_of(robot: Robot) -> Parts:
     if isinstance(parts, Parts):
         return parts
     if robot.model.nq == robot.display_model.nq:
-        return Parts(robot.collision_model, robot.notes)
+        return Parts(robot.shapes.collision_model, robot.notes)
     raise RobotError(f"{robot.name}: was not made by nmm.load, so that its wheels' shapes are not known")

@@ -18,11 +18,12 @@ from nmm.robots.loading.load import load
 from nmm.robots.loading.packages import Packages
 from nmm.robots.loading.provenance import provenance_of
 from nmm.robots.loading.second_opinion import second_opinion
-from nmm.robots.loading.text import one_line, printable
 from nmm.robots.loading.wheel_advice import wheel_advice
 from nmm.robots.loading.xacro_file import expand
 from nmm.robots.loading.xml_tree import Element, parse
+from nmm.robots.meshes import read_meshes
 from nmm.robots.robot import Robot
+from nmm.words import one_line, printable
 
 _LINE = re.compile(r"(?:.*: )?line (\d+): ", re.DOTALL)
 _NOWHERE = "/(package not found)"
@@ -220,6 +221,8 @@ class _Report:
                 lock=lock,
                 missing_meshes="skip",
             )
+            for shapes in robot.shapes:
+                read_meshes(shapes.geometryObjects, robot.name)
         except InputError as error:
             return [Problem(str(error).removeprefix(f"{self.description.path}: "))]
         except Exception as error:  # a library's, which `load` did not foresee: a report comes all the same

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from nmm.robots.loading.text import one_line
+from nmm.words import one_line
 
 #: Largest difference of placements, m and of rotation matrices' entries.
 SAME = 1e-6

@@ -16,8 +16,9 @@ from nmm.robots.loading.check_mimics import Mimic
 from nmm.robots.loading.description import SUFFIXES, describe
 from nmm.robots.loading.packages import package_file
 from nmm.robots.loading.provenance import Provenance
-from nmm.robots.loading.text import one_line
-from nmm.robots.loading.urdf_text import urdf_text
+from nmm.robots.loading.urdf_text import UrdfText, urdf_text
+from nmm.robots.meshes import leave_unread
+from nmm.words import one_line
 
 PACKAGE = "package://"
 
@@ -127,19 +128,22 @@ def _path(source: str | Path, package_dirs: Sequence[str | Path]) -> Path:
     return robots[source]
 
 
-def _pinocchio_models(urdf: str, where: str) -> tuple[pin.Model, pin.GeometryModel, pin.GeometryModel]:
-    """Fixed-base model, visual and collision shapes of a checked URDF text."""
+def _pinocchio_models(urdf: UrdfText, where: str) -> tuple[pin.Model, pin.GeometryModel, pin.GeometryModel]:
+    """Fixed-base model, visual and collision shapes of a checked description; its meshes are not read."""
     try:
-        model = pin.buildModelFromXML(urdf)
-        return (
-            model,
-            pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.VISUAL),
-            pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.COLLISION),
+        model = pin.buildModelFromXML(urdf.xml)
+        visual, collision = (
+            pin.buildGeomFromUrdfString(model, urdf.xml, kind)
+            for kind in (pin.GeometryType.VISUAL, pin.GeometryType.COLLISION)
         )
     except (ValueError, RuntimeError) as error:
-        # coal puts the place in its own source before the message.
-        cause = one_line(str(error).split("message:", 1)[-1])
-        raise RobotError(f"{where}: Pinocchio cannot read it: {cause}") from None
+        raise RobotError(f"{where}: Pinocchio cannot read it: {one_line(str(error))}") from None
+    for shapes, kind in ((visual, "visual"), (collision, "collision")):
+        for shape in shapes.geometryObjects:
+            mesh = urdf.meshes[kind].get(shape.name)
+            if mesh is not None:
+                leave_unread(shape, str(mesh.path), mesh.scale)
+    return model, visual, collision
 
 
 def _shapes(shapes: pin.GeometryModel | None, name: str, model: pin.Model) -> pin.GeometryModel:

@@ -1,4 +1,4 @@
-"""Files as text, and text as one line of an error message."""
+"""The text of files."""
 
 from __future__ import annotations
 
@@ -26,14 +26,3 @@ def read_text(path: Path) -> str:
         raise RobotError(f"{path}: expected a .urdf or .xacro file, this is a directory") from None
     except OSError as error:
         raise RobotError(f"{path}: cannot be read ({error.strerror})") from None
-
-
-def printable(text: str) -> str:
-    """The text with control characters, line breaks among them, as escapes: names in files may hold any."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
-
-
-def one_line(text: str, limit: int = 300) -> str:
-    """The text with all white space as single spaces, cut after `limit` characters."""
-    joined = " ".join(text.split())
-    return joined if len(joined) <= limit else f"{joined[: limit - 1]}…"

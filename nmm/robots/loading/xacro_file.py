@@ -14,8 +14,9 @@ from typing import Any
 
 from nmm.errors import RobotError, unknown
 from nmm.robots.loading.packages import Packages
-from nmm.robots.loading.text import one_line, read_text
+from nmm.robots.loading.text import read_text
 from nmm.robots.loading.xml_tree import XmlError, parse
+from nmm.words import one_line
 
 # xacro keeps its stacks, arguments and verbosity in module globals.
 _LOCK = threading.RLock()

@@ -1,0 +1,109 @@
+"""Meshes that are read when something draws or collides, not when a robot is loaded.
+
+A shape whose mesh is not read is an ordinary `pin.GeometryObject` (name, joint, placement, scale and colour,
+and the file's path) around a mesh without vertices. So models are reduced, joined, copied and pickled with
+their shapes as ever, and whoever asks a robot for its shapes gets them whole.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+from weakref import WeakValueDictionary
+
+import numpy as np
+import pinocchio as pin
+
+from nmm.errors import RobotError
+from nmm.words import one_line, printable
+
+# Read by now and in use: a mesh that several shapes or robots have is read once, and goes with the last.
+_IN_USE: WeakValueDictionary[tuple[object, ...], Any] = WeakValueDictionary()
+_LOCK = threading.RLock()
+_SHOWN = 12
+
+
+class Shapes(NamedTuple):
+    """A robot's shapes, some of whose meshes may not be read yet."""
+
+    visual_model: pin.GeometryModel
+    collision_model: pin.GeometryModel
+
+
+def leave_unread(shape: pin.GeometryObject, file: str, scale: Sequence[float]) -> None:
+    """Make a shape that of a mesh file which is yet to be read; `scale` (3,) stretches its axes."""
+    shape.geometry, shape.meshPath, shape.meshScale = pin.hppfcl.BVHModelOBBRSS(), file, np.array(scale)
+
+
+def is_unread(shape: pin.GeometryObject) -> bool:
+    """Whether the shape is that of a mesh file that is yet to be read."""
+    mesh = shape.geometry
+    return isinstance(mesh, pin.hppfcl.BVHModelBase) and not mesh.num_vertices and bool(shape.meshPath)
+
+
+def read_meshes(shapes: Iterable[pin.GeometryObject], where: str) -> None:
+    """Give shapes their meshes where these are not read yet; threads may call it at the same time.
+
+    Parameters
+    ----------
+    shapes : of a geometry model, changed in place
+    where : what messages call the robot
+
+    Raises
+    ------
+    RobotError : meshes that cannot be read, with file and link of each; the others are read
+    """
+    problems = []
+    with _LOCK:
+        for shape in shapes:
+            if is_unread(shape):
+                try:
+                    shape.geometry = _mesh(shape.meshPath, shape.meshScale)
+                except (OSError, ValueError, RuntimeError) as error:
+                    # coal puts the place in its own source before the message.
+                    said = isinstance(error, OSError) and error.strerror
+                    cause = said or one_line(str(error).split("message:", 1)[-1])
+                    link = shape.name.rpartition("_")[0]
+                    problems.append(f"link {link!r}: mesh {shape.meshPath} cannot be read: {cause}")
+    if problems:
+        more = [f"and {len(problems) - _SHOWN} more"] if len(problems) > _SHOWN else []
+        raise RobotError(printable(f"{where}: {'; '.join([*problems[:_SHOWN], *more])}"))
+
+
+def _mesh(file: str, scale: np.ndarray) -> Any:
+    """A mesh as Pinocchio's own reader of URDFs takes it."""
+    state = os.stat(file)
+    key = (file, *map(float, scale), state.st_mtime_ns, state.st_size)
+    mesh = _IN_USE.get(key)
+    if mesh is None:
+        _IN_USE[key] = mesh = mesh_of(file, scale)
+    return mesh
+
+
+def mesh_of(file: str, scale: np.ndarray) -> Any:
+    """The mesh of a file (coal's, with its tree of boxes), its axes stretched by `scale` (3,)."""
+    return pin.hppfcl.MeshLoader().load(file, scale)
+
+
+class MeshesWhenAsked:
+    """A field of a dataclass that has a `name`: a geometry model, whose meshes are read when it is asked for.
+
+    `vars(owner)` has the model under the field's name as it is, its meshes perhaps unread.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name, self._done = name, f"_{name}_has_meshes"
+
+    def __get__(self, owner: Any, kind: type | None = None) -> Any:
+        if owner is None:
+            return self
+        held = vars(owner)
+        if self._done not in held:
+            read_meshes(held[self._name].geometryObjects, owner.name)
+            held[self._done] = True
+        return held[self._name]
+
+    def __set__(self, owner: Any, shapes: pin.GeometryModel) -> None:
+        vars(owner)[self._name] = shapes
