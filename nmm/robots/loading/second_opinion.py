@@ -12,7 +12,11 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from nmm.robots.followers import settled
+from nmm.robots.loading.check_mimics import check_mimics
+from nmm.robots.loading.findings import Findings, children
 from nmm.robots.loading.text import one_line
+from nmm.robots.loading.xml_tree import parse
 
 #: Largest difference of placements, m and of rotation matrices' entries.
 SAME = 1e-6
@@ -25,7 +29,7 @@ def second_opinion(xml: str) -> list[str]:
 
     Parameters
     ----------
-    xml : URDF text, without problems and without mimic joints that matter; meshes are not read
+    xml : URDF text, without problems; meshes are not read
     """
     try:
         import yourdfpy
@@ -47,17 +51,22 @@ def second_opinion(xml: str) -> list[str]:
 
 def _differences(xml: str, other: Any) -> Iterator[str]:
     """Links whose placements in the root link differ, at one configuration with every joint moved."""
-    model = pin.buildModelFromXML(xml, mimic=True)
+    model = pin.buildModelFromXML(xml)
     data = model.createData()
     q = pin.neutral(model)
     rng = np.random.default_rng(1)
     cfg: dict[str, float] = {}
     for name in other.actuated_joint_names:
-        joint = model.joints[model.getJointId(name)]
         limit = other.joint_map[name].limit
         bounded = limit is not None and limit.lower is not None and limit.upper is not None
-        low, high = (limit.lower, limit.upper) if bounded and joint.nq == 1 else (-1.0, 1.0)
-        cfg[name] = value = float(rng.uniform(max(low, -3.0), min(high, 3.0))) if low < high else float(low)
+        single = model.joints[model.getJointId(name)].nq == 1
+        low, high = (limit.lower, limit.upper) if bounded and single else (-1.0, 1.0)
+        cfg[name] = float(rng.uniform(max(low, -3.0), min(high, 3.0))) if low < high else float(low)
+    followers = check_mimics(children(parse(xml), "joint"), Findings())
+    fixed = {one.leader: 0.0 for one in followers if not model.existJointName(one.leader)}
+    following = settled(followers, {**fixed, **cfg})[0]
+    for name, value in {**cfg, **{name: value for name, (_, value) in following.items()}}.items():
+        joint = model.joints[model.getJointId(name)]
         q[joint.idx_q : joint.idx_q + joint.nq] = [value] if joint.nq == 1 else [np.cos(value), np.sin(value)]
     other.update_cfg(cfg)
     pin.framesForwardKinematics(model, data, q)
