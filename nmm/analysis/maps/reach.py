@@ -58,6 +58,8 @@ class Reach:
                 raise InputError(unknown("joint", name, names, "ranges"))
         limits = [checked_range(given[name], name) if name in given else self._usual(name) for name in names]
         self.lower, self.upper = np.array(limits).reshape(-1, 2).T
+        who = robot.following
+        self._carried = who.carried[:, np.searchsorted(who.independent, moving)]
         self._placements, self._jacobians = np.empty((1, 3, 4)), np.empty((1, 6, robot.n))
         self._update = kinematics_updater(
             robot, (frame,), self._placements, self._jacobians, np.empty((0, 6, robot.n, robot.n))
@@ -81,7 +83,7 @@ class Reach:
         """Configurations (N, n) with these varied joints (N, k)."""
         q = np.tile(self.q, (len(joints), 1))
         q[:, self.moving] = joints
-        return q
+        return self.robot.following.placed(q)
 
     def positions(self, q: Array, progress: Progress | None = None) -> Array:
         """Where the frame is, (N, 3), m."""
@@ -146,7 +148,7 @@ class Reach:
             points[k] = origin
             jacobians[k] = jacobian
         rows = [*self.in_plane, *([] if self.slab is None else [self.third])]
-        return points, jacobians[:, rows][:, :, self.moving]
+        return points, jacobians[:, rows] @ self._carried
 
     def _stepped(self, q: Array, targets: Array, points: Array, rates: Array) -> Array:
         """Configurations a Newton step from q, where the frame is at points and moves by rates."""

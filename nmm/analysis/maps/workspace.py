@@ -83,7 +83,7 @@ def workspace_map(
     """
     evaluator = Evaluator(subject, **judged)
     robot = evaluator.robot
-    if robot.n == robot.platform.n_p:
+    if not len(robot.arm_coordinates):
         raise InputError(f"workspace map: expected a robot with an arm, {robot.name} has none")
     longest, _ = sample_counts(samples)
     count = counted(configurations, "configurations", 2)
@@ -91,6 +91,7 @@ def workspace_map(
     if len(plane) != 2 or plane[0] == plane[1] or not set(plane) <= set(AXES):
         raise InputError(f"plane: expected two of x, y, z, as in 'xy', got {plane!r}")
     held = robot.rest if at is None else robot.q(at)
+    robot.check_followers(held)
     frame = _task_frame(evaluator) if frame is None else frame
     robot.frame_id(frame)
     moving = _moving(evaluator, frame, held)
@@ -164,15 +165,16 @@ def _task_frame(evaluator: Evaluator) -> str:
 def _moving(evaluator: Evaluator, frame: str, held: Array) -> Integers:
     """The arm's joints that move the frame's origin or are felt by the task."""
     robot = evaluator.robot
-    n_p = robot.platform.n_p
+    arm = robot.arm_coordinates
     q = np.tile(held, (8, 1))
-    q[:, n_p:] += np.random.default_rng(0).uniform(-1.0, 1.0, (8, robot.n - n_p))
+    q[:, arm] += np.random.default_rng(0).uniform(-1.0, 1.0, (8, len(arm)))
+    q = robot.following.placed(q)
     felt = np.abs(np.nan_to_num(evaluator.jacobians.batch(q, evaluator.t)))[:, :, robot.platform.p :]
     moved = np.max(felt, axis=(0, 1)) > 1e-9
     moved |= _moves(robot, frame, q)
     if not moved.any():
         raise InputError(f"workspace map: the arm of {robot.name} moves {frame} in no way")
-    return np.asarray(n_p + np.flatnonzero(moved), dtype=np.int64)
+    return np.asarray(arm[moved], dtype=np.int64)
 
 
 def _check_plane(reach: Reach) -> None:
@@ -191,9 +193,10 @@ def _check_plane(reach: Reach) -> None:
 
 
 def _moves(robot: Robot, frame: str, q: Array) -> Array:
-    """Which joints of the arm move a frame's origin, (n_m,)."""
-    found = [np.abs(Configuration(robot, point).jacobian(frame)[:3]).max(axis=0) for point in q]
-    return np.max(found, axis=0)[robot.platform.n_p :] > 1e-9
+    """Which of the arm's inputs move a frame's origin, (n_m,)."""
+    here = [Configuration(robot, point) for point in q]
+    found = [np.abs((one.jacobian(frame) @ one.S)[:3]).max(axis=0) for one in here]
+    return np.asarray(np.max(found, axis=0)[robot.platform.p :] > 1e-9)
 
 
 def _singular_places(evaluator: Evaluator, reach: Reach, part: str, progress: Progress | None) -> SingularSet:
