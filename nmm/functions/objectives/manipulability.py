@@ -113,5 +113,7 @@ class Manipulability(Objective):
                 f"always 0; expected at most {inputs} rows"
             )
         rows = [ROWS[row] for row in self.selected]
-        numbers = np.array([platform, len(rows), len(arm), *rows, *arm, *robot.following.table.ravel()], float)
+        numbers = np.array(
+            [platform, len(rows), len(arm), *rows, *arm, *robot.following.table.ravel()], float
+        )
         return (Stage(manipulability, 1, (self.frame,), numbers, hessians=True),)
