@@ -8,11 +8,12 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
 
-from nmm.robots.followers import settled
+from nmm.robots.followers import first_leaders, settled
 from nmm.robots.loading.check_mimics import check_mimics
 from nmm.robots.loading.findings import Findings, children
 from nmm.robots.loading.text import one_line
@@ -35,6 +36,7 @@ def second_opinion(xml: str) -> list[str]:
         import yourdfpy
     except ImportError as error:
         return [f"yourdfpy, for a second opinion, is not there: {error}"]
+    xml = _without_chains(xml)
     with _quiet() as said:
         try:
             other = yourdfpy.URDF.load(io.BytesIO(xml.encode("utf-8")), load_meshes=False)
@@ -80,6 +82,21 @@ def _differences(xml: str, other: Any) -> Iterator[str]:
                 "turned (an axis that is no unit vector?)"
             )
             return
+
+
+def _without_chains(xml: str) -> str:
+    """The same with every follower by a joint that follows nobody: yourdfpy reads no chains of them."""
+    followers = check_mimics(children(parse(xml), "joint"), Findings())
+    if first_leaders(followers) == followers:
+        return xml
+    root = ElementTree.fromstring(xml)
+    found = {one.joint: one for one in first_leaders(followers)}
+    for joint in root.iterfind("joint"):
+        one, mimic = found.get(joint.get("name", "")), joint.find("mimic")
+        if one is not None and mimic is not None:
+            numbers = {"multiplier": repr(one.multiplier), "offset": repr(one.offset)}
+            mimic.attrib = {"joint": one.leader, **numbers}
+    return ElementTree.tostring(root, encoding="unicode")
 
 
 @contextmanager
