@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from gripping import folding
 from spatial_arms import load_tiago, load_ur5
 
 from nmm.robots.loading import load
@@ -22,7 +23,7 @@ def robot_3r() -> Robot:
 
 @pytest.fixture(scope="session")
 def robots(robot_2r: Robot, robot_3r: Robot) -> dict[str, Robot]:
-    return {robot.name: robot for robot in (robot_2r, robot_3r)}
+    return {robot.name: robot for robot in (robot_2r, robot_3r, folding())}
 
 
 @pytest.fixture(scope="session")

@@ -62,6 +62,8 @@ Array = NDArray[np.float64]
 
 BOTH = ("unicycle_2r", "unicycle_3r")
 SPATIAL = ("unicycle_3r",)
+#: For what depends on the inputs and the limits, a robot with a joint that follows another, too.
+FOLDING = ("unicycle_3r_folding",)
 
 
 @dataclass(frozen=True)
@@ -128,7 +130,7 @@ def _tasks() -> Iterator[Entry]:
     yield Entry("heading of link1", Heading("link1"))
     yield Entry("coordinate", Coordinates("q2"))
     yield Entry("combinations", Coordinates("y", {"theta": 1, "q1": 1, "q2": -2.5}, {"x": 3.0}))
-    yield Entry("posture", Posture())
+    yield Entry("posture", Posture(), (*BOTH, *FOLDING))
     yield Entry("posture of two", Posture("q2", "x"))
     yield Entry("callable function", CallableFunction(_hand, ["a", "b"]))
     yield Entry("callable function, jacobian", CallableFunction(_hand, ["a", "b"], jacobian=_hand_jacobian))
@@ -237,11 +239,16 @@ def _objectives() -> Iterator[Entry]:
         ("arm", "xyz", SPATIAL),
         ("arm", ("rx", "ry", "rz"), SPATIAL),
     ):
-        yield Entry(f"manipulability of the {of}, {' '.join(rows)}", Manipulability("ee", rows, of), robots)
-    yield Entry("manipulability of a link", Manipulability("link2", "xy"))
+        # Two joints of its arm are moved by inputs, and the platform's two.
+        folding = FOLDING if len(rows) <= (2 if of == "arm" else 4) else ()
+        function = Manipulability("ee", rows, of)
+        yield Entry(f"manipulability of the {of}, {' '.join(rows)}", function, (*robots, *folding))
+    yield Entry("manipulability of a link", Manipulability("link2", "xy"), (*BOTH, *FOLDING))
     yield Entry("callable objective", CallableObjective(_height))
     yield Entry("callable objective, gradient", CallableObjective(_height, _height_gradient))
-    yield Entry("sum", Sum((2.0, h1), (-0.5, Manipulability("ee", "xy")), (1.0, Coordinates("x"))))
+    yield Entry(
+        "sum", Sum((2.0, h1), (-0.5, Manipulability("ee", "xy")), (1.0, Coordinates("x"))), (*BOTH, *FOLDING)
+    )
     yield Entry("sum of sums", Sum((3.0, h1 + CallableObjective(_height)), (-2.0, h1 - 0.5 * h1)))
     yield Entry("negative", -Manipulability("ee", "xy", "arm"))
     yield Entry("difference", 2.0 * h1 - Manipulability("ee", "xy") * 0.3)

@@ -15,6 +15,7 @@ from paper_cases import CIRCLE
 from nmm.analysis.formulas import SymbolicAnalysis, symbolic
 from nmm.analysis.singular.jacobians import Jacobians
 from nmm.analysis.singular.reached import stacked
+from nmm.functions.program import evaluate
 from nmm.functions.references import Bearing
 from nmm.functions.tasks import Heading, Position, Task
 from nmm.robots.configuration import Configuration
@@ -62,7 +63,7 @@ def check_numbers(
     for point in q:
         J = jacobians.J(0.0, point)
         configuration = Configuration(robot, point)
-        value = np.concatenate([t.function.evaluate(0.0, configuration).value for t in stacked(task)])
+        value = np.concatenate([evaluate(t.function, 0.0, configuration).value for t in stacked(task)])
         angular = [row.angular for row in jacobians.rows]
         off = functions.f(point) - value
         off = np.where(angular, np.remainder(off + np.pi, 2 * np.pi) - np.pi, off)

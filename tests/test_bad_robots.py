@@ -146,8 +146,8 @@ BAD = {
     "planar": (arm(AXIS, "planar"), ["joint 'elbow': a planar joint is refused"]),
     "floating": (arm("", "floating"), ["joint 'elbow': a floating joint is refused"]),
     "mimic": (
-        robot(LINKS, link("c"), joint(), joint("k", "b", "c", body=AXIS + LIMIT + '<mimic joint="j"/>')),
-        ["mimic joints are refused", "'k'"],
+        robot(LINKS, link("c"), joint(), joint("k", "b", "c", body=AXIS + LIMIT + '<mimic joint="i"/>')),
+        ["'k'", "unknown joint to follow 'i'"],
     ),
     "revolute without limit": (arm(AXIS), ["joint 'elbow': a revolute joint needs a <limit>"]),
     "prismatic without limit": (arm(AXIS, "prismatic"), ["joint 'elbow': a prismatic joint needs a <limit>"]),
@@ -336,10 +336,11 @@ def test_long_lists_of_problems_are_cut(tmp_path: Path) -> None:
 
 
 def test_problems_with_joints_locked() -> None:
-    text = robot(LINKS, link("c"), joint(), joint("k", "b", "c", body=AXIS + LIMIT + '<mimic joint="j"/>'))
-    (problem,) = find_problems(text)
-    assert "locked, lock={'j': 0.0}: 'k' (follows 'j')" in problem.message
-    assert find_problems(text, lock=["j"]) == find_problems(text, lock=["k"]) == []
+    """A joint that is locked follows nobody, whatever its <mimic> says."""
+    text = robot(LINKS, link("c"), joint(), joint("k", "b", "c", body=AXIS + LIMIT + '<mimic joint="i"/>'))
+    (problem,) = find_problems(text, lock=["j"])
+    assert "unknown joint to follow 'i'" in problem.message
+    assert find_problems(text, lock=["k"]) == []
 
 
 def test_problems_without_a_file() -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import Result
-from urdf_parts import AXIS, LIMIT, inertial, joint, link, random_tree, robot, shape, write
+from urdf_parts import AXIS, inertial, joint, link, random_tree, robot, shape, write
 
 import nmm
 from nmm.bundled import bundled_robots
@@ -237,21 +237,22 @@ def test_a_joint_that_its_limits_hold_is_told(tmp_path: Path) -> None:
     np.testing.assert_array_equal(nmm.load(tmp_path / "robot.urdf").q_limits[-1], 0.0)
 
 
-def test_followers_are_told_with_what_to_lock(tmp_path: Path) -> None:
-    mimic = '<mimic joint="{}" multiplier="2"/>'
-    up = '<limit lower="0.3" upper="1" effort="1" velocity="1"/>'
+def test_followers_are_told(tmp_path: Path) -> None:
+    mimic = '<mimic joint="{}" multiplier="{}"/>'
+    up = '<limit lower="0" upper="1" effort="1" velocity="1"/>'
     text = robot(
         HEAVY_LINKS, link("c", inertial()), link("d", inertial()),
         joint("lead", "a", "b", body=AXIS + up),
-        joint("first", "b", "c", body=AXIS + LIMIT + mimic.format("lead")),
-        joint("second", "c", "d", body=AXIS + LIMIT + mimic.format("first")),
+        joint("first", "b", "c", body=AXIS + up + mimic.format("lead", 2)),
+        joint("second", "c", "d", body=AXIS + up + mimic.format("first", -0.5)),
     )  # fmt: skip
     made = reported(tmp_path, text)
-    with pytest.raises(RobotError, match="mimic"):
-        nmm.load(made.file)
-    followers = [warning.message for warning in made.warnings if "<mimic>" in warning.message]
-    assert len(followers) == 2
-    assert all("lock={'lead': 0.3}" in text for text in followers)
+    assert made.facts["followers"] == "first = 2 lead, second = -lead"
+    (warning,) = [warning.message for warning in made.warnings]
+    assert warning == "second = -lead: its limits, from 0 to 1, leave lead no room and do not count"
+    robot_read = nmm.load(made.file)
+    assert warning in robot_read.notes
+    np.testing.assert_array_equal(robot_read.q_limits[3:], [[0, 0.5], [0, 1], [-0.5, 0]])
 
 
 def test_names_of_a_link_and_a_joint(tmp_path: Path) -> None:

@@ -1,8 +1,9 @@
-"""Every analytic derivative against central differences, over the grid of options and on both robots."""
+"""Every analytic derivative against central differences, over the grid of options and on all robots."""
 
 from __future__ import annotations
 
 import itertools
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -14,16 +15,20 @@ from derivatives import (
     partials,
 )
 from function_grid import ENTRIES, TIMES, Entry, concrete_subclasses, random_configuration
+from gripping import folding, hitched
 from numpy.typing import NDArray
 from paper_cases import CASES, Case
 from platform_grid import EXAMPLES, random_qp
 
 from nmm.analysis.singular.reached import Reached
+from nmm.control.controller import Controller
 from nmm.functions.function import Function
-from nmm.functions.objectives import Objective, Sum
+from nmm.functions.objectives import Manipulability, Objective, Quadratic, Square, Sum
 from nmm.functions.program import Program, evaluate
-from nmm.functions.references import CallableReference
+from nmm.functions.references import CallableReference, Circle
+from nmm.functions.tasks import Coordinates, Position, Task
 from nmm.functions.tasks.comparison import Comparison
+from nmm.resolvers import ProjectedGradient
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 
@@ -44,7 +49,7 @@ def test_the_grid_holds_every_function() -> None:
     assert not missing, f"add entries to function_grid.py for {sorted(kind.__name__ for kind in missing)}"
 
 
-@pytest.mark.parametrize("name", ["unicycle_2r", "unicycle_3r"])
+@pytest.mark.parametrize("name", ["unicycle_2r", "unicycle_3r", "unicycle_3r_folding"])
 def test_functions_laid_out_together_do_not_disturb_each_other(
     name: str, robots: dict[str, Robot], rng: np.random.Generator
 ) -> None:
@@ -97,6 +102,23 @@ def test_J_bar_and_h_are_derivatives_along_every_input(
     robot = robots[case.robot]
     for t in (0.0, 3.3, 17.0):
         check_equation(case.controller(robot), t, case.q0 + rng.normal(scale=0.7, size=robot.n))
+
+
+@pytest.mark.parametrize("robot", [folding(), hitched()], ids=["folding", "hitched"])
+@pytest.mark.parametrize("of", ["robot", "arm"])
+def test_J_bar_and_h_through_joints_that_follow(
+    robot: Robot, of: Literal["robot", "arm"], rng: np.random.Generator
+) -> None:
+    """One that follows its arm's, and one that follows a coordinate of the platform, by which G changes."""
+    tasks = [Task(Position("ee", "xy"), Circle([2, 2], 3, 0.08), 1.0), Task(Coordinates("q3"), [0.4])]
+    bent = Quadratic(*(Square(name, 0.3) for name in robot.q_names[2:]))
+    objective = 2.0 * Manipulability("ee", "xy", of) - bent
+    controller = Controller(robot, tasks, ProjectedGradient(), objective)
+    for _ in range(5):
+        q = robot.following.placed(rng.uniform(-1.0, 1.0, robot.n))
+        check_equation(controller, 1.3, q)
+        here = controller.evaluate(1.3, q)
+        np.testing.assert_allclose(here.q_dot, robot.S(q) @ here.u, atol=1e-13)
 
 
 @each_case

@@ -13,6 +13,7 @@ from spatial_arms import MOVING, UR5
 
 import nmm
 from nmm.functions.function import Function, Row, Stage
+from nmm.functions.program import evaluate
 from nmm.functions.references import Circle, Constant, PoseReference, Slerp, Turn
 from nmm.functions.tasks import (
     CenterOfMass,
@@ -74,7 +75,7 @@ def test_pointing_straight_away_is_singular(ur5: Robot, height: float) -> None:
     """With the point straight behind, and in the frame's origin."""
     q = np.zeros(ur5.n)
     function = Pointing("theta", [0.0, 0.0, height])
-    found = function.evaluate(0.0, Configuration(ur5, q))
+    found = evaluate(function, 0.0, Configuration(ur5, q))
     assert found.value.tolist() == [pi, 0.0]
     assert not found.value_q.any()
     with pytest.raises(nmm.SingularError, match="rank"):
@@ -84,7 +85,7 @@ def test_pointing_straight_away_is_singular(ur5: Robot, height: float) -> None:
 def test_a_distance_of_zero_is_singular(ur5: Robot) -> None:
     q = np.zeros(ur5.n)
     function = Distance("theta", [0, 0, 0])
-    found = function.evaluate(0.0, Configuration(ur5, q))
+    found = evaluate(function, 0.0, Configuration(ur5, q))
     assert found.value[0] == 0.0
     assert not found.value_q.any()
     with pytest.raises(nmm.SingularError, match="rank"):

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from spatial_arms import MOVING, UR5, near, pose
 
 import nmm
+from nmm.functions.program import evaluate
 from nmm.functions.references import Circle, PoseReference, Turn, rotation_vector
 from nmm.functions.tasks import (
     CenterOfMass,
@@ -200,7 +201,7 @@ def test_moving_the_world_moves_nothing_else(ur5: Robot, rng: np.random.Generato
 def test_a_relative_pose_does_not_feel_the_platform(tiago: Robot, rng: np.random.Generator) -> None:
     here = Configuration(tiago, random_configuration(tiago, rng))
     for function in (Pose("arm_tool_link", "head_2_link"), Distance("arm_tool_link", "head_2_link")):
-        found = function.evaluate(0.0, here).value_q
+        found = evaluate(function, 0.0, here).value_q
         np.testing.assert_allclose(found[:, :3], 0.0, atol=1e-13)
         assert np.abs(found[:, 3:]).max() > 0.1
 

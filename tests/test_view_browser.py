@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from command_line import process
+from gripping import folding
 from playback_browser import PROJECT, UPRIGHT, WALK, Window, assert_same, drawn_visuals, expected_visuals
 from playback_browser import browser as browser
 from playback_browser import window as window
@@ -28,10 +29,12 @@ from nmm.robots.robot import Robot
 pytestmark = pytest.mark.browser
 
 
-@pytest.fixture(scope="module", params=["hand-built", "unicycle_3r", "car_base"])
+@pytest.fixture(scope="module", params=["hand-built", "unicycle_3r", "folding", "car_base"])
 def robot(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Robot:
     if request.param == "hand-built":  # with skew axes, and a joint that slides
         return hand_built_robot(tmp_path_factory.mktemp("robot"))
+    if request.param == "folding":  # with a joint that follows another
+        return folding()
     return nmm.load(request.param)
 
 
@@ -88,11 +91,12 @@ def test_sliders_move_every_joint_to_where_pinocchio_says(robot: Robot, window: 
     with shown(robot) as url:
         page = window.open(url)
         sliders = page.locator("input[data-name]").evaluate_all("all => all.map((one) => one.dataset.name)")
-        assert tuple(sliders) == robot.q_names
+        names = [robot.q_names[i] for i in robot.following.independent]
+        assert sliders == names
         angles = Rolling(robot).settled(robot.rest)  # wheels and swivels stay
         assert_same(drawn_visuals(page), expected_visuals(robot, robot.rest, angles))
         for _ in range(3):
-            q = np.array([slide(page, name, rng.uniform()) for name in robot.q_names])
+            q = robot.q({name: slide(page, name, rng.uniform()) for name in names})
             assert_same(drawn_visuals(page), expected_visuals(robot, q, angles), 1e-6)
             drawn, expected = drawn_frames(page), expected_frames(robot, q)
             for name in ("x", "y"):

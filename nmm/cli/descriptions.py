@@ -107,6 +107,8 @@ def _show(robot: Robot, tasks: Sequence[tuple[str, int]]) -> None:
     show_text()
     for name, inputs in robot.groups.items():
         show_text(f"group {name}: {', '.join(inputs) or 'none'}")
+    for follower in robot.followers:
+        show_text(f"follows: {follower}")
     show_text(f"frames: {', '.join(robot.frames)}")
     for name, value in robot.platform.described().items():
         show_text(f"platform {name}: {value}")
@@ -159,7 +161,8 @@ def _wheel(wheel: Wheel) -> list[str]:
 
 def _redundancies(robot: Robot, tasks: Sequence[tuple[str, int]]) -> Iterator[list[str]]:
     for name, s in tasks:
-        yield [name, str(s), *(str(count - s) if count >= s else "-" for count in (robot.n, robot.n_u))]
+        counts = (robot.n_independent, robot.n_u)
+        yield [name, str(s), *(str(count - s) if count >= s else "-" for count in counts)]
 
 
 def _show_loading(robot: Robot) -> None:

@@ -136,7 +136,7 @@ def _found(made: Map, those: SingularSet) -> str:
 
 def _two_first(robot: Robot) -> list[str]:
     """The arm's first two coordinates; the first two of a robot whose arm has fewer."""
-    arm = robot.q_names[robot.platform.n_p :]
+    arm = robot.u_names[robot.platform.p :]
     return list((arm if len(arm) >= 2 else robot.q_names)[:2])
 
 

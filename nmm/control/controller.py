@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, Integers
-from nmm.control.equations import PLAIN, WRAPPED, ControlStep, TaskRows, drive, step
+from nmm.control.equations import PLAIN, WRAPPED, Arm, ControlStep, TaskRows, drive, step
 from nmm.errors import InputError, SingularError
 from nmm.functions.function import Row, row_scales
 from nmm.functions.objectives.base import Objective
@@ -123,6 +123,7 @@ class Controller:
             ControlStep(
                 task=_task_rows(self.task, robot, table[:s]),
                 added=_task_rows(self.added_task, robot, table[s:]),
+                arm=Arm(robot.arm_coordinates, robot.following.table.ravel()),
                 terms=np.array(first[3 * len(every) :], dtype=np.int64),
                 weights=np.array([weight for weight, _ in weighted]),
                 H=np.array(0.0),
@@ -178,7 +179,7 @@ class Controller:
         def solve_and_finish(t: float, q: Array) -> float:
             solve(t, q)
             resolver.finish(found.problem, dimensions, found.answer)
-            drive(found.answer.u, program.buffers.G, found.q_dot)
+            drive(found.answer.u, program.buffers.G, found.arm, found.q_dot)
             return float(found.answer.status[()])
 
         return solve if type(resolver).finish is Resolver.finish else solve_and_finish

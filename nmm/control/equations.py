@@ -1,7 +1,7 @@
 """The compiled control step: from functions to J_bar u = rate and h, from these to u and q_dot.
 
 This is where the multiplication by S happens, once for all: J_bar = (∂f/∂q - ∂g/∂q) S,
-h = Sᵀ ∂H/∂q, q_dot = S u (paper, eqs. 2, 6 and 13).
+h = Sᵀ ∂H/∂q, q_dot = S u (paper, eqs. 2, 6 and 13), S = blkdiag(G, C).
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 from nmm.arrays import Array, Integers
 from nmm.functions.program import BESIDE, Buffers, run
 from nmm.kernels.compiled import compiled
+from nmm.kernels.followers import add_to_leaders, move_followers
 from nmm.kernels.memory import Cell, IntegerMatrix, IntegerVector, Matrix, Vector, views
 from nmm.resolvers.answer import NOT_FINITE, AnswerArrays
 from nmm.resolvers.base import call_resolver
@@ -36,10 +37,22 @@ class TaskRows(NamedTuple):
     error: Vector
 
 
+class Arm(NamedTuple):
+    """C of S = blkdiag(G, C): the identity, with a row of its own for every coordinate that follows another.
+
+    moved (m - p,) : the coordinate that input p + j moves
+    followers (3 k,) : see `nmm.kernels.followers`
+    """
+
+    moved: IntegerVector
+    followers: Vector
+
+
 class ControlStep(NamedTuple):
     """What a step reads and writes beside its program's functions; its place in memory is `BESIDE`.
 
     task, added : the task, and the added task of the extended Jacobian
+    arm : what its inputs move
     terms, weights : rows of the objective's terms, and what they count
     H () : the objective
     problem, answer : what the resolver gets and gives
@@ -49,6 +62,7 @@ class ControlStep(NamedTuple):
 
     task: TaskRows
     added: TaskRows
+    arm: Arm
     terms: IntegerVector
     weights: Vector
     H: Cell
@@ -66,31 +80,36 @@ PLAIN, WRAPPED = -1, -2
 
 
 @compiled
-def times_S(rows: Array, row: int, G: Array, out: Array) -> None:
-    """out = rows[row] S, S = blkdiag(G, I): a derivative in the coordinates, seen by the inputs."""
+def times_S(rows: Array, row: int, G: Array, C: Arm, out: Array) -> None:
+    """out = rows[row] S: a derivative in the coordinates, seen by the inputs.
+
+    In place: what followers add to their leaders stays in rows[row].
+    """
     n_p, p = G.shape
+    add_to_leaders(rows, row, C.followers)
     for j in range(p):
         out[j] = 0.0
         for i in range(n_p):
             out[j] += rows[row, i] * G[i, j]
-    for j in range(rows.shape[1] - n_p):
-        out[p + j] = rows[row, n_p + j]
+    for j in range(C.moved.shape[0]):
+        out[p + j] = rows[row, C.moved[j]]
 
 
 @compiled
-def drive(u: Array, G: Array, q_dot: Array) -> None:
+def drive(u: Array, G: Array, C: Arm, q_dot: Array) -> None:
     """q_dot = S u."""
     n_p, p = G.shape
     for i in range(n_p):
         q_dot[i] = 0.0
         for j in range(p):
             q_dot[i] += G[i, j] * u[j]
-    for j in range(u.shape[0] - p):
-        q_dot[n_p + j] = u[p + j]
+    for j in range(C.moved.shape[0]):
+        q_dot[C.moved[j]] = u[p + j]
+    move_followers(q_dot, C.followers)
 
 
 @compiled
-def write_equation(task: TaskRows, b: Buffers, J: Array, rate: Array) -> None:
+def write_equation(task: TaskRows, b: Buffers, C: Arm, J: Array, rate: Array) -> None:
     """rate = ∂g/∂t + K e, J_bar = (∂f/∂q - ∂g/∂q) S.
 
     Where an error is computed, rate = ∂e/∂t + K e and J_bar = -∂e/∂q S: the same equation for any e.
@@ -108,7 +127,7 @@ def write_equation(task: TaskRows, b: Buffers, J: Array, rate: Array) -> None:
             rate[i] = b.value_t[compared]
             for j in range(n):
                 b.value_q[compared, j] = -b.value_q[compared, j]
-            times_S(b.value_q, compared, b.G, J[i])
+            times_S(b.value_q, compared, b.G, C, J[i])
             continue
         error = b.value[g] - b.value[f]
         if compared == WRAPPED:  # to (-π, π]
@@ -117,7 +136,7 @@ def write_equation(task: TaskRows, b: Buffers, J: Array, rate: Array) -> None:
         rate[i] = b.value_t[g] - b.value_t[f]
         for j in range(n):  # in place: f's derivative is not read again
             b.value_q[f, j] -= b.value_q[g, j]
-        times_S(b.value_q, f, b.G, J[i])
+        times_S(b.value_q, f, b.G, C, J[i])
     for i in range(s):
         for j in range(s):
             rate[i] += task.gain[i, j] * task.error[j]
@@ -132,8 +151,8 @@ def step(t: float, q: Array, integers: Integers, floats: Array) -> float:
     b = run(t, q, integers, floats)
     e = views(ControlStep, integers, floats, BESIDE)
     problem, answer = e.problem, e.answer
-    write_equation(e.task, b, problem.J, problem.rate)
-    write_equation(e.added, b, problem.added_J, problem.added_rate)
+    write_equation(e.task, b, e.arm, problem.J, problem.rate)
+    write_equation(e.added, b, e.arm, problem.added_J, problem.added_rate)
     gradient = np.zeros((1, q.shape[0]))
     e.H[()] = 0.0
     for i in range(e.terms.shape[0]):
@@ -141,7 +160,7 @@ def step(t: float, q: Array, integers: Integers, floats: Array) -> float:
         e.H[()] += e.weights[i] * b.value[term]
         for j in range(q.shape[0]):
             gradient[0, j] += e.weights[i] * b.value_q[term, j]
-    times_S(gradient, 0, b.G, problem.h)
+    times_S(gradient, 0, b.G, e.arm, problem.h)
     for j in range(answer.u.shape[0]):
         answer.u[j] = math.nan  # what a resolver that finds no solution leaves behind
     answer.status[()] = NOT_FINITE
@@ -150,5 +169,5 @@ def step(t: float, q: Array, integers: Integers, floats: Array) -> float:
     answer.residual[()] = math.nan
     answer.measure[()] = math.nan
     call_resolver(e.resolver, problem, e.numbers, e.options, e.state, answer)
-    drive(answer.u, b.G, e.q_dot)
+    drive(answer.u, b.G, e.arm, e.q_dot)
     return float(answer.status[()])

@@ -78,4 +78,4 @@ def _configurations(controller: Controller, q0: Array) -> Array:
     # A start outside its limits is somebody else's complaint.
     lower, upper = np.minimum(lower, upper), np.maximum(lower, upper)
     rng = np.random.default_rng(0)
-    return rng.uniform(lower, upper, (CONFIGURATIONS, controller.robot.n))
+    return controller.robot.following.placed(rng.uniform(lower, upper, (CONFIGURATIONS, controller.robot.n)))

@@ -187,7 +187,7 @@ def _reached(robot: Robot, q: Array, wheels: Array) -> Array:
     poses = np.random.default_rng(0).uniform(lower, upper, (POSES, robot.n))
     moving = np.arange(robot.n) >= min(3, robot.platform.n_p)
     poses[:, ~moving] = q[~moving]
-    poses = np.vstack([q, poses])
+    poses = np.vstack([q, robot.following.placed(poses)])
     return robot_boxes(robot, poses, np.tile(wheels, (len(poses), 1)))
 
 

@@ -129,6 +129,8 @@ class Swivel:
         platform, q_dot, change = robot.platform, S @ u, np.zeros(robot.n)
         n_p, p = platform.n_p, platform.p
         change[:n_p] = platform.G_dot(q[:n_p], q_dot[:n_p]) @ driving[:p]
+        who = robot.following
+        change[who.columns] = who.multipliers * change[who.leaders]
         rates = self.carriers.twist_rates(q, q_dot, S @ driving, change)[self.carrier]
         x_dot, y_dot = at_point(rates, self.pivot)
         return self.sign * float(x * y_dot - y * x_dot) / float(velocity @ velocity)

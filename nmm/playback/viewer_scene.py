@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -45,10 +46,11 @@ def viewer_scene(robot: Robot, q: Array, *, frames: bool = True) -> list[Command
 
 
 def _coordinates(robot: Robot, drawn: DrawnRobot, q: Array) -> Iterator[dict[str, Any]]:
-    """Each coordinate: its slider, its joint's placement at zero in the parent's frame, and its screw: for a
-    unit of it the joint turns by `angular` and slides by `linear`."""
+    """Each coordinate: its slider or what it follows, its joint's placement at zero in the parent's frame,
+    and its screw: for a unit of it the joint turns by `angular` and slides by `linear`."""
     model = robot.display_model
     neutral = pin.neutral(model)
+    followers = {one.joint: one for one in robot.followers}
     for i, (name, unit, (lower, upper)) in enumerate(
         zip(robot.q_names, robot.q_units, robot.q_limits, strict=True)
     ):
@@ -60,8 +62,10 @@ def _coordinates(robot: Robot, drawn: DrawnRobot, q: Array) -> Iterator[dict[str
         of_platform = i < robot.platform.n_p
         end = ANGLE if unit == "rad" else WAY if of_platform else REACH
         arms = [arm for arm, joints in robot.arms.items() if name in joints]
+        follower = followers.get(name)
         yield {
             "name": name,
+            "follows": None if follower is None else asdict(follower),
             "unit": unit,
             "of": "platform" if of_platform else next(iter(arms), "arm"),
             "lower": float(lower) if abs(lower) < UNBOUNDED else min(-end, float(q[i])),

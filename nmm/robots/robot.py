@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from nmm.arrays import scalar, vector
 from nmm.errors import InputError, unknown
 from nmm.platforms.base import Platform
+from nmm.robots.followers import SLACK, Follower, Following
 from nmm.robots.meshes import MeshesWhenAsked, Shapes
 
 Array = NDArray[np.float64]
@@ -72,6 +73,7 @@ class Robot:
     arguments : the xacro arguments that the file was read with
     notes : what loading did to the file, a sentence each
     arms : the joints of each arm by the arm's name, when several were mounted or one was named
+    followers : coordinates that follow another one, which follows nobody; they have no input of their own
     parts : what loading keeps for mounting and for reports (`nmm.robots.loading.provenance.Parts`)
     """
 
@@ -86,6 +88,7 @@ class Robot:
     arguments: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     arms: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    followers: tuple[Follower, ...] = ()
     parts: Any = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -105,6 +108,13 @@ class Robot:
                 f"{self.name}: the {self.platform.name} platform expects the first coordinates to be "
                 f"{', '.join(self.platform.coordinates)}, the model has {', '.join(head)}"
             )
+        for one in self.followers:
+            if one.joint in head:
+                raise InputError(f"{self.name}: {one}: the {self.platform.name} platform moves {one.joint}")
+        try:
+            self.following  # noqa: B018  # whether there are such coordinates is seen when it is made
+        except InputError as error:
+            raise InputError(f"{self.name}: {error}") from None
 
     @property
     def shapes(self) -> Shapes:
@@ -125,8 +135,20 @@ class Robot:
 
     @cached_property
     def u_names(self) -> tuple[str, ...]:
-        """Names of the p + n_m inputs: the platform's, then the arm's joints."""
-        return self.platform.inputs + self.q_names[self.platform.n_p :]
+        """Names of the p + n_m inputs: the platform's, then the arm's joints that follow no other."""
+        return self.platform.inputs + tuple(self.q_names[i] for i in self.arm_coordinates)
+
+    @cached_property
+    def following(self) -> Following:
+        """The followers in numbers: columns, leaders, multipliers, offsets."""
+        return Following(self.followers, self.q_names)
+
+    @cached_property
+    def arm_coordinates(self) -> NDArray[np.int64]:
+        """Index of the coordinate each of the arm's inputs moves, (n_u - p,): input p + j is its rate."""
+        moved: NDArray[np.int64] = self.following.independent[self.platform.n_p :]
+        moved.flags.writeable = False
+        return moved
 
     @cached_property
     def q_units(self) -> tuple[str, ...]:
@@ -141,17 +163,30 @@ class Robot:
     @cached_property
     def u_units(self) -> tuple[str, ...]:
         """Unit of each input."""
-        return self.platform.input_units + tuple(f"{unit}/s" for unit in self.q_units[self.platform.n_p :])
+        return self.platform.input_units + tuple(f"{self.q_units[i]}/s" for i in self.arm_coordinates)
 
     @cached_property
     def q_limits(self) -> Array:
-        """Lower and upper limit of each coordinate, (n, 2), m or rad; infinite where there is none."""
+        """Lower and upper limit of each coordinate, (n, 2), m or rad; infinite where there is none.
+
+        Those of a coordinate that others follow are narrowed to what these allow.
+        """
+        limits = self._limits[0]
+        limits.flags.writeable = False
+        return limits
+
+    @property
+    def unheeded(self) -> tuple[Follower, ...]:
+        """The followers whose own limits would leave the joint that they follow no room, and do not count."""
+        return self._limits[1]
+
+    @cached_property
+    def _limits(self) -> tuple[Array, tuple[Follower, ...]]:
         limits = np.column_stack([self.model.lowerPositionLimit, self.model.upperPositionLimit])
         own = self.platform.coordinate_limits
         limits[: len(own), 0] = np.maximum(limits[: len(own), 0], own[:, 0])
         limits[: len(own), 1] = np.minimum(limits[: len(own), 1], own[:, 1])
-        limits.flags.writeable = False
-        return limits
+        return self.following.narrowed(limits)
 
     @cached_property
     def limited(self) -> NDArray[np.bool_]:
@@ -166,13 +201,17 @@ class Robot:
 
     @cached_property
     def u_limits(self) -> Array:
-        """Largest absolute value of each input, (n_u,): the platform's, then the joints' velocity limits."""
-        arm = np.array(self.model.velocityLimit[self.platform.n_p :])
-        limits = np.concatenate([self._platform_limits(), np.where(arm > 0.0, arm, np.inf)])
+        """Largest absolute value of each input, (n_u,): the platform's, then the joints' velocity limits.
+
+        Those of a joint that others follow are narrowed to what these allow.
+        """
+        own = np.array(self.model.velocityLimit)
+        speeds = self.following.slowed(np.where(own > 0.0, own, np.inf))
+        limits = np.concatenate([self._platform_limits(speeds), speeds[self.arm_coordinates]])
         limits.flags.writeable = False
         return limits
 
-    def _platform_limits(self) -> Array:
+    def _platform_limits(self, speeds: Array) -> Array:
         """Those of the platform, and of its own joints where an input is one's rate (a steering rate)."""
         platform = self.platform
         limits = platform.input_limits
@@ -181,8 +220,7 @@ class Robot:
             for column in range(platform.p):
                 (rows,) = np.nonzero(G[:, column])
                 if len(rows) == 1 and rows[0] >= 3 and G[rows[0], column] == 1.0:
-                    own = float(self.model.velocityLimit[rows[0]])
-                    limits[column] = min(limits[column], own if own > 0.0 else np.inf)
+                    limits[column] = min(limits[column], speeds[rows[0]])
         return limits
 
     @cached_property
@@ -192,6 +230,7 @@ class Robot:
         numbers = [placement.homogeneous.ravel() for placement in model.jointPlacements]
         numbers += [frame.placement.homogeneous.ravel() for frame in model.frames] + [platform.parameters]
         names = [*self.q_names, *self.u_names, platform.name, *(frame.name for frame in model.frames)]
+        names += map(str, self.followers)
         # Rounded: another machine's last digit is no other robot.
         text = "\n".join([*names, *(f"{number:.6f}" for number in np.concatenate(numbers) + 0.0)])
         return hashlib.sha256(text.replace("-0.000000", "0.000000").encode()).hexdigest()[:16]
@@ -200,7 +239,8 @@ class Robot:
     def groups(self) -> Mapping[str, tuple[str, ...]]:
         """Inputs that are spoken of together: "platform", "arm" (all joints), and each arm by its name."""
         p = self.platform.p
-        return {"platform": self.u_names[:p], "arm": self.u_names[p:], **self.arms}
+        own = {arm: tuple(j for j in joints if j in self.u_names) for arm, joints in self.arms.items()}
+        return {"platform": self.u_names[:p], "arm": self.u_names[p:], **own}
 
     @property
     def n(self) -> int:
@@ -208,9 +248,14 @@ class Robot:
         return int(self.model.nq)
 
     @property
+    def n_independent(self) -> int:
+        """Number of coordinates that follow no other."""
+        return len(self.following.independent)
+
+    @property
     def n_u(self) -> int:
         """Number of inputs, p + n_m."""
-        return self.n - self.platform.n_p + self.platform.p
+        return self.platform.p + len(self.arm_coordinates)
 
     @property
     def frames(self) -> tuple[str, ...]:
@@ -228,28 +273,52 @@ class Robot:
         return int(self.model.getFrameId(name))
 
     def check_limits(self, q: ArrayLike) -> None:
-        """`InputError` names every coordinate of q (n,) that is outside its limits, and what they are."""
+        """`InputError` names every coordinate of q (n,) that is outside its limits, and what they are, and
+        every follower that is not where its leader has it."""
         q = self.q(q)
-        slack = 1e-9
+        following = {one.joint for one in self.followers}  # their leaders' limits are theirs, too
         outside = [
             f"{name} = {value:g} {unit} (from {lower:g} to {upper:g})"
             for name, value, unit, (lower, upper) in zip(
                 self.q_names, q, self.q_units, self.q_limits, strict=True
             )
-            if not lower - slack <= value <= upper + slack
+            if name not in following and not lower - SLACK <= value <= upper + SLACK
         ]
         complaints = [f"outside its limits: {', '.join(outside)}"] if outside else []
+        complaints += self._strays(q)
         problem = self.platform.problem(q[: self.platform.n_p])
         if problem is not None:
             complaints.append(problem)
         if complaints:
             raise InputError(f"{self.name}: {'; '.join(complaints)}")
 
+    def check_followers(self, q: ArrayLike) -> None:
+        """`InputError` names every follower in q (n,) that is not where its leader has it."""
+        strays = self._strays(self.q(q))
+        if strays:
+            raise InputError(f"{self.name}: {'; '.join(strays)}")
+
+    def _strays(self, q: Array) -> list[str]:
+        placed = self.following.placed(q)
+        return [
+            f"{one.joint} is at {q[i]:g} {self.q_units[i]}, and {one.leader} has it at {placed[i]:g} ({one})"
+            for one, i in zip(self.followers, self.following.columns, strict=True)
+            if not abs(q[i] - placed[i]) <= SLACK * max(1.0, abs(placed[i]))
+        ]
+
     def coordinate(self, name: str) -> int:
         """Index of a coordinate in q; `InputError` lists the names."""
         if name not in self.q_names:
             raise InputError(unknown("coordinate", name, self.q_names, f"robot {self.name}"))
         return self.q_names.index(name)
+
+    def independent(self, name: str) -> int:
+        """Index of a coordinate that follows no other; `InputError` names the one that it follows."""
+        index = self.coordinate(name)
+        for one in self.followers:
+            if one.joint == name:
+                raise InputError(f"robot {self.name}: {name} follows {one.leader} ({one}): give {one.leader}")
+        return index
 
     def input(self, name: str) -> int:
         """Index of an input in u; `InputError` lists the names."""
@@ -258,13 +327,16 @@ class Robot:
         return self.u_names.index(name)
 
     def q(self, values: Mapping[str, float] | ArrayLike | None = None) -> Array:
-        """A configuration: from a vector, or by name with zero for what is not named."""
-        if values is None:
-            return np.zeros(self.n)
-        if isinstance(values, Mapping):
+        """A configuration: from a vector, taken as it is, or by name.
+
+        What is not named is zero, and a follower that is not named is where its leader has it.
+        """
+        if values is None or isinstance(values, Mapping):
+            given = {self.coordinate(name): scalar(value, name) for name, value in (values or {}).items()}
             q = np.zeros(self.n)
-            for name, value in values.items():
-                q[self.coordinate(name)] = scalar(value, name)
+            q[list(given)] = list(given.values())
+            q = self.following.placed(q)
+            q[list(given)] = list(given.values())
             return q
         try:
             return vector(values, self.n, "q")
@@ -301,14 +373,19 @@ class Robot:
     def rest(self) -> Array:
         """The configuration nearest to zero within the limits, (n,)."""
         lower, upper = self.q_limits.T
-        return np.asarray(np.clip(np.zeros(self.n), lower, upper))
+        return self.following.placed(np.clip(np.zeros(self.n), lower, upper))
 
     def S(self, q: ArrayLike) -> Array:
-        """S = blkdiag(G(qp), I), shape (n, n_u): q_dot = S(q) u (paper, eqs. 2 and 3)."""
-        n_p, p = self.platform.n_p, self.platform.p
+        """S(q), shape (n, n_u): q_dot = S(q) u (paper, eqs. 2 and 3).
+
+        S = blkdiag(G(qp), C), with C the identity where no joint follows another; a follower's row is its
+        leader's, times its multiplier.
+        """
+        n_p, p, following = self.platform.n_p, self.platform.p, self.following
         S = np.zeros((self.n, self.n_u))
         S[:n_p, :p] = self.platform.G(self.q(q)[:n_p])
-        S[n_p:, p:] = np.eye(self.n - n_p)
+        S[self.arm_coordinates, p + np.arange(len(self.arm_coordinates))] = 1.0
+        S[following.columns] = following.multipliers[:, np.newaxis] * S[following.leaders]
         return S
 
 

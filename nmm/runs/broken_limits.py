@@ -23,7 +23,8 @@ def excesses(robot: Robot, t: Array, q: Array, u: Array) -> list[str]:
     coordinates = [
         f"{name} at {t[k]:.3g} s ({q[k, i]:.4g} {unit}; from {lower[i]:.4g} to {upper[i]:.4g})"
         for i, (name, unit) in enumerate(zip(robot.q_names, robot.q_units, strict=True))
-        if (k := _first(beyond[:, i], max(1.0, abs(lower[i]), abs(upper[i])))) is not None
+        if i in robot.following.independent  # what follows it has its limits, too
+        and (k := _first(beyond[:, i], max(1.0, abs(lower[i]), abs(upper[i])))) is not None
     ]
     limits = robot.u_limits
     inputs = [

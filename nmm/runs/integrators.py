@@ -6,6 +6,7 @@ Methods are data: an explicit Runge-Kutta method is its tableau and its stabilit
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -101,9 +102,8 @@ class Adaptive:
 
 @compiled
 def drive(kernel: int, parameters: Array, n_p: int, p: int, q: Array, u: Array, dt: float) -> Array:
-    """q after dt with the inputs held constant: RK4 on q_dot = S(q) u (the arm's part is exact)."""
-    ahead = q.copy()
-    ahead[n_p:] += dt * u[p:]
+    """The platform's coordinates (n_p,) after dt with the inputs held constant: RK4 on qp_dot = G(qp) up."""
+    ahead = q[:n_p].copy()
     G = np.zeros((n_p, p))
     G_q = np.zeros((n_p, p, n_p))
     stage = q[:n_p].copy()
@@ -122,17 +122,36 @@ def drive(kernel: int, parameters: Array, n_p: int, p: int, q: Array, u: Array, 
 
 
 class ZeroOrderHold:
-    """The inputs stay constant over dt, as on a robot with a sampled controller."""
+    """The inputs stay constant over dt, as on a robot with a sampled controller; the arm's part is exact."""
 
     stability: tuple[float, ...] = (1.0, 1.0)
 
     def __init__(self, robot: Robot) -> None:
         platform = robot.platform
         self._platform = (platform.velocity_map.address, platform.parameters, platform.n_p, platform.p)
+        self._arm = robot.arm_coordinates
 
     def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
-        ahead: Array = drive(*self._platform, q, u, dt)
+        n_p, p = self._platform[2:]
+        ahead = q.copy()
+        ahead[:n_p] = drive(*self._platform, q, u, dt)
+        ahead[self._arm] += dt * u[p:]
         return ahead
+
+
+@dataclass(frozen=True)
+class Followed:
+    """An integrator after which the joints that follow others are where these have them, to the digit."""
+
+    integrator: Integrator
+    robot: Robot
+
+    @property
+    def stability(self) -> tuple[float, ...]:
+        return self.integrator.stability
+
+    def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
+        return self.robot.following.placed(self.integrator.advance(velocity, t, q, q_dot, u, dt))
 
 
 METHODS = ("rk4", "midpoint", "euler", "zoh", "adaptive")
@@ -140,6 +159,11 @@ METHODS = ("rk4", "midpoint", "euler", "zoh", "adaptive")
 
 def integrator(method: str, robot: Robot, tolerance: float) -> Integrator:
     """The integrator of that name; `InputError` lists the names."""
+    found = _integrator(method, robot, tolerance)
+    return Followed(found, robot) if robot.followers else found
+
+
+def _integrator(method: str, robot: Robot, tolerance: float) -> Integrator:
     fixed = {"rk4": RK4, "midpoint": MIDPOINT, "euler": EULER}
     if method in fixed:
         return fixed[method]

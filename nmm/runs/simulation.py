@@ -59,11 +59,13 @@ def simulate(
 
     Raises
     ------
-    InputError : wrong q0 (also one outside the robot's limits), duration, dt, method
+    InputError : wrong q0 (also one outside the robot's limits, or with a joint that is not where the one that
+        it follows has it), duration, dt, method
     """
     robot = controller.robot
     q = robot.q(q0)
     robot.check_limits(q)
+    q = robot.following.placed(q)
     duration = positive(duration, "duration")
     dt = positive(dt, "dt")
     steps = max(1, math.ceil(duration / dt - 1e-9))

@@ -19,7 +19,7 @@ def summarise(trajectory: Trajectory) -> dict[str, Any]:
 
     robot, count = trajectory.robot, len(trajectory)
     redundancy = {
-        "static": robot.n - len(trajectory.r_names),
+        "static": robot.n_independent - len(trajectory.r_names),
         "kinematic": robot.n_u - len(trajectory.r_names),
     }
     summary: dict[str, Any] = {

@@ -141,6 +141,6 @@ def _moving_axes(data: dict[str, Any], robot: Robot) -> str:
     rng = np.random.default_rng(0)
     moved = np.zeros(3)
     for _ in range(4):
-        here = Configuration(robot, rng.uniform(lower, upper))
+        here = Configuration(robot, robot.following.placed(rng.uniform(lower, upper)))
         moved = np.maximum(moved, np.abs(evaluate(function, 0.0, here).value_q @ here.S).max(axis=1))
     return "".join(axis for axis, motion in zip("xyz", moved, strict=True) if motion > 1e-9) or "xyz"

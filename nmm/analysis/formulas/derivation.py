@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from nmm.analysis.formulas.expansion import Expansion, Ring
 from nmm.analysis.formulas.frames import Frames
 from nmm.analysis.formulas.geometry import Geometry
+from nmm.analysis.formulas.numbers import exact
 from nmm.analysis.formulas.platforms import platform_columns
 from nmm.analysis.formulas.row import Auxiliary, SymbolicRow, Value, value_without
 from nmm.analysis.formulas.rows import task_rows
@@ -93,22 +94,26 @@ def derived(robot: Robot, stack: Stack, geometry: Geometry) -> Derivation:
         values=tuple(row.value for row in plain),
         matrix=tuple(_through_platform(row, G, frames) for row in controlled),
         row_denominators=tuple(row.denominator for row in controlled),
-        column_denominators=(*columns, *[one] * (robot.n - robot.platform.n_p)),
+        column_denominators=(*columns, *[one] * len(robot.arm_coordinates)),
         auxiliaries=tuple(frames.auxiliaries),
         lengths=geometry.values,
         target_moves=any(f is not g for f, g in zip(plain, controlled, strict=True)),
-        notes=tuple(dict.fromkeys(geometry.notes)),
+        notes=tuple(dict.fromkeys([*geometry.notes, *map(str, robot.followers)])),
     )
 
 
 def _through_platform(row: SymbolicRow, G: list[list[Expansion]], frames: Frames) -> tuple[Expansion, ...]:
-    """A row times S = blkdiag(G, I)."""
-    platform, ring = frames.robot.platform, frames.geometry.ring
+    """A row times S = blkdiag(G, C)."""
+    robot, ring = frames.robot, frames.geometry.ring
+    platform, gradient = robot.platform, list(row.gradient)
+    for one in robot.followers:
+        leader, follower = robot.coordinate(one.leader), robot.coordinate(one.joint)
+        gradient[leader] = gradient[leader] + ring.number(exact(one.multiplier)) * gradient[follower]
     moved = []
     for j in range(platform.p):
         total = ring.number(0)
         for i in range(platform.n_p):
-            if G[i][j] and row.gradient[i]:
-                total = total + row.gradient[i] * G[i][j]
+            if G[i][j] and gradient[i]:
+                total = total + gradient[i] * G[i][j]
         moved.append(total)
-    return (*moved, *row.gradient[platform.n_p :])
+    return (*moved, *(gradient[i] for i in robot.arm_coordinates))

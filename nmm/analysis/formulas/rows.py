@@ -102,7 +102,7 @@ def _coordinates(function: Coordinates, frames: Frames) -> list[SymbolicRow]:
 
 def _posture(function: Posture, frames: Frames) -> list[SymbolicRow]:
     function.rows(frames.robot)
-    names = function.names or frames.robot.q_names[frames.robot.platform.n_p :]
+    names = function.names or frames.robot.u_names[frames.robot.platform.p :]
     return _coordinates(Coordinates(*names), frames)
 
 

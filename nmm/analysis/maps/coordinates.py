@@ -61,6 +61,7 @@ def singularity_map(
     evaluator = Evaluator(subject, **judged)
     robot = evaluator.robot
     held = robot.rest if at is None else robot.q(at)
+    robot.check_followers(held)
     names, columns = coordinates(over, robot)
     if isinstance(at, Mapping):
         check_held(at, names, "at")
@@ -70,7 +71,7 @@ def singularity_map(
     def placed(points: Array) -> Array:
         q = np.tile(held, (len(points), 1))
         q[:, columns] = points
-        return q
+        return robot.following.placed(q)
 
     points = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
     found = evaluator(placed(points), between(progress, 0.0, 0.8), arm=evaluator.arm_beside)
@@ -105,7 +106,7 @@ def coordinates(over: Sequence[str], robot: Robot) -> tuple[tuple[str, str], lis
     given = [over] if isinstance(over, str) else list(over)
     if len(given) != 2:
         raise InputError(f"over: expected two coordinates, as in ('q1', 'q2'), got {over!r}")
-    columns = [robot.coordinate(name) for name in given]
+    columns = [robot.independent(name) for name in given]
     if columns[0] == columns[1]:
         raise InputError(f"over: expected two different coordinates, got {given[0]} twice")
     return (given[0], given[1]), columns

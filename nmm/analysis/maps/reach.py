@@ -56,6 +56,8 @@ class Reach:
                 raise InputError(unknown("joint", name, names, "ranges"))
         limits = [checked_range(given[name], name) if name in given else self._usual(name) for name in names]
         self.lower, self.upper = np.array(limits).reshape(-1, 2).T
+        who = robot.following
+        self._carried = who.carried[:, np.searchsorted(who.independent, moving)]
         self._path = FramePath(robot, frame)
 
     def _usual(self, name: str) -> tuple[float, float]:
@@ -76,7 +78,7 @@ class Reach:
         """Configurations (N, n) with these varied joints (N, k)."""
         q = np.tile(self.q, (len(joints), 1))
         q[:, self.moving] = joints
-        return q
+        return self.robot.following.placed(q)
 
     def positions(self, q: Array, progress: Progress | None = None) -> Array:
         """Where the frame is, (N, 3), m."""
@@ -128,7 +130,7 @@ class Reach:
         """Where the frame is (N, 3), and the derivatives (N, s, k) of what counts of that by the joints."""
         points, jacobians = self._path.jacobians(q)
         rows = [*self.in_plane, *([] if self.slab is None else [self.third])]
-        return points, jacobians[:, rows][:, :, self.moving]
+        return points, jacobians[:, rows] @ self._carried
 
     def _stepped(self, q: Array, targets: Array, points: Array, rates: Array) -> Array:
         """Configurations a Newton step from q, where the frame is at points and moves by rates."""

@@ -20,6 +20,7 @@ from nmm.arrays import Array, Integers, counted
 from nmm.errors import InputError
 from nmm.progress import Progress, between
 from nmm.robots.frame_path import FramePath
+from nmm.robots.robot import Robot
 
 #: Postures drawn, and how many of them are led to a singular one each to draw these.
 CONFIGURATIONS, SINGULAR_STARTS = 1 << 16, 1 << 9
@@ -83,7 +84,7 @@ def workspace_map(
     """
     evaluator = Evaluator(subject, **judged)
     robot = evaluator.robot
-    if robot.n == robot.platform.n_p:
+    if not len(robot.arm_coordinates):
         raise InputError(f"workspace map: expected a robot with an arm, {robot.name} has none")
     longest, _ = sample_counts(samples)
     count = counted(configurations, "configurations", 2)
@@ -91,6 +92,7 @@ def workspace_map(
     if len(plane) != 2 or plane[0] == plane[1] or not set(plane) <= set(AXES):
         raise InputError(f"plane: expected two of x, y, z, as in 'xy', got {plane!r}")
     held = robot.rest if at is None else robot.q(at)
+    robot.check_followers(held)
     frame = _task_frame(evaluator) if frame is None else frame
     robot.frame_id(frame)
     moving = _moving(evaluator, frame, held)
@@ -164,15 +166,16 @@ def _task_frame(evaluator: Evaluator) -> str:
 def _moving(evaluator: Evaluator, frame: str, held: Array) -> Integers:
     """The arm's joints that move the frame's origin or are felt by the task."""
     robot = evaluator.robot
-    n_p = robot.platform.n_p
+    arm = robot.arm_coordinates
     q = np.tile(held, (8, 1))
-    q[:, n_p:] += np.random.default_rng(0).uniform(-1.0, 1.0, (8, robot.n - n_p))
+    q[:, arm] += np.random.default_rng(0).uniform(-1.0, 1.0, (8, len(arm)))
+    q = robot.following.placed(q)
     felt = np.abs(np.nan_to_num(evaluator.jacobians.batch(q, evaluator.t)))[:, :, robot.platform.p :]
     moved = np.max(felt, axis=(0, 1)) > 1e-9
-    moved |= np.max(np.abs(FramePath(robot, frame).jacobians(q)[1]), axis=(0, 1))[n_p:] > 1e-9
+    moved |= _moves(robot, frame, q)
     if not moved.any():
         raise InputError(f"workspace map: the arm of {robot.name} moves {frame} in no way")
-    return np.asarray(n_p + np.flatnonzero(moved), dtype=np.int64)
+    return np.asarray(arm[moved], dtype=np.int64)
 
 
 def _check_plane(reach: Reach) -> None:
@@ -188,6 +191,12 @@ def _check_plane(reach: Reach) -> None:
     where = "a horizontal plane" if AXES[flat[0]] == "z" else "a vertical plane"
     other = AXES.replace(AXES[flat[0]], "")
     raise InputError(f"{reach.frame} moves in {where}, {held} only; try --workspace {other}")
+
+
+def _moves(robot: Robot, frame: str, q: Array) -> Array:
+    """Which of the arm's inputs move a frame's origin, (n_m,)."""
+    by_inputs = FramePath(robot, frame).jacobians(q)[1] @ np.array([robot.S(point) for point in q])
+    return np.asarray(np.max(np.abs(by_inputs), axis=(0, 1))[robot.platform.p :] > 1e-9)
 
 
 def _singular_places(evaluator: Evaluator, reach: Reach, part: str, progress: Progress | None) -> SingularSet:

@@ -234,8 +234,9 @@ class _Motion:
     def _check(self, sample: Step) -> None:
         lower, upper = self.robot.q_limits.T
         beyond = np.flatnonzero((sample.q < lower - 1e-9) | (sample.q > upper + 1e-9))
-        if beyond.size:
-            raise Ended(f"{listed([self.robot.q_names[i] for i in beyond])} at the limit")
+        names = [self.robot.q_names[i] for i in beyond if i in self.robot.following.independent]
+        if names:
+            raise Ended(f"{listed(names)} at the limit")
         problem = self.robot.platform.problem(sample.q[: self.robot.platform.n_p])
         if problem is not None:
             raise Ended(problem)

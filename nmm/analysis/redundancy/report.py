@@ -34,14 +34,15 @@ STEP = 1e-5
 class RedundancyReport:
     """What a task leaves free at (t, q), by coordinates and by inputs (paper, section II).
 
-    F = ∂f/∂q - ∂g/∂q (s, n) and J = F S (s, m); with a fixed base both are the same.
+    F = ∂f/∂q - ∂g/∂q (s, n) and J = F S (s, m); with a fixed base both are the same, unless joints follow
+    others: these leave n - k coordinates to choose.
 
     Attributes
     ----------
     robot, rows : the robot, the names of the task's s rows
     t, q (n,) : where
     F (s, n), J (s, m), S (n, m) : there
-    rank_F, rank_J : their ranks
+    rank_F, rank_J : ranks of F for motions in which followers follow, and of J
     null (m - rank_J, m) : orthonormal null vectors of J
     readable (m - rank_J, m) : a basis of the same space with few non-zero components, the largest of each 1
     texts : each of `readable` in words
@@ -72,8 +73,9 @@ class RedundancyReport:
 
     @property
     def static(self) -> int:
-        """Degree of static redundancy, n - s (below zero: the task asks for more than there is)."""
-        return self.robot.n - len(self.rows)
+        """Degree of static redundancy, n - s, without what follows (below zero: the task asks for more than
+        there is)."""
+        return self.robot.n_independent - len(self.rows)
 
     @property
     def kinematic(self) -> int:
@@ -83,7 +85,7 @@ class RedundancyReport:
     @property
     def manifold(self) -> int:
         """n - rank F: dimension of the configurations around q with the same task value."""
-        return self.robot.n - self.rank_F
+        return self.robot.n_independent - self.rank_F
 
     @property
     def free(self) -> int:
@@ -101,12 +103,13 @@ class RedundancyReport:
         return "\n\n".join("\n".join(part) for part in parts if part)
 
     def _counts(self) -> list[str]:
-        robot, s = self.robot, len(self.rows)
+        robot, s, n = self.robot, len(self.rows), self.robot.n_independent
+        following = f" (and {robot.n - n} that follow others)" if robot.followers else ""
         lines = [
             f"{robot.name}, task {', '.join(self.rows)}",
-            f"n = {_many(robot.n, 'coordinate')}, n_u = {_many(robot.n_u, 'input')}, "
+            f"n = {_many(n, 'coordinate')}{following}, n_u = {_many(robot.n_u, 'input')}, "
             f"s = {_many(s, 'row')} of the task",
-            f"static redundancy       n - s = {robot.n} - {s} = {self.static} (configurations)",
+            f"static redundancy       n - s = {n} - {s} = {self.static} (configurations)",
             f"kinematic redundancy  n_u - s = {robot.n_u} - {s} = {self.kinematic} (motions)",
             "at "
             + ", ".join(f"{name} = {value:.4g}" for name, value in zip(robot.q_names, self.q, strict=True))
@@ -144,7 +147,7 @@ class RedundancyReport:
     def _withheld(self) -> list[str]:
         k = len(self.withheld)
         if not k:
-            if self.robot.n == self.robot.n_u:
+            if self.robot.n_independent == self.robot.n_u:
                 return []
             return ["the inputs give every motion of the coordinates that leaves the task at rest"]
         them = "it" if k == 1 else "them"
@@ -205,7 +208,7 @@ def redundancy(
     tolerance = positive(tolerance, "tolerance")
     robot, p = jacobians.robot, jacobians.robot.platform.p
     J, F, S = jacobians.J(t, q), coordinate_jacobian(jacobians, t, q), robot.S(q)
-    rank_J, rank_F = jacobians.rank(J, tolerance), jacobians.rank(F, tolerance)
+    rank_J, rank_F = jacobians.rank(J, tolerance), jacobians.rank(F @ robot.following.carried, tolerance)
     readable = readable_null_space(J, rank_J, [1] * p + [0] * (robot.n_u - p))
     words = input_words(robot, q)
     withheld, texts = _withheld(robot, q, F, rank_F, readable @ S.T)
@@ -256,18 +259,27 @@ def _withheld(
 ) -> tuple[Array, tuple[str, ...]]:
     """Self-motions (k, n) that complete those admitted (rows) to null F, with their sentences.
 
-    They are looked for along the platform's own axes, in which few coordinates say much.
+    They are looked for along the platform's own axes, in which few coordinates say much, and among motions in
+    which followers follow.
     """
-    n_p = robot.platform.n_p
-    to_world = np.eye(robot.n)
+    n_p, who = robot.platform.n_p, robot.following
+    to_world = np.eye(robot.n_independent)
     if n_p:
         c, s = np.cos(q[2]), np.sin(q[2])
         to_world[:2, :2] = [[c, -s], [s, c]]
-    own = readable_null_space(F @ to_world, rank_F, [1] * n_p + [0] * (robot.n - n_p), admitted @ to_world)
+    own = readable_null_space(
+        F @ who.carried @ to_world,
+        rank_F,
+        [1] * n_p + [0] * (robot.n_independent - n_p),
+        admitted[:, who.independent] @ to_world,
+    )
     words = coordinate_words(robot, q)
-    units = [f"{unit}/s" for unit in robot.q_units]
-    texts = tuple(motion_text(one, robot.q_names, units, words, n_p) for one in own)
-    return own @ to_world.T, texts
+    names, units = (
+        [robot.q_names[i] for i in who.independent],
+        [f"{robot.q_units[i]}/s" for i in who.independent],
+    )
+    texts = tuple(motion_text(one, names, units, words, n_p) for one in own)
+    return own @ to_world.T @ who.carried.T, texts
 
 
 def _by_brackets(jacobians: Jacobians, t: float, q: Array, rank: int) -> int | None:

@@ -173,6 +173,7 @@ def find_singularities(
     tolerance = positive(tolerance, "tolerance")
     robot, rng = measure.robot, np.random.default_rng(seed)
     stand = robot.rest if at is None else robot.q(at)
+    robot.check_followers(stand)
     units = np.where([unit == "m" for unit in robot.q_units], 1.0 if length is None else float(length), 1.0)
     space = search_space(measure, stand, among, ranges, units, rng)
     first, singular = _starts(measure, space, starts, tolerance, rng)
@@ -203,7 +204,7 @@ def find_singularities(
         ranges={names[j]: (float(space.lower[j]), float(space.upper[j])) for j in space.axes},
         units=dict(zip(names, robot.q_units, strict=True)),
         indifferent=tuple(names[j] for j in space.indifferent),
-        fixed={names[j]: float(stand[j]) for j in range(robot.n) if j not in space.moving},
+        fixed={names[j]: float(stand[j]) for j in robot.following.independent if j not in space.moving},
         tolerance=tolerance,
     )
 

@@ -217,6 +217,7 @@ def _with_examples(
     for name in family.free:
         j = space.robot.coordinate(name)
         plain[0, j] = space.at[j]
+    plain = space.robot.following.placed(plain)
     there = localised(measure, space, space.z(plain), tolerance, rng)
     if there.rank[0] == family.rank and there.signature(0) == usual:
         q = np.concatenate([plain, q[: EXAMPLES - 1]])

@@ -54,7 +54,7 @@ class Space:
         """Configurations (N, n) of the values (N, a) of `axes`, in their units."""
         q = np.tile(self.at, (len(z), 1))
         q[:, self.axes] = z * self.units[self.axes]
-        return q
+        return self.robot.following.placed(q)
 
     def z(self, q: Array) -> Array:
         """Values (..., a) of `axes` in their units."""
@@ -83,7 +83,9 @@ class Space:
         turned = low + np.mod(q - low, TURN)
         turned = np.where((turned > self.upper) & (turned - TURN >= self.lower), turned - TURN, turned)
         # Where neither is inside, the range is short of a turn by the digits in which files write pi.
-        return np.asarray(np.where(self.circular, np.clip(turned, self.lower, self.upper), q))
+        return self.robot.following.placed(
+            np.where(self.circular, np.clip(turned, self.lower, self.upper), q)
+        )
 
 
 def reach(robot: Robot) -> float:
@@ -114,7 +116,7 @@ def search_space(
     Parameters
     ----------
     at (n,) : where the coordinates stay that do not move
-    among : coordinates that may move; None for all
+    among : coordinates that may move; None for all that follow no other
     ranges : (lower, upper) by coordinate
     units (n,) : what counts as 1
     around : ranges lie around `at`; and what is limited keeps its limits, whole turns too
@@ -156,9 +158,9 @@ def search_space(
 
 def _moving(robot: Robot, among: Sequence[str] | None) -> tuple[int, ...]:
     if among is None:
-        return tuple(range(robot.n))
+        return tuple(int(j) for j in robot.following.independent)
     names = [among] if isinstance(among, str) else list(among)
-    found = tuple(sorted({robot.coordinate(name) for name in names}))
+    found = tuple(sorted({robot.independent(name) for name in names}))
     if not found:
         raise InputError(f"among: expected coordinates of {', '.join(robot.q_names)}, got none")
     return found
@@ -169,7 +171,7 @@ def _ranges(
 ) -> dict[int, tuple[float, float]]:
     found = {}
     for name, value in (ranges or {}).items():
-        j = robot.coordinate(name)
+        j = robot.independent(name)
         if j not in moving:
             raise InputError(f"ranges: {name} may not move; among are {', '.join(_names(robot, moving))}")
         lower, upper = vector(value, 2, f"range of {name}")

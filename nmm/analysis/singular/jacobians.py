@@ -100,6 +100,8 @@ class Jacobians:
     def batch(self, q: Array, t: float = 0.0, progress: Progress | None = None) -> Array:
         """J (N, s, m) at N configurations (N, n) and one time, some microseconds each.
 
+        Joints that follow others are taken to be where these have them.
+
         Where there is none (the wheels cannot roll, the task is undefined), it is not a number.
 
         Parameters
@@ -109,7 +111,7 @@ class Jacobians:
         solve, found = self._of_task.equation_solver()
         platform = self.robot.platform
         rolls = type(platform).problem is Platform.problem
-        points = np.ascontiguousarray(q, dtype=np.float64)
+        points = np.ascontiguousarray(self.robot.following.placed(np.asarray(q, dtype=np.float64)))
         J = np.empty((len(points), len(self.rows), self.robot.n_u))
         every = max(1, len(points) // 100)
         for k, point in enumerate(points):
@@ -194,4 +196,6 @@ def checked(jacobians: Jacobians, t: float, q: ArrayLike | Mapping[str, float] |
     """(t, q) as numbers; `InputError` says what is wrong with them."""
     if q is None:
         raise InputError(f"q: expected {jacobians.robot.n} numbers, got None")
-    return scalar(t, "t"), jacobians.robot.q(q)
+    q = jacobians.robot.q(q)
+    jacobians.robot.check_followers(q)
+    return scalar(t, "t"), q

@@ -23,7 +23,8 @@ class Restoration:
 
     Attributes
     ----------
-    names : of the motions: inputs (q moves along S(q) e_j) or coordinates (along e_i)
+    names : of the motions: inputs (q moves along S(q) e_j) or coordinates (along e_i, with
+        what follows that one)
     rates (k,) : growth of σ_min, per m or rad of the motion
     regained (k,) : how many lost directions come back at first order; 0 where none is lost
     best (k,) : unit combination of the motions with the largest effect (‖Nᵀ dJ V‖ in Frobenius' norm, or the

@@ -203,7 +203,8 @@ def analyse(
 
     J, Jc = jacobians.J(t, q), jacobians.Jc(t, q)
     scaled_J = scaled(J)
-    J_u, J_q = jacobians.along(t, q, robot.S(q)), jacobians.along(t, q, np.eye(robot.n))
+    J_u, J_q = (jacobians.along(t, q, motions) for motions in (robot.S(q), robot.following.carried))
+    coordinates = [robot.q_names[i] for i in robot.following.independent]
     natural = jacobians.natural(row_sizes)
     parts = {
         name: part(name, scaled_J, own, robot, rows, tolerance, natural)
@@ -229,7 +230,7 @@ def analyse(
         given_back=given_back(parts["arm"], whole),
         minors=Minors(columns, determinants(J, columns), robot.u_names),
         by_input=restoration(scaled_J, scaled(J_u), robot.u_names, whole.rank),
-        by_coordinate=restoration(scaled_J, scaled(J_q), robot.q_names, whole.rank),
+        by_coordinate=restoration(scaled_J, scaled(J_q), coordinates, whole.rank),
         extended=extended_singularity(
             J, Jc, all_sizes, (*rows, *(row.name for row in jacobians.constraint_rows)), tolerance, natural
         )

@@ -11,7 +11,8 @@ from nmm.arrays import Array
 from nmm.errors import InputError, unknown
 from nmm.functions.function import Stage
 from nmm.functions.objectives.base import Objective
-from nmm.kernels.compiled import kernel
+from nmm.kernels.compiled import kernel, view
+from nmm.kernels.followers import add_to_leaders
 from nmm.kernels.linear_algebra import orthonormal_rows, pseudoinverse_transposed
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import Robot
@@ -24,24 +25,27 @@ def manipulability(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     """w = sqrt(det(J Jᵀ)) and ∂w/∂q_k = w tr(J⁺ ∂J/∂q_k); where w = 0 it has no gradient, and 0 is given.
 
     J = (rows of the frame's Jacobian) S for the robot, its arm's columns for the arm;
-    ∂J/∂q_k = H_k S + J_q ∂S/∂q_k. numbers = [first column: 0 robot, 1 arm; rows...].
+    ∂J/∂q_k = H_k S + J_q ∂S/∂q_k. numbers = [platform inputs that count, rows s, arm inputs; the rows; the
+    coordinates that the arm inputs move; followers (`nmm.kernels.followers`)].
     """
     frame = frames.slots[0]
     n = at.q.shape[0]
-    n_p, p = at.G.shape
-    arm_only = numbers[0] > 0.0
-    s = numbers.shape[0] - 1
-    m = n - n_p if arm_only else n - n_p + p
-    offset = 0 if arm_only else p
+    n_p = at.G.shape[0]
+    p, s, arm = int(numbers[0]), int(numbers[1]), int(numbers[2])
+    m = p + arm
+    selected, moved = view(numbers, 3, (s,)), view(numbers, 3 + s, (arm,))
+    followers = view(numbers, 3 + s + arm, (numbers.shape[0] - 3 - s - arm,))
+    J_q = np.empty((s, n))
     J = np.zeros((s, m))
     for i in range(s):
-        row = int(numbers[1 + i])
-        if not arm_only:
-            for j in range(p):
-                for k in range(n_p):
-                    J[i, j] += frames.jacobians[frame, row, k] * at.G[k, j]
-        for j in range(n - n_p):
-            J[i, offset + j] = frames.jacobians[frame, row, n_p + j]
+        for a in range(n):
+            J_q[i, a] = frames.jacobians[frame, int(selected[i]), a]
+        add_to_leaders(J_q, i, followers)
+        for j in range(p):
+            for a in range(n_p):
+                J[i, j] += J_q[i, a] * at.G[a, j]
+        for j in range(arm):
+            J[i, p + j] = J_q[i, int(moved[j])]
     order = np.empty(s, dtype=np.int64)
     L = np.empty((s, s))
     Q = np.empty((s, m))
@@ -54,20 +58,22 @@ def manipulability(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     rows.value[0] = w
     X = np.empty((s, m))
     pseudoinverse_transposed(order, L, Q, X)
+    H_k = np.empty((1, n))
     for k in range(n):
         trace = 0.0
         for i in range(s):
-            row = int(numbers[1 + i])
-            for j in range(m):
+            for a in range(n):
+                H_k[0, a] = frames.hessians[frame, int(selected[i]), a, k]
+            add_to_leaders(H_k, 0, followers)
+            for j in range(p):
                 derivative = 0.0
-                if j >= offset:
-                    derivative = frames.hessians[frame, row, n_p + j - offset, k]
-                else:
-                    for a in range(n_p):
-                        derivative += frames.hessians[frame, row, a, k] * at.G[a, j]
-                        if k < n_p:
-                            derivative += frames.jacobians[frame, row, a] * at.G_q[a, j, k]
+                for a in range(n_p):
+                    derivative += H_k[0, a] * at.G[a, j]
+                    if k < n_p:
+                        derivative += J_q[i, a] * at.G_q[a, j, k]
                 trace += X[i, j] * derivative
+            for j in range(arm):
+                trace += X[i, p + j] * H_k[0, int(moved[j])]
         rows.value_q[0, k] = w * trace
 
 
@@ -99,11 +105,15 @@ class Manipulability(Objective):
         self.of = of
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
-        inputs = robot.n - robot.platform.n_p if self.of == "arm" else robot.n_u
+        platform, arm = 0 if self.of == "arm" else robot.platform.p, robot.arm_coordinates
+        inputs = platform + len(arm)
         if len(self.selected) > inputs:
             raise InputError(
                 f"manipulability of the {self.of}: {len(self.selected)} rows with {inputs} inputs is "
                 f"always 0; expected at most {inputs} rows"
             )
-        numbers = np.array([float(self.of == "arm"), *(ROWS[row] for row in self.selected)])
+        rows = [ROWS[row] for row in self.selected]
+        numbers = np.array(
+            [platform, len(rows), len(arm), *rows, *arm, *robot.following.table.ravel()], float
+        )
         return (Stage(manipulability, 1, (self.frame,), numbers, hessians=True),)

@@ -73,7 +73,7 @@ class JointRange(Objective):
 
     Parameters
     ----------
-    joints : names of the coordinates; all those of the arm when not given
+    joints : names of the coordinates; all those of the arm, but those that follow others, when not given
     lower, upper : their limits, rad or m; the robot's own when not given
     """
 
@@ -88,12 +88,12 @@ class JointRange(Objective):
         self.upper = upper
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
-        joints = robot.q_names[robot.platform.n_p :] if self.joints is None else self.joints
+        joints = robot.u_names[robot.platform.p :] if self.joints is None else self.joints
         indices = [robot.coordinate(name) for name in joints]
         if not indices:
             raise InputError(f"joint range: robot {robot.name} has no arm joint")
-        lower = self._limits(self.lower, robot.model.lowerPositionLimit[indices], "lower")
-        upper = self._limits(self.upper, robot.model.upperPositionLimit[indices], "upper")
+        lower = self._limits(self.lower, robot.q_limits[indices, 0], "lower")
+        upper = self._limits(self.upper, robot.q_limits[indices, 1], "upper")
         for name, low, high in zip(joints, lower, upper, strict=True):
             if not (np.isfinite(low) and np.isfinite(high)):
                 raise InputError(

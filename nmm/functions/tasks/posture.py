@@ -1,4 +1,4 @@
-"""Posture: coordinates as they are, by default all of the manipulator's."""
+"""Posture: coordinates as they are, by default all of the manipulator's that follow no other."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class Posture(Function):
 
     Parameters
     ----------
-    names : names of coordinates; all of the manipulator's when none is given
+    names : names of coordinates; all of the manipulator's, but those that follow others, when none is given
     """
 
     def __init__(self, *names: str) -> None:
@@ -33,7 +33,7 @@ class Posture(Function):
         return self._coordinates(robot).stages(robot)
 
     def _coordinates(self, robot: Robot) -> Coordinates:
-        names = self.names or robot.q_names[robot.platform.n_p :]
+        names = self.names or robot.u_names[robot.platform.p :]
         if not names:
             raise InputError(f"posture: expected names of coordinates, {robot.name} has no manipulator")
         return Coordinates(*names)

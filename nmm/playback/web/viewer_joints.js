@@ -56,13 +56,18 @@
     nmm.viewer.set_dirty();
   }
 
-  // Values by name, m and rad.
+  // Values by name, m and rad; what follows another coordinate has no slider and goes with that one.
   joints.set = (values) => {
     for (const coordinate of joints.coordinates) {
-      if (values[coordinate.name] === undefined) continue;
+      if (coordinate.follows || values[coordinate.name] === undefined) continue;
       coordinate.value = values[coordinate.name];
       place(coordinate);
       show(coordinate);
+      for (const follower of joints.coordinates) {
+        if (follower.follows?.leader !== coordinate.name) continue;
+        follower.value = follower.follows.multiplier * coordinate.value + follower.follows.offset;
+        place(follower);
+      }
     }
     moved();
   };
@@ -77,7 +82,9 @@
     reset.addEventListener("click", joints.reset);
     let group = null;
     for (const coordinate of coordinates) {
-      const { name, unit, of, lower, upper, value } = coordinate;
+      const { name, unit, of, lower, upper, value, follows } = coordinate;
+      coordinate.start = value;
+      if (follows) continue;
       if (of !== group) nmm.element(nmm.panel, "h3", {}, (group = of));
       const row = nmm.element(nmm.panel, "label", { class: "coordinate" });
       nmm.element(row, "span", { title: name }, name);
@@ -86,7 +93,6 @@
         type: "range", min: lower, max: upper, step: "any", "data-name": name, "aria-label": name,
         title: `${name}: from ${nmm.fixed(lower, 3)} to ${nmm.fixed(upper, 3)} ${unit}`,
       });
-      coordinate.start = value;
       coordinate.slider.addEventListener("input", () => {
         joints.set({ [name]: Number(coordinate.slider.value) });
       });

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from nmm.robots.loading.check_mimics import leaders_to_lock
 from nmm.robots.loading.findings import Findings, Problem, child, children
 from nmm.robots.loading.xml_tree import Element
 
@@ -96,7 +95,7 @@ def _mass(link: Element) -> float | None:
 
 
 def _on_joints(joints: list[Element]) -> Iterator[Problem]:
-    """Speeds without a limit, joints that cannot move, and followers."""
+    """Speeds without a limit, and joints that cannot move."""
     for joint in joints:
         kind, owner = joint.get("type", ""), f"joint {joint.get('name')!r}"
         if kind == "fixed":
@@ -113,16 +112,6 @@ def _on_joints(joints: list[Element]) -> Iterator[Problem]:
                     f"{owner}: <limit> lets it stand at {lower:g} only (both ends are 0 unless given)",
                     limit.line,
                 )
-    lock = leaders_to_lock(joints)
-    for joint in joints:
-        mimic = child(joint, "mimic")
-        if mimic is not None and joint.get("name") in lock.followers:
-            leader = lock.followers[joint.get("name", "")]
-            yield Problem(
-                f"joint {joint.get('name')!r}: follows {leader!r} (<mimic>): refused unless that is locked, "
-                f"lock={{{leader!r}: {lock.values[leader]:g}}}",
-                mimic.line,
-            )
 
 
 def _on_names(links: list[Element], joints: list[Element]) -> Iterator[Problem]:

@@ -15,7 +15,8 @@ import pinocchio as pin
 
 from nmm.errors import RobotError
 from nmm.platforms.own_joints import PLANAR as CHAIN
-from nmm.robots.loading.joint_kinds import is_continuous, is_simple, kind, one_number, value_at
+from nmm.robots.followers import Follower
+from nmm.robots.loading.joint_kinds import is_continuous, is_mimic, is_simple, kind, one_number, value_at
 from nmm.robots.loading.joint_limits import joint_limits, no_limits
 
 Head = Sequence[tuple[str, Any]]
@@ -105,6 +106,16 @@ class _Plan:
         return self.root * placement if joint == self.count else placement
 
 
+def followers_of(source: pin.Model) -> tuple[Follower, ...]:
+    """The joints that a model built with `mimic=True` has follow others."""
+    pairs = zip(source.mimicking_joints, source.mimicked_joints, strict=True)
+    found = [(joint, leader, source.joints[joint].extract()) for joint, leader in pairs]
+    return tuple(
+        Follower(str(source.names[joint]), str(source.names[leader]), float(one.scaling), float(one.offset))
+        for joint, leader, one in found
+    )
+
+
 def replaced_joints(source: pin.Model) -> int:
     """How many first joints the chain stands for: 3 (the chain itself), 1 (a planar or free root), or 0."""
     kinds = [kind(joint) for joint in source.joints]
@@ -160,6 +171,8 @@ def _add_joints(model: pin.Model, plan: _Plan, first: Sequence[str]) -> dict[int
         )
     # Of a replaced root there is nothing to copy, of a kept chain there is.
     for joint in range(1 if plan.keeps_chain else count + 1, source.njoints):
+        if is_mimic(source.joints[joint]):
+            continue  # it has none of its own
         new, old = model.joints[joints[joint]].idx_v, source.joints[joint].idx_v
         model.armature[new] = source.armature[old]
         model.rotorInertia[new] = source.rotorInertia[old]
@@ -255,7 +268,11 @@ def _add_references(model: pin.Model, plan: _Plan, joints: Mapping[int, int]) ->
         if old.shape != (source.nq,):
             continue
         for joint in range(1 if plan.keeps_chain else plan.count + 1, source.njoints):
-            q[model.joints[joints[joint]].idx_q] = value_at(source.joints[joint], old)
+            if not is_mimic(source.joints[joint]):
+                q[model.joints[joints[joint]].idx_q] = value_at(source.joints[joint], old)
+        for one in followers_of(source):
+            follower, leader = (model.joints[model.getJointId(name)] for name in (one.joint, one.leader))
+            q[follower.idx_q] = one.value(q[leader.idx_q])
         model.referenceConfigurations[entry.key()] = q
 
 

@@ -13,9 +13,10 @@ from pathlib import Path
 
 from nmm.errors import RobotError, unknown
 from nmm.platforms import PLATFORMS
+from nmm.robots.followers import Follower
 from nmm.robots.loading.check_joints import check_joint
 from nmm.robots.loading.check_links import FindMesh, check_link, check_material
-from nmm.robots.loading.check_mimics import Mimic, check_mimics
+from nmm.robots.loading.check_mimics import check_mimics
 from nmm.robots.loading.check_tree import check_names, check_tree
 from nmm.robots.loading.findings import Findings, Problem, children
 from nmm.robots.loading.xml_tree import Element, XmlError, parse
@@ -35,14 +36,14 @@ class CheckedUrdf:
     root : its <robot> element
     name : the robot's name
     meshes : files of its meshes, by the name in the description
-    mimics : joints that follow others which do not move
+    followers : joints that follow others, each after the one that it follows
     platform : the kind of platform that it declares, if it does
     """
 
     root: Element
     name: str
     meshes: dict[str, Path]
-    mimics: tuple[Mimic, ...]
+    followers: tuple[Follower, ...]
     platform: str | None
 
 
@@ -56,7 +57,7 @@ def find_problems(
     xml_text : the expanded description
     find_mesh : the path of a mesh by its name in the file, a sentence that says why there is none, or None
         to leave its shape out; without it, mesh files are taken to exist
-    lock : names of joints that will not move, so that they may mimic others, and others them
+    lock : names of joints that will not move, so that they follow nobody
     """
     return _inspect(xml_text, find_mesh or Path, lock)[1]
 
@@ -129,8 +130,8 @@ def _check_robot(root: Element, findings: Findings, find_mesh: FindMesh, lock: C
         meshes |= check_link(link, findings, find_mesh)
     for joint in joints:
         check_joint(joint, findings)
-    mimics = check_mimics(joints, findings, lock)
-    return CheckedUrdf(root, root.get("name") or "", meshes, mimics, _declared_platform(root, findings))
+    followers = check_mimics(joints, findings, lock)
+    return CheckedUrdf(root, root.get("name") or "", meshes, followers, _declared_platform(root, findings))
 
 
 def _declared_platform(root: Element, findings: Findings) -> str | None:

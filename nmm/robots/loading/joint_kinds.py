@@ -30,9 +30,27 @@ def is_continuous(joint: Any) -> bool:
     return kind(joint) in _CONTINUOUS or kind(joint) == _CONTINUOUS_UNALIGNED
 
 
+def is_mimic(joint: Any) -> bool:
+    """Whether Pinocchio has it follow another joint, without a number of its own (`mimic=True`)."""
+    return kind(joint) == "Mimic"
+
+
 def is_simple(joint: Any) -> bool:
     """Whether it has one degree of freedom that one number can describe."""
-    return kind(joint) in _SIMPLE or is_continuous(joint)
+    return kind(joint) in _SIMPLE or is_continuous(joint) or (is_mimic(joint) and _free(joint) is not None)
+
+
+def _free(mimic: Any) -> Any:
+    """The joint that a follower would be on its own; None where it neither only turns nor only slides."""
+    if not mimic.extract().scaling:
+        return None  # its axis is not to be had
+    data, q = mimic.createData(), np.zeros(mimic.idx_q + 2)
+    q[mimic.idx_q] = 1.0  # an angle 0, if the leader has cosine and sine
+    mimic.calc(data, q)
+    linear, angular = (np.array(data.S) / mimic.extract().scaling).reshape(2, 3)
+    if not linear.any():
+        return pin.JointModelRevoluteUnaligned(angular)
+    return None if angular.any() else pin.JointModelPrismaticUnaligned(linear)
 
 
 def is_revolute(joint: Any) -> bool:
@@ -55,7 +73,9 @@ def value_at(joint: Any, q: NDArray[np.float64]) -> float:
 
 
 def one_number(joint: Any, q: NDArray[np.float64]) -> Any:
-    """The joint itself, or the one-number form of a continuous one."""
+    """The joint itself, or the one-number form of a continuous one or of a follower."""
+    if is_mimic(joint):
+        return _free(joint)
     if not is_continuous(joint):
         return joint
     if kind(joint) == _CONTINUOUS_UNALIGNED:

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from nmm.robots.loading.joint_kinds import is_continuous
+from nmm.robots.loading.joint_kinds import is_continuous, is_mimic
 
 # Pinocchio's "no limit" is the largest number there is.
 _HUGE = 1e300
@@ -27,6 +27,8 @@ def no_limits(joint: Any) -> tuple[NDArray[np.float64], ...]:
 
 def joint_limits(source: pin.Model, joint: int) -> tuple[NDArray[np.float64], ...]:
     """Limits of effort, velocity, position and friction (lower, upper), and damping; infinite where none."""
+    if is_mimic(source.joints[joint]):
+        return no_limits(pin.JointModelRX())  # Pinocchio has dropped them
     v, q = source.joints[joint].idx_v, source.joints[joint].idx_q
     velocity = source.velocityLimit[v : v + 1]  # `lowerVelocityLimit` comes back with the wrong sign
     lower, upper = source.lowerPositionLimit[q : q + 1], source.upperPositionLimit[q : q + 1]

@@ -37,7 +37,8 @@ def load(
     The robot gets the coordinates x, y (m) and theta (rad, not wrapped) above its root link, which is the
     platform's reference point (REP-103: x forward, z up; on the ground, midway between the wheels) unless
     `axle` says where that is. A platform without coordinates is a fixed base. Continuous joints become one
-    unbounded angle. Wheels that only roll are no coordinates. Mimic joints must follow a locked one.
+    unbounded angle. Wheels that only roll are no coordinates. A joint that follows another
+    (<mimic>) stays a coordinate and has no input of its own; one that follows a locked joint stands still.
 
     Parameters
     ----------
@@ -51,7 +52,8 @@ def load(
     wheels : joints that only roll, or the radius (m) of each; `()` for none. By default those with "wheel"
         in the joint's or link's name, with a level axis and no joint below them; on a fixed base they
         stand still
-    lock : joints to fix, and their values (rad or m), within their limits
+    lock : joints to fix, and their values (rad or m), within their limits; joints that follow them are fixed
+        with them, and one that is fixed itself follows nobody
     axle : the platform's reference point in the root link: a frame, whose yaw counts too, or x, y(, z) in m
     name : the robot's name; by default that of the file or model
     limits : largest absolute values of the platform's inputs, by name, in their units

@@ -10,8 +10,8 @@ import pinocchio as pin
 
 from nmm.arrays import scalar
 from nmm.errors import InputError, RobotError, unknown
+from nmm.robots.followers import Follower, settled
 from nmm.robots.loading.chain import CHAIN, Rebuilt
-from nmm.robots.loading.check_mimics import Mimic
 from nmm.robots.loading.reduction import reduced
 
 # Limits are decimal fractions of angles that are none.
@@ -26,16 +26,23 @@ class Locked:
     ----------
     rebuilt : the model, and notes on what was fixed
     values : where the named joints are fixed, rad or m
-    followers : the joints that were fixed because they follow one of these: which, and where
+    mimicked : the joints that were fixed because they follow one of these: which, and where
+    followers : the others that follow a joint, each after the one that it follows
     """
 
     rebuilt: Rebuilt
     values: Mapping[str, float]
-    followers: Mapping[str, tuple[str, float]]
+    mimicked: Mapping[str, tuple[str, float]]
+    followers: tuple[Follower, ...]
 
 
 def with_locked(
-    rebuilt: Rebuilt, lock: Mapping[str, float], mimics: Sequence[Mimic], where: str, own: Sequence[str] = ()
+    rebuilt: Rebuilt,
+    lock: Mapping[str, float],
+    followers: Sequence[Follower],
+    where: str,
+    own: Sequence[str] = (),
+    standing: Mapping[str, float] | None = None,
 ) -> Locked:
     """The model with joints fixed at their values, on the body above; they are no coordinates any more.
 
@@ -43,9 +50,10 @@ def with_locked(
     ----------
     rebuilt : a model on the chain
     lock : values by joint, rad or m
-    mimics : joints that follow one of these, or a fixed joint, each after the one that it follows
+    followers : joints that follow others, each after the one that it follows
     where : what messages call the model
     own : the platform's own joints, as far as they are known: they cannot be locked
+    standing : other joints to fix, of which nothing is said
 
     Raises
     ------
@@ -56,28 +64,28 @@ def with_locked(
     values = {name: _value(name, value, free, own, where) for name, value in lock.items()}
     for name, value in values.items():
         _check_limits(model, name, value, where, "")
-    followers: dict[str, tuple[str, float]] = {}
-    settled = dict(values)
-    for mimic in mimics:
-        # A leader that is no joint of the model is a fixed one, which stands at zero.
-        value = mimic.multiplier * settled.get(mimic.leader, 0.0) + mimic.offset
-        _check_limits(model, mimic.joint, value, where, f", which follows {mimic.leader}")
-        followers[mimic.joint] = mimic.leader, value
-        settled[mimic.joint] = value
-    if not settled:
-        return Locked(rebuilt, {}, {})
+    followers = [one for one in followers if one.joint not in lock]  # what is locked follows nobody
+    # A leader that is no joint of the model is a fixed one, which stands at zero.
+    fixed = {one.leader: 0.0 for one in followers if one.leader not in free}
+    standing = {**(standing or {}), **values}
+    mimicked, moving = settled(followers, {**fixed, **standing})
+    for name, (leader, value) in mimicked.items():
+        _check_limits(model, name, value, where, f", which follows {leader}")
+    still = {**standing, **{name: value for name, (_, value) in mimicked.items()}}
+    if not still:
+        return Locked(rebuilt, {}, {}, moving)
     q = np.zeros(model.nq)
-    ids = [model.getJointId(name) for name in settled]
-    for joint, value in zip(ids, settled.values(), strict=True):
+    ids = [model.getJointId(name) for name in still]
+    for joint, value in zip(ids, still.values(), strict=True):
         q[model.joints[joint].idx_q] = value
     lean, geometries = reduced(model, rebuilt.geometries, ids, q)
     notes = [*rebuilt.notes]
     if values:
         notes.append(f"locked joints: {', '.join(f'{name} at {at:g}' for name, at in values.items())}")
-    if followers:
-        told = (f"{name} at {at:g} (follows {leader})" for name, (leader, at) in followers.items())
+    if mimicked:
+        told = (f"{name} at {at:g} (follows {leader})" for name, (leader, at) in mimicked.items())
         notes.append(f"locked with the joint that they follow: {', '.join(told)}")
-    return Locked(Rebuilt(lean, geometries, tuple(notes)), values, followers)
+    return Locked(Rebuilt(lean, geometries, tuple(notes)), values, mimicked, moving)
 
 
 def _value(name: str, value: float, free: Sequence[str], own: Sequence[str], where: str) -> float:

@@ -14,8 +14,9 @@ from nmm.platforms import Layout, Platform, Unicycle, platform_by_name
 from nmm.robots.loading.axle import axle_placement, told
 from nmm.robots.loading.chain import CHAIN, Rebuilt, rebuild
 from nmm.robots.loading.collision_pairs import add_pairs
+from nmm.robots.loading.following import among_coordinates, told_limits
 from nmm.robots.loading.layout import measure_layout
-from nmm.robots.loading.locking import with_locked
+from nmm.robots.loading.locking import Locked, with_locked
 from nmm.robots.loading.provenance import Parts
 from nmm.robots.loading.reduction import reduced
 from nmm.robots.loading.source import Source
@@ -51,7 +52,7 @@ def robot_from(source: Source, options: Options) -> Robot:
     rebuilt = rebuild(source.model, (source.visual_model, source.collision_model), where)
     rebuilt.model.name = options.name or source.name
     stated = options.platform.coordinates[len(CHAIN) :] if isinstance(options.platform, Platform) else ()
-    locked = with_locked(rebuilt, options.lock, source.mimics, where, stated)
+    locked = with_locked(rebuilt, options.lock, source.followers, where, stated)
     rebuilt = locked.rebuilt
     if options.axle is not None:
         placement = axle_placement(rebuilt.model, options.axle, where)
@@ -64,14 +65,14 @@ def robot_from(source: Source, options: Options) -> Robot:
         except InputError as error:
             raise RobotError(f"{where}: {error}") from None
     own = _own_joints(platform, rebuilt.model, locked.values, where)
-    display = _on_platform(rebuilt, platform, own, where)
+    made = replace(locked, rebuilt=_on_platform(rebuilt, platform, own, where))
     if not platform.coordinates:
-        display = _with_held_wheels(display, options.wheels, where)
+        made = _with_held_wheels(made, options.wheels, where)
+    display = made.rebuilt
     notes = (*source.notes, *display.notes)
-    provenance = replace(source.provenance, locked=locked.values, mimicked=locked.followers, platform=origin)
-    return _without_wheels(
-        display, platform, own, source, options, Parts(display.geometries[1], notes, provenance)
-    )
+    provenance = replace(source.provenance, locked=made.values, mimicked=made.mimicked, platform=origin)
+    parts = Parts(display.geometries[1], notes, provenance)
+    return _without_wheels(made, platform, own, source, options, parts)
 
 
 def _platform(rebuilt: Rebuilt, source: Source, options: Options) -> tuple[Platform, str]:
@@ -118,9 +119,10 @@ def _on_platform(rebuilt: Rebuilt, platform: Platform, own: Sequence[str], where
 
 
 def _without_wheels(
-    display: Rebuilt, platform: Platform, own: Sequence[str], source: Source, options: Options, parts: Parts
+    made: Locked, platform: Platform, own: Sequence[str], source: Source, options: Options, parts: Parts
 ) -> Robot:
     """The robot, with its wheels on the display model only."""
+    display = made.rebuilt
     whole, (shown, solid) = display.model, display.geometries
     wheels, notes = _wheels(display, platform, own, source.where, options.wheels)
     names = list(dict.fromkeys(name for wheel in wheels for name in (wheel.swivel, wheel.joint) if name))
@@ -131,6 +133,8 @@ def _without_wheels(
         model, (solid,) = reduced(whole, (solid,), ids, np.zeros(whole.nq))
     elif source.all_pairs or options.add_pairs:
         solid = solid.copy()
+    followers, more = among_coordinates(made.followers, names, source.where)
+    notes += more
     if model.nq == platform.n_p:
         notes.append("no arm: the platform is all that moves" if model.nq else "nothing moves")
     add = options.add_pairs or (add_pairs if source.all_pairs else None)
@@ -152,22 +156,25 @@ def _without_wheels(
         source=source.label,
         arguments=dict(source.arguments),
         notes=(*parts.notes, *notes),
+        followers=followers,
         parts=replace(parts, provenance=replace(parts.provenance, reduced=tuple(names))),
     )
-    return replace(robot, **robot.shapes._asdict(), notes=(*robot.notes, *told_slip(robot)))
+    more = (*told_limits(robot), *told_slip(robot))
+    return replace(robot, **robot.shapes._asdict(), notes=(*robot.notes, *more))
 
 
-def _with_held_wheels(
-    display: Rebuilt, asked: Sequence[str] | Mapping[str, float] | None, where: str
-) -> Rebuilt:
-    """The model of a base that does not move, with its wheels fixed."""
+def _with_held_wheels(made: Locked, asked: Sequence[str] | Mapping[str, float] | None, where: str) -> Locked:
+    """The model of a base that does not move, with its wheels fixed, and what follows them."""
+    display = made.rebuilt
     names, notes = held_joints(display.model, asked, where)
     if not names:
-        return replace(display, notes=(*display.notes, *notes))
-    ids = [display.model.getJointId(name) for name in names]
-    model, geometries = reduced(display.model, display.geometries, ids, np.zeros(display.model.nq))
+        return replace(made, rebuilt=replace(display, notes=(*display.notes, *notes)))
+    others = [one for one in made.followers if one.joint not in names]
+    still = with_locked(display, {}, others, where, standing=dict.fromkeys(names, 0.0))
     note = f"wheels of a fixed base, which stand still: {', '.join(names)}"
-    return Rebuilt(model, geometries, (*display.notes, *notes, note))
+    notes = (*display.notes, *notes, note, *still.rebuilt.notes[len(display.notes) :])
+    mimicked = {**made.mimicked, **still.mimicked}
+    return Locked(replace(still.rebuilt, notes=notes), made.values, mimicked, still.followers)
 
 
 def _wheels(

@@ -130,6 +130,7 @@ def _mounted(
             _told(base, arm, key, frame, prefix),
         ),
         provenance=provenance,
+        followers=(*base.followers, *(one.renamed(prefix) for one in arm.followers)),
     )
 
     def pairs(model: pin.Model, geometry: pin.GeometryModel) -> None:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from nmm.arrays import array
 from nmm.errors import InputError, unknown
 from nmm.robots.loading.chain import CHAIN_JOINTS, Head, rebuild, replaced_joints
-from nmm.robots.loading.joint_kinds import is_continuous, is_simple, kind
+from nmm.robots.loading.joint_kinds import is_continuous, is_mimic, is_simple, kind
 from nmm.robots.loading.provenance import parts_of, provenance_of
 from nmm.robots.loading.reduction import reduced
 from nmm.robots.loading.root_layout import ROOTS, ChainRoot, RootLayout
@@ -91,8 +91,8 @@ class PinocchioLayout:
 
     Joints are matched by name, continuous ones may be (cos, sin) pairs; the model may have the wheels that
     the robot leaves out (they stand at zero) and the joints that were locked (they stand where they are
-    locked). The reference point may be elsewhere than the model's root (`axle`): it is found by the frames
-    that both have.
+    locked). Joints that follow others may be without a number in the model (`mimic=True`). The reference
+    point may be elsewhere than the model's root (`axle`): it is found by the frames that both have.
 
     Parameters
     ----------
@@ -118,6 +118,7 @@ class PinocchioLayout:
         self._head = replaced_joints(self.model)
         self._root = self._root_layout()
         self._pairs, self._held = self._matched()
+        self._mimics = any(is_mimic(joint) for joint in self.model.joints)
 
     def configuration(self, q: ArrayLike) -> Array:
         """The model's configuration (nq,) at coordinates q (n,); or (N, nq) for a trajectory (N, n)."""
@@ -173,6 +174,8 @@ class PinocchioLayout:
         for column in turning if len(rows) else []:
             ahead = np.concatenate([start[column : column + 1], result[:, column]])
             result[:, column] = np.unwrap(ahead)[1:]
+        if self._mimics:
+            result = self.robot.following.placed(result)
         return result[0] if single else result
 
     def rates(self, configuration: ArrayLike, velocity: ArrayLike) -> Array:
@@ -191,6 +194,9 @@ class PinocchioLayout:
         result[:, :k] = self._root.rates(q[:, :k], v[:, : self._root.nv])
         for joint, column in self._pairs:
             result[:, column] = v[:, self.model.joints[joint].idx_v]
+        if self._mimics:
+            who = self.robot.following
+            result[:, who.columns] = who.multipliers * result[:, who.leaders]
         return result[0] if single else result
 
     @property
@@ -228,13 +234,17 @@ class PinocchioLayout:
         held = {**made.locked, **{name: value for name, (_, value) in made.mimicked.items()}}
         standing = {name for wheel in robot.wheels for name in (wheel.swivel, wheel.joint)}
         own = list(robot.q_names[self._n_root :])
+        following = [one.joint for one in robot.followers]
         pairs, still = [], {}
         for joint in range(self._head + 1, model.njoints):
             name = str(model.names[joint])
+            if is_mimic(model.joints[joint]) and name in (*held, *following):
+                own = [other for other in own if other != name]
+                continue
             if not is_simple(model.joints[joint]):
                 raise InputError(f"joint {name} of the model has more than one degree of freedom")
             if name in own:
-                pairs.append((joint, self._n_root + own.index(name)))
+                pairs.append((joint, robot.coordinate(name)))
             elif name in held:
                 still[joint] = float(held[name])
             elif name not in standing:

@@ -11,12 +11,11 @@ from pathlib import Path
 from nmm.errors import InputError, RobotError
 from nmm.robots.loading.advice import advice, joints_by_type
 from nmm.robots.loading.check import find_problems
-from nmm.robots.loading.check_mimics import leaders_to_lock
 from nmm.robots.loading.description import Description, argument_texts, describe
 from nmm.robots.loading.findings import Problem, child, children
+from nmm.robots.loading.following import told_limits
 from nmm.robots.loading.load import load
 from nmm.robots.loading.packages import Packages
-from nmm.robots.loading.provenance import provenance_of
 from nmm.robots.loading.second_opinion import second_opinion
 from nmm.robots.loading.wheel_advice import wheel_advice
 from nmm.robots.loading.xacro_file import expand
@@ -59,8 +58,7 @@ def report(
 ) -> Report:
     """Look at a .urdf or .xacro file from all sides; every problem is named, not only the first.
 
-    Without problems the file was loaded, with what the warnings say: mimic joints' leaders locked, shapes
-    left out whose meshes are missing.
+    Without problems the file was loaded, with what the warnings say: shapes without their meshes left out.
 
     Parameters
     ----------
@@ -155,15 +153,12 @@ class _Report:
         if not any("XML" in p.message for p in problems[:1]):
             root = _root(text)
         if root is not None:
-            lock = leaders_to_lock(children(root, "joint")).values
-            self.meshes.clear()
-            problems = find_problems(text, self._mesh, lock)
             problems += [*found, *_left_over(root)]
             self._count(root)
             self._about_meshes(root)
             if not problems:
                 self.warnings += advice(root)
-                problems += self._load(root, lock)
+                problems += self._load(root)
         return Report(
             self.description.path,
             self.description.expanded,
@@ -211,14 +206,13 @@ class _Report:
         self.facts["links"] = str(len(children(root, "link")))
         self.facts["joints"] = f"{len(children(root, 'joint'))}: {kinds}" if kinds else "none"
 
-    def _load(self, root: Element, lock: Mapping[str, float]) -> list[Problem]:
+    def _load(self, root: Element) -> list[Problem]:
         """Load it, to see that it loads; what is wrong then."""
         try:
             robot = load(
                 self.description.path,
                 arguments=self.arguments,
                 package_dirs=self.package_dirs,
-                lock=lock,
                 missing_meshes="skip",
             )
             for shapes in robot.shapes:
@@ -228,18 +222,18 @@ class _Report:
         except Exception as error:  # a library's, which `load` did not foresee: a report comes all the same
             return [Problem(f"cannot be loaded: {type(error).__name__}: {one_line(str(error))}")]
         self.warnings += [Problem(text) for text in wheel_advice(robot, _top(root))]
+        self.warnings += [Problem(text) for text in told_limits(robot)]
         self.warnings += [Problem(text) for text in second_opinion(self.description.xml)]
         self._about(robot)
         return []
 
     def _about(self, robot: Robot) -> None:
-        locked = ", ".join(f"{name} at {value:g}" for name, value in provenance_of(robot).locked.items())
         self.facts["platform"] = robot.platform.name
         self.facts["coordinates"] = f"{robot.n}: {', '.join(robot.q_names)}"
+        if robot.followers:
+            self.facts["followers"] = ", ".join(map(str, robot.followers))
         self.facts["wheels"] = ", ".join(wheel.joint for wheel in robot.wheels) or "none"
         self.facts["mass"] = f"{sum(inertia.mass for inertia in robot.model.inertias):.4g} kg"
-        if locked:
-            self.facts["locked to load it"] = locked
 
 
 def _root(text: str) -> Element | None:

@@ -11,8 +11,9 @@ import pinocchio as pin
 
 from nmm.bundled import bundled_robots
 from nmm.errors import RobotError, unknown
+from nmm.robots.followers import Follower
+from nmm.robots.loading.chain import followers_of
 from nmm.robots.loading.check import check
-from nmm.robots.loading.check_mimics import Mimic
 from nmm.robots.loading.description import SUFFIXES, describe
 from nmm.robots.loading.packages import package_file
 from nmm.robots.loading.provenance import Provenance
@@ -35,7 +36,7 @@ class Source:
     model, visual_model, collision_model : Pinocchio's, not to be changed
     all_pairs : whether the collision pairs are ours to choose
     arguments : the xacro arguments used
-    mimics : joints that follow others which are locked
+    followers : joints that follow others, each after the one that it follows
     platform : the kind of platform that the file declares
     notes : what was done
     provenance : what was found
@@ -49,7 +50,7 @@ class Source:
     collision_model: pin.GeometryModel
     all_pairs: bool
     arguments: Mapping[str, str] = field(default_factory=dict)
-    mimics: tuple[Mimic, ...] = ()
+    followers: tuple[Follower, ...] = ()
     platform: str | None = None
     notes: tuple[str, ...] = ()
     provenance: Provenance = field(default_factory=Provenance)
@@ -89,7 +90,7 @@ def read_file(
         collision_model=collision,
         all_pairs=True,
         arguments=description.arguments,
-        mimics=checked.mimics,
+        followers=checked.followers,
         platform=checked.platform,
         notes=(*description.notes, *told),
         provenance=Provenance(dict(packages.found), packages.searched, meshes),
@@ -108,6 +109,7 @@ def read_model(
         visual_model=_shapes(visual_model, "visual_model", model),
         collision_model=_shapes(collision_model, "collision_model", model),
         all_pairs=False,
+        followers=followers_of(model),
     )
 
 

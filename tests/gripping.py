@@ -1,0 +1,36 @@
+"""Robots with joints that follow others, for the tests that need one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import nmm
+from nmm.robots.followers import Follower
+from nmm.robots.robot import Robot
+
+DATA = "package://example-robot-data/robots/"
+PANDA = DATA + "panda_description/urdf/panda.urdf"
+FINGERS = ("panda_finger_joint1", "panda_finger_joint2")
+
+
+@cache
+def panda(base: str = "") -> Robot:
+    """A Panda with its hand, alone or on a bundled base without arm."""
+    alone = nmm.load(PANDA, platform="fixed")
+    return nmm.mount(base, alone, at="arm_mount") if base else alone
+
+
+@cache
+def folding() -> Robot:
+    """The bundled planar robot of three joints, of which the last follows the first."""
+    followers = (Follower("q3", "q1", -0.7, 0.2),)
+    return replace(nmm.load("unicycle_3r"), name="unicycle_3r_folding", followers=followers)
+
+
+@cache
+def hitched() -> Robot:
+    """An arm on a tractor, of which one joint follows a hitch of the platform and another the first joint."""
+    robot = nmm.mount("trailer_base", "small_arm", at="arm_mount")
+    followers = (Follower("q3", "hitch1", 0.8, 0.1), Follower("q4", "q1", -1.5))
+    return replace(robot, followers=followers)
