@@ -13,7 +13,7 @@ class Posture(Function):
 
     Parameters
     ----------
-    names : names of coordinates; all of the manipulator's when none is given
+    names : names of coordinates; all of the manipulator's when not given
     """
 
     def __init__(self, *names: str) -> None:
