@@ -6,19 +6,8 @@ from typing import Annotated
 
 import typer
 
-from nmm.cli.options import (
-    ArgumentOption,
-    AxleOption,
-    LockOption,
-    NoOpenOption,
-    PackageOption,
-    PlatformOption,
-    PortOption,
-    arguments_of,
-    loading_of,
-)
-
-ROBOT_HELP = "A bundled name (see `nmm robots`), a .urdf or .xacro file, or package://PACKAGE/PATH."
+from nmm.cli.groups import Browser, Loading
+from nmm.cli.options import ROBOT_HELP, ArgumentOption, PackageOption, arguments_of
 
 
 def info(
@@ -30,7 +19,7 @@ def info(
             show_default=False,
         ),
     ] = None,
-    platform: PlatformOption = None,
+    *,
     scenario: Annotated[
         str | None,
         typer.Option(
@@ -38,9 +27,7 @@ def info(
             help="Show the redundancy for this scenario's task, and the inputs that it does not feel.",
         ),
     ] = None,
-    lock: LockOption = None,
-    axle: AxleOption = None,
-    package_dir: PackageOption = None,
+    loading: Loading,
 ) -> int:
     """Describe a robot.
 
@@ -56,11 +43,7 @@ def info(
     """
     from nmm.cli.descriptions import describe_robot
 
-    return describe_robot(
-        robot,
-        scenario,
-        **loading_of(platform, lock, axle, package_dir),
-    )
+    return describe_robot(robot, scenario, **loading.keywords())
 
 
 def check(
@@ -87,12 +70,8 @@ def check(
 
 def view(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help=ROBOT_HELP)],
-    platform: PlatformOption = None,
-    lock: LockOption = None,
-    axle: AxleOption = None,
-    package_dir: PackageOption = None,
-    port: PortOption = None,
-    no_open: NoOpenOption = False,
+    loading: Loading,
+    browser: Browser,
     frames: Annotated[
         bool, typer.Option("--frames/--no-frames", help="Show frames at first; the page can change it.")
     ] = True,
@@ -108,13 +87,7 @@ def view(
     """
     from nmm.cli.viewing import view_robot
 
-    return view_robot(
-        robot,
-        **loading_of(platform, lock, axle, package_dir),
-        port=port,
-        open_browser=not no_open,
-        frames=frames,
-    )
+    return view_robot(robot, **loading.keywords(), **browser.keywords(), frames=frames)
 
 
 def scenarios(
