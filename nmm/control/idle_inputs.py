@@ -38,7 +38,7 @@ def unfelt_inputs(controller: Controller, q0: ArrayLike | None = None) -> tuple[
 
 
 def idle_inputs(controller: Controller, q0: ArrayLike | None = None) -> tuple[str, ...]:
-    """Names of the inputs that neither the task nor the constraint nor the objective feels: they stay 0.
+    """Names of the inputs that neither the task nor the added one nor the objective feels: they stay 0.
 
     Parameters and result as for `unfelt_inputs`.
     """
