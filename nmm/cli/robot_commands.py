@@ -24,7 +24,7 @@ def info(
         str | None,
         typer.Option(
             metavar="SCENARIO",
-            help="Show the redundancy for this scenario's task, and the inputs that it does not feel.",
+            help="Show the redundancy for this scenario's task, and the inputs without effect on it.",
         ),
     ] = None,
     loading: Loading,

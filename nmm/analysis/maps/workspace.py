@@ -162,13 +162,13 @@ def _task_frame(evaluator: Evaluator) -> str:
 
 
 def _moving(evaluator: Evaluator, frame: str, held: Array) -> Integers:
-    """The arm's joints that move the frame's origin or are felt by the task."""
+    """The arm's joints that move the frame's origin or the task."""
     robot = evaluator.robot
     n_p = robot.platform.n_p
     q = np.tile(held, (8, 1))
     q[:, n_p:] += np.random.default_rng(0).uniform(-1.0, 1.0, (8, robot.n - n_p))
-    felt = np.abs(np.nan_to_num(evaluator.jacobians.batch(q, evaluator.t)))[:, :, robot.platform.p :]
-    moved = np.max(felt, axis=(0, 1)) > 1e-9
+    effect = np.abs(np.nan_to_num(evaluator.jacobians.batch(q, evaluator.t)))[:, :, robot.platform.p :]
+    moved = np.max(effect, axis=(0, 1)) > 1e-9
     moved |= np.max(np.abs(FramePath(robot, frame).jacobians(q)[1]), axis=(0, 1))[n_p:] > 1e-9
     if not moved.any():
         raise InputError(f"workspace map: the arm of {robot.name} moves {frame} in no way")
