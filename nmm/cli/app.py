@@ -144,7 +144,6 @@ def compare(
 
 
 @app.command()
-@command
 def paper(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Where to write, as for `nmm run`.")] = Path(
         "paper"
@@ -189,7 +188,7 @@ for _name, _command in (
     ("scenarios", scenarios),
     ("robots", robots),
 ):
-    app.command(_name)(command(_command))
+    app.command(_name)(_command)
 
 
 def status_of(arguments: Sequence[str]) -> int:

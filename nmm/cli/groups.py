@@ -30,7 +30,10 @@ if TYPE_CHECKING:
 
 
 def command(function: Callable[..., int]) -> Callable[..., int]:
-    """A command of typer's, whose parameters that are groups stand option by option in their places."""
+    """The function as typer takes it: options in the place of each parameter that is a group of them.
+
+    It is called with the options, too, from Python: `redundancy("unicycle_2r", task=["position"])`.
+    """
     hints = get_type_hints(function, include_extras=True)
     groups: dict[str, type] = {}
     parameters: list[inspect.Parameter] = []
@@ -40,10 +43,14 @@ def command(function: Callable[..., int]) -> Callable[..., int]:
             groups[name] = hint
             parameters += _options(hint)
         else:
-            parameters.append(parameter.replace(kind=parameter.KEYWORD_ONLY, annotation=hint))
+            parameters.append(_option(parameter, hint))
+    signature = inspect.Signature(parameters)
 
     @wraps(function)
-    def whole(**given: Any) -> int:
+    def whole(*arguments: Any, **options: Any) -> int:
+        bound = signature.bind(*arguments, **options)
+        bound.apply_defaults()
+        given = dict(bound.arguments)
         made = {
             name: group(**{field.name: given.pop(field.name) for field in fields(group)})
             for name, group in groups.items()
@@ -51,17 +58,22 @@ def command(function: Callable[..., int]) -> Callable[..., int]:
         return function(**made, **given)
 
     del whole.__wrapped__
-    whole.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]  # what typer reads
+    whole.__signature__ = signature  # type: ignore[attr-defined]  # what typer reads
     whole.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     return whole
 
 
 def _options(group: type) -> list[inspect.Parameter]:
     hints = get_type_hints(group, include_extras=True)
-    return [
-        parameter.replace(kind=parameter.KEYWORD_ONLY, annotation=hints[name])
-        for name, parameter in inspect.signature(group).parameters.items()
-    ]
+    given = inspect.signature(group).parameters
+    return [_option(parameter, hints[name]) for name, parameter in given.items()]
+
+
+def _option(parameter: inspect.Parameter, hint: Any) -> inspect.Parameter:
+    """Positional where it has no default."""
+    required = parameter.default is parameter.empty
+    kind = parameter.POSITIONAL_OR_KEYWORD if required else parameter.KEYWORD_ONLY
+    return parameter.replace(kind=kind, annotation=hint)
 
 
 @dataclass(frozen=True)

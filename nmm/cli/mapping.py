@@ -7,10 +7,11 @@ from typing import Annotated
 
 import typer
 
-from nmm.cli.groups import Loading, Subject
+from nmm.cli.groups import Loading, Subject, command
 from nmm.cli.options import LengthOption, out_option
 
 
+@command
 def map_measures(
     subject: Subject,
     *,

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from nmm.cli.groups import Browser, Loading, Subject
+from nmm.cli.groups import Browser, Loading, Subject, command
 from nmm.cli.options import (
     ResolversOption,
     ScenarioArgument,
@@ -18,6 +18,7 @@ from nmm.cli.options import (
 )
 
 
+@command
 def redundancy(
     subject: Subject,
     *,
@@ -66,6 +67,7 @@ def redundancy(
     )
 
 
+@command
 def laps(
     scenario: ScenarioArgument,
     number: Annotated[

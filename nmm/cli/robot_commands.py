@@ -6,10 +6,11 @@ from typing import Annotated
 
 import typer
 
-from nmm.cli.groups import Browser, Loading
+from nmm.cli.groups import Browser, Loading, command
 from nmm.cli.options import ROBOT_HELP, ArgumentOption, PackageOption, arguments_of
 
 
+@command
 def info(
     robot: Annotated[
         str | None,
@@ -68,6 +69,7 @@ def check(
     return check_file(file, arguments_of(arguments), package_dir or [])
 
 
+@command
 def view(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help=ROBOT_HELP)],
     loading: Loading,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from nmm.cli.groups import Loading, Subject
+from nmm.cli.groups import Loading, Subject, command
 from nmm.cli.options import LengthOption
 from nmm.errors import InputError
 
@@ -25,6 +25,7 @@ MANY_MINORS = 60
 STARTS = 200
 
 
+@command
 def singularities(
     subject: Subject,
     *,
