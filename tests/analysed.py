@@ -1,4 +1,4 @@
-"""What the tests of the singularity analysis look at: tasks, a constraint of EJ."""
+"""What the tests of the singularity analysis look at: tasks, an added task of EJ."""
 
 from __future__ import annotations
 
@@ -18,5 +18,5 @@ LINK_POINTING = (TIP, Task(Heading("link1"), Bearing(Position("link2", "xy"), tw
 HELD = (Task(Coordinates("q1"), 0.0), Task(Heading("link2"), 0.0))
 
 
-def extended(constraint: Task | tuple[Task, ...], robot: Robot) -> Controller:
-    return Controller(robot, TIP, ExtendedJacobian(), None, constraint)
+def extended(added: Task | tuple[Task, ...], robot: Robot) -> Controller:
+    return Controller(robot, TIP, ExtendedJacobian(), None, added)

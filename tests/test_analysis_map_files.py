@@ -49,13 +49,13 @@ def test_extremes_count_the_singular_places_that_the_grid_misses(robot_2r: Robot
         end, value = ("largest", 1.0) if name == "eccentricity" else ("smallest", 0.0)
         found = made.extremes(name)
         assert found[end].value == value
-        told = made.summary()["measures"][name][end]
+        written = made.summary()["measures"][name][end]
         if name in ("arm_manipulability", "platform_manipulability"):  # two inputs, three rows
             assert np.all(made.values[name] == 0.0)
-            assert told == {"value": 0.0, "at": None, "on": "everywhere"}
+            assert written == {"value": 0.0, "at": None, "on": "everywhere"}
             continue
         assert np.cos(found[end].at[0]) == pytest.approx(0.0, abs=1e-9)
-        assert told == {"value": value, "at": list(found[end].at), "on": "the singular lines"}
+        assert written == {"value": value, "at": list(found[end].at), "on": "the singular lines"}
 
 
 def test_equal_nodes_beside_a_singular_line_are_no_constant_map(robot_2r: Robot) -> None:

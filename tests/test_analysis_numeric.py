@@ -285,7 +285,7 @@ def test_sizes_by_name(robot_2r: Robot, rng: np.random.Generator) -> None:
 # --- the resolvers' own singularities
 
 
-def test_ej_is_singular_where_the_constraint_asks_for_what_the_task_fixes(robot_2r: Robot) -> None:
+def test_ej_is_singular_where_the_added_task_asks_for_what_the_task_fixes(robot_2r: Robot) -> None:
     """With q1 and the heading of link 2 held, |det J_e| is case 2's minor without q1's column, d + l1 c1."""
     for q1, singular in ((2.0, False), (float(np.arccos(-0.3 / 0.5)), True)):  # d + l1 c1 = 0
         q = np.array([0.1, 0.2, 0.3, q1, 0.4])
@@ -293,7 +293,7 @@ def test_ej_is_singular_where_the_constraint_asks_for_what_the_task_fixes(robot_
         found = analyse(controller, q).extended
         assert found is not None
         assert not found.kinematic
-        assert not found.constraint_singular
+        assert not found.added_singular
         assert found.algorithmic == singular
         # Laplace along q1's row (0 0 1 0), the third: the sign is (-1)^(3 + 3).
         assert found.determinant == pytest.approx(0.3 + 0.5 * cos(q1), abs=1e-12)
@@ -308,16 +308,16 @@ def test_ej_is_singular_where_the_constraint_asks_for_what_the_task_fixes(robot_
             assert 0.01 < found.angle_measure < 1.0
 
 
-def test_ej_where_J_or_the_constraint_itself_is_singular(no_offset: Robot, robot_2r: Robot) -> None:
+def test_ej_where_J_or_the_added_task_itself_is_singular(no_offset: Robot, robot_2r: Robot) -> None:
     kinematic = analyse(extended(HELD, no_offset), [0.0, 0.0, 0.0, pi / 2, 0.0]).extended
     assert kinematic is not None
     assert kinematic.kinematic
     assert not kinematic.algorithmic
     assert np.isnan(kinematic.angle_measure)
     twice = (Task(Coordinates("q1"), 0.0), Task(Coordinates({"q1": 2.0}), 0.0))
-    found = analyse((robot_2r, TIP), [0.0, 0.0, 0.0, 0.4, 0.5], constraint=twice).extended
+    found = analyse((robot_2r, TIP), [0.0, 0.0, 0.0, 0.4, 0.5], added_task=twice).extended
     assert found is not None
-    assert found.constraint_singular
+    assert found.added_singular
     assert found.algorithmic
     assert found.lost_text == ("0.89 q1 - 0.45 2 q1",)
 
@@ -327,7 +327,7 @@ def test_the_measure_of_ej_with_the_arm_held(robot_2r: Robot, rng: np.random.Gen
     q = rng.uniform(-1, 1, 5)
     J = analyse((robot_2r, TIP), q).J
     held = (Task(Coordinates("q1"), 0.0), Task(Coordinates("q2"), 0.0))
-    found = analyse((robot_2r, TIP), q, constraint=held).extended
+    found = analyse((robot_2r, TIP), q, added_task=held).extended
     assert found is not None
     expected = abs(np.linalg.det(J[:, :2])) / np.sqrt(np.linalg.det(J @ J.T))
     assert found.angle_measure == pytest.approx(expected)
@@ -418,7 +418,7 @@ def test_keys_of_the_minors(robot_2r: Robot) -> None:
         ({"partitions": [("v", "q7")]}, "unknown input 'q7'"),
         ({"partitions": [("v",)]}, "expected 2 different inputs"),
         ({"partitions": "some"}, "expected 'automatic'"),
-        ({"constraint": Task(Coordinates("q1"), 0.0)}, "expected 2 rows"),
+        ({"added_task": Task(Coordinates("q1"), 0.0)}, "expected 2 rows"),
         ({"length": 0.0}, "length: expected a number above 0"),
         ({"sizes": {"vv": 1.0}}, "unknown row or input 'vv'"),
         ({"sizes": {"v": -1.0}}, "size of v"),

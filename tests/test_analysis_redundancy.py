@@ -125,7 +125,7 @@ def test_cheap_columns_come_first(rng: np.random.Generator) -> None:
     assert all(np.count_nonzero(one[:2]) == 1 for one in readable[1:])
 
 
-def test_no_column_feels_anything() -> None:
+def test_no_input_moves_anything() -> None:
     np.testing.assert_array_equal(readable_null_space(np.zeros((2, 3)), 0, [0] * 3), np.eye(3))
 
 
@@ -195,25 +195,25 @@ def test_no_redundancy_is_said() -> None:
     assert "--self-motion" not in text
 
 
-def test_inputs_that_the_task_never_feels() -> None:
+def test_inputs_without_effect_anywhere() -> None:
     robot = mount("car_base", "small_arm", at="arm_mount")
     report = redundancy((robot, Position("ee")), {"steering": 0.2, "q2": 0.3, "q3": 1.7, "q4": 0.6})
-    assert report.unfelt == ("steering_rate", "q5")
+    assert report.without_effect == ("steering_rate", "q5")
     alone = [text for text in report.texts if text.endswith(" alone")]
     assert alone == ["q5 turns at +1 rad/s alone", "the platform steers left at 1 rad/s alone"]
-    assert report.text().count("(the task never feels it)") == 2
+    assert report.text().count("(without effect on the task)") == 2
     # Sideways and on the spot; only the first is one bracket away, the other two.
     assert len(report.withheld) == 2
     assert report.by_brackets == 1
     assert_report(report)
 
 
-def test_an_input_that_the_task_does_not_feel_here() -> None:
+def test_an_input_without_effect_here() -> None:
     """With the end on the shoulder's axis q1 does not move it; elsewhere it does."""
     robot = load("unicycle_2r", arguments={"l1": 0.3, "l2": 0.3})
     report = redundancy((robot, Position("ee", "xy")), {"q1": 0.4, "q2": pi})
-    assert "q1 turns left at 1 rad/s alone (the task does not feel it here)" in report.text()
-    assert report.unfelt == ()
+    assert "q1 turns left at 1 rad/s alone (without effect on the task here)" in report.text()
+    assert report.without_effect == ()
 
 
 @pytest.mark.parametrize(("d", "brackets"), [(0.3, 1), (0.0, 0)])

@@ -101,7 +101,7 @@ SETTINGS: list[tuple[str, list[str]]] = [
         "task={kind: heading, frame: ee, reference: {kind: bearing, of: [1, 2], towards: [1]}}",
         ["task.reference.towards", "2 numbers"],
     ),
-    ("resolver.kind=ej", ["resolver.constraint", "expected 2 rows"]),
+    ("resolver.kind=ej", ["resolver.added_task", "expected 2 rows"]),
     # NaN, infinite and other numbers
     ("q0.x=nan", ["q0.x", "expected a finite number", "'nan'"]),
     ("q0=[0, 0, 0, 0, .inf]", ["q0", "expected a finite number", "'.inf'"]),
@@ -174,7 +174,7 @@ COMMANDS: list[tuple[list[str], list[str]]] = [
     (["run", "given.yaml", "--out", "given.yaml/below"], ["given.yaml/below", "cannot be written"]),
     (["compare", "nowhere"], ["unknown scenario 'nowhere'"]),
     (["compare", "given.yaml", "--resolvers", "rg,sqp"], ["unknown kind 'sqp'", "rg, pg, ej"]),
-    (["compare", "given.yaml", "--resolvers", "rg,ej"], ["resolver.constraint", "expected 2 rows"]),
+    (["compare", "given.yaml", "--resolvers", "rg,ej"], ["resolver.added_task", "expected 2 rows"]),
     (["compare", "given.yaml", "--resolvers", ","], ["--resolvers", "rg,pg"]),
     (["compare", "given.yaml", "--out", "theirs"], ["theirs", "not what this writes"]),
     (["paper", "--out", "theirs"], ["theirs", "not what this writes"]),

@@ -12,6 +12,8 @@ import pytest
 from command_line import Result, Terminal, imported, process
 
 import nmm
+from nmm import kinds
+from nmm.analysis.maps.measures import MEASURES
 from nmm.bundled import bundled_robots, bundled_scenarios
 from nmm.cli.app import status_of
 
@@ -69,6 +71,22 @@ def test_help_of_a_command(run: Command, command: str, words: Sequence[str]) -> 
     for word in words:
         assert word in result.out
     assert "\x1b" not in result.out
+
+
+@pytest.mark.parametrize(
+    ("command", "names"),
+    [
+        ("run", kinds.RESOLVERS),
+        ("compare", kinds.RESOLVERS),
+        ("laps", kinds.RESOLVERS),
+        ("info", kinds.PLATFORMS),
+        ("redundancy", kinds.TASKS),
+        ("map", MEASURES),
+    ],
+)
+def test_help_lists_what_there_is(run: Command, command: str, names: Sequence[str]) -> None:
+    text = " ".join(run(command, "--help").out.split())
+    assert [name for name in names if not re.search(rf"\b{name}\b", text)] == []
 
 
 def test_version(run: Command) -> None:

@@ -37,24 +37,24 @@ def test_a_map_is_written_and_told(capsys: pytest.CaptureFixture[str]) -> None:
     )
     assert status == 0
     folder = Path("runs/unicycle_2r-map")
-    told = json.loads((folder / "map.json").read_text(encoding="utf-8"))
-    assert told["axes"][0] == {
+    written = json.loads((folder / "map.json").read_text(encoding="utf-8"))
+    assert written["axes"][0] == {
         "name": "q1", "unit": "rad", "from": -np.pi / 2, "to": np.pi / 2, "samples": 30
     }  # fmt: skip
-    assert told["held"]["theta"] == pytest.approx(np.pi / 6)
-    assert told["weights"] == {"v": 4.0, "omega": 4.0}
-    assert told["alpha"] == 0.25
+    assert written["held"]["theta"] == pytest.approx(np.pi / 6)
+    assert written["weights"] == {"v": 4.0, "omega": 4.0}
+    assert written["alpha"] == 0.25
     arrays = np.load(folder / "map.npz", allow_pickle=False)
     assert arrays["sigma_min"].shape == arrays["weighted"].shape == (20, 30)
     assert (folder / "weighted.png").exists()
     out = capsys.readouterr().out
-    smallest = told["measures"]["weighted"]["smallest"]
+    smallest = written["measures"]["weighted"]["smallest"]
     assert smallest["value"] == arrays["weighted"].min()
     row = next(line for line in out.splitlines() if line.startswith("weighted"))
     assert f"{smallest['value']:.4g}" in row
     assert "robot singular      none found" in out
     assert "arm alone singular  lines\n" in out
-    assert told["arm_singular"] == {"lines": True, "points": 0, "everywhere": False}
+    assert written["arm_singular"] == {"lines": True, "points": 0, "everywhere": False}
 
 
 def test_the_arguments_of_the_robot_count(capsys: pytest.CaptureFixture[str]) -> None:
@@ -71,18 +71,18 @@ def test_the_arguments_of_the_robot_count(capsys: pytest.CaptureFixture[str]) ->
 
 def test_a_scenario_has_its_own_task_and_start() -> None:
     make_map("unicycle_3r_position", over="q2,q3", samples="12")
-    told = json.loads(Path("runs/unicycle_3r_position-map/map.json").read_text(encoding="utf-8"))
-    assert told["task"] == ["ee.x", "ee.y", "ee.z"]
-    assert set(told["held"]) == {"x", "y", "theta", "q1"}
+    written = json.loads(Path("runs/unicycle_3r_position-map/map.json").read_text(encoding="utf-8"))
+    assert written["task"] == ["ee.x", "ee.y", "ee.z"]
+    assert set(written["held"]) == {"x", "y", "theta", "q1"}
 
 
 def test_a_workspace_is_mapped(capsys: pytest.CaptureFixture[str]) -> None:
     make_map("unicycle_2r", workspace="xy", at=["x=2"], **POSITION)
-    told = json.loads(Path("runs/unicycle_2r-map/map.json").read_text(encoding="utf-8"))
-    assert told["kind"] == "workspace"
-    assert told["frame"] == "ee"
-    assert told["held"] == {"x": 2.0, "y": 0.0, "theta": 0.0}
-    first, second = told["axes"]
+    written = json.loads(Path("runs/unicycle_2r-map/map.json").read_text(encoding="utf-8"))
+    assert written["kind"] == "workspace"
+    assert written["frame"] == "ee"
+    assert written["held"] == {"x": 2.0, "y": 0.0, "theta": 0.0}
+    first, second = written["axes"]
     assert first["from"] > 1.0  # around where the platform stands
     assert max(first["samples"], second["samples"]) == 24
     out = capsys.readouterr().out
@@ -206,11 +206,11 @@ def test_a_constant_map_has_its_value_everywhere(capfd: pytest.CaptureFixture[st
     """The angle of the platform turns J and changes no σ but by rounding."""
     line = ["map", "unicycle_2r", "--task", "position:ee:xy", "--over", "x,theta", "--at", "q2=pi/3"]
     assert status_of([*line, "--samples", "15"]) == 0
-    told = json.loads(Path("runs/unicycle_2r-map/map.json").read_text(encoding="utf-8"))
+    written = json.loads(Path("runs/unicycle_2r-map/map.json").read_text(encoding="utf-8"))
     values = np.load("runs/unicycle_2r-map/map.npz", allow_pickle=False)["sigma_min"]
     assert np.ptp(values) < 1e-12
     for end, value in (("smallest", values.min()), ("largest", values.max())):
-        assert told["measures"]["sigma_min"][end] == {"value": value, "at": None, "on": "everywhere"}
+        assert written["measures"]["sigma_min"][end] == {"value": value, "at": None, "on": "everywhere"}
     out, _ = capfd.readouterr()
     row = next(line for line in out.splitlines() if line.startswith("sigma_min"))
     assert row.split().count("everywhere") == 2
@@ -221,11 +221,11 @@ def test_what_is_zero_everywhere_is_told_without_rounding(capfd: pytest.CaptureF
     """A folded arm loses rank, whatever its first joint and the platform do."""
     line = ["map", "unicycle_2r", "--task", "position:ee:xy", "--part", "arm", "--over", "theta,q1"]
     assert status_of([*line, "--at", "q2=pi", "--samples", "15", "--measure", "sigma_min,eccentricity"]) == 0
-    told = json.loads(Path("runs/unicycle_2r-map/map.json").read_text(encoding="utf-8"))
-    assert told["singular"]["everywhere"]
+    written = json.loads(Path("runs/unicycle_2r-map/map.json").read_text(encoding="utf-8"))
+    assert written["singular"]["everywhere"]
     for name, value in (("sigma_min", 0.0), ("eccentricity", 1.0)):
         for end in ("smallest", "largest"):
-            assert told["measures"][name][end] == {"value": value, "at": None, "on": "everywhere"}
+            assert written["measures"][name][end] == {"value": value, "at": None, "on": "everywhere"}
     assert "robot singular" not in capfd.readouterr().out
 
 

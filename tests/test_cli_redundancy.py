@@ -275,7 +275,7 @@ def test_laps_that_end_early_are_written_and_fail(tmp_path: Path, capsys: Printe
     """An extended Jacobian whose constraint is the task's own row: singular at once."""
     path = tmp_path / "stuck.yaml"
     text = MINIMAL.replace("[1, 0.5]", ROUND).replace(
-        "{kind: rg}", "{kind: ej, constraint: [{kind: position, frame: ee, axes: xy, reference: [1.2, 0.2]}]}"
+        "{kind: rg}", "{kind: ej, added_task: [{kind: position, frame: ee, axes: xy, reference: [1.2, 0.2]}]}"
     )
     path.write_text(text, encoding="utf-8")
     assert run_laps(str(path), ["ej"], {}, laps=2, period=None, out=tmp_path / "out") == 1

@@ -1,4 +1,4 @@
-"""info, view and robots: what they print, and what they refuse; and the inputs that a task does not feel."""
+"""info, view and robots: what they print, and what they refuse; and the inputs without effect on a task."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from urdf_parts import AXIS, LIMIT, inertial, joint, link, robot, shape, write
 import nmm
 from nmm.bundled import bundled_robots
 from nmm.cli.app import status_of
-from nmm.control.idle_inputs import unfelt_inputs
+from nmm.control.idle_inputs import inputs_without_effect
 
 Command = Callable[..., Result]
 
@@ -118,7 +118,7 @@ def test_info_tells_meshes_and_packages(run: Command, tmp_path: Path) -> None:
     assert result.value("package not found: nowhere; looked in").startswith(str(tmp_path))
 
 
-def test_info_of_a_scenario_shows_its_robot_and_what_its_task_does_not_feel(
+def test_info_of_a_scenario_shows_its_robot_and_what_does_not_move_its_task(
     run: Command, tmp_path: Path
 ) -> None:
     write(tmp_path / "arm.urdf", on_wheels("car"))
@@ -127,14 +127,14 @@ def test_info_of_a_scenario_shows_its_robot_and_what_its_task_does_not_feel(
     assert (result.status, result.err) == (0, "")
     assert "steering" in rows(result, "coordinate")
     assert result.value("car_position").split() == ["2", "3", "1"]
-    assert "the task does not feel steering_rate: only the objective can use it" in result.out
-    assert "does not feel v" not in result.out
+    assert "steering_rate has no effect on the task: only the objective can use it" in result.out
+    assert "\nv has no effect" not in result.out
     write(tmp_path / "arm.urdf", on_wheels("unicycle"))
-    felt = run("info", "--scenario", "car.yaml")
+    steered = run("info", "--scenario", "car.yaml")
     assert (
-        "the task does not feel steering: " in felt.out
+        "\nsteering has no effect on the task: " in steered.out
     )  # which is then a joint of the arm that moves nothing
-    assert "feels every input" in run("info", "--scenario", "unicycle_2r_position").out
+    assert "every input moves the task" in run("info", "--scenario", "unicycle_2r_position").out
 
 
 @pytest.mark.parametrize(
@@ -210,7 +210,7 @@ def test_robots_lists_robots_bases_and_arms(run: Command) -> None:
     assert "small five-joint arm" in result.value("small_arm")
 
 
-# Inputs that a task does not feel
+# Inputs without effect on a task
 
 
 def controller_on(robot: nmm.Robot, frame: str, **options: Any) -> nmm.Controller:
@@ -223,11 +223,14 @@ def car(tmp_path_factory: pytest.TempPathFactory) -> nmm.Robot:
     return nmm.load(write(tmp_path_factory.mktemp("car") / "arm.urdf", on_wheels("car")))
 
 
-def test_a_car_does_not_feel_its_steering_rate(car: nmm.Robot, robot_3r: nmm.Robot) -> None:
-    assert unfelt_inputs(controller_on(car, "b")) == ("steering_rate", "q")  # b's origin is on q's axis
-    assert unfelt_inputs(controller_on(robot_3r, "ee")) == ()
+def test_a_steering_rate_has_no_effect(car: nmm.Robot, robot_3r: nmm.Robot) -> None:
+    assert inputs_without_effect(controller_on(car, "b")) == (
+        "steering_rate",
+        "q",
+    )  # on q's axis
+    assert inputs_without_effect(controller_on(robot_3r, "ee")) == ()
     # The column's origin is on q1's axis, and the later joints are below it.
-    assert unfelt_inputs(controller_on(robot_3r, "link1")) == ("q1", "q2", "q3")
+    assert inputs_without_effect(controller_on(robot_3r, "link1")) == ("q1", "q2", "q3")
 
 
 def test_a_singular_start_hides_no_input(robot_3r: nmm.Robot) -> None:
@@ -235,14 +238,14 @@ def test_a_singular_start_hides_no_input(robot_3r: nmm.Robot) -> None:
     controller = controller_on(robot_3r, "ee")
     upright = controller.evaluate(0.0, robot_3r.q())
     assert np.linalg.norm(upright.J[:, robot_3r.input("q1")]) < 1e-12
-    assert unfelt_inputs(controller, robot_3r.q()) == ()
+    assert inputs_without_effect(controller, robot_3r.q()) == ()
 
 
 def test_the_partition_stays_as_it_was(robot_3r: nmm.Robot) -> None:
     controller, twin = controller_on(robot_3r, "ee"), controller_on(robot_3r, "ee")
     q = robot_3r.q({"q2": 1.0, "q3": 0.5})
     controller(0.0, q), twin(0.0, q)
-    unfelt_inputs(controller, q)
+    inputs_without_effect(controller, q)
     for other in (q, q + 0.01):
         np.testing.assert_array_equal(controller(0.0, other), twin(0.0, other))
         np.testing.assert_array_equal(controller.last(0.0, other).partition, twin.last(0.0, other).partition)
@@ -254,4 +257,4 @@ def test_a_users_function_that_raises_is_no_error(robot_3r: nmm.Robot) -> None:
 
     task = nmm.Task(nmm.CallableFunction(value, ["one"]), nmm.Constant([1.0]), 1.0)
     controller = nmm.Controller(robot_3r, task, nmm.ProjectedGradient())
-    assert unfelt_inputs(controller) == ()
+    assert inputs_without_effect(controller) == ()

@@ -113,7 +113,7 @@ def test_only_what_the_wheels_do_not_admit(capsys: pytest.CaptureFixture[str]) -
     assert "A motion along y would, which the wheels do not admit." in out
 
 
-def test_a_scenario_with_its_start_and_its_constraint(run: Command) -> None:
+def test_a_scenario_with_its_start_and_its_added_task(run: Command) -> None:
     name = "unicycle_2r_extended_jacobian"
     scenario = Scenario.load(name)
     start = run(name, "--length", "0.8")
@@ -123,13 +123,11 @@ def test_a_scenario_with_its_start_and_its_constraint(run: Command) -> None:
     assert extended is not None
     assert "singular values count lengths in L = 0.8 m" in start.out
     assert f"det J_e = {extended.determinant:.4g}, rank 4 of 4" in start.out
-    assert f"= {extended.angle_measure:.3g}: 1 where the constraint moves only" in start.out
+    assert f"= {extended.angle_measure:.3g}: 1 where the added task moves only" in start.out
     singular = run(name, "--at", f"q1={float(np.arccos(-0.3 / 0.5))}")
     assert singular.status == 0
     assert "Nonsingular: J has rank 2." in singular.out
-    assert (
-        "An algorithmic singularity: J_e is singular though neither J nor the constraint is." in singular.out
-    )
+    assert "J_e is singular though neither J nor the added task's J_y is." in singular.out
 
 
 def test_rg_with_the_partitions_of_a_scenario(run: Command) -> None:

@@ -28,6 +28,7 @@ from nmm.functions.program import Program, evaluate
 from nmm.functions.references import CallableReference, Circle
 from nmm.functions.tasks import Coordinates, Position, Task
 from nmm.functions.tasks.comparison import Comparison
+from nmm.kinds import OBJECTIVES, REFERENCES, TASKS
 from nmm.resolvers import ProjectedGradient
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
@@ -45,7 +46,11 @@ def test_the_grid_holds_every_function() -> None:
     # A comparison is no function on its own: the closed loops below are its test. A target that is reached
     # wherever the robot is stands still by definition: test_analysis_subjects.py.
     apart = {Comparison, Reached}
-    missing = concrete_subclasses(Function) - {type(entry.function) for entry in ENTRIES} - apart
+    examples = {type(entry.function) for entry in ENTRIES}
+    for listed in (TASKS, REFERENCES, OBJECTIVES):
+        without = [name for name, kind in listed.items() if kind not in examples]
+        assert not without, f"add entries to function_grid.py for the {listed.what}s {', '.join(without)}"
+    missing = concrete_subclasses(Function) - examples - apart
     assert not missing, f"add entries to function_grid.py for {sorted(kind.__name__ for kind in missing)}"
 
 

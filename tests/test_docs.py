@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import nmm
+from nmm.kinds import OBJECTIVES, PLATFORMS, REFERENCES, RESOLVERS, TASKS, Kinds
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -89,6 +90,15 @@ def test_the_python_on_singularities_runs() -> None:
     assert len(names["formulas"].minors) == 6
     assert [family.pinned for family in names["search"].families] == [{"q2": pytest.approx((0.0, np.pi))}]
     assert names["history"].sigma_min["arm"].max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    "listed", [PLATFORMS, TASKS, REFERENCES, OBJECTIVES, RESOLVERS], ids=lambda it: it.what
+)
+def test_the_readme_lists_what_there_is(listed: Kinds) -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    (row,) = re.findall(rf"^\| \*\*{listed.what.capitalize()}s\*\* \| (.*) \|$", text, re.MULTILINE)
+    assert set(re.findall(r"`(\w+)`", row)) == set(listed), f"README.md: row {listed.what}s"
 
 
 def test_every_public_name_is_documented() -> None:

@@ -10,6 +10,7 @@ import pytest
 import twin
 from conditioned import with_condition
 from numpy.typing import NDArray
+from resolver_grid import every_resolver
 
 from nmm.errors import InputError
 from nmm.resolvers import (
@@ -54,8 +55,8 @@ class Example:
         return self.given(resolver, state, **changed), state.partition(self.s)
 
 
-def three() -> tuple[Resolver, ...]:
-    return ReducedGradient(3.0), ProjectedGradient(3.0), ExtendedJacobian()
+def every() -> tuple[Resolver, ...]:
+    return tuple(every_resolver(alpha=3.0).values())
 
 
 def close(found: Array, expected: Array, tolerance: float = 1e-10) -> None:
@@ -68,7 +69,7 @@ def test_every_resolver_does_the_task(shape: tuple[int, int], rng: np.random.Gen
     for _ in range(20):
         problem = Example(shape, rng)
         weighted = ProjectedGradient(3.0, weights=rng.uniform(0.1, 10, problem.m))
-        for resolver in (*three(), weighted):
+        for resolver in (*every(), weighted):
             found = problem.given(resolver)
             assert found.status is Status.SOLVED
             assert not found.singular
@@ -187,7 +188,7 @@ def test_extended_jacobian_is_numpys(shape: tuple[int, int], rng: np.random.Gene
 @pytest.mark.parametrize("s", [1, 2, 4, 6])
 def test_no_redundancy_left(s: int, rng: np.random.Generator) -> None:
     problem = Example((s, s), rng)
-    for resolver in three():
+    for resolver in every():
         close(
             problem.given(resolver).u,
             np.linalg.solve(problem.J, problem.rate),
@@ -204,7 +205,7 @@ def test_near_a_singularity_the_answer_is_as_good_as_numpys(
         problem = Example(shape, rng)
         problem.J = with_condition(shape, 1e6, rng)
         size = np.linalg.norm(problem.J, 2)
-        for resolver in three():
+        for resolver in every():
             found = problem.given(resolver)
             exact = found.residual <= 1e-9 * (1.0 + np.linalg.norm(problem.rate))
             large = np.linalg.norm(found.u) > 1e5  # more than rounding lets certify
@@ -226,7 +227,7 @@ def test_what_is_singular_is_told_apart(shape: tuple[int, int], rng: np.random.G
         np.vstack([problem.J[:-1], np.zeros((1, m))]),
         np.zeros(shape),
     ):
-        for resolver in (*three(), *more):
+        for resolver in (*every(), *more):
             found = problem.given(resolver, J=J)
             assert found.status is Status.SINGULAR_J, resolver.name
             assert found.singular
@@ -255,7 +256,7 @@ def test_invariances(shape: tuple[int, int], rng: np.random.Generator) -> None:
     order = rng.permutation(m)
     turn = np.linalg.qr(rng.normal(size=(m, m)))[0]
     D = np.diag(rng.uniform(0.3, 3.0, m))
-    for resolver in three():
+    for resolver in every():
         u = problem.given(resolver).u
         # The task may be written in other variables, and the inputs be listed in another order.
         close(problem.given(resolver, J=mix @ J, rate=mix @ rate).u, u)
@@ -273,8 +274,11 @@ def test_invariances(shape: tuple[int, int], rng: np.random.Generator) -> None:
 
 
 def test_resolvers_by_name() -> None:
-    assert set(RESOLVERS) == {"rg", "pg", "ej"}
+    assert list(RESOLVERS) == ["rg", "pg", "ej"]
     assert all(kind.name == name for name, kind in RESOLVERS.items())
+    assert RESOLVERS.words("ej") == "extended Jacobian"
+    with pytest.raises(InputError, match=r"unknown resolver 'eg'.*available: rg, pg, ej"):
+        RESOLVERS.named("eg")
 
 
 def test_callable_resolver(rng: np.random.Generator) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from numpy.typing import NDArray
+from resolver_grid import every_resolver
 from robot_grid import ARMS, BASES, built, frame_of, start
 from scipy.linalg import null_space, qr
 
@@ -45,7 +46,7 @@ def posture(robot: Robot, q0: Array) -> nmm.Objective:
     return nmm.Quadratic(*squares)
 
 
-def constraint(robot: Robot, task: nmm.Task, q0: Array) -> nmm.Task | None:
+def added_task(robot: Robot, task: nmm.Task, q0: Array) -> nmm.Task | None:
     """As many coordinates held as the task leaves free: those that its null space moves the most."""
     step = nmm.Controller(robot, task, nmm.ProjectedGradient()).evaluate(0.0, q0)
     free = robot.S(q0) @ null_space(step.J)
@@ -56,10 +57,8 @@ def constraint(robot: Robot, task: nmm.Task, q0: Array) -> nmm.Task | None:
 
 
 RESOLVERS: dict[str, Resolver] = {
-    "pg": nmm.ProjectedGradient(2.0),
+    **every_resolver(alpha=2.0),
     "pg, the platform spared": nmm.ProjectedGradient(2.0, weights={"platform": 5.0}),
-    "rg": nmm.ReducedGradient(2.0),
-    "ej": nmm.ExtendedJacobian(),
 }
 
 
@@ -80,7 +79,7 @@ def run_of(base: str, arm: str, kind: str, resolver: Resolver) -> nmm.Trajectory
     q0 = robot.q(start(base, arm))
     task = tasks(robot, frame, q0, kind)
     if isinstance(resolver, nmm.ExtendedJacobian):
-        held = constraint(robot, task, q0)
+        held = added_task(robot, task, q0)
         controller = nmm.Controller(robot, task, resolver, added_task=held)
     else:
         controller = nmm.Controller(robot, task, resolver, posture(robot, q0))

@@ -12,6 +12,7 @@ from short_scenario import MINIMAL, scenario
 
 from nmm import Scenario, ScenarioError
 from nmm.bundled import bundled_scenarios
+from nmm.kinds import RESOLVERS
 from nmm.scenario.numbers import evaluate, number
 
 # Numbers
@@ -267,8 +268,8 @@ def test_settings_reach_below_a_robots_bare_name() -> None:
 # Runs that come out again
 
 
-#: Their objectives are quadratic, with a term for each degree of redundancy: EJ's constraint.
-WITH_A_CONSTRAINT = ("position", "pointing", "link_pointing", "extended_jacobian", "sampled", "switching")
+#: Their objectives are quadratic, with a term for each degree of redundancy: EJ's added task.
+WITH_AN_ADDED_TASK = ("position", "pointing", "link_pointing", "extended_jacobian", "sampled", "switching")
 
 
 @pytest.mark.parametrize(
@@ -276,8 +277,8 @@ WITH_A_CONSTRAINT = ("position", "pointing", "link_pointing", "extended_jacobian
     [
         (name, resolver)
         for name in bundled_scenarios()
-        for resolver in ("rg", "pg", "ej")
-        if resolver != "ej" or name.partition("r_")[2] in WITH_A_CONSTRAINT
+        for resolver in RESOLVERS
+        if resolver != "ej" or name.partition("r_")[2] in WITH_AN_ADDED_TASK
     ],
 )
 def test_a_resolved_scenario_gives_the_same_run(name: str, resolver: str, tmp_path: Path) -> None:

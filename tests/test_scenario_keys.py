@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from pathlib import Path
 
 import numpy as np
@@ -11,19 +10,18 @@ import pytest
 from short_scenario import scenario
 
 import nmm
-import nmm.functions.objectives
-import nmm.functions.references
-import nmm.functions.tasks
 import nmm.resolvers
-from nmm import Scenario, ScenarioError
+from nmm import Scenario, ScenarioError, kinds
 from nmm.robots.configuration import Configuration
 from nmm.runs.integrators import METHODS
-from nmm.scenario.functions import REFERENCES
-from nmm.scenario.objectives import OBJECTIVES
+from nmm.scenario.constructors import documented, parameters
+from nmm.scenario.functions import FUNCTION_PARTS, REFERENCE_PARTS
+from nmm.scenario.made_part import MadePart
+from nmm.scenario.objectives import OBJECTIVE_PARTS
 from nmm.scenario.reference import sections
-from nmm.scenario.resolvers import PARTS
+from nmm.scenario.resolvers import RESOLVER_PARTS
 from nmm.scenario.schema import ScenarioPart
-from nmm.scenario.tasks import TASKS as TASK_PARTS
+from nmm.scenario.tasks import TASK_PARTS
 
 
 def evaluated(robot: nmm.Robot, function: nmm.Function, t: float) -> tuple[np.ndarray, ...]:
@@ -186,17 +184,51 @@ def test_resolvers(tmp_path: Path, text: str, expected: nmm.Resolver) -> None:
         assert np.array_equal(ours, theirs)
 
 
-def test_every_function_of_the_library_can_be_asked_for() -> None:
-    """A new task, reference, objective or resolver without a key in the scenario shows here."""
-    kinds = {section.title.split()[-1] for section in sections()}
-    python_only = {"Callable", "PiecewisePolynomial", "Sum", "Square", "Stack", "Task", "Objective"}
-    python_only |= {"rotation_vector", "Signal"}
-    for module in (nmm.functions.tasks, nmm.functions.references, nmm.functions.objectives):
-        for name in module.__all__:
-            if not any(name.startswith(word) for word in python_only):
-                kind = re.sub("(?<=[a-z])(?=[A-Z])", "_", name.removesuffix("Reference")).lower()
-                assert kind in kinds, name
-    assert set(PARTS) == set(nmm.resolvers.RESOLVERS)
+REGISTERED: list[tuple[kinds.Kinds, dict[str, type[MadePart]]]] = [
+    (kinds.TASKS, dict(TASK_PARTS)),
+    (kinds.REFERENCES, dict(REFERENCE_PARTS)),
+    (kinds.OBJECTIVES, dict(OBJECTIVE_PARTS)),
+    (kinds.RESOLVERS, dict(RESOLVER_PARTS)),
+]
+each_list = pytest.mark.parametrize(("listed", "parts"), REGISTERED, ids=lambda it: getattr(it, "what", ""))
+
+
+@each_list
+def test_every_kind_can_be_asked_for(listed: kinds.Kinds, parts: dict[str, type[MadePart]]) -> None:
+    """What a constructor takes, a file can say, and with the same default; what else it says is listed."""
+    beside = {"kind", "reference", "gain", "weight", "maximise", "added_task"}
+    own = {"quadratic": {"terms"}, "polynomial": {"times", "points"}}
+    assert set(listed) <= set(parts)
+    for name, made in listed.items():
+        fields, taken = parts[name].model_fields, {one.key: one for one in parameters(made)}
+        if name not in own:
+            assert set(taken) <= set(fields), f"{name}: no key for {set(taken) - set(fields)}"
+        assert set(fields) - set(taken) <= beside | own.get(name, set()), name
+        for key in set(fields) & set(taken) - {"unit"}:
+            if name not in own:
+                assert fields[key].is_required() == taken[key].required, f"{name}.{key}"
+                if not taken[key].required:
+                    assert fields[key].default == taken[key].default, f"{name}.{key}"
+
+
+@each_list
+def test_every_parameter_is_documented(listed: kinds.Kinds, parts: dict[str, type[MadePart]]) -> None:
+    for name, made in listed.items():
+        texts = documented(made)
+        for one in parameters(made):
+            assert texts.get(one.name), f"{made.__name__} ({name}): its docstring says nothing of {one.name}"
+
+
+@pytest.mark.parametrize("listed", [*(one for one, _ in REGISTERED), kinds.PLATFORMS], ids=lambda it: it.what)
+def test_every_kind_is_a_public_name(listed: kinds.Kinds) -> None:
+    for name, kind in listed.items():
+        public = getattr(nmm, kind.__name__, None)
+        assert public is kind, f"{name}: add {kind.__name__} to nmm/__init__.pyi"
+        own = getattr(kind, "name", name)
+        assert own == name, f"{kind.__name__} calls itself {own}, nmm.kinds calls it {name}"
+
+
+def test_the_methods_are_the_integrators() -> None:
     assert set(ScenarioPart.model_fields["method"].annotation.__args__) == set(METHODS)
 
 
@@ -205,10 +237,11 @@ def test_every_key_is_described() -> None:
         assert section.summary, section.title
         for key, _, description in section.keys:
             assert description, f"{section.title}: {key}"
-    shared = [part for part in REFERENCES if any(issubclass(task, part) for task in TASK_PARTS)]
+    titles = [section.title for section in sections()]
+    assert len(set(titles)) == len(titles)
+    shared = [kind for kind, part in REFERENCE_PARTS.items() if part is FUNCTION_PARTS.get(kind)]
     others = ("the file", "robot", "robot, with arms mounted", "robot.arms", "objective.terms")
-    functions = len(TASK_PARTS) + len(REFERENCES) - len(shared)
-    assert len(list(sections())) == len(others) + functions + len(OBJECTIVES) + len(PARTS)
+    assert len(titles) == len(others) + sum(len(parts) for _, parts in REGISTERED) - len(shared)
 
 
 def test_a_unit_that_is_not_the_tasks(tmp_path: Path) -> None:
@@ -222,10 +255,10 @@ def test_planning_mode_keeps_the_error(tmp_path: Path) -> None:
     assert np.linalg.norm(run.error[0]) > 0.1
 
 
-# The extended Jacobian's constraint
+# The extended Jacobian's added task
 
 
-def test_the_constraint_is_made_from_the_objective(robot_2r: nmm.Robot) -> None:
+def test_the_added_task_is_made_from_the_objective(robot_2r: nmm.Robot) -> None:
     given = Scenario.load("unicycle_2r_position", {"resolver.kind": "ej", "resolver.gain": 3})
     controller = given.controller()
     here = Configuration(robot_2r, [0.1, -0.3, 0.5, 0.7, 1.1])
@@ -253,12 +286,30 @@ def test_the_extended_jacobian_does_in_case_2_what_the_reduced_gradient_does() -
         ("{kind: manipulability, frame: ee, rows: xy}", "the objective has 0 quadratic terms"),
     ],
 )
-def test_a_constraint_that_cannot_be_made(tmp_path: Path, objective: str, came: str) -> None:
-    with pytest.raises(ScenarioError, match=rf"resolver\.constraint: expected 2 rows .*{came}"):
+def test_an_added_task_that_cannot_be_made(tmp_path: Path, objective: str, came: str) -> None:
+    with pytest.raises(ScenarioError, match=rf"resolver\.added_task: expected 2 rows .*{came}"):
         scenario(tmp_path, objective=objective, resolver__kind="ej").controller()
 
 
-def test_a_constraint_of_the_wrong_size(tmp_path: Path) -> None:
-    constraint = "{kind: coordinates, of: q1, reference: 0}"
-    with pytest.raises(ScenarioError, match=r"resolver\.constraint: expected 2 rows .*, got 1"):
-        scenario(tmp_path, resolver=f"{{kind: ej, constraint: {constraint}}}").controller()
+def test_an_added_task_of_the_wrong_size(tmp_path: Path) -> None:
+    added = "{kind: coordinates, of: q1, reference: 0}"
+    with pytest.raises(ScenarioError, match=r"resolver\.added_task: expected 2 rows .*, got 1"):
+        scenario(tmp_path, resolver=f"{{kind: ej, added_task: {added}}}").controller()
+
+
+def test_the_added_task_has_a_new_name(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match=r"resolver\.constraint: this key is called added_task now"):
+        scenario(tmp_path, resolver="{kind: ej, constraint: {kind: coordinates, of: q1, reference: 0}}")
+
+
+def test_a_point_may_be_a_frame(robot_2r: nmm.Robot, tmp_path: Path) -> None:
+    """As in Python, `Distance("ee", "link1")`."""
+    task = scenario(tmp_path, task="{kind: distance, frame: ee, to: link1, reference: 0.2}").controller().task
+    for a, b in zip(
+        evaluated(robot_2r, task.tasks[0].function, 0.0),
+        evaluated(robot_2r, nmm.Distance("ee", "link1"), 0.0),
+        strict=True,
+    ):
+        assert np.array_equal(a, b)
+    with pytest.raises(ScenarioError, match=r"task\.to: .*unknown frame 'hand'"):
+        scenario(tmp_path, task="{kind: distance, frame: ee, to: hand, reference: 0.2}").controller()

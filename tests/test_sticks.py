@@ -226,7 +226,7 @@ def test_links_are_drawn_by_their_collision_shapes_first(tmp_path: Path) -> None
     robot = nmm.load(written(tmp_path / "mixed.urdf", {"upper": egg, "fore": both}))
     before = [geometry.name for geometry in robot.visual_model.geometryObjects]
     found = appearance(robot)
-    assert found.told() == [
+    assert found.notes() == [
         "links without visuals are drawn by their collision shapes: upper",
         "links without shapes are drawn as sticks: base, hand",
     ]
@@ -264,7 +264,7 @@ def test_robots_with_shapes_are_drawn_as_before(source: str, monkeypatch: pytest
 def test_bundled_robots_have_shapes_everywhere(source: str) -> None:
     robot = nmm.load(source)
     assert appearance(robot).shapes is robot.visual_model
-    assert appearance(robot).told() == []
+    assert appearance(robot).notes() == []
 
 
 def test_a_link_without_length_between_others_stays_unseen(tmp_path: Path) -> None:

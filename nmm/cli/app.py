@@ -12,8 +12,17 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from nmm.cli.groups import Browser, Ellipsoids, command
 from nmm.cli.mapping import map_measures
-from nmm.cli.options import SetOption, settings_of
+from nmm.cli.options import (
+    ResolverOption,
+    ResolversOption,
+    ScenarioArgument,
+    SetOption,
+    out_option,
+    resolvers_of,
+    settings_of,
+)
 from nmm.cli.output import complain
 from nmm.cli.redundancy import laps, redundancy
 from nmm.cli.robot_commands import check, info, robots, scenarios, view
@@ -32,27 +41,6 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
-
-ScenarioArgument = Annotated[
-    str, typer.Argument(metavar="SCENARIO", help="A bundled name (see `nmm scenarios`) or a YAML file.")
-]
-
-EllipsoidsOption = Annotated[
-    bool,
-    typer.Option(
-        "--ellipsoids",
-        help="Draw the manipulability ellipsoids: how fast the robot, and its arm alone, can move the "
-        "end-effector in each direction.",
-    ),
-]
-EllipsoidScaleOption = Annotated[
-    float | None,
-    typer.Option(
-        metavar="M",
-        help="Draw the ellipsoids, with M metres for each m/s.",
-        show_default="a readable one",
-    ),
-]
 
 
 def _version(wanted: bool) -> None:
@@ -90,26 +78,13 @@ def nmm(
 
 
 @app.command()
+@command
 def run(
     scenario: ScenarioArgument,
-    resolver: Annotated[
-        str | None,
-        typer.Option(
-            metavar="rg|pg|ej",
-            help="Resolve the redundancy with the reduced gradient (rg), the projected gradient (pg) or the "
-            "extended Jacobian (ej), with those of the scenario's settings that it knows.",
-        ),
-    ] = None,
+    *,
+    resolver: ResolverOption = None,
     settings: SetOption = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="DIR",
-            help="Where to write. What this command wrote there before is replaced; a folder of anything "
-            "else is refused.",
-            show_default="runs/<scenario>-<resolver>",
-        ),
-    ] = None,
+    out: Annotated[Path | None, out_option("runs/<scenario>-<resolver>")] = None,
     html: Annotated[
         bool,
         typer.Option("--html", help="Write playback.html too: the motion in 3D, one file, works offline."),
@@ -117,8 +92,7 @@ def run(
     play: Annotated[
         bool, typer.Option("--play", help="Play the motion in the browser afterwards; Ctrl-C ends it.")
     ] = False,
-    ellipsoids: EllipsoidsOption = False,
-    ellipsoid_scale: EllipsoidScaleOption = None,
+    ellipsoids: Ellipsoids,
 ) -> int:
     """Run a scenario and write what happened.
 
@@ -134,29 +108,23 @@ def run(
     with --ellipsoids ellipses.png among them.
     Ctrl-C ends the run and writes the part that was computed, marked incomplete.
     """
-    from nmm.cli.runs import ellipsoids_of, run_scenario
+    from nmm.cli.runs import run_scenario
 
-    drawn = ellipsoids_of(ellipsoids, ellipsoid_scale)
+    drawn = ellipsoids.wanted()
     return run_scenario(
         scenario, resolver, settings_of(settings), out, html=html, play=play, ellipsoids=drawn
     )
 
 
 @app.command()
+@command
 def compare(
     scenario: ScenarioArgument,
-    resolvers: Annotated[
-        str, typer.Option(metavar="KIND,KIND,...", help="The resolvers: some of rg, pg, ej.")
-    ] = "rg,pg",
+    *,
+    resolvers: ResolversOption = "rg,pg",
     settings: SetOption = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="DIR", help="Where to write, as for `nmm run`.", show_default="runs/<scenario>-compare"
-        ),
-    ] = None,
-    ellipsoids: EllipsoidsOption = False,
-    ellipsoid_scale: EllipsoidScaleOption = None,
+    out: Annotated[Path | None, out_option("runs/<scenario>-compare")] = None,
+    ellipsoids: Ellipsoids,
 ) -> int:
     """Run a scenario with several resolvers.
 
@@ -169,12 +137,9 @@ def compare(
     The folder holds comparison.png, playback.html (all robots in one scene), summary.json and, for each
     resolver, a folder with its run.
     """
-    from nmm.cli.runs import compare_resolvers, ellipsoids_of
+    from nmm.cli.runs import compare_resolvers
 
-    kinds = list(dict.fromkeys(kind.strip() for kind in resolvers.split(",") if kind.strip()))
-    if not kinds:
-        raise InputError("--resolvers: expected kinds with commas between them, as in rg,pg")
-    drawn = ellipsoids_of(ellipsoids, ellipsoid_scale)
+    kinds, drawn = resolvers_of(resolvers), ellipsoids.wanted()
     return compare_resolvers(scenario, kinds, settings_of(settings), out, ellipsoids=drawn)
 
 
@@ -195,34 +160,35 @@ def paper(
 
 
 @app.command()
+@command
 def play(
     folder: Annotated[
         Path, typer.Argument(metavar="RUN_DIR", help="A folder of `nmm run` or `nmm compare`.")
     ],
-    port: Annotated[
-        int | None, typer.Option(metavar="N", help="Port on this machine.", show_default="a free one")
-    ] = None,
-    no_open: Annotated[bool, typer.Option("--no-open", help="Print the address, open no browser.")] = False,
-    ellipsoids: EllipsoidsOption = False,
-    ellipsoid_scale: EllipsoidScaleOption = None,
+    browser: Browser,
+    ellipsoids: Ellipsoids,
 ) -> int:
     """Play a run in the browser.
 
     In 3D, with MeshCat; only this machine can reach it. Ctrl-C ends it.
     """
-    from nmm.cli.runs import ellipsoids_of, play_folder
+    from nmm.cli.runs import play_folder
 
-    drawn = ellipsoids_of(ellipsoids, ellipsoid_scale)
-    return play_folder(folder, port, open_browser=not no_open, ellipsoids=drawn)
+    return play_folder(folder, **browser.keywords(), ellipsoids=ellipsoids.wanted())
 
 
-for _command in (info, check, view, singularities):
-    app.command()(_command)
-app.command("map")(map_measures)
-app.command()(redundancy)
-app.command()(laps)
-app.command()(scenarios)
-app.command()(robots)
+for _name, _command in (
+    ("info", info),
+    ("check", check),
+    ("view", view),
+    ("singularities", singularities),
+    ("map", map_measures),
+    ("redundancy", redundancy),
+    ("laps", laps),
+    ("scenarios", scenarios),
+    ("robots", robots),
+):
+    app.command(_name)(_command)
 
 
 def status_of(arguments: Sequence[str]) -> int:

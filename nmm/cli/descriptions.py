@@ -56,19 +56,19 @@ def describe_robot(
         ("position in space", 3),
         ("pose in space", 6),
     ]
-    unfelt: Sequence[str] | None = None
+    without: Sequence[str] | None = None
     if scenario is not None:
         name, controller, q0 = _of_scenario(scenario, given)
-        from nmm.control.idle_inputs import unfelt_inputs
+        from nmm.control.idle_inputs import inputs_without_effect
 
         given = controller.robot
-        task, unfelt = [(name, len(controller.rows))], unfelt_inputs(controller, q0)
+        task, without = [(name, len(controller.rows))], inputs_without_effect(controller, q0)
     robot = cast("Robot", given)  # there is a source, or a scenario
     _show(robot, task)
-    for name in unfelt or ():
-        show_text(f"the task does not feel {name}: only the objective can use it")
-    if unfelt == ():
-        show_text("the task feels every input")
+    for name in without or ():
+        show_text(f"{name} has no effect on the task: only the objective can use it")
+    if without == ():
+        show_text("every input moves the task")
     _show_loading(robot)
     return OK
 

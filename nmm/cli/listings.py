@@ -12,10 +12,10 @@ OK = 0
 
 def list_scenarios() -> int:
     """The bundled scenarios."""
-    from nmm.scenario import Scenario
+    from nmm.scenario.document import read_file
 
-    loaded = [Scenario.load(name) for name in bundled_scenarios()]
-    show_table(["scenario", "what it shows"], [[scenario.name, scenario.title] for scenario in loaded])
+    titles = [[name, read_file(path).data.get("title", "")] for name, path in bundled_scenarios().items()]
+    show_table(["scenario", "what it shows"], titles)
     return OK
 
 

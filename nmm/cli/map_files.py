@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nmm.cli.options import values_of
+from nmm.cli.options import names_of, values_of
 from nmm.cli.output import progress, show_table
 from nmm.cli.subjects import studied
 from nmm.errors import InputError
@@ -58,7 +58,7 @@ def make_map(
     check_folder(folder, is_map)
     common: dict[str, Any] = {
         "ranges": bounds,
-        "measures": _names(measures, "--measure"),
+        "measures": names_of(measures, "--measure"),
         "part": part,
         "at": what.q,
         "t": what.t,
@@ -69,7 +69,7 @@ def make_map(
     given = values_of(at, "--at", "COORDINATE=VALUE")
     with progress(f"map of {what.name}") as report:
         if workspace is None:
-            names = _two_first(what.robot) if over is None else _names(over, "--over")
+            names = _two_first(what.robot) if over is None else names_of(over, "--over")
             check_held(given, names, "--at")
             made = singularity_map(what.subject, names, samples=counts, progress=report, **common)
         else:
@@ -138,13 +138,6 @@ def _two_first(robot: Robot) -> list[str]:
     """The arm's first two coordinates; the first two of a robot whose arm has fewer."""
     arm = robot.u_names[robot.platform.p :]
     return list((arm if len(arm) >= 2 else robot.q_names)[:2])
-
-
-def _names(text: str, option: str) -> list[str]:
-    names = [name.strip() for name in text.split(",") if name.strip()]
-    if not names:
-        raise InputError(f"{option}: expected names with commas between them, got {text!r}")
-    return names
 
 
 def counts_of(text: str) -> tuple[int, int]:

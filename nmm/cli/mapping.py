@@ -7,24 +7,14 @@ from typing import Annotated
 
 import typer
 
-from nmm.cli.options import (
-    AtOption,
-    AxleOption,
-    LockOption,
-    PackageOption,
-    PlatformOption,
-    SubjectSetOption,
-    TaskOption,
-    loading_of,
-)
+from nmm.cli.groups import Loading, Subject, command
+from nmm.cli.options import LengthOption, out_option
 
 
+@command
 def map_measures(
-    subject: Annotated[
-        str,
-        typer.Argument(metavar="SUBJECT", help="A robot (name or file), a scenario, or a run's folder."),
-    ],
-    task: TaskOption = None,
+    subject: Subject,
+    *,
     over: Annotated[
         str | None,
         typer.Option(
@@ -80,7 +70,6 @@ def map_measures(
         str,
         typer.Option(metavar="N|NxM", help="Samples along each axis, or along the first and the second."),
     ] = "300",
-    at: AtOption = None,
     time: Annotated[
         float | None,
         typer.Option("--time", metavar="S", help="Instant, s.", show_default="0, or a run's first"),
@@ -96,23 +85,9 @@ def map_measures(
             show_default="1",
         ),
     ] = None,
-    length: Annotated[
-        float | None,
-        typer.Option(metavar="M", help="Characteristic length: so many m count as 1 rad.", show_default="1"),
-    ] = None,
-    settings: SubjectSetOption = None,
-    platform: PlatformOption = None,
-    lock: LockOption = None,
-    axle: AxleOption = None,
-    package_dir: PackageOption = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="DIR",
-            help="Where to write. A folder of a map is replaced; any other that exists is refused.",
-            show_default="runs/<subject>-map",
-        ),
-    ] = None,
+    length: LengthOption = None,
+    out: Annotated[Path | None, out_option("runs/<subject>-map")] = None,
+    loading: Loading,
 ) -> int:
     """Map singularity and manipulability over two coordinates or a plane of the workspace.
 
@@ -131,8 +106,7 @@ def map_measures(
     from nmm.cli.map_files import make_map
 
     return make_map(
-        subject,
-        tasks=task,
+        subject.subject,
         over=over,
         ranges=ranges,
         workspace=workspace,
@@ -141,12 +115,11 @@ def map_measures(
         measures=measure,
         part=part,
         samples=samples,
-        at=at,
         t=time,
         alpha=alpha,
         weights=weight,
         length=length,
-        settings=settings,
         out=out,
-        **loading_of(platform, lock, axle, package_dir),
+        **subject.keywords(),
+        **loading.keywords(),
     )

@@ -9,7 +9,23 @@ from typing import Annotated, Any
 import typer
 
 from nmm.errors import InputError
+from nmm.kinds import PLATFORMS, RESOLVERS, TASKS
+from nmm.words import listed
 
+ROBOT_HELP = "A bundled name (see `nmm robots`), a .urdf or .xacro file, or package://PACKAGE/PATH."
+
+ScenarioArgument = Annotated[
+    str, typer.Argument(metavar="SCENARIO", help="A bundled name (see `nmm scenarios`) or a YAML file.")
+]
+SubjectArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="SUBJECT",
+        help="A robot (a bundled name, a .urdf or .xacro file, package://PACKAGE/PATH) with --task; a "
+        "scenario; or a run's folder.",
+        show_default=False,
+    ),
+]
 SetOption = Annotated[
     list[str] | None,
     typer.Option(
@@ -27,7 +43,11 @@ ArgumentOption = Annotated[
 ]
 PlatformOption = Annotated[
     str | None,
-    typer.Option(metavar="NAME", help="How the base moves.", show_default="what the file says, or unicycle"),
+    typer.Option(
+        metavar="NAME",
+        help=f"How the base moves: {listed(list(PLATFORMS), 'or')}.",
+        show_default="what the file says, or unicycle",
+    ),
 ]
 LockOption = Annotated[
     list[str] | None,
@@ -49,9 +69,9 @@ TaskOption = Annotated[
     typer.Option(
         "--task",
         metavar="KIND[:FRAME[:AXES]]",
-        help="The task: position, pose, orientation, heading, center_of_mass; coordinates:q1,q2; posture; "
-        "or a mapping as in a scenario, '{kind: pointing, frame: ee, at: [2, 0, 1]}'. Without FRAME the "
-        "end of the arm. May be repeated: tasks stand above each other.",
+        help=f"The task, of KIND {listed(list(TASKS), 'or')}: position:ee:xy, pose, coordinates:q1,q2; or "
+        "a mapping as in a scenario, '{kind: pointing, frame: ee, at: [2, 0, 1]}'. Without FRAME the end of "
+        "the arm. May be repeated: tasks stand above each other.",
         show_default="the scenario's",
     ),
 ]
@@ -85,6 +105,66 @@ PortOption = Annotated[
     int | None, typer.Option(metavar="N", help="Port on this machine.", show_default="a free one")
 ]
 NoOpenOption = Annotated[bool, typer.Option("--no-open", help="Print the address, open no browser.")]
+ResolverOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="|".join(RESOLVERS),
+        help=f"Resolve the redundancy with the "
+        f"{listed([f'{RESOLVERS.words(name)} ({name})' for name in RESOLVERS], 'or')}, "
+        "with those of the scenario's settings that it knows.",
+    ),
+]
+ResolversOption = Annotated[
+    str,
+    typer.Option(metavar="KIND,KIND,...", help=f"The resolvers: some of {', '.join(RESOLVERS)}."),
+]
+LengthOption = Annotated[
+    float | None,
+    typer.Option(
+        metavar="M",
+        help="Characteristic length: so many m count as 1 rad; such as the arm's reach.",
+        show_default="1",
+    ),
+]
+EllipsoidsOption = Annotated[
+    bool,
+    typer.Option(
+        "--ellipsoids",
+        help="Draw the manipulability ellipsoids: how fast the robot, and its arm alone, can move the "
+        "end-effector in each direction.",
+    ),
+]
+EllipsoidScaleOption = Annotated[
+    float | None,
+    typer.Option(
+        metavar="M",
+        help="Draw the ellipsoids, with M metres for each m/s.",
+        show_default="a readable one",
+    ),
+]
+
+
+def out_option(default: str) -> Any:
+    """The `--out` of a command that writes a folder; `default` says which."""
+    return typer.Option(
+        metavar="DIR",
+        help="Where to write. What this command wrote there before is replaced; a folder of anything else "
+        "is refused.",
+        show_default=default,
+    )
+
+
+def resolvers_of(given: str) -> list[str]:
+    """The kinds in `--resolvers`, each once."""
+    return list(dict.fromkeys(names_of(given, "--resolvers", "kinds with commas between them, as in rg,pg")))
+
+
+def names_of(given: str, option: str, expected: str = "names with commas between them") -> list[str]:
+    """Names with commas between them; `InputError` where there is none."""
+    names = [name.strip() for name in given.split(",") if name.strip()]
+    if not names:
+        raise InputError(f"{option}: expected {expected}, got {given!r}")
+    return names
 
 
 def settings_of(given: Sequence[str] | None) -> dict[str, object]:
@@ -132,18 +212,6 @@ def axle_of(given: str | None) -> str | list[float] | None:
         return [evaluate(part) for part in given.split(",")]
     except ValueError as error:
         raise InputError(f"--axle: expected a frame or X,Y in m, got {given!r}: {error}") from None
-
-
-def loading_of(
-    platform: str | None, lock: Sequence[str] | None, axle: str | None, package_dirs: Sequence[Path] | None
-) -> dict[str, Any]:
-    """The four options about how a robot is loaded, as `nmm.load` takes them."""
-    return {
-        "platform": platform,
-        "lock": lock_of(lock),
-        "axle": axle_of(axle),
-        "package_dirs": list(package_dirs or ()),
-    }
 
 
 def _pairs(given: Sequence[str] | None, option: str, expected: str) -> list[tuple[str, str]]:

@@ -7,37 +7,21 @@ from typing import Annotated
 
 import typer
 
+from nmm.cli.groups import Browser, Loading, Subject, command
 from nmm.cli.options import (
-    AtOption,
-    AxleOption,
-    LockOption,
-    NoOpenOption,
-    PackageOption,
-    PlatformOption,
-    PortOption,
+    ResolversOption,
+    ScenarioArgument,
     SetOption,
-    SubjectSetOption,
-    TaskOption,
-    loading_of,
+    out_option,
+    resolvers_of,
     settings_of,
 )
-from nmm.errors import InputError
 
 
+@command
 def redundancy(
-    subject: Annotated[
-        str,
-        typer.Argument(
-            metavar="SUBJECT", help="A robot, a scenario or a run's folder; a robot needs --task."
-        ),
-    ],
-    task: TaskOption = None,
-    at: AtOption = None,
-    settings: SubjectSetOption = None,
-    platform: PlatformOption = None,
-    lock: LockOption = None,
-    axle: AxleOption = None,
-    package_dir: PackageOption = None,
+    subject: Subject,
+    *,
     self_motion: Annotated[
         str | None,
         typer.Option(
@@ -55,8 +39,8 @@ def redundancy(
         typer.Option(metavar="FILE", help="Write the self-motion in 3D: one file, works offline."),
     ] = None,
     play: Annotated[bool, typer.Option("--play", help="Play it in the browser; Ctrl-C ends it.")] = False,
-    port: PortOption = None,
-    no_open: NoOpenOption = False,
+    browser: Browser,
+    loading: Loading,
 ) -> int:
     """Say what a task leaves free.
 
@@ -71,45 +55,31 @@ def redundancy(
     from nmm.cli.redundancy_tables import show_redundancy
 
     return show_redundancy(
-        subject,
-        tasks=task,
-        at=at,
-        settings=settings,
-        **loading_of(platform, lock, axle, package_dir),
+        subject.subject,
         along=self_motion,
         duration=duration,
         speed=speed,
         html=html,
         play=play,
-        port=port,
-        open_browser=not no_open,
+        **browser.keywords(),
+        **subject.keywords(),
+        **loading.keywords(),
     )
 
 
+@command
 def laps(
-    scenario: Annotated[
-        str, typer.Argument(metavar="SCENARIO", help="A bundled name (see `nmm scenarios`) or a YAML file.")
-    ],
+    scenario: ScenarioArgument,
     number: Annotated[
         int, typer.Option("--laps", metavar="N", help="How many; 3 or more tell whether the drift falls.")
     ] = 5,
-    resolvers: Annotated[
-        str, typer.Option(metavar="KIND,KIND,...", help="The resolvers: some of rg, pg, ej.")
-    ] = "rg,pg",
+    resolvers: ResolversOption = "rg,pg",
     period: Annotated[
         float | None,
         typer.Option(metavar="S", help="Of the path, s.", show_default="that of the circles in the task"),
     ] = None,
     settings: SetOption = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="DIR",
-            help="Where to write. What this command wrote there before is replaced; a folder of anything "
-            "else is refused.",
-            show_default="runs/<scenario>-laps",
-        ),
-    ] = None,
+    out: Annotated[Path | None, out_option("runs/<scenario>-laps")] = None,
 ) -> int:
     """Go round a closed path several times: does the posture come back?
 
@@ -123,7 +93,5 @@ def laps(
     """
     from nmm.cli.laps import run_laps
 
-    kinds = list(dict.fromkeys(kind.strip() for kind in resolvers.split(",") if kind.strip()))
-    if not kinds:
-        raise InputError("--resolvers: expected kinds with commas between them, as in rg,pg")
+    kinds = resolvers_of(resolvers)
     return run_laps(scenario, kinds, settings_of(settings), laps=number, period=period, out=out)

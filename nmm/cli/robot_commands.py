@@ -6,21 +6,11 @@ from typing import Annotated
 
 import typer
 
-from nmm.cli.options import (
-    ArgumentOption,
-    AxleOption,
-    LockOption,
-    NoOpenOption,
-    PackageOption,
-    PlatformOption,
-    PortOption,
-    arguments_of,
-    loading_of,
-)
-
-ROBOT_HELP = "A bundled name (see `nmm robots`), a .urdf or .xacro file, or package://PACKAGE/PATH."
+from nmm.cli.groups import Browser, Loading, command
+from nmm.cli.options import ROBOT_HELP, ArgumentOption, PackageOption, arguments_of
 
 
+@command
 def info(
     robot: Annotated[
         str | None,
@@ -30,17 +20,15 @@ def info(
             show_default=False,
         ),
     ] = None,
-    platform: PlatformOption = None,
+    *,
     scenario: Annotated[
         str | None,
         typer.Option(
             metavar="SCENARIO",
-            help="Show the redundancy for this scenario's task, and the inputs that it does not feel.",
+            help="Show the redundancy for this scenario's task, and the inputs without effect on it.",
         ),
     ] = None,
-    lock: LockOption = None,
-    axle: AxleOption = None,
-    package_dir: PackageOption = None,
+    loading: Loading,
 ) -> int:
     """Describe a robot.
 
@@ -56,11 +44,7 @@ def info(
     """
     from nmm.cli.descriptions import describe_robot
 
-    return describe_robot(
-        robot,
-        scenario,
-        **loading_of(platform, lock, axle, package_dir),
-    )
+    return describe_robot(robot, scenario, **loading.keywords())
 
 
 def check(
@@ -85,14 +69,11 @@ def check(
     return check_file(file, arguments_of(arguments), package_dir or [])
 
 
+@command
 def view(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help=ROBOT_HELP)],
-    platform: PlatformOption = None,
-    lock: LockOption = None,
-    axle: AxleOption = None,
-    package_dir: PackageOption = None,
-    port: PortOption = None,
-    no_open: NoOpenOption = False,
+    loading: Loading,
+    browser: Browser,
     frames: Annotated[
         bool, typer.Option("--frames/--no-frames", help="Show frames at first; the page can change it.")
     ] = True,
@@ -108,13 +89,7 @@ def view(
     """
     from nmm.cli.viewing import view_robot
 
-    return view_robot(
-        robot,
-        **loading_of(platform, lock, axle, package_dir),
-        port=port,
-        open_browser=not no_open,
-        frames=frames,
-    )
+    return view_robot(robot, **loading.keywords(), **browser.keywords(), frames=frames)
 
 
 def scenarios(

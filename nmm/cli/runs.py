@@ -112,20 +112,6 @@ def play_folder(folder: Path, port: int | None, *, open_browser: bool, ellipsoid
     return OK
 
 
-def ellipsoids_of(wanted: bool, scale: float | None) -> Wanted:
-    """What `--ellipsoids` and `--ellipsoid-scale` ask for; a scale alone asks for ellipsoids too.
-
-    Raises
-    ------
-    InputError : a scale that is not above zero
-    """
-    if scale is None:
-        return wanted
-    from nmm.runs.ellipsoid_options import EllipsoidOptions
-
-    return EllipsoidOptions(scale=scale)
-
-
 def _load(name: str, resolver: str | None, settings: Mapping[str, object]) -> Scenario:
     kind = {} if resolver is None else {"resolver.kind": resolver}
     return Scenario.load(name, kind | dict(settings))

@@ -9,16 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from nmm.cli.options import (
-    AtOption,
-    AxleOption,
-    LockOption,
-    PackageOption,
-    PlatformOption,
-    SubjectSetOption,
-    TaskOption,
-    loading_of,
-)
+from nmm.cli.groups import Loading, Subject, command
+from nmm.cli.options import LengthOption
 from nmm.errors import InputError
 
 if TYPE_CHECKING:
@@ -33,18 +25,10 @@ MANY_MINORS = 60
 STARTS = 200
 
 
+@command
 def singularities(
-    subject: Annotated[
-        str,
-        typer.Argument(
-            metavar="SUBJECT",
-            help="A robot (a bundled name, a .urdf or .xacro file, package://PACKAGE/PATH) with --task; a "
-            "scenario; or a run's folder, which is looked at along its motion.",
-            show_default=False,
-        ),
-    ],
-    task: TaskOption = None,
-    at: AtOption = None,
+    subject: Subject,
+    *,
     time: Annotated[
         float | None,
         typer.Option(
@@ -53,15 +37,7 @@ def singularities(
             show_default="0; the whole run",
         ),
     ] = None,
-    settings: SubjectSetOption = None,
-    length: Annotated[
-        float | None,
-        typer.Option(
-            metavar="L",
-            help="Characteristic length, m, in which singular values count lengths; such as the arm's reach.",
-            show_default="1 m counts as much as 1 rad",
-        ),
-    ] = None,
+    length: LengthOption = None,
     minors: Annotated[
         bool | None,
         typer.Option(
@@ -112,10 +88,7 @@ def singularities(
             show_default="the whole robot",
         ),
     ] = None,
-    platform: PlatformOption = None,
-    lock: LockOption = None,
-    axle: AxleOption = None,
-    package_dir: PackageOption = None,
+    loading: Loading,
 ) -> int:
     """Say where a robot loses rank with a task, and why.
 
@@ -156,15 +129,8 @@ def singularities(
             raise InputError(f"{option}: {text}")
     from nmm.cli.subjects import studied
 
-    given = studied(
-        subject,
-        tasks=task,
-        at=at,
-        t=time,
-        settings=settings,
-        **loading_of(platform, lock, axle, package_dir),
-    )
-    if at:
+    given = studied(subject.subject, t=time, **subject.keywords(), **loading.keywords())
+    if subject.at:
         _warn_of_limits(given)
     if looking:
         from nmm.cli.searching import search_command
@@ -179,10 +145,10 @@ def singularities(
         )
     choice, left_out = _chosen(given, minors, minor)
     if given.trajectory is not None and symbolic:
-        raise InputError(f"--symbolic: expected a robot or a scenario; {subject} is a run")
+        raise InputError(f"--symbolic: expected a robot or a scenario; {subject.subject} is a run")
     if given.trajectory is not None and time is None:
-        if at:
-            raise InputError(f"--at: {subject} is a run, which is where it was; expected --time")
+        if subject.at:
+            raise InputError(f"--at: {subject.subject} is a run, which is where it was; expected --time")
         return _along(given, given.trajectory, choice, left_out, length, as_json)
     if symbolic:
         return _formulas(given, choice, left_out, length, minor is not None, latex)

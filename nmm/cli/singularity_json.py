@@ -65,7 +65,7 @@ def report_data(given: Studied, report: SingularityReport) -> dict[str, Any]:
                 "lost": extended.lost,
                 "kinematic": extended.kinematic,
                 "algorithmic": extended.algorithmic,
-                "constraint_singular": extended.constraint_singular,
+                "constraint_singular": extended.added_singular,
             },
         }
     )

@@ -114,25 +114,25 @@ def extended(report: SingularityReport) -> Iterator[str]:
     found = report.extended
     if found is None:
         return
-    constraint = ", ".join(found.rows[len(report.rows) :])
+    added = ", ".join(found.rows[len(report.rows) :])
     count, largest = len(found.rows), float(found.singular_values[0])
     yield (
-        f"EJ, with the constraint {constraint}: det J_e = {number(found.determinant, largest**count)}, "
+        f"EJ, with the added task {added}: det J_e = {number(found.determinant, largest**count)}, "
         f"rank {found.rank} of {count}, σ_min {number(found.sigma_min, largest)}, "
         f"condition {number(found.condition)}."
     )
     if found.kinematic:
         yield "J_e is singular because J is: a kinematic singularity."
-    elif found.constraint_singular:
-        yield "EJ fails here though J has full rank: the constraint's own rows depend on each other."
+    elif found.added_singular:
+        yield "EJ fails here though J has full rank: the added task's own rows depend on each other."
     elif found.algorithmic:
         yield (
-            "An algorithmic singularity: J_e is singular though neither J nor the constraint is. "
+            "An algorithmic singularity: J_e is singular though neither J nor the added task's J_y is. "
             f"Both speak of the same: no input moves {directions(found.lost, found.rows)}."
         )
     else:
         yield (
-            f"|det J_e|/√(det J Jᵀ det Jc Jcᵀ) = {found.angle_measure:.3g}: 1 where the constraint moves "
+            f"|det J_e|/√(det J Jᵀ det J_y J_yᵀ) = {found.angle_measure:.3g}: 1 where the added task moves "
             "only what the task leaves free, 0 where it asks for what the task fixes."
         )
 

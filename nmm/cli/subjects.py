@@ -33,7 +33,7 @@ class Studied:
     name : the robot's or the scenario's
     robot : the robot
     task : its task; a bare function where no target was said
-    controller : the scenario's, with its resolver and constraint; None for a robot, or with another task
+    controller : the scenario's, with its resolver and added task; None for a robot, or with another task
     q (n,) : where; the scenario's start, the run's, or the configuration nearest to zero
     t : s
     trajectory : the run, for a run's folder

@@ -1,4 +1,4 @@
-"""Inputs that a task does not feel: columns of J that are zero wherever the robot stands."""
+"""Inputs without effect on a task: columns of J that are zero wherever the robot stands."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ AROUND = 1.0
 ZERO = 1e-12
 
 
-def unfelt_inputs(controller: Controller, q0: ArrayLike | None = None) -> tuple[str, ...]:
+def inputs_without_effect(controller: Controller, q0: ArrayLike | None = None) -> tuple[str, ...]:
     """Names of the inputs whose column of J (s, n_u) is zero, as a car's steering rate is for a position.
 
     To first order such an input does not move the task, so that only the objective can use it. The columns
@@ -38,9 +38,9 @@ def unfelt_inputs(controller: Controller, q0: ArrayLike | None = None) -> tuple[
 
 
 def idle_inputs(controller: Controller, q0: ArrayLike | None = None) -> tuple[str, ...]:
-    """Names of the inputs that neither the task nor the constraint nor the objective feels: they stay 0.
+    """Names of the inputs without effect on the task, the added one and the objective: they stay 0.
 
-    Parameters and result as for `unfelt_inputs`.
+    Parameters and result as for `inputs_without_effect`.
     """
     return _zero_columns(controller, q0, lambda controller: controller.derivatives)
 

@@ -173,15 +173,15 @@ def _title(drawn: Map, measure: str, width: float) -> list[tuple[str, bool]]:
     """Lines of text, each with whether it is the headline."""
     about = drawn.about
     whose = "" if about.part == "robot" or not MEASURES[measure].on_part else f", {about.part} alone"
-    told = [f"{subscripted(MEASURES[measure].about)}{whose}"]
+    notes = [f"{subscripted(MEASURES[measure].about)}{whose}"]
     if measure == "weighted":
-        told.append(f"α = {about.alpha:g}")
+        notes.append(f"α = {about.alpha:g}")
     if about.sizes:
-        told.append(about.sizes)
+        notes.append(about.sizes)
     if about.weights:
-        told.append("weights " + ", ".join(f"{name} {value:g}" for name, value in about.weights.items()))
+        notes.append("weights " + ", ".join(f"{name} {value:g}" for name, value in about.weights.items()))
     lines = [(f"{about.robot}: {', '.join(about.task)}", True)]
-    texts = ["; ".join(told), _held(drawn)]
+    texts = ["; ".join(notes), _held(drawn)]
     for text in texts:
         lines += [(line, False) for line in textwrap.wrap(text, int((width - 0.4) / 0.062))]
     return lines

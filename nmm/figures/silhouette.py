@@ -192,9 +192,9 @@ def _feet(robot: Robot, arm: Sequence[int]) -> list[tuple[int, Solid]]:
         foot = np.array(below.placement.translation)
         column = model.jointPlacements[joint].translation - foot
         along = _motion(robot, joint)
-        beside = float(np.linalg.norm(np.cross(column, along)))
+        offset = float(np.linalg.norm(np.cross(column, along)))
         high = float(np.linalg.norm(column)) > _COLUMN
-        if below.parentJoint == model.parents[joint] and high and beside < _COLUMN:
+        if below.parentJoint == model.parents[joint] and high and offset < _COLUMN:
             found.append((joint, Solid(int(model.parents[joint]), foot[np.newaxis])))
     return found
 

@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
 from nmm.arrays import Array
+from nmm.kinds import RESOLVERS as NAMES
 
 #: Okabe and Ito's colours, told apart by colour-blind readers.
 BLUE, VERMILLION, GREEN, PINK = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
@@ -26,9 +27,7 @@ CYCLE = (BLUE, VERMILLION, GREEN, PINK, ORANGE, SKY, BLACK)
 DASHES = ("-", "--", "-.", ":")
 #: Colour and dashes of a resolver, the same in every figure.
 RESOLVERS: Mapping[str, tuple[str, str]] = {
-    "rg": (BLUE, "-"),
-    "pg": (VERMILLION, "--"),
-    "ej": (GREEN, "-."),
+    name: (CYCLE[k % len(CYCLE)], DASHES[k % len(DASHES)]) for k, name in enumerate(NAMES)
 }
 GREY, LIGHT = "#6B7280", "#E5E7EB"
 DPI = 180

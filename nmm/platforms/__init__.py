@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from nmm.errors import InputError, unknown
+from nmm.kinds import PLATFORMS
 from nmm.platforms.base import Platform
 from nmm.platforms.car import Car, FrontDriveCar
 from nmm.platforms.differential_drive import DifferentialDrive
@@ -25,20 +25,11 @@ from nmm.platforms.wheeled import (
     WheeledPlatform,
 )
 
-PLATFORMS: dict[str, type[Platform]] = {
-    kind.name: kind
-    for kind in (
-        Unicycle, DifferentialDrive, Car, FrontDriveCar, Tractor, Omnidirectional, Mecanum, Fixed,
-        WheeledPlatform,
-    )
-}  # fmt: skip
-
 
 def platform_by_name(name: str) -> type[Platform]:
     """The kind of platform of that name; `InputError` lists the names."""
-    if name not in PLATFORMS:
-        raise InputError(unknown("platform", name, PLATFORMS))
-    return PLATFORMS[name]
+    kind: type[Platform] = PLATFORMS.named(name)
+    return kind
 
 
 __all__ = [

@@ -74,7 +74,7 @@ def serve(
     Ctrl-C or when `stop` is set, with the server closed."""
     try:
         print(f"{what} at {server.url} (Ctrl-C ends it)", flush=True)
-        for note in dict.fromkeys(note for robot in robots for note in appearance(robot).told()):
+        for note in dict.fromkeys(note for robot in robots for note in appearance(robot).notes()):
             print(note, flush=True)
         if open_browser:
             _open(server.url)

@@ -44,14 +44,14 @@ class Appearance:
     solids: tuple[str, ...] = ()
     sticks: tuple[str, ...] = ()
 
-    def told(self) -> list[str]:
+    def notes(self) -> list[str]:
         """A sentence for each way in which links are drawn that have no visuals."""
-        notes = []
+        found = []
         if self.solids:
-            notes.append(f"links without visuals are drawn by their collision shapes: {_listed(self.solids)}")
+            found.append(f"links without visuals are drawn by their collision shapes: {_listed(self.solids)}")
         if self.sticks:
-            notes.append(f"links without shapes are drawn as sticks: {_listed(self.sticks)}")
-        return notes
+            found.append(f"links without shapes are drawn as sticks: {_listed(self.sticks)}")
+        return found
 
 
 def appearance(robot: Robot) -> Appearance:

@@ -38,8 +38,8 @@ def viewer_scene(robot: Robot, q: Array, *, frames: bool = True) -> list[Command
     drawing = Drawing()
     listed = list(_frames(robot, drawn, drawing))
     drawing.add("joints", coordinates=list(_coordinates(robot, drawn, q)))
-    told = first_tip(robot) or _first_shown(listed)
-    drawing.add("frames", frames=listed, shown=frames, length=length, pose=told)
+    shown_pose = first_tip(robot) or _first_shown(listed)
+    drawing.add("frames", frames=listed, shown=frames, length=length, pose=shown_pose)
     drawing.add("hold")
     # The last command says that everything has come.
     return [*commands[:-1], *drawing.commands, commands[-1]]

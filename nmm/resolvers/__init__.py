@@ -1,5 +1,6 @@
-"""Resolvers: one file each. `RESOLVERS` finds them by name."""
+"""Resolvers: one file each. `RESOLVERS` finds them by name; `nmm.kinds` lists them."""
 
+from nmm.kinds import RESOLVERS
 from nmm.resolvers.answer import Answer, Status
 from nmm.resolvers.base import Resolver, Setup
 from nmm.resolvers.callable_resolver import CallableResolver
@@ -8,10 +9,6 @@ from nmm.resolvers.problem import Dimensions, Problem
 from nmm.resolvers.projected_gradient import ProjectedGradient
 from nmm.resolvers.reduced_gradient import ReducedGradient
 from nmm.resolvers.state import State
-
-RESOLVERS: dict[str, type[Resolver]] = {
-    kind.name: kind for kind in (ReducedGradient, ProjectedGradient, ExtendedJacobian)
-}
 
 __all__ = [
     "RESOLVERS",

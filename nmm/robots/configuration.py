@@ -171,7 +171,7 @@ def _matrix_view(placement: pin.SE3) -> Array:
     """
     rotation, translation = placement.rotation, placement.translation
     start = rotation.__array_interface__["data"][0]
-    beside = translation.__array_interface__["data"][0] == start + 9 * rotation.itemsize
-    if not (beside and rotation.flags.f_contiguous):
+    adjacent = translation.__array_interface__["data"][0] == start + 9 * rotation.itemsize
+    if not (adjacent and rotation.flags.f_contiguous):
         raise NmmError("this version of Pinocchio keeps placements in another way than nmm expects")
     return np.lib.stride_tricks.as_strided(rotation, (3, 4), (8, 24))

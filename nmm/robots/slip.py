@@ -38,7 +38,7 @@ def slipping_wheels(robot: Robot) -> dict[str, float]:
     return found
 
 
-def told(robot: Robot) -> list[str]:
+def slip_warnings(robot: Robot) -> list[str]:
     """A sentence about the wheels that slide, if there are any."""
     slipping = slipping_wheels(robot)
     if not slipping:

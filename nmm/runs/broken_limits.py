@@ -11,7 +11,7 @@ from nmm.robots.robot import Robot
 SLACK = 1e-6
 
 
-def excesses(robot: Robot, t: Array, q: Array, u: Array) -> list[str]:
+def broken_limits(robot: Robot, t: Array, q: Array, u: Array) -> list[str]:
     """A sentence for the coordinates, and one for the inputs, that leave their limits.
 
     Parameters

@@ -11,7 +11,7 @@ from nmm.functions.function import Function, Shown
 from nmm.functions.program import Program
 from nmm.functions.tasks.position import AXES, Position
 from nmm.robots.robot import Robot
-from nmm.runs.broken_limits import excesses
+from nmm.runs.broken_limits import broken_limits
 from nmm.runs.trajectory import Outcome, Trajectory
 
 #: Below this ratio of smallest to largest singular value a run is warned about.
@@ -120,7 +120,7 @@ class Recorder:
         if outcome is not Outcome.SINGULAR:  # which says so itself
             self._warn_of_singularities(singular_values)
         if outcome in (Outcome.COMPLETED, Outcome.INTERRUPTED):  # of one that failed it goes without saying
-            self.warnings += excesses(robot, self.t, self.q[:count], self._u[:count])
+            self.warnings += broken_limits(robot, self.t, self.q[:count], self._u[:count])
         frame, columns, target = self._shown
         path, desired = None, None
         if frame is not None:

@@ -12,7 +12,7 @@ from nmm.arrays import Array, positive
 from nmm.control.controller import Controller, Step
 from nmm.control.idle_inputs import idle_inputs
 from nmm.errors import DivergedError, InputError, RunError, SingularError
-from nmm.robots.slip import told as told_slip
+from nmm.robots.slip import slip_warnings
 from nmm.runs.integrators import Integrator, integrator
 from nmm.runs.recording import Recorder
 from nmm.runs.stability import Instability, find_instability
@@ -78,11 +78,11 @@ def simulate(
     advance = integrator(method, robot, positive(tolerance, "tolerance"))
     recorder = Recorder(controller, times)
     outcome, message = Outcome.COMPLETED, ""
-    recorder.warnings += told_slip(robot)
+    recorder.warnings += slip_warnings(robot)
     idle = idle_inputs(controller, q)
     if idle:
         recorder.warnings.append(
-            f"neither the task nor the objective feels {', '.join(idle)}: at first order nothing moves "
+            f"without effect on task and objective: {', '.join(idle)}; at first order nothing moves "
             f"{'it' if len(idle) == 1 else 'them'} (an objective can)"
         )
     controller.reset()

@@ -1,54 +1,50 @@
-"""What the functions of a scenario have in common, and combinations of coordinates."""
+"""Functions phi(t, q) of the library, as parts of a scenario."""
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Literal
+from collections.abc import Iterable
+from typing import Any
 
-from pydantic import BeforeValidator
+from nmm.functions.function import Function
+from nmm.robots.robot import Robot
+from nmm.scenario.keys import at
+from nmm.scenario.made_part import MadePart
 
-from nmm.scenario.keys import Part
-from nmm.scenario.numbers import numbers_by_name, shown
-
-if TYPE_CHECKING:
-    from nmm.functions.function import Function
-    from nmm.robots.robot import Robot
-
-Unit = Literal["m", "rad", "1"]
+#: Keys whose text is a frame of the robot, and keys whose list names coordinates.
+FRAMES, COORDINATES = ("frame", "relative_to"), ("of", "joints")
 
 
-def combination(value: object) -> str | dict[str, float]:
-    """A coordinate's name, or coefficients by name."""
-    if isinstance(value, str):
-        return value
-    if isinstance(value, Mapping) and value:
-        return numbers_by_name(value, "coefficient of ")
-    raise ValueError(
-        f"expected a coordinate's name, or coefficients by name ({{theta: 1, q1: 1}}), got {shown(value)}"
-    )
-
-
-Combination = Annotated[str | dict[str, float], BeforeValidator(combination)]
-
-
-def check_combination(combination: str | dict[str, float], robot: Robot) -> None:
-    """`InputError` for a coordinate that the robot does not have."""
-    for name in [combination] if isinstance(combination, str) else combination:
-        robot.coordinate(name)
-
-
-class FunctionPart(Part):
-    """A function phi(t, q) of the library."""
-
-    @abstractmethod
-    def make(self, robot: Robot, unit: str) -> Function:
-        """The function; `unit` is that of values whose unit the file leaves open."""
+class FunctionPart(MadePart):
+    """A function phi(t, q)."""
 
     def build(self, robot: Robot, unit: str = "m") -> Function:
-        """`make`, with the robot's word on it: errors know their key."""
+        """The function, with the robot's word on it: errors know their key."""
+        check_names(self, robot)
+        for key in type(self).model_fields:
+            inner = getattr(self, key)
+            if isinstance(inner, FunctionPart):
+                with at(key):
+                    inner.build(robot)
+        function: Function = self.make(unit)
         with self.own_keys():
-            function = self.make(robot, unit)
             function.rows(robot)
             function.stages(robot)
         return function
+
+
+def check_names(part: MadePart, robot: Robot) -> None:
+    """`InputError`, at its key, for a frame or a coordinate that the robot does not have."""
+    for key in type(part).model_fields:
+        value = getattr(part, key)
+        with at(key):
+            if key in FRAMES and value is not None:
+                robot.frame_id(value)
+            elif key in COORDINATES and isinstance(value, list):
+                check_coordinates(value, robot)
+
+
+def check_coordinates(combinations: Iterable[Any], robot: Robot) -> None:
+    """`InputError` for a coordinate that the robot does not have, in names or in coefficients by name."""
+    for combination in combinations:
+        for name in [combination] if isinstance(combination, str) else combination:
+            robot.coordinate(name)

@@ -1,119 +1,28 @@
-"""The functions of a scenario that are made of others, and the choice of a reference."""
+"""Every function that a scenario can ask for: those of tasks, and the references that these follow."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator
 
-from nmm.scenario.function_part import Combination as Combination
+from nmm.kinds import REFERENCES, TASKS
 from nmm.scenario.function_part import FunctionPart
-from nmm.scenario.function_part import check_combination as check_combination
-from nmm.scenario.keys import Part, at, kind_of
-from nmm.scenario.motions import (
-    CirclePart,
-    ConstantPart,
-    LinePart,
+from nmm.scenario.keys import Part, one_of
+from nmm.scenario.made_part import part_of
+from nmm.scenario.numbers import Numbers
+from nmm.scenario.special_references import (
+    FixedOrientation,
     PolynomialPart,
     RotationPart,
-    SlerpPart,
-    SplinePart,
-    TurnPart,
     checked_orientation,
     is_orientation,
 )
-from nmm.scenario.numbers import NumberList
-from nmm.scenario.robot_functions import (
-    CenterOfMassPart,
-    CoordinatesPart,
-    Direction,
-    HeadingPart,
-    OrientationPart,
-    PositionPart,
-    check_frames,
-)
 
-if TYPE_CHECKING:
-    from nmm.functions.function import Function
-    from nmm.robots.robot import Robot
-
-POINT = (
-    "three numbers, m, or a mapping with a kind: of time (circle, spline...), or a point of the robot "
-    "(position, center_of_mass)"
-)
-
-
-class BearingPart(FunctionPart):
-    """Angle at which a fixed point is seen from a moving one, rad."""
-
-    kind: Literal["bearing"]
-    of: Reference = Field(
-        description="the moving point: a reference of time (circle, spline...), or a point of the robot, "
-        "{kind: position, frame: ...}, which makes it a function of the configuration"
-    )
-    towards: NumberList = Field(description="the fixed point, 2 numbers, m (a third, z, is only drawn)")
-
-    def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.functions.references.bearing import Bearing
-
-        with at("of"):
-            of = self.of.build(robot, "m")
-        return Bearing(of, self.towards)
-
-
-class PointingPart(FunctionPart):
-    """How far an axis of a frame points past a point: two rows, rad, both 0 when it points at it. The turn
-    about the axis is free."""
-
-    kind: Literal["pointing"]
-    frame: str = Field(description="a frame of the robot")
-    at: Reference = Field(description=f"the point: {POINT}")
-    axis: Direction = Field("z", description="x, y, z or three numbers, in the frame's axes")
-
-    def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.functions.tasks.pointing import Pointing
-
-        check_frames(self, robot)
-        with at("at"):
-            point = self.at.build(robot, "m")
-        return Pointing(self.frame, point, self.axis)
-
-
-class DistancePart(FunctionPart):
-    """Distance of a frame's origin from a point, m."""
-
-    kind: Literal["distance"]
-    frame: str = Field(description="a frame of the robot")
-    to: Reference = Field(description=f"the point: {POINT}")
-
-    def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.functions.tasks.distance import Distance
-
-        check_frames(self, robot)
-        with at("to"):
-            point = self.to.build(robot, "m")
-        return Distance(self.frame, point)
-
-
-class PoseReferencePart(FunctionPart):
-    """A position over an orientation: the target of a pose."""
-
-    kind: Literal["pose"]
-    position: Reference = Field(description="three numbers, m, or a mapping with a kind of reference")
-    orientation: Reference = Field(
-        description="a rotation vector, rad; {rpy: [...]}; {quaternion: [x, y, z, w]}; or a mapping with a "
-        "kind of reference, read as a rotation vector (slerp, turn, orientation of another frame...)"
-    )
-
-    def make(self, robot: Robot, unit: str) -> Function:
-        from nmm.functions.references.pose import PoseReference
-
-        with at("position"):
-            position = self.position.build(robot, "m")
-        with at("orientation"):
-            orientation = self.orientation.build(robot, "rad")
-        return PoseReference(position, orientation)
+#: A target that does not move may be one number.
+SPELLED: dict[str, dict[str, Any]] = {"constant": {"value": Numbers}}
+SPECIAL: dict[str, type[FunctionPart]] = {"polynomial": PolynomialPart, "rotation": RotationPart}
 
 
 def _short(value: object) -> object:
@@ -123,46 +32,28 @@ def _short(value: object) -> object:
     return value if isinstance(value, Mapping | Part) else {"kind": "constant", "value": value}
 
 
-REFERENCES: tuple[type[FunctionPart], ...] = (
-    CirclePart,
-    LinePart,
-    ConstantPart,
-    PolynomialPart,
-    SplinePart,
-    BearingPart,
-    RotationPart,
-    SlerpPart,
-    TurnPart,
-    PoseReferencePart,
-    PositionPart,
-    OrientationPart,
-    HeadingPart,
-    DistancePart,
-    CenterOfMassPart,
-    CoordinatesPart,
-)
-Reference = Annotated[
-    Annotated[
-        CirclePart
-        | LinePart
-        | ConstantPart
-        | PolynomialPart
-        | SplinePart
-        | BearingPart
-        | RotationPart
-        | SlerpPart
-        | TurnPart
-        | PoseReferencePart
-        | PositionPart
-        | OrientationPart
-        | HeadingPart
-        | DistancePart
-        | CenterOfMassPart
-        | CoordinatesPart,
-        Field(discriminator="kind"),
-    ],
-    kind_of(*REFERENCES),
-    BeforeValidator(_short),
-]
-for recursive in (BearingPart, PointingPart, DistancePart, PoseReferencePart):
-    recursive.model_rebuild()
+def _point(value: object) -> object:
+    """A frame's name stands for its origin."""
+    return {"kind": "position", "frame": value} if isinstance(value, str) else _short(value)
+
+
+#: The functions of tasks, by kind.
+FUNCTION_PARTS = {kind: part_of(kind, made, FunctionPart) for kind, made in TASKS.items()}
+#: The references, by kind; after those of time what a task can follow of the robot itself.
+REFERENCE_PARTS = {
+    kind: SPECIAL.get(kind) or part_of(kind, REFERENCES[kind], FunctionPart, **SPELLED.get(kind, {}))
+    for kind in dict.fromkeys([*REFERENCES, *SPECIAL])
+}
+REFERENCE_PARTS |= {kind: part for kind, part in FUNCTION_PARTS.items() if kind not in REFERENCE_PARTS}
+
+if TYPE_CHECKING:
+    Reference = FunctionPart
+else:
+    Reference = Annotated[one_of(REFERENCE_PARTS), BeforeValidator(_short)]
+    _named = {
+        "Reference": Reference,
+        "Point": Annotated[one_of(REFERENCE_PARTS), BeforeValidator(_point)],
+        "FixedOrientation": FixedOrientation,
+    }
+    for _part in {*FUNCTION_PARTS.values(), *REFERENCE_PARTS.values()}:
+        _part.model_rebuild(_types_namespace=_named)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any, get_args
+from functools import reduce
+from operator import or_
+from typing import Annotated, Any, ClassVar
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from nmm.errors import InputError, unknown
@@ -44,11 +46,16 @@ class Part(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
+    #: Keys that have another name now, by the one that older files use.
+    renamed: ClassVar[Mapping[str, str]] = {}
+
     @model_validator(mode="before")
     @classmethod
     def _known_keys(cls, data: Any) -> Any:
         if isinstance(data, Mapping):
             for key in data:
+                if key in cls.renamed:
+                    raise at_key(str(key), f"this key is called {cls.renamed[key]} now")
                 if key not in cls.model_fields:
                     raise at_key(str(key), unknown("key", key, cls.model_fields))
         return data
@@ -67,16 +74,16 @@ class Part(BaseModel):
             raise
 
 
-def kind_of(*parts: type[Part]) -> BeforeValidator:
-    """For a union of parts that their `kind` tells apart: complains about a mapping without one."""
+def one_of(parts: Mapping[str, type[Part]]) -> Any:
+    """The type of a value that is one of several parts, told by its `kind`; complains about one without."""
 
     def check(value: Any) -> Any:
         if isinstance(value, Mapping) and "kind" not in value:
-            kinds = [str(kind) for part in parts for kind in get_args(part.model_fields["kind"].annotation)]
-            raise at_key("kind", f"this key is missing; available: {', '.join(kinds)}")
+            raise at_key("kind", f"this key is missing; available: {', '.join(parts)}")
         return value
 
-    return BeforeValidator(check)
+    either: Any = reduce(or_, parts.values())
+    return Annotated[Annotated[either, Field(discriminator="kind")], BeforeValidator(check)]
 
 
 def first_error(error: ValidationError, data: Any) -> KeyedError:
@@ -124,6 +131,11 @@ def _unquoted(names: str) -> str:
     return names.replace("'", "")
 
 
+def _kind_of_short(data: Mapping[str, Any]) -> str | None:
+    """The kind of a mapping that is written without: {rpy: ...} and {quaternion: ...} are rotations."""
+    return "rotation" if {"rpy", "quaternion"} & set(data) else None
+
+
 def as_written(place: Place, data: Any) -> Place:
     """A place in the checked parts as the place in the data that they were made from.
 
@@ -135,7 +147,7 @@ def as_written(place: Place, data: Any) -> Place:
         if isinstance(data, Mapping):
             if step in data:
                 data = data[step]
-            elif isinstance(step, int) or step == data.get("kind"):
+            elif isinstance(step, int) or step == data.get("kind", _kind_of_short(data)):
                 continue
             else:  # a key that is missing, or left at its default
                 return (*written, *place[depth:])

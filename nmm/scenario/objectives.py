@@ -2,34 +2,32 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
-from nmm.scenario.functions import Combination, check_combination
-from nmm.scenario.keys import Part, at, kind_of
-from nmm.scenario.numbers import Number, NumberList, Positive
+from nmm.functions.objectives.base import Objective
+from nmm.functions.objectives.quadratic import Quadratic, Square
+from nmm.kinds import OBJECTIVES
+from nmm.robots.robot import Robot
+from nmm.scenario.function_part import check_coordinates, check_names
+from nmm.scenario.keys import Part, at, one_of
+from nmm.scenario.made_part import MadePart, part_of
+from nmm.scenario.numbers import Number, Positive
+from nmm.scenario.spelling import Combination
 
-if TYPE_CHECKING:
-    from nmm.functions.objectives import Objective
-    from nmm.robots.robot import Robot
 
-
-class ObjectivePart(Part):
+class ObjectivePart(MadePart):
     """An objective H(q), minimised."""
 
     weight: Positive = Field(1.0, description="factor on this objective in the sum, above 0")
     maximise: bool = Field(False, description="whether to maximise it: its negative is minimised")
 
-    @abstractmethod
-    def make(self, robot: Robot) -> Objective:
-        """The library's object, without weight and sign."""
-
     def build(self, robot: Robot) -> Objective:
         """The weighted objective; errors know their key."""
+        check_names(self, robot)
+        objective: Objective = self.make()
         with self.own_keys():
-            objective = self.make(robot)
             objective.rows(robot)
             objective.stages(robot)
         factor = -self.weight if self.maximise else self.weight
@@ -47,54 +45,32 @@ class TermPart(Part):
 class QuadraticPart(ObjectivePart):
     """½ Σ weight (combination - target)²; angles are read as they are, never wrapped."""
 
+    makes = Quadratic
     kind: Literal["quadratic"]
     terms: list[TermPart] = Field(description="the squares that are added up", min_length=1)
 
-    def make(self, robot: Robot) -> Objective:
-        from nmm.functions.objectives import Quadratic, Square
-
-        for i, term in enumerate(self.terms):
-            with at("terms", i, "of"):
-                check_combination(term.of, robot)
+    def make(self, unit: str = "m") -> Objective:
         return Quadratic(*(Square(term.of, term.target, term.weight) for term in self.terms))
 
-
-class JointRangePart(ObjectivePart):
-    """Distance of joints from the middle of their ranges, 1/(2N) Σ ((q - middle) / (upper - lower))²."""
-
-    kind: Literal["joint_range"]
-    joints: list[str] | None = Field(None, description="names; all the arm's when not given")
-    lower: NumberList | None = Field(None, description="lower limits, rad or m; the robot's when not given")
-    upper: NumberList | None = Field(None, description="upper limits")
-
-    def make(self, robot: Robot) -> Objective:
-        from nmm.functions.objectives import JointRange
-
-        with at("joints"):
-            for name in self.joints or ():
-                robot.coordinate(name)
-        return JointRange(self.joints, self.lower, self.upper)
+    def build(self, robot: Robot) -> Objective:
+        for i, term in enumerate(self.terms):
+            with at("terms", i, "of"):
+                check_coordinates([term.of], robot)
+        return super().build(robot)
 
 
-class ManipulabilityPart(ObjectivePart):
-    """Manipulability sqrt(det J Jᵀ) of a frame; maximised, unless maximise is false."""
+class MaximisedPart(ObjectivePart):
+    """An objective that is better when it is larger."""
 
-    kind: Literal["manipulability"]
-    frame: str = Field(description="a frame of the robot")
-    rows: Annotated[list[str], BeforeValidator(lambda v: list(v) if isinstance(v, str) else v)] = Field(
-        ["x", "y", "z"], description="rows of its Jacobian: xy, xyz, or a list of x, y, z, rx, ry, rz"
-    )
-    of: Literal["robot", "arm"] = Field(
-        "robot", description="robot, with the platform's inputs, or arm alone"
-    )
-    maximise: bool = Field(True, description="whether to maximise it")
+    maximise: bool = Field(True, description="whether to maximise it: its negative is minimised")
 
-    def make(self, robot: Robot) -> Objective:
-        from nmm.functions.objectives import Manipulability
 
-        with at("frame"):
-            robot.frame_id(self.frame)
-        return Manipulability(self.frame, self.rows, self.of)
+SPECIAL: dict[str, type[ObjectivePart]] = {"quadratic": QuadraticPart}
+BASES = {"manipulability": MaximisedPart}
+OBJECTIVE_PARTS: dict[str, type[ObjectivePart]] = {
+    kind: SPECIAL.get(kind) or part_of(kind, made, BASES.get(kind, ObjectivePart))
+    for kind, made in OBJECTIVES.items()
+}
 
 
 def _listed(value: object) -> object:
@@ -103,20 +79,14 @@ def _listed(value: object) -> object:
     return value if isinstance(value, list | tuple) else [value]
 
 
-OBJECTIVES: tuple[type[ObjectivePart], ...] = (QuadraticPart, JointRangePart, ManipulabilityPart)
-#: One objective, a list that is added up, or nothing.
-ObjectiveList = Annotated[
-    list[
-        Annotated[
-            Annotated[QuadraticPart | JointRangePart | ManipulabilityPart, Field(discriminator="kind")],
-            kind_of(*OBJECTIVES),
-        ]
-    ],
-    BeforeValidator(_listed),
-]
+if TYPE_CHECKING:
+    ObjectiveList = list[ObjectivePart]
+else:
+    #: One objective, a list that is added up, or nothing.
+    ObjectiveList = Annotated[list[one_of(OBJECTIVE_PARTS)], BeforeValidator(_listed)]
 
 
-def build_objective(parts: list[Any], robot: Robot) -> Objective | None:
+def build_objective(parts: list[ObjectivePart], robot: Robot) -> Objective | None:
     """The sum of the parts, if there are any."""
     total: Objective | None = None
     for i, part in enumerate(parts):

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple, get_args
+from typing import NamedTuple
 
 from pydantic_core import PydanticUndefined
 
-from nmm.scenario.functions import REFERENCES
+from nmm.kinds import RESOLVERS
+from nmm.scenario.functions import FUNCTION_PARTS, REFERENCE_PARTS
 from nmm.scenario.keys import Part
-from nmm.scenario.objectives import OBJECTIVES, TermPart
-from nmm.scenario.resolvers import PARTS
+from nmm.scenario.objectives import OBJECTIVE_PARTS, TermPart
+from nmm.scenario.resolvers import RESOLVER_PARTS
 from nmm.scenario.robot import ArmPart, MountedPart, RobotPart
 from nmm.scenario.schema import ScenarioPart
-from nmm.scenario.tasks import TASKS
+from nmm.scenario.tasks import TASK_PARTS
 
 
 class Section(NamedTuple):
@@ -30,23 +31,20 @@ def sections() -> Iterator[Section]:
     yield _section("robot", RobotPart)
     yield _section("robot, with arms mounted", MountedPart)
     yield _section("robot.arms", ArmPart)
-    for task in TASKS:
-        yield _section(f"task, kind: {_kind(task)}", task)
-    for reference in REFERENCES:
-        if not any(issubclass(task, reference) for task in TASKS):
-            yield _section(f"reference, kind: {_kind(reference)}", reference)
-    for objective in OBJECTIVES:
-        yield _section(f"objective, kind: {_kind(objective)}", objective)
+    for kind, task in TASK_PARTS.items():
+        yield _section(f"task, kind: {kind}", task)
+    for kind, reference in REFERENCE_PARTS.items():
+        if reference is not FUNCTION_PARTS.get(kind):
+            yield _section(f"reference, kind: {kind}", reference)
+    for kind, objective in OBJECTIVE_PARTS.items():
+        yield _section(f"objective, kind: {kind}", objective)
     yield _section("objective.terms", TermPart)
-    for kind, resolver in PARTS.items():
-        yield _section(f"resolver, kind: {kind}", resolver)
+    for kind, resolver in RESOLVER_PARTS.items():
+        called = RESOLVERS.words(kind)
+        yield _section(f"resolver, kind: {kind}", resolver, f"{called[0].upper()}{called[1:]}. ")
 
 
-def _kind(part: type[Part]) -> str:
-    return str(get_args(part.model_fields["kind"].annotation)[0])
-
-
-def _section(title: str, part: type[Part]) -> Section:
+def _section(title: str, part: type[Part], called: str = "") -> Section:
     keys = []
     for name, field in part.model_fields.items():
         if name == "kind":
@@ -54,8 +52,7 @@ def _section(title: str, part: type[Part]) -> Section:
         default = field.get_default(call_default_factory=True)
         text = "required" if default is PydanticUndefined else _text(default)
         keys.append((name, text, field.description or ""))
-    summary = " ".join((part.__doc__ or "").split())
-    return Section(title, summary, keys)
+    return Section(title, called + " ".join((part.__doc__ or "").split()), keys)
 
 
 def _text(value: object) -> str:

@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from nmm.errors import ScenarioError, unknown
+from nmm.kinds import RESOLVERS
 from nmm.progress import Progress
 from nmm.scenario.document import Document, read_file
 from nmm.scenario.keys import KeyedError, as_written, at, first_error
-from nmm.scenario.resolvers import PARTS
-from nmm.scenario.schema import ScenarioPart
 
 if TYPE_CHECKING:
     from nmm.control.controller import Controller
@@ -42,6 +41,8 @@ class Scenario:
         self.path = Path(document.name)
         own_name = re.sub(r"[^\w.-]", "_", self.path.name.split(".", 1)[0]) or "scenario"
         data = {"name": own_name, **document.data}
+        from nmm.scenario.schema import ScenarioPart
+
         try:
             self.parts = ScenarioPart.model_validate(data)
         except ValidationError as error:
@@ -155,8 +156,10 @@ class Scenario:
 def _with_settings(document: Document, settings: Mapping[str, object]) -> Document:
     for key, value in settings.items():
         document = document.with_setting(key, value)
-        if key == "resolver.kind" and isinstance(value, str) and value in PARTS:
-            resolver, known = document.data["resolver"], PARTS[value].model_fields
+        if key == "resolver.kind" and isinstance(value, str) and value in RESOLVERS:
+            from nmm.scenario.resolvers import RESOLVER_PARTS
+
+            resolver, known = document.data["resolver"], RESOLVER_PARTS[value].model_fields
             document.data["resolver"] = {name: item for name, item in resolver.items() if name in known}
     return document
 

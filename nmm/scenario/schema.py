@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
+from nmm.control.controller import Controller
 from nmm.errors import InputError
-from nmm.scenario.functions import ConstantPart
+from nmm.kinds import RESOLVERS
+from nmm.robots.robot import Robot
+from nmm.scenario.functions import REFERENCE_PARTS
 from nmm.scenario.keys import Part, at
 from nmm.scenario.numbers import Nested, Positive, numbers, numbers_by_name
 from nmm.scenario.objectives import ObjectiveList, QuadraticPart, build_objective
-from nmm.scenario.resolvers import ExtendedJacobianPart, ResolverKind
+from nmm.scenario.resolvers import AnyResolver, WithAddedTask
 from nmm.scenario.robot import RobotChoice
-from nmm.scenario.tasks import CoordinatesTask, TaskList, build_tasks, listed
-
-if TYPE_CHECKING:
-    from nmm.control.controller import Controller
-    from nmm.robots.robot import Robot
+from nmm.scenario.tasks import TASK_PARTS, TaskList, TaskPart, build_tasks, listed
+from nmm.words import listed as in_words
 
 
 def _coordinates(value: object) -> dict[str, float] | list[Nested]:
@@ -52,14 +52,12 @@ class ScenarioPart(Part):
         default_factory=list,
         description="what to minimise with the redundancy: one, a list that is added up, or none",
     )
-    resolver: ResolverKind = Field(
-        description="how the redundancy is resolved: kind rg, pg or ej, with its keys"
+    resolver: AnyResolver = Field(
+        description=f"how the redundancy is resolved: kind {in_words(list(RESOLVERS), 'or')}, with its keys"
     )
 
     def build(self, robot: Robot) -> Controller:
         """The controller, after a check of q0; errors know their key."""
-        from nmm.control.controller import Controller
-
         with at("q0"):
             for name in self.q0 if isinstance(self.q0, dict) else ():
                 with at(name):
@@ -74,50 +72,53 @@ class ScenarioPart(Part):
         with at("objective"):
             objective = build_objective(self.objective, robot)
         with at("resolver"):
-            resolver = self.resolver.build()
-            constraint = None
-            if isinstance(self.resolver, ExtendedJacobianPart):
-                with at("constraint"):
-                    constraint = build_tasks(self._constraint(), robot)
-                    self._check_constraint(sum(len(item.rows(robot)) for item in constraint), robot.n_u - s)
+            resolver, added = self.resolver.make(), None
+            if isinstance(self.resolver, WithAddedTask):
+                with at("added_task"):
+                    added = build_tasks(self._added_task(self.resolver), robot)
+                    rows = sum(len(item.rows(robot)) for item in added)
+                    self._check_added(self.resolver, rows, robot.n_u - s)
             with self.resolver.own_keys():
-                return Controller(robot, task, resolver, objective, added_task=constraint)
+                return Controller(robot, task, resolver, objective, added_task=added)
 
-    def _constraint(self) -> list[Any]:
-        """The constraint of the extended Jacobian: as given, or the objective's terms at their targets."""
-        resolver = self.resolver
-        if not isinstance(resolver, ExtendedJacobianPart):
-            return []
-        if resolver.constraint is not None:
-            return resolver.constraint
+    def _added_task(self, resolver: WithAddedTask) -> list[TaskPart]:
+        """The task that takes up the redundancy: as given, or the objective's terms at their targets."""
+        if resolver.added_task is not None:
+            return resolver.added_task
         squares = [part for part in self.objective if isinstance(part, QuadraticPart) and not part.maximise]
         if len(squares) < len(self.objective):
             return []
         return [
-            CoordinatesTask(
-                kind="coordinates",
-                of=[term.of],
-                reference=ConstantPart(kind="constant", value=term.target, unit=None),
-                gain=resolver.gain,
+            TASK_PARTS["coordinates"].model_validate(
+                {
+                    "kind": "coordinates",
+                    "of": [term.of],
+                    "reference": REFERENCE_PARTS["constant"].model_validate(
+                        {"kind": "constant", "value": term.target}
+                    ),
+                    "gain": resolver.gain,
+                }
             )
             for part in squares
             for term in part.terms
         ]
 
-    def _check_constraint(self, rows: int, redundancy: int) -> None:
+    @staticmethod
+    def _check_added(resolver: WithAddedTask, rows: int, redundancy: int) -> None:
         if rows == redundancy:
             return
-        resolver = self.resolver
-        given = isinstance(resolver, ExtendedJacobianPart) and resolver.constraint is not None
-        came = f"got {rows}" if given else f"none is given and the objective has {rows} quadratic terms"
+        came = f"none is given and the objective has {rows} quadratic terms"
+        if resolver.added_task is not None:
+            came = f"got {rows}"
         raise InputError(f"expected {redundancy} rows (the inputs less the rows of the task), {came}")
 
     def explicit(self) -> dict[str, Any]:
         """Every key as plain data, with what the library chooses where the file leaves it open."""
         data = self.model_dump()
         data["resolver"] = self.resolver.explicit()
-        if isinstance(self.resolver, ExtendedJacobianPart):
-            data["resolver"]["constraint"] = [part.model_dump() for part in self._constraint()] or None
+        if isinstance(self.resolver, WithAddedTask):
+            added = self._added_task(self.resolver)
+            data["resolver"]["added_task"] = [part.model_dump() for part in added] or None
         for key in ("task", "objective"):
             if len(data[key]) == 1:
                 data[key] = data[key][0]

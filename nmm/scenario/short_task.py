@@ -3,50 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
 
 from nmm.errors import InputError, unknown
+from nmm.functions.function import Function
+from nmm.functions.program import evaluate
+from nmm.functions.tasks.task import Task
+from nmm.kinds import TASKS
+from nmm.robots.configuration import Configuration
+from nmm.robots.loading.tips import tips
+from nmm.robots.robot import Robot
+from nmm.scenario.constructors import STARRED, parameters
 from nmm.scenario.document import dotted, read_text
-from nmm.scenario.function_part import FunctionPart
-from nmm.scenario.functions import DistancePart, PointingPart
+from nmm.scenario.functions import FUNCTION_PARTS
 from nmm.scenario.keys import KeyedError, as_written, first_error
-from nmm.scenario.robot_functions import (
-    CenterOfMassPart,
-    CoordinatesPart,
-    HeadingPart,
-    OrientationPart,
-    PosePart,
-    PositionPart,
-    PosturePart,
-)
-from nmm.scenario.tasks import TASKS
-
-if TYPE_CHECKING:
-    from nmm.functions.function import Function
-    from nmm.functions.tasks import Task
-    from nmm.robots.robot import Robot
+from nmm.scenario.spelling import POINT, SPELLINGS
+from nmm.scenario.tasks import TASK_PARTS
 
 #: What a text may be.
 EXPECTED = "KIND:FRAME:AXES, as in position:ee:xy, or a mapping as in a scenario"
-
-_PARTS: tuple[type[FunctionPart], ...] = (
-    PositionPart,
-    OrientationPart,
-    PosePart,
-    PointingPart,
-    HeadingPart,
-    DistancePart,
-    CenterOfMassPart,
-    CoordinatesPart,
-    PosturePart,
-)
-
-
-def _by_kind(parts: tuple[type[Any], ...]) -> dict[str, type[Any]]:
-    return {str(kind): part for part in parts for kind in get_args(part.model_fields["kind"].annotation)}
 
 
 def short_task(text: str, robot: Robot) -> Task | Function:
@@ -69,16 +47,15 @@ def short_task(text: str, robot: Robot) -> Task | Function:
         data = _from_words(stripped, robot)
     if not isinstance(data, Mapping):
         raise InputError(f"task {text}: expected {EXPECTED}")
-    with_reference = "reference" in data
-    parts = _by_kind(TASKS if with_reference else _PARTS)
     if data.get("kind") is None:
-        raise InputError(f"task {text}: kind: this key is missing; expected one of {', '.join(parts)}")
+        raise InputError(f"task {text}: kind: this key is missing; expected one of {', '.join(TASKS)}")
     kind = str(data["kind"])
-    if kind not in parts:
-        raise InputError(unknown("kind", kind, parts, f"task {text}"))
+    if kind not in TASKS:
+        raise InputError(unknown("kind", kind, TASKS, f"task {text}"))
     try:
-        part = parts[kind].model_validate(dict(data))
-        made: Task | Function = part.build_task(robot) if with_reference else part.build(robot)
+        if "reference" in data:
+            return TASK_PARTS[kind].model_validate(dict(data)).build_task(robot)
+        return FUNCTION_PARTS[kind].model_validate(dict(data)).build(robot)
     except ValidationError as error:
         wrong = first_error(error, data)
         raise InputError(f"task {text}: {dotted(as_written(wrong.place, data))}: {wrong.text}") from None
@@ -86,42 +63,44 @@ def short_task(text: str, robot: Robot) -> Task | Function:
         raise InputError(f"task {text}: {dotted(error.place)}: {error.text}") from None
     except InputError as error:
         raise InputError(f"task {text}: {error}") from None
-    return made
 
 
 def _from_words(text: str, robot: Robot) -> dict[str, Any]:
+    """The mapping that words stand for: what a kind takes says which words it has."""
     kind, *words = (word.strip() for word in text.split(":"))
-    if kind in ("coordinates", "posture"):
+    if kind not in TASKS:
+        raise InputError(unknown("kind", kind, TASKS, f"task {text}"))
+    part = FUNCTION_PARTS[kind]
+    keys = part.model_fields
+    if STARRED in keys:
         names = [name.strip() for name in words[0].split(",")] if words and words[0] else None
-        if len(words) > 1 or (kind == "coordinates" and names is None) or (names and not all(names)):
+        if len(words) > 1 or (names is None and keys[STARRED].is_required()) or not all(names or ["-"]):
             raise InputError(f"task {text}: expected {kind}:NAME,NAME,...")
-        return {"kind": kind} | ({} if names is None else {"of": names})
-    if kind in ("pointing", "distance"):
-        key = "at" if kind == "pointing" else "to"
-        raise InputError(
-            f"task {text}: expected a mapping, as in {{kind: {kind}, frame: ..., {key}: [1, 0, 1]}}"
-        )
-    if kind not in _by_kind(_PARTS):
-        raise InputError(unknown("kind", kind, _by_kind(_PARTS), f"task {text}"))
+        return {"kind": kind} | ({} if names is None else {STARRED: names})
+    others = [key for key, field in keys.items() if field.is_required() and key not in ("kind", "frame")]
+    if others:
+        framed = ["frame: ..."] if "frame" in keys else []
+        points = {p.key for p in parameters(part.makes) if SPELLINGS.get(p.annotation) is POINT}
+        shown = [f"{key}: {'[1, 0, 1]' if key in points else '...'}" for key in others]
+        needed = ", ".join([f"kind: {kind}", *framed, *shown])
+        raise InputError(f"task {text}: expected a mapping, as in {{{needed}}}")
     data: dict[str, Any] = {"kind": kind}
-    given = words.pop(0) if words and (kind != "center_of_mass" or not words[0]) else ""
-    if kind != "center_of_mass":
+    given = words.pop(0) if words and ("frame" in keys or not words[0]) else ""
+    if "frame" in keys:
         data["frame"] = given or _tip(robot, text)
         if data["frame"] not in robot.frames:
             raise InputError(unknown("frame", data["frame"], robot.frames, f"task {text}"))
     axes = words.pop(0) if words else ""
-    if words or (axes and kind not in ("position", "center_of_mass")):
+    if words or (axes and "axes" not in keys):
         raise InputError(
             f"task {text}: expected KIND:FRAME:AXES, as in position:ee:xy; axes are of positions"
         )
-    if kind in ("position", "center_of_mass"):
+    if "axes" in keys:
         data["axes"] = axes or _moving_axes(data, robot)
     return data
 
 
 def _tip(robot: Robot, text: str) -> str:
-    from nmm.robots.loading.tips import tips
-
     ends = tips(robot)
     if len(ends) != 1:
         available = ", ".join(ends or robot.frames)
@@ -133,10 +112,7 @@ def _tip(robot: Robot, text: str) -> str:
 
 def _moving_axes(data: dict[str, Any], robot: Robot) -> str:
     """Those of x, y, z along which some input moves the point at some of a few configurations."""
-    from nmm.functions.program import evaluate
-    from nmm.robots.configuration import Configuration
-
-    function = _by_kind(_PARTS)[data["kind"]].model_validate(data | {"axes": "xyz"}).build(robot)
+    function = FUNCTION_PARTS[data["kind"]].model_validate(data | {"axes": "xyz"}).build(robot)
     lower, upper = np.clip(robot.q_limits, -np.pi, np.pi).T
     rng = np.random.default_rng(0)
     moved = np.zeros(3)

@@ -2,29 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, cast
 
-from pydantic import Field
+from pydantic import Field, create_model
 
 from nmm.errors import InputError
+from nmm.functions.function import Row
+from nmm.functions.tasks.task import Task
+from nmm.robots.robot import Robot
 from nmm.scenario.function_part import FunctionPart
-from nmm.scenario.functions import DistancePart, PointingPart, Reference
-from nmm.scenario.keys import KeyedError, at, kind_of
+from nmm.scenario.functions import FUNCTION_PARTS, Reference
+from nmm.scenario.keys import KeyedError, at, one_of
 from nmm.scenario.numbers import Numbers, shown
-from nmm.scenario.robot_functions import (
-    CenterOfMassPart,
-    CoordinatesPart,
-    HeadingPart,
-    OrientationPart,
-    PosePart,
-    PositionPart,
-    PosturePart,
-)
-
-if TYPE_CHECKING:
-    from nmm.functions.function import Row
-    from nmm.functions.tasks import Task
-    from nmm.robots.robot import Robot
 
 
 class TaskPart(FunctionPart):
@@ -42,8 +31,6 @@ class TaskPart(FunctionPart):
 
     def build_task(self, robot: Robot) -> Task:
         """The task; errors know their key."""
-        from nmm.functions.tasks import Task
-
         function = self.build(robot)
         rows = function.rows(robot)
         units = {row.unit for row in rows}
@@ -69,45 +56,6 @@ def _check_rows(rows: tuple[Row, ...], targets: tuple[Row, ...]) -> None:
             raise InputError(f"expected {row.unit} as {row.name} of the task, got {target.unit}")
 
 
-class PositionTask(TaskPart, PositionPart):
-    """Position of a frame's origin along world axes, or along another frame's, m."""
-
-
-class OrientationTask(TaskPart, OrientationPart):
-    """Orientation of a frame as its rotation vector (axis times angle), three rows, rad. Its error is the
-    rotation vector of the turn that is left, in the frame's own axes."""
-
-
-class PoseTask(TaskPart, PosePart):
-    """Pose of a frame, six rows: position, m, over rotation vector, rad. Its error is the motion that is left
-    (the logarithm of SE(3), in the frame's own axes), so that the frame moves along a screw."""
-
-
-class PointingTask(TaskPart, PointingPart):
-    """How far an axis of a frame points past a point: two rows, rad, both 0 when it points at it. The turn
-    about the axis is free."""
-
-
-class HeadingTask(TaskPart, HeadingPart):
-    """Absolute angle of a direction fixed in a frame, about a world axis, rad; differences wrap."""
-
-
-class DistanceTask(TaskPart, DistancePart):
-    """Distance of a frame's origin from a point, m."""
-
-
-class CenterOfMassTask(TaskPart, CenterOfMassPart):
-    """Position of the whole robot's centre of mass along world axes, m."""
-
-
-class CoordinatesTask(TaskPart, CoordinatesPart):
-    """Linear combinations of coordinates, a row each (a joint coupling is one); angles are not wrapped."""
-
-
-class PostureTask(TaskPart, PosturePart):
-    """Coordinates as they are, a row each; angles are not wrapped."""
-
-
 def listed(value: object) -> object:
     """A mapping without its list."""
     if isinstance(value, list | tuple):
@@ -117,38 +65,24 @@ def listed(value: object) -> object:
     raise ValueError(f"expected a mapping with a kind, or a list of such, got {shown(value)}")
 
 
-TASKS: tuple[type[TaskPart], ...] = (
-    PositionTask,
-    OrientationTask,
-    PoseTask,
-    PointingTask,
-    HeadingTask,
-    DistanceTask,
-    CenterOfMassTask,
-    CoordinatesTask,
-    PostureTask,
-)
-#: One task, or several done together, one above the other.
-TaskList = list[
-    Annotated[
-        Annotated[
-            PositionTask
-            | OrientationTask
-            | PoseTask
-            | PointingTask
-            | HeadingTask
-            | DistanceTask
-            | CenterOfMassTask
-            | CoordinatesTask
-            | PostureTask,
-            Field(discriminator="kind"),
-        ],
-        kind_of(*TASKS),
-    ]
-]
+#: By kind: the function's part, with a reference and a gain.
+TASK_PARTS: dict[str, type[TaskPart]] = {
+    kind: cast(
+        type[TaskPart],
+        create_model(
+            f"{part.makes.__name__}Task", __base__=(TaskPart, part), __module__=__name__, __doc__=part.__doc__
+        ),
+    )
+    for kind, part in FUNCTION_PARTS.items()
+}
+if TYPE_CHECKING:
+    TaskList = list[TaskPart]
+else:
+    #: One task, or several done together, one above the other.
+    TaskList = list[one_of(TASK_PARTS)]
 
 
-def build_tasks(parts: list[Any], robot: Robot) -> list[Task]:
+def build_tasks(parts: list[TaskPart], robot: Robot) -> list[Task]:
     """The tasks; errors know their key."""
     tasks = []
     for i, part in enumerate(parts):

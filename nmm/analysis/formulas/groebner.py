@@ -28,7 +28,7 @@ class Work:
             raise Undecided
 
 
-class Led(NamedTuple):
+class Monic(NamedTuple):
     """A monic polynomial of SymPy's sparse ring with its leading monomial, which is dear to find."""
 
     head: Monomial
@@ -45,7 +45,7 @@ class Basis:
         this is a basis of more than the generators' ideal, which vanishes where that does
     """
 
-    def __init__(self, members: Sequence[Led] = (), nonzero: Sequence[int] = ()) -> None:
+    def __init__(self, members: Sequence[Monic] = (), nonzero: Sequence[int] = ()) -> None:
         self.members = list(members)
         self.nonzero = tuple(nonzero)
 
@@ -77,7 +77,7 @@ class Basis:
             rest = self._stripped(_remainder(candidate, found, work))
             if not rest:
                 continue
-            new = Led(rest.LM, rest.monic())
+            new = Monic(rest.LM, rest.monic())
             if not any(new.head):
                 return Basis([new], self.nonzero)
             for k, old in enumerate(found):
@@ -97,7 +97,7 @@ class Basis:
         return polynomial.ring.from_dict({_less(m, common): c for m, c in polynomial.items()})
 
 
-def _remainder(polynomial: Any, divisors: Sequence[Led], work: Work) -> Any:
+def _remainder(polynomial: Any, divisors: Sequence[Monic], work: Work) -> Any:
     """What is left of a polynomial when its terms are reduced by the divisors' leading ones."""
     rest, left = dict(polynomial), {}
     # Leading monomials first.
@@ -137,7 +137,7 @@ def _less(one: Monomial, other: Sequence[int]) -> Monomial:
     return tuple(map(sub, one, other))
 
 
-def _useless(found: list[Led], i: int, j: int, lcm: Monomial, pending: set[tuple[int, int]]) -> bool:
+def _useless(found: list[Monic], i: int, j: int, lcm: Monomial, pending: set[tuple[int, int]]) -> bool:
     """Buchberger's two criteria: coprime leading monomials; a third polynomial whose pairs are done."""
     if not any(map(min, found[i].head, found[j].head)):
         return True
@@ -150,18 +150,18 @@ def _useless(found: list[Led], i: int, j: int, lcm: Monomial, pending: set[tuple
     )
 
 
-def _s_polynomial(one: Led, two: Led, lcm: Monomial) -> Any:
+def _s_polynomial(one: Monic, two: Monic, lcm: Monomial) -> Any:
     first = one.polynomial.mul_monom(_less(lcm, one.head))
     return first - two.polynomial.mul_monom(_less(lcm, two.head))
 
 
-def _reduced(found: list[Led], work: Work) -> list[Led]:
+def _reduced(found: list[Monic], work: Work) -> list[Monic]:
     """Without those whose leading monomial another one's divides; the rest reduced by each other."""
-    kept: list[Led] = []
+    kept: list[Monic] = []
     for one in sorted(found, key=lambda led: (sum(led.head), led.head)):
         if not any(_divides(other.head, one.head) for other in kept):
             kept.append(one)
     return [
-        Led(one.head, _remainder(one.polynomial, [other for other in kept if other is not one], work))
+        Monic(one.head, _remainder(one.polynomial, [other for other in kept if other is not one], work))
         for one in kept
     ]

@@ -47,8 +47,8 @@ def curves_and_points(points: Array) -> tuple[list[Array], Array]:
     alone = points[free]
     if curves and len(alone):
         # What lies beside a curve is of the curve.
-        beside, _ = cKDTree(np.vstack(curves)).query(alone)
-        alone = alone[beside > LINK]
+        distance, _ = cKDTree(np.vstack(curves)).query(alone)
+        alone = alone[distance > LINK]
     return curves, _apart(alone)
 
 

@@ -56,10 +56,10 @@ class About:
             # In sizes J is free of units.
             units[name] = "" if evaluator.scaled else unit_of(measure, [row.unit for row in rows], own)
         length = evaluator.length
-        told = [f"L = {length:g} m counts as 1 rad"] if length is not None else []
-        told += [f"size of {name} {value:g}" for name, value in evaluator.sizes.items()]
-        if not told and "mixed units" in units.values():
-            told = ["1 m counts as 1 rad"]
+        notes = [f"L = {length:g} m counts as 1 rad"] if length is not None else []
+        notes += [f"size of {name} {value:g}" for name, value in evaluator.sizes.items()]
+        if not notes and "mixed units" in units.values():
+            notes = ["1 m counts as 1 rad"]
         weights = zip(robot.u_names, evaluator.weights, strict=True)
         return cls(
             robot=robot.name,
@@ -69,7 +69,7 @@ class About:
             alpha=evaluator.alpha,
             weights={name: float(weight) for name, weight in weights if weight != 1.0},
             units=units,
-            sizes=", ".join(told),
+            sizes=", ".join(notes),
             q_names=robot.q_names,
             q_units=robot.q_units,
         )

@@ -162,11 +162,11 @@ class Search:
             own[blocks] = layer.values[cells]
             row, column = blocks // columns + down, blocks % columns + right
             inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
-            beside = (row * columns + column)[inside]
+            neighbours = (row * columns + column)[inside]
             value = layer.values[cells[inside]]
             # Of the worst value, which is kept with its sign changed, better is nearer to zero.
-            better = value > own[beside] + margin * np.abs(value)
-            yield cells[inside][better], beside[better]
+            better = value > own[neighbours] + margin * np.abs(value)
+            yield cells[inside][better], neighbours[better]
 
     def fill(self, progress: Progress | None) -> None:
         """Reach the cells beside those that are reached, as long as some are found."""
@@ -197,7 +197,7 @@ class Search:
             for sweep in range(SWEEPS):
                 before = layer.values.copy()
                 for side, seen in zip(BESIDE, tried, strict=True):
-                    seeds, cells = self._foretold(layer, side, margin)
+                    seeds, cells = self._extrapolated(layer, side, margin)
                     # Not the same one twice.
                     fresh = seen[cells] != layer.values[seeds]
                     seeds, cells = seeds[fresh], cells[fresh]
@@ -208,7 +208,7 @@ class Search:
                 if np.array_equal(before, layer.values):
                     break
 
-    def _foretold(self, layer: Layer, side: tuple[int, int], margin: float) -> tuple[Integers, Integers]:
+    def _extrapolated(self, layer: Layer, side: tuple[int, int], margin: float) -> tuple[Integers, Integers]:
         """(seeds, cells): cells that have less than the two cells before them, on one side, foretell."""
         seeds, cells = self._beside(layer.reached, side)
         step = side[0] * self.grid.columns + side[1]

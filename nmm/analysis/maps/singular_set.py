@@ -60,8 +60,8 @@ class SingularSet:
         if self.everywhere:
             return "everywhere"
         n = len(self.points)
-        told = ["lines"] * bool(self.lines) + [f"{n} point{'s' * (n > 1)}"] * bool(n)
-        return ", ".join(told) or "none found"
+        counts = ["lines"] * bool(self.lines) + [f"{n} point{'s' * (n > 1)}"] * bool(n)
+        return ", ".join(counts) or "none found"
 
 
 def singular_set(

@@ -164,14 +164,14 @@ def _task_frame(evaluator: Evaluator) -> str:
 
 
 def _moving(evaluator: Evaluator, frame: str, held: Array) -> Integers:
-    """The arm's joints that move the frame's origin or are felt by the task."""
+    """The arm's joints that move the frame's origin or the task."""
     robot = evaluator.robot
     arm = robot.arm_coordinates
     q = np.tile(held, (8, 1))
     q[:, arm] += np.random.default_rng(0).uniform(-1.0, 1.0, (8, len(arm)))
     q = robot.following.placed(q)
-    felt = np.abs(np.nan_to_num(evaluator.jacobians.batch(q, evaluator.t)))[:, :, robot.platform.p :]
-    moved = np.max(felt, axis=(0, 1)) > 1e-9
+    effect = np.abs(np.nan_to_num(evaluator.jacobians.batch(q, evaluator.t)))[:, :, robot.platform.p :]
+    moved = np.max(effect, axis=(0, 1)) > 1e-9
     moved |= _moves(robot, frame, q)
     if not moved.any():
         raise InputError(f"workspace map: the arm of {robot.name} moves {frame} in no way")

@@ -23,7 +23,7 @@ MOST_ROUNDS = 12
 
 
 def common_period(controllers: Iterable[Controller], q: Array) -> float:
-    """The time in which all references of tasks and constraints have come round, s.
+    """The time in which all references of tasks, the added one too, have come round, s.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ from nmm.analysis.singular.parts import null_space, rank_of
 from nmm.analysis.singular.singularity import TOLERANCE
 from nmm.arrays import Array, positive
 from nmm.control.controller import Controller
-from nmm.control.idle_inputs import unfelt_inputs
+from nmm.control.idle_inputs import inputs_without_effect
 from nmm.errors import SingularError
 from nmm.functions.function import Function
 from nmm.functions.program import Program
@@ -46,7 +46,7 @@ class RedundancyReport:
     null (m - rank_J, m) : orthonormal null vectors of J
     readable (m - rank_J, m) : a basis of the same space with few non-zero components, the largest of each 1
     texts : each of `readable` in words
-    unfelt : inputs that the task feels nowhere; each is a null vector of its own
+    without_effect : inputs that move the task nowhere; each is a null vector of its own
     withheld (k, n) : self-motions q_dot with F q_dot = 0 that no input gives, which complete S `readable` to
         null F
     withheld_texts : each in words, along the platform's own axes
@@ -66,7 +66,7 @@ class RedundancyReport:
     null: Array
     readable: Array
     texts: tuple[str, ...]
-    unfelt: tuple[str, ...]
+    without_effect: tuple[str, ...]
     withheld: Array
     withheld_texts: tuple[str, ...]
     by_brackets: int | None
@@ -139,8 +139,8 @@ class RedundancyReport:
             moved = [name for name, rate in zip(self.robot.u_names, vector, strict=True) if rate]
             of_it = ""
             if len(moved) == 1:
-                of_it = f" (the task {'never feels' if moved[0] in self.unfelt else 'does not feel'} it"
-                of_it += ")" if moved[0] in self.unfelt else " here)"
+                where = "" if moved[0] in self.without_effect else " here"
+                of_it = f" (without effect on the task{where})"
             lines.append(f"  {k}  {text}{of_it}")
         return [*lines, "and in their opposites and combinations" if several else "and in its opposite"]
 
@@ -225,7 +225,7 @@ def redundancy(
         null=null_space(J, rank_J),
         readable=readable,
         texts=tuple(motion_text(one, robot.u_names, robot.u_units, words, p) for one in readable),
-        unfelt=unfelt_inputs(Controller(robot, jacobians.task, ProjectedGradient()), q),
+        without_effect=inputs_without_effect(Controller(robot, jacobians.task, ProjectedGradient()), q),
         withheld=withheld,
         withheld_texts=texts,
         by_brackets=_by_brackets(jacobians, t, q, rank_J) if len(withheld) else 0,

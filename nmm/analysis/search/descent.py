@@ -67,8 +67,8 @@ def descend(
             break
         trials = _trials(measure, space, z[live], damping[live], slow[live])
         count = trials.shape[1]
-        tried, beside = measure.sigma(space.q(trials.reshape(-1, trials.shape[2])))
-        tried, beside = tried.reshape(-1, count), beside.reshape(-1, count)
+        tried, ratios = measure.sigma(space.q(trials.reshape(-1, trials.shape[2])))
+        tried, ratios = tried.reshape(-1, count), ratios.reshape(-1, count)
         best = np.argmin(tried, axis=1)
         row = np.arange(len(live))
         value = tried[row, best]
@@ -79,7 +79,7 @@ def descend(
         damping[live] *= np.where(~better, 10.0, np.where(best == 0, 0.2, 1.0))
         chosen = live[better]
         z[chosen] = trials[row, best][better]
-        sigma[chosen], ratio[chosen] = value[better], beside[row, best][better]
+        sigma[chosen], ratio[chosen] = value[better], ratios[row, best][better]
         if progress is not None:
             progress((iteration + 1) / iterations)
     return z, ratio

@@ -144,7 +144,7 @@ def walk(
     another piece and is left out.
     """
     normals = normal_spaces(measure, space, z[np.newaxis], measure.full_rank - rank)[0]
-    told = len(normals) == len(z) - len(along)  # else slopes do not tell the tangents; only z has them
+    complete = len(normals) == len(z) - len(along)  # else slopes do not tell the tangents; only z has them
     found = [z[np.newaxis]]
     walkers, directions = np.tile(z, (WALKERS, 1)), [along] * WALKERS
     for _ in range(ROUNDS):
@@ -158,7 +158,7 @@ def walk(
         stays[stays] = measure.ranks(space.q(landed[stays]), tolerance) == rank
         walkers = landed[stays]
         directions = [own for own, ok in zip(directions, stays, strict=True) if ok]
-        if told and len(walkers):
+        if complete and len(walkers):
             spaces = normal_spaces(measure, space, walkers, measure.full_rank - rank)
             same = [_same_piece(*pair, len(normals)) for pair in zip(spaces, directions, strict=True)]
             walkers = walkers[same]

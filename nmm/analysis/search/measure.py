@@ -73,7 +73,7 @@ class Measure:
     def sigma(self, q: Array) -> tuple[Array, Array]:
         """The k-th singular value (N,), and that beside the largest of the whole J; infinite without a J."""
         values, largest = self.values(q)
-        return values[:, -1], beside(values[:, -1], largest)
+        return values[:, -1], ratio(values[:, -1], largest)
 
     def values(self, q: Array) -> tuple[Array, Array]:
         """The part's k singular values (N, k), falling, and what they stand beside (N,).
@@ -127,6 +127,6 @@ class Measure:
         return F.reshape(count, -1), np.swapaxes(C.reshape(count, a, -1), 1, 2), values
 
 
-def beside(small: Array, largest: Array) -> Array:
+def ratio(small: Array, largest: Array) -> Array:
     """small / largest, 0 for 0 / 0, infinite where `small` is."""
     return np.asarray(np.where(largest > 0.0, small / np.where(largest > 0.0, largest, 1.0), 0.0))

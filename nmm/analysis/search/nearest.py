@@ -167,7 +167,7 @@ def nearest_singularity(
         return None
     best = _nearest(measure, space, found, goal, tolerance, progress)
     where = space.q(best[np.newaxis])
-    sigma, beside = measure.sigma(where)
+    sigma, ratio = measure.sigma(where)
     rank = int(measure.ranks(where, tolerance)[0])
     return SingularPoint(
         q=where[0],
@@ -181,7 +181,7 @@ def nearest_singularity(
         full_rank=measure.full_rank,
         lost=measure.lost_text(where[0], rank),
         sigma_min=float(sigma[0]),
-        ratio=float(beside[0]),
+        ratio=float(ratio[0]),
         starts=starts,
         converged=len(found),
     )

@@ -22,8 +22,8 @@ def holds(
 ) -> bool:  # fmt: skip
     """Whether J's rank is as low at random members, far away: all members, where nothing else ties them."""
     names = space.robot.q_names
-    told = {name for one in family.constraints for name in one.coefficients} | set(family.free)
-    silent = {names[j] for j in space.moving} - told
+    named = {name for one in family.constraints for name in one.coefficients} | set(family.free)
+    silent = {names[j] for j in space.moving} - named
     if family.equations < 0 or (silent and not family.equations) or (family.equations and not family.related):
         return False
     drawn = space.draw(rng, MEMBERS)

@@ -66,13 +66,13 @@ def family_at(
         local = localised(measure, space, np.concatenate([z[np.newaxis], tries]), tolerance, rng)
         signatures = [local.signature(i) for i in range(len(local.z))]
         usual = Counter(signatures).most_common(1)[0][0]
-        family = _told(measure, space, local, signatures.index(usual), tolerance, rng)
+        family = _family_of(measure, space, local, signatures.index(usual), tolerance, rng)
         if family is not None:
             return family
     return None
 
 
-def _told(
+def _family_of(
     measure: Measure, space: Space, local: Local, i: int, tolerance: float, rng: np.random.Generator
 ) -> SingularFamily | None:
     """The family of point i, by a walk from it; None where large random motions contradict it."""
@@ -209,9 +209,9 @@ def _with_examples(
 
     None lies where another family is met: what is lost there, and what brings it back, would be that one's.
     """
-    told = space.z(family.examples[:1])
-    usual = localised(measure, space, told, tolerance, rng).signature(0)
-    z = np.concatenate([told, *(local.z[j : j + 1] for j in members if local.signature(j) == usual)])
+    example = space.z(family.examples[:1])
+    usual = localised(measure, space, example, tolerance, rng).signature(0)
+    z = np.concatenate([example, *(local.z[j : j + 1] for j in members if local.signature(j) == usual)])
     q = space.fold(space.q(z[:EXAMPLES]))
     plain = q[:1].copy()
     for name in family.free:

@@ -15,20 +15,20 @@ from nmm.arrays import Array, Integers
 
 @dataclass(frozen=True, eq=False)
 class ExtendedSingularity(Ranked):
-    """The extended Jacobian J_e = [J; Jc] (m, m) beside J.
+    """The extended Jacobian J_e = [J; J_y] (m, m) beside J.
 
     Attributes
     ----------
-    rows : names of J's rows and of the constraint's
+    rows : names of J's rows and of the added task's
     determinant : of J_e, as it is
     singular_values (m,) : of J_e with the sizes counted in
     rank : of J_e
-    angle_measure : |det J_e| / sqrt(det J Jᵀ det Jc Jcᵀ), from 0 to 1 (Fischer's inequality): 1 when the
-        constraint moves only what the task leaves free, 0 when it asks for what the task already fixes; not a
-        number where J or Jc has itself lost rank
-    lost (m - rank, m) : combinations of the rows that no input moves: what task and constraint both speak of
+    angle_measure : |det J_e| / sqrt(det J Jᵀ det J_y J_yᵀ), from 0 to 1 (Fischer's inequality): 1 when the
+        added task moves only what the task leaves free, 0 when it asks for what the task already fixes; not a
+        number where J or J_y has itself lost rank
+    lost (m - rank, m) : combinations of the rows that no input moves: what both tasks speak of
     kinematic : J itself lost rank
-    constraint_singular : Jc itself lost rank
+    added_singular : the added task's J_y itself lost rank
     """
 
     rows: tuple[str, ...]
@@ -38,7 +38,7 @@ class ExtendedSingularity(Ranked):
     angle_measure: float
     lost: Array
     kinematic: bool
-    constraint_singular: bool
+    added_singular: bool
 
     @property
     def algorithmic(self) -> bool:
@@ -94,17 +94,17 @@ def volume(J: Array) -> Array:
 
 def extended_singularity(
     J: Array,
-    Jc: Array,
+    added_J: Array,
     sizes: tuple[Array, Array, Array],
     rows: tuple[str, ...],
     tolerance: float,
     natural: float,
 ) -> ExtendedSingularity:
-    """From J (s, m) and Jc (m - s, m) as they are; sizes of rows, constraint rows and inputs."""
-    row_sizes, constraint_sizes, input_sizes = sizes
+    """From J (s, m) and added_J (m - s, m) as they are; sizes of rows, added rows and inputs."""
+    row_sizes, added_sizes, input_sizes = sizes
     s = len(J)
-    extended = np.vstack([J, Jc])
-    scaled = extended * input_sizes / np.concatenate([row_sizes, constraint_sizes])[:, np.newaxis]
+    extended = np.vstack([J, added_J])
+    scaled = extended * input_sizes / np.concatenate([row_sizes, added_sizes])[:, np.newaxis]
     values = singular_values(scaled)
     U = np.linalg.svd(scaled)[0]
     rank = int(ranks(values, values[0], tolerance, natural))
@@ -113,9 +113,9 @@ def extended_singularity(
         own = singular_values(block)
         return len(block) > 0 and int(ranks(own, own[0], tolerance, natural)) < len(block)
 
-    kinematic, constraint_singular = lost_rank(scaled[:s]), lost_rank(scaled[s:])
+    kinematic, added_singular = lost_rank(scaled[:s]), lost_rank(scaled[s:])
     measure = np.nan
-    if not (kinematic or constraint_singular):
+    if not (kinematic or added_singular):
         measure = float(np.prod(values) / (volume(scaled[:s]) * volume(scaled[s:])))
     return ExtendedSingularity(
         rows=rows,
@@ -125,7 +125,7 @@ def extended_singularity(
         angle_measure=measure,
         lost=readable_basis(U[:, rank:].T),
         kinematic=kinematic,
-        constraint_singular=constraint_singular,
+        added_singular=added_singular,
     )
 
 

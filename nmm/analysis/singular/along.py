@@ -45,10 +45,10 @@ class SingularityHistory:
     sigma_min : (N,) of each part: "platform", "arm", the arms by name, "robot"
     minors : of J as it is; an item is (N,)
     ratios (N, count) : |minor| / sqrt(det J Jᵀ), from 0 to 1 (Cauchy-Binet): RG's measure of that partition
-    extended_sigma_min (N,) : of EJ's J_e; None without a constraint
+    extended_sigma_min (N,) : of EJ's J_e; None without an added task
     crossings : where a minor changes its sign, in the order of time
     dips : local minima of σ_min below `threshold`
-    extended_dips : local minima of J_e's σ_min below it; no entries without a constraint
+    extended_dips : local minima of J_e's σ_min below it; no entries without an added task
     """
 
     t: Array
@@ -78,7 +78,7 @@ def analyse_along(
     sizes: Mapping[str, float] | None = None,
     minors: Choice = True,
     most_minors: int = MOST_MINORS,
-    constraint: Tasks | None = None,
+    added_task: Tasks | None = None,
     threshold: float | None = None,
     tolerance: float = TOLERANCE,
 ) -> SingularityHistory:
@@ -94,7 +94,7 @@ def analyse_along(
     q : (N, n), m and rad, with times
     threshold : σ_min below which a local minimum is reported; 0.05 of the largest singular value on the
         motion when not given
-    length, sizes, minors, most_minors, constraint, tolerance : as in `analyse`
+    length, sizes, minors, most_minors, added_task, tolerance : as in `analyse`
 
     Raises
     ------
@@ -110,7 +110,7 @@ def analyse_along(
         raise InputError("analysis: expected a trajectory, or times and configurations; got no q")
     else:
         times, points = motion, q
-    jacobians = Jacobians(subject, constraint)
+    jacobians = Jacobians(subject, added_task)
     t, q = jacobians.samples(times, points)
     tolerance = positive(tolerance, "tolerance")
     robot, s = jacobians.robot, len(jacobians.rows)
@@ -120,8 +120,8 @@ def analyse_along(
             f"minors: {len(columns)} at {len(t)} samples are more than {MOST_NUMBERS} numbers; "
             "list those wanted, or ask for none (minors=False)"
         )
-    row_sizes, constraint_sizes, input_sizes = jacobians.sizes(length, sizes)
-    J, Jc = jacobians.history(t, q)
+    row_sizes, added_sizes, input_sizes = jacobians.sizes(length, sizes)
+    J, added_J = jacobians.history(t, q)
     scale = input_sizes / row_sizes[:, np.newaxis]
     values = singular_values(J * scale)
     rank = ranks(values, values[:, 0], tolerance, jacobians.natural(row_sizes))
@@ -133,14 +133,18 @@ def analyse_along(
     def sigma_at(time: float) -> float:
         return float(singular_values(jacobians.J(time, interpolated(time, t, q)) * scale)[-1])
 
-    extended_scale = input_sizes / np.concatenate([row_sizes, constraint_sizes])[:, np.newaxis]
+    extended_scale = input_sizes / np.concatenate([row_sizes, added_sizes])[:, np.newaxis]
 
     def extended_at(time: float) -> float:
         here = interpolated(time, t, q)
-        rows = np.vstack([jacobians.J(time, here), jacobians.Jc(time, here)])
+        rows = np.vstack([jacobians.J(time, here), jacobians.added_J(time, here)])
         return float(singular_values(rows * extended_scale)[-1])
 
-    extended = singular_values(np.concatenate([J, Jc], axis=1) * extended_scale)[:, -1] if Jc.size else None
+    extended = (
+        singular_values(np.concatenate([J, added_J], axis=1) * extended_scale)[:, -1]
+        if added_J.size
+        else None
+    )
     significant = np.abs(found) > ROUNDING * hadamard_bounds(J, columns)
     names = Minors(columns, found, robot.u_names).names
     return SingularityHistory(

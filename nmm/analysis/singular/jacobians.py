@@ -1,4 +1,4 @@
-"""What is analysed: the task's J_bar and a constraint's, evaluated anywhere, with names, units and sizes."""
+"""What is analysed: the task's J_bar and an added task's, evaluated anywhere, with names, units and sizes."""
 
 from __future__ import annotations
 
@@ -32,41 +32,41 @@ STEP = float(np.cbrt(np.finfo(float).eps))
 
 
 class Jacobians:
-    """J (s, m) of the task and Jc (k, m) of the constraint at any (t, q).
+    """J (s, m) of the task and added_J (k, m) of the added task at any (t, q).
 
     The subject's own controller is never run, so that its partition stays as it is.
 
     Parameters
     ----------
     subject : a controller, or (robot, task)
-    constraint : EJ's added task; None for the controller's own, if it has one
+    added_task : EJ's added task; None for the controller's own, if it has one
 
     Raises
     ------
     InputError : the subject is neither; a task of more rows than the robot has inputs; a
-        constraint that does not make J_e square
+        added task that does not make J_e square
     """
 
-    def __init__(self, subject: Subject, constraint: Tasks | None = None) -> None:
+    def __init__(self, subject: Subject, added_task: Tasks | None = None) -> None:
         self.resolver = None
         if isinstance(subject, Controller):
             self.robot, self.task, self.resolver = subject.robot, subject.task, subject.resolver
-            added = subject.added_task if constraint is None else stacked(constraint)
+            added = subject.added_task if added_task is None else stacked(added_task)
         elif isinstance(subject, tuple) and len(subject) == 2 and isinstance(subject[0], Robot):
             self.robot, self.task = subject[0], stacked(subject[1])
-            added = Stack() if constraint is None else stacked(constraint)
+            added = Stack() if added_task is None else stacked(added_task)
         else:
             raise InputError(f"analysis: expected a Controller or (robot, task), got {subject!r}")
         self._of_task = Controller(self.robot, self.task, ProjectedGradient())
-        self._of_constraint = Controller(self.robot, added, ProjectedGradient()) if len(added) else None
+        self._of_added = Controller(self.robot, added, ProjectedGradient()) if len(added) else None
         self.rows: tuple[Row, ...] = self._of_task.rows
         self.scales = row_scales(self.rows, self.robot)
-        self.constraint_rows: tuple[Row, ...] = self._of_constraint.rows if self._of_constraint else ()
+        self.added_rows: tuple[Row, ...] = self._of_added.rows if self._of_added else ()
         free = self.robot.n_u - len(self.rows)
-        if self.constraint_rows and len(self.constraint_rows) != free:
+        if self.added_rows and len(self.added_rows) != free:
             raise InputError(
-                f"constraint: expected {free} rows ({self.robot.n_u} inputs less {len(self.rows)} rows of "
-                f"the task), got {len(self.constraint_rows)}"
+                f"added_task: expected {free} rows ({self.robot.n_u} inputs less {len(self.rows)} rows of "
+                f"the task), got {len(self.added_rows)}"
             )
 
     @property
@@ -83,11 +83,11 @@ class Jacobians:
         """
         return self._finite(self._of_task, t, q)
 
-    def Jc(self, t: float, q: Array) -> Array:
-        """J_bar of the constraint (k, m); no rows without one."""
-        if self._of_constraint is None:
+    def added_J(self, t: float, q: Array) -> Array:
+        """J_bar of the added task (k, m); no rows without one."""
+        if self._of_added is None:
             return np.zeros((0, self.robot.n_u))
-        return self._finite(self._of_constraint, t, q)
+        return self._finite(self._of_added, t, q)
 
     def along(self, t: float, q: Array, directions: Array) -> Array:
         """dJ/dε at q + ε directions[:, j] and the same t, shape (columns, s, m), by central differences."""
@@ -125,18 +125,18 @@ class Jacobians:
         return J
 
     def history(self, t: Array, q: Array) -> tuple[Array, Array]:
-        """J (N, s, m) and Jc (N, k, m) at N samples."""
+        """J (N, s, m) and added_J (N, k, m) at N samples."""
         m = self.robot.n_u
         J = np.empty((len(t), len(self.rows), m))
-        Jc = np.empty((len(t), len(self.constraint_rows), m))
+        added_J = np.empty((len(t), len(self.added_rows), m))
         for k in range(len(t)):
             J[k] = self.J(t[k], q[k])
-            if self._of_constraint is not None:
-                Jc[k] = self.Jc(t[k], q[k])
-        return J, Jc
+            if self._of_added is not None:
+                added_J[k] = self.added_J(t[k], q[k])
+        return J, added_J
 
     def sizes(self, length: float | None, sizes: Mapping[str, float] | None) -> tuple[Array, Array, Array]:
-        """How much of each row (s,), constraint row (k,) and input (m,) counts as 1, in their own units.
+        """How much of each row (s,), added row (k,) and input (m,) counts as 1, in their own units.
 
         Raises
         ------
@@ -144,7 +144,7 @@ class Jacobians:
         """
         L = 1.0 if length is None else positive(length, "length")
         given = {} if sizes is None else dict(sizes)
-        names = (*self.row_names, *(row.name for row in self.constraint_rows), *self.robot.u_names)
+        names = (*self.row_names, *(row.name for row in self.added_rows), *self.robot.u_names)
         for name, value in given.items():
             if name not in names:
                 raise InputError(unknown("row or input", name, names, "sizes"))
@@ -157,7 +157,7 @@ class Jacobians:
 
         return (
             of([(row.name, row.unit) for row in self.rows]),
-            of([(row.name, row.unit) for row in self.constraint_rows]),
+            of([(row.name, row.unit) for row in self.added_rows]),
             of(list(zip(self.robot.u_names, self.robot.u_units, strict=True))),
         )
 

@@ -53,7 +53,7 @@ class SingularityReport:
     minors : of J as it is, by the names of their columns
     by_input, by_coordinate : which motions bring back what is lost; those along the coordinates include
         motions that the wheels do not admit
-    extended : J_e beside J; None without a constraint
+    extended : J_e beside J; None without an added task
     partitions : every candidate's Ja beside J
     tolerance : singular values this small beside the largest, or beside a row of natural size, are zero
     """
@@ -159,7 +159,7 @@ def analyse(
     sizes: Mapping[str, float] | None = None,
     minors: Choice = True,
     most_minors: int = MOST_MINORS,
-    constraint: Tasks | None = None,
+    added_task: Tasks | None = None,
     partitions: Candidates = None,
     tolerance: float = TOLERANCE,
 ) -> SingularityReport:
@@ -180,7 +180,7 @@ def analyse(
     sizes : what counts as 1 of a row or an input, by name, in its unit; before `length`
     minors : True for all, False for none, or a list of those wanted, ["v, q1", ("v", "omega")]
     most_minors : `InputError` when there are more
-    constraint : EJ's added task; None for the controller's own
+    added_task : EJ's added task; None for the controller's own
     partitions : RG's candidates: lists of inputs or "automatic"; None for those of the controller's RG, or
         else, those of the minors
     tolerance : singular values this small beside the largest, or beside a row of natural size, are zero
@@ -190,7 +190,7 @@ def analyse(
     InputError : a task of more rows than inputs, q of another length, an unknown name, too many minors
     SingularError : there is no J: the wheels cannot roll there, or the task is undefined
     """
-    jacobians = Jacobians(subject, constraint)
+    jacobians = Jacobians(subject, added_task)
     t, q = checked(jacobians, t, q)
     tolerance = positive(tolerance, "tolerance")
     robot, rows = jacobians.robot, jacobians.row_names
@@ -201,7 +201,7 @@ def analyse(
     def scaled(matrix: Array) -> Array:
         return matrix * input_sizes / row_sizes[:, np.newaxis]
 
-    J, Jc = jacobians.J(t, q), jacobians.Jc(t, q)
+    J, added_J = jacobians.J(t, q), jacobians.added_J(t, q)
     scaled_J = scaled(J)
     J_u, J_q = (jacobians.along(t, q, motions) for motions in (robot.S(q), robot.following.carried))
     coordinates = [robot.q_names[i] for i in robot.following.independent]
@@ -232,9 +232,9 @@ def analyse(
         by_input=restoration(scaled_J, scaled(J_u), robot.u_names, whole.rank),
         by_coordinate=restoration(scaled_J, scaled(J_q), coordinates, whole.rank),
         extended=extended_singularity(
-            J, Jc, all_sizes, (*rows, *(row.name for row in jacobians.constraint_rows)), tolerance, natural
+            J, added_J, all_sizes, (*rows, *(row.name for row in jacobians.added_rows)), tolerance, natural
         )
-        if len(Jc)
+        if len(added_J)
         else None,
         partitions=partition_singularities(J, jacobians.scales, blocks, robot.u_names, singular, tolerance),
         tolerance=tolerance,

@@ -83,7 +83,7 @@ class Manipulability(Objective):
     Parameters
     ----------
     frame : a frame of the robot
-    rows : which rows of its Jacobian: "xy", "xyz", or a sequence of x, y, z, rx, ry, rz
+    rows : rows of its Jacobian: "xy", "xyz", or a list of x, y, z, rx, ry, rz
     of : "robot", with J = (∂f/∂q) S and the platform's inputs (in m/s and rad/s, unweighted), or
         "arm", with the arm's joints alone
     """

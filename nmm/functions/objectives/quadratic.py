@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,13 +74,14 @@ class JointRange(Objective):
 
     Parameters
     ----------
-    joints : names of the coordinates; all those of the arm, but those that follow others, when not given
-    lower, upper : their limits, rad or m; the robot's own when not given
+    joints : names of coordinates; all the arm's, but those that follow others, when not given
+    lower : their lower limits, rad or m; the robot's own when not given
+    upper : their upper limits
     """
 
     def __init__(
         self,
-        joints: tuple[str, ...] | list[str] | None = None,
+        joints: Sequence[str] | None = None,
         lower: ArrayLike | None = None,
         upper: ArrayLike | None = None,
     ) -> None:

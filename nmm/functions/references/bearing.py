@@ -32,10 +32,10 @@ class Bearing(Function):
 
     Parameters
     ----------
-    of : the moving point, whose first two components are its x and y: a reference of time such
-        as `Circle` (case 2), or a point of the robot, `Position("link2", "xy")` (case 3), in
-        which case the bearing is a function of the configuration
-    towards : (2,) the fixed point, m
+    of : the moving point, its first two components x and y: a reference of time (circle, spline, ...;
+        case 2), or a point of the robot (position; case 3), which makes the bearing a function of the
+        configuration
+    towards : the fixed point, 2 numbers, m (a third, z, is only drawn)
     """
 
     def __init__(self, of: Function, towards: ArrayLike) -> None:

@@ -38,11 +38,11 @@ class Circle(Function):
 
     Parameters
     ----------
-    center : (2,) in the plane or (3,) in space, m
+    center : 2 numbers in the plane or 3 in space, m
     radius : m, above 0
     rate : angular speed, rad/s; negative runs clockwise
     phase : φ at t = 0, rad
-    plane : "xy", "yz" or "zx" for a centre in space: the axes along which φ is 0 and π/2
+    plane : xy, yz or zx, for a centre in space: the axes along which φ is 0 and π/2
     """
 
     def __init__(

@@ -18,6 +18,9 @@ from nmm.robots.robot import Robot
 SLACK = 1e-6
 ROWS = tuple(Row(name, "rad") for name in ("rx", "ry", "rz"))
 
+#: A rotation vector φ (3,), rad: R = exp(φ^).
+RotationVector = ArrayLike
+
 
 @kernel(FUNCTION)
 def turning(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
@@ -50,20 +53,19 @@ class Turn(Function):
 
     Parameters
     ----------
-    axis : (3,) a, in the axes of the orientation itself; its length is not read
+    axis : a, three numbers, in the axes of the orientation itself; its length is not read
     rate : rad/s
-    start : (3,) rotation vector of R0, at t = 0 (see `rotation_vector`)
+    start : at t = 0, R0: a rotation vector (3,), rad; the world's axes when not given
     """
 
-    def __init__(self, axis: ArrayLike, rate: float, start: ArrayLike = (0.0, 0.0, 0.0)) -> None:
+    def __init__(self, axis: ArrayLike, rate: float, start: RotationVector | None = None) -> None:
         direction = vector(axis, 3, "axis")
         length = float(np.linalg.norm(direction))
         if length == 0.0:
             raise InputError("axis: expected a vector that is not zero")
+        first = np.zeros(3) if start is None else vector(start, 3, "start")
         coefficients = [scalar(rate, "rate"), 0.0]
-        self._numbers = np.concatenate(
-            [vector(start, 3, "start"), direction / length, [-np.inf, np.inf], coefficients]
-        )
+        self._numbers = np.concatenate([first, direction / length, [-np.inf, np.inf], coefficients])
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         return ROWS
@@ -80,7 +82,8 @@ class Slerp(Function):
 
     Parameters
     ----------
-    start, end : (3,) rotation vectors of R0 and R1 (see `rotation_vector`)
+    start : where it begins, R0: a rotation vector (3,), rad (`rotation_vector` makes one of other notations)
+    end : where it ends, R1
     duration : s, above 0
     profile : "constant" rate, or "smooth": a fifth-degree polynomial that starts and stops at rest with
         zero acceleration
@@ -88,8 +91,8 @@ class Slerp(Function):
 
     def __init__(
         self,
-        start: ArrayLike,
-        end: ArrayLike,
+        start: RotationVector,
+        end: RotationVector,
         duration: float,
         profile: Profile = "constant",
     ) -> None:

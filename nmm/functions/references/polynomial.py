@@ -90,7 +90,13 @@ class PiecewisePolynomial(Function):
 
 
 class Constant(PiecewisePolynomial):
-    """A target that does not move: `value`, s numbers."""
+    """A target that does not move. A number or numbers in place of a reference are one too.
+
+    Parameters
+    ----------
+    value : s numbers
+    unit : of the values: m, rad or 1
+    """
 
     def __init__(self, value: ArrayLike, unit: str = "m") -> None:
         self.value = value = vector(np.atleast_1d(array(value, "value")), None, "value")
@@ -104,6 +110,7 @@ class Polynomial(PiecewisePolynomial):
     ----------
     coefficients : (order, s), lowest power first, in m/s^k
     duration : s, above 0
+    unit : of the values: m, rad or 1
     """
 
     def __init__(self, coefficients: ArrayLike, duration: float, unit: str = "m") -> None:
@@ -147,10 +154,12 @@ class Line(PiecewisePolynomial):
 
     Parameters
     ----------
-    start, end : s numbers each
+    start : where it begins, s numbers
+    end : where it ends, s numbers
     duration : s, above 0
     profile : "constant" speed, or "smooth": a fifth-degree polynomial that starts and stops at
         rest with zero acceleration
+    unit : of the values: m, rad or 1
     """
 
     def __init__(
@@ -170,14 +179,17 @@ class Line(PiecewisePolynomial):
 
 
 class Spline(PiecewisePolynomial):
-    """A spline through `points` (k, s) at `times` (k,) s, increasing.
+    """A spline through waypoints; before the first and after the last it rests.
 
     Parameters
     ----------
+    times : (k,) s, increasing
+    points : (k, s), a point a time
     degree : 3, twice continuously differentiable, or 5, four times
     ends : "rest" (velocity zero at both ends; for degree 5 the acceleration too), "natural" (free
         ends; the second derivative is zero, for degree 5 the third and fourth), or "periodic" (the
         last point equals the first; degree 3)
+    unit : of the values: m, rad or 1
     """
 
     def __init__(

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array, vector
 from nmm.errors import InputError
 from nmm.functions.function import Function, Row, Stage
+from nmm.functions.references.orientation import RotationVector
 from nmm.functions.references.polynomial import Constant
 from nmm.kernels.compiled import kernel
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
@@ -37,16 +38,16 @@ def move_rows(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
 
 
 class PoseReference(Function):
-    """A position over an orientation, (6,): what `Pose` follows.
+    """A position over an orientation, (6,): the target of a pose.
 
     Parameters
     ----------
     position : three numbers (world axes, m), or a function with three rows, of time or the configuration
-    orientation : a rotation vector (rad; see `rotation_vector`), or a function with three rows: `Slerp`,
-        `Turn`, `Orientation` of another frame, or any other, read as a rotation vector
+    orientation : a rotation vector, rad, or a function with three rows, read as one (slerp, turn, orientation
+        of another frame, ...)
     """
 
-    def __init__(self, position: Function | ArrayLike, orientation: Function | ArrayLike) -> None:
+    def __init__(self, position: Function | ArrayLike, orientation: Function | RotationVector) -> None:
         self.position = _three(position, "position", "m")
         self.orientation = _three(orientation, "orientation", "rad")
 

@@ -17,7 +17,7 @@ class CenterOfMass(Function):
 
     Parameters
     ----------
-    axes : any of "x", "y", "z", in the order wanted: "xy", "xyz", "z", ("x", "z")
+    axes : some of x, y, z in the order wanted: "xy", "xyz", "z"
     """
 
     def __init__(self, axes: str | Sequence[str] = "xyz") -> None:

@@ -57,7 +57,7 @@ class Coordinates(Function):
 
     Parameters
     ----------
-    combinations : coordinate names ("q2") or mappings ({"theta": 1, "q1": 1})
+    combinations : coordinates by name (q2), or combinations of them ({theta: 1, q1: 1})
     """
 
     def __init__(self, *combinations: Combination) -> None:

@@ -42,8 +42,8 @@ class Distance(Function):
     Parameters
     ----------
     frame : a frame of the robot
-    to : the name of another (its origin), three numbers (world axes, m), or a function with three rows,
-        of time (`Circle`, `Spline`, ...) or of the configuration (`CenterOfMass`)
+    to : the point: the name of another frame (its origin), three numbers (world axes, m), or a function with
+        three rows, of time (circle, spline, ...) or of the configuration (center_of_mass)
     """
 
     def __init__(self, frame: str, to: Function | str | ArrayLike) -> None:

@@ -55,16 +55,16 @@ class Heading(Function):
     Parameters
     ----------
     frame : a frame of the robot
-    direction : (3,) vector or "x", "y", "z", in the frame's axes; its angle is taken
-    about : world axis "x", "y" or "z" about which the angle is measured, from the next axis in
-        the cyclic order x, y, z (about z: from x towards y)
+    direction : whose angle is taken: x, y, z or three numbers, in the frame's axes
+    about : world axis x, y or z about which the angle is measured, from the next axis in the cyclic order
+        x, y, z (about z: from x towards y)
     """
 
     def __init__(self, frame: str, direction: str | ArrayLike = "x", about: str = "z") -> None:
         self.frame = frame
         if isinstance(direction, str):
             if direction not in UNIT:
-                raise InputError(unknown("direction", direction, UNIT))
+                raise InputError(unknown("direction", direction, UNIT, "direction"))
             direction = UNIT[direction]
         self.direction = vector(direction, 3, "direction")
         length = float(np.linalg.norm(self.direction))
@@ -72,7 +72,7 @@ class Heading(Function):
             raise InputError("direction: expected a vector that is not zero")
         self.direction /= length
         if about not in PLANES:
-            raise InputError(unknown("axis", about, PLANES))
+            raise InputError(unknown("axis", about, PLANES, "about"))
         self.about = about
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:

@@ -71,7 +71,7 @@ class Orientation(Function):
     Parameters
     ----------
     frame : a frame of the robot
-    relative_to : a frame of the robot in whose axes R is taken; the world's when None
+    relative_to : a frame of the robot that sees it, in its axes; the world when not given
     """
 
     comparison = orientation_error

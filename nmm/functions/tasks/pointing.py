@@ -91,8 +91,8 @@ class Pointing(Function):
     ----------
     frame : a frame of the robot
     at : the point, world axes, m: three numbers, the name of a frame (its origin), or a function with
-        three rows, of time (`Circle`, `Spline`, ...) or of the configuration (`Position`, `CenterOfMass`)
-    axis : "x", "y", "z", or (3,) in the frame's axes
+        three rows, of time (circle, spline, ...) or of the configuration (position, center_of_mass)
+    axis : x, y, z or three numbers, in the frame's axes
     """
 
     def __init__(self, frame: str, at: Function | str | ArrayLike, axis: str | ArrayLike = "z") -> None:
@@ -100,7 +100,7 @@ class Pointing(Function):
         self.at = as_point(at, "at")
         if isinstance(axis, str):
             if axis not in UNIT:
-                raise InputError(unknown("axis", axis, UNIT))
+                raise InputError(unknown("axis", axis, UNIT, "axis"))
             axis = UNIT[axis]
         direction = vector(axis, 3, "axis")
         length = float(np.linalg.norm(direction))

@@ -86,8 +86,7 @@ class Pose(Function):
     Parameters
     ----------
     frame : a frame of the robot
-    relative_to : a frame of the robot that T is relative to (two arms that hold one thing); the world when
-        None
+    relative_to : a frame of the robot that sees it (two arms that hold one thing); the world when not given
     """
 
     comparison = pose_error

@@ -44,9 +44,9 @@ class Position(Function):
     Parameters
     ----------
     frame : a frame of the robot
-    axes : any of "x", "y", "z", in the order wanted: "xy", "xyz", "z", ("x", "z")
-    relative_to : a frame of the robot from whose origin and in whose axes the position is taken; the world's
-        when None
+    axes : some of x, y, z in the order wanted: "xy", "xyz", "z"
+    relative_to : a frame of the robot that sees it, from its origin and in its axes (two arms that hold one
+        thing); the world when not given
     """
 
     def __init__(self, frame: str, axes: str | Sequence[str] = "xyz", relative_to: str | None = None) -> None:

@@ -56,7 +56,7 @@ def _of_frame(model: pin.Model, name: str, where: str) -> pin.SE3:
     return pin.SE3(pin.utils.rotate("z", float(yaw)), np.array(placement.translation))
 
 
-def told(placement: pin.SE3) -> str:
+def axle_note(placement: pin.SE3) -> str:
     """What was done, as a note."""
     x, y, z = placement.translation
     yaw = np.arctan2(placement.rotation[1, 0], placement.rotation[0, 0])

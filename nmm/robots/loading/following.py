@@ -40,7 +40,7 @@ def among_coordinates(
     return found, notes
 
 
-def told_limits(robot: Robot) -> list[str]:
+def limit_notes(robot: Robot) -> list[str]:
     """The followers whose limits are not heeded, a sentence each."""
     lower, upper = robot.model.lowerPositionLimit, robot.model.upperPositionLimit
     return [

@@ -83,8 +83,8 @@ def with_locked(
     if values:
         notes.append(f"locked joints: {', '.join(f'{name} at {at:g}' for name, at in values.items())}")
     if mimicked:
-        told = (f"{name} at {at:g} (follows {leader})" for name, (leader, at) in mimicked.items())
-        notes.append(f"locked with the joint that they follow: {', '.join(told)}")
+        sentences = (f"{name} at {at:g} (follows {leader})" for name, (leader, at) in mimicked.items())
+        notes.append(f"locked with the joint that they follow: {', '.join(sentences)}")
     return Locked(Rebuilt(lean, geometries, tuple(notes)), values, mimicked, moving)
 
 

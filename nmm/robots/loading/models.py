@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 
 from nmm.errors import InputError, RobotError, unknown
 from nmm.platforms import Layout, Platform, Unicycle, platform_by_name
-from nmm.robots.loading.axle import axle_placement, told
+from nmm.robots.loading.axle import axle_note, axle_placement
 from nmm.robots.loading.chain import CHAIN, Rebuilt, rebuild
 from nmm.robots.loading.collision_pairs import add_pairs
-from nmm.robots.loading.following import among_coordinates, told_limits
+from nmm.robots.loading.following import among_coordinates, limit_notes
 from nmm.robots.loading.layout import measure_layout
 from nmm.robots.loading.locking import Locked, with_locked
 from nmm.robots.loading.provenance import Parts
@@ -22,7 +22,7 @@ from nmm.robots.loading.reduction import reduced
 from nmm.robots.loading.source import Source
 from nmm.robots.loading.wheels import find_wheels, held_joints
 from nmm.robots.robot import Robot, Wheel
-from nmm.robots.slip import told as told_slip
+from nmm.robots.slip import slip_warnings
 
 #: Adds its pairs to the collision shapes on a model.
 AddPairs = Callable[[pin.Model, pin.GeometryModel], None]
@@ -57,7 +57,7 @@ def robot_from(source: Source, options: Options) -> Robot:
     if options.axle is not None:
         placement = axle_placement(rebuilt.model, options.axle, where)
         moved = rebuild(rebuilt.model, rebuilt.geometries, where, root=placement.inverse())
-        rebuilt = replace(moved, notes=(*rebuilt.notes, told(placement)))
+        rebuilt = replace(moved, notes=(*rebuilt.notes, axle_note(placement)))
     platform, origin = _platform(rebuilt, source, options)
     if options.limits:
         try:
@@ -159,7 +159,7 @@ def _without_wheels(
         followers=followers,
         parts=replace(parts, provenance=replace(parts.provenance, reduced=tuple(names))),
     )
-    complaints = (*told_limits(robot), *told_slip(robot))
+    complaints = (*limit_notes(robot), *slip_warnings(robot))
     return replace(robot, **robot.shapes._asdict(), notes=(*robot.notes, *complaints))
 
 

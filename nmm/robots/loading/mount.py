@@ -127,7 +127,7 @@ def _mounted(
         notes=(
             *parts.notes,
             *(f"{key}: {note}" for note in arm_parts.notes),
-            _told(base, arm, key, frame, prefix),
+            _mount_note(base, arm, key, frame, prefix),
         ),
         provenance=provenance,
         followers=(*base.followers, *(one.renamed(prefix) for one in arm.followers)),
@@ -254,7 +254,7 @@ def _appended(
     return whole, visual, collision
 
 
-def _told(base: Robot, arm: Robot, key: str, frame: str, prefix: str) -> str:
+def _mount_note(base: Robot, arm: Robot, key: str, frame: str, prefix: str) -> str:
     named = f", its names with the prefix {prefix}" if prefix else ""
     known = f" as {key}" if key != arm.name else ""
     return f"{arm.name} mounted{known} at {frame} of {base.name}{named}"

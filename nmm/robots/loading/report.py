@@ -13,7 +13,7 @@ from nmm.robots.loading.advice import advice, joints_by_type
 from nmm.robots.loading.check import find_problems
 from nmm.robots.loading.description import Description, argument_texts, describe
 from nmm.robots.loading.findings import Problem, child, children
-from nmm.robots.loading.following import told_limits
+from nmm.robots.loading.following import limit_notes
 from nmm.robots.loading.load import load
 from nmm.robots.loading.packages import Packages
 from nmm.robots.loading.second_opinion import second_opinion
@@ -222,7 +222,7 @@ class _Report:
         except Exception as error:  # a library's, which `load` did not foresee: a report comes all the same
             return [Problem(f"cannot be loaded: {type(error).__name__}: {one_line(str(error))}")]
         self.warnings += [Problem(text) for text in wheel_advice(robot, _top(root))]
-        self.warnings += [Problem(text) for text in told_limits(robot)]
+        self.warnings += [Problem(text) for text in limit_notes(robot)]
         self.warnings += [Problem(text) for text in second_opinion(self.description.xml)]
         self._about(robot)
         return []

@@ -47,8 +47,8 @@ def second_opinion(xml: str) -> list[str]:
             return [f"yourdfpy cannot read it: {type(error).__name__}: {one_line(str(error), 160)}"]
     # It asks for limits that the standard gives a default; `advice` tells where that default is no good.
     texts = [] if valid else [text for text in other_errors if not _DEFAULTED.search(text)]
-    told = dict.fromkeys([*texts, *(one_line(text, 160) for text in said)])
-    return [*(f"yourdfpy: {text}" for text in told), *differing]
+    reported = dict.fromkeys([*texts, *(one_line(text, 160) for text in said)])
+    return [*(f"yourdfpy: {text}" for text in reported), *differing]
 
 
 def _differences(xml: str, other: Any) -> Iterator[str]:

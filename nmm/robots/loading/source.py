@@ -80,7 +80,7 @@ def read_file(
     checked = check(description.xml, where, find_mesh, lock, not description.expanded)
     model, visual, collision = _pinocchio_models(urdf_text(checked, checked.name), where)
     missing = [name for name, file in meshes.items() if file is None]
-    told = [f"shapes left out, their meshes are missing: {', '.join(missing)}"] if missing else []
+    left_out = [f"shapes left out, their meshes are missing: {', '.join(missing)}"] if missing else []
     return Source(
         name=checked.name,
         where=where,
@@ -92,7 +92,7 @@ def read_file(
         arguments=description.arguments,
         followers=checked.followers,
         platform=checked.platform,
-        notes=(*description.notes, *told),
+        notes=(*description.notes, *left_out),
         provenance=Provenance(dict(packages.found), packages.searched, meshes),
     )
 

@@ -1,4 +1,4 @@
-"""Inputs that a task does not feel: found, said where nothing else moves them, moved by an objective."""
+"""Inputs without effect on a task: found, said where nothing else moves them, moved by an objective."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nmm
-from nmm.control.idle_inputs import idle_inputs, unfelt_inputs
+from nmm.control.idle_inputs import idle_inputs, inputs_without_effect
 from nmm.robots.robot import Robot
 
 START = {"q2": 0.2, "q3": 1.7, "q4": 0.6}
@@ -22,23 +22,23 @@ def controller(robot: Robot, objective: nmm.Objective | None = None) -> nmm.Cont
     return nmm.Controller(robot, nmm.Task(nmm.Position("ee"), TIP), nmm.ProjectedGradient(), objective)
 
 
-def test_a_position_feels_neither_steering_nor_tool_roll(car: Robot) -> None:
+def test_neither_steering_nor_tool_roll_moves_a_position(car: Robot) -> None:
     plain = controller(car)
-    assert unfelt_inputs(plain, car.q(START)) == ("steering_rate", "q5")
+    assert inputs_without_effect(plain, car.q(START)) == ("steering_rate", "q5")
     assert idle_inputs(plain, car.q(START)) == ("steering_rate", "q5")
 
 
-def test_what_the_objective_feels_is_not_idle(car: Robot) -> None:
+def test_what_lowers_the_objective_is_not_idle(car: Robot) -> None:
     steered = controller(car, nmm.Quadratic(nmm.Square({"steering": 1, "q1": -1})))
-    assert unfelt_inputs(steered, car.q(START)) == ("steering_rate", "q5")
+    assert inputs_without_effect(steered, car.q(START)) == ("steering_rate", "q5")
     assert idle_inputs(steered, car.q(START)) == ("q5",)
 
 
-def test_what_a_constraint_feels_is_not_idle(car: Robot) -> None:
+def test_what_moves_an_added_task_is_not_idle(car: Robot) -> None:
     task = nmm.Task(nmm.Position("ee"), TIP)
     held = nmm.Task(nmm.Coordinates("steering", "x", "q4", "q5"), [0.1, 0, 0.6, 0])
     extended = nmm.Controller(car, task, nmm.ExtendedJacobian(), added_task=held)
-    assert unfelt_inputs(extended, car.q(START)) == ("steering_rate", "q5")
+    assert inputs_without_effect(extended, car.q(START)) == ("steering_rate", "q5")
     assert idle_inputs(extended, car.q(START)) == ()
 
 
@@ -51,7 +51,7 @@ def test_a_run_says_it_once(car: Robot) -> None:
     np.testing.assert_allclose(idle, 0.0, atol=1e-15)  # the kinematics' rounding
 
 
-def test_the_objective_moves_what_the_task_does_not_feel(car: Robot) -> None:
+def test_the_objective_moves_what_has_no_effect_on_the_task(car: Robot) -> None:
     squares = nmm.Quadratic(nmm.Square("steering", 0.15), nmm.Square("q5", -0.3))
     run = nmm.simulate(controller(car, squares), START, 2.0, 0.01)
     assert run.warnings == ()
@@ -69,4 +69,4 @@ def test_a_task_that_cannot_be_evaluated_there_says_nothing(car: Robot) -> None:
         return float(configuration.q[4])
 
     task = nmm.Task(nmm.CallableFunction(near_the_start, ["a"]), [0.0])
-    assert unfelt_inputs(nmm.Controller(car, task, nmm.ProjectedGradient()), car.q(START)) == ()
+    assert inputs_without_effect(nmm.Controller(car, task, nmm.ProjectedGradient()), car.q(START)) == ()
