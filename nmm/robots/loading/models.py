@@ -157,8 +157,8 @@ def _without_wheels(
         followers=followers,
         parts=replace(parts, provenance=replace(parts.provenance, reduced=tuple(names))),
     )
-    more = (*told_limits(robot), *told_slip(robot))
-    return replace(robot, **robot.shapes._asdict(), notes=(*robot.notes, *more))
+    remarks = (*told_limits(robot), *told_slip(robot))
+    return replace(robot, **robot.shapes._asdict(), notes=(*robot.notes, *remarks))
 
 
 def _with_held_wheels(made: Locked, asked: Sequence[str] | Mapping[str, float] | None, where: str) -> Locked:
