@@ -44,7 +44,7 @@ def test_pointing_says_how_far_and_which_way(
         point = rng.uniform(-3, 3, 3)
         seen = here.placement("tool0").actInv(point)
         seen /= np.linalg.norm(seen)
-        y = Pointing("tool0", point, axis).evaluate(0.0, here).value
+        y = evaluate(Pointing("tool0", point, axis), 0.0, here).value
         angle = np.arctan2(np.linalg.norm(np.cross(a, seen)), a @ seen)
         assert np.linalg.norm(y) == pytest.approx(angle, abs=1e-12)
         values[k], across[k] = y / angle, (seen - (a @ seen) * a) / np.sin(angle)
@@ -60,11 +60,11 @@ def test_pointing_is_smooth_where_it_points_at_the_point(ur5: Robot) -> None:
     """Across the threshold of the series at angles of 1e-5, and at 0."""
     here = Configuration(ur5, ur5.q(UR5))
     T = here.placement("tool0")
-    straight = Pointing("tool0", T.act(np.array([0, 0, 2.0]))).evaluate(0.0, here)
+    straight = evaluate(Pointing("tool0", T.act(np.array([0, 0, 2.0]))), 0.0, here)
     np.testing.assert_allclose(straight.value, 0.0, atol=1e-15)
     for angle in (1e-12, 1e-8, 0.999e-5, 1.001e-5, 1e-4):
         point = T.act(2.0 * np.array([np.sin(angle) * 0.6, np.sin(angle) * 0.8, np.cos(angle)]))
-        found = Pointing("tool0", point).evaluate(0.0, here)
+        found = evaluate(Pointing("tool0", point), 0.0, here)
         np.testing.assert_allclose(found.value, angle * np.array([0.6, 0.8]), rtol=0, atol=1e-15)
         np.testing.assert_allclose(found.value_q, straight.value_q, rtol=0, atol=2 * angle + 1e-14)
     check_function(Pointing("tool0", T.act(np.array([0, 0, 2.0]))), ur5, 0.0, here.q)
@@ -111,8 +111,8 @@ def test_a_pose_reference_of_functions_that_need_more_rows(ur5: Robot, rng: np.r
     tip = FirstThree(Pose("tool0"))
     for position, orientation in ((wide, moving), (MOVING, tip), (tip, wide), (wide, tip), (tip, [1, 2, 3])):
         reference = PoseReference(position, orientation)
-        found = reference.evaluate(0.4, here)
-        halves = [part.evaluate(0.4, here) for part in (reference.position, reference.orientation)]
+        found = evaluate(reference, 0.4, here)
+        halves = [evaluate(part, 0.4, here) for part in (reference.position, reference.orientation)]
         for whole, first, second in zip(found, *halves, strict=True):
             assert np.array_equal(whole, np.concatenate([first, second]))
 
@@ -127,16 +127,16 @@ def test_slerp_goes_from_one_to_the_other_by_the_shortest_turn(robot_3r: Robot) 
     for profile in ("constant", "smooth"):
         slerp = Slerp(start, end, 2.0, profile)
         for t, expected in ((-1.0, R0), (0.0, R0), (1.0, R0 @ pin.exp3(pin.log3(R0.T @ R1) / 2)), (5.0, R1)):
-            found = slerp.evaluate(t, here)
+            found = evaluate(slerp, t, here)
             np.testing.assert_allclose(pin.exp3(found.value), expected, rtol=0, atol=1e-14)
-        assert not slerp.evaluate(5.0, here).value_t.any()
+        assert not evaluate(slerp, 5.0, here).value_t.any()
 
 
 def test_a_turn_turns(robot_3r: Robot) -> None:
     here = Configuration(robot_3r, np.zeros(robot_3r.n))
     start = np.array([0.4, -1.0, 0.7])
     for t in (-30.0, 0.0, 3.0, 100.0):
-        found = pin.exp3(Turn([0, 3, 4], 0.5, start).evaluate(t, here).value)
+        found = pin.exp3(evaluate(Turn([0, 3, 4], 0.5, start), t, here).value)
         expected = pin.exp3(start) @ pin.exp3(0.5 * t * np.array([0, 0.6, 0.8]))
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13)
 

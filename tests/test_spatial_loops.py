@@ -209,7 +209,7 @@ def test_a_relative_pose_does_not_feel_the_platform(tiago: Robot, rng: np.random
 def test_poses_each_of_the_other_are_inverse(ur5: Robot, rng: np.random.Generator) -> None:
     here = Configuration(ur5, random_configuration(ur5, rng))
     one, two = (
-        Pose(*frames).evaluate(0.0, here).value
+        evaluate(Pose(*frames), 0.0, here).value
         for frames in (("tool0", "elbow_joint"), ("elbow_joint", "tool0"))
     )
     T, inverse = (pin.SE3(pin.exp3(value[3:]), value[:3]) for value in (one, two))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from spatial_arms import MOVING, UR5, pose
 
 from nmm.functions.function import Evaluation, Function
-from nmm.functions.program import Program
+from nmm.functions.program import Program, evaluate
 from nmm.functions.references import PoseReference, Slerp, Turn, rotation_vector
 from nmm.functions.tasks import (
     CenterOfMass,
@@ -79,15 +79,15 @@ def test_values_are_pinocchios(name: str, arms: dict[str, Robot], rng: np.random
         here = Configuration(robot, random_configuration(robot, rng))
         for seen_from in (None, other):
             expected = pose(here, tip, seen_from)
-            value = Pose(tip, seen_from).evaluate(0.0, here).value
+            value = evaluate(Pose(tip, seen_from), 0.0, here).value
             np.testing.assert_allclose(value[:3], expected.translation, rtol=0, atol=1e-13)
             np.testing.assert_allclose(pin.exp3(value[3:]), expected.rotation, rtol=0, atol=1e-13)
             assert np.linalg.norm(value[3:]) <= pi + 1e-15
-            assert np.array_equal(Orientation(tip, seen_from).evaluate(0.0, here).value, value[3:])
-            position = Position(tip, "zxy", seen_from).evaluate(0.0, here).value
+            assert np.array_equal(evaluate(Orientation(tip, seen_from), 0.0, here).value, value[3:])
+            position = evaluate(Position(tip, "zxy", seen_from), 0.0, here).value
             np.testing.assert_allclose(position, value[[2, 0, 1]], rtol=0, atol=1e-13)
         between = pose(here, tip).translation - pose(here, other).translation
-        assert Distance(tip, other).evaluate(0.0, here).value[0] == pytest.approx(np.linalg.norm(between))
+        assert evaluate(Distance(tip, other), 0.0, here).value[0] == pytest.approx(np.linalg.norm(between))
 
 
 @each_arm
@@ -101,7 +101,7 @@ def test_center_of_mass_is_that_of_the_links(
     bodies = list(zip(robot.model.inertias, data.oMi, strict=True))
     moments = [inertia.mass * placement.act(inertia.lever) for inertia, placement in bodies]
     expected = sum(moments) / sum(inertia.mass for inertia, _ in bodies)
-    np.testing.assert_allclose(CenterOfMass().evaluate(0.0, here).value, expected, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(evaluate(CenterOfMass(), 0.0, here).value, expected, rtol=0, atol=1e-12)
 
 
 # Errors of orientations and poses
