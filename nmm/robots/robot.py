@@ -55,6 +55,16 @@ class Wheel:
     pivot: Array = field(default_factory=lambda: np.zeros(3))
     roller: float = 0.0
 
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of its joints in the display model: the swivel's, if there is one, and its own."""
+        return (self.swivel, self.joint) if self.swivel else (self.joint,)
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether it hangs on the root link's body, without swivel and rollers: it rolls one way only."""
+        return self.carrier == "theta" and not self.swivel and self.roller == 0.0
+
 
 @dataclass(frozen=True, eq=False)
 class Robot:

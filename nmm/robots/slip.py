@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nmm.robots.robot import Robot, Wheel
+from nmm.robots.robot import Robot
 
 #: Sideways speeds of a wheel below this, for an input of 1 m/s or 1 rad/s, are the file's rounding.
 SLACK = 1e-3
@@ -17,7 +17,7 @@ def slipping_wheels(robot: Robot) -> dict[str, float]:
     the platform's x and y are not on their axle, they cannot only roll.
     """
     platform = robot.platform
-    plain = [wheel for wheel in robot.wheels if _is_plain(wheel)]
+    plain = [wheel for wheel in robot.wheels if wheel.is_fixed]
     if not plain or platform.n_p < 3 or platform.p > 2:  # with three inputs the wheels must have rollers
         return {}
     own = platform.coordinate_limits[3:]
@@ -48,7 +48,3 @@ def slip_warnings(robot: Robot) -> list[str]:
         f"wheels slide sideways under platform {robot.platform.name}: {names}; is its reference point on "
         "their axle? (axle=)"
     ]
-
-
-def _is_plain(wheel: Wheel) -> bool:
-    return wheel.carrier == "theta" and not wheel.swivel and wheel.roller == 0.0

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
@@ -18,7 +17,7 @@ from nmm.robots.loading.following import among_coordinates, limit_notes
 from nmm.robots.loading.layout import measure_layout
 from nmm.robots.loading.locking import Locked, with_locked
 from nmm.robots.loading.provenance import Parts
-from nmm.robots.loading.reduction import reduced
+from nmm.robots.loading.reduction import at_zero
 from nmm.robots.loading.source import Source
 from nmm.robots.loading.wheels import find_wheels, held_joints
 from nmm.robots.robot import Robot, Wheel
@@ -125,12 +124,11 @@ def _without_wheels(
     display = made.rebuilt
     whole, (shown, solid) = display.model, display.geometries
     wheels, notes = _wheels(display, platform, own, source.where, options.wheels)
-    names = list(dict.fromkeys(name for wheel in wheels for name in (wheel.swivel, wheel.joint) if name))
+    names = list(dict.fromkeys(name for wheel in wheels for name in wheel.joints))
     model = whole
     if names:
         notes.append(f"wheels that only roll, left out of q: {', '.join(names)}")
-        ids = [whole.getJointId(name) for name in names]
-        model, (solid,) = reduced(whole, (solid,), ids, np.zeros(whole.nq))
+        model, (solid,) = at_zero(whole, (solid,), names)
     elif source.all_pairs or options.add_pairs:
         solid = solid.copy()
     followers, more = among_coordinates(made.followers, names, source.where)

@@ -18,7 +18,7 @@ from nmm.robots.loading.collision_pairs import add_pairs
 from nmm.robots.loading.load import load
 from nmm.robots.loading.models import Options, robot_from
 from nmm.robots.loading.provenance import Parts, parts_of
-from nmm.robots.loading.reduction import reduced, told_apart
+from nmm.robots.loading.reduction import at_zero, told_apart
 from nmm.robots.loading.source import Source
 from nmm.robots.robot import Robot
 from nmm.words import printable
@@ -160,11 +160,9 @@ def _mounted(
 
 def _arm_body(arm: Robot, parts: Parts) -> _Body:
     """A copy of the arm alone: of a fixed base, with its wheels standing still."""
-    model, shapes = arm.display_model, (arm.shapes.visual_model, parts.collision_model)
-    wheels = dict.fromkeys(name for wheel in arm.wheels for name in (wheel.swivel, wheel.joint) if name)
-    if wheels:
-        ids = [model.getJointId(wheel) for wheel in wheels]
-        model, shapes = reduced(model, shapes, ids, np.zeros(model.nq))
+    rolling = dict.fromkeys(name for wheel in arm.wheels for name in wheel.joints)
+    shapes = arm.shapes.visual_model, parts.collision_model
+    model, shapes = at_zero(arm.display_model, shapes, rolling)
     root = model.jointPlacements[1] if replaced_joints(model) else pin.SE3.Identity()
     rebuilt = rebuild(model, shapes, arm.name, root=root, head=())
     return _Body(rebuilt.model, *rebuilt.geometries)

@@ -18,7 +18,7 @@ from nmm.errors import InputError, unknown
 from nmm.robots.loading.chain import CHAIN_JOINTS, Head, rebuild, replaced_joints
 from nmm.robots.loading.joint_kinds import is_continuous, is_mimic, is_simple, kind
 from nmm.robots.loading.provenance import parts_of, provenance_of
-from nmm.robots.loading.reduction import reduced
+from nmm.robots.loading.reduction import at_zero
 from nmm.robots.loading.root_layout import ROOTS, ChainRoot, RootLayout
 from nmm.robots.meshes import read_meshes
 from nmm.robots.robot import Robot
@@ -65,11 +65,9 @@ def _models(robot: Robot, root: Root | str) -> PinocchioModels:
     """The models, whose meshes need not be read yet."""
     if root not in ROOTS:
         raise InputError(unknown("root", root, ROOTS))
-    model, shapes = robot.display_model, (robot.shapes.visual_model, parts_of(robot).collision_model)
-    names = dict.fromkeys(name for wheel in robot.wheels for name in (wheel.swivel, wheel.joint) if name)
-    if names:
-        ids = [model.getJointId(name) for name in names]
-        model, shapes = reduced(model, shapes, ids, np.zeros(model.nq))
+    rolling = dict.fromkeys(name for wheel in robot.wheels for name in wheel.joints)
+    shapes = robot.shapes.visual_model, parts_of(robot).collision_model
+    model, shapes = at_zero(robot.display_model, shapes, rolling)
     if not robot.platform.coordinates:
         if root != "chain":
             raise InputError(f"{robot.name} has a fixed base: expected root 'chain' (none), got {root!r}")
@@ -232,7 +230,7 @@ class PinocchioLayout:
         robot, model = self.robot, self.model
         made = provenance_of(robot)
         held = {**made.locked, **{name: value for name, (_, value) in made.mimicked.items()}}
-        standing = {name for wheel in robot.wheels for name in (wheel.swivel, wheel.joint)}
+        standing = {name for wheel in robot.wheels for name in wheel.joints}
         own = list(robot.q_names[self._n_root :])
         following = [one.joint for one in robot.followers]
         pairs, still = [], {}

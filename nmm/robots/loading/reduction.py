@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
+import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
@@ -20,6 +21,15 @@ def told_apart(model: pin.Model, tag: str) -> tuple[pin.Model, dict[str, str]]:
             names[f"{tag}{index}"] = frame.name
             frame.name = f"{tag}{index}"
     return copied, names
+
+
+def at_zero(
+    model: pin.Model, geometries: Sequence[pin.GeometryModel], joints: Collection[str]
+) -> tuple[pin.Model, tuple[pin.GeometryModel, ...]]:
+    """The models with the joints of these names fixed at zero; as they are without any."""
+    if not joints:
+        return model, tuple(geometries)
+    return reduced(model, geometries, [model.getJointId(name) for name in joints], np.zeros(model.nq))
 
 
 def reduced(

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from nmm.robots.loading.layout import Measured
-from nmm.robots.robot import Robot, Wheel
+from nmm.robots.robot import Robot
 
 #: How far the axle's midpoint may be from the reference point, m.
 NEAR = 2e-3
@@ -48,7 +48,7 @@ def _nameless(robot: Robot) -> Iterator[str]:
 
 def _about_axle(robot: Robot, root: str) -> Iterator[str]:
     """Where the axle of the wheels is that neither steer nor swivel nor have rollers."""
-    fixed = [wheel for wheel in robot.wheels if _is_fixed(wheel)]
+    fixed = [wheel for wheel in robot.wheels if wheel.is_fixed]
     if not fixed or robot.platform.p > 2:
         return
     names = ", ".join(wheel.joint for wheel in fixed)
@@ -74,7 +74,3 @@ def _about_axle(robot: Robot, root: str) -> Iterator[str]:
             f"{middle[1]:.4g}) m in it ({names}): give axle=({middle[0]:.4g}, {middle[1]:.4g}), or the robot "
             "turns about the wrong point"
         )
-
-
-def _is_fixed(wheel: Wheel) -> bool:
-    return wheel.carrier == "theta" and not wheel.swivel and wheel.roller == 0.0
