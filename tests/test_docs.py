@@ -71,6 +71,30 @@ def test_the_readmes_python_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert len(controller(0.0, controller.robot.q({"ur5_elbow_joint": 1.0, "ur5_wrist_2_joint": 1.0}))) == 8
 
 
+def test_the_worked_examples_can_be_typed_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The page's own files: a task whose Jacobian is the differences', and a resolver that says what it gives."""
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    slope, damped, used = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    for name, code in (("slope", slope), ("damped", damped), ("used", used)):
+        (tmp_path / f"{name}.py").write_text(code, encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    try:
+        used_names = vars(importlib.import_module("used"))
+    finally:
+        RESOLVERS.pop("dls", None)
+        for name in ("slope", "damped", "used"):
+            sys.modules.pop(name, None)
+    run, named, robot, task = (used_names[name] for name in ("run", "named", "robot", "task"))
+    for q in run.q[::100]:
+        check_function(task.function, robot, 0.0, q)
+    # e_dot = -λ K e, with the share λ of the rate that the damping leaves.
+    decay = np.exp(-2.0 * np.concatenate([[0.0], np.cumsum(run.scale[:-1, 0] * np.diff(run.t))]))
+    np.testing.assert_allclose(run.error[:, 0], run.error[0, 0] * decay, atol=2e-3)
+    assert np.all(run.scale < 1.0)
+    assert np.all(run.scale > 0.5)
+    assert named.resolver == "dls"
+
+
 @pytest.mark.parametrize(
     "page", ["README.md", *(f"docs/{path.name}" for path in sorted((ROOT / "docs").glob("*.md")))]
 )
