@@ -6,7 +6,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from nmm.analysis.singular.directions import direction_texts, readable_basis
 from nmm.analysis.singular.jacobians import STEP, Jacobians
 from nmm.analysis.singular.parts import WHOLE, expect_inputs, singular_values
 from nmm.arrays import Array, Integers

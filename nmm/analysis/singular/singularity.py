@@ -15,7 +15,7 @@ from nmm.analysis.singular.algorithmic import (
     extended_singularity,
     partition_singularities,
 )
-from nmm.analysis.singular.directions import direction_texts
+from nmm.control.directions import direction_texts
 from nmm.analysis.singular.jacobians import Candidates, Jacobians, Subject, Tasks, checked
 from nmm.analysis.singular.minors import (
     MOST_MINORS,
