@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array
@@ -32,7 +31,7 @@ def lost_directions(
 
     Parameters
     ----------
-    J (s, m) : the task's matrix, its frames' rows in world axes (see `world_axes`)
+    J (s, m) : the task's matrix, its frames' rows in world axes (see `in_world_axes`)
     rows : its rows
     scales (s,) : how much of each row counts as 1: the robot's reach for m, 1 for rad
     tolerance : singular values of J / scales this small beside the largest are zero
@@ -79,30 +78,23 @@ def direction_words(direction: Array, rows: Sequence[Row]) -> str:
     return " with ".join(phrases)
 
 
-def world_axes(task: Stack, robot: Robot, q: ArrayLike) -> Array:
-    """T (s, s) that turns a task's rows, so that those in a frame's own axes are in the world's: T J.
+def in_world_axes(J: Array, task: Stack, robot: Robot, q: ArrayLike) -> Array:
+    """J (s, m) with those rows in world axes that are of a frame's pose or orientation.
 
-    The errors of poses and orientations are vectors in the frame's own axes; those relative to another frame
-    are turned into that one's. Other rows stay.
+    Their errors are logarithms, in the frame's own axes, whose rate is A(e) times a velocity, with A regular.
+    The velocity's rows, in the world's axes, are put in their place, which lose rank together with them. Rows
+    relative to another frame, and all other rows, stay.
     """
     here = Configuration(robot, q)
-    T = np.eye(len(task.rows(robot)))
+    turned = J.copy()
     first = 0
     for one in task:
         function = one.function
-        if isinstance(function, Pose | Orientation):
-            R = _rotation(here, function.frame, function.relative_to)
-            for row in range(first, first + len(function.rows(robot)), 3):
-                T[row : row + 3, row : row + 3] = R
-        first += len(function.rows(robot))
-    return T
-
-
-def _rotation(here: Configuration, frame: str, relative_to: str | None) -> Array:
-    placement: pin.SE3 = here.placement(frame)
-    if relative_to is not None:
-        placement = here.placement(relative_to).actInv(placement)
-    return np.array(placement.rotation)
+        rows = len(function.rows(robot))
+        if isinstance(function, Pose | Orientation) and function.relative_to is None:
+            turned[first : first + rows] = (here.jacobian(function.frame) @ here.S)[-rows:]
+        first += rows
+    return turned
 
 
 def _left_vectors(J: Array, scales: ArrayLike) -> tuple[Array, Array]:

@@ -60,7 +60,8 @@ class Departure(NamedTuple):
     Attributes
     ----------
     first, worst : the samples at which it left and at which it was farthest from it
-    bound (N,) : the largest ‖e‖ that gain, integration and target explain
+    promise (N,) : ‖exp(-K (t - t0)) e(t0)‖
+    bound (N,) : the largest ‖e‖ that the promise, integration and the target explain
     unmet (N,) : what the residual adds to it, where the inputs did not do what the task asked
     missed : whether the run did not keep its promise; else the error left it by little, or because of the
         residual, and came back
@@ -68,6 +69,7 @@ class Departure(NamedTuple):
 
     first: int
     worst: int
+    promise: Array
     bound: Array
     unmet: Array
     missed: bool
@@ -89,7 +91,8 @@ def departure(samples: Samples, step: Array, target: Array | None = None) -> Dep
     decays = decay(t, samples.K)
     norm = _sizes(error)
     size = 1.0 + norm[0]
-    bound = promised(t, error, samples.K) + np.minimum(accumulated(step, decays), MOST * size)
+    promise = promised(t, error, samples.K)
+    bound = promise + np.minimum(accumulated(step, decays), MOST * size)
     if target is not None:
         bound = bound + accumulated(target, decays)
     short = np.where(differs(samples.residual, samples.rate), samples.residual, 0.0)
@@ -99,7 +102,7 @@ def departure(samples: Samples, step: Array, target: Array | None = None) -> Dep
     (beyond,) = np.nonzero(excess > ENDS * size)
     if not beyond.size:
         return None
-    return Departure(int(beyond[0]), int(np.argmax(excess)), bound, unmet, missed)
+    return Departure(int(beyond[0]), int(np.argmax(excess)), promise, bound, unmet, missed)
 
 
 def decay(t: Array, K: Array) -> Array:

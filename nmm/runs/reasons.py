@@ -7,7 +7,7 @@ import pinocchio as pin
 
 from nmm.arrays import Array
 from nmm.control.controller import Controller
-from nmm.control.lost_directions import PARTS, lost_directions, weakest_direction, world_axes
+from nmm.control.lost_directions import PARTS, in_world_axes, lost_directions, weakest_direction
 from nmm.robots.reach import joint_position, longest_reach, reach
 from nmm.runs.promise import Departure, Samples
 
@@ -36,15 +36,12 @@ def lost_words(controller: Controller, q: Array, J: Array) -> list[str]:
     """What nothing moves of the task at or near q (n,), where its matrix is J (s, m)."""
     if not np.all(np.isfinite(J)):
         return []
-    return lost_directions(
-        world_axes(controller.task, controller.robot, q) @ J, controller.rows, row_scales(controller)
-    )
+    return lost_directions(_in_world_axes(controller, q, J), controller.rows, row_scales(controller))
 
 
 def weakest_words(controller: Controller, q: Array, J: Array) -> str:
     """What of the task the inputs move the least at q (n,), where its matrix is J (s, m)."""
-    T = world_axes(controller.task, controller.robot, q)
-    return weakest_direction(T @ J, controller.rows, row_scales(controller))
+    return weakest_direction(_in_world_axes(controller, q, J), controller.rows, row_scales(controller))
 
 
 def out_of_reach(controller: Controller, q: Array, target: Array) -> str:
@@ -73,7 +70,7 @@ def out_of_reach(controller: Controller, q: Array, target: Array) -> str:
 def stretched(controller: Controller, q: Array, J: Array) -> str:
     """A sentence where an arm is stretched and its direction is the one that moves the least; else ""."""
     robot = controller.robot
-    turned = world_axes(controller.task, robot, q) @ J
+    turned = _in_world_axes(controller, q, J)
     y = np.linalg.svd(turned / row_scales(controller)[:, np.newaxis])[0][:, -1]
     for frame, places in _positioned(controller).items():
         arm = reach(robot, frame)
@@ -97,10 +94,9 @@ def singularity(controller: Controller, samples: Samples, q: Array, found: Depar
     """Whether J was singular between two samples, or nearly singular, where the error left its promise."""
     first, last = max(0, found.first - 1), min(len(q) - 1, found.worst + 1)
     norm = np.linalg.norm(samples.error, axis=1)
-    grown = np.diff(norm[first : last + 1])
-    if grown.size:
-        k = first + int(np.argmax(grown))
-        passed = _passed(controller, samples, q, k) if grown.max() >= JUMP * (1.0 + norm[k]) else ""
+    grown = np.diff(norm[first : last + 1]) >= JUMP * (1.0 + norm[first:last])
+    if grown.any():
+        passed = _passed(controller, samples, q, first + int(np.argmax(grown)))
         if passed:
             return passed
     ratios = _ratios(controller, samples.J[first : last + 1])
@@ -140,6 +136,10 @@ def unresolved(samples: Samples, found: Departure) -> str:
     if larger == 0.0 or change < 0.5 * larger:
         return ""
     return f"along that step the inputs changed by {100 * change / larger:.0f} % of their size"
+
+
+def _in_world_axes(controller: Controller, q: Array, J: Array) -> Array:
+    return in_world_axes(J, controller.task, controller.robot, q)
 
 
 def _passed(controller: Controller, samples: Samples, q: Array, k: int) -> str:
