@@ -17,6 +17,7 @@ from urdf_parts import robot as urdf
 
 import nmm
 from nmm.control.lost_directions import in_world_axes, lost_directions
+from nmm.resolvers import Answer, Problem, Status
 from nmm.robots.reach import joint_position, reach
 from nmm.robots.robot import Robot
 from nmm.runs.chattering import chattering
@@ -27,8 +28,12 @@ TIP = nmm.Task(nmm.Position("ee", "xy"), nmm.Circle([2, 2], 3, 0.08 * pi, 5 / 4 
 UR3 = DATA + "ur_description/urdf/ur3_robot.urdf"
 
 
+def plain(problem: Problem) -> np.ndarray:
+    return np.linalg.pinv(problem.J) @ problem.rate
+
+
 def clipped(limit: float) -> nmm.CallableResolver:
-    return nmm.CallableResolver(lambda J, rate, h: np.clip(np.linalg.pinv(J) @ rate, -limit, limit))
+    return nmm.CallableResolver(lambda problem: np.clip(plain(problem), -limit, limit))
 
 
 # The residual
@@ -61,6 +66,21 @@ def test_inputs_that_are_clipped_at_the_start_are_told(robot_2r: Robot) -> None:
     assert free.complete
     assert free.warnings == ()
     assert free.unmet.samples == 0
+
+
+def test_a_rate_that_is_scaled_on_purpose_is_recorded(robot_2r: Robot) -> None:
+    def scaled(problem: Problem) -> Answer:
+        u = plain(problem)
+        scale = min(1.0, 1.5 / np.abs(u).max())
+        return Answer(scale * u, Status.RELAXED if scale < 1 else Status.SOLVED, np.array([scale]), 0.0, 1.0)
+
+    run = nmm.simulate(nmm.Controller(robot_2r, TIP, nmm.CallableResolver(scaled)), START, 10.0, 0.01)
+    assert run.complete, run.message
+    assert run.scale.shape == (len(run), 1)
+    assert np.all(run.scale[run.residual > 1e-9] < 1.0)
+    assert np.all(run.scale[run.residual <= 1e-9] == 1.0)
+    assert any(f"down to {run.scale.min():.3g} of it" in warning for warning in run.warnings)
+    assert run.summary()["scale_min"] == run.scale.min() < 1.0
 
 
 def test_an_older_folder_without_scale_loads(robot_2r: Robot, tmp_path: Path) -> None:
@@ -102,12 +122,12 @@ def test_what_a_motion_does_otherwise_is_no_honest_error(robot_2r: Robot) -> Non
     """Inputs that are wrong so that the error ends elsewhere, at any dt, though the residual says nothing."""
 
     class Liar(nmm.CallableResolver):
-        def finish(self, J, rate, h, u, report) -> None:  # type: ignore[no-untyped-def]
-            super().finish(J, rate, h, u, report)
-            report[1] = 0.0
+        def finish(self, problem, dimensions, answer) -> None:  # type: ignore[no-untyped-def]
+            super().finish(problem, dimensions, answer)
+            answer.residual[()] = 0.0
 
-    def wrong(J: np.ndarray, rate: np.ndarray, h: np.ndarray) -> np.ndarray:
-        return 0.8 * np.linalg.pinv(J) @ rate
+    def wrong(problem: Problem) -> np.ndarray:
+        return 0.8 * plain(problem)
 
     for method, dt in (("rk4", 0.02), ("euler", 0.02), ("zoh", 0.005)):
         run = nmm.simulate(nmm.Controller(robot_2r, TIP, Liar(wrong)), START, 4.0, dt, method)
@@ -207,7 +227,7 @@ def test_rows_in_world_axes_lose_rank_with_the_tasks_own(tmp_path: Path, rng: np
         frame = robot.frames[-1]
         q = rng.uniform(0.1, 0.3, robot.n)
         task = nmm.Task(nmm.Pose(frame), rng.uniform(-0.5, 0.5, 6))
-        still = nmm.CallableResolver(lambda J, rate, h: np.zeros(J.shape[1]))
+        still = nmm.CallableResolver(lambda problem: np.zeros(problem.J.shape[1]))
         J = nmm.Controller(robot, task, still).evaluate(0.0, q).J
         turned = in_world_axes(J, nmm.Stack.of(task), robot, q)
         for matrix in (J, turned):

@@ -13,6 +13,7 @@ import numpy as np
 from nmm.analysis.singular.reached import stacked
 from nmm.arrays import Array
 from nmm.cli.output import console, show_text
+from nmm.control.directions import SMALL, direction_text
 from nmm.words import measured
 
 if TYPE_CHECKING:

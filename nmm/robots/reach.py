@@ -49,12 +49,6 @@ def reach(robot: Robot, frame: str) -> Reach | None:
     return Reach(str(model.names[joints[0]]), length)
 
 
-def longest_reach(robot: Robot) -> float:
-    """The longest finite reach of the robot's frames, m: what counts as 1 of a length. 1 m without an arm."""
-    found = [arm.length for frame in robot.frames if (arm := reach(robot, frame)) is not None]
-    return max((length for length in found if 0.0 < length < np.inf), default=1.0)
-
-
 def joint_position(robot: Robot, q: Array, joint: str) -> Array:
     """A joint's origin (3,) in the world at q (n,), m; a sliding joint's, where it begins to slide."""
     data = robot.model.createData()

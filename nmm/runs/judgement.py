@@ -103,7 +103,7 @@ def judge(
     found = assess(controller, recorder, advance, dt)
     unmet = residuals(samples.t, samples.residual, samples.rate)
     chatter = chattering(samples.t, samples.u, controller.robot.u_names)
-    warnings = [unmet.sentence] if unmet.samples else []
+    warnings = [_joined(unmet.sentence, _relaxed(recorder.scale))] if unmet.samples else []
     seen = _seen(controller, recorder, samples, found, chatter)
     if outcome is Outcome.INTERRUPTED:
         return Verdict(outcome, message, warnings)
@@ -292,6 +292,11 @@ def _lost(controller: Controller, recorder: Recorder, ended: Ended) -> list[str]
     if len(recorder):
         sentences.append(reasons.out_of_reach(controller, ended.q, recorder.target[-1]))
     return [sentence for sentence in sentences if sentence]
+
+
+def _relaxed(scale: Array) -> str:
+    least = float(scale.min(initial=1.0))
+    return f"its resolver scales the rate on purpose, down to {least:.3g} of it" if least < 1.0 else ""
 
 
 def _hopeless(seen: list[str]) -> bool:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 
 from nmm.arrays import Array
 from nmm.control.controller import Controller
 from nmm.control.lost_directions import PARTS, in_world_axes, lost_directions, weakest_direction
-from nmm.robots.reach import joint_position, longest_reach, reach
+from nmm.functions.function import row_scales
+from nmm.robots.configuration import Configuration
+from nmm.robots.reach import joint_position, reach
 from nmm.runs.promise import Departure, Samples
 
 #: Below this ratio of smallest to largest singular value of the scaled J a departure is put down to it.
@@ -26,22 +27,16 @@ STRETCHED, ALONG = 0.75, 0.9
 SWITCHES = 3
 
 
-def row_scales(controller: Controller) -> Array:
-    """How much of each of the task's rows counts as 1, (s,): the robot's reach of lengths, 1 of the rest."""
-    length = longest_reach(controller.robot)
-    return np.array([length if row.unit == "m" else 1.0 for row in controller.rows])
-
-
 def lost_words(controller: Controller, q: Array, J: Array) -> list[str]:
     """What nothing moves of the task at or near q (n,), where its matrix is J (s, m)."""
     if not np.all(np.isfinite(J)):
         return []
-    return lost_directions(_in_world_axes(controller, q, J), controller.rows, row_scales(controller))
+    return lost_directions(_in_world_axes(controller, q, J), controller.rows, _scales(controller))
 
 
 def weakest_words(controller: Controller, q: Array, J: Array) -> str:
     """What of the task the inputs move the least at q (n,), where its matrix is J (s, m)."""
-    return weakest_direction(_in_world_axes(controller, q, J), controller.rows, row_scales(controller))
+    return weakest_direction(_in_world_axes(controller, q, J), controller.rows, _scales(controller))
 
 
 def out_of_reach(controller: Controller, q: Array, target: Array) -> str:
@@ -71,15 +66,13 @@ def stretched(controller: Controller, q: Array, J: Array) -> str:
     """A sentence where an arm is stretched and its direction is the one that moves the least; else ""."""
     robot = controller.robot
     turned = _in_world_axes(controller, q, J)
-    y = np.linalg.svd(turned / row_scales(controller)[:, np.newaxis])[0][:, -1]
+    y = np.linalg.svd(turned / _scales(controller)[:, np.newaxis])[0][:, -1]
     for frame, places in _positioned(controller).items():
         arm = reach(robot, frame)
         if arm is None or not np.isfinite(arm.length):
             continue
         joint = joint_position(robot, q, arm.joint)
-        data = robot.model.createData()
-        pin.framesForwardKinematics(robot.model, data, q)
-        line = data.oMf[robot.frame_id(frame)].translation - joint
+        line = Configuration(robot, q).placement(frame).translation - joint
         away = float(np.linalg.norm(line))
         along = sum(y[row] * line[axis] for axis, row in places.items())
         if away > STRETCHED * arm.length and abs(along) > ALONG * away * np.linalg.norm(y):
@@ -138,6 +131,10 @@ def unresolved(samples: Samples, found: Departure) -> str:
     return f"along that step the inputs changed by {100 * change / larger:.0f} % of their size"
 
 
+def _scales(controller: Controller) -> Array:
+    return row_scales(controller.rows, controller.robot)
+
+
 def _in_world_axes(controller: Controller, q: Array, J: Array) -> Array:
     return in_world_axes(J, controller.task, controller.robot, q)
 
@@ -164,7 +161,7 @@ def _passed(controller: Controller, samples: Samples, q: Array, k: int) -> str:
 
 def _ratios(controller: Controller, J: Array) -> Array:
     """Smallest over largest singular value of scaled matrices (K, s, m), (K,)."""
-    values = np.linalg.svd(J / row_scales(controller)[:, np.newaxis], compute_uv=False)
+    values = np.linalg.svd(J / _scales(controller)[:, np.newaxis], compute_uv=False)
     return np.asarray(values[:, -1] / np.maximum(values[:, 0], 1e-300))
 
 

@@ -37,7 +37,7 @@ class Recorder:
         self._q_dot = np.empty((count, robot.n))
         self._rows = np.empty((4, count, s))
         self._scalars = np.empty((2, count))
-        self._scale = np.ones((count, 1))  # no resolver relaxes a task yet
+        self._scale: Array | None = None
         self._J = np.empty((count, s, robot.n_u))
         self._partition = np.empty((count, s), dtype=np.int64)
         self._count = 0
@@ -65,6 +65,11 @@ class Recorder:
     def target(self) -> Array:
         """The targets recorded so far, (N, s)."""
         return self._rows[1, : self._count]
+
+    @property
+    def scale(self) -> Array:
+        """The shares of the task's rate that were left so far, (N, levels)."""
+        return np.ones((0, 1)) if self._scale is None else self._scale[: self._count]
 
     @property
     def samples(self) -> Samples:
@@ -101,6 +106,9 @@ class Recorder:
         self._scalars[0, k] = sample.objective
         self._scalars[1, k] = sample.residual
         self._J[k] = sample.J
+        if self._scale is None:
+            self._scale = np.ones((len(self._times), len(sample.scale)))
+        self._scale[k] = sample.scale
         self._partition[k] = sample.partition
 
     def warn_once(self, t: float, warning: str) -> None:
@@ -154,7 +162,7 @@ class Recorder:
             sigma_min=singular_values[:, -1],
             partition=self._partition[:count].copy(),
             residual=self._scalars[1, :count].copy(),
-            scale=self._scale[:count].copy(),
+            scale=self.scale.copy(),
             unmet=residuals(self.t, self._scalars[1, :count], self._rows[3, :count]),
             r_names=tuple(row.name for row in rows),
             r_units=tuple(row.unit for row in rows),

@@ -7,9 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nmm.arrays import Array
-
-#: J u counts as the rate where they differ by no more than this, times 1 + ‖rate‖.
-EXACT = 1e-9
+from nmm.resolvers.answer import EXACT
 
 
 class Residuals(NamedTuple):

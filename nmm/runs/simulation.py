@@ -196,5 +196,3 @@ def _sample(controller: Controller, t: float, q: Array) -> Step:
     if not sample.u.dot(sample.u) < BOUND**2:
         raise DivergedError(f"at t = {t:g} s the motion has diverged: the inputs are beyond {BOUND:g}")
     return sample
-
-

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from nmm.analysis.redundancy.motion_words import coordinate_words, input_words, motion_text
 from nmm.analysis.redundancy.null_space import projector, readable_null_space
-from nmm.control.directions import direction_text
 from nmm.analysis.singular.jacobians import Jacobians, Subject, checked
 from nmm.analysis.singular.parts import null_space, rank_of
 from nmm.analysis.singular.singularity import TOLERANCE

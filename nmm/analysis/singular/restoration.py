@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from nmm.arrays import Array, Integers
-from nmm.control.directions import direction_text
 
 #: A rate this small beside the largest singular value is rounding of the differences.
 SMALL_RATE = 1e-7
