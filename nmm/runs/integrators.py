@@ -162,6 +162,14 @@ class Followed:
     robot: Robot
 
     @property
+    def order(self) -> int:
+        return self.integrator.order
+
+    @property
+    def tolerance(self) -> float:
+        return self.integrator.tolerance
+
+    @property
     def stability(self) -> tuple[float, ...]:
         return self.integrator.stability
 

@@ -14,45 +14,19 @@ import numpy as np
 
 from nmm.arrays import Array
 from nmm.control.controller import Controller
-from nmm.errors import RunError
 from nmm.runs import reasons
 from nmm.runs.advice import Trial, advised
+from nmm.runs.assessment import Assessment, assess
 from nmm.runs.chattering import Chattering, chattering
 from nmm.runs.integrators import Integrator
-from nmm.runs.promise import Departure, Samples, adaptive_errors, departure, step_errors
+from nmm.runs.promise import Departure, Samples
 from nmm.runs.recording import Recorder
 from nmm.runs.residuals import residuals
-from nmm.runs.stability import Advice, Instability, find_instability
+from nmm.runs.stability import Advice, Instability
 from nmm.runs.trajectory import Outcome
-
-#: At how many instants of a run the integrator's stability is examined.
-EXAMINED = 20
-#: A target that moves otherwise than its rate says in more than this share of the steps does not only jump.
-OFTEN = 0.05
 
 #: (first sample, dt, most steps) -> the part of the run that was tried from there on, and how it ended.
 Retry = Callable[[int, float, int], tuple[Recorder, Outcome]]
-
-
-class Assessment(NamedTuple):
-    """What is wrong with a run.
-
-    Attributes
-    ----------
-    unstable, examined : the instabilities, and at how many instants they were looked for
-    departure : where the error left its promise
-    target : in how many steps the target moved otherwise than its rate says, where that matters
-    """
-
-    unstable: list[Instability]
-    examined: int
-    departure: Departure | None
-    target: int
-
-    @property
-    def missed(self) -> bool:
-        """Whether the error was not what was promised."""
-        return self.departure is not None and self.departure.missed
 
 
 class Ended(NamedTuple):
@@ -136,60 +110,6 @@ def judge(
     return Verdict(outcome, message, warnings)
 
 
-def assess(controller: Controller, recorder: Recorder, advance: Integrator, dt: float) -> Assessment:
-    """What is wrong with a run whose samples were recorded."""
-    unstable, examined = _examine(controller, recorder, advance, dt)
-    samples = recorder.samples
-    if len(recorder) < 3:
-        return Assessment(unstable, examined, None, 0)
-    if advance.tolerance:
-        steps = adaptive_errors(samples, recorder.q[: len(recorder)], advance.tolerance)
-    else:
-        steps = step_errors(samples, advance.order)
-    found, own = departure(samples, steps), 0
-    if found is not None:  # then it is worth the time to ask the target
-        moved = _target_moves(controller, recorder)
-        found = departure(samples, steps, moved)
-        own = int(np.sum(moved > 1e-9 * (1.0 + np.abs(samples.error).max())))
-        own = own if own > OFTEN * len(moved) else 0
-    return Assessment(unstable, examined, found, own)
-
-
-def _target_moves(controller: Controller, recorder: Recorder) -> Array:
-    """By how much the error changed along each step with q held, otherwise than its rate says, (N - 1,)."""
-    samples, count = recorder.samples, len(recorder)
-    moves = np.empty(count - 1)
-    for k in range(count - 1):
-        ahead = controller.evaluate(float(samples.t[k + 1]), recorder.q[k])
-        rates = samples.rate[k] - samples.K @ samples.error[k] + ahead.rate - samples.K @ ahead.error
-        change = ahead.error - samples.error[k] - 0.5 * (samples.t[k + 1] - samples.t[k]) * rates
-        moves[k] = np.linalg.norm(change)
-    controller.reset()
-    return np.nan_to_num(moves)
-
-
-def _examine(
-    controller: Controller, recorder: Recorder, advance: Integrator, dt: float
-) -> tuple[list[Instability], int]:
-    """The instabilities at some instants of the run, and how many instants were looked at."""
-    if not advance.stability:
-        return [], 0
-    found = []
-    chosen = np.unique(np.linspace(0, len(recorder) - 1, EXAMINED).astype(int))
-    for k in chosen:
-        controller.reset()
-        try:
-            instability = find_instability(
-                controller, float(recorder.t[k]), recorder.q[k], dt, advance.stability
-            )
-        except (RunError, np.linalg.LinAlgError):  # singular just beside this sample: not a matter of dt
-            continue
-        if instability is not None:
-            found.append(instability)
-    controller.reset()
-    return found, len(chosen)
-
-
 def _advice(
     controller: Controller,
     recorder: Recorder,
@@ -209,8 +129,11 @@ def _advice(
         # The whole run where it fits, else from a little before it went wrong.
         fits = samples.t[-1] - samples.t[0] <= most * shorter
         start = 0 if fits else max(0, before - int(0.1 * most * shorter / dt))
-        tried, outcome = retry(start, shorter, most)
-        again = assess(controller, tried, advance, shorter)
+        try:
+            tried, outcome = retry(start, shorter, most)
+            again = assess(controller, tried, advance, shorter)
+        except Exception:  # a user's function may raise anything, where it was not made for
+            return Trial(False, [], float(samples.t[start]), float(samples.t[start]))
         behaves = outcome is Outcome.COMPLETED and not again.unstable and again.departure is None
         return Trial(behaves, again.unstable, float(samples.t[start]), tried.reached)
 

@@ -144,7 +144,10 @@ def _passed(controller: Controller, samples: Samples, q: Array, k: int) -> str:
     shares = np.linspace(0.0, 1.0, BETWEEN + 1)
     t = samples.t
     ways = [(1 - share) * q[k] + share * q[k + 1] for share in shares]
-    matrices = np.array([controller.evaluate(float(t[k]), way).J for way in ways])
+    try:
+        matrices = np.array([controller.evaluate(float(t[k]), way).J for way in ways])
+    except Exception:  # a user's function may raise anything, where it was not made for
+        return ""
     if not np.all(np.isfinite(matrices)):
         return ""
     ratios = _ratios(controller, matrices)

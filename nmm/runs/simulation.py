@@ -80,12 +80,18 @@ def simulate(
         tried, ended = _record(
             controller, advance, _times(start, dt, steps, duration), recorder.q[first], None
         )
+        if ended.outcome is Outcome.INTERRUPTED:
+            raise KeyboardInterrupt
         return tried, ended.outcome
 
     try:
         verdict = judge(controller, recorder, advance, method, dt, ended, retry)
     except KeyboardInterrupt:  # the motion is there; what is lost is what to say of it
-        verdict = Verdict(Outcome.INTERRUPTED, "interrupted while the run was judged", [])
+        if ended.outcome is Outcome.COMPLETED:
+            ended = ended._replace(
+                outcome=Outcome.INTERRUPTED, message="interrupted while the run was judged"
+            )
+        verdict = Verdict(ended.outcome, ended.message, [])
     recorder.warnings += verdict.warnings
     return recorder.trajectory(verdict.outcome, verdict.message, dt, method)
 
