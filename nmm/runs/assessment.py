@@ -1,4 +1,4 @@
-"""What is wrong with a run that was recorded: modes that its dt is too long for, an error that left its promise."""
+"""What is wrong with a recorded run: modes that its dt is too long for, an error that left its promise."""
 
 from __future__ import annotations
 
