@@ -43,7 +43,6 @@ def test_commands_in_the_docs_print_what_the_docs_say() -> None:
     """The same words, and the same numbers but for rounding, counts of starts among them."""
     console = script("console")
     for name in console.PAGES:
-        pytest.importorskip("sympy")
         page = (ROOT / "docs" / name).read_text(encoding="utf-8")
         said, said_numbers = words_and_numbers(page)
         printed, printed_numbers = words_and_numbers(console.rewritten(page, console.COMPARED))
@@ -81,7 +80,6 @@ def test_links_between_files_lead_somewhere(page: str) -> None:
 
 
 def test_the_python_on_singularities_runs() -> None:
-    pytest.importorskip("sympy")
     text = (ROOT / "docs" / "singularities.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
     names: dict[str, Any] = {}
