@@ -14,8 +14,8 @@ from numpy import cos, pi, sin
 from numpy.typing import NDArray
 
 from nmm.analysis import SingularityReport, analyse
-from nmm.analysis.singular.directions import direction_text, readable_basis
 from nmm.control.controller import Controller
+from nmm.control.directions import direction_text, readable_basis
 from nmm.errors import InputError, SingularError
 from nmm.functions.tasks import Coordinates, Pose, Position, Task
 from nmm.resolvers import ReducedGradient

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,8 +17,6 @@ from nmm.analysis import analyse
 from nmm.cli.app import status_of
 from nmm.functions.tasks import Pose, Position
 from nmm.robots.loading import load
-
-pytest.importorskip("sympy")
 
 Command = Callable[..., Result]
 
@@ -183,11 +180,3 @@ def test_what_has_no_formula_gives_its_numbers_instead(run: Command) -> None:
     latex = run("ur5_unicycle_pose", "--symbolic", "--latex")
     assert (latex.status, latex.out) == (2, "")
     assert latex.err.startswith("nmm singularities: --latex: ")
-
-
-def test_without_sympy(run: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "sympy", None)
-    result = run(*POSITION, "--symbolic")
-    assert (result.status, result.out) == (2, "")
-    assert "pip install nmm[symbolic]" in result.err
-    assert run(*POSITION).status == 0

@@ -12,13 +12,15 @@ from derivatives import assert_close, check_equation, check_function, partials
 from function_grid import random_configuration
 from numpy.typing import NDArray
 from paper_cases import CASES, H1, TIP, Case
+from symbolic_checks import check_numbers
 
+from nmm.analysis.formulas import symbolic
 from nmm.control.controller import Controller
 from nmm.errors import InputError
 from nmm.functions.function import Function, Row, Shown, Stage
 from nmm.functions.objectives import Manipulability, Sum
 from nmm.functions.references import Line
-from nmm.functions.tasks import CallableFunction, Task
+from nmm.functions.tasks import CallableFunction, Position, Task
 from nmm.kernels.compiled import PLATFORM, Kernel, kernel
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.platforms import Platform
@@ -94,6 +96,12 @@ def test_platform_with_its_own_joint(robot: Robot, rng: np.random.Generator) -> 
         G_q = partials(platform.G, q[:4])
         direction = rng.normal(size=4)
         assert_close(platform.G_dot(q[:4], direction), G_q @ direction)
+
+
+def test_platform_and_function_of_ones_own_have_formulas(robot: Robot, rng: np.random.Generator) -> None:
+    """Nothing is written for them: the kernels themselves are run on symbols."""
+    for function in (Position("ee", "xy"), SquareDistance("ee", "base_footprint", 0.0)):
+        check_numbers(robot, function, symbolic(robot, function), rng.uniform(-3, 3, (3, robot.n)))
 
 
 @pytest.mark.parametrize("rows", ["x", "xy", ("x", "y", "rz")], ids=str)

@@ -199,8 +199,9 @@ def test_bad_input_is_refused(robot_2r: Robot, change: dict, words: str) -> None
 def test_a_singularity_passed_between_two_samples_is_no_success() -> None:
     """A trailer's arm without a posture to keep: the reduced gradient runs it into its end of reach."""
     run = nmm.Scenario.load("small_arm_second_trailer", {"objective": None}).run()
-    assert run.outcome == "unstable"
+    assert run.outcome == "missed"
     assert "a singular configuration was passed between two samples" in run.message
+    assert "along" in run.message.split("lost there: ")[1]  # and says what was lost
 
 
 def test_a_target_that_jumps_is_not_taken_for_a_singularity(robot_2r: nmm.Robot) -> None:

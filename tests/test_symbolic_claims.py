@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sympy
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from symbolic_checks import PAPER, TASKS, made
@@ -34,8 +35,6 @@ from nmm.errors import InputError
 from nmm.functions.tasks import Coordinates, Heading, Position
 from nmm.platforms import Omnidirectional
 from nmm.robots.loading import load
-
-sympy = pytest.importorskip("sympy")
 
 Array = NDArray[np.float64]
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sympy
 from robot_grid import built, frame_of
 from scipy.optimize import least_squares
 from spatial_arms import load_tiago
@@ -18,8 +19,6 @@ from urdf_parts import robot as urdf
 import nmm
 from nmm.analysis.formulas import TooLarge, never_zero, singular_set, symbolic
 from nmm.functions.tasks import CenterOfMass, Orientation, Pose, Position, Posture
-
-sympy = pytest.importorskip("sympy")
 
 
 @pytest.mark.parametrize("seen_from", [None, "link2"])

@@ -48,6 +48,10 @@ def _rows(trajectory: Trajectory, numbers: dict[str, Any]) -> Iterator[tuple[str
         yield "objective H", f"{trajectory.objective[0]:.4g} → {trajectory.objective[-1]:.4g}"
         yield "mean H, second half", f"{numbers['objective_mean_second_half']:.4g}"
     yield "smallest σ_min", f"{numbers['sigma_min']:.3g}"
+    if trajectory.unmet.samples:
+        unmet = trajectory.unmet
+        share = f"{unmet.samples} of {len(trajectory)} samples"
+        yield "J u differs from the rate", f"in {share}, by {unmet.largest:.3g} at most"
     if trajectory.resolver == "rg":
         yield "switches of partition", str(numbers["partition_switches"])
     yield "lateral slip", f"{numbers['lateral_slip_max']:.1g} m/s at most"

@@ -124,12 +124,12 @@ def _run(scenario: Scenario) -> Trajectory:
 
 
 def _status(command: str, trajectories: Sequence[Trajectory], folder: Path) -> int:
-    """0, or 1 with a line for each run that did not reach its end."""
+    """0, or 1 with a line for each run that did not end as asked."""
     failed = [trajectory for trajectory in trajectories if not trajectory.complete]
     for trajectory in failed:
         complain(
             command,
             f"{trajectory.resolver.upper()} {trajectory.outcome}: {trajectory.message}; "
-            f"the part that was computed is in {folder}",
+            f"{'the run' if trajectory.outcome == 'missed' else 'the part that was computed'} is in {folder}",
         )
     return FAILED if failed else OK

@@ -54,9 +54,7 @@ def singularities(
     ] = None,
     symbolic: Annotated[
         bool,
-        typer.Option(
-            "--symbolic", help="f, J and its minors as formulas, and what follows from them; needs SymPy."
-        ),
+        typer.Option("--symbolic", help="f, J and its minors as formulas, and what follows from them."),
     ] = False,
     latex: Annotated[
         bool, typer.Option("--latex", help="With --symbolic: only the formulas, as LaTeX.")

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nmm.analysis.singular.directions import SMALL, direction_text
 from nmm.analysis.singular.reached import stacked
 from nmm.arrays import Array
 from nmm.cli.output import console, show_text
+from nmm.control.directions import SMALL, direction_text
 from nmm.words import measured
 
 if TYPE_CHECKING:

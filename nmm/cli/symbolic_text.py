@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from nmm.analysis.singular.minors import Columns, chosen_columns, minor_name
@@ -29,10 +28,8 @@ def formulas(given: Studied) -> tuple[SymbolicAnalysis | None, str]:
 
     Raises
     ------
-    InputError : SymPy is missing, or the task does not fit the robot
+    InputError : the task does not fit the robot
     """
-    if find_spec("sympy") is None:
-        raise InputError("symbolic: needs SymPy: pip install nmm[symbolic]")
     from nmm.analysis.formulas import symbolic
     from nmm.analysis.singular.jacobians import Jacobians
 

@@ -12,7 +12,7 @@ import yaml
 
 from nmm.errors import InputError, RobotError
 from nmm.folders.whole import has_format, replaced_folder
-from nmm.runs.summary import FORMAT
+from nmm.runs.summary import FORMAT, unmet
 
 if TYPE_CHECKING:
     from nmm.robots.robot import Robot
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 ARRAYS = ("t", "q", "u", "q_dot", "r", "r_d", "error", "objective", "sigma_min", "partition", "residual")
 OPTIONAL_ARRAYS = ("path", "desired", "target")
+#: Arrays that older folders lack, with what they then were.
+LATER_ARRAYS = {"scale": lambda count: np.ones((count, 1))}
 
 
 def is_run(folder: Path) -> bool:
@@ -100,6 +102,8 @@ def load(folder: str | Path, robot: Robot | None = None) -> Trajectory:
         with np.load(folder / "trajectory.npz", allow_pickle=False) as file:
             arrays = {name: file[name] for name in ARRAYS}
             arrays |= {name: file.get(name) for name in OPTIONAL_ARRAYS}
+            count = len(arrays["t"])
+            arrays |= {name: file[name] if name in file else was(count) for name, was in LATER_ARRAYS.items()}
     except (OSError, ValueError, KeyError) as error:
         raise InputError(f"{folder / 'trajectory.npz'}: cannot be read: {error}") from None
     scenario = None
@@ -122,6 +126,7 @@ def load(folder: str | Path, robot: Robot | None = None) -> Trajectory:
         message=summary["message"],
         warnings=tuple(summary["warnings"]),
         frame=summary["frame"],
+        unmet=unmet(summary),
         scenario=scenario,
         **arrays,
     )
@@ -138,7 +143,7 @@ def _from_its_file(folder: Path, said: dict[str, Any]) -> Robot:
 
 
 def _arrays(trajectory: Trajectory) -> dict[str, Any]:
-    arrays = {name: getattr(trajectory, name) for name in ARRAYS}
+    arrays = {name: getattr(trajectory, name) for name in (*ARRAYS, *LATER_ARRAYS)}
     arrays |= {
         name: getattr(trajectory, name) for name in OPTIONAL_ARRAYS if getattr(trajectory, name) is not None
     }
@@ -161,6 +166,7 @@ def _write_csv(trajectory: Trajectory, path: Path) -> None:
         ("sigma_min", trajectory.sigma_min),
         *((f"partition_{i}", trajectory.partition[:, i]) for i in range(len(rows))),
         ("residual", trajectory.residual),
+        *((f"scale_{i}", trajectory.scale[:, i]) for i in range(trajectory.scale.shape[1])),
     ]
     with path.open("w", newline="", encoding="utf-8") as file:
         csv.writer(file, lineterminator="\n").writerow([name for name, _ in columns])

@@ -27,8 +27,9 @@ class Platform(ABC):
     3. implements `pfaffian`, the constraint rows with `A(qp) G(qp) = 0`, written independently
        of G (from the rolling of the wheels): the tests check the one against the other.
 
-    It may say more: `parameters` (the numbers that the kernel reads), `fit` (how to measure them in a robot's
-    file), `coordinate_limits`, `problem` (where its wheels cannot roll, and why), `roller`.
+    It may say more: `parameters` (the numbers that the kernel reads) and their `parameter_names`, `fit` (how
+    to measure them in a robot's file), `coordinate_limits`, `problem` (where its wheels cannot roll, and
+    why), `roller`.
 
     Parameters
     ----------
@@ -88,6 +89,12 @@ class Platform(ABC):
     def parameters(self) -> Array:
         """The numbers that `velocity_map` reads (lengths in m, angles in rad); none by default."""
         return np.zeros(0)
+
+    @property
+    def parameter_names(self) -> Mapping[str, str]:
+        """What the lengths in `parameters` are called in formulas, in their order, each with what it is where
+        its name does not say so ("" otherwise); without names, formulas have the numbers."""
+        return {}
 
     @property
     def input_limits(self) -> Array:

@@ -122,6 +122,10 @@ class _Bicycle(Platform):
     def parameters(self) -> Array:
         return np.array([self.wheelbase])
 
+    @property
+    def parameter_names(self) -> Mapping[str, str]:
+        return {"L": ""}
+
     def described(self) -> dict[str, str]:
         widest = "no limit" if self.max_steering is None else f"{math.degrees(self.max_steering):.4g}°"
         return {"wheelbase": f"{self.wheelbase:g} m", "steering": self.steering, "max_steering": widest}

@@ -79,6 +79,10 @@ class DifferentialDrive(Platform):
     def parameters(self) -> Array:
         return np.array([self.radius, self.track])
 
+    @property
+    def parameter_names(self) -> Mapping[str, str]:
+        return {"r": "", "b": ""}
+
     def described(self) -> dict[str, str]:
         return {"radius": f"{self.radius:g} m", "track": f"{self.track:g} m"}
 

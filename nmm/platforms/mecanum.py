@@ -18,7 +18,7 @@ from nmm.platforms.measuring import NEAR, misfit, rolls_forward, same, say_wheel
 
 @kernel(PLATFORM)
 def mecanum(qp: Array, parameters: Array, G: Array, G_q: Array) -> None:
-    """vx = r drive, vy = r strafe, ω = 2 r turn / (length + width); parameters = [r, length, width]."""
+    """vx = r drive, vy = r strafe, ω = r turn / k; parameters = [r, k], k = (length + width) / 2."""
     radius = parameters[0]
     cosine = radius * math.cos(qp[2])
     sine = radius * math.sin(qp[2])
@@ -26,7 +26,7 @@ def mecanum(qp: Array, parameters: Array, G: Array, G_q: Array) -> None:
     G[0, 1] = -sine
     G[1, 0] = sine
     G[1, 1] = cosine
-    G[2, 2] = 2.0 * radius / (parameters[1] + parameters[2])
+    G[2, 2] = radius / parameters[1]
     G_q[0, 0, 2] = -sine
     G_q[0, 1, 2] = -cosine
     G_q[1, 0, 2] = cosine
@@ -94,7 +94,11 @@ class Mecanum(Platform):
 
     @property
     def parameters(self) -> Array:
-        return np.array([self.radius, self.length, self.width])
+        return np.array([self.radius, (self.length + self.width) / 2.0])
+
+    @property
+    def parameter_names(self) -> Mapping[str, str]:
+        return {"r": "", "k": "half the sum of the mecanum wheels' length and width"}
 
     def described(self) -> dict[str, str]:
         return {"radius": f"{self.radius:g} m", "length": f"{self.length:g} m", "width": f"{self.width:g} m"}

@@ -145,6 +145,12 @@ class Tractor(Platform):
         return np.array([[trailer.hitch, trailer.length] for trailer in self.trailers]).ravel()
 
     @property
+    def parameter_names(self) -> Mapping[str, str]:
+        # H and L with the trailer's number; alone, the only one's.
+        numbers = [str(i) for i in range(1, len(self.trailers) + 1)] if len(self.trailers) > 1 else [""]
+        return {f"{letter}{number}": "" for number in numbers for letter in "HL"}
+
+    @property
     def coordinate_limits(self) -> Array:
         """Those of each hitch are ±max_angle, if given."""
         limits = super().coordinate_limits

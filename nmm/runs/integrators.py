@@ -23,6 +23,14 @@ class Integrator(Protocol):
     """Takes one sample of the closed loop to the next."""
 
     @property
+    def order(self) -> int:
+        """The error of a step dt is of the order dt^(order + 1)."""
+
+    @property
+    def tolerance(self) -> float:
+        """What the error of a step is kept below where steps adapt, m and rad; 0 where they do not."""
+
+    @property
     def stability(self) -> tuple[float, ...]:
         """Coefficients c of the stability polynomial R(z) = Σ c_k z^k, lowest first; () if steps adapt."""
 
@@ -43,15 +51,19 @@ def combined(q: Array, dt: float, weights: Array, slopes: Array) -> Array:
 
 
 class RungeKutta:
-    """An explicit method: nodes c, rows of the matrix A, weights b, stability polynomial."""
+    """An explicit method: order, nodes c, rows of the matrix A, weights b, stability polynomial."""
+
+    tolerance = 0.0
 
     def __init__(
         self,
+        order: int,
         nodes: tuple[float, ...],
         matrix: tuple[tuple[float, ...], ...],
         weights: tuple[float, ...],
         stability: tuple[float, ...],
     ) -> None:
+        self.order = order
         self.stability = stability
         self._stages = [(node, np.array(row)) for node, row in zip(nodes, matrix, strict=True)]
         self._weights = np.array(weights)
@@ -65,9 +77,10 @@ class RungeKutta:
         return ahead
 
 
-EULER = RungeKutta((), (), (1.0,), (1.0, 1.0))
-MIDPOINT = RungeKutta((0.5,), ((0.5,),), (0.0, 1.0), (1.0, 1.0, 1 / 2))
+EULER = RungeKutta(1, (), (), (1.0,), (1.0, 1.0))
+MIDPOINT = RungeKutta(2, (0.5,), ((0.5,),), (0.0, 1.0), (1.0, 1.0, 1 / 2))
 RK4 = RungeKutta(
+    4,
     (0.5, 0.5, 1.0),
     ((0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)),
     (1 / 6, 1 / 3, 1 / 3, 1 / 6),
@@ -78,6 +91,7 @@ RK4 = RungeKutta(
 class Adaptive:
     """SciPy's DOP853 between the samples, with a step that keeps the local error below `tolerance`."""
 
+    order = 8
     stability: tuple[float, ...] = ()
 
     def __init__(self, tolerance: float) -> None:
@@ -124,6 +138,7 @@ def drive(kernel: int, parameters: Array, n_p: int, p: int, q: Array, u: Array, 
 class ZeroOrderHold:
     """The inputs stay constant over dt, as on a robot with a sampled controller; the arm's part is exact."""
 
+    order, tolerance = 1, 0.0
     stability: tuple[float, ...] = (1.0, 1.0)
 
     def __init__(self, robot: Robot) -> None:
@@ -145,6 +160,14 @@ class Followed:
 
     integrator: Integrator
     robot: Robot
+
+    @property
+    def order(self) -> int:
+        return self.integrator.order
+
+    @property
+    def tolerance(self) -> float:
+        return self.integrator.tolerance
 
     @property
     def stability(self) -> tuple[float, ...]:

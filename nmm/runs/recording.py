@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from nmm.arrays import Array
 from nmm.control.controller import Controller, Step
@@ -12,12 +13,13 @@ from nmm.functions.program import Program
 from nmm.functions.tasks.position import AXES, Position
 from nmm.robots.robot import Robot
 from nmm.runs.broken_limits import broken_limits
+from nmm.runs.promise import Samples
+from nmm.runs.reasons import weakest_words
+from nmm.runs.residuals import residuals
 from nmm.runs.trajectory import Outcome, Trajectory
 
 #: Below this ratio of smallest to largest singular value a run is warned about.
 NEARLY_SINGULAR = 1e-3
-#: The task error grows by less than this in one step, times 1 + its size (m, rad): feedback lets it fall.
-JUMP = 0.01
 
 
 class Recorder:
@@ -27,13 +29,15 @@ class Recorder:
         self._controller = controller
         self._times = times
         self._shown = _shown(controller)
+        self._K = block_diag(*(task.gain_matrix(controller.robot) for task in controller.task))
         robot, s = controller.robot, len(controller.rows)
         count = len(times)
         self.q = np.empty((count, robot.n))
         self._u = np.empty((count, robot.n_u))
         self._q_dot = np.empty((count, robot.n))
-        self._rows = np.empty((3, count, s))
+        self._rows = np.empty((4, count, s))
         self._scalars = np.empty((2, count))
+        self._scale: Array | None = None
         self._J = np.empty((count, s, robot.n_u))
         self._partition = np.empty((count, s), dtype=np.int64)
         self._count = 0
@@ -53,25 +57,33 @@ class Recorder:
         return float(self._times[self._count - 1]) if self._count else 0.0
 
     @property
-    def keeps_erring(self) -> bool:
-        """Whether the task error of the second half is still of the size of the first half's."""
-        error = np.linalg.norm(self._rows[2, : self._count], axis=1)
-        half = self._count // 2
-        return bool(half and error[half:].max() > 0.1 * error[:half].max())
+    def duration(self) -> float:
+        """What the run was to take, s."""
+        return float(self._times[-1] - self._times[0])
 
     @property
-    def jump(self) -> str | None:
-        """Where the task error grew in one step as no feedback lets it, unless the target itself jumped."""
-        r_d, error = self._rows[1, : self._count], np.linalg.norm(self._rows[2, : self._count], axis=1)
-        grown = np.diff(error) - np.linalg.norm(np.diff(r_d, axis=0), axis=1)
-        jumps = np.flatnonzero(grown >= JUMP * (1.0 + error[:-1]))
-        if not jumps.size:
-            return None
-        k = int(jumps[0])
-        again = f" (and {jumps.size - 1} times later)" if jumps.size > 1 else ""
-        return (
-            f"at t = {self._times[k]:.4g} s the task error jumped from {error[k]:.3g} to {error[k + 1]:.3g} "
-            f"in one step{again}: a singular configuration was passed between two samples"
+    def target(self) -> Array:
+        """The targets recorded so far, (N, s)."""
+        return self._rows[1, : self._count]
+
+    @property
+    def scale(self) -> Array:
+        """The shares of the task's rate that were left so far, (N, levels)."""
+        return np.ones((0, 1)) if self._scale is None else self._scale[: self._count]
+
+    @property
+    def samples(self) -> Samples:
+        """What was recorded of the task so far."""
+        count = self._count
+        return Samples(
+            self.t,
+            self._rows[2, :count],
+            self._rows[3, :count],
+            self._J[:count],
+            self._u[:count],
+            self._scalars[1, :count],
+            self._partition[:count],
+            self._K,
         )
 
     def add(self, sample: Step) -> None:
@@ -90,9 +102,13 @@ class Recorder:
         self._rows[0, k] = sample.r
         self._rows[1, k] = sample.r_d
         self._rows[2, k] = sample.error
+        self._rows[3, k] = sample.rate
         self._scalars[0, k] = sample.objective
         self._scalars[1, k] = sample.residual
         self._J[k] = sample.J
+        if self._scale is None:
+            self._scale = np.ones((len(self._times), len(sample.scale)))
+        self._scale[k] = sample.scale
         self._partition[k] = sample.partition
 
     def warn_once(self, t: float, warning: str) -> None:
@@ -108,7 +124,8 @@ class Recorder:
         if ratio[worst] < NEARLY_SINGULAR:
             self.warnings.append(
                 f"at t = {self._times[worst]:.3g} s the task Jacobian is nearly singular (condition "
-                f"number {1.0 / max(ratio[worst], 1e-300):.2g}); inputs reach "
+                f"number {1.0 / max(ratio[worst], 1e-300):.2g}), nearly lost: "
+                f"{weakest_words(self._controller, self.q[worst], self._J[worst])}; inputs reach "
                 f"{np.abs(self._u[: self._count]).max():.3g}"
             )
 
@@ -119,7 +136,8 @@ class Recorder:
         singular_values = np.linalg.svd(self._J[:count], compute_uv=False).astype(np.float64)
         if outcome is not Outcome.SINGULAR:  # which says so itself
             self._warn_of_singularities(singular_values)
-        if outcome in (Outcome.COMPLETED, Outcome.INTERRUPTED):  # of one that failed it goes without saying
+        ended = outcome in (Outcome.COMPLETED, Outcome.MISSED)
+        if ended or outcome is Outcome.INTERRUPTED:  # of one that failed it goes without saying
             self.warnings += broken_limits(robot, self.t, self.q[:count], self._u[:count])
         frame, columns, target = self._shown
         path, desired = None, None
@@ -144,6 +162,8 @@ class Recorder:
             sigma_min=singular_values[:, -1],
             partition=self._partition[:count].copy(),
             residual=self._scalars[1, :count].copy(),
+            scale=self.scale.copy(),
+            unmet=residuals(self.t, self._scalars[1, :count], self._rows[3, :count]),
             r_names=tuple(row.name for row in rows),
             r_units=tuple(row.unit for row in rows),
             resolver=controller.resolver.name,

@@ -14,14 +14,12 @@ from nmm.control.idle_inputs import idle_inputs
 from nmm.errors import DivergedError, InputError, RunError, SingularError
 from nmm.robots.slip import slip_warnings
 from nmm.runs.integrators import Integrator, integrator
+from nmm.runs.judgement import Ended, Verdict, judge
 from nmm.runs.recording import Recorder
-from nmm.runs.stability import Instability, find_instability
 from nmm.runs.trajectory import Outcome, Trajectory
 
 #: Coordinates or inputs whose norm is beyond this have diverged, m, rad, m/s or rad/s.
 BOUND = 1e6
-#: At how many instants of a run the integrator's stability is examined.
-EXAMINED = 20
 #: The most samples that a run may have; beyond it the numbers do not fit in memory.
 MOST_SAMPLES = 20_000_000
 
@@ -73,18 +71,56 @@ def simulate(
         raise InputError(
             f"dt: {duration:g} s in steps of {dt:g} s are {steps} samples; expected at most {MOST_SAMPLES}"
         )
-    times = np.minimum(np.arange(steps + 1) * dt, duration)
-    times[-1] = duration
     advance = integrator(method, robot, positive(tolerance, "tolerance"))
+    recorder, ended = _record(controller, advance, _times(0.0, dt, steps, duration), q, progress)
+
+    def retry(first: int, dt: float, most: int) -> tuple[Recorder, Outcome]:
+        start = float(recorder.t[first])
+        steps = min(most, max(1, math.ceil((duration - start) / dt - 1e-9)))
+        tried, ended = _record(
+            controller, advance, _times(start, dt, steps, duration), recorder.q[first], None
+        )
+        if ended.outcome is Outcome.INTERRUPTED:
+            raise KeyboardInterrupt
+        return tried, ended.outcome
+
+    try:
+        verdict = judge(controller, recorder, advance, method, dt, ended, retry)
+    except KeyboardInterrupt:  # the motion is there; what is lost is what to say of it
+        if ended.outcome is Outcome.COMPLETED:
+            ended = ended._replace(
+                outcome=Outcome.INTERRUPTED, message="interrupted while the run was judged"
+            )
+        verdict = Verdict(ended.outcome, ended.message, [])
+    recorder.warnings += verdict.warnings
+    return recorder.trajectory(verdict.outcome, verdict.message, dt, method)
+
+
+def _times(start: float, dt: float, steps: int, end: float) -> Array:
+    """start, start + dt, ... of that many steps, none beyond the end, which rounding does not miss."""
+    times = np.minimum(start + np.arange(steps + 1) * dt, end)
+    if end - times[-1] < 1e-6 * dt:
+        times[-1] = end
+    return times
+
+
+def _record(
+    controller: Controller,
+    advance: Integrator,
+    times: Array,
+    q: Array,
+    progress: Callable[[float], None] | None,
+) -> tuple[Recorder, Ended]:
+    """Integrate over the times (N,) from q, and say how that ended."""
     recorder = Recorder(controller, times)
-    outcome, message = Outcome.COMPLETED, ""
-    recorder.warnings += slip_warnings(robot)
+    recorder.warnings += slip_warnings(controller.robot)
     idle = idle_inputs(controller, q)
     if idle:
         recorder.warnings.append(
             f"without effect on task and objective: {', '.join(idle)}; at first order nothing moves "
             f"{'it' if len(idle) == 1 else 'them'} (an objective can)"
         )
+    outcome, message = Outcome.COMPLETED, ""
     controller.reset()
     try:
         _integrate(controller, advance, recorder, times, q, progress)
@@ -95,23 +131,10 @@ def simulate(
     except RunError as error:
         outcome, message = Outcome.FAILED, str(error)
     except KeyboardInterrupt:
-        outcome, message = Outcome.INTERRUPTED, f"interrupted after {recorder.reached:g} s of {duration:g} s"
-    try:
-        unstable, examined = _examine(controller, recorder, advance, dt)
-    except KeyboardInterrupt:  # the motion is there; what is lost is advice
-        unstable, examined = [], 0
-    if unstable:
-        worst = max(unstable, key=lambda found: found.rate)
-        advice = worst.describe(method, dt)
-        if outcome is Outcome.COMPLETED and (2 * len(unstable) > examined or recorder.keeps_erring):
-            outcome, message = Outcome.UNSTABLE, advice
-        elif outcome is Outcome.COMPLETED:
-            recorder.warnings.append(f"for part of the run {advice}")
-        else:
-            message = f"{message}; {advice}"
-    if outcome is Outcome.COMPLETED and recorder.jump is not None:
-        outcome, message = Outcome.UNSTABLE, recorder.jump
-    return recorder.trajectory(outcome, message, dt, method)
+        outcome = Outcome.INTERRUPTED
+        message = f"interrupted after {recorder.reached:g} s of {times[-1]:g} s"
+    last = recorder.q[len(recorder) - 1] if len(recorder) else q
+    return recorder, Ended(outcome, message, last, controller.derivatives[0].copy())
 
 
 def _integrate(
@@ -179,25 +202,3 @@ def _sample(controller: Controller, t: float, q: Array) -> Step:
     if not sample.u.dot(sample.u) < BOUND**2:
         raise DivergedError(f"at t = {t:g} s the motion has diverged: the inputs are beyond {BOUND:g}")
     return sample
-
-
-def _examine(
-    controller: Controller, recorder: Recorder, advance: Integrator, dt: float
-) -> tuple[list[Instability], int]:
-    """The instabilities at some instants of the run, and how many instants were looked at."""
-    if not advance.stability or not len(recorder):
-        return [], 0
-    found = []
-    chosen = np.unique(np.linspace(0, len(recorder) - 1, EXAMINED).astype(int))
-    for k in chosen:
-        controller.reset()
-        try:
-            instability = find_instability(
-                controller, float(recorder.t[k]), recorder.q[k], dt, advance.stability
-            )
-        except (RunError, np.linalg.LinAlgError):  # singular just beside this sample: not a matter of dt
-            continue
-        if instability is not None:
-            found.append(instability)
-    controller.reset()
-    return found, len(chosen)

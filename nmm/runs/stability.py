@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from nmm.arrays import Array
 from nmm.control.controller import Controller
 from nmm.functions.callbacks import STEP
+
+
+class Advice(NamedTuple):
+    """The dt (s) with which a run behaved when it was tried, and from when to when (s)."""
+
+    dt: float
+    start: float
+    end: float
 
 
 @dataclass(frozen=True)
@@ -22,13 +31,16 @@ class Instability:
     rate: float
     limit: float
 
-    def describe(self, method: str, dt: float) -> str:
-        """One sentence with advice."""
-        return (
+    def describe(self, method: str, dt: float, advice: Advice | None) -> str:
+        """One sentence, with advice where a shorter dt was tried and followed the motion."""
+        said = (
             f"alpha * dt (or K * dt) is too large: at t = {self.t:.3g} s a mode of the closed loop decays "
-            f"with {self.rate:.3g} 1/s, which {method} follows only for dt below {self.limit:.3g} s "
-            f"(dt is {dt:g} s)"
+            f"with {self.rate:.3g} 1/s, which {method} does not follow with dt = {dt:g} s"
         )
+        if advice is None:
+            return said
+        tried = f"tried from t = {advice.start:g} to {advice.end:g} s"
+        return f"{said}; a dt below {advice.dt:.3g} s follows it ({tried})"
 
 
 def linearisation(controller: Controller, t: float, q: Array) -> Array:

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nmm.runs.residuals import NONE, Residuals
+
 if TYPE_CHECKING:
     from nmm.runs.trajectory import Trajectory
 
@@ -59,6 +61,8 @@ def summarise(trajectory: Trajectory) -> dict[str, Any]:
             "objective_max_second_half": float(trajectory.objective[half].max()),
             "sigma_min": float(trajectory.sigma_min.min()),
             "residual_max": float(trajectory.residual.max()),
+            **{f"unmet_{name}": value for name, value in trajectory.unmet._asdict().items()},
+            "scale_min": float(trajectory.scale.min()),
             "lateral_slip_max": lateral_slip(trajectory),
             "partition_switches": trajectory.switches,
             "u_max": {
@@ -71,6 +75,12 @@ def summarise(trajectory: Trajectory) -> dict[str, Any]:
             "the task has as many rows as there are inputs: no redundancy is left to resolve"
         )
     return summary
+
+
+def unmet(summary: dict[str, Any]) -> Residuals:
+    """Where J u differed from the rate, read back from a summary; older ones do not say."""
+    found = {name: summary[f"unmet_{name}"] for name in NONE._fields if f"unmet_{name}" in summary}
+    return NONE._replace(**found)
 
 
 def lateral_slip(trajectory: Trajectory) -> float:

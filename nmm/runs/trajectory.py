@@ -14,15 +14,17 @@ from nmm.doors import door
 from nmm.robots.motion import Motion
 from nmm.robots.robot import Robot
 from nmm.runs.ellipsoid_options import Wanted
+from nmm.runs.residuals import NONE, Residuals
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
 class Outcome(StrEnum):
-    """How a run ended."""
+    """How a run ended (docs/outcomes.md)."""
 
     COMPLETED = "completed"
+    MISSED = "missed"
     SINGULAR = "singular"
     DIVERGED = "diverged"
     UNSTABLE = "unstable"
@@ -44,6 +46,9 @@ class Trajectory:
     sigma_min (N,): smallest singular value of J_bar
     partition (N, s): columns of Ja (RG), -1 elsewhere
     residual (N,): ‖J u - rate‖
+    scale (N, levels): the share λ of the task's rate that was left, a priority level a column; 1 where
+        nothing was relaxed on purpose
+    unmet : where J u differed from the rate
     r_names, r_units : the task's rows
     resolver, method, dt : how it was made
     outcome, message, warnings : how it ended and why
@@ -65,6 +70,7 @@ class Trajectory:
     sigma_min: Array
     partition: Integers
     residual: Array
+    scale: Array
     r_names: tuple[str, ...]
     r_units: tuple[str, ...]
     resolver: str
@@ -77,6 +83,7 @@ class Trajectory:
     path: Array | None = None
     desired: Array | None = None
     target: Array | None = None
+    unmet: Residuals = NONE
     scenario: dict[str, Any] | None = field(default=None)
 
     def __len__(self) -> int:
@@ -88,7 +95,7 @@ class Trajectory:
 
     @property
     def complete(self) -> bool:
-        """Whether the run reached its end as asked."""
+        """Whether the run reached its end, and its task error went as its gain promises."""
         return self.outcome is Outcome.COMPLETED
 
     @property

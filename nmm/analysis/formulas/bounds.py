@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from nmm.analysis.formulas.analysis import SymbolicAnalysis
-from nmm.analysis.formulas.claims import Claim
-from nmm.analysis.formulas.constants import NOTHING, is_constant
-from nmm.analysis.formulas.form import expanded
-from nmm.analysis.formulas.tree import Product, Sum, Symbol, Trig, text, to_sympy
-from nmm.analysis.formulas.words import condition_text
+import sympy
+
+from nmm.analysis.formulas.claims import NOTHING, Claim
+from nmm.analysis.formulas.expressions import Product, Sum, Symbol, Trig, is_constant, text, to_sympy
+from nmm.analysis.formulas.readable import condition_text, expanded
+from nmm.analysis.formulas.symbolic_analysis import SymbolicAnalysis
 from nmm.analysis.singular.minors import minor_name
 
 
@@ -63,8 +63,6 @@ def lower_bound(analysis: SymbolicAnalysis) -> Claim | None:
 
     A C that is a product of lengths proves that J never loses rank.
     """
-    import sympy
-
     derivation, ring = analysis.derivation, analysis.derivation.ring
     if any(one.variables() for one in derivation.row_denominators):
         return None
@@ -132,8 +130,6 @@ def never_zero(analysis: SymbolicAnalysis) -> dict[tuple[str, ...], Bound]:
     can reach, cosines and sines being at most 1; where each of them can be reached alone, it vanishes
     somewhere otherwise, too. A minor with a cosine or sine as a factor is not listed.
     """
-    import sympy
-
     found = {}
     for columns, form in analysis.minor_forms.items():
         if not form.number:
@@ -201,8 +197,6 @@ def _attained(factor: Sum, analysis: SymbolicAnalysis) -> bool:
 
     They do when the combinations of coordinates in them are linearly independent.
     """
-    import sympy
-
     angles = _angles(analysis)
     rows = []
     for term in factor.terms:
@@ -234,8 +228,6 @@ def _condition(factor: Sum, analysis: SymbolicAnalysis) -> tuple[Any, Any] | Non
 
 def _reach(term: Product, analysis: SymbolicAnalysis) -> Any:
     """The largest absolute value that a term may take; None where a coordinate in it has no bound."""
-    import sympy
-
     total = sympy.Rational(abs(term.number).numerator, term.number.denominator)
     for factor, power in term.factors:
         if isinstance(factor, Symbol):

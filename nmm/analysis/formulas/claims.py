@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from nmm.analysis.formulas.analysis import SymbolicAnalysis
-from nmm.analysis.formulas.constants import constants
+import sympy
+
+from nmm.analysis.formulas.expressions import GREEK, Product, Symbol, is_constant, text, to_sympy
 from nmm.analysis.formulas.families import Cases, TooMany
-from nmm.analysis.formulas.form import factored
 from nmm.analysis.formulas.groebner import Undecided
-from nmm.analysis.formulas.tree import GREEK, Product, Symbol, text, to_sympy
-from nmm.analysis.formulas.words import condition_text
+from nmm.analysis.formulas.readable import condition_text, factored
+from nmm.analysis.formulas.symbolic_analysis import SymbolicAnalysis
 from nmm.analysis.formulas.zeros import Zeros
 from nmm.analysis.singular.minors import minor_name
 
+#: What rounding and the digits of a file leave of zero.
+NOTHING = 1e-9
 #: Products of terms for a proof in one step; there is another way when they are not enough.
 _BRIEF = 100_000
 
@@ -117,7 +119,7 @@ def _quantities(
     ring = analysis.derivation.ring
     lengths = {*analysis.geometry, *analysis.definitions}
     used = set().union(*(numerator.variables() for numerator in analysis.numerators.values()))
-    nonzero, zero = constants(forms, analysis)
+    nonzero, zero = _constants(forms, analysis)
     below: dict[Product, None] = {}
     for denominator in analysis.denominators:
         used |= denominator.variables()
@@ -127,6 +129,23 @@ def _quantities(
                 below[alone] = None
     names = [ring.names[i] for i in sorted(used) if not ring.is_angle[i] and ring.names[i] in lengths]
     return [*map(_symbol, names), *nonzero], list(below), [one for one in zero if one not in below]
+
+
+def _constants(
+    forms: Iterable[Product], analysis: SymbolicAnalysis
+) -> tuple[dict[Product, None], dict[Product, None]]:
+    """Constant sums, cosines and sines among the factors: not 0 for this robot, and 0 for it."""
+    nonzero: dict[Product, None] = {}
+    zero: dict[Product, None] = {}
+    values = {analysis.symbols[name]: value for name, value in analysis.geometry.items()}
+    for form in forms:
+        for factor, _ in form.factors:
+            if isinstance(factor, Symbol) or not is_constant(factor, analysis.geometry):
+                continue
+            alone = Product(Fraction(1), ((factor, 1),))
+            value = float(to_sympy(alone, analysis.symbols).subs(values))
+            (zero if abs(value) < NOTHING else nonzero)[alone] = None
+    return nonzero, zero
 
 
 def _has(form: Product, factors: list[Product]) -> bool:
@@ -206,8 +225,6 @@ def _where(
 
 def _as_one(families: tuple[tuple[Any, ...], ...]) -> tuple[Any, ...]:
     """Expressions that all vanish exactly in the union of the families."""
-    import sympy
-
     if len(families) == 1:
         return families[0]
     single = [

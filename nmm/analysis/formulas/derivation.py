@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 
-from nmm.analysis.formulas.expansion import Expansion, Ring
+from nmm.analysis.formulas.expansion import Expansion, Ring, exact
 from nmm.analysis.formulas.frames import Frames
 from nmm.analysis.formulas.geometry import Geometry
-from nmm.analysis.formulas.numbers import exact
-from nmm.analysis.formulas.platforms import platform_columns
-from nmm.analysis.formulas.row import Auxiliary, SymbolicRow, Value, value_without
-from nmm.analysis.formulas.rows import task_rows
+from nmm.analysis.formulas.platform_columns import platform_columns
+from nmm.analysis.formulas.quotient import common_multiple
+from nmm.analysis.formulas.row_values import Auxiliary, Value, value_without
+from nmm.analysis.formulas.task_rows import TracedRow, task_rows
 from nmm.errors import InputError, unknown
 from nmm.functions.tasks.task import Stack
 from nmm.robots.robot import Robot
@@ -83,32 +84,43 @@ class Derivation:
 
 def derived(robot: Robot, stack: Stack, geometry: Geometry) -> Derivation:
     """The rows of f, and (∂f/∂q - ∂g/∂q) S."""
-    for name, unit in zip(robot.q_names, robot.q_units, strict=True):
-        geometry.ring.variable(name, unit == "rad")
     frames = Frames(robot, geometry)
-    plain, controlled = task_rows(stack, frames)
-    G, columns = platform_columns(robot.platform, geometry)
+    frames.coordinates()
+    rows = task_rows(stack, frames)
+    G, columns = platform_columns(frames)
     one = geometry.ring.number(1)
+    below = [_denominator(row, frames) for row in rows]
     return Derivation(
         ring=geometry.ring,
-        values=tuple(row.value for row in plain),
-        matrix=tuple(_through_platform(row, G, frames) for row in controlled),
-        row_denominators=tuple(row.denominator for row in controlled),
+        values=tuple(row.value for row in rows),
+        matrix=tuple(_times_S(numerators, G, frames) for numerators, _ in below),
+        row_denominators=tuple(denominator for _, denominator in below),
         column_denominators=(*columns, *[one] * len(robot.arm_coordinates)),
         auxiliaries=tuple(frames.auxiliaries),
         lengths=geometry.values,
-        target_moves=any(f is not g for f, g in zip(plain, controlled, strict=True)),
+        target_moves=any(row.target_moves for row in rows),
         notes=tuple(dict.fromkeys([*geometry.notes, *map(str, robot.followers)])),
     )
 
 
-def _through_platform(row: SymbolicRow, G: list[list[Expansion]], frames: Frames) -> tuple[Expansion, ...]:
+def _denominator(row: TracedRow, frames: Frames) -> tuple[list[Expansion], Expansion]:
+    """The gradient times a common denominator, and this; with auxiliary lengths, and all that may vanish."""
+    under = common_multiple([entry.under for entry in row.gradient] + [*row.defined])
+    above = [entry.above(under) for entry in row.gradient]
+    powers = [dict(key) for entry in above for key in entry.terms]
+    lacking = {i: max((-power.get(i, 0) for power in powers), default=0) for i in frames.positive()}
+    key = tuple(sorted((i, n) for i, n in lacking.items() if n > 0))
+    scalars = Expansion(under.ring, {key: (Fraction(1), Fraction(0))})
+    return [entry * scalars for entry in above], under * scalars
+
+
+def _times_S(row: Sequence[Expansion], G: list[list[Expansion]], frames: Frames) -> tuple[Expansion, ...]:
     """A row times S = blkdiag(G, C)."""
     robot, ring = frames.robot, frames.geometry.ring
-    platform, gradient = robot.platform, list(row.gradient)
+    platform, gradient = robot.platform, list(row)
     for one in robot.followers:
         leader, follower = robot.coordinate(one.leader), robot.coordinate(one.joint)
-        gradient[leader] = gradient[leader] + ring.number(exact(one.multiplier)) * gradient[follower]
+        gradient[leader] = gradient[leader] + gradient[follower].scaled(exact(one.multiplier))
     moved = []
     for j in range(platform.p):
         total = ring.number(0)

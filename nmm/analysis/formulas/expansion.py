@@ -7,8 +7,12 @@ and a platform's heading falls out of the minors without any simplification.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping
 from fractions import Fraction
+
+from sympy import QQ, QQ_I
+from sympy.polys.rings import ring as polynomial_ring
 
 from nmm.errors import InputError
 
@@ -30,11 +34,19 @@ class Ring:
     Parameters
     ----------
     budget : products of terms after which `TooLarge` is raised
+
+    Attributes
+    ----------
+    names, is_angle : of each variable
+    sample : a value of each, together in general position: where a kernel that is traced branches
+    ratios : for an angle α, by its index, the name of the scalar α / sin α
     """
 
     def __init__(self, budget: int) -> None:
         self.names: list[str] = []
         self.is_angle: list[bool] = []
+        self.sample: list[float] = []
+        self.ratios: dict[int, str] = {}
         self.budget = budget
         self._left = budget
 
@@ -51,6 +63,7 @@ class Ring:
             return index
         self.names.append(name)
         self.is_angle.append(angle)
+        self.sample.append(0.2 + (0.7548776662 * len(self.names)) % 1.0)
         return len(self.names) - 1
 
     def spend(self, products: int) -> None:
@@ -155,6 +168,63 @@ class Expansion:
                 terms[lower] = (re * n, im * n)
         return Expansion(self.ring, terms)
 
+    def split(self) -> tuple[Expansion, Expansion]:
+        """A number with powers of scalars that all terms have, and the rest, which multiples have, too."""
+        scalars = [i for i in sorted(self.variables()) if not self.ring.is_angle[i]]
+        least = [(i, min(dict(key).get(i, 0) for key in self.terms)) for i in scalars]
+        common = Expansion(self.ring, {tuple((i, n) for i, n in least if n): (Fraction(1), _ZERO)})
+        rest = self * common.inverse()
+        key = min(rest.terms)
+        number = next(part for part in rest.terms[key] if part)
+        if any(self.ring.is_angle[i] for i, _ in key):
+            number *= 2  # of cos and sin themselves it is 1
+        return common.scaled(number), rest.scaled(1 / number)
+
+    def inverse(self) -> Expansion:
+        """1 over a number times powers of scalars."""
+        ((key, (number, _)),) = self.terms.items()
+        return Expansion(self.ring, {tuple((i, -n) for i, n in key): (1 / number, _ZERO)})
+
+    def divided(self, other: Expansion) -> Expansion | None:
+        """By another one, where that leaves no remainder."""
+        if not other.variables():
+            return self * other.inverse()
+        if not self or not other.variables() <= self.variables():
+            return None if self else self
+        variables = sorted(self.variables())
+        self.ring.spend(len(self.terms) * len(other.terms))
+        domain = polynomial_ring([f"x{i}" for i in variables], QQ_I)[0]
+        shifts = [
+            {i: min(dict(key).get(i, 0) for key in one.terms) for i in variables} for one in (self, other)
+        ]
+        top, bottom = (
+            domain.from_dict(
+                {
+                    tuple(dict(key).get(i, 0) - shift[i] for i in variables): QQ_I(*map(QQ.convert, number))
+                    for key, number in one.terms.items()
+                }
+            )
+            for one, shift in zip((self, other), shifts, strict=True)
+        )
+        quotient, remainder = top.div(bottom)
+        if remainder:
+            return None
+        terms = {}
+        for powers, number in quotient.items():
+            moved = [(i, n + shifts[0][i] - shifts[1][i]) for i, n in zip(variables, powers, strict=True)]
+            parts = [Fraction(int(part.numerator), int(part.denominator)) for part in (number.x, number.y)]
+            terms[tuple((i, n) for i, n in moved if n)] = (parts[0], parts[1])
+        return Expansion(self.ring, terms)
+
+    def at_sample(self) -> float:
+        """The value at `Ring.sample`."""
+        ring, total = self.ring, 0.0
+        for key, (re, im) in self.terms.items():
+            angle = sum(n * ring.sample[i] for i, n in key if ring.is_angle[i])
+            size = math.prod(ring.sample[i] ** n for i, n in key if not ring.is_angle[i])
+            total += size * (float(re) * math.cos(angle) - float(im) * math.sin(angle))
+        return total
+
     def variables(self) -> set[int]:
         """Those that occur."""
         return {i for key in self.terms for i, _ in key}
@@ -176,6 +246,12 @@ def _times(one: Key, two: Key) -> Key:
         else:
             del powers[i]
     return tuple(sorted(powers.items()))
+
+
+def exact(value: float) -> Fraction:
+    """The shortest decimal fraction that is this float, without the dust of its last digits."""
+    near = Fraction(value).limit_denominator(1_000_000)
+    return near if abs(float(near) - value) < 1e-15 * max(1.0, abs(value)) else Fraction(repr(value))
 
 
 def maximal_minors(rows: list[list[Expansion]]) -> dict[tuple[int, ...], Expansion]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from fractions import Fraction
 
+from nmm.analysis.formulas.expressions import Product, Symbol, Trig
 from nmm.analysis.formulas.groebner import Basis
-from nmm.analysis.formulas.tree import Product, Symbol, Trig
-from nmm.analysis.formulas.words import condition_text
+from nmm.analysis.formulas.readable import condition_text
 from nmm.analysis.formulas.zeros import Zeros
 
 #: More cases than that no one reads.

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import sympy
 from numpy.typing import ArrayLike
 
-from nmm.analysis.formulas.value import ROTATION_VECTOR
+from nmm.analysis.formulas.result import Formulas
+from nmm.analysis.formulas.written import ROTATION_VECTOR
 from nmm.arrays import Array, scalar
 from nmm.errors import InputError, unknown
 from nmm.kernels.rotations import log3
-
-if TYPE_CHECKING:
-    from nmm.analysis.formulas.analysis import SymbolicAnalysis
 
 
 class SymbolicFunctions:
@@ -24,15 +23,13 @@ class SymbolicFunctions:
     Lengths are given by name: `functions.J(q, d=0.0)`.
     """
 
-    def __init__(self, analysis: SymbolicAnalysis) -> None:
-        import sympy
-
-        self._geometry = dict(analysis.geometry)
-        self._n = len(analysis.q)
-        self._columns = tuple(analysis.minors)
-        self._shape = analysis.J.shape
-        names = [*analysis.q, *self._geometry]
-        arguments = [analysis.symbols[name] for name in names]
+    def __init__(self, formulas: Formulas) -> None:
+        self._geometry = dict(formulas.geometry)
+        self._n = len(formulas.q)
+        self._columns = tuple(formulas.minors)
+        self._shape = formulas.J.shape
+        names = [*formulas.q, *self._geometry]
+        arguments = [formulas.symbols[name] for name in names]
         modules = [
             {name: partial(_rotation_vector, part) for part, name in enumerate(ROTATION_VECTOR)},
             "numpy",
@@ -43,11 +40,11 @@ class SymbolicFunctions:
             return sympy.lambdify([*arguments, *auxiliary], entries, modules, cse=True)
 
         # Auxiliary quantities are computed first, and given to the others.
-        auxiliary = [analysis.symbols[name] for name in analysis.definitions]
-        self._auxiliary = compiled(list(analysis.definitions.values()))
-        self._f = compiled(list(analysis.f), auxiliary)
-        self._J = compiled(list(analysis.J), auxiliary)
-        self._minors = compiled(list(analysis.minors.values()), auxiliary)
+        auxiliary = [formulas.symbols[name] for name in formulas.definitions]
+        self._auxiliary = compiled(list(formulas.definitions.values()))
+        self._f = compiled(list(formulas.f), auxiliary)
+        self._J = compiled(list(formulas.J), auxiliary)
+        self._minors = compiled(list(formulas.minors.values()), auxiliary)
 
     def f(self, q: ArrayLike, **geometry: float) -> Array:
         """Task value, (..., s), m and rad; angles are not wrapped."""

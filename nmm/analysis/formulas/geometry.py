@@ -8,8 +8,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from nmm.analysis.formulas.expansion import Expansion, Ring
-from nmm.analysis.formulas.numbers import exact
+from nmm.analysis.formulas.expansion import Expansion, Ring, exact
 from nmm.analysis.formulas.turning import Turning
 from nmm.arrays import Array
 from nmm.errors import InputError
@@ -65,17 +64,23 @@ class Geometry:
         sign = -1 if given.startswith("-") else 1
         if label not in self._names:
             self._names[label] = self._name(given.removeprefix("-"), sign * value, label)
-        name = self._names[label]
-        self.values[name] = sign * value
-        return self.ring.scalar(name).scaled(Fraction(sign))
+        self._valued(self._names[label], sign * value, False)
+        return self.ring.scalar(self._names[label]).scaled(Fraction(sign))
 
-    def inverse(self, value: float, label: str) -> Expansion:
-        """1 over a length that is not zero."""
-        if self._as_numbers:
-            return self.ring.number(1 / exact(value))
-        self.length(value, label)
-        name = self._names[label]
-        return self.ring.scalar(name, -1).scaled(Fraction(1 if self.values[name] * value > 0 else -1))
+    def fixed_angle(self, value: float) -> int:
+        """The variable for an angle (rad) that has no name in the robot's file: angle1, angle2, ..."""
+        label = f"angle of {value:.9f} rad"
+        if label not in self._names:
+            count = sum(label.startswith("angle of") for label in self._names)
+            self._names[label] = self._name(f"angle{count + 1}", value, label)
+        return self._valued(self._names[label], value, True)
+
+    def _valued(self, name: str, value: float, angle: bool) -> int:
+        """The variable of a name, with its value."""
+        self.values[name] = value
+        index = self.ring.variable(name, angle)
+        self.ring.sample[index] = value
+        return index
 
     def _name(self, name: str, value: float, label: str) -> str:
         """A name that stands for this value alone."""
@@ -131,9 +136,7 @@ class Geometry:
             return Turning(axis, (), quarters % 4)
         if label not in self._names:
             self._names[label] = self._name(label, value, label)
-        name = self._names[label]
-        self.values[name] = value
-        return Turning(axis, ((self.ring.variable(name, True), 1),))
+        return Turning(axis, ((self._valued(self._names[label], value, True), 1),))
 
 
 def _roll_pitch_yaw(R: Array) -> tuple[float, float, float]:

@@ -54,11 +54,6 @@ def position(steps: list[Step], geometry: Geometry) -> Vector:
     return p
 
 
-def direction(steps: list[Step], geometry: Geometry, vector: Vector) -> Vector:
-    """A direction of the last frame in the axes of the first."""
-    return turned(turns(steps, geometry), vector, geometry.ring)
-
-
 def turns(steps: list[Step], geometry: Geometry) -> tuple[Turning, ...]:
     """The turns that the last frame's rotation in the axes of the first is the product of."""
     return merged([turn for step in steps for turn in _turns_of(step, geometry)])

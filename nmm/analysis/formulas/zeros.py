@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any, TypeAlias
 
+import sympy
+from sympy.polys.orderings import grevlex
+from sympy.polys.rings import ring
+
+from nmm.analysis.formulas.expressions import Product, Sum, Symbol, Trig
+from nmm.analysis.formulas.fewest_angles import basis_of
 from nmm.analysis.formulas.groebner import Basis, Undecided, Work
-from nmm.analysis.formulas.lattice import basis_of
-from nmm.analysis.formulas.tree import Product, Sum, Symbol, Trig
 
 #: As `Trig` has it.
 Angle: TypeAlias = tuple[tuple[str, int], ...]
@@ -39,9 +43,6 @@ class Zeros:
         work: int | None = None,
         zero: Sequence[Product] = (),
     ) -> None:
-        import sympy
-        from sympy.polys.orderings import grevlex
-        from sympy.polys.rings import ring
 
         waves: dict[Angle, None] = {}
         scalars: dict[str, None] = {}
@@ -129,8 +130,6 @@ def _in_few_angles(waves: list[Angle]) -> dict[Angle, tuple[int, ...]]:
 
     The angles are some of the waves themselves, where the others are whole combinations of these.
     """
-    import sympy
-
     names = list(dict.fromkeys(name for wave in waves for name, _ in wave))
     rows = {wave: tuple(dict(wave).get(name, 0) for name in names) for wave in waves}
     single = {((name, 1),): tuple(int(name == other) for other in names) for name in names}

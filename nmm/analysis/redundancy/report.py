@@ -10,12 +10,12 @@ from numpy.typing import ArrayLike
 
 from nmm.analysis.redundancy.motion_words import coordinate_words, input_words, motion_text
 from nmm.analysis.redundancy.null_space import projector, readable_null_space
-from nmm.analysis.singular.directions import direction_text
 from nmm.analysis.singular.jacobians import Jacobians, Subject, checked
 from nmm.analysis.singular.parts import null_space, rank_of
 from nmm.analysis.singular.singularity import TOLERANCE
 from nmm.arrays import Array, positive
 from nmm.control.controller import Controller
+from nmm.control.directions import direction_text
 from nmm.control.idle_inputs import inputs_without_effect
 from nmm.errors import SingularError
 from nmm.functions.function import Function

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from nmm.analysis.singular.directions import direction_texts, readable_basis
 from nmm.analysis.singular.jacobians import STEP, Jacobians
 from nmm.analysis.singular.parts import WHOLE, expect_inputs, singular_values
 from nmm.arrays import Array, Integers
+from nmm.control.directions import direction_texts, readable_basis
 
 #: Singular values beside the largest, at a point that has converged: what is above it is not zero.
 ROUNDING = 1e-13

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from nmm.analysis.singular.directions import readable_basis
 from nmm.analysis.singular.minors import determinants
 from nmm.analysis.singular.parts import Ranked, ranks, singular_values
 from nmm.arrays import Array, Integers
+from nmm.control.directions import readable_basis
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nmm.analysis.singular.directions import direction_texts, readable_basis
 from nmm.arrays import Array, Integers
+from nmm.control.directions import direction_texts, readable_basis
 from nmm.errors import InputError, unknown
 from nmm.robots.robot import Robot
 

@@ -15,7 +15,6 @@ from nmm.analysis.singular.algorithmic import (
     extended_singularity,
     partition_singularities,
 )
-from nmm.analysis.singular.directions import direction_texts
 from nmm.analysis.singular.jacobians import Candidates, Jacobians, Subject, Tasks, checked
 from nmm.analysis.singular.minors import (
     MOST_MINORS,
@@ -28,6 +27,7 @@ from nmm.analysis.singular.minors import (
 from nmm.analysis.singular.parts import WHOLE, Part, given_back, groups, part
 from nmm.analysis.singular.restoration import Restoration, restoration
 from nmm.arrays import Array, Integers, positive
+from nmm.control.directions import direction_texts
 from nmm.resolvers.partitions import candidate_columns
 from nmm.resolvers.problem import Dimensions
 from nmm.resolvers.reduced_gradient import ReducedGradient

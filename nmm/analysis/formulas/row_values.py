@@ -1,25 +1,20 @@
-"""What a row of a task is made of: its value, and its gradient over a denominator."""
+"""What the rows of a task have as values, and what auxiliary symbols stand for."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import NamedTuple, TypeAlias
 
 from nmm.analysis.formulas.expansion import Expansion
+from nmm.analysis.formulas.quotient import Linear
 
 
-class Arc(NamedTuple):
-    """An angle atan2(sine, cosine)."""
+@dataclass(frozen=True, eq=False)
+class Arc:
+    """An angle atan2(sine, cosine), which no kernel can compute with."""
 
     sine: Expansion
     cosine: Expansion
-
-
-class Linear(NamedTuple):
-    """A combination of coordinates."""
-
-    terms: tuple[tuple[str, Fraction], ...]
 
 
 class Turn(NamedTuple):
@@ -47,15 +42,6 @@ class Share(NamedTuple):
 Value: TypeAlias = Expansion | Arc | Linear | Turn | Share
 
 
-@dataclass(frozen=True, eq=False)
-class SymbolicRow:
-    """One row: its value, and its derivatives by the coordinates (n) times `denominator`."""
-
-    value: Value
-    gradient: list[Expansion]
-    denominator: Expansion
-
-
 class Auxiliary(NamedTuple):
     """A symbol for a quantity that would make the formulas long.
 
@@ -63,7 +49,7 @@ class Auxiliary(NamedTuple):
     ----------
     name : the symbol's
     kind : "length" of a vector (2 or 3 arguments), "bearing" atan2(b, a), "elevation" atan2(c, hypot(a, b)),
-        "off axis" atan2(hypot(b, c), a), "over sine": the angle off axis over its sine
+        "off axis" atan2(hypot(b, c), a), "over sine": the angle off axis over its sine, "root" of a
     arguments : a, b, c
     """
 

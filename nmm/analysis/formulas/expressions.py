@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
+
+import sympy
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,15 @@ ZERO = Product(Fraction(0))
 _INDEXED = re.compile(r"q\d")
 
 
+def is_constant(factor: Node, lengths: Collection[str]) -> bool:
+    """Whether a factor is made of lengths and fixed angles alone."""
+    if isinstance(factor, Symbol):
+        return factor.name in lengths
+    if isinstance(factor, Trig):
+        return all(name in lengths for name, _ in factor.angle)
+    return all(is_constant(inner, lengths) for term in factor.terms for inner, _ in term.factors)
+
+
 def text(product: Product) -> str:
     """One line: "-Λ (d + Λ c1)", with c12 = cos(q1 + q2)."""
     return _written(product, _TEXT)
@@ -64,7 +75,6 @@ def latex(product: Product) -> str:
 
 def to_sympy(product: Product, symbols: Mapping[str, Any]) -> Any:
     """As a SymPy expression of the symbols given by name."""
-    import sympy
 
     def node(factor: Node) -> Any:
         if isinstance(factor, Symbol):

@@ -10,9 +10,12 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Any
 
+import sympy
+from sympy.polys.rings import ring as polynomial_ring
+
 from nmm.analysis.formulas.expansion import Expansion, Key, Ring, TooLarge
+from nmm.analysis.formulas.fewest_angles import basis_of
 from nmm.analysis.formulas.half_angles import to_tangents, to_waves
-from nmm.analysis.formulas.lattice import basis_of
 from nmm.analysis.formulas.polynomial_factors import polynomial_factors
 
 #: The largest polynomial that is given to SymPy: its terms.
@@ -65,8 +68,6 @@ def _ratio(value: Expansion, product: Expansion) -> Fraction | None:
 
 def _polynomial_factors(value: Expansion) -> list[tuple[Expansion, int]]:
     """Factors up to a number, none of them one."""
-    import sympy
-    from sympy.polys.rings import ring as polynomial_ring
 
     ring = value.ring
     angles = sorted(i for i in value.variables() if ring.is_angle[i])

@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-import importlib
-import itertools
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Any, Literal
+from typing import Literal
+
+import sympy
 
 from nmm.analysis.formulas.arguments import argument_names
 from nmm.analysis.formulas.derivation import Derivation, derived
 from nmm.analysis.formulas.expansion import Expansion, Ring, TooLarge, maximal_minors
-from nmm.analysis.formulas.form import factored, in_names, named
+from nmm.analysis.formulas.expressions import Product
 from nmm.analysis.formulas.functions import SymbolicFunctions
 from nmm.analysis.formulas.geometry import Geometry
-from nmm.analysis.formulas.row import Turn
-from nmm.analysis.formulas.rows import frames_of
-from nmm.analysis.formulas.tree import Product, to_sympy
-from nmm.analysis.formulas.value import Written, auxiliary_written, matrix_latex, matrix_text, written
-from nmm.analysis.formulas.words import latex_of, text_of
+from nmm.analysis.formulas.readable import factored, in_names, named
+from nmm.analysis.formulas.result import Formulas
+from nmm.analysis.formulas.row_values import Turn
+from nmm.analysis.formulas.task_rows import frames_of
+from nmm.analysis.formulas.text import latex_of, text_of
+from nmm.analysis.formulas.written import auxiliary_written, matrix_latex, matrix_text, written
 from nmm.analysis.singular.reached import Tasks, stacked
 from nmm.errors import InputError, unknown
 from nmm.robots.robot import Robot
@@ -32,99 +31,8 @@ __all__ = ["SymbolicAnalysis", "TooLarge", "symbolic"]
 BUDGET = 200_000
 
 
-@dataclass(frozen=True, eq=False)
-class SymbolicAnalysis:
-    """Formulas of one robot and task. Angles are in rad, lengths in m; all symbols are real.
-
-    Attributes
-    ----------
-    robot : the robot
-    row_names, u_names : names of J's rows (s) and columns (m)
-    symbols : SymPy symbol of every coordinate, length, fixed angle and auxiliary quantity, by name
-    geometry : the robot's own values of the lengths and fixed angles, by name
-    values : the rows of f, each as expression, text and LaTeX
-    entry_forms, minor_forms : J's entries and the minors in factors (`symbolic_tree.Product`)
-    named_forms, short_forms, short_entries : factors with a name; minors and entries in these names
-    definitions : what auxiliary symbols are, such as rho and g of a bearing
-    definition_texts, definition_latex : the same as text and LaTeX, and the matrix of a rotation vector
-    numerators : the minors times J's denominators, multiplied out
-    derivation : what the formulas were written from
-    notes : what was rounded or summed up
-    """
-
-    robot: Robot
-    row_names: tuple[str, ...]
-    u_names: tuple[str, ...]
-    symbols: Mapping[str, Any] = field(repr=False)
-    geometry: Mapping[str, float]
-    values: tuple[Written, ...] = field(repr=False)
-    entry_forms: tuple[tuple[Product, ...], ...] = field(repr=False)
-    short_entries: tuple[tuple[Product, ...], ...] = field(repr=False)
-    minor_forms: Mapping[tuple[str, ...], Product] = field(repr=False)
-    named_forms: Mapping[str, Product] = field(repr=False)
-    short_forms: Mapping[tuple[str, ...], Product] = field(repr=False)
-    definitions: Mapping[str, Any] = field(repr=False)
-    definition_texts: Mapping[str, str] = field(repr=False)
-    definition_latex: Mapping[str, str] = field(repr=False)
-    numerators: Mapping[tuple[str, ...], Expansion] = field(repr=False)
-    derivation: Derivation = field(repr=False)
-    notes: tuple[str, ...] = ()
-
-    @cached_property
-    def q(self) -> dict[str, Any]:
-        """The coordinates' symbols, by name."""
-        return {name: self.symbols[name] for name in self.robot.q_names}
-
-    @cached_property
-    def f(self) -> Any:
-        """Task value, (s, 1); an angle is not wrapped."""
-        import sympy
-
-        return sympy.Matrix([value.expression for value in self.values])
-
-    @cached_property
-    def J(self) -> Any:
-        """Matrix (s, m) of J u = rate; with a reference that depends on q, J_bar of eq. 13."""
-        import sympy
-
-        return sympy.Matrix([[to_sympy(entry, self.symbols) for entry in row] for row in self.entry_forms])
-
-    @cached_property
-    def minors(self) -> dict[tuple[str, ...], Any]:
-        """Every maximal minor in factors, by the names of its columns, in the order of the inputs."""
-        return {columns: to_sympy(form, self.symbols) for columns, form in self.minor_forms.items()}
-
-    @cached_property
-    def named(self) -> dict[str, Any]:
-        """Factors that several minors have (the paper's Λ), by name."""
-        return {name: to_sympy(form, self.symbols) for name, form in self.named_forms.items()}
-
-    def minor(self, *columns: str) -> Any:
-        """One minor by the names of its columns, in any order (which gives the sign).
-
-        Raises
-        ------
-        InputError : another number of names than rows, a name twice, or one that is no input
-        """
-        for name in columns:
-            if name not in self.u_names:
-                raise InputError(unknown("input", name, self.u_names, f"robot {self.robot.name}"))
-        s = len(self.row_names)
-        if len(columns) != s or len(set(columns)) != s:
-            raise InputError(f"minor: expected {s} different inputs, got {', '.join(columns)}")
-        order = [self.u_names.index(name) for name in columns]
-        swaps = sum(a > b for a, b in itertools.combinations(order, 2))
-        return (-1) ** swaps * self.minors[tuple(self.u_names[j] for j in sorted(order))]
-
-    @property
-    def divided(self) -> bool:
-        """Whether J has denominators that may vanish."""
-        return any(one.variables() for one in self.denominators)
-
-    @property
-    def denominators(self) -> list[Expansion]:
-        """What J's rows and columns are divided by."""
-        return [*self.derivation.row_denominators, *self.derivation.column_denominators]
+class SymbolicAnalysis(Formulas):
+    """Formulas of one robot and task, with what can be made of them."""
 
     def without(self, *lengths: str) -> SymbolicAnalysis:
         """The same with lengths set to 0: what changes where d = 0.
@@ -160,11 +68,11 @@ def symbolic(
 
     Parameters
     ----------
-    robot : on any platform but one described by its wheels
-    task : functions of `nmm.functions.tasks` but a user's own, or tasks made of them, one or several. A
-        task's reference counts where it depends on the configuration (`Bearing` of a `Position`, or one of
-        these functions): J is then J_bar = (∂f/∂q - ∂g/∂q) S (paper, eq. 13). `Orientation` and `Pose` are
-        taken without a reference: J is that of the error 0, velocities in the frame's own axes
+    robot : on any platform whose kernel has a formula, as almost all have
+    task : functions of the configuration, or tasks made of them, one or several; no Python function of the
+        user's. A task's reference counts where it depends on the configuration (`Bearing` of a `Position`,
+        or one of these functions): J is then J_bar = (∂f/∂q - ∂g/∂q) S (paper, eq. 13). `Orientation` and
+        `Pose` are taken without a reference: J is that of the error 0, velocities in the frame's own axes
     geometry : "symbols" for the robot's lengths that are not zero, or "numbers"
     arguments : names for lengths by their label, {"x_q2": "l1"} for the offset of joint q2 along x; by
         default the names of the xacro file's arguments, for which the file is read again
@@ -172,12 +80,8 @@ def symbolic(
     Raises
     ------
     TooLarge : (an InputError) the formulas would be too long to read
-    InputError : SymPy is not installed, a function or platform without a formula here, more rows than inputs
+    InputError : a function or platform whose kernel does what has no formula, more rows than inputs
     """
-    try:
-        importlib.import_module("sympy")
-    except ImportError:
-        raise InputError("symbolic: needs SymPy: pip install nmm[symbolic]") from None
     if geometry not in ("symbols", "numbers"):
         raise InputError(unknown("geometry", geometry, ("symbols", "numbers")))
     stack = stacked(task)
@@ -189,7 +93,7 @@ def symbolic(
     demanded = arguments is not None
     if arguments is None:
         every = [f for task in stack for f in (task.function, task.reference)]
-        arguments = argument_names(robot, frames_of(every)) if geometry == "symbols" else {}
+        arguments = argument_names(robot, frames_of(every, robot)) if geometry == "symbols" else {}
     lengths = Geometry(Ring(BUDGET), arguments, demanded, geometry == "numbers", robot.q_names)
     names = tuple(row.name for row in stack.rows(robot))
     with _reason(robot, len(names), lengths.ring):
@@ -217,8 +121,6 @@ def _reason(robot: Robot, s: int, ring: Ring) -> Iterator[None]:
 
 def _assembled(robot: Robot, row_names: tuple[str, ...], derivation: Derivation) -> SymbolicAnalysis:
     """The formulas of a derivation."""
-    import sympy
-
     ring, rows, columns = derivation.ring, derivation.row_denominators, derivation.column_denominators
     numbers = maximal_minors([list(line) for line in derivation.matrix])
     entries = tuple(

@@ -6,10 +6,13 @@ from collections.abc import Callable, Mapping
 from fractions import Fraction
 from typing import Any, NamedTuple
 
+import sympy
+
 from nmm.analysis.formulas.expansion import Expansion
-from nmm.analysis.formulas.form import as_sum, factored
-from nmm.analysis.formulas.row import Arc, Auxiliary, Linear, Share, Turn, Value
-from nmm.analysis.formulas.tree import Product, Sum, Symbol, latex, text, to_sympy
+from nmm.analysis.formulas.expressions import Product, Sum, Symbol, latex, text, to_sympy
+from nmm.analysis.formulas.quotient import Linear
+from nmm.analysis.formulas.readable import as_sum, factored
+from nmm.analysis.formulas.row_values import Auxiliary, Share, Turn, Value
 
 
 class Written(NamedTuple):
@@ -26,12 +29,10 @@ ROTATION_VECTOR = tuple(f"rotation_vector_{axis}" for axis in "xyz")
 
 def written(value: Value, symbols: Mapping[str, Any]) -> Written:
     """A row's value; the value of an angle is not wrapped."""
-    import sympy
-
     if isinstance(value, Expansion):
         return _of(factored(value), symbols)
     if isinstance(value, Linear):
-        return _of(_sum([Product(n, ((Symbol(name), 1),)) for name, n in value.terms]), symbols)
+        return _linear(value, symbols)
     if isinstance(value, Share):
         return _of(Product(Fraction(1), ((Symbol(value.angle), 1),)).times(factored(value.factor)), symbols)
     if isinstance(value, Turn):
@@ -40,18 +41,6 @@ def written(value: Value, symbols: Mapping[str, Any]) -> Written:
             sympy.Function(ROTATION_VECTOR[value.part])(*_matrix(value, symbols)),
             f"log({value.name}).{axis}",
             rf"\log({value.name})_{axis}",
-        )
-    plain = _plain_angle(value)
-    if plain is not None:
-        terms, quarters = plain
-        angle = _of(_sum([Product(Fraction(n), ((Symbol(name), 1),)) for name, n in terms]), symbols)
-        if not quarters:
-            return angle
-        turn = {1: " + pi/2", 2: " + pi", -1: " - pi/2"}[quarters]
-        return Written(
-            angle.expression + quarters * sympy.pi / 2,
-            angle.text + turn,
-            angle.latex + turn.replace("pi/2", r"\frac{\pi}{2}").replace("+ pi", r"+ \pi"),
         )
     sine, cosine = (_of(factored(part), symbols) for part in (value.sine, value.cosine))
     return Written(
@@ -86,8 +75,6 @@ def _turns_written(turn: Turn, style: Callable[[Product], str], form: str, half:
 
 def _matrix(turn: Turn, symbols: Mapping[str, Any]) -> Any:
     """A rotation as a SymPy matrix."""
-    import sympy
-
     product = sympy.eye(3)
     for axis, angle, quarters in turn.product:
         total = sympy.Add(*(n * symbols[name] for name, n in angle), quarters * sympy.pi / 2)
@@ -101,10 +88,11 @@ def _matrix(turn: Turn, symbols: Mapping[str, Any]) -> Any:
 
 def auxiliary_written(auxiliary: Auxiliary, symbols: Mapping[str, Any]) -> Written:
     """What an auxiliary symbol stands for."""
-    import sympy
-
-    a, b, *rest = [_of(as_sum(argument), symbols) for argument in auxiliary.arguments]
-    everything = [a, b, *rest]
+    everything = [_of(as_sum(argument), symbols) for argument in auxiliary.arguments]
+    if auxiliary.kind == "root":
+        (a,) = everything
+        return Written(sympy.sqrt(a.expression), f"sqrt({a.text})", rf"\sqrt{{{a.latex}}}")
+    a, b, *rest = everything
     if auxiliary.kind == "length":
         return Written(
             sympy.sqrt(sympy.Add(*(one.expression**2 for one in everything))),
@@ -132,8 +120,6 @@ def auxiliary_written(auxiliary: Auxiliary, symbols: Mapping[str, Any]) -> Writt
 
 
 def _hypot(a: Written, b: Written) -> Written:
-    import sympy
-
     return Written(
         sympy.sqrt(a.expression**2 + b.expression**2),
         f"hypot({a.text}, {b.text})",
@@ -149,15 +135,19 @@ def _sum(terms: list[Product]) -> Product:
     return terms[0] if len(terms) == 1 else Product(Fraction(1), ((Sum(tuple(terms)), 1),))
 
 
-def _plain_angle(arc: Arc) -> tuple[list[tuple[str, int]], int] | None:
-    """k·q and a number of quarter turns, where cosine and sine are those of such an angle."""
-    ring = arc.cosine.ring
-    half = Fraction(1, 2)
-    turns = {(half, 0): 0, (0, half): 1, (-half, 0): 2, (0, -half): -1}
-    if not len(arc.cosine.terms) == len(arc.sine.terms) == 2:
-        return None
-    for key, (re, im) in arc.cosine.terms.items():
-        whole = (re, im) in turns and all(ring.is_angle[i] for i, _ in key)
-        if whole and arc.sine.terms.get(key) == (im, -re):  # β = -i α
-            return [(ring.names[i], n) for i, n in key], turns[re, im]
-    return None
+def _linear(value: Linear, symbols: Mapping[str, Any]) -> Written:
+    """A combination of coordinates, and a number of quarter turns or what else is added."""
+    names = value.ring.names
+    terms = [Product(n, ((Symbol(names[i]), 1),)) for i, n in value.terms.items()]
+    quarters, rest = value.quarters
+    if rest:
+        return _of(_sum([*terms, Product(value.constant)]), symbols)
+    found = _of(_sum(terms), symbols)
+    if not quarters:
+        return found
+    turn = {1: " + pi/2", 2: " + pi", -1: " - pi/2"}.get(quarters, f" {quarters:+d} pi/2")
+    return Written(
+        found.expression + quarters * sympy.pi / 2,
+        found.text + turn,
+        found.latex + turn.replace("pi/2", r"\frac{\pi}{2}").replace("+ pi", r"+ \pi"),
+    )

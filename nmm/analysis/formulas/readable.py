@@ -7,10 +7,9 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from fractions import Fraction
 from math import gcd
 
-from nmm.analysis.formulas.constants import is_constant
 from nmm.analysis.formulas.expansion import Expansion, Gaussian, Key, Ring
-from nmm.analysis.formulas.factor import factors_of
-from nmm.analysis.formulas.tree import ZERO, Node, Product, Sum, Symbol, Trig
+from nmm.analysis.formulas.expressions import ZERO, Node, Product, Sum, Symbol, Trig, is_constant, text
+from nmm.analysis.formulas.trigonometric_factors import factors_of
 
 #: Names of factors that several minors have, in the order in which they are given.
 FACTOR_NAMES = ("Lambda", "Gamma", "Phi", "Psi", "Omega")
@@ -98,6 +97,14 @@ def in_names(product: Product, names: Mapping[str, Product]) -> Product:
         if isinstance(node, Sum):
             product = _replaced(product, node, Symbol(name))
     return product
+
+
+def condition_text(factor: Product, names: Mapping[str, Product]) -> str:
+    """A factor of a minor where it is said to vanish: "sin(q2)", "Λ", "d + Λ c1"."""
+    node = factor.factors[0][0]
+    if isinstance(node, Trig) and len(node.angle) == 1 and node.angle[0][1] == 1:
+        return f"{node.kind}({node.angle[0][0]})"
+    return text(in_names(factor, names))
 
 
 def as_sum(value: Expansion) -> Product:

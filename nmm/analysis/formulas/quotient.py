@@ -1,0 +1,210 @@
+"""Numbers that kernels are run on to get formulas: quotients of trigonometric polynomials; coordinates."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from fractions import Fraction
+from numbers import Real
+from typing import Any
+
+import numpy as np
+from numpy.lib.mixins import NDArrayOperatorsMixin
+
+from nmm.analysis.formulas.expansion import Expansion, Ring, exact
+from nmm.analysis.formulas.geometry import Geometry
+from nmm.errors import InputError
+
+#: How far from a multiple of π/2 a fixed angle may be and still be one, rad.
+_SQUARE = 1e-9
+
+
+class Untraceable(InputError):
+    """A kernel does what has no formula here."""
+
+
+class Traced(NDArrayOperatorsMixin):
+    """Arithmetic, beside numbers of Python and numpy. Comparisons, on which a kernel branches, are made where
+    the variables have the values of `Ring.sample`, a point in general position; `==` is exact."""
+
+    ring: Ring
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
+        if ufunc in (np.equal, np.not_equal):
+            return (ufunc is np.equal) != bool(_plus(inputs[0], inputs[1], -1))
+        if ufunc in (np.less, np.less_equal, np.greater, np.greater_equal):
+            return bool(ufunc(*(float(value) for value in inputs)))
+        if ufunc not in _OPERATIONS:
+            raise Untraceable(f"it takes {ufunc.__name__} of a formula")
+        return _OPERATIONS[ufunc](*inputs)
+
+    def quotient(self) -> Quotient:
+        """As a quotient of trigonometric polynomials; `Untraceable` where it is none."""
+        raise NotImplementedError
+
+
+class Quotient(Traced):
+    """A trigonometric polynomial over another one; lengths alone are divided by as they are."""
+
+    def __init__(self, over: Expansion, under: Expansion | None = None) -> None:
+        self.ring = over.ring
+        self.over = over
+        self.under = over.ring.number(1) if under is None else under
+
+    def __bool__(self) -> bool:
+        return bool(self.over)
+
+    def __float__(self) -> float:
+        return self.over.at_sample() / self.under.at_sample()
+
+    def quotient(self) -> Quotient:
+        return self
+
+    def times(self, other: Quotient) -> Quotient:
+        """Their product; what one is divided by and the other has as a factor is cancelled."""
+        a, d = _cancelled(self.over, other.under)
+        c, b = _cancelled(other.over, self.under)
+        return Quotient(a * c, b * d)
+
+    def plus(self, other: Quotient) -> Quotient:
+        """Their sum."""
+        under = common_multiple([self.under, other.under])
+        return Quotient(*_cancelled(self.above(under) + other.above(under), under))
+
+    def inverse(self) -> Quotient:
+        """1 over it."""
+        if not self.over:
+            raise Untraceable("it divides by what is 0")
+        factor, under = self.over.split()
+        return Quotient(self.under * factor.inverse(), under)
+
+    def above(self, under: Expansion) -> Expansion:
+        """The numerator over a multiple of the denominator."""
+        factor = under.divided(self.under)
+        assert factor is not None
+        return self.over * factor
+
+
+class Linear(Traced):
+    """A combination of coordinates and a constant; angles may go into cosines and sines, or out as a value.
+
+    Attributes
+    ----------
+    terms : coefficients by the variables' indices
+    constant : rad, or m
+    """
+
+    def __init__(self, ring: Ring, terms: dict[int, Fraction], constant: Fraction = Fraction(0)) -> None:
+        self.ring = ring
+        self.terms = {i: n for i, n in terms.items() if n}
+        self.constant = constant
+
+    def __bool__(self) -> bool:
+        return bool(self.terms or self.constant)
+
+    def __float__(self) -> float:
+        return float(self.constant) + sum(float(n) * self.ring.sample[i] for i, n in self.terms.items())
+
+    def quotient(self) -> Quotient:
+        ring, total = self.ring, self.ring.number(self.constant)
+        for i, n in self.terms.items():
+            if not ring.is_angle[i]:
+                total = total + ring.scalar(ring.names[i]).scaled(n)
+            elif i in ring.ratios:  # alpha = kappa sin(alpha)
+                total = total + (ring.scalar(ring.ratios[i]) * ring.sin({i: 1})).scaled(n)
+            else:
+                raise Untraceable(f"the angle {ring.names[i]} occurs outside of cosines and sines")
+        return Quotient(total)
+
+    @property
+    def quarters(self) -> tuple[int, float]:
+        """The constant in quarter turns, and what is left of it, rad."""
+        count = round(float(self.constant) / (math.pi / 2))
+        rest = float(self.constant) - count * math.pi / 2
+        return count, rest if abs(rest) > _SQUARE else 0.0
+
+    def wave(self, geometry: Geometry) -> tuple[Quotient, Quotient]:
+        """Its cosine and sine."""
+        ring, angle = self.ring, {}
+        for i, n in self.terms.items():
+            if not ring.is_angle[i] or n.denominator != 1:
+                raise Untraceable(f"it takes the cosine or sine of {n} {ring.names[i]}")
+            angle[i] = int(n)
+        quarters, rest = self.quarters
+        if rest:
+            angle[geometry.fixed_angle(abs(rest))] = 1 if rest > 0.0 else -1
+        cosine, sine = ring.cos(angle), ring.sin(angle)
+        for _ in range(quarters % 4):
+            cosine, sine = -sine, cosine
+        return Quotient(cosine), Quotient(sine)
+
+
+def quotient(value: Any, ring: Ring) -> Quotient:
+    """A number of any kind as a quotient."""
+    return value.quotient() if isinstance(value, Traced) else Quotient(ring.number(exact(float(value))))
+
+
+def common_multiple(values: Iterable[Expansion]) -> Expansion:
+    """A polynomial that all are factors of, as far as one of them is another's."""
+    first, *others = values
+    for value in others:
+        if value.divided(first) is not None:
+            first = value
+        elif first.divided(value) is None:
+            first = first * value
+    return first
+
+
+def _cancelled(over: Expansion, under: Expansion) -> tuple[Expansion, Expansion]:
+    """Both without one of them, where it is a factor of the other."""
+    if not under.variables():
+        return over, under
+    one = under.ring.number(1)
+    if (divided := over.divided(under)) is not None:
+        return divided, one
+    if over.variables() and (divided := under.divided(over)) is not None:
+        factor, rest = divided.split()
+        return factor.inverse(), rest
+    return over, under
+
+
+def _plus(a: Any, b: Any, sign: int = 1) -> Any:
+    ring = (a if isinstance(a, Traced) else b).ring
+    linear = [
+        value if isinstance(value, Linear) else Linear(ring, {}, exact(float(value)))
+        for value in (a, b)
+        if isinstance(value, Linear | Real)
+    ]
+    if len(linear) == 2:
+        one, two = linear
+        terms = one.terms | {i: one.terms.get(i, Fraction(0)) + sign * n for i, n in two.terms.items()}
+        return Linear(ring, terms, one.constant + sign * two.constant)
+    return quotient(a, ring).plus(_times(quotient(b, ring), sign))
+
+
+def _times(a: Any, b: Any) -> Any:
+    if isinstance(a, Real):
+        a, b = b, a
+    if isinstance(b, Real) and isinstance(a, Linear):
+        factor = exact(float(b))
+        return Linear(a.ring, {i: n * factor for i, n in a.terms.items()}, a.constant * factor)
+    return quotient(a, a.ring).times(quotient(b, a.ring))
+
+
+def _over(a: Any, b: Any) -> Any:
+    return _times(a, 1 / exact(float(b)) if isinstance(b, Real) else b.quotient().inverse())
+
+
+def _power(a: Any, n: int) -> Any:
+    return math.prod([a if n > 0 else _over(1, a)] * abs(int(n)))
+
+
+_OPERATIONS: dict[Any, Any] = {
+    np.add: _plus,
+    np.subtract: lambda a, b: _plus(a, b, -1),
+    np.multiply: _times,
+    np.divide: _over,
+    np.power: _power,
+    np.negative: lambda a: _times(a, -1),
+    np.absolute: lambda a: a if float(a) >= 0.0 else _times(a, -1),
+}

@@ -1,0 +1,159 @@
+"""Kernels run as plain Python on symbols: the function that computes a number computes its formula."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from fractions import Fraction
+from types import CodeType, FunctionType, ModuleType
+from typing import Any
+
+import numpy as np
+
+from nmm.analysis.formulas.expansion import Expansion, exact
+from nmm.analysis.formulas.frames import Frames
+from nmm.analysis.formulas.quotient import Linear, Quotient, Traced, Untraceable, quotient
+from nmm.analysis.formulas.row_values import Arc
+
+
+def traced(kernel: Any, frames: Frames) -> Callable[..., Any]:
+    """A kernel, or a function that one calls, with `math` and `numpy` that take symbols.
+
+    Its code is the same, and so is that of the functions that it calls; branches are taken as they are for
+    `Ring.sample`.
+    """
+    modules = {math: _Math(frames), np: _Numpy(frames)}
+    known: dict[Any, FunctionType] = {}
+
+    def copied(function: Any) -> Any:
+        plain = getattr(function, "plain", getattr(function, "py_func", function))
+        if not isinstance(plain, FunctionType):
+            return function
+        if plain not in known:
+            names: dict[str, Any] = {"__builtins__": __builtins__}
+            known[plain] = FunctionType(
+                plain.__code__, names, plain.__name__, plain.__defaults__, plain.__closure__
+            )
+            for name in _names(plain.__code__):
+                if name in plain.__globals__:
+                    names[name] = replaced(plain.__globals__[name])
+        return known[plain]
+
+    def replaced(value: Any) -> Any:
+        if isinstance(value, ModuleType):
+            return modules.get(value, value)
+        for module, own in modules.items():
+            name = getattr(value, "__name__", "")
+            if callable(value) and name and getattr(module, name, None) is value:
+                return getattr(own, name)
+        return copied(value)
+
+    function: Callable[..., Any] = copied(kernel)
+    return function
+
+
+def _names(code: CodeType) -> Iterator[str]:
+    """Names that a function, or one inside it, may look up outside."""
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _names(constant)
+
+
+class _Math:
+    """`math` for numbers and for symbols."""
+
+    def __init__(self, frames: Frames) -> None:
+        self._frames = frames
+
+    def __getattr__(self, name: str) -> Any:
+        """What else there is, for numbers alone."""
+        there = getattr(math, name)
+
+        def plain(*arguments: Any) -> Any:
+            if any(isinstance(argument, Traced) for argument in arguments) and not name.startswith("is"):
+                raise Untraceable(f"it takes math.{name} of a formula")
+            return there(*arguments)
+
+        return plain if callable(there) else there
+
+    def cos(self, x: Any) -> Any:
+        return self._wave(x, 0) if isinstance(x, Traced) else math.cos(x)
+
+    def sin(self, x: Any) -> Any:
+        return self._wave(x, 1) if isinstance(x, Traced) else math.sin(x)
+
+    def tan(self, x: Any) -> Any:
+        return self.sin(x) / self.cos(x)
+
+    def _wave(self, x: Any, part: int) -> Quotient:
+        if not isinstance(x, Linear):
+            raise Untraceable("it takes the cosine or sine of what is no combination of coordinates")
+        return x.wave(self._frames.geometry)[part]
+
+    def hypot(self, *parts: Any) -> Any:
+        return self.sqrt(sum((part * part for part in parts[1:]), parts[0] * parts[0]))
+
+    def sqrt(self, x: Any) -> Any:
+        """The root of a square of what is not below 0; another one gets a name."""
+        if not isinstance(x, Traced):
+            return math.sqrt(x)
+        square = self._polynomial(x)
+        root = self._root(square)
+        if root is None:
+            (name,) = self._frames.auxiliary(("rho", "root", [square]))
+            root = x.ring.scalar(name)
+        return Quotient(root)
+
+    def _root(self, square: Expansion) -> Expansion | None:
+        """Of a number, times squares of auxiliary lengths and of sines of angles between 0 and π."""
+        if not square:
+            return square
+        size, rest = square.split()
+        ((key, (number, _)),) = size.terms.items()
+        root, ring = square.ring.number(1), square.ring
+        for one in self._frames.auxiliaries:
+            if one.kind == "off axis" and rest.variables():
+                sine = ring.sin({ring.variable(one.name, True): 1})
+                if (divided := rest.divided(sine * sine)) is not None and not divided.variables():
+                    number, rest, root = number * divided.terms[()][0], ring.number(1), sine
+        if rest.variables() or number < 0 or not size.variables() <= self._frames.positive():
+            return None
+        if any(n % 2 for _, n in key):
+            return None
+        halved = {tuple((i, n // 2) for i, n in key): (exact(math.sqrt(number)), Fraction(0))}
+        return root * Expansion(ring, halved)
+
+    def atan2(self, y: Any, x: Any) -> Any:
+        """An angle itself where y and x are its sine and cosine, times what is above 0."""
+        if not isinstance(y, Traced) and not isinstance(x, Traced):
+            return math.atan2(y, x)
+        ring = y.ring if isinstance(y, Traced) else x.ring
+        sine, cosine = (self._polynomial(quotient(part, ring)) for part in (y, x))
+        square = sine * sine + cosine * cosine
+        if square:
+            self._frames.undefined.append(square.split()[1])
+        return self._frames.angle(sine, cosine) or Arc(sine, cosine)
+
+    def _polynomial(self, value: Traced) -> Expansion:
+        found = value.quotient()
+        if found.under.variables():
+            raise Untraceable("it takes a square root or atan2 of quotients")
+        return found.over
+
+
+class _Numpy:
+    """`numpy` with arrays that hold symbols."""
+
+    def __init__(self, frames: Frames) -> None:
+        own = _Math(frames)
+        self.cos, self.sin, self.tan, self.sqrt = own.cos, own.sin, own.tan, own.sqrt
+        self.arctan2, self.hypot = own.atan2, own.hypot
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(np, name)
+
+    def zeros(self, shape: Any, dtype: Any = None) -> Any:
+        return np.full(shape, 0.0, dtype=object) if dtype is None else np.zeros(shape, dtype)
+
+    empty = zeros

@@ -1,0 +1,99 @@
+"""What is wrong with a recorded run: modes that its dt is too long for, an error that left its promise."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from nmm.arrays import Array
+from nmm.control.controller import Controller
+from nmm.errors import RunError
+from nmm.runs.integrators import Integrator
+from nmm.runs.promise import Departure, adaptive_errors, departure, step_errors
+from nmm.runs.recording import Recorder
+from nmm.runs.stability import Instability, find_instability
+
+#: At how many instants of a run the integrator's stability is examined.
+EXAMINED = 20
+#: A target that moves otherwise than its rate says in more than this share of the steps does not only jump.
+OFTEN = 0.05
+
+
+class Assessment(NamedTuple):
+    """What is wrong with a run.
+
+    Attributes
+    ----------
+    unstable, examined : the instabilities, and at how many instants they were looked for
+    departure : where the error left its promise
+    target : in how many steps the target moved otherwise than its rate says, where that matters
+    """
+
+    unstable: list[Instability]
+    examined: int
+    departure: Departure | None
+    target: int
+
+    @property
+    def missed(self) -> bool:
+        """Whether the error was not what was promised."""
+        return self.departure is not None and self.departure.missed
+
+
+def assess(controller: Controller, recorder: Recorder, advance: Integrator, dt: float) -> Assessment:
+    """What is wrong with a run whose samples were recorded."""
+    unstable, examined = _examine(controller, recorder, advance, dt)
+    samples = recorder.samples
+    if len(recorder) < 3:
+        return Assessment(unstable, examined, None, 0)
+    if advance.tolerance:
+        steps = adaptive_errors(samples, recorder.q[: len(recorder)], advance.tolerance)
+    else:
+        steps = step_errors(samples, advance.order)
+    found, own = departure(samples, steps), 0
+    if found is not None:  # then it is worth the time to ask the target
+        moved = _target_moves(controller, recorder)
+        found = departure(samples, steps, moved)
+        own = int(np.sum(moved > 1e-9 * (1.0 + np.abs(samples.error).max())))
+        own = own if own > OFTEN * len(moved) else 0
+    return Assessment(unstable, examined, found, own)
+
+
+def _target_moves(controller: Controller, recorder: Recorder) -> Array:
+    """By how much the error changed along each step with q held, otherwise than its rate says, (N - 1,)."""
+    samples, count = recorder.samples, len(recorder)
+    moves = np.empty(count - 1)
+    for k in range(count - 1):
+        try:
+            ahead = controller.evaluate(float(samples.t[k + 1]), recorder.q[k])
+        except Exception:  # a user's function may raise anything, where it was not made for
+            moves[k] = 0.0
+            continue
+        rates = samples.rate[k] - samples.K @ samples.error[k] + ahead.rate - samples.K @ ahead.error
+        change = ahead.error - samples.error[k] - 0.5 * (samples.t[k + 1] - samples.t[k]) * rates
+        moves[k] = np.linalg.norm(change)
+    controller.reset()
+    return np.nan_to_num(moves)
+
+
+def _examine(
+    controller: Controller, recorder: Recorder, advance: Integrator, dt: float
+) -> tuple[list[Instability], int]:
+    """The instabilities at some instants of the run, and how many instants were looked at."""
+    if not advance.stability:
+        return [], 0
+    found = []
+    chosen = np.unique(np.linspace(0, len(recorder) - 1, EXAMINED).astype(int))
+    for k in chosen:
+        controller.reset()
+        try:
+            instability = find_instability(
+                controller, float(recorder.t[k]), recorder.q[k], dt, advance.stability
+            )
+        except (RunError, np.linalg.LinAlgError):  # singular just beside this sample: not a matter of dt
+            continue
+        if instability is not None:
+            found.append(instability)
+    controller.reset()
+    return found, len(chosen)

@@ -1,0 +1,72 @@
+"""Inputs that jump back and forth from sample to sample."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from nmm.arrays import Array
+
+#: So many jumps in a row, each back from the last: fewer are a switch of partition, or a swing.
+IN_A_ROW = 4
+#: A jump smaller than this share of the input's size about it is none,
+SMALL = 0.1
+#: and neither is one smaller than this share of the largest input of the run.
+NEGLIGIBLE = 1e-3
+
+
+class Chattering(NamedTuple):
+    """An input that chatters, the one that jumps the farthest.
+
+    Attributes
+    ----------
+    jumps : how many of its jumps turn back the one before, in rows of at least `IN_A_ROW`
+    start, end : when the first and the last of them are, s
+    input : its name
+    size : the largest of these jumps, in the input's unit
+    """
+
+    jumps: int
+    start: float
+    end: float
+    input: str
+    size: float
+
+    @property
+    def sentence(self) -> str:
+        """For a warning or a reason."""
+        return (
+            f"the inputs chatter: {self.input} jumps back and forth between samples {self.jumps} times "
+            f"from t = {self.start:.4g} s to {self.end:.4g} s, by up to {self.size:.3g}"
+        )
+
+
+def chattering(t: Array, u: Array, names: Sequence[str]) -> Chattering | None:
+    """Whether the inputs u (N, m) at times t (N,) chatter, and how."""
+    if len(u) < IN_A_ROW + 2:
+        return None
+    jump = np.diff(u, axis=0)
+    size = np.abs(jump)
+    about = np.maximum.reduce([np.abs(u[:-2]), np.abs(u[1:-1]), np.abs(u[2:])])
+    least = np.maximum(SMALL * about, NEGLIGIBLE * np.abs(u).max())
+    back = (jump[1:] * jump[:-1] < 0.0) & (np.minimum(size[1:], size[:-1]) > least)
+    found = None
+    for i, name in enumerate(names):
+        (steps,) = np.nonzero(_in_rows(back[:, i]))
+        if steps.size:
+            largest = float(size[steps, i].max())
+            if found is None or largest > found.size:
+                found = Chattering(len(steps), float(t[steps[0] + 1]), float(t[steps[-1] + 1]), name, largest)
+    return found
+
+
+def _in_rows(flags: Array) -> Array:
+    """The flags (K,) that stand in rows of at least `IN_A_ROW`."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
+    kept = np.zeros(len(flags), dtype=bool)
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        if last - first >= IN_A_ROW:
+            kept[first:last] = True
+    return kept

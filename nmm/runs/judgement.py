@@ -1,0 +1,231 @@
+"""What a run amounts to: its error against what the gain promises, its inputs against what the task asked.
+
+A run that reached its end is `completed` when the error went as promised, `unstable` when dt was too long for
+it (a shorter one was tried), and `missed` otherwise. Whatever the outcome, the message says what was seen
+where it went wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from nmm.arrays import Array
+from nmm.control.controller import Controller
+from nmm.runs import reasons
+from nmm.runs.advice import Trial, advised
+from nmm.runs.assessment import Assessment, assess
+from nmm.runs.chattering import Chattering, chattering
+from nmm.runs.integrators import Integrator
+from nmm.runs.promise import Departure, Samples
+from nmm.runs.recording import Recorder
+from nmm.runs.residuals import residuals
+from nmm.runs.stability import Advice, Instability
+from nmm.runs.trajectory import Outcome
+
+#: (first sample, dt, most steps) -> the part of the run that was tried from there on, and how it ended.
+Retry = Callable[[int, float, int], tuple[Recorder, Outcome]]
+
+
+class Ended(NamedTuple):
+    """How integrating a run ended.
+
+    Attributes
+    ----------
+    outcome, message : as far as integrating it told
+    q (n,) : the last configuration recorded, or the start
+    J (s, m) : the task's matrix in the controller's last call, made at q or a step from it
+    """
+
+    outcome: Outcome
+    message: str
+    q: Array
+    J: Array
+
+
+class Verdict(NamedTuple):
+    """An outcome, the message that belongs to it, and what else is worth a warning."""
+
+    outcome: Outcome
+    message: str
+    warnings: list[str]
+
+
+def judge(
+    controller: Controller,
+    recorder: Recorder,
+    advance: Integrator,
+    method: str,
+    dt: float,
+    ended: Ended,
+    retry: Retry,
+) -> Verdict:
+    """Judge a run.
+
+    Parameters
+    ----------
+    controller, recorder, advance, method, dt : the run
+    ended : how integrating it ended
+    retry : to try parts of it again with another dt
+    """
+    outcome, message = ended.outcome, ended.message
+    samples = recorder.samples
+    if not len(recorder):
+        return Verdict(outcome, _joined(message, *_lost(controller, recorder, ended)), [])
+    found = assess(controller, recorder, advance, dt)
+    unmet = residuals(samples.t, samples.residual, samples.rate)
+    chatter = chattering(samples.t, samples.u, controller.robot.u_names)
+    warnings = [_joined(unmet.sentence, _relaxed(recorder.scale))] if unmet.samples else []
+    seen = _seen(controller, recorder, samples, found, chatter)
+    if outcome is Outcome.INTERRUPTED:
+        return Verdict(outcome, message, warnings)
+    troubled = found.unstable or found.missed or outcome is Outcome.DIVERGED
+    advice = None
+    if troubled and outcome is not Outcome.SINGULAR and not _hopeless(seen):
+        advice = _advice(controller, recorder, advance, dt, found, retry)
+    stability = _stability(found.unstable, advice, method, dt)
+    if outcome is not Outcome.COMPLETED:
+        if advice is None:
+            also = [*_lost(controller, recorder, ended), *seen]
+        else:
+            also = [stability or _tried(advice, dt)]
+        return Verdict(outcome, _joined(message, *also), warnings)
+    if found.missed and found.departure is not None:
+        if stability and advice:
+            return Verdict(Outcome.UNSTABLE, _joined(stability, *seen), warnings)
+        told = _told(samples, found.departure)
+        return Verdict(Outcome.MISSED, _joined(told, *seen, _tried(advice, dt)), warnings)
+    if 2 * len(found.unstable) > found.examined:
+        return Verdict(Outcome.UNSTABLE, stability, warnings)
+    if found.departure is not None:
+        warnings.append(_joined(_told(samples, found.departure), *seen))
+    elif chatter is not None:
+        warnings.append(chatter.sentence)
+    if found.target and found.departure is None:
+        warnings.append(_moved(found.target))
+    if stability:
+        warnings.append(f"for part of the run {stability}")
+    return Verdict(outcome, message, warnings)
+
+
+def _advice(
+    controller: Controller,
+    recorder: Recorder,
+    advance: Integrator,
+    dt: float,
+    found: Assessment,
+    retry: Retry,
+) -> Advice | None:
+    """A shorter dt with which the run behaves."""
+    samples = recorder.samples
+    troubles = [int(np.searchsorted(samples.t, one.t)) for one in found.unstable]
+    if found.departure is not None:
+        troubles.append(found.departure.first)
+    before = min(troubles, default=0)
+
+    def try_with(shorter: float, most: int) -> Trial:
+        # The whole run where it fits, else from a little before it went wrong.
+        fits = samples.t[-1] - samples.t[0] <= most * shorter
+        start = 0 if fits else max(0, before - int(0.1 * most * shorter / dt))
+        try:
+            tried, outcome = retry(start, shorter, most)
+            again = assess(controller, tried, advance, shorter)
+        except Exception:  # a user's function may raise anything, where it was not made for
+            return Trial(False, [], float(samples.t[start]), float(samples.t[start]))
+        behaves = outcome is Outcome.COMPLETED and not again.unstable and again.departure is None
+        return Trial(behaves, again.unstable, float(samples.t[start]), tried.reached)
+
+    return advised(try_with, dt, recorder.duration, found.unstable)
+
+
+def _stability(unstable: list[Instability], advice: Advice | None, method: str, dt: float) -> str:
+    if not unstable:
+        return ""
+    # Of a run that went astray the last modes are monstrous: the one that the advice answers is told.
+    answered = [one for one in unstable if advice is not None and one.limit >= advice.dt]
+    return max(answered or unstable, key=lambda one: one.rate).describe(method, dt, advice)
+
+
+def _tried(advice: Advice | None, dt: float) -> str:
+    if advice is None:
+        return ""
+    return f"with dt = {advice.dt:.3g} s in place of {dt:g} s it kept its promise when tried"
+
+
+def _told(samples: Samples, found: Departure) -> str:
+    """What was asked, promised and was."""
+    norm = np.linalg.norm(samples.error, axis=1)
+    t = samples.t
+
+    def at(k: int) -> str:
+        allowed = (
+            f", {found.bound[k]:.3g} with the method's own error"
+            if found.bound[k] > 1.1 * found.promise[k]
+            else ""
+        )
+        return f"{norm[k]:.3g} (promised {found.promise[k]:.3g}{allowed})"
+
+    when, worst = f"t = {t[found.first]:.4g} s", f"t = {t[found.worst]:.4g} s"
+    return (
+        f"the task error was not what its gain promises: it began with {norm[0]:.3g}, left that at {when}, "
+        f"was {at(found.worst)} at {worst} and {at(-1)} at the end"
+    )
+
+
+def _seen(
+    controller: Controller,
+    recorder: Recorder,
+    samples: Samples,
+    found: Assessment,
+    chatter: Chattering | None,
+) -> list[str]:
+    """What there is to see where the error left its promise; of a run that did not end, at its end."""
+    left = found.departure
+    if left is None:
+        return [chatter.sentence] if chatter else []
+    q = recorder.q[: len(recorder)]
+    target = recorder.target
+    sentences = [
+        reasons.out_of_reach(controller, q[left.worst], target[left.worst]),
+        reasons.inputs_unmet(samples, left),
+        reasons.singularity(controller, samples, q, left),
+        reasons.switching(samples, left),
+        "" if chatter is None else chatter.sentence,
+    ]
+    controller.reset()
+    if not any(sentences):
+        sentences.append(reasons.unresolved(samples, left))
+    if found.target:
+        sentences.append(_moved(found.target))
+    return [sentence for sentence in sentences if sentence]
+
+
+def _moved(steps: int) -> str:
+    return f"the target moved otherwise than its rate says in {steps} steps, and the error with it"
+
+
+def _lost(controller: Controller, recorder: Recorder, ended: Ended) -> list[str]:
+    """What nothing moves where a run became singular, and whether the target is out of reach."""
+    if ended.outcome is not Outcome.SINGULAR:
+        return []
+    words = reasons.lost_words(controller, ended.q, ended.J)
+    sentences = [f"no input gives: {', '.join(words)}"] if words and words[0] not in ended.message else []
+    if len(recorder):
+        sentences.append(reasons.out_of_reach(controller, ended.q, recorder.target[-1]))
+    return [sentence for sentence in sentences if sentence]
+
+
+def _relaxed(scale: Array) -> str:
+    least = float(scale.min(initial=1.0))
+    return f"its resolver scales the rate on purpose, down to {least:.3g} of it" if least < 1.0 else ""
+
+
+def _hopeless(seen: list[str]) -> bool:
+    """Whether no dt helps: the target is out of reach."""
+    return any("out of reach" in sentence for sentence in seen)
+
+
+def _joined(*sentences: str) -> str:
+    return "; ".join(sentence for sentence in sentences if sentence)

@@ -1,0 +1,169 @@
+"""What a gain promises of the task error along a run, and what an integrator of finite step may add to it.
+
+The closed loop has e_dot = -K e whatever the robot, so that e(t) = exp(-K (t - t0)) e(t0): an angle's error
+and a pose's logarithm too. A step h of a method of order p adds its local error. What that is made of is
+known at the samples: along a step the task's rate changes by ΔJ u (the robot's own curvature) and by Δ(∂e/∂t)
+(the reference's acceleration), and feedback by K² e h, so that the local error of a method of first order is
+
+    c = h/2 (‖ΔJ u‖ + ‖Δ ∂e/∂t‖ + h ‖K² e‖),
+
+to leading order, and that of a method of order p is c ρ^(p-1), where ρ is h over the time in which the motion
+changes: the share by which u, J or ∂e/∂t changed along the step. Errors made earlier decay as the error
+itself does. A step along which u or J changed by more than their own size is not resolved by the method and
+explains nothing: no allowance is made for it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import expm
+
+from nmm.arrays import Array, Integers
+from nmm.runs.residuals import differs
+
+#: The local error is estimated, not bounded: this many times the estimate is allowed.
+SAFETY = 3.0
+#: What integration may come to at most, as a share of 1 + ‖e(t0)‖ (m, rad): what errs more does not follow.
+MOST = 0.1
+#: The error has left its promise where it exceeds it by more than this share of 1 + ‖e(t0)‖.
+LEFT = 0.01
+#: At its end it is where it was promised: up to this many times the promise, and up to a share as above.
+RETURNED, ENDS = 2.0, 1e-3
+
+
+class Samples(NamedTuple):
+    """What a run recorded of its task: N samples, s rows, m inputs.
+
+    Attributes
+    ----------
+    t (N,) s; error (N, s); rate (N, s): ∂e/∂t + K e, asked of J u; J (N, s, m); u (N, m)
+    residual (N,) : ‖J u - rate‖
+    partition (N, s) : columns of Ja, -1 where there is none
+    K (s, s) : the gains, 1/s
+    """
+
+    t: Array
+    error: Array
+    rate: Array
+    J: Array
+    u: Array
+    residual: Array
+    partition: Integers
+    K: Array
+
+
+class Departure(NamedTuple):
+    """The error left its promise.
+
+    Attributes
+    ----------
+    first, worst : the samples at which it left and at which it was farthest from it
+    promise (N,) : ‖exp(-K (t - t0)) e(t0)‖
+    bound (N,) : the largest ‖e‖ that the promise, integration and the target explain
+    unmet (N,) : what the residual adds to it, where the inputs did not do what the task asked
+    missed : whether the run did not keep its promise; else the error left it by little, or because of the
+        residual, and came back
+    """
+
+    first: int
+    worst: int
+    promise: Array
+    bound: Array
+    unmet: Array
+    missed: bool
+
+
+def departure(samples: Samples, step: Array, target: Array | None = None) -> Departure | None:
+    """Where and how far ‖e‖ left what was promised; None where it did not.
+
+    Parameters
+    ----------
+    samples : the run
+    step (N - 1,) : the error that each integration step may add (`step_errors`)
+    target (N - 1,) : by how much the target moved along each step otherwise than its rate says: a target that
+        jumps restarts the promise
+    """
+    t, error = samples.t, samples.error
+    if len(t) < 2:
+        return None
+    decays = decay(t, samples.K)
+    norm = _sizes(error)
+    size = 1.0 + norm[0]
+    promise = promised(t, error, samples.K)
+    bound = promise + np.minimum(accumulated(step, decays), MOST * size)
+    if target is not None:
+        bound = bound + accumulated(target, decays)
+    short = np.where(differs(samples.residual, samples.rate), samples.residual, 0.0)
+    unmet = accumulated(np.diff(t) * np.maximum(short[1:], short[:-1]), decays)
+    excess = norm - bound
+    missed = bool(np.any(excess - unmet > LEFT * size) or norm[-1] > RETURNED * bound[-1] + ENDS * size)
+    (beyond,) = np.nonzero(excess > ENDS * size)
+    if not beyond.size:
+        return None
+    return Departure(int(beyond[0]), int(np.argmax(excess)), promise, bound, unmet, missed)
+
+
+def decay(t: Array, K: Array) -> Array:
+    """‖exp(-K h)‖ of each step h of the times (N,), shape (N - 1,)."""
+    steps, which = np.unique(np.round(np.diff(t), 12), return_inverse=True)
+    norms = np.array([np.linalg.norm(expm(-K * h), 2) for h in steps])
+    return np.asarray(norms[which])
+
+
+def promised(t: Array, error: Array, K: Array) -> Array:
+    """‖exp(-K (t - t0)) e(t0)‖ at the times (N,), in the mixed units of the rows."""
+    steps, which = np.unique(np.round(np.diff(t), 12), return_inverse=True)
+    factors = [expm(-K * h) for h in steps]
+    norms = np.empty(len(t))
+    e = error[0]
+    for k in range(len(t)):
+        norms[k] = np.linalg.norm(e)
+        if k < len(which):
+            e = factors[which[k]] @ e
+    return norms
+
+
+def step_errors(samples: Samples, order: int) -> Array:
+    """The error that a method of that order may make along each step, (N - 1,); 0 where it cannot follow."""
+    t, error, rate, J, u, _, partition, K = samples
+    h = np.diff(t)
+    moved = rate - error @ K.T  # ∂e/∂t
+    turned = np.einsum("kij,kj->ki", np.diff(J, axis=0), u[:-1])
+    first = 0.5 * h * (_sizes(turned) + _sizes(np.diff(moved, axis=0)) + h * _sizes(error[:-1] @ (K @ K).T))
+    change = _relative_change(u)
+    switched = np.any(
+        np.diff(partition, axis=0) != 0, axis=1
+    )  # u then jumps between two steps, not along one
+    for k in np.flatnonzero(switched):
+        change[k] = change[k - 1] if k else 0.0
+    change = np.maximum(change, _relative_change(J.reshape(len(J), -1)))
+    share = np.maximum.reduce([change, _relative_change(moved), h * np.linalg.norm(K, 2)])
+    allowed: Array = SAFETY * first * np.minimum(share, 1.0) ** (order - 1)
+    return np.where(change <= 1.0, allowed, 0.0)
+
+
+def adaptive_errors(samples: Samples, q: Array, tolerance: float) -> Array:
+    """What steps of adaptive size add between samples at q (N, n) with a tolerance in m and rad, (N - 1,)."""
+    moved = np.linalg.norm(samples.J[:-1], axis=(1, 2)) * (1.0 + np.abs(q[:-1]).max(axis=1))
+    return np.asarray(SAFETY * tolerance * moved)
+
+
+def accumulated(added: Array, decays: Array) -> Array:
+    """What errors added along each step (N - 1,) come to at the samples (N,), each decaying from there on."""
+    total = np.zeros(len(added) + 1)
+    for k, (one, factor) in enumerate(zip(added, decays, strict=True)):
+        total[k + 1] = factor * total[k] + one
+    return total
+
+
+def _sizes(rows: Array) -> Array:
+    return np.asarray(np.linalg.norm(rows, axis=1))
+
+
+def _relative_change(values: Array) -> Array:
+    """‖v[k+1] - v[k]‖ beside the larger of both, (N - 1,)."""
+    size = _sizes(values)
+    larger = np.maximum(size[1:], size[:-1])
+    return np.asarray(_sizes(np.diff(values, axis=0)) / np.where(larger > 0.0, larger, 1.0))

@@ -1,0 +1,59 @@
+"""How often and how far J u differed from the rate that the task asked for."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from nmm.arrays import Array
+from nmm.resolvers.answer import EXACT
+
+
+class Residuals(NamedTuple):
+    """The samples of a run at which J u differed from the rate.
+
+    Attributes
+    ----------
+    samples : how many; share : of all samples
+    largest : ‖J u - rate‖ at most, in the mixed units of the rows per second; 0 where none differed
+    relative : that beside ‖rate‖ there
+    t : when, s
+    """
+
+    samples: int
+    share: float
+    largest: float
+    relative: float
+    t: float
+
+    @property
+    def sentence(self) -> str:
+        """For a warning; "" where J u was the rate everywhere."""
+        if not self.samples:
+            return ""
+        return (
+            f"the inputs did not do all that the task asked in {self.samples} samples "
+            f"({100 * self.share:.3g} %): J u differed from the rate by up to {self.largest:.3g} "
+            f"({100 * self.relative:.3g} % of it), at t = {self.t:.4g} s"
+        )
+
+
+#: Of a run whose inputs did all that the task asked.
+NONE = Residuals(0, 0.0, 0.0, 0.0, 0.0)
+
+
+def differs(residual: Array, rate: Array) -> Array:
+    """At which samples the residual (N,) says so, beside the rate (N, s)."""
+    return np.asarray(residual > EXACT * (1.0 + np.linalg.norm(rate, axis=1)))
+
+
+def residuals(t: Array, residual: Array, rate: Array) -> Residuals:
+    """What the residual (N,) says of a run at times t (N,) whose rate is (N, s)."""
+    (found,) = np.nonzero(differs(residual, rate))
+    if not found.size:
+        return NONE
+    k = int(found[np.argmax(residual[found])])
+    asked = float(np.linalg.norm(rate[k]))
+    relative = float(residual[k]) / asked if asked > 0.0 else 1.0
+    return Residuals(len(found), len(found) / len(t), float(residual[k]), relative, float(t[k]))
