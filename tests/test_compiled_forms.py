@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from function_grid import ENTRIES, TIMES, Entry, evaluated, modules, random_configuration
+from gripping import folding
 from numba.core.dispatcher import Dispatcher
 from numpy.typing import NDArray
 from paper_cases import CASES, TIP
@@ -189,7 +190,7 @@ def answers() -> dict[str, Array]:
     """Everything the two forms are compared by: functions, errors, platforms, and the inputs of the cases."""
     found = {}
     rng = np.random.default_rng(7)
-    robots = {name: load(name) for name in ("unicycle_2r", "unicycle_3r")}
+    robots = {robot.name: robot for robot in (load("unicycle_2r"), load("unicycle_3r"), folding())}
     for entry in ENTRIES:
         robot = robots[entry.robots[-1]]
         configuration = Configuration(robot, random_configuration(robot, rng))
