@@ -54,7 +54,7 @@ def parameters(made: type) -> tuple[Parameter, ...]:
             Parameter(
                 name,
                 STARRED if starred else name,
-                str(given.annotation).removesuffix(" | None"),
+                _as_written(given.annotation).removesuffix(" | None"),
                 hints[name],
                 default,
                 texts.get(name, ""),
@@ -62,6 +62,11 @@ def parameters(made: type) -> tuple[Parameter, ...]:
             )
         )
     return tuple(found)
+
+
+def _as_written(annotation: Any) -> str:
+    """An annotation as the source says it, also of a file that does not postpone their evaluation."""
+    return annotation.__name__ if isinstance(annotation, type) else str(annotation)
 
 
 def _may_be_called_bare(made: type) -> bool:
