@@ -40,6 +40,8 @@ def test_a_row_of_one_can_be_lost(ur5: Robot) -> None:
     ):
         controller = nmm.Controller(ur5, nmm.Task(height, [0.5]), resolver)
         assert controller.evaluate(0.0, STRETCHED_UP).status is Status.SINGULAR_J
+        with pytest.raises(nmm.SingularError, match="no input gives: motion of tool0 along z"):
+            controller(0.0, STRETCHED_UP)
         assert controller.evaluate(0.0, bent).status is Status.SOLVED
 
 

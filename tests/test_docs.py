@@ -83,10 +83,9 @@ def test_the_worked_examples_can_be_typed_in(tmp_path: Path, monkeypatch: pytest
     try:
         used_names = vars(importlib.import_module("used"))
     finally:
-        RESOLVERS.pop("dls", None)
         for name in ("slope", "damped", "used"):
             sys.modules.pop(name, None)
-    run, named, robot, task = (used_names[name] for name in ("run", "named", "robot", "task"))
+    run, robot, task = (used_names[name] for name in ("run", "robot", "task"))
     for q in run.q[::100]:
         check_function(task.function, robot, 0.0, q)
     # e_dot = -λ K e, with the share λ of the rate that the damping leaves.
@@ -94,7 +93,6 @@ def test_the_worked_examples_can_be_typed_in(tmp_path: Path, monkeypatch: pytest
     np.testing.assert_allclose(run.error[:, 0], run.error[0, 0] * decay, atol=2e-3)
     assert np.all(run.scale < 1.0)
     assert np.all(run.scale > 0.5)
-    assert named.resolver == "dls"
 
 
 @pytest.mark.parametrize(

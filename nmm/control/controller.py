@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, Integers
 from nmm.control.equations import PLAIN, WRAPPED, Arm, ControlStep, TaskRows, drive, step
+from nmm.control.lost_directions import in_world_axes, lost_directions
 from nmm.errors import InputError, SingularError
 from nmm.functions.function import Row, row_scales
 from nmm.functions.objectives.base import Objective
@@ -189,7 +190,16 @@ class Controller:
         problem = self.robot.platform.problem(q[: self.robot.platform.n_p])
         status = Status(int(self._step.answer.status[()]))
         also = "" if problem is None else f"; {problem}"
-        raise SingularError(f"at t = {t:g} s: {status.meaning}{also}")
+        raise SingularError(f"at t = {t:g} s: {status.meaning}{self._lost(status, q)}{also}")
+
+    def _lost(self, status: Status, q: Array) -> str:
+        """What no input gives, where J lost rank."""
+        J = self._step.problem.J
+        if status is not Status.SINGULAR_J or not np.all(np.isfinite(J)):
+            return ""
+        turned = in_world_axes(J, self.task, self.robot, q)
+        lost = lost_directions(turned, self.rows, row_scales(self.rows, self.robot))
+        return f" (no input gives: {', '.join(lost)})" if lost else ""
 
     def evaluate(self, t: float, q: ArrayLike) -> Step:
         """All quantities at (t, q); a singular matrix is reported in `status`, not raised.

@@ -34,14 +34,14 @@ def lost_directions(
     J (s, m) : the task's matrix, its frames' rows in world axes (see `in_world_axes`)
     rows : its rows
     scales (s,) : how much of each row counts as 1: the robot's reach for m, 1 for rad
-    tolerance : singular values of J / scales this small beside the largest are zero
+    tolerance : singular values of J / scales this small beside the largest, or beside 1, are zero
 
     Returns
     -------
     A phrase each, for directions that are orthogonal in those scales; none where J has full rank
     """
     U, values = _left_vectors(J, scales)
-    rank = int(np.sum(values > tolerance * values[0])) if values[0] > 0.0 else 0
+    rank = int(np.sum(values > tolerance * max(1.0, float(values[0]))))
     return [direction_words(y, rows) for y in readable_basis(U[:, rank:].T)]
 
 
