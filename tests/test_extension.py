@@ -222,6 +222,43 @@ def test_figures_show_what_a_users_task_says(robot_2r: Robot) -> None:
             run(said)
 
 
+@kernel(FUNCTION)
+def folded(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
+    """|cos q|, q the last coordinate."""
+    last = at.q.shape[0] - 1
+    rows.value[0] = abs(math.cos(at.q[last]))
+    rows.value_q[0, last] = -math.sin(at.q[last]) if math.cos(at.q[last]) > 0.0 else math.sin(at.q[last])
+
+
+class Folded(SquareDistance):
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        return (Stage(folded, 1),)
+
+
+def test_a_kernel_with_several_formulas_is_refused(robot_2r: Robot) -> None:
+    with pytest.raises(InputError, match="one of these branches on the configuration"):
+        symbolic(robot_2r, Folded("", "", 0.0))
+
+
+@kernel(FUNCTION)
+def beating(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
+    """(1 + t²) sin q, q the last coordinate."""
+    last = at.q.shape[0] - 1
+    rows.value[0] = (1.0 + at.t * at.t) * math.sin(at.q[last])
+    rows.value_t[0] = 2.0 * at.t * math.sin(at.q[last])
+    rows.value_q[0, last] = (1.0 + at.t * at.t) * math.cos(at.q[last])
+
+
+class Beating(SquareDistance):
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        return (Stage(beating, 1),)
+
+
+def test_a_kernel_of_time_and_configuration_at_once_is_refused(robot_2r: Robot) -> None:
+    with pytest.raises(InputError, match="no formula for Beating: it depends on the time and on the conf"):
+        symbolic(robot_2r, Beating("", "", 0.0))
+
+
 @kernel(RESOLVER)
 def steepest(
     problem: ProblemArrays, numbers: Array, options: Array, state: Array, answer: AnswerArrays
