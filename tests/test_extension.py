@@ -241,22 +241,35 @@ def test_a_kernel_with_several_formulas_is_refused(robot_2r: Robot) -> None:
 
 
 @kernel(FUNCTION)
-def beating(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
-    """(1 + t²) sin q, q the last coordinate."""
+def swaying(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
+    """t^a sin q + b t, q the last coordinate; numbers = [a, b]."""
     last = at.q.shape[0] - 1
-    rows.value[0] = (1.0 + at.t * at.t) * math.sin(at.q[last])
-    rows.value_t[0] = 2.0 * at.t * math.sin(at.q[last])
-    rows.value_q[0, last] = (1.0 + at.t * at.t) * math.cos(at.q[last])
+    rows.value[0] = at.t ** numbers[0] * math.sin(at.q[last]) + numbers[1] * at.t
+    rows.value_t[0] = numbers[1]
+    if numbers[0] != 0.0:
+        rows.value_t[0] += numbers[0] * at.t ** (numbers[0] - 1.0) * math.sin(at.q[last])
+    rows.value_q[0, last] = at.t ** numbers[0] * math.cos(at.q[last])
 
 
-class Beating(SquareDistance):
+class Swaying(SquareDistance):
+    def __init__(self, power: float, drift: float) -> None:
+        self.numbers = np.array([power, drift])
+
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
-        return (Stage(beating, 1),)
+        return (Stage(swaying, 1, numbers=self.numbers),)
 
 
-def test_a_kernel_of_time_and_configuration_at_once_is_refused(robot_2r: Robot) -> None:
-    with pytest.raises(InputError, match="no formula for Beating: it depends on the time and on the conf"):
-        symbolic(robot_2r, Beating("", "", 0.0))
+def test_a_formula_is_one_of_the_configuration_alone(robot_2r: Robot, rng: np.random.Generator) -> None:
+    for function in (Swaying(1.0, 0.0), Swaying(0.0, 0.5)):
+        check_function(function, robot_2r, 0.4, random_configuration(robot_2r, rng))
+        with pytest.raises(
+            InputError, match="no formula for Swaying: it depends on the time and on the conf"
+        ):
+            symbolic(robot_2r, function)
+    # As a target it may drift: only its derivatives are in J.
+    task = Task(Swaying(0.0, 0.0), Swaying(0.0, 0.5))
+    assert not any(symbolic(robot_2r, task).minors.values())
+    check_numbers(robot_2r, Swaying(0.0, 0.0), symbolic(robot_2r, Swaying(0.0, 0.0)), rng.normal(size=(3, 5)))
 
 
 @kernel(RESOLVER)
