@@ -222,6 +222,56 @@ def test_figures_show_what_a_users_task_says(robot_2r: Robot) -> None:
             run(said)
 
 
+@kernel(FUNCTION)
+def folded(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
+    """|cos q|, q the last coordinate."""
+    last = at.q.shape[0] - 1
+    rows.value[0] = abs(math.cos(at.q[last]))
+    rows.value_q[0, last] = -math.sin(at.q[last]) if math.cos(at.q[last]) > 0.0 else math.sin(at.q[last])
+
+
+class Folded(SquareDistance):
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        return (Stage(folded, 1),)
+
+
+def test_a_kernel_with_several_formulas_is_refused(robot_2r: Robot) -> None:
+    with pytest.raises(InputError, match="one of these branches on the configuration"):
+        symbolic(robot_2r, Folded("", "", 0.0))
+
+
+@kernel(FUNCTION)
+def swaying(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
+    """t^a sin q + b t, q the last coordinate; numbers = [a, b]."""
+    last = at.q.shape[0] - 1
+    rows.value[0] = at.t ** numbers[0] * math.sin(at.q[last]) + numbers[1] * at.t
+    rows.value_t[0] = numbers[1]
+    if numbers[0] != 0.0:
+        rows.value_t[0] += numbers[0] * at.t ** (numbers[0] - 1.0) * math.sin(at.q[last])
+    rows.value_q[0, last] = at.t ** numbers[0] * math.cos(at.q[last])
+
+
+class Swaying(SquareDistance):
+    def __init__(self, power: float, drift: float) -> None:
+        self.numbers = np.array([power, drift])
+
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        return (Stage(swaying, 1, numbers=self.numbers),)
+
+
+def test_a_formula_is_one_of_the_configuration_alone(robot_2r: Robot, rng: np.random.Generator) -> None:
+    for function in (Swaying(1.0, 0.0), Swaying(0.0, 0.5)):
+        check_function(function, robot_2r, 0.4, random_configuration(robot_2r, rng))
+        with pytest.raises(
+            InputError, match="no formula for Swaying: it depends on the time and on the conf"
+        ):
+            symbolic(robot_2r, function)
+    # As a target it may drift: only its derivatives are in J.
+    task = Task(Swaying(0.0, 0.0), Swaying(0.0, 0.5))
+    assert not any(symbolic(robot_2r, task).minors.values())
+    check_numbers(robot_2r, Swaying(0.0, 0.0), symbolic(robot_2r, Swaying(0.0, 0.0)), rng.normal(size=(3, 5)))
+
+
 @kernel(RESOLVER)
 def steepest(
     problem: ProblemArrays, numbers: Array, options: Array, state: Array, answer: AnswerArrays

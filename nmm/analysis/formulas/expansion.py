@@ -40,6 +40,7 @@ class Ring:
     names, is_angle : of each variable
     sample : a value of each, together in general position: where a kernel that is traced branches
     ratios : for an angle α, by its index, the name of the scalar α / sin α
+    branched : whether a kernel has compared formulas
     """
 
     def __init__(self, budget: int) -> None:
@@ -47,6 +48,7 @@ class Ring:
         self.is_angle: list[bool] = []
         self.sample: list[float] = []
         self.ratios: dict[int, str] = {}
+        self.branched = False
         self.budget = budget
         self._left = budget
 

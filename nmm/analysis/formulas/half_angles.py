@@ -1,4 +1,4 @@
-"""Between waves e^{ikφ} and powers of t = tan(φ/2), one angle after the other, in whole numbers."""
+"""Between waves z^k, z = e^{iφ}, and powers of t = tan(φ/2), in whole numbers: z = (1 + i t)/(1 - i t)."""
 
 from __future__ import annotations
 
@@ -11,73 +11,61 @@ from typing import TypeAlias
 #: Exponents: one an angle, then those of scalars.
 Exponents: TypeAlias = tuple[int, ...]
 #: Real and imaginary part.
+Gaussian: TypeAlias = tuple[Fraction, Fraction]
 Whole: TypeAlias = tuple[int, int]
 
 
-def to_tangents(
-    waves: Mapping[Exponents, tuple[Fraction, Fraction]], degrees: Sequence[int]
-) -> dict[Exponents, Fraction]:
+def to_tangents(waves: Mapping[Exponents, Gaussian], degrees: Sequence[int]) -> dict[Exponents, Fraction]:
     """Σ c Π e^{i k_j φ_j} times Π (1 + t_j²)^m_j, by powers of t; |k_j| is at most degrees[j] = m_j.
 
     The sum is real: its waves come with their conjugates.
     """
-    over = lcm(*(part.denominator for value in waves.values() for part in value))
-    table = {key: (int(re * over), int(im * over)) for key, (re, im) in waves.items()}
-    for j, m in enumerate(degrees):
-        table = _transformed(table, j, {k: _tangents(k, m) for k in range(-m, m + 1)})
-    return {key: Fraction(re, over) for key, (re, _) in table.items() if re}
+    shifted = {_shifted(key, degrees): value for key, value in waves.items()}
+    found = _replaced(shifted, [2 * m for m in degrees], ((1, 0), (0, 1)), ((1, 0), (0, -1)))
+    return {key: re for key, (re, _) in found.items() if re}
 
 
-def to_waves(
-    powers: Mapping[Exponents, Fraction], degrees: Sequence[int]
-) -> dict[Exponents, tuple[Fraction, Fraction]]:
-    """Σ c Π sin^n_j cos^(d_j - n_j) of the half angles, d = degrees (even), by the waves' k."""
-    over = lcm(*(number.denominator for number in powers.values()))
-    table = {key: (int(number * over), 0) for key, number in powers.items()}
+def to_waves(powers: Mapping[Exponents, Fraction], degrees: Sequence[int]) -> dict[Exponents, Gaussian]:
+    """Σ c Π sin^n_j cos^(d_j - n_j) of the half angles, d = degrees (even), by the waves' k.
+
+    These are ((z - 1)/2i)^n ((z + 1)/2)^(d-n) / z^(d/2).
+    """
+    over = Fraction(1, 2 ** sum(degrees))
+    given = {key: (number * over, Fraction(0)) for key, number in powers.items()}
+    found = _replaced(given, degrees, ((0, 1), (0, -1)), ((1, 0), (1, 0)))
+    return {_shifted(key, [-(d // 2) for d in degrees]): value for key, value in found.items()}
+
+
+def _shifted(key: Exponents, by: Sequence[int]) -> Exponents:
+    return (*(k + m for k, m in zip(key, by, strict=False)), *key[len(by) :])
+
+
+def _replaced(
+    given: Mapping[Exponents, Gaussian],
+    degrees: Sequence[int],
+    up: tuple[Whole, Whole],
+    down: tuple[Whole, Whole],
+) -> dict[Exponents, Gaussian]:
+    """x_j^k replaced by up^k down^(d_j - k), polynomials (constant, slope), one variable after the other."""
+    over = lcm(*(part.denominator for value in given.values() for part in value))
+    table = {key: (int(re * over), int(im * over)) for key, (re, im) in given.items()}
     for j, d in enumerate(degrees):
-        table = _transformed(table, j, {n: _waves(n, d) for n in range(d + 1)})
-    over *= 2 ** sum(degrees)
-    return {key: (Fraction(re, over), Fraction(im, over)) for key, (re, im) in table.items() if re or im}
-
-
-def _transformed(
-    table: dict[Exponents, Whole], j: int, to: Mapping[int, Sequence[tuple[int, int, int]]]
-) -> dict[Exponents, Whole]:
-    """Each exponent j replaced by its sum of (exponent, real, imaginary part)."""
-    found: dict[Exponents, Whole] = {}
-    for key, (re, im) in table.items():
-        before, after = key[:j], key[j + 1 :]
-        for exponent, a, b in to[key[j]]:
-            place = (*before, exponent, *after)
-            x, y = found.get(place, (0, 0))
-            found[place] = (x + re * a - im * b, y + re * b + im * a)
-    return {key: value for key, value in found.items() if value[0] or value[1]}
+        found: dict[Exponents, Whole] = {}
+        for key, (re, im) in table.items():
+            for n, (a, b) in enumerate(_product(key[j], d, up, down)):
+                if a or b:
+                    place = (*key[:j], n, *key[j + 1 :])
+                    x, y = found.get(place, (0, 0))
+                    found[place] = (x + re * a - im * b, y + re * b + im * a)
+        table = {key: value for key, value in found.items() if value[0] or value[1]}
+    return {key: (Fraction(re, over), Fraction(im, over)) for key, (re, im) in table.items()}
 
 
 @cache
-def _tangents(k: int, m: int) -> list[tuple[int, int, int]]:
-    """z^k (1 + t²)^m = (1 + i t)^(m+k) (1 - i t)^(m-k)."""
-    found = {0: (1, 0)}
-    for sign in (1,) * (m + k) + (-1,) * (m - k):
-        found = _added(found, {n + 1: (-sign * im, sign * re) for n, (re, im) in found.items()})
-    return [(n, re, im) for n, (re, im) in found.items() if re or im]
-
-
-@cache
-def _waves(n: int, d: int) -> list[tuple[int, int, int]]:
-    """2^d times ((w - 1/w)/2i)^n ((w + 1/w)/2)^(d-n), w = e^{iφ/2}: only even powers of w are left."""
-    found = {0: (1, 0)}
-    for sign in (-1,) * n + (1,) * (d - n):
-        up = {k + 1: value for k, value in found.items()}
-        down = {k - 1: (sign * re, sign * im) for k, (re, im) in found.items()}
-        found = _added(up, down)
-    a, b = ((1, 0), (0, -1), (-1, 0), (0, 1))[n % 4]  # 1/i^n
-    return [(k // 2, re * a - im * b, re * b + im * a) for k, (re, im) in found.items() if re or im]
-
-
-def _added(one: dict[int, Whole], two: dict[int, Whole]) -> dict[int, Whole]:
-    found = dict(one)
-    for key, (re, im) in two.items():
-        x, y = found.get(key, (0, 0))
-        found[key] = (x + re, y + im)
+def _product(k: int, d: int, up: tuple[Whole, Whole], down: tuple[Whole, Whole]) -> list[Whole]:
+    """Coefficients of up^k down^(d - k)."""
+    found = [(1, 0)]
+    for (a, b), (c, e) in [up] * k + [down] * (d - k):
+        pairs = zip([*found, (0, 0)], [(0, 0), *found], strict=True)
+        found = [(x * a - y * b + u * c - v * e, x * b + y * a + u * e + v * c) for (x, y), (u, v) in pairs]
     return found

@@ -1,4 +1,8 @@
-"""Factors of polynomials that are linear in some variable, without a search."""
+"""Factors of polynomials that are linear in some variable, without a search.
+
+With SymPy's `factor_list` alone the polynomials of the paper's 2R take 0.6 s instead of 0.03 s, of the 3R
+3.3 s instead of 0.5 s, of UR5's pose over 40 s instead of 3.4 s, of a small arm's pose 19 s instead of 1.5 s.
+"""
 
 from __future__ import annotations
 

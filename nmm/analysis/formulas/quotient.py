@@ -33,6 +33,7 @@ class Traced(NDArrayOperatorsMixin):
         if ufunc in (np.equal, np.not_equal):
             return (ufunc is np.equal) != bool(_plus(inputs[0], inputs[1], -1))
         if ufunc in (np.less, np.less_equal, np.greater, np.greater_equal):
+            self.ring.branched = True
             return bool(ufunc(*(float(value) for value in inputs)))
         if ufunc not in _OPERATIONS:
             raise Untraceable(f"it takes {ufunc.__name__} of a formula")
@@ -206,5 +207,5 @@ _OPERATIONS: dict[Any, Any] = {
     np.divide: _over,
     np.power: _power,
     np.negative: lambda a: _times(a, -1),
-    np.absolute: lambda a: a if float(a) >= 0.0 else _times(a, -1),
+    np.absolute: lambda a: a if a >= 0.0 else _times(a, -1),
 }

@@ -1,4 +1,8 @@
-"""From a trigonometric polynomial to the form that a person would write."""
+"""From a trigonometric polynomial to the form that a person would write.
+
+SymPy's `simplify`, `fu` and `factor(trigsimp(...))` take 6 to 8 s for the paper's 3R, which is 0.4 s here,
+and leave products such as Λ (d + Λ c1) as sums of ten terms; `trigsimp` by Gröbner bases takes 28 s for one.
+"""
 
 from __future__ import annotations
 

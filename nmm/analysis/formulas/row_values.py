@@ -9,7 +9,7 @@ from nmm.analysis.formulas.expansion import Expansion
 from nmm.analysis.formulas.quotient import Linear
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Arc:
     """An angle atan2(sine, cosine), which no kernel can compute with."""
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Literal
 
+import numpy as np
 import sympy
 
 from nmm.analysis.formulas.arguments import argument_names
@@ -21,14 +22,18 @@ from nmm.analysis.formulas.row_values import Turn
 from nmm.analysis.formulas.task_rows import frames_of
 from nmm.analysis.formulas.text import latex_of, text_of
 from nmm.analysis.formulas.written import auxiliary_written, matrix_latex, matrix_text, written
+from nmm.analysis.singular.jacobians import Jacobians
 from nmm.analysis.singular.reached import Tasks, stacked
-from nmm.errors import InputError, unknown
+from nmm.errors import InputError, SingularError, unknown
+from nmm.functions.tasks.task import Stack
 from nmm.robots.robot import Robot
 
 __all__ = ["SymbolicAnalysis", "TooLarge", "symbolic"]
 
 #: Products of terms that an analysis may take: some seconds.
 BUDGET = 200_000
+#: Where a formula is compared with its kernel, if that branches; what a file's rounded angles may do to it.
+_PLACES, _ROUNDED = 10, 1e-3
 
 
 class SymbolicAnalysis(Formulas):
@@ -97,7 +102,25 @@ def symbolic(
     lengths = Geometry(Ring(BUDGET), arguments, demanded, geometry == "numbers", robot.q_names)
     names = tuple(row.name for row in stack.rows(robot))
     with _reason(robot, len(names), lengths.ring):
-        return _assembled(robot, names, derived(robot, stack, lengths))
+        analysis = _assembled(robot, names, derived(robot, stack, lengths))
+    if lengths.ring.branched:
+        _check_branches(analysis, stack)
+    return analysis
+
+
+def _check_branches(analysis: SymbolicAnalysis, stack: Stack) -> None:
+    """`InputError` when a kernel that branches on the configuration has another formula elsewhere."""
+    jacobians, functions = Jacobians((analysis.robot, stack)), analysis.functions()
+    for q in np.random.default_rng(0).uniform(-3.0, 3.0, (_PLACES, analysis.robot.n)):
+        try:
+            J = jacobians.J(0.0, q)
+        except SingularError:
+            continue
+        if not np.allclose(functions.J(q), J, rtol=_ROUNDED, atol=_ROUNDED * np.abs(J).max(initial=1.0)):
+            raise InputError(
+                "symbolic: expected kernels with one formula, one of these branches on the configuration "
+                "(the numeric analysis takes it)"
+            )
 
 
 @contextmanager

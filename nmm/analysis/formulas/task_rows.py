@@ -29,6 +29,10 @@ from nmm.robots.robot import CENTER_OF_MASS, Robot
 _COMPARED = ((orientation_error, range(3, 6)), (pose_error, range(6)))
 
 
+#: Two times, s, that are nothing to any motion: what differs between them depends on the time.
+_INSTANTS = (0.7548776662, 1.5698402910)
+
+
 class TracedRow(NamedTuple):
     """One row of f.
 
@@ -76,7 +80,7 @@ def task_rows(stack: Stack, frames: Frames) -> list[TracedRow]:
                 )
             gradients = _at_no_error(task.function, frames)
         elif not reached:
-            targets = function_rows(task.reference, frames)[1]
+            targets = function_rows(task.reference, frames, target=True)[1]
             moves = [any(target) for target in targets]
             gradients = [
                 [a - b for a, b in zip(row, target, strict=True)]
@@ -87,8 +91,12 @@ def task_rows(stack: Stack, frames: Frames) -> list[TracedRow]:
     return found
 
 
-def function_rows(function: Function, frames: Frames) -> tuple[list[Value], list[list[Quotient]]]:
+def function_rows(
+    function: Function, frames: Frames, target: bool = False
+) -> tuple[list[Value], list[list[Quotient]]]:
     """Values (s) and derivatives by the coordinates (s, n) of a function of the configuration.
+
+    A target's values may depend on the time: they are those of some instant.
 
     Raises
     ------
@@ -100,11 +108,13 @@ def function_rows(function: Function, frames: Frames) -> tuple[list[Value], list
         for frame in stage.frames:  # whose lengths come in this order
             frames.position(frame)
     try:
-        rows = _evaluated(stages, 0.0, frames)
+        rows, later = (_evaluated(stages, t, frames) for t in _INSTANTS)
+        if (rows.value_q != later.value_q)[:s].any() or (
+            not target and (rows.value != later.value)[:s].any()
+        ):
+            raise Untraceable("it depends on the time and on the configuration")
         values = [_value(value, frames) for value in rows.value[:s]]
         gradients = [[quotient(entry, ring) for entry in row] for row in rows.value_q[:s]]
-        if any(map(any, gradients)) and (rows.value_q != _evaluated(stages, 1.0, frames).value_q)[:s].any():
-            raise Untraceable("it depends on the time and on the configuration")
     except (Untraceable, TypeError) as error:  # TypeError: of numbers alone
         raise InputError(
             f"symbolic: no formula for {type(function).__name__}: {error} (the numeric analysis takes every "
@@ -158,21 +168,17 @@ def _frame_pose(stage: Stage, rows: Rows, frames: Frames) -> None:
     """What the kernel `frame_pose` computes, whose rotation vector is a logarithm: that stays a name, and has
     derivatives where a task compares it (see `_at_no_error`)."""
     geometry, ring = frames.geometry, frames.geometry.ring
-    product: tuple[Any, ...] = ()
-    name = ""
-    if any(part >= 3 for part in stage.numbers):
-        name = frames.new_matrix()
-        product = tuple(
-            (turn.axis, tuple((ring.names[i], k) for i, k in turn.angle), turn.quarters)
-            for turn in turns(steps_to(frames.robot, *stage.frames), geometry)
-        )
+    product = tuple(
+        (turn.axis, tuple((ring.names[i], k) for i, k in turn.angle), turn.quarters)
+        for turn in turns(steps_to(frames.robot, *stage.frames), geometry)
+    )
     for row, part in enumerate(map(int, stage.numbers)):
         if part < 3:
             at = frames.position(*stage.frames)[part]
             rows.value[row] = Quotient(at)
             rows.value_q[row] = [Quotient(entry) for entry in frames.gradient(at)]
         else:
-            rows.value[row] = Turn(part - 3, name, product)
+            rows.value[row] = Turn(part - 3, frames.matrix(product), product)
 
 
 def _at_no_error(function: Function, frames: Frames) -> list[list[Quotient]]:
