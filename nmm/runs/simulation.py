@@ -163,8 +163,8 @@ def _integrate(
             before = state.snapshot()
             ahead = _advanced(controller, advance, sample, t)
             if ahead is None:
-                recorder.warn_once(sample.t, state.reservation(before, controller.robot.u_names))
                 ahead = _sample(controller, t, _integrated(controller, advance, sample, t))
+                recorder.warn_once(sample.t, state.reservation(before, controller.robot.u_names))
         sample = ahead
         recorder.add(sample)
         if progress is not None and k % max(1, steps // 100) == 0:
