@@ -39,14 +39,8 @@ def reach(robot: Robot, frame: str) -> Reach | None:
     joints = [j for j in model.supports[there.parentJoint] if j > 0 and not _is_platforms(robot, j)]
     if not joints:
         return None
-    length = float(np.linalg.norm(there.placement.translation))
-    length += sum(float(np.linalg.norm(model.jointPlacements[joint].translation)) for joint in joints[1:])
-    for joint in joints:
-        i = model.joints[joint].idx_q
-        if robot.q_units[i] == "m":
-            travel = np.abs(robot.q_limits[i])
-            length += float(travel.max()) if robot.limited[i].all() else np.inf
-    return Reach(str(model.names[joints[0]]), length)
+    length = robot.joint_reaches[there.parentJoint] + np.linalg.norm(there.placement.translation)
+    return Reach(str(model.names[joints[0]]), float(length))
 
 
 def joint_position(robot: Robot, q: Array, joint: str) -> Array:

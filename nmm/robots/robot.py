@@ -354,30 +354,35 @@ class Robot:
             raise InputError(f"{error} (robot {self.name} has q = {', '.join(self.q_names)})") from None
 
     @cached_property
-    def reach(self) -> float:
-        """How far the arms reach from their first joints at most, m: the natural length of the robot.
+    def joint_reaches(self) -> Array:
+        """How far each joint of `model` can be from the first of its arm, (njoints,), m; 0 for no arm's.
 
-        The longest sum of lengths from joint to joint and on to a frame, with what prismatic joints add
-        within their limits; 1 for a robot without arms.
+        An upper bound: the lengths from joint to joint, added up, and what sliding joints travel within
+        their limits; infinite where there is none.
         """
-        model, first = self.model, self.platform.n_p
-        sums = np.zeros(model.njoints)
+        model, sums = self.model, np.zeros(self.model.njoints)
         for joint in range(1, model.njoints):
             index, parent = model.joints[joint].idx_q, int(model.parents[joint])
-            if index < first:
+            if index < self.platform.n_p:
                 continue
-            on_arm = parent > 0 and model.joints[parent].idx_q >= first
-            offset = float(np.linalg.norm(model.jointPlacements[joint].translation)) if on_arm else 0.0
-            travel = 0.0
-            if self.q_units[index] == "m" and np.all(self.limited[index]):
-                travel = float(np.abs(self.q_limits[index]).max())
-            sums[joint] = (sums[parent] if on_arm else 0.0) + offset + travel
+            if parent > 0 and model.joints[parent].idx_q >= self.platform.n_p:
+                sums[joint] = sums[parent] + np.linalg.norm(model.jointPlacements[joint].translation)
+            if self.q_units[index] == "m":
+                sums[joint] += np.abs(self.q_limits[index]).max() if self.limited[index].all() else np.inf
+        return sums
+
+    @cached_property
+    def reach(self) -> float:
+        """How far the frames of an arm can be from its first joint at most, m: the robot's natural length.
+
+        1 for a robot without arms; what lies beyond a sliding joint without limits does not count.
+        """
         ends = [
-            sums[frame.parentJoint] + float(np.linalg.norm(frame.placement.translation))
-            for frame in model.frames
-            if frame.parentJoint > 0 and model.joints[frame.parentJoint].idx_q >= first
+            self.joint_reaches[frame.parentJoint] + float(np.linalg.norm(frame.placement.translation))
+            for frame in self.model.frames
+            if frame.parentJoint > 0 and self.model.joints[frame.parentJoint].idx_q >= self.platform.n_p
         ]
-        return max(ends, default=0.0) or 1.0
+        return max((end for end in ends if np.isfinite(end)), default=0.0) or 1.0
 
     @property
     def rest(self) -> Array:
