@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nmm.arrays import Array
-from nmm.kernels.compiled import compiled
+from nmm.kernels.compiled import compiled, inlined
 from nmm.kernels.linear_algebra import residual_norm
 from nmm.kernels.memory import Cell, Vector
 from nmm.resolvers.problem import ProblemArrays
@@ -120,20 +120,23 @@ class Answer:
         )
 
 
-@compiled
-def certify(problem: ProblemArrays, answer: AnswerArrays) -> None:
-    """Residual and status of the u that was written: solved, inexact, or not finite.
+@inlined
+def certified(residual: float, rounding: float, asked: float) -> int:
+    """The status of inputs with a residual ‖J u - rate‖ that rounding may hide so much of, asked = ‖rate‖.
 
     Inexact is also what rounding does not let certify, where u is some 1e7 times larger than the rate.
     """
+    if not math.isfinite(residual):
+        return NOT_FINITE
+    return INEXACT if residual + rounding > EXACT * (1.0 + asked) else SOLVED
+
+
+@compiled
+def certify(problem: ProblemArrays, answer: AnswerArrays) -> None:
+    """Residual and status of the u that was written: solved, inexact, or not finite."""
     residual, rounding = residual_norm(problem.J, answer.u, problem.rate)
     answer.residual[()] = residual
     square = 0.0
     for i in range(problem.rate.shape[0]):
         square += problem.rate[i] * problem.rate[i]
-    if not math.isfinite(residual):
-        answer.status[()] = NOT_FINITE
-    elif residual + rounding > EXACT * (1.0 + math.sqrt(square)):
-        answer.status[()] = INEXACT
-    else:
-        answer.status[()] = SOLVED
+    answer.status[()] = certified(residual, rounding, math.sqrt(square))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import ClassVar
 
@@ -11,7 +12,8 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array, Integers
 from nmm.errors import InputError
 from nmm.kernels.compiled import Kernel, kernel
-from nmm.resolvers.answer import Answer, AnswerArrays, Status, certify
+from nmm.kernels.linear_algebra import residual_norm
+from nmm.resolvers.answer import Answer, AnswerArrays, Status, certified
 from nmm.resolvers.base import NO_OPTIONS, RESOLVER, Resolver, Setup
 from nmm.resolvers.problem import Dimensions, Problem, ProblemArrays
 
@@ -51,14 +53,11 @@ class CallableResolver(Resolver):
 
     def finish(self, problem: ProblemArrays, dimensions: Dimensions, answer: AnswerArrays) -> None:
         answer.measure[()] = np.nan
-        if not all(np.all(np.isfinite(given)) for given in (problem.J, problem.rate, problem.h)):
+        if not all(np.isfinite(given).all() for given in (problem.J, problem.rate, problem.h)):
             answer.status[()] = Status.NOT_FINITE
             return
-        given = {name: value for name, value in problem._asdict().items() if name != "ends"}
-        levels = np.diff(problem.ends, prepend=0).tolist()
-        asked = Problem(**given, inputs=dimensions.inputs, groups=dimensions.groups, levels=levels)
         try:
-            found = self.function(asked)
+            found = self.function(Problem.of(problem, dimensions))
         except np.linalg.LinAlgError:
             answer.status[()] = Status.SINGULAR_J
             return
@@ -66,7 +65,9 @@ class CallableResolver(Resolver):
         if u.shape != answer.u.shape:
             raise InputError(f"callable resolver: expected u of shape {answer.u.shape}, got {u.shape}")
         answer.u[:] = u
-        certify(problem, answer)
+        residual, rounding = residual_norm(problem.J, answer.u, problem.rate)
+        answer.residual[()] = residual
+        answer.status[()] = certified(residual, rounding, math.sqrt(problem.rate @ problem.rate))
         if isinstance(found, Answer):
             answer.measure[()] = found.measure
             if found.status is not Status.SOLVED and answer.status[()] < Status.SINGULAR_J:
