@@ -577,7 +577,7 @@ def test_singularities_are_where_the_inputs_lose_rank(rng: np.random.Generator) 
         with pytest.raises(
             InputError, match=r"elbow_joint follows shoulder_lift_joint .*: give shoulder_lift"
         ):
-            find_singularities((robot, task), starts=2, **{what: given})  # type: ignore[arg-type]
+            find_singularities((robot, task), starts=2, **{what: given})  # type: ignore[arg-type]  # of two types
 
 
 def test_maps_move_followers_along() -> None:

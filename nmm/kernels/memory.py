@@ -166,7 +166,7 @@ def _length(field: Any) -> int:
 
 def _flat(record: type, values: tuple[Any, ...]) -> Iterator[tuple[Any, Any]]:
     """The fields that are no records, with their values."""
-    for name, field, value in zip(record._fields, _fields(record), values, strict=True):  # type: ignore[attr-defined]
+    for name, field, value in zip(record._fields, _fields(record), values, strict=True):  # type: ignore[attr-defined]  # records are NamedTuples
         if field is not int and not isinstance(field, Kind):
             yield from _flat(field, value)
             continue

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from fractions import Fraction
 from numbers import Real
@@ -23,7 +24,7 @@ class Untraceable(InputError):
     """A kernel does what has no formula here."""
 
 
-class Traced(NDArrayOperatorsMixin):
+class Traced(NDArrayOperatorsMixin, ABC):
     """Arithmetic, beside numbers of Python and numpy. Comparisons, on which a kernel branches, are made where
     the variables have the values of `Ring.sample`, a point in general position; `==` is exact."""
 
@@ -39,9 +40,9 @@ class Traced(NDArrayOperatorsMixin):
             raise Untraceable(f"it takes {ufunc.__name__} of a formula")
         return _OPERATIONS[ufunc](*inputs)
 
+    @abstractmethod
     def quotient(self) -> Quotient:
         """As a quotient of trigonometric polynomials; `Untraceable` where it is none."""
-        raise NotImplementedError
 
 
 class Quotient(Traced):
@@ -82,7 +83,8 @@ class Quotient(Traced):
     def above(self, under: Expansion) -> Expansion:
         """The numerator over a multiple of the denominator."""
         factor = under.divided(self.under)
-        assert factor is not None
+        if factor is None:
+            raise Untraceable("its denominators have no common multiple")
         return self.over * factor
 
 
