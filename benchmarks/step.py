@@ -91,7 +91,7 @@ def compare(name: str, controller: nmm.Controller, q: np.ndarray) -> tuple[float
 
 
 def main() -> int:
-    """Print the table; exit status 1 when a fused step takes more than 2.5 times its floor."""
+    """Print the table; exit status 1 when a fused step takes more than 1.8 times its floor."""
     found = controllers()
     if "--plain" in sys.argv:
         print(json.dumps({name: microseconds(lambda c=c, q=q: c(T, q)) for name, (c, q) in found.items()}))
@@ -103,8 +103,8 @@ def main() -> int:
         floor, fused, user = compare(name, controller, q)
         worst = max(worst, fused / floor)
         print(f"{name:12s}{floor:8.2f}{fused:8.2f}{fused / floor:8.2f}{plain[name]:9.1f}{user:10.1f}")
-    print(f"worst ratio {worst:.2f} (aim: at most 2.5)")
-    return int(worst > 2.5)
+    print(f"worst ratio {worst:.2f} (aim: at most 1.8)")
+    return int(worst > 1.8)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, Integers
-from nmm.control.equations import PLAIN, WRAPPED, Arm, ControlStep, TaskRows, drive, step
+from nmm.control.equations import PLAIN, STEP, WRAPPED, Arm, ControlStep, TaskRows, drive
+from nmm.control.equations import step as compiled_step
 from nmm.control.lost_directions import in_world_axes, lost_directions
 from nmm.errors import InputError, SingularError
 from nmm.functions.function import Row, row_scales
@@ -17,6 +18,7 @@ from nmm.functions.objectives.base import Objective
 from nmm.functions.program import BESIDE, Program
 from nmm.functions.tasks.comparison import Comparison
 from nmm.functions.tasks.task import Stack, Task
+from nmm.kernels.compiled import checked_by_caller
 from nmm.kernels.memory import views
 from nmm.resolvers.answer import Status, unanswered
 from nmm.resolvers.base import Resolver
@@ -171,6 +173,7 @@ class Controller:
     def _solver(self) -> Callable[[float, Array], float]:
         """solve(t, q) -> status, with everything it needs at hand."""
         program, found, resolver = self._program, self._step, self.resolver
+        step = checked_by_caller(compiled_step, STEP)
         dimensions, prepare, (integers, floats) = self._dimensions, program.prepare, program.blocks
 
         def solve(t: float, q: Array) -> float:

@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
+from numba import types
 
 from nmm.arrays import Array, Integers
-from nmm.functions.program import BESIDE, Buffers, run
-from nmm.kernels.compiled import compiled
+from nmm.functions.program import BESIDE, Buffers, LaidOut, run
+from nmm.kernels.compiled import compiled, scratch
 from nmm.kernels.followers import add_to_leaders, move_followers
 from nmm.kernels.memory import Cell, IntegerMatrix, IntegerVector, Matrix, Vector, views
 from nmm.resolvers.answer import NOT_FINITE, AnswerArrays
@@ -74,6 +74,9 @@ class ControlStep(NamedTuple):
     answer: AnswerArrays
     q_dot: Vector
 
+
+#: A step's arguments and what it returns.
+STEP = types.float64(types.float64, types.float64[::1], types.int64[::1], types.float64[::1])
 
 #: Instead of the row of an error that is computed: the error is r_d - r; an angle's, wrapped.
 PLAIN, WRAPPED = -1, -2
@@ -148,17 +151,21 @@ def step(t: float, q: Array, integers: Integers, floats: Array) -> float:
 
     Pinocchio's part is in memory already.
     """
-    b = run(t, q, integers, floats)
+    run(t, q, integers, floats)
+    b = views(LaidOut, integers, floats, 0).buffers
     e = views(ControlStep, integers, floats, BESIDE)
     problem, answer = e.problem, e.answer
     write_equation(e.task, b, e.arm, problem.J, problem.rate)
     write_equation(e.added, b, e.arm, problem.added_J, problem.added_rate)
-    gradient = np.zeros((1, q.shape[0]))
+    n = q.shape[0]
+    gradient = scratch((1, n))
+    for j in range(n):
+        gradient[0, j] = 0.0
     e.H[()] = 0.0
     for i in range(e.terms.shape[0]):
         term = e.terms[i]
         e.H[()] += e.weights[i] * b.value[term]
-        for j in range(q.shape[0]):
+        for j in range(n):
             gradient[0, j] += e.weights[i] * b.value_q[term, j]
     times_S(gradient, 0, b.G, e.arm, problem.h)
     for j in range(answer.u.shape[0]):

@@ -9,7 +9,7 @@ import numpy as np
 
 from nmm.arrays import Array, Integers
 from nmm.functions.function import Callback, Evaluation, Function, Stage
-from nmm.kernels.compiled import call_platform, compiled, inlined, view
+from nmm.kernels.compiled import call_platform, clear, compiled, view
 from nmm.kernels.memory import (
     Blocks,
     IntegerVector,
@@ -70,17 +70,9 @@ class LaidOutStage(NamedTuple):
 BESIDE = header_length(LaidOut)
 
 
-@inlined
-def clear(array: Array) -> None:
-    """Zeros everywhere."""
-    numbers = view(array, 0, (array.size,))
-    for i in range(array.size):
-        numbers[i] = 0.0
-
-
 @compiled
-def run(t: float, q: Array, integers: Integers, floats: Array) -> Buffers:
-    """Evaluate the platform and every stage at (t, q), into the buffers returned.
+def run(t: float, q: Array, integers: Integers, floats: Array) -> None:
+    """Evaluate the platform and every stage at (t, q), into the program's buffers.
 
     The kinematics of the frames are there already.
     """
@@ -105,7 +97,6 @@ def run(t: float, q: Array, integers: Integers, floats: Array) -> Buffers:
         )
         frames = Frames(stage.slots, b.placements, b.jacobians, b.hessians)
         call_function(stage.kernel, at, frames, stage.numbers, rows)
-    return b
 
 
 class Program:

@@ -12,16 +12,19 @@ in plain Python (`NUMBA_DISABLE_JIT=1`, or `program.py_func`) calls the plain ke
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
 import numba
+import numpy as np
 from numba import types
 from numba.core import cgutils
 from numba.core.dispatcher import Dispatcher
-from numba.extending import intrinsic, overload
+from numba.core.errors import TypingError
+from numba.extending import intrinsic, lower_builtin, overload, type_callable
 
 from nmm.kernels.cache import KernelCache
 
@@ -44,17 +47,27 @@ class Kernel:
 
     def __init__(self, plain: Plain, signature: Any) -> None:
         self.plain = plain
-        self.compiled = compiled(plain)
         self._signature = signature
 
     def __call__(self, *arguments: Any) -> None:
         self.compiled(*arguments)
 
     @cached_property
+    def compiled(self) -> Any:
+        """The compiled form; with numba's bookkeeping of arrays only if the kernel makes some of its own."""
+        made = compiled(self.plain)
+        if isinstance(made, Dispatcher):
+            try:
+                made.compile(self._signature.args)
+            except TypingError:
+                made = allocating(self.plain)
+                made.compile(self._signature.args)
+        return made
+
+    @cached_property
     def address(self) -> int:
         """Where the machine code of the compiled form begins: what compiled programs call it by."""
         if isinstance(self.compiled, Dispatcher):
-            self.compiled.compile(self._signature.args)
             result = self.compiled.overloads[self._signature.args]
             address = int(result.library.get_pointer_to_function(result.fndesc.llvm_func_name))
         else:  # NUMBA_DISABLE_JIT=1: run as it stands
@@ -66,20 +79,35 @@ class Kernel:
 _plain_by_address: dict[int, Plain] = {}
 
 
-def compiled(function: Callable[..., Any]) -> Any:
+def compiled(function: Callable[..., Any], allocates: bool = False) -> Any:
     """`numba.njit` with nmm's options and nmm's cache folder; `.py_func` is the plain function.
 
     Divisions by zero give inf and nan as in numpy (`error_model`): a singular matrix is a case
-    that the resolvers report, not an exception out of compiled code.
+    that the resolvers report, not an exception out of compiled code. Arrays are neither made (but see
+    `scratch`) nor returned: counting references to them would take half of a control step.
     """
-    made = numba.njit(error_model="numpy")(function)
+    made = numba.njit(error_model="numpy", _nrt=allocates)(function)
     if isinstance(made, Dispatcher):  # the function itself with NUMBA_DISABLE_JIT=1
         made._cache = KernelCache(function)  # type: ignore[attr-defined]  # as `enable_caching` does with numba's own
     return made
 
 
+#: Decorator for functions that make or return arrays.
+allocating = functools.partial(compiled, allocates=True)
+
 #: Decorator for helpers of compiled functions that stay plain Python when called from Python.
 inlined = numba.extending.register_jitable
+
+
+def checked_by_caller(function: Any, signature: Any) -> Callable[..., Any]:
+    """A compiled function for arguments of one signature, which it no longer looks at: a third of a µs less.
+
+    An argument of another type is read as if it were of this one, or crashes.
+    """
+    if not isinstance(function, Dispatcher):
+        return function  # NUMBA_DISABLE_JIT=1: as it stands
+    function.compile(signature.args)
+    return function.overloads[signature.args].entry_point
 
 
 def kernel(signature: Any) -> Callable[[Plain], Kernel]:
@@ -101,6 +129,50 @@ def view(memory: Any, first: int, shape: tuple[int, ...]) -> Any:
     return memory.reshape(-1)[first : first + math.prod(shape)].reshape(shape)
 
 
+def generated_in_callers(function: Any, type_of: Any, generate: Any, *kinds: tuple[Any, ...]) -> None:
+    """Give a plain function a compiled form that is no function: instructions written where it is called.
+
+    What a function called would hand back is then possible: room on the caller's stack, arrays that nobody
+    owns. `type_of` maps the arguments' types to a type or a signature, `kinds` are those it is for.
+    """
+    type_callable(function)(lambda context: type_of)
+    for arguments in kinds:
+        lower_builtin(function, *arguments)(generate)
+
+
+def scratch(extents: Any) -> Any:
+    """Room for numbers that a kernel needs while it runs: `np.empty(extents)`, on the stack when compiled.
+
+    Extents are an integer or a tuple. To be called outside of loops; neither returned nor kept.
+    """
+    return np.empty(extents)
+
+
+def integer_scratch(extent: int) -> Any:
+    """`scratch` for as many integers."""
+    return np.empty(extent, dtype=np.int64)
+
+
+def _on_the_stack(function: Callable[..., Any], number: Any) -> None:
+    """Register the compiled form of `scratch`."""
+
+    def type_of(extents: Any) -> Any:
+        return types.Array(number, getattr(extents, "count", 1), "C")
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        several = isinstance(signature.args[0], types.UniTuple)
+        extents = cgutils.unpack_tuple(builder, values[0]) if several else [values[0]]
+        size = functools.reduce(builder.mul, extents)
+        data = builder.alloca(context.get_value_type(number), size=size)
+        return array_at(context, builder, signature.return_type, data, extents)
+
+    generated_in_callers(function, type_of, generate, (types.Integer,), (types.UniTuple,))
+
+
+_on_the_stack(scratch, types.float64)
+_on_the_stack(integer_scratch, types.int64)
+
+
 def array_at(context: Any, builder: Any, kind: Any, data: Any, extents: Any) -> Any:
     """For intrinsics: the contiguous array at a pointer; no references are counted."""
     itemsize = context.get_constant(types.intp, context.get_abi_sizeof(context.get_data_type(kind.dtype)))
@@ -114,24 +186,26 @@ def array_at(context: Any, builder: Any, kind: Any, data: Any, extents: Any) -> 
     return array._getvalue()
 
 
-@intrinsic
-def _view_compiled(context: Any, memory: Any, first: Any, shape: Any) -> Any:
+def _type_of_view(memory: Any, first: Any, shape: Any) -> Any:
     result = types.Array(memory.dtype, len(shape), "C")
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        owner = context.make_array(signature.args[0])(context, builder, values[0])
-        extents = cgutils.unpack_tuple(builder, values[2])
-        return array_at(context, builder, result, builder.gep(owner.data, [values[1]]), extents)
-
-    return result(memory, types.int64, types.UniTuple(types.int64, len(shape))), generate
+    return result(memory, types.int64, types.UniTuple(types.int64, len(shape)))
 
 
-@overload(view)
-def _view_overload(memory: Any, first: Any, shape: Any) -> Any:
-    def through(memory: Any, first: Any, shape: Any) -> Any:
-        return _view_compiled(memory, first, shape)
+def _generate_view(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+    owner = context.make_array(signature.args[0])(context, builder, values[0])
+    extents = cgutils.unpack_tuple(builder, values[2])
+    return array_at(context, builder, signature.return_type, builder.gep(owner.data, [values[1]]), extents)
 
-    return through
+
+generated_in_callers(view, _type_of_view, _generate_view, (types.Array, types.int64, types.UniTuple))
+
+
+@inlined
+def clear(array: Any) -> None:
+    """Zeros everywhere."""
+    numbers = view(array, 0, (array.size,))
+    for i in range(array.size):
+        numbers[i] = 0.0
 
 
 def caller(signature: Any) -> Callable[..., None]:

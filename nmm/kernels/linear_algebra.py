@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from nmm.arrays import Array
-from nmm.kernels.compiled import compiled
+from nmm.kernels.compiled import compiled, scratch
 
 EPSILON = float(np.finfo(float).eps)
 
@@ -90,7 +90,7 @@ def closest_solution(rate: Array, u0: Array, order: Array, L: Array, Q: Array, u
     u = u0 + Qᵀ (y - Q u0) with L y = rate[order].
     """
     s, m = Q.shape
-    y = np.empty(s)
+    y = scratch(s)
     for j in range(m):
         u[j] = u0[j]
     for i in range(s):

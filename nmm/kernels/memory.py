@@ -42,10 +42,9 @@ from typing import Annotated, Any, NamedTuple, TypeAlias, TypeVar, get_args, get
 
 import numpy as np
 from numba import types
-from numba.extending import intrinsic, overload
 
 from nmm.arrays import Array, Integers
-from nmm.kernels.compiled import array_at, view
+from nmm.kernels.compiled import array_at, generated_in_callers, view
 
 
 class Kind(NamedTuple):
@@ -175,43 +174,36 @@ def _flat(record: type, values: tuple[Any, ...]) -> Iterator[tuple[Any, Any]]:
         yield field, value
 
 
-@intrinsic
-def _views_compiled(context: Any, record: Any, integers: Any, floats: Any, place: Any) -> Any:
-    result = record_type(record.instance_class)
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        blocks: dict[type, Any] = {
-            dtype: context.make_array(kind)(context, builder, value).data
-            for dtype, kind, value in zip(
-                (np.int64, np.float64), signature.args[1:3], values[1:3], strict=True
-            )
-        }
-        position = values[3]
-
-        def read() -> Any:
-            nonlocal position
-            value = builder.load(builder.gep(blocks[np.int64], [position]))
-            position = builder.add(position, context.get_constant(types.int64, 1))
-            return value
-
-        def build(kind: type, built: Any) -> Any:
-            parts = []
-            for field, part in zip(_fields(kind), built.types, strict=True):
-                if isinstance(field, Kind):
-                    data = builder.gep(blocks[field.dtype], [read()])
-                    parts.append(array_at(context, builder, part, data, [read() for _ in range(field.ndim)]))
-                else:
-                    parts.append(read() if field is int else build(field, part))
-            return context.make_tuple(builder, built, parts)
-
-        return build(record.instance_class, result)
-
-    return result(record, integers, floats, types.int64), generate
+def _type_of_views(record: Any, integers: Any, floats: Any, place: Any) -> Any:
+    return record_type(record.instance_class)(record, integers, floats, types.int64)
 
 
-@overload(views)
-def _views_overload(record: Any, integers: Any, floats: Any, place: Any) -> Any:
-    def through(record: Any, integers: Any, floats: Any, place: Any) -> Any:
-        return _views_compiled(record, integers, floats, place)
+def _generate_views(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+    blocks: dict[type, Any] = {
+        dtype: context.make_array(kind)(context, builder, value).data
+        for dtype, kind, value in zip((np.int64, np.float64), signature.args[1:3], values[1:3], strict=True)
+    }
+    position = values[3]
 
-    return through
+    def read() -> Any:
+        nonlocal position
+        value = builder.load(builder.gep(blocks[np.int64], [position]))
+        position = builder.add(position, context.get_constant(types.int64, 1))
+        return value
+
+    def build(kind: type, built: Any) -> Any:
+        parts = []
+        for field, part in zip(_fields(kind), built.types, strict=True):
+            if isinstance(field, Kind):
+                data = builder.gep(blocks[field.dtype], [read()])
+                parts.append(array_at(context, builder, part, data, [read() for _ in range(field.ndim)]))
+            else:
+                parts.append(read() if field is int else build(field, part))
+        return context.make_tuple(builder, built, parts)
+
+    return build(signature.args[0].instance_class, signature.return_type)
+
+
+generated_in_callers(
+    views, _type_of_views, _generate_views, (types.NamedTupleClass, types.Array, types.Array, types.int64)
+)

@@ -12,10 +12,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from nmm.arrays import Array
-from nmm.kernels.compiled import compiled
+from nmm.kernels.compiled import compiled, scratch
 
 #: 1/3!, -1/5!, 1/7!, ...: (θ - sin θ)/θ³ in powers of θ².
 _SINE = (1 / 6, -1 / 120, 1 / 5040, -1 / 362880, 1 / 39916800, -1 / 6227020800, 1 / 1307674368000)
@@ -177,7 +175,7 @@ def log6(R: Array, p: Array, e: Array) -> None:
 
     w = log3(R), p = J(w) v. Linear (m) over angular (rad).
     """
-    J = np.empty((3, 3))
+    J = scratch((3, 3))
     log3(R, e[3:])
     left_jacobian_inverse3(e[3:], J)
     times3(J, p, e[:3])
@@ -192,20 +190,20 @@ def log6_jacobian(e: Array, p: Array, A: Array, B: Array) -> None:
     Jacobian of SE(3) (T. D. Barfoot, State estimation for robotics, section 7.1.5, has D in another form).
     """
     w = e[3:]
-    J = np.empty((3, 3))
+    J = scratch((3, 3))
     left_jacobian_inverse3(w, J)
     for i in range(3):
         for j in range(3):
             A[i, j] = J[j, i]
     c, slope = inverse_factor(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
-    wp = np.empty(3)
-    wwp = np.empty(3)
+    wp = scratch(3)
+    wwp = scratch(3)
     cross3(w, p, wp)
     cross3(w, wp, wwp)
-    u = np.empty(3)
-    up = np.empty(3)
-    wup = np.empty(3)
-    uwp = np.empty(3)
+    u = scratch(3)
+    up = scratch(3)
+    wup = scratch(3)
+    uwp = scratch(3)
     for k in range(3):
         for i in range(3):
             u[i] = A[i, k]

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from nmm.arrays import positive, scalar
 from nmm.errors import InputError
-from nmm.kernels.compiled import PLATFORM, Kernel, kernel
+from nmm.kernels.compiled import PLATFORM, Kernel, kernel, scratch
 from nmm.platforms.base import Array, Platform
 from nmm.platforms.layout import Layout
 from nmm.platforms.own_joints import coordinates_with
@@ -38,8 +38,8 @@ def tractor(qp: Array, parameters: Array, G: Array, G_q: Array) -> None:
     G[2, 1] = 1.0
     G_q[0, 0, 2] = -sine
     G_q[1, 0, 2] = cosine
-    v_b = np.empty(trailers)
-    w_b = np.empty(trailers)
+    v_b = scratch(trailers)
+    w_b = scratch(trailers)
     for j in range(2):
         v = 1.0 - j
         w = 1.0 * j

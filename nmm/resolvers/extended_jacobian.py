@@ -8,7 +8,7 @@ import numpy as np
 
 from nmm.arrays import Array, Integers, positive
 from nmm.errors import InputError
-from nmm.kernels.compiled import Kernel, kernel
+from nmm.kernels.compiled import Kernel, integer_scratch, kernel, scratch
 from nmm.kernels.linear_algebra import eliminate, orthonormal_rows
 from nmm.resolvers.answer import SINGULAR_J, SINGULAR_JE, AnswerArrays, certify
 from nmm.resolvers.base import NO_OPTIONS, RESOLVER, Resolver, Setup
@@ -24,8 +24,8 @@ def extended_jacobian(
     """[J; J_added] u = [rate; rate_added]."""
     J = problem.J
     s, m = J.shape
-    M = np.empty((m, m + 1))
-    scales = np.empty(m)
+    M = scratch((m, m + 1))
+    scales = scratch(m)
     for i in range(m):
         for j in range(m):
             M[i, j] = J[i, j] if i < s else problem.added_J[i - s, j]
@@ -33,9 +33,9 @@ def extended_jacobian(
         scales[i] = problem.row_scales[i] if i < s else problem.added_row_scales[i - s]
     _, answer.measure[()] = eliminate(M, scales)
     if answer.measure[()] <= numbers[TOLERANCE]:
-        order = np.empty(s, dtype=np.int64)
-        L = np.empty((s, s))
-        Q = np.empty((s, m))
+        order = integer_scratch(s)
+        L = scratch((s, s))
+        Q = scratch((s, m))
         regular = orthonormal_rows(J, problem.row_scales, order, L, Q) > numbers[TOLERANCE]
         answer.status[()] = SINGULAR_JE if regular else SINGULAR_J
         return

@@ -12,7 +12,7 @@ import numpy as np
 
 from nmm.arrays import Array, Integers
 from nmm.errors import InputError, unknown
-from nmm.kernels.compiled import compiled
+from nmm.kernels.compiled import compiled, integer_scratch, scratch
 from nmm.kernels.linear_algebra import eliminate, orthonormal_rows
 from nmm.resolvers.problem import Dimensions
 from nmm.resolvers.state import State
@@ -115,7 +115,7 @@ def solve_partition(
 ) -> tuple[float, float]:
     """M = [*, Ja⁻¹ J, Ja⁻¹ rate], shape (s, s + m + 1). Returns det Ja and how regular Ja is."""
     s, m = J.shape
-    scales = np.empty(s)
+    scales = scratch(s)
     for i in range(s):
         scales[i] = row_scales[i]
         for j in range(s):
@@ -130,8 +130,8 @@ def solve_partition(
 def choose_partition(J: Array, candidates: Integers, columns: Integers) -> None:
     """Write into `columns` the candidate with the largest |det Ja|, the first of equals."""
     s = J.shape[0]
-    Ja = np.empty((s, s))
-    scales = np.empty(s)
+    Ja = scratch((s, s))
+    scales = scratch(s)
     largest = -1.0
     for c in range(0, candidates.shape[0], s):
         for i in range(s):
@@ -149,9 +149,9 @@ def choose_partition(J: Array, candidates: Integers, columns: Integers) -> None:
 def volume(J: Array, row_scales: Array, tolerance: float) -> float:
     """sqrt(det J Jᵀ), by Cauchy-Binet the norm of all det Ja; 0 when J lost rank."""
     s, m = J.shape
-    order = np.empty(s, dtype=np.int64)
-    L = np.empty((s, s))
-    if orthonormal_rows(J, row_scales, order, L, np.empty((s, m))) <= tolerance:
+    order = integer_scratch(s)
+    L = scratch((s, s))
+    if orthonormal_rows(J, row_scales, order, L, scratch((s, m))) <= tolerance:
         return 0.0
     product = 1.0
     for i in range(s):

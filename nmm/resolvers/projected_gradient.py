@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from nmm.arrays import Array, Integers, positive
-from nmm.kernels.compiled import Kernel, kernel, view
+from nmm.kernels.compiled import Kernel, integer_scratch, kernel, scratch, view
 from nmm.kernels.linear_algebra import closest_solution, orthonormal_rows
 from nmm.resolvers.answer import SINGULAR_J, AnswerArrays, certify
 from nmm.resolvers.base import NO_OPTIONS, RESOLVER, Resolver, Setup
@@ -29,10 +29,10 @@ def projected_gradient(
     J, h, u = problem.J, problem.h, answer.u
     s, m = J.shape
     alpha = numbers[ALPHA]
-    order = np.empty(s, dtype=np.int64)
-    L = np.empty((s, s))
-    Q = np.empty((s, m))
-    u0 = np.empty(m)
+    order = integer_scratch(s)
+    L = scratch((s, s))
+    Q = scratch((s, m))
+    u0 = scratch(m)
     if numbers.shape[0] == C:
         for j in range(m):
             u0[j] = -alpha * h[j]
@@ -43,9 +43,11 @@ def projected_gradient(
         closest_solution(problem.rate, u0, order, L, Q, u)
     else:
         W = view(numbers, C, (m, m))
-        weighted_J = np.zeros((s, m))
+        weighted_J = scratch((s, m))
         for j in range(m):
             u0[j] = 0.0
+            for i in range(s):
+                weighted_J[i, j] = 0.0
             for k in range(m):
                 u0[j] -= alpha * W[k, j] * h[k]
                 for i in range(s):
@@ -54,7 +56,7 @@ def projected_gradient(
         if answer.measure[()] <= numbers[TOLERANCE]:
             answer.status[()] = SINGULAR_J
             return
-        solution = np.empty(m)
+        solution = scratch(m)
         closest_solution(problem.rate, u0, order, L, Q, solution)
         for j in range(m):
             u[j] = 0.0

@@ -9,7 +9,7 @@ import numpy as np
 
 from nmm.arrays import Array, Integers, positive
 from nmm.errors import InputError
-from nmm.kernels.compiled import Kernel, compiled, kernel, view
+from nmm.kernels.compiled import Kernel, compiled, kernel, scratch, view
 from nmm.resolvers.answer import SINGULAR_J, SINGULAR_JA, AnswerArrays, certify
 from nmm.resolvers.base import RESOLVER, Resolver, Setup
 from nmm.resolvers.partitions import (
@@ -46,9 +46,11 @@ def reduced_gradient(
     s, m = J.shape
     weighted = numbers.shape[0] > C
     if weighted:
-        J, h = scaled(J, h, view(numbers, C, (m,)))
+        weighted_J, weighted_h = scratch((s, m)), scratch(m)
+        scale_columns(J, h, view(numbers, C, (m,)), weighted_J, weighted_h)
+        J, h = weighted_J, weighted_h
     columns = view(state, COLUMNS, (s,))
-    M = np.empty((s, s + m + 1))
+    M = scratch((s, s + m + 1))
     unit = 1.0
     if options[NORMALISED] == 1:
         unit = volume(J, problem.row_scales, numbers[TOLERANCE])
@@ -109,16 +111,13 @@ def partitioned(
 
 
 @compiled
-def scaled(J: Array, h: Array, c: Array) -> tuple[Array, Array]:
+def scale_columns(J: Array, h: Array, c: Array, scaled_J: Array, scaled_h: Array) -> None:
     """J diag(c) and diag(c) h."""
     s, m = J.shape
-    scaled_J = np.empty((s, m))
-    scaled_h = np.empty(m)
     for j in range(m):
         scaled_h[j] = c[j] * h[j]
         for i in range(s):
             scaled_J[i, j] = J[i, j] * c[j]
-    return scaled_J, scaled_h
 
 
 def _as_tuple(partition: Partition) -> tuple[str | int, ...]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from nmm.arrays import Array
 from nmm.errors import InputError, RunError, unknown
-from nmm.kernels.compiled import call_platform, compiled
+from nmm.kernels.compiled import allocating, call_platform
 from nmm.robots.robot import Robot
 
 Velocity = Callable[[float, Array], Array]
@@ -38,7 +38,7 @@ class Integrator(Protocol):
         """q at t + dt, from q, q_dot and u at t."""
 
 
-@compiled
+@allocating
 def combined(q: Array, dt: float, weights: Array, slopes: Array) -> Array:
     """q + dt Σ weights[k] slopes[k]; the slopes are summed first, so that q is rounded once."""
     ahead = np.empty_like(q)
@@ -114,7 +114,7 @@ class Adaptive:
         return ahead
 
 
-@compiled
+@allocating
 def drive(kernel: int, parameters: Array, n_p: int, p: int, q: Array, u: Array, dt: float) -> Array:
     """The platform's coordinates (n_p,) after dt with the inputs held constant: RK4 on qp_dot = G(qp) up."""
     ahead = q[:n_p].copy()

@@ -11,7 +11,7 @@ from nmm.arrays import Array
 from nmm.errors import InputError, unknown
 from nmm.functions.function import Stage
 from nmm.functions.objectives.base import Objective
-from nmm.kernels.compiled import kernel, view
+from nmm.kernels.compiled import integer_scratch, kernel, scratch, view
 from nmm.kernels.followers import add_to_leaders
 from nmm.kernels.linear_algebra import orthonormal_rows, pseudoinverse_transposed
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
@@ -35,30 +35,33 @@ def manipulability(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     m = p + arm
     selected, moved = view(numbers, 3, (s,)), view(numbers, 3 + s, (arm,))
     followers = view(numbers, 3 + s + arm, (numbers.shape[0] - 3 - s - arm,))
-    J_q = np.empty((s, n))
-    J = np.zeros((s, m))
+    J_q = scratch((s, n))
+    J = scratch((s, m))
+    scales = scratch(s)
     for i in range(s):
+        scales[i] = 1.0
         for a in range(n):
             J_q[i, a] = frames.jacobians[frame, int(selected[i]), a]
         add_to_leaders(J_q, i, followers)
         for j in range(p):
+            J[i, j] = 0.0
             for a in range(n_p):
                 J[i, j] += J_q[i, a] * at.G[a, j]
         for j in range(arm):
             J[i, p + j] = J_q[i, int(moved[j])]
-    order = np.empty(s, dtype=np.int64)
-    L = np.empty((s, s))
-    Q = np.empty((s, m))
-    if orthonormal_rows(J, np.ones(s), order, L, Q) <= 1e-12:  # zero to rounding
+    order = integer_scratch(s)
+    L = scratch((s, s))
+    Q = scratch((s, m))
+    if orthonormal_rows(J, scales, order, L, Q) <= 1e-12:  # zero to rounding
         rows.value[0] = 0.0
         return
     w = 1.0
     for i in range(s):
         w *= L[i, i]
     rows.value[0] = w
-    X = np.empty((s, m))
+    X = scratch((s, m))
     pseudoinverse_transposed(order, L, Q, X)
-    H_k = np.empty((1, n))
+    H_k = scratch((1, n))
     for k in range(n):
         trace = 0.0
         for i in range(s):

@@ -9,7 +9,7 @@ from nmm.arrays import Array, matrix, positive, scalar, vector
 from nmm.errors import InputError
 from nmm.functions.function import Function, Row, Stage
 from nmm.functions.references.polynomial import Profile, share_of_way
-from nmm.kernels.compiled import kernel
+from nmm.kernels.compiled import kernel, scratch
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.kernels.rotations import between3, compose3, exp3, left_jacobian_inverse3, log3, transposed_times3
 from nmm.robots.robot import Robot
@@ -35,11 +35,11 @@ def turning(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     for k in range(8, numbers.shape[0]):
         s_t = s_t * local + s
         s = s * local + numbers[k]
-    axis, rate = np.empty(3), np.empty(3)
+    axis, rate = scratch(3), scratch(3)
     for i in range(3):
         axis[i] = numbers[3 + i] * s
         rate[i] = 0.0 if outside else numbers[3 + i] * s_t
-    first, turn, R = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    first, turn, R = scratch((3, 3)), scratch((3, 3)), scratch((3, 3))
     exp3(numbers[:3], first)
     exp3(axis, turn)
     compose3(first, turn, R)

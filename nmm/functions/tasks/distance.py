@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array
 from nmm.functions.function import Function, Row, Stage
 from nmm.functions.tasks.position import as_point, check_point
-from nmm.kernels.compiled import kernel
+from nmm.kernels.compiled import kernel, scratch
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import Robot
 
@@ -18,7 +17,7 @@ from nmm.robots.robot import Robot
 @kernel(FUNCTION)
 def distance(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     """|d|, d = point - p, by the chain rule, in place: the first three rows hold the point."""
-    d = np.empty(3)
+    d = scratch(3)
     for i in range(3):
         d[i] = rows.value[i] - frames.placements[frames.slots[0], i, 3]
     length = math.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])

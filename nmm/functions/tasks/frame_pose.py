@@ -7,7 +7,7 @@ import numpy as np
 from nmm.arrays import Array
 from nmm.errors import InputError
 from nmm.functions.function import Row, Stage
-from nmm.kernels.compiled import compiled, kernel
+from nmm.kernels.compiled import compiled, kernel, scratch
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.kernels.rotations import between3, left_jacobian_inverse3, log3, transposed_times3
 from nmm.robots.robot import Robot
@@ -26,12 +26,12 @@ def relative_motion(
     p_dot = R_bᵀ (v_a - v_b - ω_b × (p_a - p_b)), ω = R_bᵀ (ω_a - ω_b).
     """
     base = placements[b]
-    d = np.empty(3)
+    d = scratch(3)
     for i in range(3):
         d[i] = placements[a, i, 3] - base[i, 3]
     between3(base, placements[a], R)
     transposed_times3(base, d, p)
-    x = np.empty(3)
+    x = scratch(3)
     for k in range(velocity.shape[1]):
         wx, wy, wz = jacobians[b, 3, k], jacobians[b, 4, k], jacobians[b, 5, k]
         x[0] = jacobians[a, 0, k] - jacobians[b, 0, k] - (wy * d[2] - wz * d[1])
@@ -52,9 +52,9 @@ def frame_pose(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     slots = [frame], in world axes, or [frame, the frame that sees it].
     """
     n = at.q.shape[0]
-    R = np.empty((3, 3))
-    p = np.empty(3)
-    velocity = np.empty((6, n))
+    R = scratch((3, 3))
+    p = scratch(3)
+    velocity = scratch((6, n))
     if frames.slots.shape[0] == 2:
         relative_motion(frames.slots[0], frames.slots[1], frames.placements, frames.jacobians, R, p, velocity)
     else:
@@ -65,8 +65,8 @@ def frame_pose(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
         for i in range(6):
             for k in range(n):
                 velocity[i, k] = frames.jacobians[frames.slots[0], i, k]
-    phi = np.empty(3)
-    J = np.empty((3, 3))
+    phi = scratch(3)
+    J = scratch((3, 3))
     log3(R, phi)
     left_jacobian_inverse3(phi, J)
     for row in range(numbers.shape[0]):

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array, vector
 from nmm.errors import InputError, unknown
 from nmm.functions.function import Function, Row, Stage
-from nmm.kernels.compiled import kernel
+from nmm.kernels.compiled import kernel, scratch
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import Robot
 
@@ -23,7 +23,7 @@ PLANES = {"x": ("y", "z"), "y": ("z", "x"), "z": ("x", "y")}
 def heading(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     """ψ = atan2(e2·d, e1·d), d = R a, with d_dot = ω × d; numbers = [a, e1, e2]."""
     frame = frames.slots[0]
-    d = np.empty(3)
+    d = scratch(3)
     for i in range(3):
         d[i] = 0.0
         for j in range(3):

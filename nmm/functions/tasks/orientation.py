@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from nmm.arrays import Array
 from nmm.functions.function import Function, Row, Shown, Stage
 from nmm.functions.tasks.frame_pose import PARTS, pose_rows, pose_stage
-from nmm.kernels.compiled import kernel
+from nmm.kernels.compiled import kernel, scratch
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.kernels.rotations import (
     between3,
@@ -30,8 +28,8 @@ def orientation_error(at: At, frames: Frames, numbers: Array, rows: Rows) -> Non
     With the body rates ω = J(φ)ᵀ φ_dot and ω_d = J(g)ᵀ g_dot, each in its own axes:
     e_dot = Jr(e)⁻¹ ω_d - Jl(e)⁻¹ ω, of which Jr(e) = Jl(e)ᵀ.
     """
-    R, target, turn = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    J, J_target, J_error = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    R, target, turn = scratch((3, 3)), scratch((3, 3)), scratch((3, 3))
+    J, J_target, J_error = scratch((3, 3)), scratch((3, 3)), scratch((3, 3))
     exp3(rows.value[:3], R)
     exp3(rows.value[3:6], target)
     between3(R, target, turn)
@@ -39,8 +37,8 @@ def orientation_error(at: At, frames: Frames, numbers: Array, rows: Rows) -> Non
     left_jacobian3(rows.value[:3], J)
     left_jacobian3(rows.value[3:6], J_target)
     left_jacobian_inverse3(rows.value[6:], J_error)
-    rate, omega, omega_target = np.empty(3), np.empty(3), np.empty(3)
-    forward, backward = np.empty(3), np.empty(3)
+    rate, omega, omega_target = scratch(3), scratch(3), scratch(3)
+    forward, backward = scratch(3), scratch(3)
     for k in range(-1, at.q.shape[0]):  # -1: the time
         for i in range(3):
             rate[i] = rows.value_t[i] if k < 0 else rows.value_q[i, k]

@@ -13,7 +13,7 @@ from nmm.functions.function import Function, Row, Shown, Stage
 from nmm.functions.references.polynomial import Constant
 from nmm.functions.tasks.heading import UNIT
 from nmm.functions.tasks.position import as_point, check_point
-from nmm.kernels.compiled import kernel
+from nmm.kernels.compiled import kernel, scratch
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.kernels.rotations import transposed_times3
 from nmm.robots.robot import Robot
@@ -28,7 +28,7 @@ def pointing(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     dy_i = k ds_i + s_i (m (s_1 ds_1 + s_2 ds_2) - dc / r²), m = (c / r² - k) / s².
     """
     frame = frames.placements[frames.slots[0]]
-    d, seen, x = np.empty(3), np.empty(3), np.empty(3)
+    d, seen, x = scratch(3), scratch(3), scratch(3)
     for i in range(3):
         d[i] = rows.value[i] - frame[i, 3]
     transposed_times3(frame, d, seen)

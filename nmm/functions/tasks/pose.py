@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from nmm.arrays import Array
 from nmm.functions.function import Function, Row, Shown, Stage
 from nmm.functions.tasks.frame_pose import PARTS, pose_rows, pose_stage
-from nmm.kernels.compiled import kernel
+from nmm.kernels.compiled import kernel, scratch
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.kernels.rotations import (
     between3,
@@ -28,21 +26,21 @@ def pose_error(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     Each pose moves with a body velocity [Rᵀ p_dot, J(φ)ᵀ φ_dot] in its own axes; that of E = T⁻¹T_d is
     V_E = V_d - Ad(E⁻¹) V, and e_dot = Jlog6(E) V_E.
     """
-    R, target, turn = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    R, target, turn = scratch((3, 3)), scratch((3, 3)), scratch((3, 3))
     exp3(rows.value[3:6], R)
     exp3(rows.value[9:12], target)
     between3(R, target, turn)
-    shift, x, y = np.empty(3), np.empty(3), np.empty(3)
+    shift, x, y = scratch(3), scratch(3), scratch(3)
     for i in range(3):
         x[i] = rows.value[6 + i] - rows.value[i]
     transposed_times3(R, x, shift)  # E = (turn, shift)
     log6(turn, shift, rows.value[12:])
-    J, J_target, A, B = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    J, J_target, A, B = scratch((3, 3)), scratch((3, 3)), scratch((3, 3)), scratch((3, 3))
     left_jacobian3(rows.value[3:6], J)
     left_jacobian3(rows.value[9:12], J_target)
     log6_jacobian(rows.value[12:], shift, A, B)
-    v, w, v_target, w_target = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    rate = np.empty(12)
+    v, w, v_target, w_target = scratch(3), scratch(3), scratch(3), scratch(3)
+    rate = scratch(12)
     for k in range(-1, at.q.shape[0]):  # -1: the time
         for i in range(12):
             rate[i] = rows.value_t[i] if k < 0 else rows.value_q[i, k]

@@ -20,10 +20,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from nmm.arrays import Array
-from nmm.kernels.compiled import PLATFORM, compiled, kernel
+from nmm.kernels.compiled import PLATFORM, clear, compiled, integer_scratch, kernel, scratch, view
 from nmm.kernels.linear_algebra import eliminate
 from nmm.platforms.wheeled.sections import section
 
@@ -41,7 +39,8 @@ CONTRADICTION = 1e-3
 def terms(qp: Array, bodies: Array, listed: Array, M: Array, M_q: Array) -> None:
     """Add the rows that are velocities of points; M_q[r, c, k] = dM[r, c] / dq of body k."""
     count = bodies.size // 3
-    frame = np.zeros((count, 3))  # origin and angle in the main body's axes
+    frame = scratch((count, 3))  # origin and angle in the main body's axes
+    clear(frame)
     for b in range(1, count):
         carrier = int(bodies[3 * b])
         cosine, sine = math.cos(frame[carrier, 2]), math.sin(frame[carrier, 2])
@@ -115,9 +114,9 @@ def closures(qp: Array, listed: Array, length: float, M: Array, M_q: Array) -> f
     D = 0 says that the axes meet in one point (or are parallel). The share is D / ‖c₁ x c₂‖: the third
     wheel's sideways speed where the first two determine the motion.
     """
-    lines = np.empty((3, 2, 3))
-    coordinates = np.empty(3, dtype=np.int64)
-    product = np.empty(3)
+    lines = scratch((3, 2, 3))
+    coordinates = integer_scratch(3)
+    product = scratch(3)
     worst = 0.0
     width = 1 + 3 * _AXIS
     for line in range(listed.size // width):
@@ -149,10 +148,10 @@ def closures(qp: Array, listed: Array, length: float, M: Array, M_q: Array) -> f
 @compiled
 def common_speeds(qp: Array, listed: Array, M: Array, M_q: Array) -> None:
     """Rows w over the twist at (x, y), w = ± c₁ x c₂ / ‖c₁ x c₂‖: orthogonal to both no-slip rows."""
-    lines = np.empty((2, 2, 3))
-    coordinates = np.empty(2, dtype=np.int64)
-    w = np.empty(3)
-    change = np.empty(3)
+    lines = scratch((2, 2, 3))
+    coordinates = integer_scratch(2)
+    w = scratch(3)
+    change = scratch(3)
     width = 5 + 2 * _AXIS
     for line in range(listed.size // width):
         first = width * line
@@ -187,17 +186,26 @@ def common_speeds(qp: Array, listed: Array, M: Array, M_q: Array) -> None:
 def wheeled(qp: Array, parameters: Array, G: Array, G_q: Array) -> None:
     """G = M⁻¹ [0; I] and its derivatives; not a number where M is singular or axes contradict each other."""
     n, p = G.shape
-    M = np.zeros((n, 2 * n))  # [M I], which `eliminate` turns into [*, M⁻¹]
-    M_q = np.zeros((n, n, n - 2))
-    terms(qp, section(parameters, BODIES), section(parameters, TERMS), M, M_q)
-    rates = section(parameters, RATES)
+    M = scratch((n, 2 * n))  # [M I], which `eliminate` turns into [*, M⁻¹]
+    M_q = scratch((n, n, n - 2))
+    scales = scratch(n)
+    clear(M)
+    clear(M_q)
+    bodies = view(parameters, *section(parameters, BODIES))
+    velocities = view(parameters, *section(parameters, TERMS))
+    rates = view(parameters, *section(parameters, RATES))
+    concurrent = view(parameters, *section(parameters, CLOSURES))
+    common = view(parameters, *section(parameters, COMMON))
+    size = view(parameters, *section(parameters, SIZE))[0]
+    terms(qp, bodies, velocities, M, M_q)
     for line in range(rates.size // 2):
         M[int(rates[2 * line]), int(rates[2 * line + 1])] = 1.0
-    share = closures(qp, section(parameters, CLOSURES), section(parameters, SIZE)[0], M, M_q)
-    common_speeds(qp, section(parameters, COMMON), M, M_q)
+    share = closures(qp, concurrent, size, M, M_q)
+    common_speeds(qp, common, M, M_q)
     for i in range(n):
         M[i, n + i] = 1.0
-    _, regular = eliminate(M, np.ones(n))
+        scales[i] = 1.0
+    _, regular = eliminate(M, scales)
     if not (regular > SINGULAR and share <= CONTRADICTION):
         for i in range(n):
             for j in range(p):

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from nmm.arrays import Array
-from nmm.kernels.compiled import inlined, view
+from nmm.kernels.compiled import inlined
 
 
 def pack(sections: Sequence[Array]) -> Array:
@@ -21,7 +21,7 @@ def pack(sections: Sequence[Array]) -> Array:
 
 
 @inlined
-def section(packed: Array, number: int) -> Array:
-    """The view of one section."""
+def section(packed: Array, number: int) -> tuple[int, tuple[int]]:
+    """Where one section begins, and its extents, for `view`."""
     first = int(packed[number])
-    return view(packed, first, (int(packed[number + 1]) - first,))
+    return first, (int(packed[number + 1]) - first,)
