@@ -1,5 +1,7 @@
 from .control.controller import Controller as Controller
 from .control.controller import Step as Step
+from .control.limits import Bound as Bound
+from .control.limits import Limits as Limits
 from .errors import DivergedError as DivergedError
 from .errors import InputError as InputError
 from .errors import NmmError as NmmError

@@ -15,6 +15,7 @@ import typer
 from nmm.cli.groups import Browser, Ellipsoids, command
 from nmm.cli.mapping import map_measures
 from nmm.cli.options import (
+    LimitsOption,
     ResolverOption,
     ResolversOption,
     ScenarioArgument,
@@ -84,6 +85,7 @@ def run(
     *,
     resolver: ResolverOption = None,
     settings: SetOption = None,
+    limits: LimitsOption = None,
     out: Annotated[Path | None, out_option("runs/<scenario>-<resolver>")] = None,
     html: Annotated[
         bool,
@@ -112,7 +114,7 @@ def run(
 
     drawn = ellipsoids.wanted()
     return run_scenario(
-        scenario, resolver, settings_of(settings), out, html=html, play=play, ellipsoids=drawn
+        scenario, resolver, settings_of(settings), limits, out, html=html, play=play, ellipsoids=drawn
     )
 
 
@@ -123,6 +125,7 @@ def compare(
     *,
     resolvers: ResolversOption = "rg,pg",
     settings: SetOption = None,
+    limits: LimitsOption = None,
     out: Annotated[Path | None, out_option("runs/<scenario>-compare")] = None,
     ellipsoids: Ellipsoids,
 ) -> int:
@@ -140,7 +143,7 @@ def compare(
     from nmm.cli.runs import compare_resolvers
 
     kinds, drawn = resolvers_of(resolvers), ellipsoids.wanted()
-    return compare_resolvers(scenario, kinds, settings_of(settings), out, ellipsoids=drawn)
+    return compare_resolvers(scenario, kinds, settings_of(settings), limits, out, ellipsoids=drawn)
 
 
 @app.command()

@@ -144,6 +144,16 @@ EllipsoidScaleOption = Annotated[
 ]
 
 
+LimitsOption = Annotated[
+    bool | None,
+    typer.Option(
+        "--limits/--no-limits",
+        help="Keep the robot's own limits where the scenario says none, or keep none at all.",
+        show_default="as the scenario says",
+    ),
+]
+
+
 def out_option(default: str) -> Any:
     """The `--out` of a command that writes a folder; `default` says which."""
     return typer.Option(

@@ -52,6 +52,14 @@ def _rows(trajectory: Trajectory, numbers: dict[str, Any]) -> Iterator[tuple[str
         unmet = trajectory.unmet
         share = f"{unmet.samples} of {len(trajectory)} samples"
         yield "J u differs from the rate", f"in {share}, by {unmet.largest:.3g} at most"
+    if trajectory.limited:
+        share = numbers["scaled_share"]
+        yield (
+            "left of the rate",
+            f"{numbers['scale_min']:.3g} at least; less than all {100 * share:.3g} % of the time",
+        )
+    if numbers["margin_min"] is not None:
+        yield "least margin to a limit", f"{100 * numbers['margin_min']:.3g} % of its range"
     if trajectory.resolver == "rg":
         yield "switches of partition", str(numbers["partition_switches"])
     yield "lateral slip", f"{numbers['lateral_slip_max']:.1g} m/s at most"

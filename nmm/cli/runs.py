@@ -25,6 +25,7 @@ def run_scenario(
     name: str,
     resolver: str | None,
     settings: Mapping[str, object],
+    limits: bool | None,
     out: Path | None,
     *,
     html: bool,
@@ -32,7 +33,7 @@ def run_scenario(
     ellipsoids: Wanted = False,
 ) -> int:
     """Run a scenario, write its folder, print its table."""
-    scenario = _load(name, resolver, settings)
+    scenario = _load(name, resolver, settings, limits)
     folder = out or Path("runs") / f"{scenario.name}-{scenario.parts.resolver.kind}"
     check_folder(folder, is_run)
     trajectory = _run(scenario)
@@ -49,12 +50,13 @@ def compare_resolvers(
     name: str,
     kinds: Sequence[str],
     settings: Mapping[str, object],
+    limits: bool | None,
     out: Path | None,
     *,
     ellipsoids: Wanted = False,
 ) -> int:
     """Run a scenario with several resolvers; write and print how they compare."""
-    scenarios = [_load(name, kind, settings) for kind in kinds]
+    scenarios = [_load(name, kind, settings, limits) for kind in kinds]
     folder = out or Path("runs") / f"{scenarios[0].name}-compare"
     check_folder(folder, comparison.is_comparison)
     for scenario in scenarios:
@@ -112,9 +114,12 @@ def play_folder(folder: Path, port: int | None, *, open_browser: bool, ellipsoid
     return OK
 
 
-def _load(name: str, resolver: str | None, settings: Mapping[str, object]) -> Scenario:
+def _load(name: str, resolver: str | None, settings: Mapping[str, object], limits: bool | None) -> Scenario:
     kind = {} if resolver is None else {"resolver.kind": resolver}
-    return Scenario.load(name, kind | dict(settings))
+    scenario = Scenario.load(name, kind | dict(settings))
+    if limits is None or limits is (scenario.parts.limits is not None):
+        return scenario
+    return scenario.override("limits", limits)
 
 
 def _run(scenario: Scenario) -> Trajectory:

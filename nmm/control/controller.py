@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, Integers
+from nmm.arrays import Array, Integers, positive
+from nmm.control.bounds import OFF, STAGE
 from nmm.control.equations import PLAIN, STEP, WRAPPED, Arm, ControlStep, TaskRows, drive
 from nmm.control.equations import step as compiled_step
+from nmm.control.limits import Limits
 from nmm.control.lost_directions import in_world_axes, lost_directions
 from nmm.errors import InputError, SingularError
 from nmm.functions.function import Row, row_scales
@@ -35,7 +39,7 @@ class Step:
     """Everything that a controller found at (t, q): copies, in the units of the task's rows.
 
     r, r_d, error, rate (s,), J (s, m) of J_bar u = rate; objective H and gradient h (m,);
-    u (m,), q_dot = S u (n,); status, scale (levels,), residual ‖J u - rate‖ and measure: see `Answer`;
+    u (m,), q_dot = S u (n,); status, scale (levels,), residual ‖J u - rate‖, measure, excess: see `Answer`;
     partition (s,) the columns of Ja, -1 where there is none.
     """
 
@@ -55,6 +59,7 @@ class Step:
     residual: float
     measure: float
     partition: Integers
+    excess: float = 0.0
 
 
 class Controller:
@@ -67,6 +72,12 @@ class Controller:
     resolver : how the redundancy is resolved
     objective : H(q) to minimise; None for the plain solution
     added_task : the added task y = h(q) of the extended Jacobian
+    limits : what the inputs are kept within; None for none
+    dt : time between two calls, s, which limits of position and acceleration need; a simulation sets its own
+
+    Attributes
+    ----------
+    before : (m,) the inputs of the call before, from which accelerations count; a call changes it
 
     Raises
     ------
@@ -81,12 +92,17 @@ class Controller:
         resolver: Resolver,
         objective: Objective | None = None,
         added_task: Task | Stack | Sequence[Task] | None = None,
+        limits: Limits | None = None,
+        dt: float | None = None,
     ) -> None:
         _expect(robot, Robot, "robot")
         _expect(resolver, Resolver, "resolver")
         if objective is not None:
             _expect(objective, Objective, "objective")
+        if limits is not None:
+            _expect(limits, Limits, "limits")
         self.robot = robot
+        self.limits = limits
         self.task = Stack.of(task)
         self.resolver = resolver
         self.objective = objective
@@ -99,8 +115,11 @@ class Controller:
         every = (*self.task, *self.added_task)
         weighted = () if objective is None else objective.terms_on(robot)
         functions = [f for task in every for f in (task.function, task.reference, Comparison(task))]
-        program = Program(robot, [*functions, *(function for _, function in weighted)])
+        kept = (Limits(False, False) if limits is None else limits).on(robot)
+        objectives = [function for _, function in weighted]
+        program = Program(robot, [*functions, *objectives, *kept.functions])
         first = program.first_rows
+        after = 3 * len(every) + len(objectives)
         listed = [
             (first[3 * i] + j, first[3 * i + 1] + j, _error_row(task, first[3 * i + 2], j, row))
             for i, task in enumerate(every)
@@ -118,7 +137,9 @@ class Controller:
             added_J=np.zeros((k, m)),
             added_rate=np.zeros(k),
             added_row_scales=row_scales(added_rows, robot),
+            limit_rows=np.zeros((len(kept.rows), m)),
         )
+        self.kept = kept
         self._dimensions = dimensions = problem.dimensions
         setup = resolver.setup(dimensions)
         self.state: State = resolver.start(dimensions)
@@ -127,10 +148,11 @@ class Controller:
                 task=_task_rows(self.task, robot, table[:s]),
                 added=_task_rows(self.added_task, robot, table[s:]),
                 arm=Arm(robot.arm_coordinates, robot.following.table.ravel()),
-                terms=np.array(first[3 * len(every) :], dtype=np.int64),
+                terms=np.array(first[3 * len(every) : after], dtype=np.int64),
                 weights=np.array([weight for weight, _ in weighted]),
                 H=np.array(0.0),
                 problem=problem.arrays,
+                limits=kept.numbers(first[after:], robot),
                 resolver=resolver.kernel.address,
                 numbers=setup.numbers,
                 options=setup.options,
@@ -145,9 +167,23 @@ class Controller:
         self._u = self._step.answer.u
         self._shape = (robot.n,)
         self._solve = self._solver()
+        self.before = self._step.problem.before
+        self.dt = dt
+
+    @property
+    def dt(self) -> float | None:
+        """Time between two calls, s; None where it was not said."""
+        dt = float(self._step.problem.dt)
+        return None if math.isnan(dt) else dt
+
+    @dt.setter
+    def dt(self, dt: float | None) -> None:
+        self._step.problem.dt[()] = math.nan if dt is None else positive(dt, "dt")
 
     def __call__(self, t: float, q: ArrayLike) -> Array:
         """Inputs u (m,) at time t (s) and configuration q (n,), in the units of `robot.u_units`.
+
+        With limits each call is a sample: dt after the one before.
 
         Raises
         ------
@@ -157,9 +193,16 @@ class Controller:
         # Another kind of array would be compiled for anew, so anything but the plain kind is copied.
         if type(q) is not np.ndarray or q.dtype != FLOAT64 or q.shape != self._shape or not q.flags.carray:
             q = self._copied(q)
+        if self.limits is not None and self.kept.needs_dt and self.dt is None:
+            raise InputError(
+                "controller: limits of position, acceleration and functions need dt: give dt=0.01"
+            )
         if self._solve(float(t), q) >= _FAILED:
             self._fail(t, q)
-        return self._u.copy()
+        u = self._u.copy()
+        if self.limits is not None:
+            self.before[:] = u
+        return u
 
     def _copied(self, q: ArrayLike | None) -> Array:
         if q is None:
@@ -168,7 +211,8 @@ class Controller:
 
     def __reduce__(self) -> tuple[object, ...]:
         """Copies and pickles are built anew: views of memory and addresses of kernels do not travel."""
-        return type(self), (self.robot, self.task, self.resolver, self.objective, self.added_task)
+        given = (self.robot, self.task, self.resolver, self.objective, self.added_task, self.limits, self.dt)
+        return type(self), given
 
     def _solver(self) -> Callable[[float, Array], float]:
         """solve(t, q) -> status, with everything it needs at hand."""
@@ -233,17 +277,51 @@ class Controller:
             scale=answer.scale.copy(),
             residual=float(answer.residual[()]),
             measure=float(answer.measure[()]),
+            excess=float(answer.excess[()]),
             partition=self.state.partition(len(self.rows)),
         )
 
     def velocity(self, t: float, q: ArrayLike) -> Array:
-        """q_dot = S(q) u (n,) of the closed loop at (t, q); raises as a call does."""
-        self(t, q)
+        """q_dot = S(q) u (n,) of the closed loop at (t, q); raises as a call does.
+
+        With limits it is a stage of the sample that the last call began: that one's bounds hold.
+        """
+        if self.limits is None:
+            self(t, q)
+            return self._step.q_dot.copy()
+        with self._mode(STAGE):
+            q = self._copied(q)
+            if self._solve(float(t), q) >= _FAILED:
+                self._fail(t, q)
         return self._step.q_dot.copy()
 
+    def without_limits(self) -> AbstractContextManager[None]:
+        """`with controller.without_limits():` it answers as if there were none, and remembers no inputs."""
+        return self._mode(OFF)
+
+    @contextmanager
+    def _mode(self, mode: int) -> Iterator[None]:
+        cell, before = self._step.limits.mode, self.before.copy()
+        usual = int(cell)
+        cell[()] = mode
+        try:
+            yield
+        finally:
+            cell[()] = usual
+            self.before[:] = before
+
+    def beyond(self) -> dict[str, float]:
+        """The limits of wheels and functions that the last call's inputs break, and by what rate."""
+        problem = self._step.problem
+        rates = problem.limit_rows @ self._u
+        excess = np.maximum(rates - problem.upper, problem.lower - rates)
+        return {name: float(by) for name, by in zip(self.kept.rows, excess, strict=True) if by > 1e-9}
+
     def reset(self) -> None:
-        """Forget what the resolver remembers: the next call decides anew."""
+        """Forget what the resolver remembers and the inputs before: the next call decides anew, from rest."""
         self.state.reset()
+        self.before[:] = 0.0
+        self._step.problem.active[0] = 0
 
     @property
     def derivatives(self) -> tuple[Array, Array, Array]:

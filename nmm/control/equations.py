@@ -12,12 +12,21 @@ from typing import NamedTuple
 from numba import types
 
 from nmm.arrays import Array, Integers
+from nmm.control.bounds import (
+    OFF,
+    SAMPLE,
+    LimitNumbers,
+    bound_inputs,
+    function_bounds,
+    wheel_rows,
+)
 from nmm.functions.program import BESIDE, Buffers, LaidOut, run
 from nmm.kernels.compiled import compiled, scratch
 from nmm.kernels.followers import add_to_leaders, move_followers
 from nmm.kernels.memory import Cell, IntegerMatrix, IntegerVector, Matrix, Vector, views
 from nmm.resolvers.answer import NOT_FINITE, AnswerArrays
 from nmm.resolvers.base import call_resolver
+from nmm.resolvers.limited import some_inputs
 from nmm.resolvers.problem import ProblemArrays
 
 
@@ -56,6 +65,7 @@ class ControlStep(NamedTuple):
     terms, weights : rows of the objective's terms, and what they count
     H () : the objective
     problem, answer : what the resolver gets and gives
+    limits : from which the problem's come
     resolver, numbers, options, state : its kernel, what that reads, and what it remembers
     q_dot (n,) : S u
     """
@@ -67,6 +77,7 @@ class ControlStep(NamedTuple):
     weights: Vector
     H: Cell
     problem: ProblemArrays
+    limits: LimitNumbers
     resolver: int
     numbers: Vector
     options: IntegerVector
@@ -146,6 +157,25 @@ def write_equation(task: TaskRows, b: Buffers, C: Arm, J: Array, rate: Array) ->
 
 
 @compiled
+def write_limits(limits: LimitNumbers, q: Array, b: Buffers, C: Arm, problem: ProblemArrays) -> None:
+    """Bounds of inputs, wheels and functions, with their rows; a stage keeps its sample's bounds."""
+    w = limits.spin.shape[0]
+    if limits.mode[()] == OFF:
+        for j in range(problem.u_lower.shape[0]):
+            problem.u_lower[j], problem.u_upper[j] = -math.inf, math.inf
+        for i in range(problem.lower.shape[0]):
+            problem.lower[i], problem.upper[i] = -math.inf, math.inf
+        return
+    if w > 0:
+        wheel_rows(limits, q, b.G, problem)
+    for i in range(limits.rows.shape[0]):
+        times_S(b.value_q, limits.rows[i], b.G, C, problem.limit_rows[w + i])
+    if limits.mode[()] == SAMPLE:
+        bound_inputs(limits, q, problem)
+        function_bounds(limits, b.value, b.value_t, problem)
+
+
+@compiled
 def step(t: float, q: Array, integers: Integers, floats: Array) -> float:
     """One control step: functions, equations, gradient, inputs. Returns the resolver's status.
 
@@ -168,6 +198,7 @@ def step(t: float, q: Array, integers: Integers, floats: Array) -> float:
         for j in range(n):
             gradient[0, j] += e.weights[i] * b.value_q[term, j]
     times_S(gradient, 0, b.G, e.arm, problem.h)
+    write_limits(e.limits, q, b, e.arm, problem)
     for j in range(answer.u.shape[0]):
         answer.u[j] = math.nan  # what a resolver that finds no solution leaves behind
     answer.status[()] = NOT_FINITE
@@ -175,6 +206,8 @@ def step(t: float, q: Array, integers: Integers, floats: Array) -> float:
         answer.scale[level] = 1.0
     answer.residual[()] = math.nan
     answer.measure[()] = math.nan
+    answer.excess[()] = 0.0
     call_resolver(e.resolver, problem, e.numbers, e.options, e.state, answer)
+    some_inputs(problem, answer)
     drive(answer.u, b.G, e.arm, e.q_dot)
     return float(answer.status[()])

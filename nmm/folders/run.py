@@ -22,7 +22,10 @@ if TYPE_CHECKING:
 ARRAYS = ("t", "q", "u", "q_dot", "r", "r_d", "error", "objective", "sigma_min", "partition", "residual")
 OPTIONAL_ARRAYS = ("path", "desired", "target")
 #: Arrays that older folders lack, with what they then were.
-LATER_ARRAYS = {"scale": lambda count: np.ones((count, 1))}
+LATER_ARRAYS = {
+    "scale": lambda count: np.ones((count, 1)),
+    "margin": lambda count: np.full(count, np.inf),
+}
 
 
 def is_run(folder: Path) -> bool:
@@ -127,6 +130,7 @@ def load(folder: str | Path, robot: Robot | None = None) -> Trajectory:
         warnings=tuple(summary["warnings"]),
         frame=summary["frame"],
         unmet=unmet(summary),
+        limited=summary.get("limited", False),
         scenario=scenario,
         **arrays,
     )
@@ -167,6 +171,7 @@ def _write_csv(trajectory: Trajectory, path: Path) -> None:
         *((f"partition_{i}", trajectory.partition[:, i]) for i in range(len(rows))),
         ("residual", trajectory.residual),
         *((f"scale_{i}", trajectory.scale[:, i]) for i in range(trajectory.scale.shape[1])),
+        ("margin", trajectory.margin),
     ]
     with path.open("w", newline="", encoding="utf-8") as file:
         csv.writer(file, lineterminator="\n").writerow([name for name, _ in columns])

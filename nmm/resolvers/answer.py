@@ -22,10 +22,11 @@ class Status(IntEnum):
     SOLVED = 0
     RELAXED = 1
     INEXACT = 2
-    SINGULAR_J = 3
-    SINGULAR_JA = 4
-    SINGULAR_JE = 5
-    NOT_FINITE = 6
+    FALLBACK = 3
+    SINGULAR_J = 4
+    SINGULAR_JA = 5
+    SINGULAR_JE = 6
+    NOT_FINITE = 7
 
     @property
     def usable(self) -> bool:
@@ -42,6 +43,7 @@ _MEANINGS = {
     Status.SOLVED: "solved",
     Status.RELAXED: "the task's rate was scaled or damped on purpose",
     Status.INEXACT: "J u differs from the rate that the task asks for, and nobody said that it should",
+    Status.FALLBACK: "there was no answer to bring within the limits: the inputs are those nearest to rest",
     Status.SINGULAR_J: "the task Jacobian J lost rank: the task asks for a motion that no input gives here",
     Status.SINGULAR_JA: "the block Ja of the reduced gradient is singular though J is not: "
     "give more partitions, or partitions: automatic",
@@ -51,7 +53,8 @@ _MEANINGS = {
 }
 
 #: For kernels, which write numbers.
-SOLVED, RELAXED, INEXACT = (int(status) for status in (Status.SOLVED, Status.RELAXED, Status.INEXACT))
+SOLVED, RELAXED = int(Status.SOLVED), int(Status.RELAXED)
+INEXACT, FALLBACK = int(Status.INEXACT), int(Status.FALLBACK)
 SINGULAR_J, SINGULAR_JA = int(Status.SINGULAR_J), int(Status.SINGULAR_JA)
 SINGULAR_JE, NOT_FINITE = int(Status.SINGULAR_JE), int(Status.NOT_FINITE)
 
@@ -60,9 +63,10 @@ EXACT = 1e-9
 
 
 class AnswerArrays(NamedTuple):
-    """An `Answer` as kernels write it: u (m,); status, residual and measure (); scale (levels,).
+    """An `Answer` as kernels write it: u (m,); status, residual, measure and excess (); scale (levels,).
 
-    Before the kernel is called u, residual and measure are not numbers, status is NOT_FINITE and scale 1.
+    Before the kernel is called u, residual and measure are not numbers, status is NOT_FINITE, scale is 1 and
+    excess 0.
     """
 
     u: Vector
@@ -70,6 +74,7 @@ class AnswerArrays(NamedTuple):
     scale: Vector
     residual: Cell
     measure: Cell
+    excess: Cell
 
 
 def unanswered(m: int, levels: int) -> AnswerArrays:
@@ -80,6 +85,7 @@ def unanswered(m: int, levels: int) -> AnswerArrays:
         scale=np.ones(levels),
         residual=np.array(np.nan),
         measure=np.array(np.nan),
+        excess=np.array(0.0),
     )
 
 
@@ -91,10 +97,12 @@ class Answer:
     ----------
     u : (m,) the inputs; not numbers where the status is not `usable`
     status : how it went
-    scale : (levels,) the share of each level's rate that is given; below 1 where the status is RELAXED
+    scale : (levels,) the share of each level's rate that is given; below 1 where the status is RELAXED, 0
+        where it is FALLBACK
     residual : ‖J u - rate‖
     measure : of the matrix inverted: PG and EJ, its last pivot (rows in their scales) over its first, or
         over 1 if that is larger; RG, |det Ja|, divided by sqrt(det J Jᵀ) with automatic partitions
+    excess : by how much rows of limits that contradict each other had to be widened, in their units
     """
 
     u: Array
@@ -102,6 +110,7 @@ class Answer:
     scale: Array
     residual: float
     measure: float
+    excess: float = 0.0
 
     @property
     def singular(self) -> bool:
@@ -117,6 +126,7 @@ class Answer:
             written.scale.copy(),
             float(written.residual[()]),
             float(written.measure[()]),
+            float(written.excess[()]),
         )
 
 

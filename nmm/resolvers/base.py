@@ -13,6 +13,7 @@ from nmm.errors import InputError
 from nmm.kernels.compiled import Kernel, caller
 from nmm.kernels.memory import record_type
 from nmm.resolvers.answer import Answer, AnswerArrays, unanswered
+from nmm.resolvers.limited import some_inputs
 from nmm.resolvers.problem import Dimensions, Problem, ProblemArrays
 from nmm.resolvers.state import State
 
@@ -40,7 +41,8 @@ class Resolver(ABC):
     """u = resolve(problem). To add one, write in a file of its own a kernel and a subclass with:
 
     1. `kernel`, of signature `RESOLVER`, which solves J u = rate, writes u and measure, and ends with
-       `certify` (residual and status), or writes the status of what went wrong and leaves u;
+       `certify` (residual and status), or writes the status of what went wrong and leaves u; where u is not
+       `within` the limits it calls `limit` with its metric;
     2. `setup(dimensions)`, the numbers that it reads; raises `InputError` for a problem that it cannot
        resolve.
 
@@ -90,6 +92,7 @@ class Resolver(ABC):
         answer = unanswered(dimensions.m, len(arrays.ends))
         self.kernel(arrays, setup.numbers, setup.options, state.memory, answer)
         self.finish(arrays, dimensions, answer)
+        some_inputs(arrays, answer)
         return Answer.of(answer)
 
 

@@ -15,6 +15,7 @@ from nmm.kernels.compiled import Kernel, kernel
 from nmm.kernels.linear_algebra import residual_norm
 from nmm.resolvers.answer import Answer, AnswerArrays, Status, certified
 from nmm.resolvers.base import NO_OPTIONS, RESOLVER, Resolver, Setup
+from nmm.resolvers.limited import limit, within
 from nmm.resolvers.problem import Dimensions, Problem, ProblemArrays
 
 
@@ -25,6 +26,10 @@ def left_to_python(
     """No inputs yet: the compiled step stops short of them, and `CallableResolver.finish` finds them."""
     for j in range(answer.u.shape[0]):
         answer.u[j] = 0.0
+
+
+#: Inputs are kept near to the function's in the Euclidean norm.
+NO_METRIC: Array = np.zeros((0, 0))
 
 
 class CallableResolver(Resolver):
@@ -73,3 +78,5 @@ class CallableResolver(Resolver):
             if found.status is not Status.SOLVED and answer.status[()] < Status.SINGULAR_J:
                 answer.status[()] = found.status
                 answer.scale[:] = found.scale
+        if not within(problem, answer.u):
+            limit(problem, NO_METRIC, answer)

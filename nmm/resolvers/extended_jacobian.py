@@ -8,10 +8,11 @@ import numpy as np
 
 from nmm.arrays import Array, Integers, positive
 from nmm.errors import InputError
-from nmm.kernels.compiled import Kernel, integer_scratch, kernel, scratch
+from nmm.kernels.compiled import Kernel, clear, compiled, integer_scratch, kernel, scratch
 from nmm.kernels.linear_algebra import eliminate, orthonormal_rows
 from nmm.resolvers.answer import SINGULAR_J, SINGULAR_JE, AnswerArrays, certify
 from nmm.resolvers.base import NO_OPTIONS, RESOLVER, Resolver, Setup
+from nmm.resolvers.limited import limit, within
 from nmm.resolvers.problem import Dimensions, ProblemArrays
 
 TOLERANCE = 0
@@ -42,6 +43,27 @@ def extended_jacobian(
     for j in range(m):
         answer.u[j] = M[j, m]
     certify(problem, answer)
+    if not within(problem, answer.u):
+        T = scratch((m, m))
+        inverse(problem, T)
+        limit(problem, T, answer)
+
+
+@compiled
+def inverse(problem: ProblemArrays, T: Array) -> None:
+    """T = [J; J_added]⁻¹, rows in their scales: the metric in which limits keep both tasks near."""
+    s, m = problem.J.shape
+    M, scales = scratch((m, 2 * m)), scratch(m)
+    clear(M)
+    for i in range(m):
+        scales[i] = problem.row_scales[i] if i < s else problem.added_row_scales[i - s]
+        for j in range(m):
+            M[i, j] = problem.J[i, j] if i < s else problem.added_J[i - s, j]
+        M[i, m + i] = scales[i]
+    eliminate(M, scales)
+    for i in range(m):
+        for j in range(m):
+            T[i, j] = M[i, m + j]
 
 
 class ExtendedJacobian(Resolver):

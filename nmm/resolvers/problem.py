@@ -22,7 +22,9 @@ class ProblemArrays(NamedTuple):
     ends (levels,) : the row after the last of each level
     added_J (k, m), added_rate (k,), added_row_scales (k,) : the added task of the extended Jacobian
     h (m,) : the objective's gradient, seen by the inputs
+    u_lower, u_upper (m,) : u_lower <= u <= u_upper, infinite for none
     limit_rows (l, m), lower (l,), upper (l,) : lower <= limit_rows u <= upper
+    active (1 + m + l,) : which of them held back the step before (see `nearest_within`); changed
     before (m,) : the inputs of the step before
     dt () : the time that u will stand, s; not a number where it is not known
     """
@@ -35,11 +37,18 @@ class ProblemArrays(NamedTuple):
     added_rate: Vector
     added_row_scales: Vector
     h: Vector
+    u_lower: Vector
+    u_upper: Vector
     limit_rows: Matrix
     lower: Vector
     upper: Vector
+    active: IntegerVector
     before: Vector
     dt: Cell
+
+
+#: What kernels have beside the problem's own numbers.
+MEMORY = ("ends", "active")
 
 
 class Dimensions(NamedTuple):
@@ -75,6 +84,7 @@ class Problem:
         against which pivots are judged; 1 when not given
     levels : rows of each level of priority, from the highest on; one level when not given
     added_J, added_rate, added_row_scales : (k, m), (k,) and (k,), the added task of the extended Jacobian
+    u_lower, u_upper : (m,) u_lower <= u <= u_upper; infinite where there is none
     limit_rows, lower, upper : (l, m), (l,) and (l,): lower <= limit_rows u <= upper
     before : (m,) the inputs of the step before, 0 when not given
     dt : the time that u will stand, s; not a number where it is not known
@@ -94,6 +104,8 @@ class Problem:
     added_J: ArrayLike | None = None
     added_rate: ArrayLike | None = None
     added_row_scales: ArrayLike | None = None
+    u_lower: ArrayLike | None = None
+    u_upper: ArrayLike | None = None
     limit_rows: ArrayLike | None = None
     lower: ArrayLike | None = None
     upper: ArrayLike | None = None
@@ -125,9 +137,9 @@ class Problem:
             "added_J": added_J,
             "added_rate": vector(() if self.added_rate is None else self.added_rate, k, "added_rate"),
             "added_row_scales": _scales(self.added_row_scales, k, "added_row_scales"),
+            **_bounds(self.u_lower, self.u_upper, m, "u_lower", "u_upper"),
             "limit_rows": limit_rows,
-            "lower": _bounds(self.lower, count, "lower", -np.inf),
-            "upper": _bounds(self.upper, count, "upper", np.inf),
+            **_bounds(self.lower, self.upper, count, "lower", "upper"),
             "before": np.zeros(m) if self.before is None else vector(self.before, m, "before"),
             "dt": float("nan") if np.isnan(self.dt) else scalar(self.dt, "dt"),
         }
@@ -139,7 +151,7 @@ class Problem:
         """The problem of a control step, copied; unchecked, as checking takes ten times as long."""
         problem = object.__new__(cls)
         vars(problem).update(
-            {name: value.copy() for name, value in arrays._asdict().items() if name != "ends"},
+            {name: value.copy() for name, value in arrays._asdict().items() if name not in MEMORY},
             dt=float(arrays.dt),
             inputs=dimensions.inputs,
             groups=dimensions.groups,
@@ -159,8 +171,9 @@ class Problem:
     def arrays(self) -> ProblemArrays:
         """The numbers, as kernels read them."""
         ends = np.cumsum(self.levels or (), dtype=np.int64)
-        own = {name: np.asarray(getattr(self, name)) for name in ProblemArrays._fields if name != "ends"}
-        return ProblemArrays(ends=ends, **own)
+        own = {name: np.asarray(getattr(self, name)) for name in ProblemArrays._fields if name not in MEMORY}
+        active = np.zeros(1 + len(own["h"]) + len(own["lower"]), dtype=np.int64)
+        return ProblemArrays(ends=ends, active=active, **own)
 
 
 def _rows(value: ArrayLike, m: int, name: str) -> Array:
@@ -177,10 +190,14 @@ def _scales(value: ArrayLike | None, count: int, name: str) -> Array:
     return scales
 
 
-def _bounds(value: ArrayLike | None, count: int, name: str, none: float) -> Array:
-    if value is None:
-        return np.full(count, none)
-    bounds = np.array(value, dtype=np.float64)
-    if bounds.shape != (count,) or np.any(np.isnan(bounds)):
-        raise InputError(f"{name}: expected {count} numbers (infinite for none), got {bounds}")
-    return bounds
+def _bounds(lower: ArrayLike | None, upper: ArrayLike | None, count: int, *names: str) -> dict[str, Array]:
+    found = {}
+    for name, value, none in zip(names, (lower, upper), (-np.inf, np.inf), strict=True):
+        bounds = np.full(count, none) if value is None else np.array(value, dtype=np.float64)
+        if bounds.shape != (count,) or np.any(np.isnan(bounds)):
+            raise InputError(f"{name}: expected {count} numbers (infinite for none), got {bounds}")
+        found[name] = bounds
+    low, high = found.values()
+    for i in np.flatnonzero(low > high):
+        raise InputError(f"{names[0]}: {low[i]:g} of number {i} is above its {names[1]}, {high[i]:g}")
+    return found

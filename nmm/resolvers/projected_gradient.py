@@ -11,6 +11,7 @@ from nmm.kernels.compiled import Kernel, integer_scratch, kernel, scratch, view
 from nmm.kernels.linear_algebra import closest_solution, orthonormal_rows
 from nmm.resolvers.answer import SINGULAR_J, AnswerArrays, certify
 from nmm.resolvers.base import NO_OPTIONS, RESOLVER, Resolver, Setup
+from nmm.resolvers.limited import limit, within
 from nmm.resolvers.problem import Dimensions, ProblemArrays
 from nmm.resolvers.weights import Weights, weight_matrix
 
@@ -24,7 +25,8 @@ def projected_gradient(
 ) -> None:
     """u = J⁺ rate - α (I - J⁺ J) h, with J⁺ J = Qᵀ Q from J's orthonormal rows.
 
-    With weights, in the coordinates ũ = C⁻¹ u in which the weighted norm is the Euclidean one.
+    With weights, in the coordinates ũ = C⁻¹ u in which the weighted norm is the Euclidean one; that is
+    the metric, too, in which limits keep u near to it.
     """
     J, h, u = problem.J, problem.h, answer.u
     s, m = J.shape
@@ -63,6 +65,11 @@ def projected_gradient(
             for k in range(m):
                 u[j] += W[j, k] * solution[k]
     certify(problem, answer)
+    if not within(problem, u):
+        limit(problem, view(numbers, C, (0, 0) if numbers.shape[0] == C else (m, m)), answer)
+    if not within(problem, u):
+        plain = numbers.shape[0] == C
+        limit(problem, view(numbers, 0 if plain else C, (0, 0) if plain else (m, m)), answer)
 
 
 class ProjectedGradient(Resolver):

@@ -9,9 +9,10 @@ import numpy as np
 
 from nmm.arrays import Array, Integers, positive
 from nmm.errors import InputError
-from nmm.kernels.compiled import Kernel, compiled, kernel, scratch, view
+from nmm.kernels.compiled import Kernel, clear, compiled, kernel, scratch, view
 from nmm.resolvers.answer import SINGULAR_J, SINGULAR_JA, AnswerArrays, certify
 from nmm.resolvers.base import RESOLVER, Resolver, Setup
+from nmm.resolvers.limited import limit, within
 from nmm.resolvers.partitions import (
     COLUMNS,
     FREE,
@@ -83,6 +84,33 @@ def reduced_gradient(
         for j in range(m):
             u[j] *= numbers[C + j]
     certify(problem, answer)
+    if not within(problem, u):
+        T = scratch((m, m))
+        reduced_metric(M, columns, T)
+        if weighted:
+            for i in range(m):
+                for j in range(m):
+                    T[i, j] *= numbers[C + i]
+        limit(problem, T, answer)
+
+
+@compiled
+def reduced_metric(M: Array, columns: Integers, T: Array) -> None:
+    """u = T [ua'; ub] with ua = ua' - Ja⁻¹ Jb ub: limits keep the free inputs near, and the partition."""
+    s, m = columns.shape[0], T.shape[0]
+    clear(T)
+    free = s
+    for j in range(m):
+        basic = False
+        for i in range(s):
+            if columns[i] == j:
+                basic = True
+                T[j, i] = 1.0
+        if not basic:
+            T[j, free] = 1.0
+            for i in range(s):
+                T[columns[i], free] = -M[i, s + j]
+            free += 1
 
 
 @compiled

@@ -217,21 +217,26 @@ class Robot:
         """
         own = np.array(self.model.velocityLimit)
         speeds = self.following.slowed(np.where(own > 0.0, own, np.inf))
-        limits = np.concatenate([self._platform_limits(speeds), speeds[self.arm_coordinates]])
+        moved = self.rate_coordinates
+        own = np.concatenate([self.platform.input_limits, np.full(len(self.arm_coordinates), np.inf)])
+        limits: Array = np.minimum(own, np.where(moved < 0, np.inf, speeds[moved]))
         limits.flags.writeable = False
         return limits
 
-    def _platform_limits(self, speeds: Array) -> Array:
-        """Those of the platform, and of its own joints where an input is one's rate (a steering rate)."""
+    @cached_property
+    def rate_coordinates(self) -> NDArray[np.int64]:
+        """The coordinate whose rate each input is, (n_u,): a joint, a steering angle; -1: none's."""
         platform = self.platform
-        limits = platform.input_limits
+        moved = np.full(self.n_u, -1, dtype=np.int64)
+        moved[platform.p :] = self.arm_coordinates
         if platform.n_p > 3:
             G = platform.G(np.zeros(platform.n_p))
             for column in range(platform.p):
                 (rows,) = np.nonzero(G[:, column])
                 if len(rows) == 1 and rows[0] >= 3 and G[rows[0], column] == 1.0:
-                    limits[column] = min(limits[column], speeds[rows[0]])
-        return limits
+                    moved[column] = rows[0]
+        moved.flags.writeable = False
+        return moved
 
     @cached_property
     def fingerprint(self) -> str:

@@ -43,6 +43,11 @@ class Assessment(NamedTuple):
 
 def assess(controller: Controller, recorder: Recorder, advance: Integrator, dt: float) -> Assessment:
     """What is wrong with a run whose samples were recorded."""
+    with controller.without_limits():
+        return _assess(controller, recorder, advance, dt)
+
+
+def _assess(controller: Controller, recorder: Recorder, advance: Integrator, dt: float) -> Assessment:
     unstable, examined = _examine(controller, recorder, advance, dt)
     samples = recorder.samples
     if len(recorder) < 3:

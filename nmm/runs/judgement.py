@@ -77,7 +77,11 @@ def judge(
     found = assess(controller, recorder, advance, dt)
     unmet = residuals(samples.t, samples.residual, samples.rate)
     chatter = chattering(samples.t, samples.u, controller.robot.u_names)
-    warnings = [_joined(unmet.sentence, _relaxed(recorder.scale))] if unmet.samples else []
+    warnings = (
+        [_joined(unmet.sentence, _relaxed(recorder.scale, limited=controller.limits is not None))]
+        if unmet.samples
+        else []
+    )
     seen = _seen(controller, recorder, samples, found, chatter)
     if outcome is Outcome.INTERRUPTED:
         return Verdict(outcome, message, warnings)
@@ -187,14 +191,15 @@ def _seen(
         return [chatter.sentence] if chatter else []
     q = recorder.q[: len(recorder)]
     target = recorder.target
-    sentences = [
-        reasons.out_of_reach(controller, q[left.worst], target[left.worst]),
-        reasons.inputs_unmet(samples, left),
-        reasons.singularity(controller, samples, q, left),
-        reasons.switching(samples, left),
-        "" if chatter is None else chatter.sentence,
-    ]
-    controller.reset()
+    with controller.without_limits():
+        sentences = [
+            reasons.out_of_reach(controller, q[left.worst], target[left.worst]),
+            reasons.inputs_unmet(samples, left),
+            reasons.singularity(controller, samples, q, left),
+            reasons.switching(samples, left),
+            "" if chatter is None else chatter.sentence,
+        ]
+        controller.reset()
     if not any(sentences):
         sentences.append(reasons.unresolved(samples, left))
     if found.target:
@@ -217,9 +222,12 @@ def _lost(controller: Controller, recorder: Recorder, ended: Ended) -> list[str]
     return [sentence for sentence in sentences if sentence]
 
 
-def _relaxed(scale: Array) -> str:
+def _relaxed(scale: Array, *, limited: bool) -> str:
     least = float(scale.min(initial=1.0))
-    return f"its resolver scales the rate on purpose, down to {least:.3g} of it" if least < 1.0 else ""
+    if least >= 1.0:
+        return ""
+    who = "the limits leave" if limited else "its resolver scales the rate on purpose, down to"
+    return f"{who} {least:.3g} of it"
 
 
 def _hopeless(seen: list[str]) -> bool:

@@ -7,12 +7,15 @@ from scipy.linalg import block_diag
 
 from nmm.arrays import Array
 from nmm.control.controller import Controller, Step
+from nmm.control.limits import Limits
 from nmm.errors import InputError
 from nmm.functions.function import Function, Shown
 from nmm.functions.program import Program
 from nmm.functions.tasks.position import AXES, Position
+from nmm.resolvers.answer import Status
 from nmm.robots.robot import Robot
 from nmm.runs.broken_limits import broken_limits
+from nmm.runs.margins import margins
 from nmm.runs.promise import Samples
 from nmm.runs.reasons import weakest_words
 from nmm.runs.residuals import residuals
@@ -38,6 +41,8 @@ class Recorder:
         self._rows = np.empty((4, count, s))
         self._scalars = np.empty((2, count))
         self._scale: Array | None = None
+        self._beyond: dict[str, tuple[int, float, float]] = {}
+        self._unanswered: list[float] = []
         self._J = np.empty((count, s, robot.n_u))
         self._partition = np.empty((count, s), dtype=np.int64)
         self._count = 0
@@ -110,6 +115,12 @@ class Recorder:
             self._scale = np.ones((len(self._times), len(sample.scale)))
         self._scale[k] = sample.scale
         self._partition[k] = sample.partition
+        if sample.status is Status.FALLBACK:
+            self._unanswered.append(sample.t)
+        if sample.excess > 0.0:
+            for name, by in self._controller.beyond().items():
+                count, first, most = self._beyond.get(name, (0, sample.t, 0.0))
+                self._beyond[name] = count + 1, first, max(most, by)
 
     def warn_once(self, t: float, warning: str) -> None:
         """A warning about the time t, s, said once a run; an empty one is none."""
@@ -129,16 +140,31 @@ class Recorder:
                 f"{np.abs(self._u[: self._count]).max():.3g}"
             )
 
+    def _warn_of_limits(self) -> None:
+        for name, (count, first, most) in self._beyond.items():
+            self.warnings.append(
+                f"the limit of {name} could not be kept with the others in {count} samples, from "
+                f"t = {first:.3g} s on: its rate was beyond what would keep it by up to {most:.3g} a second"
+            )
+        if self._unanswered:
+            self.warnings.append(
+                f"the resolver had no answer in {len(self._unanswered)} samples, from "
+                f"t = {self._unanswered[0]:.3g} s on, as J has lost rank there: the inputs were those nearest "
+                "to rest within the limits"
+            )
+
     def trajectory(self, outcome: Outcome, message: str, dt: float, method: str) -> Trajectory:
         """What was recorded."""
         count, controller = self._count, self._controller
         robot, rows = controller.robot, controller.rows
         singular_values = np.linalg.svd(self._J[:count], compute_uv=False).astype(np.float64)
+        self._warn_of_limits()
         if outcome is not Outcome.SINGULAR:  # which says so itself
             self._warn_of_singularities(singular_values)
         ended = outcome in (Outcome.COMPLETED, Outcome.MISSED)
         if ended or outcome is Outcome.INTERRUPTED:  # of one that failed it goes without saying
             self.warnings += broken_limits(robot, self.t, self.q[:count], self._u[:count])
+        kept = controller.kept if controller.limits is not None else Limits().on(robot)
         frame, columns, target = self._shown
         path, desired = None, None
         if frame is not None:
@@ -163,6 +189,8 @@ class Recorder:
             partition=self._partition[:count].copy(),
             residual=self._scalars[1, :count].copy(),
             scale=self.scale.copy(),
+            limited=controller.limits is not None,
+            margin=margins(kept, robot, self.q[:count], self._u[:count])[1].min(axis=1, initial=np.inf),
             unmet=residuals(self.t, self._scalars[1, :count], self._rows[3, :count]),
             r_names=tuple(row.name for row in rows),
             r_units=tuple(row.unit for row in rows),

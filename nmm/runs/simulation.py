@@ -71,6 +71,10 @@ def simulate(
         raise InputError(
             f"dt: {duration:g} s in steps of {dt:g} s are {steps} samples; expected at most {MOST_SAMPLES}"
         )
+    if method == "adaptive" and controller.limits is not None:
+        raise InputError(
+            "method: limits are kept from sample to sample: expected rk4, midpoint, euler or zoh"
+        )
     advance = integrator(method, robot, positive(tolerance, "tolerance"))
     recorder, ended = _record(controller, advance, _times(0.0, dt, steps, duration), q, progress)
 
@@ -113,6 +117,8 @@ def _record(
 ) -> tuple[Recorder, Ended]:
     """Integrate over the times (N,) from q, and say how that ended."""
     recorder = Recorder(controller, times)
+    if controller.limits is not None and len(times) > 1:
+        controller.dt = float(times[1] - times[0])
     recorder.warnings += slip_warnings(controller.robot)
     idle = idle_inputs(controller, q)
     if idle:
@@ -151,6 +157,7 @@ def _integrate(
     that may not stand either, it is taken with the decisions free at its stages.
     """
     state, steps = controller.state, len(times) - 1
+    earlier = controller.before.copy()
     sample = _sample(controller, float(times[0]), q)
     recorder.add(sample)
     for k in range(steps):
@@ -158,6 +165,7 @@ def _integrate(
         ahead = _advanced(controller, advance, sample, t)
         if ahead is None:
             state.reset()
+            controller.before[:] = earlier
             sample = _sample(controller, sample.t, sample.q)
             recorder.replace_last(sample)
             before = state.snapshot()
@@ -165,7 +173,7 @@ def _integrate(
             if ahead is None:
                 ahead = _sample(controller, t, _integrated(controller, advance, sample, t))
                 recorder.warn_once(sample.t, state.reservation(before, controller.robot.u_names))
-        sample = ahead
+        earlier, sample = sample.u, ahead
         recorder.add(sample)
         if progress is not None and k % max(1, steps // 100) == 0:
             progress(k / steps)

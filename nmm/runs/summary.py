@@ -41,6 +41,7 @@ def summarise(trajectory: Trajectory) -> dict[str, Any]:
         "resolver": trajectory.resolver,
         "method": trajectory.method,
         "dt": trajectory.dt,
+        "limited": trajectory.limited,
         "samples": count,
         "redundancy": redundancy,
         "r_names": list(trajectory.r_names),
@@ -63,6 +64,8 @@ def summarise(trajectory: Trajectory) -> dict[str, Any]:
             "residual_max": float(trajectory.residual.max()),
             **{f"unmet_{name}": value for name, value in trajectory.unmet._asdict().items()},
             "scale_min": float(trajectory.scale.min()),
+            "scaled_share": float(np.mean(np.any(trajectory.scale < 1.0, axis=1))),
+            "margin_min": float(trajectory.margin.min()) if np.all(np.isfinite(trajectory.margin)) else None,
             "lateral_slip_max": lateral_slip(trajectory),
             "partition_switches": trajectory.switches,
             "u_max": {

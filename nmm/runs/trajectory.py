@@ -48,6 +48,8 @@ class Trajectory:
     residual (N,): ‖J u - rate‖
     scale (N, levels): the share λ of the task's rate that was left, a priority level a column; 1 where
         nothing was relaxed on purpose
+    margin (N,): least distance to a limit, as a share of its range; infinite without limits on both sides
+    limited : whether the controller kept limits
     unmet : where J u differed from the rate
     r_names, r_units : the task's rows
     resolver, method, dt : how it was made
@@ -71,6 +73,7 @@ class Trajectory:
     partition: Integers
     residual: Array
     scale: Array
+    margin: Array
     r_names: tuple[str, ...]
     r_units: tuple[str, ...]
     resolver: str
@@ -84,6 +87,7 @@ class Trajectory:
     desired: Array | None = None
     target: Array | None = None
     unmet: Residuals = NONE
+    limited: bool = False
     scenario: dict[str, Any] | None = field(default=None)
 
     def __len__(self) -> int:

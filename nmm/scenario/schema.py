@@ -13,6 +13,7 @@ from nmm.kinds import RESOLVERS
 from nmm.robots.robot import Robot
 from nmm.scenario.functions import REFERENCE_PARTS
 from nmm.scenario.keys import Part, at
+from nmm.scenario.limits import LimitsPart, limits_or_none
 from nmm.scenario.numbers import Nested, Positive, numbers, numbers_by_name
 from nmm.scenario.objectives import ObjectiveList, QuadraticPart, build_objective
 from nmm.scenario.resolvers import AnyResolver, WithAddedTask
@@ -56,6 +57,10 @@ class ScenarioPart(Part):
         description=f"how the redundancy is resolved: kind {in_words(list(RESOLVERS), 'or')}, with its keys"
     )
 
+    limits: Annotated[LimitsPart | None, BeforeValidator(limits_or_none)] = Field(
+        None, description="what the inputs are kept within: true for the robot's own limits, or a mapping"
+    )
+
     def build(self, robot: Robot) -> Controller:
         """The controller, after a check of q0; errors know their key."""
         with at("q0"):
@@ -71,6 +76,8 @@ class ScenarioPart(Part):
                 raise InputError(f"expected at most {robot.n_u} rows, as many as inputs ({names}), got {s}")
         with at("objective"):
             objective = build_objective(self.objective, robot)
+        with at("limits"):
+            limits = None if self.limits is None else self.limits.build(robot)
         with at("resolver"):
             resolver, added = self.resolver.make(), None
             if isinstance(self.resolver, WithAddedTask):
@@ -79,7 +86,9 @@ class ScenarioPart(Part):
                     rows = sum(len(item.rows(robot)) for item in added)
                     self._check_added(self.resolver, rows, robot.n_u - s)
             with self.resolver.own_keys():
-                return Controller(robot, task, resolver, objective, added_task=added)
+                return Controller(
+                    robot, task, resolver, objective, added_task=added, limits=limits, dt=self.dt
+                )
 
     def _added_task(self, resolver: WithAddedTask) -> list[TaskPart]:
         """The task that takes up the redundancy: as given, or the objective's terms at their targets."""

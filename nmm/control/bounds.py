@@ -1,0 +1,135 @@
+"""What limits leave the inputs for one sample: bounds in discrete time, which never contradict each other.
+
+With room = distance to a limit of position, Δt the sample, a = A Δt, D = room / Δt, the fastest approach from
+which braking at A still stops in time, sampled, is
+
+    u <= D / N + a (N - 1) / 2,  N = max(1, ⌈(√(1 + 8 D / a) - 1) / 2⌉),
+
+which is exact: obeyed at one sample, it can be obeyed at the next with |Δu| <= a, whatever is chosen below
+it. Beyond the limit (D < 0) the way back is at a stated speed. These bounds are taken at a sample and hold
+until the next: what an integrator averages over its stages is within them, too.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from nmm.arrays import Array
+from nmm.kernels.compiled import compiled
+from nmm.kernels.memory import Cell, IntegerCell, IntegerVector, Matrix, Vector
+from nmm.resolvers.problem import ProblemArrays
+
+#: What `LimitNumbers.mode` says of a step: a sample's, an integrator's stage after it, one without limits.
+SAMPLE, STAGE, OFF = 0, 1, 2
+#: As its direction turns, a row's braking is counted on with this share of what the accelerations give.
+COUNTED_ON = 0.25
+
+
+class LimitNumbers(NamedTuple):
+    """Limits of m inputs, w wheels and f functions; infinite where there is none.
+
+    slowest, fastest, acceleration (m,) : of the inputs
+    coordinate (m,) : the coordinate whose rate an input is, -1 where none; low, high (m,) : its limits
+    recovery () : speed of the way back from beyond a limit, m/s or rad/s
+    wheels (w, 7) : how they turn (`nmm.robots.wheel_rates`); spin (w,) : their largest rates, rad/s
+    rows (f,) : of the program; row_low, row_high (f,) : limits of these values; braking (f,) : counted on for
+        them, not a number where it is a share of what the inputs' accelerations give
+    mode () : SAMPLE, STAGE or OFF
+    """
+
+    slowest: Vector
+    fastest: Vector
+    acceleration: Vector
+    coordinate: IntegerVector
+    low: Vector
+    high: Vector
+    recovery: Cell
+    wheels: Matrix
+    spin: Vector
+    rows: IntegerVector
+    row_low: Vector
+    row_high: Vector
+    braking: Vector
+    mode: IntegerCell
+
+
+@compiled
+def approach(room: float, dt: float, acceleration: float, recovery: float) -> float:
+    """The largest speed towards a limit that is `room` ahead; negative where it is behind."""
+    D = room / dt
+    if D < 0.0:
+        return max(D, -recovery)
+    if math.isinf(D) or math.isinf(acceleration):
+        return D
+    a = acceleration * dt
+    if a <= 0.0:
+        return 0.0
+    N = max(1.0, math.ceil((math.sqrt(1.0 + 8.0 * D / a) - 1.0) / 2.0))
+    return D / N + 0.5 * a * (N - 1.0)
+
+
+@compiled
+def bound_inputs(limits: LimitNumbers, q: Array, problem: ProblemArrays) -> None:
+    """Bounds of the inputs at q: velocity and position, then acceleration, which wins."""
+    dt = problem.dt[()]
+    for j in range(limits.slowest.shape[0]):
+        lower, upper = limits.slowest[j], limits.fastest[j]
+        A = limits.acceleration[j]
+        i = limits.coordinate[j]
+        if i >= 0:
+            upper = min(upper, approach(limits.high[j] - q[i], dt, A, limits.recovery[()]))
+            lower = max(lower, -approach(q[i] - limits.low[j], dt, A, limits.recovery[()]))
+        if lower > upper:  # less room than a sample's way back: its middle
+            lower = 0.5 * (lower + upper)
+            upper = lower
+        if not math.isinf(A):
+            least, most = problem.before[j] - A * dt, problem.before[j] + A * dt
+            if least > upper:
+                lower, upper = least, least
+            elif most < lower:
+                lower, upper = most, most
+            else:
+                lower, upper = max(lower, least), min(upper, most)
+        problem.u_lower[j] = lower
+        problem.u_upper[j] = upper
+
+
+@compiled
+def wheel_rows(limits: LimitNumbers, q: Array, G: Array, problem: ProblemArrays) -> None:
+    """The wheels' rolling rates, rad/s, as rows on the inputs; their bounds stay."""
+    cosine, sine = math.cos(q[2]), math.sin(q[2])
+    for i in range(limits.spin.shape[0]):
+        x, y, angle = limits.wheels[i, 0], limits.wheels[i, 1], limits.wheels[i, 2]
+        steer = int(limits.wheels[i, 4])
+        if steer >= 0:
+            c, s = math.cos(q[steer]), math.sin(q[steer])
+            x, y = limits.wheels[i, 5] + c * x - s * y, limits.wheels[i, 6] + s * x + c * y
+            angle += q[steer]
+        for j in range(problem.u_lower.shape[0]):
+            problem.limit_rows[i, j] = 0.0
+        for j in range(G.shape[1]):
+            forward = cosine * G[0, j] + sine * G[1, j] - y * G[2, j]
+            sideways = cosine * G[1, j] - sine * G[0, j] + x * G[2, j]
+            rolling = math.cos(angle) * forward + math.sin(angle) * sideways
+            problem.limit_rows[i, j] = rolling / limits.wheels[i, 3]
+        problem.lower[i] = -limits.spin[i]
+        problem.upper[i] = limits.spin[i]
+
+
+@compiled
+def function_bounds(limits: LimitNumbers, value: Array, value_t: Array, problem: ProblemArrays) -> None:
+    """Bounds of the functions' rates, whose rows on the inputs are there: dampers with room to brake."""
+    dt = problem.dt[()]
+    w = limits.spin.shape[0]
+    for i in range(limits.rows.shape[0]):
+        row = limits.rows[i]
+        braking = limits.braking[i]
+        if math.isnan(braking):
+            braking = 0.0
+            for j in range(limits.slowest.shape[0]):
+                if problem.limit_rows[w + i, j] != 0.0:
+                    braking += COUNTED_ON * abs(problem.limit_rows[w + i, j]) * limits.acceleration[j]
+        recovery = limits.recovery[()]
+        problem.upper[w + i] = approach(limits.row_high[i] - value[row], dt, braking, recovery) - value_t[row]
+        problem.lower[w + i] = -approach(value[row] - limits.row_low[i], dt, braking, recovery) - value_t[row]

@@ -1,0 +1,230 @@
+"""Inputs within limits: as much of the task's rate as they leave, as near to the unlimited inputs as can be.
+
+For one level of priority: the largest λ in [0, 1] with J u = r0 + λ (J u* - r0) and u within the limits, then
+the least ‖B (u - u*)‖. u* is the resolver's own answer, B its metric, r0 = J u_ref, with u_ref the inputs
+within the limits nearest to rest, or what the levels above have left: λ = 0 always exists. α h lives in u*
+and is never scaled, only projected. u* within the limits is returned as it is.
+"""
+
+from __future__ import annotations
+
+import math
+
+from nmm.arrays import Array
+from nmm.kernels.active_set import FEASIBLE, Rows, nearest_within
+from nmm.kernels.compiled import clear, compiled, integer_scratch, scratch, view
+from nmm.kernels.linear_algebra import eliminate, residual_norm
+from nmm.resolvers.answer import (
+    EXACT,
+    FALLBACK,
+    INEXACT,
+    RELAXED,
+    SINGULAR_J,
+    SOLVED,
+    AnswerArrays,
+    certified,
+)
+from nmm.resolvers.problem import ProblemArrays
+
+#: A scale below 1 by no more than this is rounding.
+WHOLE = 1e-12
+
+
+@compiled
+def within(problem: ProblemArrays, u: Array) -> bool:
+    """Whether the inputs are within the limits; rows of limits may be missed by rounding."""
+    for j in range(u.shape[0]):
+        if not problem.u_lower[j] <= u[j] <= problem.u_upper[j]:
+            return False
+    for i in range(problem.lower.shape[0]):
+        value = times(problem.limit_rows, i, u)
+        lower, upper = problem.lower[i], problem.upper[i]
+        if value < lower - FEASIBLE * max(1.0, abs(lower)) or value > upper + FEASIBLE * max(1.0, abs(upper)):
+            return False
+    return True
+
+
+@compiled
+def times(A: Array, row: int, x: Array) -> float:
+    """A[row] . x."""
+    total = 0.0
+    for j in range(x.shape[0]):
+        total += A[row, j] * x[j]
+    return total
+
+
+@compiled
+def nearest_to_rest(problem: ProblemArrays, u: Array) -> float:
+    """Write the inputs (m,) within the limits that are nearest to 0; returns how far rows were widened.
+
+    Limits of single inputs hold always. Where the rows leave nothing with them, all rows are widened by the
+    least number, in their own units, with which they do.
+    """
+    m, count = u.shape[0], problem.lower.shape[0]
+    for j in range(m):
+        u[j] = min(max(0.0, problem.u_lower[j]), problem.u_upper[j])
+    if within(problem, u):
+        return 0.0
+    G, lower, upper, give = (
+        scratch((m + count, m)),
+        scratch(m + count),
+        scratch(m + count),
+        scratch(m + count),
+    )
+    clear(G)
+    for i in range(m + count):
+        if i < m:
+            G[i, i] = 1.0
+            lower[i], upper[i], give[i] = problem.u_lower[i], problem.u_upper[i], 0.0
+            continue
+        for j in range(m):
+            G[i, j] = problem.limit_rows[i - m, j]
+        lower[i], upper[i], give[i] = problem.lower[i - m], problem.upper[i - m], 1.0
+    E, none = scratch((0, m)), scratch(0)
+    target, y = scratch(m), scratch(m)
+    clear(target)
+    active = integer_scratch(1 + m + count)
+    active[0] = 0
+    scale = nearest_within(Rows(E, none, none, G, lower, upper, give), target, -math.inf, active, y)
+    if math.isnan(scale):
+        return math.inf
+    for j in range(m):
+        u[j] = min(max(y[j], problem.u_lower[j]), problem.u_upper[j])
+    return 1.0 - scale
+
+
+@compiled
+def fall_back(problem: ProblemArrays, answer: AnswerArrays) -> None:
+    """The inputs nearest to rest instead of an answer, and say so."""
+    answer.excess[()] = nearest_to_rest(problem, answer.u)
+    answer.residual[()], _ = residual_norm(problem.J, answer.u, problem.rate)
+    answer.status[()] = FALLBACK
+    for level in range(answer.scale.shape[0]):
+        answer.scale[level] = 0.0
+
+
+@compiled
+def some_inputs(problem: ProblemArrays, answer: AnswerArrays) -> None:
+    """Where there are limits, a resolver that found no inputs leaves those nearest to rest."""
+    if answer.status[()] < SINGULAR_J:
+        return
+    limited = problem.lower.shape[0] > 0
+    for j in range(answer.u.shape[0]):
+        limited = limited or not (math.isinf(problem.u_lower[j]) and math.isinf(problem.u_upper[j]))
+    if limited:
+        fall_back(problem, answer)
+
+
+@compiled
+def limit(problem: ProblemArrays, T: Array, answer: AnswerArrays) -> None:
+    """Bring the resolver's inputs within the limits: u, scale, residual, status, excess.
+
+    T (m, m) is the inverse of the metric B; (0, 0) where B is the identity.
+    """
+    s, m = problem.J.shape
+    count = problem.lower.shape[0]
+    c = m + count
+    u = answer.u
+    start, rest, difference, target = scratch(m), scratch(m), scratch(m), scratch(m)
+    for j in range(m):
+        start[j] = u[j]
+    excess = nearest_to_rest(problem, rest)
+    answer.excess[()] = excess
+    G, lower, upper, give = scratch((c, m)), scratch(c), scratch(c), scratch(c)
+    JT, change, fixed = scratch((s, m)), scratch(s), scratch(s)
+    clear(give)
+    clear(fixed)
+    transform(problem, T, JT, G)
+    wanted = scratch(s)
+    first = 0
+    for level in range(problem.ends.shape[0]):
+        end = problem.ends[level]
+        for j in range(m):
+            difference[j] = start[j] - rest[j]
+        into_metric(T, difference, target)
+        for i in range(end):
+            change[i] = times(JT, i, target) if i >= first else 0.0
+        for i in range(c):
+            at_rest = rest[i] if i < m else times(problem.limit_rows, i - m, rest)
+            lower[i] = (problem.u_lower[i] if i < m else problem.lower[i - m] - excess) - at_rest
+            upper[i] = (problem.u_upper[i] if i < m else problem.upper[i - m] + excess) - at_rest
+        rows = Rows(
+            view(JT, 0, (end, m)), view(fixed, 0, (end,)), view(change, 0, (end,)), G, lower, upper, give
+        )
+        scale = nearest_within(rows, target, 0.0, problem.active, difference)
+        if math.isnan(scale) and level == 0:
+            fall_back(problem, answer)
+            return
+        if math.isnan(scale):  # what the levels above have left stands
+            scale = 0.0
+        else:
+            for j in range(m):
+                moved = difference[j] if T.shape[0] == 0 else times(T, j, difference)
+                u[j] = min(max(rest[j] + moved, problem.u_lower[j]), problem.u_upper[j])
+        for i in range(first, end):
+            wanted[i] = times(problem.J, i, rest) + scale * change[i]
+        if scale < 1.0 - WHOLE:
+            answer.scale[level] *= scale
+            answer.status[()] = RELAXED
+        for j in range(m):
+            rest[j] = u[j]
+        first = end
+    judge(problem, wanted, answer)
+
+
+@compiled
+def transform(problem: ProblemArrays, T: Array, JT: Array, G: Array) -> None:
+    """JT = J T and G = [I; limit_rows] T."""
+    s, m = problem.J.shape
+    plain = T.shape[0] == 0
+    for j in range(m):
+        for i in range(s):
+            total = problem.J[i, j] if plain else 0.0
+            if not plain:
+                for a in range(m):
+                    total += problem.J[i, a] * T[a, j]
+            JT[i, j] = total
+        for i in range(m):
+            G[i, j] = T[i, j] if not plain else 1.0 if i == j else 0.0
+        for i in range(problem.lower.shape[0]):
+            total = problem.limit_rows[i, j] if plain else 0.0
+            if not plain:
+                for a in range(m):
+                    total += problem.limit_rows[i, a] * T[a, j]
+            G[m + i, j] = total
+
+
+@compiled
+def into_metric(T: Array, difference: Array, y: Array) -> None:
+    """T y = difference."""
+    m = difference.shape[0]
+    if T.shape[0] == 0:
+        for j in range(m):
+            y[j] = difference[j]
+        return
+    M, scales = scratch((m, m + 1)), scratch(m)
+    for i in range(m):
+        scales[i] = 1.0
+        for j in range(m):
+            M[i, j] = T[i, j]
+        M[i, m] = difference[i]
+    eliminate(M, scales)
+    for j in range(m):
+        y[j] = M[j, m]
+
+
+@compiled
+def judge(problem: ProblemArrays, wanted: Array, answer: AnswerArrays) -> None:
+    """Residual against the rate, and whether J u is what λ says."""
+    residual, rounding = residual_norm(problem.J, answer.u, problem.rate)
+    answer.residual[()] = residual
+    asked = 0.0
+    for i in range(problem.rate.shape[0]):
+        asked += problem.rate[i] * problem.rate[i]
+    asked = math.sqrt(asked)
+    if answer.status[()] == RELAXED:
+        astray, _ = residual_norm(problem.J, answer.u, wanted)
+        if astray > EXACT * (1.0 + asked):
+            answer.status[()] = INEXACT
+    elif answer.status[()] == SOLVED:
+        answer.status[()] = certified(residual, rounding, asked)
