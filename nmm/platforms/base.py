@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nmm.arrays import positive, vector
-from nmm.errors import InputError, unknown
+from nmm.errors import expect_known
 from nmm.kernels.compiled import Kernel
 from nmm.platforms.layout import Layout
 
@@ -59,8 +59,7 @@ class Platform(ABC):
 
     def _checked(self, limits: Mapping[str, float]) -> dict[str, float]:
         for name in limits:
-            if name not in self.inputs:
-                raise InputError(unknown("input", name, self.inputs, f"limits of platform {self.name}"))
+            expect_known("input", name, self.inputs, f"limits of platform {self.name}")
         return {name: positive(value, f"limit of {name}") for name, value in limits.items()}
 
     @classmethod

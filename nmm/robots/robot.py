@@ -13,7 +13,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from nmm.arrays import scalar, vector
-from nmm.errors import InputError, unknown
+from nmm.errors import InputError, expect_known, unknown
 from nmm.platforms.base import Platform
 from nmm.robots.followers import SLACK, Follower, Following
 from nmm.robots.meshes import MeshesWhenAsked, Shapes
@@ -318,8 +318,7 @@ class Robot:
 
     def coordinate(self, name: str) -> int:
         """Index of a coordinate in q; `InputError` lists the names."""
-        if name not in self.q_names:
-            raise InputError(unknown("coordinate", name, self.q_names, f"robot {self.name}"))
+        expect_known("coordinate", name, self.q_names, f"robot {self.name}")
         return self.q_names.index(name)
 
     def independent(self, name: str) -> int:
@@ -332,8 +331,7 @@ class Robot:
 
     def input(self, name: str) -> int:
         """Index of an input in u; `InputError` lists the names."""
-        if name not in self.u_names:
-            raise InputError(unknown("input", name, self.u_names, f"robot {self.name}"))
+        expect_known("input", name, self.u_names, f"robot {self.name}")
         return self.u_names.index(name)
 
     def q(self, values: Mapping[str, float] | ArrayLike | None = None) -> Array:

@@ -15,7 +15,7 @@ import numpy as np
 
 from nmm.analysis.singular.parts import singular_values
 from nmm.arrays import Array
-from nmm.errors import InputError, unknown
+from nmm.errors import InputError, expect_known
 
 
 class Spectra:
@@ -150,8 +150,7 @@ def chosen(names: str | Sequence[str]) -> dict[str, Measure]:
     if not wanted:
         raise InputError(f"measures: expected at least one of {', '.join(MEASURES)}")
     for name in wanted:
-        if name not in MEASURES:
-            raise InputError(unknown("measure", name, MEASURES, "measures"))
+        expect_known("measure", name, MEASURES, "measures")
     return {name: MEASURES[name] for name in wanted}
 
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from nmm.analysis.redundancy.null_space import readable_null_space
 from nmm.arrays import Array, Integers, scalar, vector
-from nmm.errors import InputError, unknown
+from nmm.errors import InputError, expect_known
 from nmm.robots.robot import Robot
 from nmm.words import listed
 
@@ -110,8 +110,7 @@ def _wish(robot: Robot, direction: Direction, what: str) -> Array:
     if isinstance(direction, str | Mapping):
         wished = {direction: 1.0} if isinstance(direction, str) else direction
         for name, value in wished.items():
-            if name not in robot.u_names:
-                raise InputError(unknown("input", name, robot.u_names, what))
+            expect_known("input", name, robot.u_names, what)
             wish[robot.input(name)] = scalar(value, f"{what}: {name}")
     elif isinstance(direction, bool):
         raise InputError(f"{what}: expected a number, an input or inputs, got {direction!r}")

@@ -9,7 +9,7 @@ import numpy as np
 
 from nmm.arrays import Array, Integers
 from nmm.control.directions import direction_texts, readable_basis
-from nmm.errors import InputError, unknown
+from nmm.errors import InputError, expect_known
 from nmm.robots.robot import Robot
 
 WHOLE = "robot"
@@ -123,8 +123,7 @@ def groups(robot: Robot) -> dict[str, list[int]]:
 def columns_of(robot: Robot, part: str) -> list[int]:
     """Columns of a part; `InputError` names the parts that the robot has."""
     columns = groups(robot)
-    if part not in columns:
-        raise InputError(unknown("part", part, columns, f"robot {robot.name}"))
+    expect_known("part", part, columns, f"robot {robot.name}")
     return columns[part]
 
 
