@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from nmm.arrays import Array
     from nmm.control.controller import Controller
     from nmm.robots.loading.provenance import Provenance
-    from nmm.robots.robot import Robot, Wheel
+    from nmm.robots.robot import Robot
+    from nmm.robots.wheel import Wheel
 
 #: An angle beyond this many turns is a joint without limits.
 UNBOUNDED = 1e6

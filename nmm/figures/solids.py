@@ -11,7 +11,8 @@ import numpy as np
 from nmm.arrays import Array
 from nmm.robots.loading.joint_kinds import axis
 from nmm.robots.meshes import read_meshes
-from nmm.robots.robot import Robot, Wheel
+from nmm.robots.robot import Robot
+from nmm.robots.wheel import Wheel
 
 #: Directions, spread evenly over the sphere, in which a mesh's outermost points are kept.
 _DIRECTIONS = 200

@@ -8,14 +8,12 @@ from collections.abc import Mapping
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from nmm.arrays import positive, vector
+from nmm.arrays import Array, positive, vector
 from nmm.errors import expect_known
 from nmm.kernels.compiled import Kernel
 from nmm.platforms.layout import Layout
-
-Array = NDArray[np.float64]
 
 
 class Platform(ABC):

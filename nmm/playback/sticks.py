@@ -17,7 +17,8 @@ from nmm.errors import RobotError
 from nmm.robots.loading.joint_kinds import axis, is_revolute, kind
 from nmm.robots.loading.provenance import parts_of
 from nmm.robots.meshes import read_meshes
-from nmm.robots.robot import Robot, Wheel
+from nmm.robots.robot import Robot
+from nmm.robots.wheel import Wheel
 
 fcl = pin.hppfcl
 

@@ -13,7 +13,8 @@ from nmm.arrays import Array
 from nmm.playback.carriers import Carriers, at_point
 from nmm.playback.caster import caster_step
 from nmm.robots.loading.joint_kinds import axis
-from nmm.robots.robot import Robot, Wheel
+from nmm.robots.robot import Robot
+from nmm.robots.wheel import Wheel
 
 # A wheel whose centre is nearer to its swivel's axis than this part of its radius does not trail.
 _NO_TRAIL = 1e-4

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from nmm.arrays import Array, Integers
+from nmm.arrays import Array, Flags, Integers
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,11 +68,11 @@ class Layer:
         self.central = np.zeros(cells, dtype=bool)
 
     @property
-    def reached(self) -> NDArray[np.bool_]:
+    def reached(self) -> Flags:
         """Whether each cell has a posture."""
         return np.asarray(np.isfinite(self.values))
 
-    def offer(self, cells: Integers, central: NDArray[np.bool_], values: Array, q: Array) -> None:
+    def offer(self, cells: Integers, central: Flags, values: Array, q: Array) -> None:
         """Keep those of the postures q (N, n) that are better than what their cells have."""
         signed = self.sign * values
         usable = np.flatnonzero((cells >= 0) & np.isfinite(signed))

@@ -9,15 +9,12 @@ from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
-from nmm.arrays import positive
+from nmm.arrays import Array, positive
 from nmm.errors import InputError, RobotError, unknown
 from nmm.platforms.layout import HITCHES, STEERING, SWIVELS, Layout, Pivot, RollingJoint
 from nmm.robots.loading.chain import CHAIN
 from nmm.robots.loading.joint_kinds import axis, is_revolute, kind
-
-Array = NDArray[np.float64]
 
 # How far from level or upright an axis may be: files write pi/2 with a few digits.
 _LEVEL = 1e-3

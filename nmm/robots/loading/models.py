@@ -20,8 +20,9 @@ from nmm.robots.loading.provenance import Parts
 from nmm.robots.loading.reduction import at_zero
 from nmm.robots.loading.source import Source
 from nmm.robots.loading.wheels import find_wheels, held_joints
-from nmm.robots.robot import Robot, Wheel
+from nmm.robots.robot import Robot
 from nmm.robots.slip import slip_warnings
+from nmm.robots.wheel import Wheel
 
 #: Adds its pairs to the collision shapes on a model.
 AddPairs = Callable[[pin.Model, pin.GeometryModel], None]

@@ -11,9 +11,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from nmm.arrays import array
+from nmm.arrays import Array, array
 from nmm.errors import InputError, expect_known, unknown
 from nmm.robots.loading.chain import CHAIN_JOINTS, Head, rebuild, replaced_joints
 from nmm.robots.loading.joint_kinds import is_continuous, is_mimic, is_simple, kind
@@ -23,7 +23,6 @@ from nmm.robots.loading.root_layout import ROOTS, ChainRoot, RootLayout
 from nmm.robots.meshes import read_meshes
 from nmm.robots.robot import Robot
 
-Array = NDArray[np.float64]
 Root = Literal["planar", "freeflyer", "chain"]
 
 # How far a locked joint may be from where it is locked, rad or m.

@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from nmm.errors import RobotError
 from nmm.robots.loading.layout import Measured
-from nmm.robots.robot import Wheel
+from nmm.robots.wheel import Wheel
 
 
 def find_wheels(
