@@ -52,7 +52,9 @@ def unknown(kind: str, name: object, available: Iterable[str], where: str = "") 
     return f"{prefix}unknown {kind} {name!r}{hint}; available: {listing}"
 
 
-def expect_known(kind: str, name: object, available: Collection[Any], where: str = "") -> None:
-    """`InputError`, in the words of `unknown`, for a name that is not among those available."""
+def expect_known(
+    kind: str, name: object, available: Collection[Any], where: str = "", error: type[InputError] = InputError
+) -> None:
+    """The error, in the words of `unknown`, for a name that is not among those available."""
     if name not in available:
-        raise InputError(unknown(kind, name, available, where))
+        raise error(unknown(kind, name, available, where))

@@ -82,8 +82,7 @@ def _extremes(vertices: Array) -> Array:
     angle = k * np.pi * (3.0 - np.sqrt(5.0))  # the golden angle: Fibonacci's sphere
     level = np.sqrt(1.0 - z * z)
     directions = np.column_stack([level * np.cos(angle), level * np.sin(angle), z])
-    chosen: Array = vertices[np.unique(np.argmax(vertices @ directions.T, axis=0))]
-    return chosen
+    return np.asarray(vertices[np.unique(np.argmax(vertices @ directions.T, axis=0))])
 
 
 def _outermost(solids: list[Solid]) -> list[Solid]:

@@ -133,8 +133,7 @@ class Platform(ABC):
 
     def G_dot(self, qp: ArrayLike, qp_dot: ArrayLike) -> Array:
         """Time derivative of G along the velocity `qp_dot`, shape (n_p, p)."""
-        derivative: Array = self._evaluate(qp)[1] @ vector(qp_dot, self.n_p, "qp_dot")
-        return derivative
+        return np.asarray(self._evaluate(qp)[1] @ vector(qp_dot, self.n_p, "qp_dot"))
 
     def A(self, qp: ArrayLike) -> Array:
         """Pfaffian constraint rows, shape (n_p - p, n_p): A(qp) qp_dot = 0, so A(qp) G(qp) = 0."""

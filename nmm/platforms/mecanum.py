@@ -121,8 +121,7 @@ class Mecanum(Platform):
         front_left = drive - strafe - turn, front_right = drive + strafe + turn,
         rear_left = drive + strafe - turn, rear_right = drive - strafe + turn.
         """
-        speeds: Array = self._parts @ vector(up, 3, "up")
-        return speeds
+        return np.asarray(self._parts @ vector(up, 3, "up"))
 
 
 def _misfit(wheels: tuple[RollingJoint, ...]) -> str | None:

@@ -254,8 +254,7 @@ def _stick(name: str, joint: int, start: Array, end: Array, radius: float) -> pi
 
 def _towards(direction: Array) -> Array:
     """A rotation that turns z to a unit vector."""
-    turned: Array = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), direction).matrix()
-    return turned
+    return np.asarray(pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), direction).matrix())
 
 
 def _shape(

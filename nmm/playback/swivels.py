@@ -177,8 +177,7 @@ class Swivel:
         return SwivelPath(self.sign * angles, ways)
 
     def _driven(self, q: Array) -> Array:
-        driven: Array = self.robot.S(q)[:, self.drive]
-        return driven
+        return np.asarray(self.robot.S(q)[:, self.drive])
 
     def _velocity(self, q: Array, q_dot: Array) -> Array:
         """Velocity (2,) of the pivot."""

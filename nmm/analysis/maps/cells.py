@@ -44,13 +44,13 @@ class Grid:
 
     def centers(self, cells: Integers, block: int = 1) -> Array:
         """Centres (N, 2) of cells, or of blocks of block x block of them."""
-        columns = -(-self.columns // block)
+        columns, _ = self.shape(block)
         place = np.column_stack([cells % columns, cells // columns])
         return np.asarray(self.lower + self.cell * block * (place + 0.5))
 
     def blocks(self, cells: Integers, block: int) -> Integers:
         """In which block of block x block cells each cell is."""
-        columns = -(-self.columns // block)
+        columns, _ = self.shape(block)
         return (cells // self.columns) // block * columns + (cells % self.columns) // block
 
 
@@ -77,7 +77,7 @@ class Layer:
         signed = self.sign * values
         usable = np.flatnonzero((cells >= 0) & np.isfinite(signed))
         order = usable[np.lexsort((signed[usable], central[usable], cells[usable]))]
-        last = order[np.append(cells[order][1:] != cells[order][:-1], True)] if len(order) else order
+        last = _last_of_each(order, cells)
         own = cells[last]
         higher = (central[last] == self.central[own]) & (signed[last] > self.values[own])
         better = last[higher | (central[last] & ~self.central[own])]
@@ -90,5 +90,11 @@ class Layer:
         cells = np.flatnonzero(self.reached)
         blocks = grid.blocks(cells, block)
         order = np.lexsort((self.values[cells], blocks))
-        last = order[np.append(blocks[order][1:] != blocks[order][:-1], True)] if len(order) else order
+        last = _last_of_each(order, blocks)
         return blocks[last], cells[last]
+
+
+def _last_of_each(order: Integers, kinds: Integers) -> Integers:
+    """Of indices in an order in which equal kinds follow one another, the last one of each kind."""
+    sorted_kinds = kinds[order]
+    return order[np.append(sorted_kinds[1:] != sorted_kinds[:-1], True)] if len(order) else order

@@ -84,8 +84,7 @@ def _of_circuit(columns: Integers, start: Array, names: str) -> Field:
             raise Ended(f"{names} alone come close to a singular configuration")
         vector = np.zeros(J.shape[1])
         vector[columns] = Vt[-1]
-        along: Array = vector * np.sign(vector @ (last if last.any() else start))
-        return along
+        return np.asarray(vector * np.sign(vector @ (last if last.any() else start)))
 
     return field
 
@@ -99,8 +98,7 @@ def _of_wish(wish: Array, rank: int) -> Field:
         size = float(np.linalg.norm(left))
         if size < LITTLE_LEFT * float(np.linalg.norm(wish)):
             raise Ended("the wished inputs move the task: next to nothing of them leaves it at rest")
-        unit: Array = left / size
-        return unit
+        return np.asarray(left / size)
 
     return field
 

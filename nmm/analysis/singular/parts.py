@@ -103,8 +103,7 @@ def rank_of(matrix: Array, tolerance: float) -> int:
 
 def null_space(J: Array, rank: int) -> Array:
     """Orthonormal rows (m - rank, m) with J v = 0, J (s, m) of that rank."""
-    basis: Array = np.linalg.svd(J)[2][rank:] if J.size else np.eye(J.shape[1])
-    return basis
+    return np.asarray(np.linalg.svd(J)[2][rank:] if J.size else np.eye(J.shape[1]))
 
 
 def condition_numbers(values: Array, rank: Integers) -> Array:

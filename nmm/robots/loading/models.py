@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from nmm.errors import InputError, RobotError, unknown
+from nmm.errors import InputError, RobotError, expect_known
 from nmm.platforms import Layout, Platform, Unicycle, platform_by_name
 from nmm.robots.loading.axle import axle_note, axle_placement
 from nmm.robots.loading.chain import CHAIN, Rebuilt, rebuild
@@ -103,8 +103,7 @@ def _own_joints(
     for name in own:
         if name in lock:
             raise RobotError(f"{where}: lock: {name} is a coordinate of the {platform.name} platform")
-        if name not in joints:
-            raise RobotError(unknown("platform joint", name, joints, where))
+        expect_known("platform joint", name, joints, where, RobotError)
     return own
 
 
