@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from nmm.arrays import positive
 from nmm.cli.groups import Browser, Loading, Subject, command
 from nmm.cli.options import (
     ResolversOption,
@@ -63,6 +62,7 @@ def redundancy(
     from nmm.analysis.redundancy import report
     from nmm.analysis.redundancy.moving import self_motion as moved_along
     from nmm.analysis.redundancy.null_fields import expect_direction
+    from nmm.arrays import positive
     from nmm.cli.redundancy_tables import check_file, direction_of, show_report, show_self_motion
     from nmm.cli.subjects import studied
 
