@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from numbers import Integral
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +13,7 @@ from nmm.errors import InputError
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Flags = NDArray[np.bool_]
+Numbers = TypeVar("Numbers", Array, Integers, Flags)
 
 
 def array(value: ArrayLike, name: str) -> Array:
@@ -75,3 +77,9 @@ def matrix(value: ArrayLike, shape: tuple[int, int], name: str) -> Array:
     if result.shape != shape:
         raise InputError(f"{name}: expected a matrix of shape {shape}, got {result.shape}")
     return result
+
+
+def unwritable(values: Numbers) -> Numbers:
+    """The very array, which nobody can change from now on."""
+    values.flags.writeable = False
+    return values

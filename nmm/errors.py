@@ -6,7 +6,8 @@ Every message says what was expected, what came, and what is available.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
+from typing import Any
 
 
 class NmmError(Exception):
@@ -49,3 +50,11 @@ def unknown(kind: str, name: object, available: Iterable[str], where: str = "") 
     listing = ", ".join(names) if names else "none"
     prefix = f"{where}: " if where else ""
     return f"{prefix}unknown {kind} {name!r}{hint}; available: {listing}"
+
+
+def expect_known(
+    kind: str, name: object, available: Collection[Any], where: str = "", error: type[InputError] = InputError
+) -> None:
+    """The error, in the words of `unknown`, for a name that is not among those available."""
+    if name not in available:
+        raise error(unknown(kind, name, available, where))

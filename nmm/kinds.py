@@ -12,7 +12,7 @@ from collections.abc import Iterator, MutableMapping
 from pkgutil import resolve_name
 from typing import Any
 
-from nmm.errors import InputError, unknown
+from nmm.errors import expect_known
 
 
 class Kinds(MutableMapping[str, Any]):
@@ -48,8 +48,7 @@ class Kinds(MutableMapping[str, Any]):
 
     def named(self, name: str) -> Any:
         """The class of that name; `InputError` lists the names."""
-        if name not in self._classes:
-            raise InputError(unknown(self.what, name, self))
+        expect_known(self.what, name, self._classes)
         return self[name]
 
     def words(self, name: str) -> str:

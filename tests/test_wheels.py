@@ -24,7 +24,8 @@ from nmm.playback.placements import Placements, rolling_joints
 from nmm.playback.rolling import Rolling
 from nmm.robots.loading import load
 from nmm.robots.loading.layout import measure_layout
-from nmm.robots.robot import Robot, Wheel
+from nmm.robots.robot import Robot
+from nmm.robots.wheel import Wheel
 
 Array = np.ndarray
 

@@ -52,7 +52,7 @@ def wanderer(name: str) -> tuple[nmm.Controller, np.ndarray]:
 def wander(
     controller: nmm.Controller, q0: np.ndarray, steps: int, seed: int = 0, method: str = "zoh"
 ) -> Broken:
-    """Follow a target that jumps at random: the controller's task follows the `Signal` that is its reference."""
+    """Follow a target that jumps at random: the `Signal` that the controller's task follows."""
     rng = np.random.default_rng(seed)
     robot, kept = controller.robot, controller.kept
     (task,) = controller.task

@@ -170,14 +170,14 @@ def play(
     ],
     browser: Browser,
     ellipsoids: Ellipsoids,
-) -> int:
+) -> None:
     """Play a run in the browser.
 
     In 3D, with MeshCat; only this machine can reach it. Ctrl-C ends it.
     """
     from nmm.cli.runs import play_folder
 
-    return play_folder(folder, **browser.keywords(), ellipsoids=ellipsoids.wanted())
+    play_folder(folder, **browser.keywords(), ellipsoids=ellipsoids.wanted())
 
 
 for _name, _command in (

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from math import degrees, isfinite
-from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from nmm.cli.output import show_table, show_text
 from nmm.errors import InputError
@@ -14,48 +13,29 @@ if TYPE_CHECKING:
     from nmm.arrays import Array
     from nmm.control.controller import Controller
     from nmm.robots.loading.provenance import Provenance
-    from nmm.robots.robot import Robot, Wheel
+    from nmm.robots.robot import Robot
+    from nmm.robots.wheel import Wheel
 
-OK = 0
 #: An angle beyond this many turns is a joint without limits.
 UNBOUNDED = 1e6
 #: Where the kind of platform comes from, for `Provenance.platform`.
 _CHOSEN = {"file": "declared in the file", "default": "by default"}
 
 
-def describe_robot(
-    source: str | None,
-    scenario: str | None,
-    *,
-    platform: str | None,
-    lock: dict[str, float],
-    axle: str | list[float] | None,
-    package_dirs: Sequence[Path],
-) -> int:
+def describe_robot(source: str | None, scenario: str | None, **loading: Any) -> None:
     """Everything about a robot, or about a scenario's robot and task."""
     from nmm.robots.loading import load
 
     if source is None and scenario is None:
         raise InputError("expected ROBOT, a bundled name or a file, or --scenario SCENARIO, which has one")
-    if source is None and (platform or lock or axle or package_dirs):
+    if source is None and any(loading.values()):
         raise InputError(
             "--platform, --lock, --axle and --package-dir are for ROBOT, a scenario says its own"
         )
     given: Robot | None = None
     if source is not None:
-        given = load(
-            source,
-            platform=platform,
-            lock=lock,
-            axle=axle,
-            package_dirs=package_dirs,
-            missing_meshes="skip",
-        )
-    task: list[tuple[str, int]] = [
-        ("position in the plane", 2),
-        ("position in space", 3),
-        ("pose in space", 6),
-    ]
+        given = load(source, **loading, missing_meshes="skip")
+    task = [("position in the plane", 2), ("position in space", 3), ("pose in space", 6)]
     without: Sequence[str] | None = None
     if scenario is not None:
         name, controller, q0 = _of_scenario(scenario, given)
@@ -70,7 +50,6 @@ def describe_robot(
     if without == ():
         show_text("every input moves the task")
     _show_loading(robot)
-    return OK
 
 
 def _of_scenario(name: str, robot: Robot | None) -> tuple[str, Controller, Array]:

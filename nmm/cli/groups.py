@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from nmm.runs.ellipsoid_options import Wanted
 
 
-def command(function: Callable[..., int]) -> Callable[..., int]:
+def command(function: Callable[..., int | None]) -> Callable[..., int | None]:
     """The function as typer takes it: options in the place of each parameter that is a group of them.
 
     It is called with the options, too, from Python: `redundancy("unicycle_2r", task=["position"])`.
@@ -47,7 +47,7 @@ def command(function: Callable[..., int]) -> Callable[..., int]:
     signature = inspect.Signature(parameters)
 
     @wraps(function)
-    def whole(*arguments: Any, **options: Any) -> int:
+    def whole(*arguments: Any, **options: Any) -> int | None:
         bound = signature.bind(*arguments, **options)
         bound.apply_defaults()
         given = dict(bound.arguments)

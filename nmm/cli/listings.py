@@ -7,19 +7,16 @@ import re
 from nmm.bundled import bundled_robots, bundled_scenarios
 from nmm.cli.output import show_table, show_text
 
-OK = 0
 
-
-def list_scenarios() -> int:
+def list_scenarios() -> None:
     """The bundled scenarios."""
     from nmm.scenario.document import read_file
 
     titles = [[name, read_file(path).data.get("title", "")] for name, path in bundled_scenarios().items()]
     show_table(["scenario", "what it shows"], titles)
-    return OK
 
 
-def list_keys() -> int:
+def list_keys() -> None:
     """The keys of a scenario file."""
     from nmm.scenario.reference import sections
 
@@ -27,10 +24,9 @@ def list_keys() -> int:
         show_text(f"{section.title} ({section.summary.rstrip('.')})")
         show_table(["key", "default", "meaning"], section.keys)
         show_text()
-    return OK
 
 
-def list_robots() -> int:
+def list_robots() -> None:
     """The bundled robots, with the platform of those whose files declare one."""
     rows = []
     for name, path in bundled_robots().items():
@@ -47,4 +43,3 @@ def list_robots() -> int:
             ]
         )
     show_table(["robot", "what it is", "arguments (m, rad)"], rows)
-    return OK

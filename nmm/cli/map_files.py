@@ -1,93 +1,18 @@
-"""map: what the options mean, the map, its folder and its table."""
+"""map: what the options mean, and the table."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from nmm.cli.options import names_of, values_of
-from nmm.cli.output import progress, show_table
-from nmm.cli.subjects import studied
+from nmm.cli.output import show_table
 from nmm.errors import InputError
-from nmm.folders.map import is_map
-from nmm.folders.whole import check_folder
 
 if TYPE_CHECKING:
     from nmm.analysis.maps.result import Map
     from nmm.analysis.maps.singular_set import SingularSet
     from nmm.robots.robot import Robot
-
-OK = 0
-
-
-def make_map(
-    source: str,
-    *,
-    tasks: Sequence[str] | None = None,
-    over: str | None = None,
-    ranges: Sequence[str] | None = None,
-    workspace: str | None = None,
-    frame: str | None = None,
-    height: str | None = None,
-    measures: str = "sigma_min",
-    part: str = "robot",
-    samples: str = "300",
-    at: Sequence[str] | None = None,
-    t: float | None = None,
-    alpha: float = 0.5,
-    weights: Sequence[str] | None = None,
-    length: float | None = None,
-    settings: Sequence[str] | None = None,
-    out: Path | None = None,
-    **loading: Any,
-) -> int:
-    """Compute a map, write its folder, print its table; see `nmm.cli.mapping` for the options' meaning."""
-    from nmm.analysis.maps.coordinates import check_held, singularity_map
-
-    counts = counts_of(samples)
-    bounds = ranges_of(ranges)
-    if workspace is None:
-        _refuse({"--frame": frame, "--height": height}, "--workspace PLANE")
-    else:
-        _refuse({"--over": over}, "a map over two coordinates, without --workspace")
-        if len(set(counts)) > 1:
-            raise InputError(f"--samples: expected one number with --workspace, got {samples}")
-    what = studied(source, tasks=tasks, at=at, t=t, settings=settings, **loading)
-    folder = out or Path("runs") / f"{what.name}-map"
-    check_folder(folder, is_map)
-    common: dict[str, Any] = {
-        "ranges": bounds,
-        "measures": names_of(measures, "--measure"),
-        "part": part,
-        "at": what.q,
-        "t": what.t,
-        "alpha": alpha,
-        "weights": values_of(weights, "--weight", "NAME=VALUE, as in platform=4") or None,
-        "length": length,
-    }
-    given = values_of(at, "--at", "COORDINATE=VALUE")
-    with progress(f"map of {what.name}") as report:
-        if workspace is None:
-            names = _two_first(what.robot) if over is None else names_of(over, "--over")
-            check_held(given, names, "--at")
-            made = singularity_map(what.subject, names, samples=counts, progress=report, **common)
-        else:
-            from nmm.analysis.maps.workspace import check_given, workspace_map
-
-            check_given(given, what.subject, frame, what.q, "--at")
-            made = workspace_map(
-                what.subject,
-                frame,
-                plane=workspace,
-                height=None if height is None else range_of(height, "--height"),
-                samples=counts[0],
-                progress=report,
-                **common,
-            )
-    made.save(folder)
-    show_map(made, folder)
-    return OK
 
 
 def show_map(made: Map, folder: Path) -> None:
@@ -134,7 +59,7 @@ def _found(made: Map, those: SingularSet) -> str:
     return those.text() + (", of postures drawn" if sampled else "")
 
 
-def _two_first(robot: Robot) -> list[str]:
+def two_first(robot: Robot) -> list[str]:
     """The arm's first two coordinates; the first two of a robot whose arm has fewer."""
     arm = robot.u_names[robot.platform.p :]
     return list((arm if len(arm) >= 2 else robot.q_names)[:2])
@@ -176,7 +101,7 @@ def range_of(text: str, option: str) -> tuple[float, float]:
     return lower, upper
 
 
-def _refuse(given: dict[str, object], needs: str) -> None:
+def refuse(given: dict[str, object], needs: str) -> None:
     wrong = [option for option, value in given.items() if value is not None]
     if wrong:
         raise InputError(f"{', '.join(wrong)}: expected with {needs}")

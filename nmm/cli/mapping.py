@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from nmm.cli.groups import Loading, Subject, command
-from nmm.cli.options import LengthOption, out_option
+from nmm.cli.options import LengthOption, names_of, out_option, values_of
+from nmm.cli.output import progress
+from nmm.errors import InputError
+from nmm.folders.whole import check_folder
 
 
 @command
@@ -88,7 +91,7 @@ def map_measures(
     length: LengthOption = None,
     out: Annotated[Path | None, out_option("runs/<subject>-map")] = None,
     loading: Loading,
-) -> int:
+) -> None:
     """Map singularity and manipulability over two coordinates or a plane of the workspace.
 
     Figures show the measure in colour and, over it, where the robot is singular and where its arm alone would
@@ -103,23 +106,43 @@ def map_measures(
     The folder holds map.npz (axes, values, rank, singular lines and points), map.json (what was computed)
     and a PNG a measure.
     """
-    from nmm.cli.map_files import make_map
+    from nmm.analysis.maps.coordinates import check_held, singularity_map
+    from nmm.analysis.maps.workspace import check_given, workspace_map
+    from nmm.cli.map_files import counts_of, range_of, ranges_of, refuse, show_map, two_first
+    from nmm.cli.subjects import studied
+    from nmm.folders.map import is_map
 
-    return make_map(
-        subject.subject,
-        over=over,
-        ranges=ranges,
-        workspace=workspace,
-        frame=frame,
-        height=height,
-        measures=measure,
-        part=part,
-        samples=samples,
-        t=time,
-        alpha=alpha,
-        weights=weight,
-        length=length,
-        out=out,
-        **subject.keywords(),
-        **loading.keywords(),
-    )
+    counts, bounds = counts_of(samples), ranges_of(ranges)
+    if workspace is None:
+        refuse({"--frame": frame, "--height": height}, "--workspace PLANE")
+    else:
+        refuse({"--over": over}, "a map over two coordinates, without --workspace")
+        if len(set(counts)) > 1:
+            raise InputError(f"--samples: expected one number with --workspace, got {samples}")
+    what = studied(subject.subject, t=time, **subject.keywords(), **loading.keywords())
+    folder = out or Path("runs") / f"{what.name}-map"
+    check_folder(folder, is_map)
+    common: dict[str, Any] = {
+        "ranges": bounds,
+        "measures": names_of(measure, "--measure"),
+        "part": part,
+        "at": what.q,
+        "t": what.t,
+        "alpha": alpha,
+        "weights": values_of(weight, "--weight", "NAME=VALUE, as in platform=4") or None,
+        "length": length,
+    }
+    given = values_of(subject.at, "--at", "COORDINATE=VALUE")
+    with progress(f"map of {what.name}") as common["progress"]:
+        if workspace is None:
+            names = two_first(what.robot) if over is None else names_of(over, "--over")
+            check_held(given, names, "--at")
+            made = singularity_map(what.subject, names, samples=counts, **common)
+        else:
+            check_given(given, what.subject, frame, what.q, "--at")
+            slab = None if height is None else range_of(height, "--height")
+            made = workspace_map(
+                what.subject, frame, plane=workspace, height=slab, samples=counts[0], **common
+            )
+    made.save(folder)
+    show_map(made, folder)

@@ -16,6 +16,13 @@ from nmm.cli.options import (
     resolvers_of,
     settings_of,
 )
+from nmm.cli.output import show_text
+from nmm.errors import InputError, SingularError
+
+#: Between samples of a self-motion, s; less for short ones.
+DT = 0.01
+#: A page's title does not hide the robot: a longer sentence is left to the table.
+LONGEST_TITLE = 100
 
 
 @command
@@ -41,7 +48,7 @@ def redundancy(
     play: Annotated[bool, typer.Option("--play", help="Play it in the browser; Ctrl-C ends it.")] = False,
     browser: Browser,
     loading: Loading,
-) -> int:
+) -> None:
     """Say what a task leaves free.
 
     Degrees of static and kinematic redundancy, the ranks at a configuration, the motions of the inputs that
@@ -52,19 +59,48 @@ def redundancy(
     nmm redundancy unicycle_2r --task position --at q2=pi/3 --self-motion 0 --play
     nmm redundancy ur5_unicycle_pose --self-motion v --html self_motion.html
     """
-    from nmm.cli.redundancy_tables import show_redundancy
+    from nmm.analysis.redundancy import report
+    from nmm.analysis.redundancy.moving import self_motion as moved_along
+    from nmm.analysis.redundancy.null_fields import expect_direction
+    from nmm.arrays import positive
+    from nmm.cli.redundancy_tables import check_file, direction_of, show_report, show_self_motion
+    from nmm.cli.subjects import studied
 
-    return show_redundancy(
-        subject.subject,
-        along=self_motion,
-        duration=duration,
-        speed=speed,
-        html=html,
-        play=play,
-        **browser.keywords(),
-        **subject.keywords(),
-        **loading.keywords(),
-    )
+    if self_motion is None and (html is not None or play):
+        raise InputError(
+            "--html and --play show a self-motion: expected --self-motion, as in --self-motion 0"
+        )
+    duration, speed = positive(duration, "--duration"), positive(speed, "--speed")
+    if html is not None:
+        check_file(html, "--html")
+    direction = None if self_motion is None else direction_of(self_motion)
+    found = studied(subject.subject, **subject.keywords(), **loading.keywords())
+    free = report.redundancy(found.subject, found.q, found.t)
+    if direction is None:
+        show_report(free)
+        return
+    expect_direction(found.robot, free.J, free.rank_J, direction, "--self-motion")
+    dt = min(DT, duration / 4.0)
+    try:
+        moved = moved_along(
+            found.subject, found.q, t=found.t, direction=direction, duration=duration, speed=speed, dt=dt
+        )
+    except SingularError:
+        show_report(free)
+        raise
+    show_report(free)
+    show_self_motion(moved)
+    short = moved.text if len(moved.text) <= LONGEST_TITLE else "self-motion"
+    title = f"{found.robot.name}: {short}"
+    motion = moved.trajectory.motion("self-motion")
+    if html is not None:
+        from nmm.playback import write_html
+
+        show_text(f"written: {write_html([motion], html, title=title)}")
+    if play:
+        from nmm.playback import play as play_motions
+
+        play_motions([motion], **browser.keywords(), title=title)
 
 
 @command

@@ -29,7 +29,7 @@ def info(
         ),
     ] = None,
     loading: Loading,
-) -> int:
+) -> None:
     """Describe a robot.
 
     Coordinates, inputs and limits with their units, groups of inputs, frames that a task may speak of, the
@@ -44,7 +44,7 @@ def info(
     """
     from nmm.cli.descriptions import describe_robot
 
-    return describe_robot(robot, scenario, **loading.keywords())
+    describe_robot(robot, scenario, **loading.keywords())
 
 
 def check(
@@ -77,7 +77,7 @@ def view(
     frames: Annotated[
         bool, typer.Option("--frames/--no-frames", help="Show frames at first; the page can change it.")
     ] = True,
-) -> int:
+) -> None:
     """Look at a robot in the browser.
 
     In 3D, with MeshCat: a slider for each coordinate, frames with their names, and the pose of one of them
@@ -89,23 +89,23 @@ def view(
     """
     from nmm.cli.viewing import view_robot
 
-    return view_robot(robot, **loading.keywords(), **browser.keywords(), frames=frames)
+    view_robot(robot, **loading.keywords(), **browser.keywords(), frames=frames)
 
 
 def scenarios(
     keys: Annotated[bool, typer.Option("--keys", help="List the keys of a scenario file instead.")] = False,
-) -> int:
+) -> None:
     """List the bundled scenarios.
 
     They are YAML files; to make your own, start from the scenario.yaml that a run writes.
     """
     from nmm.cli.listings import list_keys, list_scenarios
 
-    return list_keys() if keys else list_scenarios()
+    (list_keys if keys else list_scenarios)()
 
 
-def robots() -> int:
+def robots() -> None:
     """List the bundled robots: whole ones, bases and arms."""
     from nmm.cli.listings import list_robots
 
-    return list_robots()
+    list_robots()

@@ -99,7 +99,7 @@ def write_the_paper(folder: Path) -> int:
     return OK if paper.holds else FAILED
 
 
-def play_folder(folder: Path, port: int | None, *, open_browser: bool, ellipsoids: Wanted = False) -> int:
+def play_folder(folder: Path, port: int | None, *, open_browser: bool, ellipsoids: Wanted = False) -> None:
     """Play a run, or the runs of a comparison in one scene."""
     from nmm.playback import play
     from nmm.runs.trajectory import Trajectory
@@ -111,7 +111,6 @@ def play_folder(folder: Path, port: int | None, *, open_browser: bool, ellipsoid
     if not motions:
         raise InputError(f"{folder}: expected a run with at least one sample")
     play(motions, port=port, open_browser=open_browser, ellipsoids=ellipsoids)
-    return OK
 
 
 def _load(name: str, resolver: str | None, settings: Mapping[str, object], limits: bool | None) -> Scenario:

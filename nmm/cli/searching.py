@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from nmm.analysis.search.nearest import SingularPoint
     from nmm.cli.subjects import Studied
 
-OK = 0
-
 
 def search_command(
     studied: Studied,
@@ -24,7 +22,7 @@ def search_command(
     part: str = "robot",
     nearest: bool = False,
     length: float | None = None,
-) -> int:
+) -> None:
     """Search all singular configurations, the nearest to the one studied, or both; print what was found.
 
     Parameters
@@ -58,7 +56,6 @@ def search_command(
         if starts is not None:
             show_text()
         show_nearest(found)
-    return OK
 
 
 def show_search(search: SingularitySearch) -> None:

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from nmm.cli.subjects import Studied
     from nmm.runs.trajectory import Trajectory
 
-OK = 0
 #: All minors are listed up to so many.
 MANY_MINORS = 60
 #: From how many configurations a search starts.
@@ -87,7 +86,7 @@ def singularities(
         ),
     ] = None,
     loading: Loading,
-) -> int:
+) -> None:
     """Say where a robot loses rank with a task, and why.
 
     J maps the inputs to the task's velocity. Its rank and singular values, for the platform alone, the arm
@@ -133,7 +132,7 @@ def singularities(
     if looking:
         from nmm.cli.searching import search_command
 
-        return search_command(
+        search_command(
             given,
             (STARTS if starts is None else starts) if search else None,
             0 if seed is None else seed,
@@ -141,16 +140,18 @@ def singularities(
             nearest,
             length,
         )
+        return
     choice, left_out = _chosen(given, minors, minor)
     if given.trajectory is not None and symbolic:
         raise InputError(f"--symbolic: expected a robot or a scenario; {subject.subject} is a run")
     if given.trajectory is not None and time is None:
         if subject.at:
             raise InputError(f"--at: {subject.subject} is a run, which is where it was; expected --time")
-        return _along(given, given.trajectory, choice, left_out, length, as_json)
-    if symbolic:
-        return _formulas(given, choice, left_out, length, minor is not None, latex)
-    return _here(given, choice, left_out, length, as_json)
+        _along(given, given.trajectory, choice, left_out, length, as_json)
+    elif symbolic:
+        _formulas(given, choice, left_out, length, minor is not None, latex)
+    else:
+        _here(given, choice, left_out, length, as_json)
 
 
 def _warn_of_limits(given: Studied) -> None:
@@ -175,7 +176,7 @@ def _chosen(given: Studied, all_or_none: bool | None, listed: Sequence[str] | No
     return (True, 0) if count <= MANY_MINORS else (False, count)
 
 
-def _here(given: Studied, choice: Choice, left_out: int, length: float | None, as_json: bool) -> int:
+def _here(given: Studied, choice: Choice, left_out: int, length: float | None, as_json: bool) -> None:
     """The numbers at a configuration."""
     from nmm.analysis import analyse
 
@@ -184,16 +185,15 @@ def _here(given: Studied, choice: Choice, left_out: int, length: float | None, a
         from nmm.cli.singularity_json import report_data
 
         _print_json(report_data(given, report))
-        return OK
-    from nmm.cli.singularity_tables import show_report
+    else:
+        from nmm.cli.singularity_tables import show_report
 
-    show_report(given, report, length, left_out)
-    return OK
+        show_report(given, report, length, left_out)
 
 
 def _along(
     given: Studied, run: Trajectory, choice: Choice, left_out: int, length: float | None, as_json: bool
-) -> int:
+) -> None:
     """The numbers along a run."""
     from nmm.analysis import analyse_along
 
@@ -202,16 +202,15 @@ def _along(
         from nmm.cli.singularity_json import history_data
 
         _print_json(history_data(given, history))
-        return OK
-    from nmm.cli.singularity_history import show_history
+    else:
+        from nmm.cli.singularity_history import show_history
 
-    show_history(given, run, history, length, left_out)
-    return OK
+        show_history(given, run, history, length, left_out)
 
 
 def _formulas(
     given: Studied, choice: Choice, left_out: int, length: float | None, listed: bool, latex: bool
-) -> int:
+) -> None:
     """The formulas; the numbers where there are none that a person could read."""
     from nmm.cli.symbolic_text import formulas, show_formulas, show_latex
 
@@ -223,11 +222,11 @@ def _formulas(
 
         say(f"No formulas: {reason}. Here are the numbers.")
         say()
-        return _here(given, choice, left_out, length, as_json=False)
+        _here(given, choice, left_out, length, as_json=False)
+        return
     columns = choice if listed and not isinstance(choice, bool) else None
     show = show_latex if latex else show_formulas
     show(given, found, columns)
-    return OK
 
 
 def _print_json(data: dict[str, Any]) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from nmm.analysis import Crossing, Dip, Restoration, SingularityHistory, SingularityReport
+    from nmm.analysis import SingularityHistory, SingularityReport
     from nmm.cli.subjects import Studied
 
 
@@ -17,36 +17,17 @@ def report_data(given: Studied, report: SingularityReport) -> dict[str, Any]:
     return _plain(
         {
             **_subject(given),
-            "t": report.t,
+            **_fields(report, "t"),
             "q": dict(zip(given.robot.q_names, report.q, strict=True)),
-            "rows": report.rows,
-            "row_units": report.row_units,
-            "row_sizes": report.row_sizes,
-            "inputs": report.inputs,
-            "input_units": report.input_units,
-            "input_sizes": report.input_sizes,
-            "J": report.J,
-            "rank": report.rank,
-            "singular": report.singular,
-            "singular_values": report.singular_values,
-            "sigma_min": report.sigma_min,
-            "condition": report.condition,
+            **_fields(report, "rows row_units row_sizes inputs input_units input_sizes J rank singular"),
+            **_fields(report, "singular_values sigma_min condition"),
             "parts": {
-                name: {
-                    "inputs": part.inputs,
-                    "rank": part.rank,
-                    "singular_values": part.singular_values,
-                    "sigma_min": part.sigma_min,
-                    "condition": part.condition,
-                    "lost": part.lost,
-                }
+                name: _fields(part, "inputs rank singular_values sigma_min condition lost")
                 for name, part in report.parts.items()
             },
-            "lost": report.lost,
-            "weakest": report.weakest,
-            "given_back": report.given_back,
-            "by_input": _restoration(report.by_input),
-            "by_coordinate": _restoration(report.by_coordinate),
+            **_fields(report, "lost weakest given_back"),
+            "by_input": _fields(report.by_input, "names rates regained effective best best_rate"),
+            "by_coordinate": _fields(report.by_coordinate, "names rates regained effective best best_rate"),
             "minors": {", ".join(name): value for name, value in report.minors.items()},
             "partitions": [
                 {"inputs": name, "determinant": value, "ratio": ratio, "singular": bool(lost)}
@@ -57,14 +38,8 @@ def report_data(given: Studied, report: SingularityReport) -> dict[str, Any]:
             "extended": None
             if extended is None
             else {
-                "rows": extended.rows,
-                "determinant": extended.determinant,
-                "rank": extended.rank,
-                "singular_values": extended.singular_values,
-                "angle_measure": extended.angle_measure,
-                "lost": extended.lost,
-                "kinematic": extended.kinematic,
-                "algorithmic": extended.algorithmic,
+                **_fields(extended, "rows determinant rank singular_values angle_measure lost kinematic"),
+                **_fields(extended, "algorithmic"),
                 "constraint_singular": extended.added_singular,
             },
         }
@@ -76,18 +51,14 @@ def history_data(given: Studied, history: SingularityHistory) -> dict[str, Any]:
     return _plain(
         {
             **_subject(given),
-            "rows": history.rows,
-            "inputs": history.inputs,
-            "t": history.t,
-            "rank": history.rank,
-            "condition": history.condition,
+            **_fields(history, "rows inputs t rank condition"),
             "sigma_min": dict(history.sigma_min),
             "extended_sigma_min": history.extended_sigma_min,
             "minors": {", ".join(name): values for name, values in history.minors.items()},
             "threshold": history.threshold,
-            "crossings": [_crossing(crossing) for crossing in history.crossings],
-            "dips": [_dip(dip) for dip in history.dips],
-            "extended_dips": [_dip(dip) for dip in history.extended_dips],
+            "crossings": [_fields(crossing, "t columns sign") for crossing in history.crossings],
+            "dips": [_fields(dip, "t value at_end") for dip in history.dips],
+            "extended_dips": [_fields(dip, "t value at_end") for dip in history.extended_dips],
         }
     )
 
@@ -96,23 +67,9 @@ def _subject(given: Studied) -> dict[str, Any]:
     return {"name": given.name, "robot": given.robot.name, "platform": given.robot.platform.name}
 
 
-def _restoration(found: Restoration) -> dict[str, Any]:
-    return {
-        "names": found.names,
-        "rates": found.rates,
-        "regained": found.regained,
-        "effective": found.effective,
-        "best": found.best,
-        "best_rate": found.best_rate,
-    }
-
-
-def _crossing(crossing: Crossing) -> dict[str, Any]:
-    return {"t": crossing.t, "columns": crossing.columns, "sign": crossing.sign}
-
-
-def _dip(dip: Dip) -> dict[str, Any]:
-    return {"t": dip.t, "value": dip.value, "at_end": dip.at_end}
+def _fields(found: object, names: str) -> dict[str, Any]:
+    """Some fields, under their own names."""
+    return {name: getattr(found, name) for name in names.split()}
 
 
 def _plain(value: Any) -> Any:

@@ -10,10 +10,11 @@ from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, positive
 from nmm.control.bounds import SAMPLE, LimitNumbers
-from nmm.errors import InputError, unknown
+from nmm.errors import InputError, expect_known
 from nmm.functions.function import Function
 from nmm.functions.tasks.coordinates import Coordinates
-from nmm.robots.robot import UNLIMITED, Robot
+from nmm.robots.coordinates import UNLIMITED
+from nmm.robots.robot import Robot
 from nmm.robots.wheel_rates import wheel_rates
 
 #: A number for both signs, or [lower, upper].
@@ -231,8 +232,7 @@ def _per_input(given: float | Mapping[str, float] | None, robot: Robot, what: st
 def _inputs(name: str, robot: Robot, what: str) -> list[int]:
     if name in robot.groups:
         return [robot.input(one) for one in robot.groups[name]]
-    if name not in robot.u_names:
-        raise InputError(f"{what}: {unknown('input or group', name, [*robot.u_names, *robot.groups])}")
+    expect_known(f"{what}: input or group", name, [*robot.u_names, *robot.groups])
     return [robot.input(name)]
 
 
@@ -246,8 +246,7 @@ def _wheel_limits(
         raise InputError(f"wheels: robot {robot.name} has no wheels on its main body whose rates are known")
     if isinstance(given, Mapping):
         for name in given:
-            if name not in names:
-                raise InputError(f"wheels: {unknown('wheel', name, names)}")
+            expect_known("wheels: wheel", name, names)
         chosen = [i for i, name in enumerate(names) if name in given]
         return tuple(names[i] for i in chosen), rows[chosen], np.array([given[names[i]] for i in chosen])
     return names, rows, np.full(len(names), float(given))

@@ -216,12 +216,9 @@ def coordinates(trajectory: Trajectory) -> Figure:
     robot = trajectory.robot
     n_p = robot.platform.n_p
     parts = [
-        ("platform", unit, [c for c in range(n_p) if robot.q_units[c] == unit])
-        for unit in dict.fromkeys(robot.q_units[:n_p])
-    ]
-    parts += [
-        ("arm", unit, [c for c in range(n_p, robot.n) if robot.q_units[c] == unit])
-        for unit in dict.fromkeys(robot.q_units[n_p:])
+        (part, unit, [first + k for k in columns])
+        for part, first, kinds in (("platform", 0, robot.q_units[:n_p]), ("arm", n_p, robot.q_units[n_p:]))
+        for unit, columns in style.groups(kinds).items()
     ]
     legends = [
         style.legend_rows([style.pretty(robot.q_names[column]) for column in columns])

@@ -17,7 +17,7 @@ from nmm.analysis.maps.extremes import EVERYWHERE
 from nmm.analysis.maps.measures import MEASURES
 from nmm.analysis.maps.result import Map
 from nmm.arrays import Array
-from nmm.errors import InputError, unknown
+from nmm.errors import expect_known
 from nmm.figures import style
 from nmm.figures.map_sets import draw_sets
 from nmm.words import fraction_of_pi
@@ -45,8 +45,7 @@ def map_figure(drawn: Map, measure: str | None = None, path: str | Path | None =
     InputError : the map has no such measure
     """
     measure = next(iter(drawn.values)) if measure is None else measure
-    if measure not in drawn.values:
-        raise InputError(unknown("measure", measure, drawn.values, "map"))
+    expect_known("measure", measure, drawn.values, "map")
     layers = {"": drawn.values[measure]}
     if drawn.kind == "workspace":
         layers = {"best posture": drawn.values[measure], WORST: drawn.worst[measure]}

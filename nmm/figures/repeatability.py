@@ -116,8 +116,7 @@ def _samples(one: Laps) -> int:
 
 def _path(one: Laps) -> Array:
     """The platform's reference point, (N, 2) m, to the end of the last whole lap."""
-    path: Array = one.trajectory.q[: len(one.distance) * _samples(one) + 1, :2]
-    return path
+    return np.asarray(one.trajectory.q[: len(one.distance) * _samples(one) + 1, :2])
 
 
 def _desired(one: Laps) -> Array | None:

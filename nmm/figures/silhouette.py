@@ -205,8 +205,7 @@ def _motion(robot: Robot, joint: int) -> Array:
     data = kind.createData()
     kind.calc(data, np.zeros(model.nq))
     screw = np.array(data.S, dtype=np.float64).reshape(6)
-    turned: Array = model.jointPlacements[joint].rotation @ (screw[3:] if screw[3:].any() else screw[:3])
-    return turned
+    return np.asarray(model.jointPlacements[joint].rotation @ (screw[3:] if screw[3:].any() else screw[:3]))
 
 
 def _leaves(robot: Robot, arm: Sequence[int]) -> list[int]:

@@ -11,7 +11,8 @@ import numpy as np
 from nmm.arrays import Array
 from nmm.robots.loading.joint_kinds import axis
 from nmm.robots.meshes import read_meshes
-from nmm.robots.robot import Robot, Wheel
+from nmm.robots.robot import Robot
+from nmm.robots.wheel import Wheel
 
 #: Directions, spread evenly over the sphere, in which a mesh's outermost points are kept.
 _DIRECTIONS = 200
@@ -81,8 +82,7 @@ def _extremes(vertices: Array) -> Array:
     angle = k * np.pi * (3.0 - np.sqrt(5.0))  # the golden angle: Fibonacci's sphere
     level = np.sqrt(1.0 - z * z)
     directions = np.column_stack([level * np.cos(angle), level * np.sin(angle), z])
-    chosen: Array = vertices[np.unique(np.argmax(vertices @ directions.T, axis=0))]
-    return chosen
+    return np.asarray(vertices[np.unique(np.argmax(vertices @ directions.T, axis=0))])
 
 
 def _outermost(solids: list[Solid]) -> list[Solid]:

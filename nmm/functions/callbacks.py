@@ -13,6 +13,7 @@ from nmm.functions.function import Callback, Evaluation, Stage
 from nmm.kernels.compiled import kernel
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.configuration import Configuration
+from nmm.robots.robot import Robot
 
 #: Step of the central differences: the cube root of the machine's precision balances truncation and rounding
 #: where the values change over distances near 1. It does not grow with t or q: nor does a sine's period.
@@ -35,6 +36,25 @@ def provided(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
 def stage(rows: int, n: int, callback: Callback) -> Stage:
     """The stage of a user's function with that many rows."""
     return Stage(provided, rows, (), np.zeros(rows * (2 + n)), callback=callback)
+
+
+def of_configuration(
+    value: Callable[[Configuration], ArrayLike],
+    value_q: Callable[[Configuration], ArrayLike] | None,
+    rows: int,
+    name: str,
+    robot: Robot,
+) -> tuple[Stage, ...]:
+    """The stage of a user's function of the configuration alone."""
+    callback = differentiated(
+        lambda t, configuration: value(configuration),
+        None,
+        None if value_q is None else lambda t, configuration: value_q(configuration),
+        rows,
+        name,
+        depends_on_time=False,
+    )
+    return (stage(rows, robot.n, callback),)
 
 
 def differentiated(

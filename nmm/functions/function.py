@@ -15,14 +15,12 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nmm.arrays import Array
 from nmm.functions.live import LiveNumbers
 from nmm.kernels.compiled import Kernel
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 class Row(NamedTuple):

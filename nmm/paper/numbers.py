@@ -59,8 +59,7 @@ def settling_time(trajectory: Trajectory, fraction: float) -> float | None:
 
 def second_half(trajectory: Trajectory) -> Array:
     """H in the second half of the run, where the motion is steady."""
-    H: Array = trajectory.objective[trajectory.t >= 0.5 * (trajectory.t[0] + trajectory.t[-1])]
-    return H
+    return np.asarray(trajectory.objective[trajectory.t >= 0.5 * (trajectory.t[0] + trajectory.t[-1])])
 
 
 def ripple(trajectory: Trajectory) -> float:

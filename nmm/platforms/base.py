@@ -8,14 +8,12 @@ from collections.abc import Mapping
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from nmm.arrays import positive, vector
-from nmm.errors import InputError, unknown
+from nmm.arrays import Array, positive, vector
+from nmm.errors import expect_known
 from nmm.kernels.compiled import Kernel
 from nmm.platforms.layout import Layout
-
-Array = NDArray[np.float64]
 
 
 class Platform(ABC):
@@ -59,8 +57,7 @@ class Platform(ABC):
 
     def _checked(self, limits: Mapping[str, float]) -> dict[str, float]:
         for name in limits:
-            if name not in self.inputs:
-                raise InputError(unknown("input", name, self.inputs, f"limits of platform {self.name}"))
+            expect_known("input", name, self.inputs, f"limits of platform {self.name}")
         return {name: positive(value, f"limit of {name}") for name, value in limits.items()}
 
     @classmethod
@@ -136,8 +133,7 @@ class Platform(ABC):
 
     def G_dot(self, qp: ArrayLike, qp_dot: ArrayLike) -> Array:
         """Time derivative of G along the velocity `qp_dot`, shape (n_p, p)."""
-        derivative: Array = self._evaluate(qp)[1] @ vector(qp_dot, self.n_p, "qp_dot")
-        return derivative
+        return np.asarray(self._evaluate(qp)[1] @ vector(qp_dot, self.n_p, "qp_dot"))
 
     def A(self, qp: ArrayLike) -> Array:
         """Pfaffian constraint rows, shape (n_p - p, n_p): A(qp) qp_dot = 0, so A(qp) G(qp) = 0."""

@@ -9,10 +9,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import positive
+from nmm.arrays import Array, positive
 from nmm.errors import InputError
 from nmm.kernels.compiled import PLATFORM, Kernel, kernel
-from nmm.platforms.base import Array, Platform
+from nmm.platforms.base import Platform
 from nmm.platforms.layout import Layout, Pivot
 from nmm.platforms.measuring import (
     NEAR,

@@ -9,9 +9,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import positive
+from nmm.arrays import Array, positive
 from nmm.kernels.compiled import PLATFORM, Kernel, kernel
-from nmm.platforms.base import Array, Platform
+from nmm.platforms.base import Platform
 from nmm.platforms.layout import Layout, RollingJoint
 from nmm.platforms.measuring import NEAR, ahead, misfit, rolls_forward, same, say_wheels, wheels_on
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from nmm.arrays import Array
 from nmm.kernels.compiled import PLATFORM, Kernel, kernel
-from nmm.platforms.base import Array, Platform
+from nmm.platforms.base import Platform
 
 
 @kernel(PLATFORM)

@@ -9,9 +9,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import positive, vector
+from nmm.arrays import Array, positive, vector
 from nmm.kernels.compiled import PLATFORM, Kernel, kernel
-from nmm.platforms.base import Array, Platform
+from nmm.platforms.base import Platform
 from nmm.platforms.layout import Layout, RollingJoint
 from nmm.platforms.measuring import NEAR, misfit, rolls_forward, same, say_wheels, wheels_on
 
@@ -121,8 +121,7 @@ class Mecanum(Platform):
         front_left = drive - strafe - turn, front_right = drive + strafe + turn,
         rear_left = drive + strafe - turn, rear_right = drive - strafe + turn.
         """
-        speeds: Array = self._parts @ vector(up, 3, "up")
-        return speeds
+        return np.asarray(self._parts @ vector(up, 3, "up"))
 
 
 def _misfit(wheels: tuple[RollingJoint, ...]) -> str | None:

@@ -10,10 +10,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import positive, scalar
+from nmm.arrays import Array, positive, scalar
 from nmm.errors import InputError
 from nmm.kernels.compiled import PLATFORM, Kernel, kernel, scratch
-from nmm.platforms.base import Array, Platform
+from nmm.platforms.base import Platform
 from nmm.platforms.layout import Layout
 from nmm.platforms.own_joints import coordinates_with
 from nmm.platforms.trailer_layout import measure_trailers

@@ -66,8 +66,7 @@ class Carriers:
 
     def planar(self, carrier: int, vector: Array) -> Array:
         """A vector (3,) in the joint's frame along the body's level axes, (2,)."""
-        level: Array = self.axes[carrier].T[:2] @ vector
-        return level
+        return np.asarray(self.axes[carrier].T[:2] @ vector)
 
     def twists(self, q: Array, q_dot: Array) -> Array:
         """Twists (C, 3) at q (n,) for the velocity q_dot (n,)."""
@@ -141,8 +140,7 @@ def _jacobian(model: pin.Model, data: pin.Data, joint: int) -> Array:
     """Of the joint's frame, in its own axes, (6, n); the universe has none."""
     if not joint:
         return np.zeros((6, model.nv))
-    jacobian: Array = pin.getJointJacobian(model, data, joint, pin.LOCAL)
-    return jacobian
+    return np.asarray(pin.getJointJacobian(model, data, joint, pin.LOCAL))
 
 
 def _level_axes(rotation: Array) -> Array:

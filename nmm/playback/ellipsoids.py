@@ -168,5 +168,4 @@ def between_error(at: Ellipsoids, exact: Ellipsoids, scale: float) -> Array:
     true = (exact.axes * exact.radii[:, None]) @ np.swapaxes(exact.axes, 1, 2)
     shape = scale * np.nan_to_num(np.linalg.norm(drawn - true, axis=(1, 2)))
     place = np.linalg.norm(0.5 * (at.center[1:] + at.center[:-1]) - exact.center, axis=1)
-    error: Array = shape + place
-    return error
+    return np.asarray(shape + place)

@@ -115,8 +115,7 @@ class Rolling:
         """Spins (…, W) of wheels that are fixed on their carriers, for the carriers' twists (…, C, 3)."""
         at = twists[..., self._carrier, :]
         velocity = at[..., :2] + at[..., 2:] * self._levers
-        spins: Array = np.sum(velocity * self._gripping, axis=-1)
-        return spins
+        return np.asarray(np.sum(velocity * self._gripping, axis=-1))
 
 
 def wheel_rates(robot: Robot, q: ArrayLike, u: ArrayLike, angles: ArrayLike | None = None) -> Array:

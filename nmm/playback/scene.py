@@ -249,8 +249,7 @@ def _middle(motions: Sequence[Motion], frames: Sequence[Keyframes], times: Array
         interpolated(times, frame.t, base_position(motion.robot, frame.q))
         for motion, frame in zip(motions, frames, strict=True)
     ]
-    middle: Array = np.mean(places, axis=0)
-    return middle
+    return np.asarray(np.mean(places, axis=0))
 
 
 def _view(boxes: Array, motions: Sequence[Motion]) -> Array:

@@ -17,7 +17,8 @@ from nmm.errors import RobotError
 from nmm.robots.loading.joint_kinds import axis, is_revolute, kind
 from nmm.robots.loading.provenance import parts_of
 from nmm.robots.meshes import read_meshes
-from nmm.robots.robot import Robot, Wheel
+from nmm.robots.robot import Robot
+from nmm.robots.wheel import Wheel
 
 fcl = pin.hppfcl
 
@@ -253,8 +254,7 @@ def _stick(name: str, joint: int, start: Array, end: Array, radius: float) -> pi
 
 def _towards(direction: Array) -> Array:
     """A rotation that turns z to a unit vector."""
-    turned: Array = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), direction).matrix()
-    return turned
+    return np.asarray(pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), direction).matrix())
 
 
 def _shape(

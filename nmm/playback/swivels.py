@@ -13,7 +13,8 @@ from nmm.arrays import Array
 from nmm.playback.carriers import Carriers, at_point
 from nmm.playback.caster import caster_step
 from nmm.robots.loading.joint_kinds import axis
-from nmm.robots.robot import Robot, Wheel
+from nmm.robots.robot import Robot
+from nmm.robots.wheel import Wheel
 
 # A wheel whose centre is nearer to its swivel's axis than this part of its radius does not trail.
 _NO_TRAIL = 1e-4
@@ -176,8 +177,7 @@ class Swivel:
         return SwivelPath(self.sign * angles, ways)
 
     def _driven(self, q: Array) -> Array:
-        driven: Array = self.robot.S(q)[:, self.drive]
-        return driven
+        return np.asarray(self.robot.S(q)[:, self.drive])
 
     def _velocity(self, q: Array, q_dot: Array) -> Array:
         """Velocity (2,) of the pivot."""

@@ -7,12 +7,11 @@ from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from nmm.arrays import Array, unwritable
 from nmm.errors import NmmError
 from nmm.robots.robot import CENTER_OF_MASS, Robot
-
-Array = NDArray[np.float64]
 
 #: Velocity of the frame's origin, in world axes.
 JACOBIAN_FRAME = pin.LOCAL_WORLD_ALIGNED
@@ -33,8 +32,7 @@ class Configuration:
 
     def __init__(self, robot: Robot, q: ArrayLike) -> None:
         self.robot = robot
-        self.q = robot.q(q)
-        self.q.flags.writeable = False
+        self.q = unwritable(robot.q(q))
         self._data = robot.model.createData()
         pin.computeJointJacobians(robot.model, self._data, self.q)
         self._hessians_computed = False

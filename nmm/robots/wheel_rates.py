@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from nmm.arrays import Array
-from nmm.robots.robot import Robot, Wheel
+from nmm.robots.robot import Robot
+from nmm.robots.wheel import Wheel
 
 #: How far from level a carrier may lie: files write pi/2 with a few digits.
 _LEVEL = 1e-3

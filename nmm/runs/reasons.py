@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from nmm.arrays import Array
@@ -9,7 +11,7 @@ from nmm.control.controller import Controller
 from nmm.control.lost_directions import PARTS, in_world_axes, lost_directions, weakest_direction
 from nmm.functions.function import row_scales
 from nmm.robots.configuration import Configuration
-from nmm.robots.reach import joint_position, reach
+from nmm.robots.reach import Reach, joint_position, reach
 from nmm.runs.promise import Departure, Samples
 
 #: Below this ratio of smallest to largest singular value of the scaled J a departure is put down to it.
@@ -46,11 +48,7 @@ def out_of_reach(controller: Controller, q: Array, target: Array) -> str:
     platform changes.
     """
     robot = controller.robot
-    for frame, places in _positioned(controller).items():
-        arm = reach(robot, frame)
-        if arm is None or not np.isfinite(arm.length):
-            continue
-        joint = joint_position(robot, q, arm.joint)
+    for frame, places, arm, joint in _arms(controller, q):
         fixed = [axis for axis in places if axis == 2 or not robot.platform.n_p]
         away = float(np.linalg.norm([target[places[axis]] - joint[axis] for axis in fixed]))
         if fixed and away > arm.length:
@@ -67,11 +65,7 @@ def stretched(controller: Controller, q: Array, J: Array) -> str:
     robot = controller.robot
     turned = _in_world_axes(controller, q, J)
     y = np.linalg.svd(turned / _scales(controller)[:, np.newaxis])[0][:, -1]
-    for frame, places in _positioned(controller).items():
-        arm = reach(robot, frame)
-        if arm is None or not np.isfinite(arm.length):
-            continue
-        joint = joint_position(robot, q, arm.joint)
+    for frame, places, arm, joint in _arms(controller, q):
         line = Configuration(robot, q).placement(frame).translation - joint
         away = float(np.linalg.norm(line))
         along = sum(y[row] * line[axis] for axis, row in places.items())
@@ -166,6 +160,14 @@ def _ratios(controller: Controller, J: Array) -> Array:
     """Smallest over largest singular value of scaled matrices (K, s, m), (K,)."""
     values = np.linalg.svd(J / _scales(controller)[:, np.newaxis], compute_uv=False)
     return np.asarray(values[:, -1] / np.maximum(values[:, 0], 1e-300))
+
+
+def _arms(controller: Controller, q: Array) -> Iterator[tuple[str, dict[int, int], Reach, Array]]:
+    """Frames that tasks position, on arms of finite reach: see `_positioned`; where the arm begins (3,)."""
+    for frame, places in _positioned(controller).items():
+        arm = reach(controller.robot, frame)
+        if arm is not None and np.isfinite(arm.length):
+            yield frame, places, arm, joint_position(controller.robot, q, arm.joint)
 
 
 def _positioned(controller: Controller) -> dict[str, dict[int, int]]:

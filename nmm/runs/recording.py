@@ -149,7 +149,7 @@ class Recorder:
         if self._unanswered:
             self.warnings.append(
                 f"the resolver had no answer in {len(self._unanswered)} samples, from "
-                f"t = {self._unanswered[0]:.3g} s on, as J has lost rank there: the inputs were those nearest "
+                f"t = {self._unanswered[0]:.3g} s on, where J has lost rank: its inputs were those nearest "
                 "to rest within the limits"
             )
 

@@ -105,8 +105,7 @@ class Trajectory:
     @property
     def error_norm(self) -> Array:
         """‖e‖ at each sample, (N,), in the mixed units of the rows."""
-        norm: Array = np.linalg.norm(self.error, axis=1)
-        return norm
+        return np.asarray(np.linalg.norm(self.error, axis=1))
 
     @property
     def switches(self) -> int:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from nmm.errors import InputError, unknown
+from nmm.errors import InputError, expect_known
 from nmm.functions.function import Function
 from nmm.functions.program import evaluate
 from nmm.functions.tasks.task import Task
@@ -50,8 +50,7 @@ def short_task(text: str, robot: Robot) -> Task | Function:
     if data.get("kind") is None:
         raise InputError(f"task {text}: kind: this key is missing; expected one of {', '.join(TASKS)}")
     kind = str(data["kind"])
-    if kind not in TASKS:
-        raise InputError(unknown("kind", kind, TASKS, f"task {text}"))
+    expect_known("kind", kind, TASKS, f"task {text}")
     try:
         if "reference" in data:
             return TASK_PARTS[kind].model_validate(dict(data)).build_task(robot)
@@ -68,8 +67,7 @@ def short_task(text: str, robot: Robot) -> Task | Function:
 def _from_words(text: str, robot: Robot) -> dict[str, Any]:
     """The mapping that words stand for: what a kind takes says which words it has."""
     kind, *words = (word.strip() for word in text.split(":"))
-    if kind not in TASKS:
-        raise InputError(unknown("kind", kind, TASKS, f"task {text}"))
+    expect_known("kind", kind, TASKS, f"task {text}")
     part = FUNCTION_PARTS[kind]
     keys = part.model_fields
     if STARRED in keys:
@@ -88,8 +86,7 @@ def _from_words(text: str, robot: Robot) -> dict[str, Any]:
     given = words.pop(0) if words and ("frame" in keys or not words[0]) else ""
     if "frame" in keys:
         data["frame"] = given or _tip(robot, text)
-        if data["frame"] not in robot.frames:
-            raise InputError(unknown("frame", data["frame"], robot.frames, f"task {text}"))
+        expect_known("frame", data["frame"], robot.frames, f"task {text}")
     axes = words.pop(0) if words else ""
     if words or (axes and "axes" not in keys):
         raise InputError(

@@ -11,10 +11,11 @@ from typing import Any
 import sympy
 
 from nmm.analysis.formulas.claims import NOTHING, Claim
-from nmm.analysis.formulas.expressions import Product, Sum, Symbol, Trig, is_constant, text, to_sympy
+from nmm.analysis.formulas.expressions import Product, Sum, Symbol, Trig, alone, is_constant, text, to_sympy
 from nmm.analysis.formulas.readable import condition_text, expanded
 from nmm.analysis.formulas.symbolic_analysis import SymbolicAnalysis
 from nmm.analysis.singular.minors import minor_name
+from nmm.words import signed_sum
 
 
 @dataclass(frozen=True)
@@ -103,16 +104,14 @@ def lower_bound(analysis: SymbolicAnalysis) -> Claim | None:
         constant = Product(number, tuple((Symbol(ring.names[i]), n) for i, n in key))
         square = sum(weight**2 for weight in vector)
         used = [(w, name) for name, w in zip(columns, vector, strict=True) if w]
-        written = " ".join(
-            f"{'-' if w < 0 else '+'} {'' if abs(w) == 1 else f'{abs(w)} '}{minor_name(n)}" for w, n in used
-        )
+        written = signed_sum((w, f"{'' if abs(w) == 1 else f'{abs(w)} '}{minor_name(n)}") for w, n in used)
         over = Fraction(int(square.p), int(square.q))
         bound = text(Product(number**2 / over, tuple((f, 2 * n) for f, n in constant.factors)))
         return Claim(
             f"det J J^T >= {bound} at every configuration",
             True,
             (
-                f"{written.removeprefix('+ ')} = {text(constant)}, whatever q is",
+                f"{written} = {text(constant)}, whatever q is",
                 f"so the squares of these minors sum to at least {bound} (Cauchy and Schwarz)"
                 if len(used) > 1
                 else f"so its square is {bound}",
@@ -142,8 +141,7 @@ def never_zero(analysis: SymbolicAnalysis) -> dict[tuple[str, ...], Bound]:
                 nonzero.append(factor.name)
                 continue
             if is_constant(factor, analysis.geometry):
-                alone = Product(Fraction(1), ((factor, 1),))
-                requires.append((to_sympy(alone, analysis.symbols), sympy.Integer(0)))
+                requires.append((to_sympy(alone(factor), analysis.symbols), sympy.Integer(0)))
                 continue
             condition = _condition(factor, analysis) if isinstance(factor, Sum) else None
             if condition is None:
@@ -170,13 +168,12 @@ def vanishing(analysis: SymbolicAnalysis) -> dict[tuple[str, ...], str]:
                 found[columns] = f"{factor.name} is a factor"
             if power < 0 or isinstance(factor, Symbol):
                 continue
-            alone = Product(Fraction(1), ((factor, 1),))
-            value, ring = expanded(alone, analysis.derivation.ring), analysis.derivation.ring
+            value, ring = expanded(alone(factor), analysis.derivation.ring), analysis.derivation.ring
             names = {ring.names[i] for i in value.variables()}
             if not names <= {*analysis.geometry, *_angles(analysis)}:
                 continue
             if not value.without({ring.names.index(name) for name in _angles(analysis)}):
-                said = condition_text(alone, analysis.named_forms)
+                said = condition_text(alone(factor), analysis.named_forms)
                 found[columns] = (
                     f"{said} is a factor"
                     if isinstance(factor, Trig)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 import sympy
 
-from nmm.analysis.formulas.expressions import GREEK, Product, Symbol, is_constant, text, to_sympy
+from nmm.analysis.formulas.expressions import GREEK, Product, Symbol, alone, is_constant, text, to_sympy
 from nmm.analysis.formulas.families import Cases, TooMany
 from nmm.analysis.formulas.groebner import Undecided
 from nmm.analysis.formulas.readable import condition_text, factored
@@ -124,11 +123,14 @@ def _quantities(
     for denominator in analysis.denominators:
         used |= denominator.variables()
         for factor, _ in factored(denominator).factors:
-            alone = Product(Fraction(1), ((factor, 1),))
-            if not isinstance(factor, Symbol) and alone not in nonzero:
-                below[alone] = None
+            if not isinstance(factor, Symbol) and alone(factor) not in nonzero:
+                below[alone(factor)] = None
     names = [ring.names[i] for i in sorted(used) if not ring.is_angle[i] and ring.names[i] in lengths]
-    return [*map(_symbol, names), *nonzero], list(below), [one for one in zero if one not in below]
+    return (
+        [*(alone(Symbol(name)) for name in names), *nonzero],
+        list(below),
+        [one for one in zero if one not in below],
+    )
 
 
 def _constants(
@@ -142,15 +144,14 @@ def _constants(
         for factor, _ in form.factors:
             if isinstance(factor, Symbol) or not is_constant(factor, analysis.geometry):
                 continue
-            alone = Product(Fraction(1), ((factor, 1),))
-            value = float(to_sympy(alone, analysis.symbols).subs(values))
-            (zero if abs(value) < NOTHING else nonzero)[alone] = None
+            value = float(to_sympy(alone(factor), analysis.symbols).subs(values))
+            (zero if abs(value) < NOTHING else nonzero)[alone(factor)] = None
     return nonzero, zero
 
 
 def _has(form: Product, factors: list[Product]) -> bool:
     """Whether some of these are factors of a product."""
-    return any(Product(Fraction(1), ((factor, 1),)) in factors for factor, _ in form.factors)
+    return any(alone(factor) in factors for factor, _ in form.factors)
 
 
 def _nowhere(
@@ -187,17 +188,13 @@ def _cases(
     """The case distinction, gone through."""
     minors = []
     for columns, form in forms.items():
-        factors = [Product(Fraction(1), ((factor, 1),)) for factor, power in form.factors if power > 0]
+        factors = [alone(factor) for factor, power in form.factors if power > 0]
         said = f"{minor_name(columns)} = {text(analysis.short_forms[columns])}"
         minors.append((said, [factor for factor in factors if factor not in [*nonzero, *below]]))
     zeros = Zeros(list(forms.values()), [*nonzero, *below], zero=zero)
     cases = Cases(zeros, minors, dict(analysis.named_forms))
     cases.explore()
     return cases
-
-
-def _symbol(name: str) -> Product:
-    return Product(Fraction(1), ((Symbol(name), 1),))
 
 
 def _zero_text(zero: list[Product]) -> str:
@@ -209,7 +206,7 @@ def _where(
 ) -> str:
     """For which lengths a statement is made, and where: an auxiliary quantity depends on q."""
     gone = analysis.derivation.zero
-    moving = [_symbol(name) for name in analysis.definitions]
+    moving = [alone(Symbol(name)) for name in analysis.definitions]
     lengths = ", ".join(condition_text(one, {}) for one in nonzero if one not in moving)
     parts = [f"{' = '.join(gone)} = 0"] if gone else []
     parts += [_zero_text(zero)] if zero else []

@@ -13,7 +13,7 @@ from nmm.analysis.formulas.platform_columns import platform_columns
 from nmm.analysis.formulas.quotient import common_multiple
 from nmm.analysis.formulas.row_values import Auxiliary, Value, value_without
 from nmm.analysis.formulas.task_rows import TracedRow, task_rows
-from nmm.errors import InputError, unknown
+from nmm.errors import InputError, expect_known
 from nmm.functions.tasks.task import Stack
 from nmm.robots.robot import Robot
 
@@ -54,8 +54,7 @@ class Derivation:
         InputError : a name that is no length, or a length that J is divided by
         """
         for name in names:
-            if name not in self.lengths:
-                raise InputError(unknown("length", name, self.lengths))
+            expect_known("length", name, self.lengths)
             if self.ring.is_angle[self.ring.names.index(name)]:
                 raise InputError(f"{name}: expected a length, it is an angle")
         gone = {self.ring.names.index(name) for name in names}

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
 import sympy
+
+from nmm.words import signed_sum
 
 
 @dataclass(frozen=True)
@@ -54,13 +56,27 @@ ZERO = Product(Fraction(0))
 _INDEXED = re.compile(r"q\d")
 
 
+def alone(factor: Node, power: int = 1) -> Product:
+    """A factor, to a power, as a product."""
+    return Product(Fraction(1), ((factor, power),))
+
+
+def leaves(*products: Product) -> Iterator[Symbol | Trig]:
+    """The symbols, cosines and sines in products, sums in them opened."""
+    for product in products:
+        for factor, _ in product.factors:
+            if isinstance(factor, Sum):
+                yield from leaves(*factor.terms)
+            else:
+                yield factor
+
+
 def is_constant(factor: Node, lengths: Collection[str]) -> bool:
     """Whether a factor is made of lengths and fixed angles alone."""
-    if isinstance(factor, Symbol):
-        return factor.name in lengths
-    if isinstance(factor, Trig):
-        return all(name in lengths for name, _ in factor.angle)
-    return all(is_constant(inner, lengths) for term in factor.terms for inner, _ in term.factors)
+    return all(
+        leaf.name in lengths if isinstance(leaf, Symbol) else all(name in lengths for name, _ in leaf.angle)
+        for leaf in leaves(alone(factor))
+    )
 
 
 def text(product: Product) -> str:
@@ -169,14 +185,7 @@ def _terms_written(terms: tuple[Product, ...], sign: int, style: _Style) -> str:
 
 
 def _linear(angle: tuple[tuple[str, int], ...], name: Any, space: str) -> str:
-    written = ""
-    for of, n in angle:
-        size = "" if abs(n) == 1 else f"{abs(n)}{space}"
-        if written:
-            written += f" {'-' if n < 0 else '+'} {size}{name(of)}"
-        else:
-            written = f"{'-' if n < 0 else ''}{size}{name(of)}"
-    return written
+    return signed_sum((n, f"{'' if abs(n) == 1 else f'{abs(n)}{space}'}{name(of)}") for of, n in angle)
 
 
 def latex_name(name: str) -> str:

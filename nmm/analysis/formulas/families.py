@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from fractions import Fraction
 
-from nmm.analysis.formulas.expressions import Product, Symbol, Trig
+from nmm.analysis.formulas.expressions import Product, Trig, alone, leaves
 from nmm.analysis.formulas.groebner import Basis
 from nmm.analysis.formulas.readable import condition_text
 from nmm.analysis.formulas.zeros import Zeros
@@ -134,23 +133,10 @@ def condition_size(product: Product) -> int:
 
 def _angles(family: list[Product]) -> list[str]:
     """Names of the angles that occur."""
-    found: dict[str, None] = {}
-
-    def look(product: Product) -> None:
-        for factor, _ in product.factors:
-            if isinstance(factor, Trig):
-                found.update(dict.fromkeys(name for name, _ in factor.angle))
-            elif not isinstance(factor, Symbol):
-                for term in factor.terms:
-                    look(term)
-
-    for product in family:
-        look(product)
-    return list(found)
+    waves = [leaf for leaf in leaves(*family) if isinstance(leaf, Trig)]
+    return list(dict.fromkeys(name for wave in waves for name, _ in wave.angle))
 
 
 def _single_waves(angles: list[str]) -> list[Product]:
     """sin and cos of each angle."""
-    return [
-        Product(Fraction(1), ((Trig(kind, ((name, 1),)), 1),)) for name in angles for kind in ("sin", "cos")
-    ]
+    return [alone(Trig(kind, ((name, 1),))) for name in angles for kind in ("sin", "cos")]

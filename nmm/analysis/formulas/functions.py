@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from nmm.analysis.formulas.result import Formulas
 from nmm.analysis.formulas.written import ROTATION_VECTOR
 from nmm.arrays import Array, scalar
-from nmm.errors import InputError, unknown
+from nmm.errors import InputError, expect_known
 from nmm.kernels.rotations import log3
 
 
@@ -66,8 +66,7 @@ class SymbolicFunctions:
             raise InputError(f"q: expected {self._n} numbers in the last dimension, got shape {q.shape}")
         values = dict(self._geometry)
         for name, value in geometry.items():
-            if name not in values:
-                raise InputError(unknown("length", name, values))
+            expect_known("length", name, values)
             values[name] = scalar(value, name)
         given = [*np.moveaxis(q, -1, 0), *values.values()]
         found = function(*given, *self._auxiliary(*given))

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from fractions import Fraction
-from math import gcd
+from math import gcd, lcm
 
 from nmm.analysis.formulas.expansion import Expansion, Gaussian, Key, Ring
-from nmm.analysis.formulas.expressions import ZERO, Node, Product, Sum, Symbol, Trig, is_constant, text
+from nmm.analysis.formulas.expressions import ZERO, Node, Product, Sum, Symbol, Trig, alone, is_constant, text
 from nmm.analysis.formulas.trigonometric_factors import factors_of
 
 #: Names of factors that several minors have, in the order in which they are given.
@@ -35,14 +35,8 @@ def factored(value: Expansion) -> Product:
     if not value:
         return ZERO
     number, scalars, factors = factors_of(value)
-    result = Product(number)
-    for key in scalars:
-        result = result.times(_scalars(value, key))
-    parts = []
-    for factor, power in factors:
-        part = as_sum(factor)
-        for _ in range(power):
-            parts.append(part)
+    result = Product(number).times(_scalars(value, scalars))
+    parts = [part for factor, power in factors for part in [as_sum(factor)] * power]
     for part in sorted(parts, key=_length):
         result = result.times(part)
     return tidy(result)
@@ -89,7 +83,7 @@ def named(
         if not often:
             break
         node = max(often, key=lambda entry: entry[:3])[3]
-        names[name] = Product(Fraction(1), ((node, 1),))
+        names[name] = alone(node)
         products = [_replaced(product, node, Symbol(name)) for product in products]
     return names, products
 
@@ -160,7 +154,7 @@ def _split(value: Expansion) -> list[Product] | None:
         return None
     name = ((value.ring.names[angle], 1),)
     split = [
-        tidy(factored(part).times(Product(Fraction(1), ((Trig(kind, name), 1),))))
+        tidy(factored(part).times(alone(Trig(kind, name))))
         for kind, part in (("cos", cosine), ("sin", sine))
         if part
     ]
@@ -216,26 +210,18 @@ def _collected(terms: list[Product]) -> list[Product]:
     if not shared or counts[shared[0]] == len(terms):
         return sorted(terms, key=_rank)
     common = shared[0]
-    inside = [_without(term, common) for term in terms if common in dict(term.factors)]
+    inside = [term.times(alone(common, -1)) for term in terms if common in dict(term.factors)]
     outside = [term for term in terms if common not in dict(term.factors)]
     bracket = _normalised(_collected(inside))
-    return sorted([*outside, tidy(Product(Fraction(1), ((common, 1),)).times(bracket))], key=_rank)
-
-
-def _without(term: Product, factor: Node) -> Product:
-    return term.times(Product(Fraction(1), ((factor, -1),)))
+    return sorted([*outside, tidy(alone(common).times(bracket))], key=_rank)
 
 
 def _normalised(terms: list[Product]) -> Product:
     """A sum with whole coprime coefficients, the first one positive, times what was taken out."""
     if len(terms) == 1:
         return terms[0]
-    over = 1
-    for term in terms:
-        over = over * term.number.denominator // gcd(over, term.number.denominator)
-    content = 0
-    for term in terms:
-        content = gcd(content, int(term.number * over))
+    over = lcm(*(term.number.denominator for term in terms))
+    content = gcd(*(int(term.number * over) for term in terms))
     number = Fraction(content, over) * (-1 if terms[0].number < 0 else 1)
     shared = [
         (f, min(dict(term.factors).get(f, 0) for term in terms))
@@ -244,7 +230,7 @@ def _normalised(terms: list[Product]) -> Product:
     ]
     front = Product(number, tuple((f, n) for f, n in shared if n))
     back = Product(1 / number, tuple((f, -n) for f, n in front.factors))
-    return front.times(Product(Fraction(1), ((Sum(tuple(term.times(back) for term in terms)), 1),)))
+    return front.times(alone(Sum(tuple(term.times(back) for term in terms))))
 
 
 def _rank(term: Product) -> tuple[int, int, str]:

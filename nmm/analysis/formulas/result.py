@@ -14,7 +14,7 @@ from nmm.analysis.formulas.derivation import Derivation
 from nmm.analysis.formulas.expansion import Expansion
 from nmm.analysis.formulas.expressions import Product, to_sympy
 from nmm.analysis.formulas.written import Written
-from nmm.errors import InputError, unknown
+from nmm.errors import InputError, expect_known
 from nmm.robots.robot import Robot
 
 
@@ -89,8 +89,7 @@ class Formulas:
         InputError : another number of names than rows, a name twice, or one that is no input
         """
         for name in columns:
-            if name not in self.u_names:
-                raise InputError(unknown("input", name, self.u_names, f"robot {self.robot.name}"))
+            expect_known("input", name, self.u_names, f"robot {self.robot.name}")
         s = len(self.row_names)
         if len(columns) != s or len(set(columns)) != s:
             raise InputError(f"minor: expected {s} different inputs, got {', '.join(columns)}")

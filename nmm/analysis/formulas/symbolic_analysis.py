@@ -24,7 +24,7 @@ from nmm.analysis.formulas.text import latex_of, text_of
 from nmm.analysis.formulas.written import auxiliary_written, matrix_latex, matrix_text, written
 from nmm.analysis.singular.jacobians import Jacobians
 from nmm.analysis.singular.reached import Tasks, stacked
-from nmm.errors import InputError, SingularError, unknown
+from nmm.errors import InputError, SingularError, expect_known
 from nmm.functions.tasks.task import Stack
 from nmm.robots.robot import Robot
 
@@ -87,8 +87,7 @@ def symbolic(
     TooLarge : (an InputError) the formulas would be too long to read
     InputError : a function or platform whose kernel does what has no formula, more rows than inputs
     """
-    if geometry not in ("symbols", "numbers"):
-        raise InputError(unknown("geometry", geometry, ("symbols", "numbers")))
+    expect_known("geometry", geometry, ("symbols", "numbers"))
     stack = stacked(task)
     if len(stack.rows(robot)) > robot.n_u:
         raise InputError(

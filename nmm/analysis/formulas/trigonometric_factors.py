@@ -7,6 +7,7 @@ polynomials in whole angles again. The product is multiplied out and compared in
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 from typing import Any
 
@@ -22,36 +23,23 @@ from nmm.analysis.formulas.polynomial_factors import polynomial_factors
 _LARGEST = 20_000
 
 
-def factors_of(value: Expansion) -> tuple[Fraction, dict[Key, int], list[tuple[Expansion, int]]]:
-    """A number, powers of scalars (one key), and factors with their powers, whose product is the value.
+def factors_of(value: Expansion) -> tuple[Fraction, Key, list[tuple[Expansion, int]]]:
+    """A number, powers of scalars, and factors with their powers, whose product is the value.
 
     Raises
     ------
     TooLarge : the polynomial in the half angles' tangents has too many terms
     """
-    ring = value.ring
-    scalars = _common_scalars(value)
-    rest = value * Expansion(ring, {tuple((i, -n) for i, n in scalars): (Fraction(1), Fraction(0))})
+    common, rest = value.split()
+    ((scalars, (size, _)),) = common.terms.items()
     found = _polynomial_factors(rest)
-    product = ring.number(1)
+    product = value.ring.number(1)
     for factor, power in found:
         product = product * factor.power(power)
     number = _ratio(rest, product)
     if number is None:  # never seen; the value itself is always right
         found, number = [(rest, 1)], Fraction(1)
-    return number, ({scalars: 1} if scalars else {}), found
-
-
-def _common_scalars(value: Expansion) -> Key:
-    """The largest powers of scalars that all terms have."""
-    ring = value.ring
-    common: dict[int, int] = {}
-    for index in sorted(value.variables()):
-        if not ring.is_angle[index]:
-            power = min(dict(key).get(index, 0) for key in value.terms)
-            if power:
-                common[index] = power
-    return tuple(common.items())
+    return size * number, scalars, found
 
 
 def _ratio(value: Expansion, product: Expansion) -> Fraction | None:
@@ -68,16 +56,13 @@ def _ratio(value: Expansion, product: Expansion) -> Fraction | None:
 
 def _polynomial_factors(value: Expansion) -> list[tuple[Expansion, int]]:
     """Factors up to a number, none of them one."""
-
     ring = value.ring
     angles = sorted(i for i in value.variables() if ring.is_angle[i])
     scalars = sorted(i for i in value.variables() if not ring.is_angle[i])
     combinations = [tuple(dict(key).get(i, 0) for i in angles) for key in value.terms]
     basis, seen = basis_of(combinations, len(angles))
     degrees = [max((abs(k[j]) for k in seen), default=0) for j in range(len(basis))]
-    size = 1
-    for degree in degrees:
-        size *= 2 * degree + 1
+    size = math.prod(2 * degree + 1 for degree in degrees)
     size *= len({tuple((i, n) for i, n in key if i in scalars) for key in value.terms})
     if size > _LARGEST:
         raise TooLarge(

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import sympy
 
 from nmm.analysis.formulas.expansion import Expansion
-from nmm.analysis.formulas.expressions import Product, Sum, Symbol, latex, text, to_sympy
+from nmm.analysis.formulas.expressions import Product, Sum, Symbol, alone, latex, text, to_sympy
 from nmm.analysis.formulas.quotient import Linear
 from nmm.analysis.formulas.readable import as_sum, factored
 from nmm.analysis.formulas.row_values import Auxiliary, Share, Turn, Value
@@ -34,7 +34,7 @@ def written(value: Value, symbols: Mapping[str, Any]) -> Written:
     if isinstance(value, Linear):
         return _linear(value, symbols)
     if isinstance(value, Share):
-        return _of(Product(Fraction(1), ((Symbol(value.angle), 1),)).times(factored(value.factor)), symbols)
+        return _of(alone(Symbol(value.angle)).times(factored(value.factor)), symbols)
     if isinstance(value, Turn):
         axis = "xyz"[value.part]
         return Written(
@@ -43,11 +43,7 @@ def written(value: Value, symbols: Mapping[str, Any]) -> Written:
             rf"\log({value.name})_{axis}",
         )
     sine, cosine = (_of(factored(part), symbols) for part in (value.sine, value.cosine))
-    return Written(
-        sympy.atan2(sine.expression, cosine.expression),
-        f"atan2({sine.text}, {cosine.text})",
-        rf"\mathrm{{atan2}}({sine.latex}, {cosine.latex})",
-    )
+    return _atan2(sine, cosine)
 
 
 def matrix_text(turn: Turn) -> str:
@@ -94,22 +90,14 @@ def auxiliary_written(auxiliary: Auxiliary, symbols: Mapping[str, Any]) -> Writt
         return Written(sympy.sqrt(a.expression), f"sqrt({a.text})", rf"\sqrt{{{a.latex}}}")
     a, b, *rest = everything
     if auxiliary.kind == "length":
-        return Written(
-            sympy.sqrt(sympy.Add(*(one.expression**2 for one in everything))),
-            f"hypot({', '.join(one.text for one in everything)})",
-            r"\sqrt{" + " + ".join(f"({one.latex})^2" for one in everything) + "}",
-        )
+        return _hypot(*everything)
     if auxiliary.kind == "bearing":
         up, along = b, a
     elif auxiliary.kind == "elevation":
         up, along = rest[0], _hypot(a, b)
     else:
         up, along = _hypot(b, rest[0]), a
-    angle = Written(
-        sympy.atan2(up.expression, along.expression),
-        f"atan2({up.text}, {along.text})",
-        rf"\mathrm{{atan2}}({up.latex}, {along.latex})",
-    )
+    angle = _atan2(up, along)
     if auxiliary.kind != "over sine":
         return angle
     return Written(
@@ -119,11 +107,19 @@ def auxiliary_written(auxiliary: Auxiliary, symbols: Mapping[str, Any]) -> Writt
     )
 
 
-def _hypot(a: Written, b: Written) -> Written:
+def _hypot(*parts: Written) -> Written:
     return Written(
-        sympy.sqrt(a.expression**2 + b.expression**2),
-        f"hypot({a.text}, {b.text})",
-        rf"\sqrt{{({a.latex})^2 + ({b.latex})^2}}",
+        sympy.sqrt(sympy.Add(*(part.expression**2 for part in parts))),
+        f"hypot({', '.join(part.text for part in parts)})",
+        r"\sqrt{" + " + ".join(f"({part.latex})^2" for part in parts) + "}",
+    )
+
+
+def _atan2(sine: Written, cosine: Written) -> Written:
+    return Written(
+        sympy.atan2(sine.expression, cosine.expression),
+        f"atan2({sine.text}, {cosine.text})",
+        rf"\mathrm{{atan2}}({sine.latex}, {cosine.latex})",
     )
 
 
@@ -132,7 +128,7 @@ def _of(product: Product, symbols: Mapping[str, Any]) -> Written:
 
 
 def _sum(terms: list[Product]) -> Product:
-    return terms[0] if len(terms) == 1 else Product(Fraction(1), ((Sum(tuple(terms)), 1),))
+    return terms[0] if len(terms) == 1 else alone(Sum(tuple(terms)))
 
 
 def _linear(value: Linear, symbols: Mapping[str, Any]) -> Written:

@@ -9,7 +9,7 @@ import sympy
 from sympy.polys.orderings import grevlex
 from sympy.polys.rings import ring
 
-from nmm.analysis.formulas.expressions import Product, Sum, Symbol, Trig
+from nmm.analysis.formulas.expressions import Product, Sum, Symbol, Trig, leaves
 from nmm.analysis.formulas.fewest_angles import basis_of
 from nmm.analysis.formulas.groebner import Basis, Undecided, Work
 
@@ -43,11 +43,9 @@ class Zeros:
         work: int | None = None,
         zero: Sequence[Product] = (),
     ) -> None:
-
-        waves: dict[Angle, None] = {}
-        scalars: dict[str, None] = {}
-        for product in (*products, *nonzero, *zero):
-            _collect(product, waves, scalars)
+        found = list(leaves(*products, *nonzero, *zero))
+        waves = dict.fromkeys(leaf.angle for leaf in found if isinstance(leaf, Trig))
+        scalars = dict.fromkeys(leaf.name for leaf in found if isinstance(leaf, Symbol))
         self._seen = _in_few_angles(list(waves))
         count = max(map(len, self._seen.values()), default=0)
         variables = [f"{kind}{i}" for i in range(count) for kind in ("cos", "sin")]
@@ -112,17 +110,6 @@ class Zeros:
             for _ in range(abs(n)):
                 re, im = (re * c - im * s, re * s + im * c) if n > 0 else (re * c + im * s, im * c - re * s)
         return re if factor.kind == "cos" else im
-
-
-def _collect(product: Product, waves: dict[Angle, None], scalars: dict[str, None]) -> None:
-    for factor, _ in product.factors:
-        if isinstance(factor, Symbol):
-            scalars[factor.name] = None
-        elif isinstance(factor, Trig):
-            waves[factor.angle] = None
-        else:
-            for term in factor.terms:
-                _collect(term, waves, scalars)
 
 
 def _in_few_angles(waves: list[Angle]) -> dict[Angle, tuple[int, ...]]:

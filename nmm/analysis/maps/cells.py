@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from nmm.arrays import Array, Integers
+from nmm.arrays import Array, Flags, Integers
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,13 +44,13 @@ class Grid:
 
     def centers(self, cells: Integers, block: int = 1) -> Array:
         """Centres (N, 2) of cells, or of blocks of block x block of them."""
-        columns = -(-self.columns // block)
+        columns, _ = self.shape(block)
         place = np.column_stack([cells % columns, cells // columns])
         return np.asarray(self.lower + self.cell * block * (place + 0.5))
 
     def blocks(self, cells: Integers, block: int) -> Integers:
         """In which block of block x block cells each cell is."""
-        columns = -(-self.columns // block)
+        columns, _ = self.shape(block)
         return (cells // self.columns) // block * columns + (cells % self.columns) // block
 
 
@@ -69,16 +68,16 @@ class Layer:
         self.central = np.zeros(cells, dtype=bool)
 
     @property
-    def reached(self) -> NDArray[np.bool_]:
+    def reached(self) -> Flags:
         """Whether each cell has a posture."""
         return np.asarray(np.isfinite(self.values))
 
-    def offer(self, cells: Integers, central: NDArray[np.bool_], values: Array, q: Array) -> None:
+    def offer(self, cells: Integers, central: Flags, values: Array, q: Array) -> None:
         """Keep those of the postures q (N, n) that are better than what their cells have."""
         signed = self.sign * values
         usable = np.flatnonzero((cells >= 0) & np.isfinite(signed))
         order = usable[np.lexsort((signed[usable], central[usable], cells[usable]))]
-        last = order[np.append(cells[order][1:] != cells[order][:-1], True)] if len(order) else order
+        last = _last_of_each(order, cells)
         own = cells[last]
         higher = (central[last] == self.central[own]) & (signed[last] > self.values[own])
         better = last[higher | (central[last] & ~self.central[own])]
@@ -91,5 +90,11 @@ class Layer:
         cells = np.flatnonzero(self.reached)
         blocks = grid.blocks(cells, block)
         order = np.lexsort((self.values[cells], blocks))
-        last = order[np.append(blocks[order][1:] != blocks[order][:-1], True)] if len(order) else order
+        last = _last_of_each(order, blocks)
         return blocks[last], cells[last]
+
+
+def _last_of_each(order: Integers, kinds: Integers) -> Integers:
+    """Of indices in an order in which equal kinds follow one another, the last one of each kind."""
+    sorted_kinds = kinds[order]
+    return order[np.append(sorted_kinds[1:] != sorted_kinds[:-1], True)] if len(order) else order

@@ -15,7 +15,7 @@ import numpy as np
 
 from nmm.analysis.singular.parts import singular_values
 from nmm.arrays import Array
-from nmm.errors import InputError, unknown
+from nmm.errors import InputError, expect_known
 
 
 class Spectra:
@@ -88,6 +88,11 @@ def weighted(spectra: Spectra, part: str, alpha: float) -> Array:
     return alpha * volume(spectra, "arm") + (1.0 - alpha) * volume(spectra, part)
 
 
+def _of_part(part: str, symbol: str) -> Measure:
+    about = f"manipulability of the {part} alone"
+    return Measure(symbol, about, "volume", lambda J, _, __: volume(J, part), on_part=False, needs=part)
+
+
 #: The measures by name. A new one is a line here.
 MEASURES: Mapping[str, Measure] = {
     "sigma_min": Measure(
@@ -105,22 +110,8 @@ MEASURES: Mapping[str, Measure] = {
     "manipulability": Measure(
         "w", "manipulability sqrt(det J Jᵀ)", "volume", lambda J, part, _: volume(J, part)
     ),
-    "arm_manipulability": Measure(
-        "w_b",
-        "manipulability of the arm alone",
-        "volume",
-        lambda J, _, __: volume(J, "arm"),
-        on_part=False,
-        needs="arm",
-    ),
-    "platform_manipulability": Measure(
-        "w_p",
-        "manipulability of the platform alone",
-        "volume",
-        lambda J, _, __: volume(J, "platform"),
-        on_part=False,
-        needs="platform",
-    ),
+    "arm_manipulability": _of_part("arm", "w_b"),
+    "platform_manipulability": _of_part("platform", "w_p"),
     "weighted": Measure(
         "α w_b + (1 − α) w",
         "manipulability of arm and whole robot, weighed",
@@ -150,8 +141,7 @@ def chosen(names: str | Sequence[str]) -> dict[str, Measure]:
     if not wanted:
         raise InputError(f"measures: expected at least one of {', '.join(MEASURES)}")
     for name in wanted:
-        if name not in MEASURES:
-            raise InputError(unknown("measure", name, MEASURES, "measures"))
+        expect_known("measure", name, MEASURES, "measures")
     return {name: MEASURES[name] for name in wanted}
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from nmm.analysis.maps.coordinates import checked_range, usual_range
 from nmm.arrays import Array, Flags, Integers
-from nmm.errors import InputError, unknown
+from nmm.errors import InputError, expect_known
 from nmm.progress import Progress
 from nmm.robots.frame_path import FramePath
 from nmm.robots.robot import Robot
@@ -52,8 +52,7 @@ class Reach:
         names = [robot.q_names[j] for j in moving]
         given = dict(ranges or {})
         for name in given:
-            if name not in names:
-                raise InputError(unknown("joint", name, names, "ranges"))
+            expect_known("joint", name, names, "ranges")
         limits = [checked_range(given[name], name) if name in given else self._usual(name) for name in names]
         self.lower, self.upper = np.array(limits).reshape(-1, 2).T
         who = robot.following

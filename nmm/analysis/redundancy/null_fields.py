@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from nmm.analysis.redundancy.null_space import readable_null_space
 from nmm.arrays import Array, Integers, scalar, vector
-from nmm.errors import InputError, unknown
+from nmm.errors import InputError, expect_known
 from nmm.robots.robot import Robot
 from nmm.words import listed
 
@@ -84,8 +84,7 @@ def _of_circuit(columns: Integers, start: Array, names: str) -> Field:
             raise Ended(f"{names} alone come close to a singular configuration")
         vector = np.zeros(J.shape[1])
         vector[columns] = Vt[-1]
-        along: Array = vector * np.sign(vector @ (last if last.any() else start))
-        return along
+        return np.asarray(vector * np.sign(vector @ (last if last.any() else start)))
 
     return field
 
@@ -99,8 +98,7 @@ def _of_wish(wish: Array, rank: int) -> Field:
         size = float(np.linalg.norm(left))
         if size < LITTLE_LEFT * float(np.linalg.norm(wish)):
             raise Ended("the wished inputs move the task: next to nothing of them leaves it at rest")
-        unit: Array = left / size
-        return unit
+        return np.asarray(left / size)
 
     return field
 
@@ -110,8 +108,7 @@ def _wish(robot: Robot, direction: Direction, what: str) -> Array:
     if isinstance(direction, str | Mapping):
         wished = {direction: 1.0} if isinstance(direction, str) else direction
         for name, value in wished.items():
-            if name not in robot.u_names:
-                raise InputError(unknown("input", name, robot.u_names, what))
+            expect_known("input", name, robot.u_names, what)
             wish[robot.input(name)] = scalar(value, f"{what}: {name}")
     elif isinstance(direction, bool):
         raise InputError(f"{what}: expected a number, an input or inputs, got {direction!r}")

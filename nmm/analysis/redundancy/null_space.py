@@ -62,8 +62,7 @@ def readable_null_space(J: Array, rank: int, costs: Sequence[int], given: Array 
 
 def _scaled(vector: Array) -> Array:
     """The largest component 1: of equals the first, whatever the rounding."""
-    scaled: Array = vector / vector[np.argmax(np.round(np.abs(vector) / np.abs(vector).max(), 9))]
-    return scaled
+    return np.asarray(vector / vector[np.argmax(np.round(np.abs(vector) / np.abs(vector).max(), 9))])
 
 
 def _circuits(core: Array, costs: Sequence[int]) -> list[Array]:

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.analysis.redundancy.motion_words import coordinate_words, input_words, motion_text
-from nmm.analysis.redundancy.null_space import projector, readable_null_space
+from nmm.analysis.redundancy.motion_words import input_words, motion_text
+from nmm.analysis.redundancy.null_space import readable_null_space
+from nmm.analysis.redundancy.withheld import regained_by_brackets, withheld_motions
 from nmm.analysis.singular.jacobians import Jacobians, Subject, checked
-from nmm.analysis.singular.parts import null_space, rank_of
+from nmm.analysis.singular.parts import null_space
 from nmm.analysis.singular.singularity import TOLERANCE
 from nmm.arrays import Array, positive
 from nmm.control.controller import Controller
@@ -23,11 +24,6 @@ from nmm.functions.program import Program
 from nmm.functions.tasks.comparison import Comparison
 from nmm.resolvers.projected_gradient import ProjectedGradient
 from nmm.robots.robot import Robot
-
-#: Singular values of Lie brackets, which are taken by differences, this small beside the largest are zero.
-BRACKET_TOLERANCE = 1e-5
-#: Step of the differences along the fields of the brackets, m and rad.
-STEP = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,7 +207,7 @@ def redundancy(
     rank_J, rank_F = jacobians.rank(J, tolerance), jacobians.rank(F @ robot.following.carried, tolerance)
     readable = readable_null_space(J, rank_J, [1] * p + [0] * (robot.n_u - p))
     words = input_words(robot, q)
-    withheld, texts = _withheld(robot, q, F, rank_F, readable @ S.T)
+    withheld, texts = withheld_motions(robot, q, F, rank_F, readable @ S.T)
     return RedundancyReport(
         robot=robot,
         rows=jacobians.row_names,
@@ -228,7 +224,7 @@ def redundancy(
         without_effect=inputs_without_effect(Controller(robot, jacobians.task, ProjectedGradient()), q),
         withheld=withheld,
         withheld_texts=texts,
-        by_brackets=_by_brackets(jacobians, t, q, rank_J) if len(withheld) else 0,
+        by_brackets=regained_by_brackets(jacobians, t, q, rank_J) if len(withheld) else 0,
     )
 
 
@@ -252,56 +248,3 @@ def coordinate_jacobian(jacobians: Jacobians, t: float, q: Array) -> Array:
     if not np.all(np.isfinite(F)):
         raise SingularError(f"at t = {t:g} s: the task or its reference is undefined there")
     return F
-
-
-def _withheld(
-    robot: Robot, q: Array, F: Array, rank_F: int, admitted: Array
-) -> tuple[Array, tuple[str, ...]]:
-    """Self-motions (k, n) that complete those admitted (rows) to null F, with their sentences.
-
-    They are looked for along the platform's own axes, in which few coordinates say much, and among motions in
-    which followers follow.
-    """
-    n_p, who = robot.platform.n_p, robot.following
-    to_world = np.eye(robot.n_independent)
-    if n_p:
-        c, s = np.cos(q[2]), np.sin(q[2])
-        to_world[:2, :2] = [[c, -s], [s, c]]
-    own = readable_null_space(
-        F @ who.carried @ to_world,
-        rank_F,
-        [1] * n_p + [0] * (robot.n_independent - n_p),
-        admitted[:, who.independent] @ to_world,
-    )
-    words = coordinate_words(robot, q)
-    names, units = (
-        [robot.q_names[i] for i in who.independent],
-        [f"{robot.q_units[i]}/s" for i in who.independent],
-    )
-    texts = tuple(motion_text(one, names, units, words, n_p) for one in own)
-    return own @ to_world.T @ who.carried.T, texts
-
-
-def _by_brackets(jacobians: Jacobians, t: float, q: Array, rank: int) -> int | None:
-    """How many directions the brackets of two self-motions add to the self-motions of the inputs.
-
-    The fields are X_a(q) = S(q) P(q) c_a, with P the projector on null J and c_a an orthonormal basis of it
-    at q; [X_a, X_b] = ∂X_b/∂q X_a - ∂X_a/∂q X_b by central differences.
-    """
-    c = null_space(jacobians.J(t, q), rank).T
-
-    def fields(at: Array) -> Array:
-        J = jacobians.J(t, at)
-        if jacobians.rank(J, 1e-8) != rank:
-            raise SingularError("the rank of J changes")
-        field: Array = jacobians.robot.S(at) @ projector(J, rank) @ c
-        return field
-
-    try:
-        here = fields(q)
-        along = [(fields(q + STEP * X) - fields(q - STEP * X)) / (2.0 * STEP) for X in here.T]
-    except SingularError:
-        return None
-    brackets = [along[a][:, b] - along[b][:, a] for a in range(len(along)) for b in range(a)]
-    both = np.column_stack([here, *brackets])
-    return rank_of(both, BRACKET_TOLERANCE) - here.shape[1]

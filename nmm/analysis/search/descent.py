@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from nmm.analysis.search.measure import ROUNDING, Measure
+from nmm.analysis.search.measure import ROUNDING
+from nmm.analysis.search.search import Search
 from nmm.analysis.search.space import Space
 from nmm.arrays import Array, Flags
 from nmm.progress import Progress
@@ -14,8 +15,6 @@ FACTORS = np.array([1.0, 0.5, 0.2, 0.04])
 #: And where σ falls slowly: exact where it touches zero as a square does. Elsewhere it would lead to the
 #: places where pieces of the singular set meet.
 DOUBLE = 2.0
-#: Longest step, in units.
-LONGEST = 0.6
 #: Relative decreases of σ below this are no progress; so many in a row end a start.
 LITTLE, PATIENCE = 1e-3, 4
 #: Slopes this small beside the largest are the differences' rounding.
@@ -27,47 +26,36 @@ TOGETHER, SLOW = 20.0, 0.3
 
 def minimum_norm_step(space: Space, z: Array, F: Array, C: Array, damping: Array) -> Array:
     """-Cᵀ (C Cᵀ + damping)⁻¹ F, (N, a), without what would leave the bounds."""
-    lower, upper = space.bounds
-    usable = np.ones(z.shape, dtype=bool)
-    for _ in range(z.shape[1] + 1):
-        own = C * usable[:, np.newaxis]
-        left, sizes, right = np.linalg.svd(own, full_matrices=False)
+
+    def step(usable: Flags) -> Array:
+        left, sizes, right = np.linalg.svd(C * usable[:, np.newaxis], full_matrices=False)
         gain = sizes / np.maximum(sizes**2 + damping[:, np.newaxis], 1e-300)
         gain[sizes <= NOISE * np.max(sizes, axis=1, initial=0.0)[:, np.newaxis]] = 0.0
         along = gain * (np.swapaxes(left, 1, 2) @ F[..., np.newaxis])[..., 0]
-        step = -(np.swapaxes(right, 1, 2) @ along[..., np.newaxis])[..., 0]
-        outward = ((z <= lower) & (step < 0.0)) | ((z >= upper) & (step > 0.0))
-        if not np.any(outward & usable):
-            break
-        usable &= ~outward
-    size = np.max(np.abs(step), axis=1, initial=0.0)
-    return np.asarray(step * np.minimum(1.0, LONGEST / np.maximum(size, 1e-300))[:, np.newaxis])
+        return -(np.swapaxes(right, 1, 2) @ along[..., np.newaxis])[..., 0]
+
+    return space.step(z, step)
 
 
 def descend(
-    measure: Measure,
-    space: Space,
-    z: Array,
-    *,
-    iterations: int = 60,
-    progress: Progress | None = None,
+    search: Search, z: Array, *, iterations: int = 60, progress: Progress | None = None
 ) -> tuple[Array, Array]:
     """Local minima of σ from the starts z (N, a): where each ended (N, a), and σ beside the largest (N,).
 
     σ never grows. A start ends where σ is rounding, or where it stops falling.
     """
-    z = space.clip(z)
-    sigma, ratio = measure.sigma(space.q(z))
+    z = search.space.clip(z)
+    sigma, ratio = search.sigma(z)
     damping = np.ones(len(z))
     waited = np.zeros(len(z), dtype=np.int64)
     slow = np.zeros(len(z), dtype=bool)
     for iteration in range(iterations):
         live = np.flatnonzero((ratio > ROUNDING) & (waited < PATIENCE) & np.isfinite(ratio))
-        if not len(live) or not len(space.axes):
+        if not len(live) or not len(search.space.axes):
             break
-        trials = _trials(measure, space, z[live], damping[live], slow[live])
+        trials = _trials(search, z[live], damping[live], slow[live])
         count = trials.shape[1]
-        tried, ratios = measure.sigma(space.q(trials.reshape(-1, trials.shape[2])))
+        tried, ratios = search.sigma(trials.reshape(-1, trials.shape[2]))
         tried, ratios = tried.reshape(-1, count), ratios.reshape(-1, count)
         best = np.argmin(tried, axis=1)
         row = np.arange(len(live))
@@ -85,19 +73,19 @@ def descend(
     return z, ratio
 
 
-def _trials(measure: Measure, space: Space, z: Array, damping: Array, slow: Flags) -> Array:
+def _trials(search: Search, z: Array, damping: Array, slow: Flags) -> Array:
     """Points (N, tries, a): towards one singular value at zero, and towards two where two fall slowly."""
-    q, units = space.q(z), space.units[space.axes]
-    F, C, values = measure.equations(q, space.axes, units, 1)
+    space = search.space
+    F, C, values = search.equations(z, 1)
     step = minimum_norm_step(space, z, F, C, _damping(F, damping))
     steps = step[:, np.newaxis] * FACTORS[:, np.newaxis]
     longer = np.where(slow, DOUBLE, 0.7)[:, np.newaxis, np.newaxis] * step[:, np.newaxis]
     steps = np.concatenate([steps, longer], axis=1)
-    if measure.full_rank > 1:
+    if search.measure.full_rank > 1:
         twin = np.flatnonzero(slow & (values[:, -2] < TOGETHER * values[:, -1]))
         second = np.tile(step[:, np.newaxis] * 1.5, (1, 2, 1))
         if len(twin):
-            F, C, _ = measure.equations(q[twin], space.axes, units, 2)
+            F, C, _ = search.equations(z[twin], 2)
             both = minimum_norm_step(space, z[twin], F, C, _damping(F, damping[twin]))
             second[twin] = both[:, np.newaxis] * np.array([[1.0], [0.3]])
         steps = np.concatenate([steps, second], axis=1)

@@ -12,8 +12,9 @@ from nmm.analysis.search.descent import descend
 from nmm.analysis.search.family import SingularFamily, of_starts
 from nmm.analysis.search.measure import Measure
 from nmm.analysis.search.minimum import LocalMinimum, followed, lowest
+from nmm.analysis.search.search import TOLERANCE, Search
 from nmm.analysis.search.sorting import everywhere, families_of
-from nmm.analysis.search.space import Space, search_space
+from nmm.analysis.search.space import search_space
 from nmm.analysis.singular.jacobians import Jacobians, Subject
 from nmm.analysis.singular.parts import WHOLE
 from nmm.arrays import Array, counted, positive, scalar
@@ -21,8 +22,6 @@ from nmm.errors import SingularError
 from nmm.progress import Progress, between
 from nmm.words import listed, value_text
 
-#: Singular values this small beside the largest are zero.
-TOLERANCE = 1e-8
 #: Cheap samples for each start of the better half.
 SAMPLES = 20
 
@@ -168,26 +167,25 @@ def find_singularities(
     SingularError : there is no J anywhere in the ranges
     """
     jacobians = Jacobians(subject)
-    measure = Measure(jacobians, part, length, sizes, scalar(t, "t"))
+    measure, robot = Measure(jacobians, part, length, sizes, scalar(t, "t")), jacobians.robot
     starts, seed = counted(starts, "starts"), counted(seed, "seed", 0)
-    tolerance = positive(tolerance, "tolerance")
-    robot, rng = measure.robot, np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     stand = robot.rest if at is None else robot.q(at)
     robot.check_followers(stand)
-    units = np.where([unit == "m" for unit in robot.q_units], 1.0 if length is None else float(length), 1.0)
-    space = search_space(measure, stand, among, ranges, units, rng)
-    first, singular = _starts(measure, space, starts, tolerance, rng)
+    space = search_space(measure, stand, among, ranges, length, rng)
+    search = Search(measure, space, positive(tolerance, "tolerance"), rng)
+    first, singular = _starts(search, starts)
     families: tuple[SingularFamily, ...]
     if singular:
-        families = (everywhere(measure, space, first[0], tolerance, starts),)
+        families = (everywhere(search, first[0], starts),)
         converged, bottom = starts, None
     else:
-        z, ratio = descend(measure, space, first, progress=between(progress, 0.0, 0.6))
-        ends = followed(measure, space, z[ratio > tolerance])
-        _, of_ends = measure.sigma(space.q(ends))
-        found = np.concatenate([z[ratio <= tolerance], ends[of_ends <= tolerance]])
-        converged, bottom = len(found), lowest(measure, space, ends[of_ends > tolerance])
-        families = families_of(measure, space, found, tolerance, rng)
+        z, ratio = descend(search, first, progress=between(progress, 0.0, 0.6))
+        ends = followed(search, z[ratio > search.tolerance])
+        singular_ends = search.sigma(ends)[1] <= search.tolerance
+        found = np.concatenate([z[ratio <= search.tolerance], ends[singular_ends]])
+        converged, bottom = len(found), lowest(search, ends[~singular_ends])
+        families = families_of(search, found)
     if progress is not None:
         progress(1.0)
     names = robot.q_names
@@ -205,23 +203,21 @@ def find_singularities(
         units=dict(zip(names, robot.q_units, strict=True)),
         indifferent=tuple(names[j] for j in space.indifferent),
         fixed={names[j]: float(stand[j]) for j in robot.following.independent if j not in space.moving},
-        tolerance=tolerance,
+        tolerance=search.tolerance,
     )
 
 
-def _starts(
-    measure: Measure, space: Space, starts: int, tolerance: float, rng: np.random.Generator
-) -> tuple[Array, bool]:
+def _starts(search: Search, starts: int) -> tuple[Array, bool]:
     """Starts (starts, a) that have a J, and whether all samples are singular."""
-    pool = space.draw(rng, max(SAMPLES * ((starts + 1) // 2), 2 * SAMPLES))
-    sigma, ratio = measure.sigma(space.q(pool))
+    pool = search.space.draw(search.rng, max(SAMPLES * ((starts + 1) // 2), 2 * SAMPLES))
+    sigma, ratio = search.sigma(pool)
     exists = np.isfinite(sigma)
     if not exists.any():
         raise SingularError("the wheels cannot roll, or the task is undefined, everywhere in these ranges")
     best = sigma.reshape(-1, SAMPLES).argmin(axis=1) + SAMPLES * np.arange(len(pool) // SAMPLES)
     good = [int(i) for i in best if exists[i]][: (starts + 1) // 2]
     plain = np.flatnonzero(exists)
-    rest = plain[rng.permutation(len(plain))[: starts - len(good)]]
+    rest = plain[search.rng.permutation(len(plain))[: starts - len(good)]]
     chosen = np.concatenate([np.array(good, dtype=np.int64), rest])
     chosen = np.resize(chosen, starts)  # again from the first, where hardly any have a J
-    return pool[chosen], bool(np.all(ratio[exists] <= tolerance))
+    return pool[chosen], bool(np.all(ratio[exists] <= search.tolerance))

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import Bounds, minimize
 
-from nmm.analysis.search.measure import Measure
-from nmm.analysis.search.space import Space
+from nmm.analysis.search.search import Search
 from nmm.arrays import Array
 
 #: So many of the lowest ends are followed to the bottom.
@@ -47,43 +46,35 @@ class LocalMinimum:
         return text
 
 
-def followed(measure: Measure, space: Space, z: Array) -> Array:
+def followed(search: Search, z: Array) -> Array:
     """The lowest of the ends z (N, a), each brought to its minimum of σ, (FOLLOWED or fewer, a)."""
-    if not len(z) or not len(space.axes):
+    if not len(z) or not len(search.space.axes):
         return z[:FOLLOWED]
-    sigma, _ = measure.sigma(space.q(z))
+    sigma, _ = search.sigma(z)
     order = np.argsort(sigma, kind="stable")
     order = order[np.isfinite(sigma[order])][:FOLLOWED]
-    return np.array([_bottom(measure, space, z[i]) for i in order]).reshape(-1, z.shape[1])
+    return np.array([_bottom(search, z[i]) for i in order]).reshape(-1, z.shape[1])
 
 
-def _bottom(measure: Measure, space: Space, z: Array) -> Array:
+def _bottom(search: Search, z: Array) -> Array:
     def sigma(point: Array) -> tuple[float, Array]:
-        _, C, values = measure.equations(
-            space.q(point[np.newaxis]), space.axes, space.units[space.axes], corank=1
-        )
+        _, C, values = search.equations(point[np.newaxis], corank=1)
         return float(values[0, -1]), C[0, 0]
 
-    lower, upper = space.bounds
     found = minimize(
-        sigma,
-        z,
-        jac=True,
-        method="L-BFGS-B",
-        bounds=Bounds(lower, upper),
+        sigma, z, jac=True, method="L-BFGS-B", bounds=Bounds(*search.space.bounds),
         options={"gtol": 1e-9, "ftol": 1e-14},
-    ).x
+    ).x  # fmt: skip
     both = np.array([z, found])
-    return np.asarray(both[np.argmin(measure.sigma(space.q(both))[0])])
+    return np.asarray(both[np.argmin(search.sigma(both)[0])])
 
 
-def lowest(measure: Measure, space: Space, z: Array) -> LocalMinimum | None:
+def lowest(search: Search, z: Array) -> LocalMinimum | None:
     """Of points z (N, a) that with the smallest σ; None without points."""
     if not len(z):
         return None
-    q = space.q(z)
-    sigma, ratio = measure.sigma(q)
+    sigma, ratio = search.sigma(z)
     best = int(np.argmin(sigma))
     if not np.isfinite(sigma[best]):
         return None
-    return LocalMinimum(space.fold(q[best]), float(sigma[best]), float(ratio[best]))
+    return LocalMinimum(search.space.fold(search.space.q(z)[best]), float(sigma[best]), float(ratio[best]))

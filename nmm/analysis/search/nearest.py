@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 
 from nmm.analysis.search.descent import descend
 from nmm.analysis.search.family import SingularFamily
-from nmm.analysis.search.many_starts import TOLERANCE
 from nmm.analysis.search.measure import Measure
+from nmm.analysis.search.search import TOLERANCE, Search
 from nmm.analysis.search.slide import slide
 from nmm.analysis.search.sorting import family_at
-from nmm.analysis.search.space import Space, search_space
+from nmm.analysis.search.space import search_space
 from nmm.analysis.singular.jacobians import Jacobians, Subject, checked
 from nmm.analysis.singular.parts import WHOLE
 from nmm.arrays import Array, counted, positive
@@ -153,33 +153,29 @@ def nearest_singularity(
     """
     jacobians = Jacobians(subject)
     t, given = checked(jacobians, t, q)
-    measure = Measure(jacobians, part, length, sizes, t)
-    starts, seed = counted(starts, "starts"), counted(seed, "seed", 0)
-    tolerance = positive(tolerance, "tolerance")
-    robot, rng = measure.robot, np.random.default_rng(seed)
-    L = 1.0 if length is None else float(length)
-    units = np.where([unit == "m" for unit in robot.q_units], L, 1.0)
-    space = search_space(measure, given, among, ranges, units, rng, around=True)
+    measure, robot = Measure(jacobians, part, length, sizes, t), jacobians.robot
+    starts, rng = counted(starts, "starts"), np.random.default_rng(counted(seed, "seed", 0))
+    space = search_space(measure, given, among, ranges, length, rng, around=True)
+    search = Search(measure, space, positive(tolerance, "tolerance"), rng)
     goal = space.z(given)
-    z, ratio = descend(measure, space, _starts(measure, space, goal, starts, rng))
-    found = z[ratio <= tolerance]
+    z, ratio = descend(search, _starts(search, goal, starts))
+    found = z[ratio <= search.tolerance]
     if not len(found):
         return None
-    best = _nearest(measure, space, found, goal, tolerance, progress)
-    where = space.q(best[np.newaxis])
-    sigma, ratio = measure.sigma(where)
-    rank = int(measure.ranks(where, tolerance)[0])
+    best = _nearest(search, found, goal, progress)
+    at = best[np.newaxis]
+    where, (sigma, ratio), rank = space.q(at)[0], search.sigma(at), int(search.ranks(at)[0])
     return SingularPoint(
-        q=where[0],
+        q=where,
         given=given,
         distance=float(np.linalg.norm(best - goal)),
-        length=L,
+        length=1.0 if length is None else float(length),
         names=robot.q_names,
         units=robot.q_units,
-        family=family_at(measure, space, best, tolerance, rng),
+        family=family_at(search, best),
         rank=rank,
         full_rank=measure.full_rank,
-        lost=measure.lost_text(where[0], rank),
+        lost=measure.lost_text(where, rank),
         sigma_min=float(sigma[0]),
         ratio=float(ratio[0]),
         starts=starts,
@@ -187,31 +183,23 @@ def nearest_singularity(
     )
 
 
-def _starts(measure: Measure, space: Space, goal: Array, starts: int, rng: np.random.Generator) -> Array:
+def _starts(search: Search, goal: Array, starts: int) -> Array:
     """(starts, a): the goal, half the others around it near and far, the rest all over the ranges."""
-    near = starts // 2
+    near, rng = starts // 2, search.rng
     directions = rng.standard_normal((near, len(goal)))
     directions /= np.maximum(np.linalg.norm(directions, axis=1), 1e-300)[:, np.newaxis]
     around = goal + directions * np.exp(rng.uniform(np.log(0.02), np.log(3.0), near))[:, np.newaxis]
-    drawn = np.concatenate([goal[np.newaxis], around, space.draw(rng, 4 * starts)])
-    drawn = space.clip(drawn)
-    exists = np.isfinite(measure.sigma(space.q(drawn))[0])
-    return drawn[exists][:starts]
+    drawn = np.concatenate([goal[np.newaxis], around, search.space.draw(rng, 4 * starts)])
+    drawn = search.space.clip(drawn)
+    return drawn[np.isfinite(search.sigma(drawn)[0])][:starts]
 
 
-def _nearest(
-    measure: Measure,
-    space: Space,
-    z: Array,
-    goal: Array,
-    tolerance: float,
-    progress: Progress | None,
-) -> Array:
+def _nearest(search: Search, z: Array, goal: Array, progress: Progress | None) -> Array:
     """The nearest to the goal of singular points z (N, a), each slid towards it; (a,)."""
     for turn, (rounds, kept) in enumerate([(3, 4 * KEPT), (8, KEPT), (150, 1)]):
         if progress is not None:
             progress(0.25 * (turn + 1))
-        z = slide(measure, space, z, goal, tolerance, rounds)
+        z = slide(search, z, goal, rounds)
         order = np.argsort(np.round(np.linalg.norm(z - goal, axis=1), 12), kind="stable")
         z = z[order[:kept]]
     if progress is not None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from nmm.analysis.search.family import Relation, SingularFamily
 from nmm.analysis.search.local import localised, stay_singular
-from nmm.analysis.search.measure import Measure
+from nmm.analysis.search.search import Search
 from nmm.analysis.search.space import Space
 from nmm.arrays import Array, Flags
 
@@ -16,11 +16,9 @@ from nmm.arrays import Array, Flags
 MEMBERS, SLACK = 16, 100.0
 
 
-def holds(
-    measure: Measure, space: Space, family: SingularFamily, points: Array, free: Flags, tolerance: float,
-    rng: np.random.Generator,
-) -> bool:  # fmt: skip
+def holds(search: Search, family: SingularFamily, points: Array, free: Flags) -> bool:
     """Whether J's rank is as low at random members, far away: all members, where nothing else ties them."""
+    space, rng = search.space, search.rng
     names = space.robot.q_names
     named = {name for one in family.constraints for name in one.coefficients} | set(family.free)
     silent = {names[j] for j in space.moving} - named
@@ -39,16 +37,10 @@ def holds(
             )
             q[:, space.robot.coordinate(name)] = total / first
     rank = np.full(MEMBERS, family.rank)
-    return bool(np.all(stay_singular(measure, space, space.z(q), rank, tolerance * SLACK)))
+    return bool(np.all(stay_singular(search.looser(SLACK), space.z(q), rank)))
 
 
-def completed(
-    measure: Measure,
-    space: Space,
-    found: list[SingularFamily],
-    tolerance: float,
-    rng: np.random.Generator,
-) -> list[SingularFamily]:
+def completed(search: Search, found: list[SingularFamily]) -> list[SingularFamily]:
     """With the families where a pinned angle or sum has the opposite value, or that and half a turn.
 
     Where no start ended there: random members prove that they are singular, and as free as those found.
@@ -62,12 +54,10 @@ def completed(
                 twin = replace(
                     family,
                     constraints=tuple(constraints),
-                    examples=_moved(space, family.examples, relation, value),
+                    examples=_moved(search.space, family.examples, relation, value),
                     starts=0,
                 )
-                if not any(one.same_as(twin) for one in every) and _proved(
-                    measure, space, twin, tolerance, rng
-                ):
+                if not any(one.same_as(twin) for one in every) and _proved(search, twin):
                     every.append(twin)
     return every
 
@@ -90,14 +80,13 @@ def _moved(space: Space, q: Array, relation: Relation, value: float) -> Array:
     return space.fold(moved)
 
 
-def _proved(
-    measure: Measure, space: Space, family: SingularFamily, tolerance: float, rng: np.random.Generator
-) -> bool:
+def _proved(search: Search, family: SingularFamily) -> bool:
     """Whether its examples and random members are singular, with the same freedom and no more."""
+    space = search.space
     z = space.z(family.examples)
     free = np.array([space.robot.q_names[j] in family.free for j in space.axes])
-    if not holds(measure, space, family, z, free, tolerance, rng):
+    if not holds(search, family, z, free):
         return False
-    drawn = np.where(free, space.draw(rng, len(z)), z)
-    local = localised(measure, space, drawn, tolerance * SLACK, rng)
+    drawn = np.where(free, space.draw(search.rng, len(z)), z)
+    local = localised(search.looser(SLACK), drawn)
     return bool(np.all(local.free == free) and np.all(local.rank == family.rank))

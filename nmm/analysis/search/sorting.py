@@ -9,8 +9,8 @@ import numpy as np
 
 from nmm.analysis.search.family import Relation, SingularFamily, merged
 from nmm.analysis.search.local import Local, localised, shaken, tangents, walk
-from nmm.analysis.search.measure import Measure
 from nmm.analysis.search.proof import completed, holds
+from nmm.analysis.search.search import Search
 from nmm.analysis.search.space import Space
 from nmm.arrays import Array, Flags
 
@@ -24,84 +24,76 @@ SHAKES = (0.05, 0.2, 0.5)
 EXAMPLES = 4
 
 
-def families_of(
-    measure: Measure, space: Space, z: Array, tolerance: float, rng: np.random.Generator
-) -> tuple[SingularFamily, ...]:
+def families_of(search: Search, z: Array) -> tuple[SingularFamily, ...]:
     """The families of singular points z (N, a), the thickest first."""
     if not len(z):
         return ()
-    local = localised(measure, space, shaken(measure, space, z, tolerance, rng), tolerance, rng)
+    local = localised(search, shaken(search, z))
     common = Counter(local.signature(i) for i in range(len(z)))
     waiting = sorted(range(len(z)), key=lambda i: (local.signature(i)[0], -common[local.signature(i)], i))
     found: list[SingularFamily] = []
     while waiting:
         i = waiting[0]
-        family = family_at(measure, space, local.z[i], tolerance, rng)
+        family = family_at(search, local.z[i])
         if family is None:  # where pieces meet; a neighbour tells more
             waiting = waiting[1:]
             continue
-        members = [j for j in waiting if j == i or _belongs(space, family, local, j)]
-        family = _with_examples(measure, space, family, local, members, tolerance, rng)
+        members = [j for j in waiting if j == i or _belongs(search.space, family, local, j)]
+        family = _with_examples(search, family, local, members)
         again = next((k for k, one in enumerate(found) if one.same_as(family)), None)
         if again is None:
             found.append(family)
         else:
             found[again] = replace(found[again], starts=found[again].starts + family.starts)
         waiting = [j for j in waiting if j not in members]
-    found = merged(completed(measure, space, found, tolerance, rng))
+    found = merged(completed(search, found))
     return tuple(sorted(found, key=lambda family: (-family.dimension, -family.starts)))
 
 
-def family_at(
-    measure: Measure, space: Space, z: Array, tolerance: float, rng: np.random.Generator
-) -> SingularFamily | None:
+def family_at(search: Search, z: Array) -> SingularFamily | None:
     """The family of a singular point z (a,); a larger one beside it where several meet.
 
     None where what seemed pinned or free at the point does not hold in large random motions.
     """
-    if not len(space.axes):
-        return everywhere(measure, space, z, tolerance, 1)
+    if not len(search.space.axes):
+        return everywhere(search, z, 1)
     for size in SHAKES:
-        tries = shaken(measure, space, np.tile(z, (5, 1)), tolerance, rng, size)
-        local = localised(measure, space, np.concatenate([z[np.newaxis], tries]), tolerance, rng)
+        tries = shaken(search, np.tile(z, (5, 1)), size)
+        local = localised(search, np.concatenate([z[np.newaxis], tries]))
         signatures = [local.signature(i) for i in range(len(local.z))]
         usual = Counter(signatures).most_common(1)[0][0]
-        family = _family_of(measure, space, local, signatures.index(usual), tolerance, rng)
+        family = _family_of(search, local, signatures.index(usual))
         if family is not None:
             return family
     return None
 
 
-def _family_of(
-    measure: Measure, space: Space, local: Local, i: int, tolerance: float, rng: np.random.Generator
-) -> SingularFamily | None:
+def _family_of(search: Search, local: Local, i: int) -> SingularFamily | None:
     """The family of point i, by a walk from it; None where large random motions contradict it."""
     z, rank, free = local.z[i], int(local.rank[i]), local.free[i]
-    along = tangents(measure, space, z, rank, tolerance, rng)
-    points = walk(measure, space, z, rank, along, tolerance, rng)
+    space = search.space
+    along = tangents(search, z, rank)
+    points = walk(search, z, rank, along)
     constraints, related = _ties(space, points, free)
-    names, q = space.robot.q_names, space.fold(space.q(z[np.newaxis]))
-    family = SingularFamily(
-        free=tuple(names[j] for j in space.moving if j in space.indifferent or j in space.axes[free]),
+    family = replace(
+        everywhere(search, z, 1),
+        free=tuple(
+            space.robot.q_names[j] for j in space.moving if j in {*space.indifferent, *space.axes[free]}
+        ),
         constraints=constraints,
         related=related,
         dimension=len(space.indifferent) + len(along),
-        moving=len(space.moving),
-        rank=rank,
-        full_rank=measure.full_rank,
-        lost=measure.lost_text(q[0], rank),
-        examples=q,
-        starts=1,
-        names=names,
+        examples=space.fold(space.q(z[np.newaxis])),
     )
-    return family if holds(measure, space, family, points, free, tolerance, rng) else None
+    return family if holds(search, family, points, free) else None
 
 
-def everywhere(measure: Measure, space: Space, z: Array, tolerance: float, starts: int) -> SingularFamily:
+def everywhere(search: Search, z: Array, starts: int) -> SingularFamily:
     """The family of all configurations, for a J without full rank anywhere."""
+    measure, space = search.measure, search.space
     names = space.robot.q_names
     q = space.q(z[np.newaxis])
-    rank = int(measure.ranks(q, tolerance)[0])
+    rank = int(search.ranks(z[np.newaxis])[0])
     return SingularFamily(
         free=tuple(names[j] for j in space.moving),
         constraints=(),
@@ -197,20 +189,15 @@ def _belongs(space: Space, family: SingularFamily, local: Local, i: int) -> bool
 
 
 def _with_examples(
-    measure: Measure,
-    space: Space,
-    family: SingularFamily,
-    local: Local,
-    members: list[int],
-    tolerance: float,
-    rng: np.random.Generator,
+    search: Search, family: SingularFamily, local: Local, members: list[int]
 ) -> SingularFamily:
     """With its starts, and with examples: first one whose free coordinates are where `at` has them.
 
     None lies where another family is met: what is lost there, and what brings it back, would be that one's.
     """
+    space = search.space
     example = space.z(family.examples[:1])
-    usual = localised(measure, space, example, tolerance, rng).signature(0)
+    usual = localised(search, example).signature(0)
     z = np.concatenate([example, *(local.z[j : j + 1] for j in members if local.signature(j) == usual)])
     q = space.fold(space.q(z[:EXAMPLES]))
     plain = q[:1].copy()
@@ -218,7 +205,7 @@ def _with_examples(
         j = space.robot.coordinate(name)
         plain[0, j] = space.at[j]
     plain = space.robot.following.placed(plain)
-    there = localised(measure, space, space.z(plain), tolerance, rng)
+    there = localised(search, space.z(plain))
     if there.rank[0] == family.rank and there.signature(0) == usual:
         q = np.concatenate([plain, q[: EXAMPLES - 1]])
-    return replace(family, examples=q, starts=len(members), lost=measure.lost_text(q[0], family.rank))
+    return replace(family, examples=q, starts=len(members), lost=search.measure.lost_text(q[0], family.rank))

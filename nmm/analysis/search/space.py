@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +19,8 @@ DIGITS = 1e-6
 SAME = 1e-9
 #: Configurations that tell whether a coordinate matters.
 PROBES = 24
+#: Longest step, in units.
+LONGEST = 0.6
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +73,24 @@ class Space:
         """z (..., a) within the bounds."""
         return np.asarray(np.clip(z, *self.bounds))
 
+    def step(self, z: Array, of: Callable[[Flags], Array]) -> Array:
+        """The step (N, a) from z of the coordinates that may move, without those that would leave the bounds.
+
+        Parameters
+        ----------
+        of : which coordinates may move (N, a) -> the step of these
+        """
+        lower, upper = self.bounds
+        usable = np.ones(z.shape, dtype=bool)
+        for _ in range(z.shape[1] + 1):
+            step = of(usable)
+            outward = ((z <= lower) & (step < 0.0)) | ((z >= upper) & (step > 0.0))
+            if not np.any(outward & usable):
+                break
+            usable &= ~outward
+        size = np.max(np.abs(step), axis=1, initial=0.0)
+        return np.asarray(step * np.minimum(1.0, LONGEST / np.maximum(size, 1e-300))[:, np.newaxis])
+
     def draw(self, rng: np.random.Generator, count: int) -> Array:
         """z (count, a), uniform over the ranges."""
         units = self.units[self.axes]
@@ -106,7 +126,7 @@ def search_space(
     at: Array,
     among: Sequence[str] | None,
     ranges: Mapping[str, tuple[float, float]] | None,
-    units: Array,
+    length: float | None,
     rng: np.random.Generator,
     *,
     around: bool = False,
@@ -118,7 +138,7 @@ def search_space(
     at (n,) : where the coordinates stay that do not move
     among : coordinates that may move; None for all that follow no other
     ranges : (lower, upper) by coordinate
-    units (n,) : what counts as 1
+    length : so many m count as 1 rad; 1 m where it is None
     around : ranges lie around `at`; and what is limited keeps its limits, whole turns too
 
     Raises
@@ -133,6 +153,7 @@ def search_space(
     lower = np.where(own[:, 0], robot.q_limits[:, 0], -np.inf)
     upper = np.where(own[:, 1], robot.q_limits[:, 1], np.inf)
     angle = np.array([unit == "rad" for unit in robot.q_units])
+    units = np.where(angle, 1.0, 1.0 if length is None else float(length))
     span = reach(robot)
     for j in range(robot.n):
         half, center = (np.pi, 0.0) if angle[j] and not around else (np.pi if angle[j] else span, at[j])

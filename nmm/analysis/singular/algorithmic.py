@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nmm.analysis.singular.minors import determinants
 from nmm.analysis.singular.parts import Ranked, ranks, singular_values
-from nmm.arrays import Array, Integers
+from nmm.arrays import Array, Flags, Integers
 from nmm.control.directions import readable_basis
 
 
@@ -64,7 +63,7 @@ class PartitionSingularities:
     names: tuple[tuple[str, ...], ...]
     determinants: Array
     ratios: Array
-    singular: NDArray[np.bool_]
+    singular: Flags
     kinematic: bool
 
     @property

@@ -82,14 +82,12 @@ class Ellipsoids:
     def matrices(self) -> Array:
         """J_v diag(input_sizes)² J_vᵀ, (N, 3, 3), m²/s²: vᵀ M⁻¹ v <= 1 inside, where M is regular."""
         halves = self.axes * self.radii[:, None]
-        product_: Array = halves @ np.swapaxes(halves, 1, 2)
-        return product_
+        return np.asarray(halves @ np.swapaxes(halves, 1, 2))
 
     def support(self, directions: ArrayLike) -> Array:
         """Largest velocity along each direction (k, 3), (N, k) m/s: sqrt(dᵀ M d)."""
         along = array(directions, "directions").reshape(-1, 3)
-        reached: Array = np.linalg.norm((along @ self.axes) * self.radii[:, None], axis=2)
-        return reached
+        return np.asarray(np.linalg.norm((along @ self.axes) * self.radii[:, None], axis=2))
 
     def half_extents(self) -> Array:
         """Half the sides of the boxes around them along the world's axes, (N, 3) m/s."""

@@ -13,7 +13,7 @@ from nmm.analysis.singular.reached import Tasks as Tasks
 from nmm.analysis.singular.reached import stacked
 from nmm.arrays import Array, array, positive, scalar, vector
 from nmm.control.controller import Controller
-from nmm.errors import InputError, SingularError, unknown
+from nmm.errors import InputError, SingularError, expect_known
 from nmm.functions.function import Row, row_scales
 from nmm.functions.tasks.task import Stack
 from nmm.platforms.base import Platform
@@ -146,8 +146,7 @@ class Jacobians:
         given = {} if sizes is None else dict(sizes)
         names = (*self.row_names, *(row.name for row in self.added_rows), *self.robot.u_names)
         for name, value in given.items():
-            if name not in names:
-                raise InputError(unknown("row or input", name, names, "sizes"))
+            expect_known("row or input", name, names, "sizes")
             given[name] = positive(value, f"size of {name}")
 
         def of(named: Sequence[tuple[str, str]]) -> Array:

@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 
 from nmm.arrays import Array, Integers
-from nmm.errors import InputError, unknown
+from nmm.errors import InputError, expect_known
 
 #: A minor's columns: names of inputs, or "v, omega, q2".
 Columns: TypeAlias = str | Sequence[str]
@@ -95,8 +95,7 @@ def column_indices(key: Columns, inputs: Sequence[str], s: int) -> tuple[int, ..
     """Indices of s different columns; `InputError` for an unknown name or another number of them."""
     names = split(key)
     for name in names:
-        if name not in inputs:
-            raise InputError(unknown("input", name, inputs, "minor"))
+        expect_known("input", name, inputs, "minor")
     if len(names) != s or len(set(names)) != s:
         raise InputError(
             f"minor: expected {s} different inputs, as many as J has rows, got {', '.join(names)}"

@@ -9,7 +9,7 @@ import numpy as np
 
 from nmm.arrays import Array, Integers
 from nmm.control.directions import direction_texts, readable_basis
-from nmm.errors import InputError, unknown
+from nmm.errors import InputError, expect_known
 from nmm.robots.robot import Robot
 
 WHOLE = "robot"
@@ -103,8 +103,7 @@ def rank_of(matrix: Array, tolerance: float) -> int:
 
 def null_space(J: Array, rank: int) -> Array:
     """Orthonormal rows (m - rank, m) with J v = 0, J (s, m) of that rank."""
-    basis: Array = np.linalg.svd(J)[2][rank:] if J.size else np.eye(J.shape[1])
-    return basis
+    return np.asarray(np.linalg.svd(J)[2][rank:] if J.size else np.eye(J.shape[1]))
 
 
 def condition_numbers(values: Array, rank: Integers) -> Array:
@@ -123,8 +122,7 @@ def groups(robot: Robot) -> dict[str, list[int]]:
 def columns_of(robot: Robot, part: str) -> list[int]:
     """Columns of a part; `InputError` names the parts that the robot has."""
     columns = groups(robot)
-    if part not in columns:
-        raise InputError(unknown("part", part, columns, f"robot {robot.name}"))
+    expect_known("part", part, columns, f"robot {robot.name}")
     return columns[part]
 
 

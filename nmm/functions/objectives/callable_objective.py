@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from numpy.typing import ArrayLike
 
-from nmm.functions.callbacks import differentiated, stage
+from nmm.functions.callbacks import of_configuration
 from nmm.functions.function import Stage
 from nmm.functions.objectives.base import Objective
 from nmm.robots.configuration import Configuration
@@ -31,13 +31,4 @@ class CallableObjective(Objective):
         self._gradient = gradient
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
-        function, gradient = self.function, self._gradient
-        callback = differentiated(
-            lambda t, configuration: function(configuration),
-            None,
-            None if gradient is None else lambda t, configuration: gradient(configuration),
-            1,
-            "callable objective",
-            depends_on_time=False,
-        )
-        return (stage(1, robot.n, callback),)
+        return of_configuration(self.function, self._gradient, 1, "callable objective", robot)

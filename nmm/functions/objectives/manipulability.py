@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from nmm.arrays import Array
-from nmm.errors import InputError, unknown
+from nmm.errors import InputError, expect_known
 from nmm.functions.function import Stage
 from nmm.functions.objectives.base import Objective
 from nmm.kernels.compiled import integer_scratch, kernel, scratch, view
@@ -101,10 +101,8 @@ class Manipulability(Objective):
                 f"manipulability rows: expected some of {', '.join(ROWS)}, each once, got {rows!r}"
             )
         for row in self.selected:
-            if row not in ROWS:
-                raise InputError(unknown("manipulability row", row, ROWS))
-        if of not in ("robot", "arm"):
-            raise InputError(unknown("manipulability of", of, ("robot", "arm")))
+            expect_known("manipulability row", row, ROWS)
+        expect_known("manipulability of", of, ("robot", "arm"))
         self.of = of
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:

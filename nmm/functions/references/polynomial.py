@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, array, positive, vector
-from nmm.errors import InputError, unknown
+from nmm.errors import InputError, expect_known
 from nmm.functions.function import Function, Row, Stage
 from nmm.kernels.compiled import kernel
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
@@ -144,8 +144,7 @@ def share_of_way(profile: Profile, T: float) -> list[float]:
     InputError : an unknown profile
     """
     profiles = {"constant": [1 / T, 0.0], "smooth": [6 / T**5, -15 / T**4, 10 / T**3, 0.0, 0.0, 0.0]}
-    if profile not in profiles:
-        raise InputError(unknown("profile", profile, profiles))
+    expect_known("profile", profile, profiles)
     return profiles[profile]
 
 
@@ -207,8 +206,7 @@ class Spline(PiecewisePolynomial):
             raise InputError(
                 f"spline: expected degree 3, or 5 with ends rest or natural, got {degree} with {ends}"
             )
-        if ends not in ("rest", "natural", "periodic"):
-            raise InputError(unknown("ends", ends, ("rest", "natural", "periodic")))
+        expect_known("ends", ends, ("rest", "natural", "periodic"))
         if ends == "periodic" and not np.allclose(table[0], table[-1], rtol=0, atol=1e-12):
             raise InputError("points: expected the last to equal the first for periodic ends")
         if ends == "periodic":

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from nmm.arrays import positive
 from nmm.errors import InputError
-from nmm.functions.callbacks import differentiated, stage
+from nmm.functions.callbacks import of_configuration
 from nmm.functions.function import Function, Row, Stage
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
@@ -59,13 +59,4 @@ class CallableFunction(Function):
         return self._rows
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
-        function, jacobian = self.function, self.jacobian
-        callback = differentiated(
-            lambda t, configuration: function(configuration),
-            None,
-            None if jacobian is None else lambda t, configuration: jacobian(configuration),
-            len(self._rows),
-            "callable function",
-            depends_on_time=False,
-        )
-        return (stage(len(self._rows), robot.n, callback),)
+        return of_configuration(self.function, self.jacobian, len(self._rows), "callable function", robot)

@@ -1,4 +1,4 @@
-"""The kernel of poses: position and rotation vector of a frame, in world axes or in another frame's."""
+"""Poses: position and rotation vector of a frame, in world axes or in another frame's."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from nmm.arrays import Array
 from nmm.errors import InputError
-from nmm.functions.function import Row, Stage
+from nmm.functions.function import Function, Row, Shown, Stage
 from nmm.kernels.compiled import compiled, kernel, scratch
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.kernels.rotations import between3, left_jacobian_inverse3, log3, transposed_times3
@@ -84,22 +84,30 @@ def frame_pose(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
                 )
 
 
-def pose_rows(robot: Robot, frame: str, relative_to: str | None, parts: tuple[str, ...]) -> tuple[Row, ...]:
-    """The rows of some parts of a pose; `InputError` for a frame that the robot does not have."""
-    robot.frame_id(frame)
-    if relative_to is None:
+class PartsOfPose(Function):
+    """Some parts of a frame's pose, in world axes or as another frame, `relative_to`, sees it."""
+
+    frame: str
+    relative_to: str | None
+    parts: tuple[str, ...] = PARTS
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        robot.frame_id(self.frame)
         where = ""
-    else:
-        if robot.frame_id(relative_to) == robot.frame_id(frame):
-            raise InputError(
-                f"relative_to: expected another frame than {frame!r}, which is at rest in itself"
-            )
-        where = f" in {relative_to}"
-    return tuple(Row(f"{frame}.{part}{where}", UNITS[PARTS.index(part)]) for part in parts)
+        if self.relative_to is not None:
+            if robot.frame_id(self.relative_to) == robot.frame_id(self.frame):
+                raise InputError(
+                    f"relative_to: expected another frame than {self.frame!r}, which is at rest in itself"
+                )
+            where = f" in {self.relative_to}"
+        return tuple(Row(f"{self.frame}.{part}{where}", UNITS[PARTS.index(part)]) for part in self.parts)
 
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        frames = (self.frame,) if self.relative_to is None else (self.frame, self.relative_to)
+        picked = np.array([float(PARTS.index(part)) for part in self.parts])
+        return (Stage(frame_pose, len(self.parts), frames, picked),)
 
-def pose_stage(frame: str, relative_to: str | None, parts: tuple[str, ...]) -> Stage:
-    """The kernel for some parts of a pose."""
-    frames = (frame,) if relative_to is None else (frame, relative_to)
-    picked = np.array([float(PARTS.index(part)) for part in parts])
-    return Stage(frame_pose, len(parts), frames, picked)
+    def shown(self) -> Shown:
+        if self.relative_to is not None:
+            return Shown()
+        return Shown(self.frame, {part: row for row, part in enumerate(self.parts) if part in PARTS[:3]})

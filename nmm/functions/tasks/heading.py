@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, vector
-from nmm.errors import InputError, unknown
+from nmm.errors import InputError, expect_known
 from nmm.functions.function import Function, Row, Stage
 from nmm.kernels.compiled import kernel, scratch
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
@@ -63,16 +63,14 @@ class Heading(Function):
     def __init__(self, frame: str, direction: str | ArrayLike = "x", about: str = "z") -> None:
         self.frame = frame
         if isinstance(direction, str):
-            if direction not in UNIT:
-                raise InputError(unknown("direction", direction, UNIT, "direction"))
+            expect_known("direction", direction, UNIT, "direction")
             direction = UNIT[direction]
         self.direction = vector(direction, 3, "direction")
         length = float(np.linalg.norm(self.direction))
         if length == 0.0:
             raise InputError("direction: expected a vector that is not zero")
         self.direction /= length
-        if about not in PLANES:
-            raise InputError(unknown("axis", about, PLANES, "about"))
+        expect_known("axis", about, PLANES, "about")
         self.about = about
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from nmm.arrays import Array
-from nmm.functions.function import Function, Row, Shown, Stage
-from nmm.functions.tasks.frame_pose import PARTS, pose_rows, pose_stage
+from nmm.functions.function import Shown
+from nmm.functions.tasks.frame_pose import PARTS, PartsOfPose
 from nmm.kernels.compiled import kernel, scratch
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.kernels.rotations import (
@@ -16,9 +16,6 @@ from nmm.kernels.rotations import (
     times3,
     transposed_times3,
 )
-from nmm.robots.robot import Robot
-
-TURNS = PARTS[3:]
 
 
 @kernel(FUNCTION)
@@ -55,7 +52,7 @@ def orientation_error(at: At, frames: Frames, numbers: Array, rows: Rows) -> Non
                 rows.value_q[6 + i, k] = forward[i] - backward[i]
 
 
-class Orientation(Function):
+class Orientation(PartsOfPose):
     """Orientation of a frame as its rotation vector φ (3,), rad: R = exp(φ^), |φ| at most π.
 
     φ jumps where the angle passes π; the task does not: its error is not g - φ but e = log(RᵀR_d), the
@@ -73,16 +70,11 @@ class Orientation(Function):
     """
 
     comparison = orientation_error
+    parts = PARTS[3:]
 
     def __init__(self, frame: str, relative_to: str | None = None) -> None:
         self.frame = frame
         self.relative_to = relative_to
-
-    def rows(self, robot: Robot) -> tuple[Row, ...]:
-        return pose_rows(robot, self.frame, self.relative_to, TURNS)
-
-    def stages(self, robot: Robot) -> tuple[Stage, ...]:
-        return (pose_stage(self.frame, self.relative_to, TURNS),)
 
     def shown(self) -> Shown:
         return Shown(turns=self.frame)

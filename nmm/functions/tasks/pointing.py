@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, vector
-from nmm.errors import InputError, unknown
+from nmm.errors import InputError, expect_known
 from nmm.functions.function import Function, Row, Shown, Stage
 from nmm.functions.references.polynomial import Constant
 from nmm.functions.tasks.heading import UNIT
@@ -99,8 +99,7 @@ class Pointing(Function):
         self.frame = frame
         self.at = as_point(at, "at")
         if isinstance(axis, str):
-            if axis not in UNIT:
-                raise InputError(unknown("axis", axis, UNIT, "axis"))
+            expect_known("axis", axis, UNIT, "axis")
             axis = UNIT[axis]
         direction = vector(axis, 3, "axis")
         length = float(np.linalg.norm(direction))

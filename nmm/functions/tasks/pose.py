@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from nmm.arrays import Array
-from nmm.functions.function import Function, Row, Shown, Stage
-from nmm.functions.tasks.frame_pose import PARTS, pose_rows, pose_stage
+from nmm.functions.tasks.frame_pose import PartsOfPose
 from nmm.kernels.compiled import kernel, scratch
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.kernels.rotations import (
@@ -16,7 +15,6 @@ from nmm.kernels.rotations import (
     log6_jacobian,
     transposed_times3,
 )
-from nmm.robots.robot import Robot
 
 
 @kernel(FUNCTION)
@@ -70,7 +68,7 @@ def pose_error(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
                 rows.value_q[15 + i, k] = angular
 
 
-class Pose(Function):
+class Pose(PartsOfPose):
     """Pose T of a frame, (6,): position p (m) over rotation vector φ (rad), R = exp(φ^), |φ| at most π.
 
     The task's error is e = log6(T⁻¹T_d): the body velocity, linear (m) over angular (rad) in the frame's own
@@ -92,14 +90,3 @@ class Pose(Function):
     def __init__(self, frame: str, relative_to: str | None = None) -> None:
         self.frame = frame
         self.relative_to = relative_to
-
-    def rows(self, robot: Robot) -> tuple[Row, ...]:
-        return pose_rows(robot, self.frame, self.relative_to, PARTS)
-
-    def stages(self, robot: Robot) -> tuple[Stage, ...]:
-        return (pose_stage(self.frame, self.relative_to, PARTS),)
-
-    def shown(self) -> Shown:
-        if self.relative_to is not None:
-            return Shown()
-        return Shown(self.frame, {axis: row for row, axis in enumerate(PARTS[:3])})

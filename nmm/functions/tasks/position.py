@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, vector
 from nmm.errors import InputError
-from nmm.functions.function import Function, Row, Shown, Stage
+from nmm.functions.function import Function, Stage
 from nmm.functions.references.polynomial import Constant
-from nmm.functions.tasks.frame_pose import pose_rows, pose_stage
+from nmm.functions.tasks.frame_pose import PartsOfPose
 from nmm.kernels.compiled import kernel
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import Robot
@@ -38,7 +38,7 @@ def picked_axes(axes: str | Sequence[str]) -> tuple[str, ...]:
     return picked
 
 
-class Position(Function):
+class Position(PartsOfPose):
     """Position (m) of the origin of `frame`, in world axes or as another frame sees it.
 
     Parameters
@@ -51,22 +51,14 @@ class Position(Function):
 
     def __init__(self, frame: str, axes: str | Sequence[str] = "xyz", relative_to: str | None = None) -> None:
         self.frame = frame
-        self.axes = picked_axes(axes)
+        self.axes = self.parts = picked_axes(axes)
         self.relative_to = relative_to
-
-    def rows(self, robot: Robot) -> tuple[Row, ...]:
-        return pose_rows(robot, self.frame, self.relative_to, self.axes)
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
         if self.relative_to is not None:
-            return (pose_stage(self.frame, self.relative_to, self.axes),)
+            return super().stages(robot)
         picked = np.array([float(AXES[axis]) for axis in self.axes])
         return (Stage(position, len(self.axes), (self.frame,), picked),)
-
-    def shown(self) -> Shown:
-        if self.relative_to is not None:
-            return Shown()
-        return Shown(self.frame, {axis: row for row, axis in enumerate(self.axes)})
 
 
 def as_point(given: Function | str | ArrayLike, name: str) -> Function:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nmm.arrays import Array
-from nmm.errors import InputError, unknown
+from nmm.errors import InputError, expect_known
 from nmm.platforms.wheeled.descriptions import MAIN, CasterWheel, Hitch, OmniWheel, SteeredWheel, Wheel
 
 
@@ -48,11 +48,9 @@ class Bodies:
     def __init__(self, wheels: Sequence[Wheel], hitches: Sequence[Hitch]) -> None:
         names = [MAIN, *(hitch.joint for hitch in hitches)]
         for hitch in hitches:
-            if hitch.carrier not in names:
-                raise InputError(unknown("carrier", hitch.carrier, names, f"hitch {hitch.joint}"))
+            expect_known("carrier", hitch.carrier, names, f"hitch {hitch.joint}")
         for wheel in wheels:
-            if wheel.body not in names:
-                raise InputError(unknown("body", wheel.body, names, f"wheel {wheel.name}"))
+            expect_known("body", wheel.body, names, f"wheel {wheel.name}")
         self.all: list[Body] = [Body(MAIN, 0, 0j)]
         self._add_carried_by(0, wheels, hitches)
         left = [hitch.joint for hitch in hitches if hitch.joint not in self.names]

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from nmm.arrays import Array, scalar
-from nmm.errors import InputError, unknown
+from nmm.errors import expect_known
 from nmm.platforms.wheeled.descriptions import CasterWheel, SteeredWheel, Wheel
 from nmm.platforms.wheeled.geometry import Bodies, Term, rolling_term
 
@@ -25,8 +25,7 @@ def wheel_rates(
     """The rates of every wheel; `swivels` are the casters' angles now (rad), zero for those not named."""
     casters = [wheel.name for wheel in wheels if isinstance(wheel, CasterWheel)]
     for name in swivels:
-        if name not in casters:
-            raise InputError(unknown("caster", name, casters, "swivels"))
+        expect_known("caster", name, casters, "swivels")
     found = {}
     for wheel in wheels:
         if isinstance(wheel, CasterWheel):

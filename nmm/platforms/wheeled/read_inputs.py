@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from nmm.arrays import Array
-from nmm.errors import InputError, unknown
+from nmm.errors import InputError, expect_known, unknown
 from nmm.platforms.wheeled.descriptions import MAIN, FixedWheel, SteeredWheel, Wheel
 from nmm.platforms.wheeled.geometry import Bodies, Term, rolling_term
 from nmm.platforms.wheeled.inputs import CommonSpeed, Input, Speed, Spin, Spins
@@ -113,6 +113,5 @@ def _common(bodies: Bodies, pair: Sequence[Wheel]) -> Common:
 
 
 def _wheel(name: str, wheels: Mapping[str, Wheel], where: str) -> Wheel:
-    if name not in wheels:
-        raise InputError(unknown("wheel", name, wheels, f"input {where}"))
+    expect_known("wheel", name, wheels, f"input {where}")
     return wheels[name]

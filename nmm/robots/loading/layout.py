@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
-from nmm.arrays import positive
-from nmm.errors import InputError, RobotError, unknown
+from nmm.arrays import Array, positive
+from nmm.errors import InputError, RobotError, expect_known
 from nmm.platforms.layout import HITCHES, STEERING, SWIVELS, Layout, Pivot, RollingJoint
 from nmm.robots.loading.chain import CHAIN
 from nmm.robots.loading.joint_kinds import axis, is_revolute, kind
-
-Array = NDArray[np.float64]
 
 # How far from level or upright an axis may be: files write pi/2 with a few digits.
 _LEVEL = 1e-3
@@ -81,8 +78,7 @@ class Measured:
 
     def axis(self, joint: int) -> Array:
         """The joint's axis, in the root link's frame."""
-        turned: Array = self.placements[joint].rotation @ axis(self.model.joints[joint], self.neutral)
-        return turned
+        return np.asarray(self.placements[joint].rotation @ axis(self.model.joints[joint], self.neutral))
 
     def is_upright(self, joint: int) -> bool:
         """Whether it turns about an upright axis, which may point up or down."""
@@ -124,9 +120,41 @@ class Measured:
         if isinstance(wheels, str) or not isinstance(wheels, Iterable):
             raise RobotError(f"{self.where}: wheels: expected a list of joint names, got {wheels!r}")
         for name in wheels:
-            if name not in self.joints:
-                raise RobotError(unknown("wheel joint", name, self.joints, self.where))
+            expect_known("wheel joint", name, self.joints, self.where, RobotError)
         return {name: wheels[name] if isinstance(wheels, Mapping) else None for name in wheels}
+
+    def wheels(
+        self,
+        asked: Sequence[str] | Mapping[str, float] | None,
+        why_not: Callable[[str, Collection[str]], str | None],
+        own: Collection[str] = (),
+    ) -> tuple[dict[str, float | None], tuple[str, ...]]:
+        """The joints that are wheels with their radii (m), where given, and notes on those only named so.
+
+        Parameters
+        ----------
+        asked : joints that have to be, or the radius of each; None finds them by name
+        why_not : of a joint and all that may be wheels, why it is none; None for one that is
+        own : joints that are none, whatever their names
+
+        Raises
+        ------
+        RobotError : one asked for that is no joint, or no wheel
+        """
+        radii = self.asked(asked)
+        named = [name for name, i in self.joints.items() if self.is_named_wheel(i) and name not in own]
+        candidates = dict.fromkeys(named) if radii is None else radii
+        found: dict[str, float | None] = {}
+        notes: list[str] = []
+        for name, radius in candidates.items():
+            reason = why_not(name, candidates)
+            if reason is None:
+                found[name] = radius
+            elif radii is None:
+                notes.append(f"{name} stays a coordinate in spite of its name: {reason}")
+            else:
+                raise RobotError(f"{self.where}: joint {name!r} is no wheel: {reason}")
+        return found, tuple(notes)
 
     def radius(self, joint: int, given: float | None = None) -> float:
         """The wheel's radius, m: as given, or its centre's height over the root link's xy plane, or its
@@ -187,15 +215,8 @@ def measure_layout(
     RobotError : a name that is no joint, or no wheel, or a wheel whose radius cannot be found
     """
     measured = Measured(model, geometries, where)
-    asked = measured.asked(wheels)
-    radii: dict[int, float | None] = {}
-    for name, joint in measured.joints.items():
-        if name in asked if asked is not None else measured.is_named_wheel(joint):
-            reason = _why_no_wheel(measured, joint)
-            if reason is None:
-                radii[joint] = asked[name] if asked is not None else None
-            elif asked is not None:
-                raise RobotError(f"{where}: joint {name!r} is no wheel: {reason}")
+    given, _ = measured.wheels(wheels, lambda name, _: _why_no_wheel(measured, measured.joints[name]))
+    radii = {joint: given[name] for name, joint in measured.joints.items() if name in given}
     carrying = {joint for wheel in radii for joint in measured.above(wheel)}
     pivots = [
         joint

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from nmm.errors import InputError, RobotError, unknown
+from nmm.errors import InputError, RobotError, expect_known
 from nmm.platforms import Layout, Platform, Unicycle, platform_by_name
 from nmm.robots.loading.axle import axle_note, axle_placement
 from nmm.robots.loading.chain import CHAIN, Rebuilt, rebuild
@@ -20,8 +20,9 @@ from nmm.robots.loading.provenance import Parts
 from nmm.robots.loading.reduction import at_zero
 from nmm.robots.loading.source import Source
 from nmm.robots.loading.wheels import find_wheels, held_joints
-from nmm.robots.robot import Robot, Wheel
+from nmm.robots.robot import Robot
 from nmm.robots.slip import slip_warnings
+from nmm.robots.wheel import Wheel
 
 #: Adds its pairs to the collision shapes on a model.
 AddPairs = Callable[[pin.Model, pin.GeometryModel], None]
@@ -102,8 +103,7 @@ def _own_joints(
     for name in own:
         if name in lock:
             raise RobotError(f"{where}: lock: {name} is a coordinate of the {platform.name} platform")
-        if name not in joints:
-            raise RobotError(unknown("platform joint", name, joints, where))
+        expect_known("platform joint", name, joints, where, RobotError)
     return own
 
 

@@ -11,10 +11,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from nmm.arrays import array
-from nmm.errors import InputError, unknown
+from nmm.arrays import Array, array
+from nmm.errors import InputError, expect_known, unknown
 from nmm.robots.loading.chain import CHAIN_JOINTS, Head, rebuild, replaced_joints
 from nmm.robots.loading.joint_kinds import is_continuous, is_mimic, is_simple, kind
 from nmm.robots.loading.provenance import parts_of, provenance_of
@@ -23,7 +23,6 @@ from nmm.robots.loading.root_layout import ROOTS, ChainRoot, RootLayout
 from nmm.robots.meshes import read_meshes
 from nmm.robots.robot import Robot
 
-Array = NDArray[np.float64]
 Root = Literal["planar", "freeflyer", "chain"]
 
 # How far a locked joint may be from where it is locked, rad or m.
@@ -63,8 +62,7 @@ def pinocchio_models(robot: Robot, root: Root | str = "planar") -> PinocchioMode
 
 def _models(robot: Robot, root: Root | str) -> PinocchioModels:
     """The models, whose meshes need not be read yet."""
-    if root not in ROOTS:
-        raise InputError(unknown("root", root, ROOTS))
+    expect_known("root", root, ROOTS)
     rolling = dict.fromkeys(name for wheel in robot.wheels for name in wheel.joints)
     shapes = robot.shapes.visual_model, parts_of(robot).collision_model
     model, shapes = at_zero(robot.display_model, shapes, rolling)

@@ -7,11 +7,9 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from nmm.arrays import Array
 from nmm.errors import InputError
-
-Array = NDArray[np.float64]
 
 # How far a root may be from upright or its height, or a pair from unit length: numbers have a few digits.
 _LEVEL = 1e-6

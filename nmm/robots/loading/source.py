@@ -10,7 +10,7 @@ from typing import Literal
 import pinocchio as pin
 
 from nmm.bundled import bundled_robots
-from nmm.errors import RobotError, unknown
+from nmm.errors import RobotError, expect_known, unknown
 from nmm.robots.followers import Follower
 from nmm.robots.loading.chain import followers_of
 from nmm.robots.loading.check import check
@@ -64,8 +64,7 @@ def read_file(
     missing_meshes: Literal["error", "skip"],
 ) -> Source:
     """The models of a bundled robot or of a file; see `load`."""
-    if missing_meshes not in ("error", "skip"):
-        raise RobotError(unknown("missing_meshes", missing_meshes, ["error", "skip"]))
+    expect_known("missing_meshes", missing_meshes, ("error", "skip"), error=RobotError)
     description = describe(_path(source, package_dirs), arguments, package_dirs)
     where, packages = str(source), description.packages
     meshes: dict[str, Path | None] = {}

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 import numpy as np
 import pinocchio as pin
 
-from nmm.errors import RobotError
 from nmm.robots.loading.layout import Measured
-from nmm.robots.robot import Wheel
+from nmm.robots.wheel import Wheel
 
 
 def find_wheels(
@@ -41,9 +40,8 @@ def find_wheels(
     RobotError : a name that is no joint, or no wheel, or a wheel whose radius cannot be found
     """
     measured = Measured(model, geometries, where)
-    names, notes = _wheel_joints(measured, asked, own)
-    radii = measured.asked(asked) or {}
-    return tuple(_wheel(measured, name, radii.get(name), own, roller) for name in names), notes
+    radii, notes = _wheels(measured, asked, own)
+    return tuple(_wheel(measured, name, radii[name], own, roller) for name in radii), notes
 
 
 def held_joints(
@@ -58,31 +56,15 @@ def held_joints(
     RobotError : a name that is no joint, or no wheel
     """
     measured = Measured(model, (), where)
-    names, notes = _wheel_joints(measured, asked, ())
+    names, notes = _wheels(measured, asked)
     held = [joint for name in names for joint in (_swivel(measured, name, ()), name) if joint]
     return tuple(dict.fromkeys(held)), notes
 
 
-def _wheel_joints(
-    measured: Measured, asked: Sequence[str] | Mapping[str, float] | None, own: Sequence[str]
-) -> tuple[list[str], tuple[str, ...]]:
-    """Names of the wheels' joints, and notes on joints that are named wheels and are none."""
-    radii = measured.asked(asked)
-    if radii is None:
-        candidates = [name for name, i in measured.joints.items() if measured.is_named_wheel(i)]
-        candidates = [name for name in candidates if name not in own]
-    else:
-        candidates = list(radii)
-    names, notes = [], []
-    for name in candidates:
-        reason = _why_no_wheel(measured, name, candidates, own)
-        if reason is None:
-            names.append(name)
-        elif radii is None:
-            notes.append(f"{name} stays a coordinate in spite of its name: {reason}")
-        else:
-            raise RobotError(f"{measured.where}: joint {name!r} is no wheel: {reason}")
-    return names, tuple(notes)
+def _wheels(
+    measured: Measured, asked: Sequence[str] | Mapping[str, float] | None, own: Sequence[str] = ()
+) -> tuple[dict[str, float | None], tuple[str, ...]]:
+    return measured.wheels(asked, lambda name, others: _why_no_wheel(measured, name, others, own), own)
 
 
 def _swivel(measured: Measured, name: str, own: Sequence[str]) -> str:
@@ -92,7 +74,9 @@ def _swivel(measured: Measured, name: str, own: Sequence[str]) -> str:
     return carrier_name if carrier > measured.root and carrier_name not in own else ""
 
 
-def _why_no_wheel(measured: Measured, name: str, candidates: Sequence[str], own: Sequence[str]) -> str | None:
+def _why_no_wheel(
+    measured: Measured, name: str, candidates: Collection[str], own: Sequence[str]
+) -> str | None:
     if name in own:
         return "it is the platform's own"
     joint = measured.joints[name]
