@@ -207,6 +207,12 @@ def test_an_undefined_objective_is_an_error(robot_2r: Robot) -> None:
             Controller(robot_2r, TIP, resolver, steep)(0.0, np.zeros(5))
 
 
+def test_a_resolver_that_answers_nonsense_is_named(robot_2r: Robot) -> None:
+    resolver = CallableResolver(lambda problem: np.full(4, np.nan))
+    with pytest.raises(SingularError, match="not finite: the resolver's answer"):
+        Controller(robot_2r, TIP, resolver)(0.0, np.zeros(5))
+
+
 def test_errors_have_one_root() -> None:
     assert issubclass(InputError, NmmError)
     assert issubclass(SingularError, NmmError)

@@ -224,7 +224,7 @@ def test_a_start_that_breaks_a_follower_is_refused_by_name(tmp_path: Path) -> No
     task = nmm.Task(nmm.Coordinates("m"), nmm.Constant(0.2, "rad"), 1.0)
     controller = nmm.Controller(loaded, task, nmm.ProjectedGradient())
     q = loaded.q({"j": 0.2})
-    said = r"l is at 0\.6 rad, and j has it at 0\.5 \(l = 2 j \+ 0\.1\)"
+    said = r"l is at 0\.6 rad; it follows j, which has it at 0\.5 \(l = 2 j \+ 0\.1\)"
     for broken in ({"j": 0.2, "l": 0.6}, [*q[:4], 0.6, *q[5:]]):
         with pytest.raises(InputError, match=said):
             nmm.simulate(controller, broken, 0.1)
@@ -492,7 +492,7 @@ def test_a_scenario_runs_is_stored_and_read(tmp_path: Path) -> None:
     np.testing.assert_array_equal(again.q, run.q)
     assert again.robot.followers == run.robot.followers
     assert again.robot.fingerprint == run.robot.fingerprint
-    with pytest.raises(InputError, match=rf"{FINGERS[1]} is at 0\.02 m, and {FINGERS[0]} has it at 0\.03"):
+    with pytest.raises(InputError, match=rf"{FINGERS[1]} is at 0\.02 m; it follows {FINGERS[0]}, .* 0\.03"):
         scenario(tmp_path, SCENARIO, **{f"q0__{FINGERS[1]}": 0.02}).run()
 
 
@@ -604,7 +604,7 @@ def test_maps_move_followers_along() -> None:
 
 def test_info_and_the_viewer_tell_who_follows(capsys: pytest.CaptureFixture[str]) -> None:
     assert status_of(["info", PANDA, "--platform", "fixed"]) == 0
-    assert "follows: panda_finger_joint2 = panda_finger_joint1" in capsys.readouterr().out
+    assert capsys.readouterr().out.count("panda_finger_joint2 = panda_finger_joint1") == 1
     robot = panda("omni_base")
     (joints,) = [command for command in viewer_scene(robot, robot.rest) if command["type"] == "joints"]
     listed = {one["name"]: one["follows"] for one in joints["coordinates"]}

@@ -155,6 +155,17 @@ def test_a_rate_that_is_not_the_targets_is_told(robot_2r: Robot) -> None:
     assert any("otherwise than its rate says" in warning for warning in run.warnings)
 
 
+def test_a_target_that_moves_as_its_rate_says_is_not_blamed(robot_2r: Robot) -> None:
+    """Inputs are clipped while the target goes round: that alone is why the error left its promise."""
+    circle = nmm.Circle(center=[2, 2], radius=3, rate=0.25, phase=4.0)
+    resolver = nmm.CallableResolver(lambda p: np.clip(np.linalg.pinv(p.J) @ p.rate, -1.0, 1.0))
+    controller = nmm.Controller(robot_2r, nmm.Task(nmm.Position("ee", "xy"), circle, 1.0), resolver)
+    run = nmm.simulate(controller, {"x": -1, "y": -1, "theta": np.pi}, 15.0, 0.02)
+    said = " ".join([run.message, *run.warnings])
+    assert "clipped" in said
+    assert "otherwise than its rate says" not in said
+
+
 # Chattering
 
 

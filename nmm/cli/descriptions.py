@@ -86,8 +86,6 @@ def _show(robot: Robot, tasks: Sequence[tuple[str, int]]) -> None:
     show_text()
     for name, inputs in robot.groups.items():
         show_text(f"group {name}: {', '.join(inputs) or 'none'}")
-    for follower in robot.followers:
-        show_text(f"follows: {follower}")
     show_text(f"frames: {', '.join(robot.frames)}")
     for name, value in robot.platform.described().items():
         show_text(f"platform {name}: {value}")
@@ -124,7 +122,7 @@ def _arm(robot: Robot, joint: str) -> str:
 
 
 def _limit(value: float) -> str:
-    return f"{value:.4g}" if isfinite(value) and abs(value) < UNBOUNDED else "-"
+    return f"{value + 0.0:.4g}" if isfinite(value) and abs(value) < UNBOUNDED else "-"  # no -0
 
 
 def _wheel(wheel: Wheel) -> list[str]:

@@ -237,16 +237,21 @@ class Controller:
         problem = self.robot.platform.problem(q[: self.robot.platform.n_p])
         status = Status(int(self._step.answer.status[()]))
         also = "" if problem is None else f"; {problem}"
-        raise SingularError(f"at t = {t:g} s: {status.meaning}{self._lost(status, q)}{also}")
+        raise SingularError(f"at t = {t:g} s: {status.meaning}{self._reason(status, q)}{also}")
 
-    def _lost(self, status: Status, q: Array) -> str:
-        """What no input gives, where J lost rank."""
-        J = self._step.problem.J
+    def _reason(self, status: Status, q: Array) -> str:
+        """What no input gives, where J lost rank; what is not finite, where something is not."""
+        problem = self._step.problem
+        J = problem.J
+        if status is Status.NOT_FINITE:
+            if all(np.isfinite(part).all() for part in (J, problem.rate, problem.h)):
+                return ": the resolver's answer, though J, rate and h are finite"
+            return ": the task, its reference or the objective is undefined here"
         if status is not Status.SINGULAR_J or not np.all(np.isfinite(J)):
             return ""
         turned = in_world_axes(J, self.task, self.robot, q)
         lost = lost_directions(turned, self.rows, row_scales(self.rows, self.robot))
-        return f" (no input gives: {', '.join(lost)})" if lost else ""
+        return f", and the task asks for what no input gives: {', '.join(lost)}" if lost else ""
 
     def evaluate(self, t: float, q: ArrayLike) -> Step:
         """All quantities at (t, q); a singular matrix is reported in `status`, not raised.

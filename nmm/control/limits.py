@@ -232,7 +232,7 @@ def _per_input(given: float | Mapping[str, float] | None, robot: Robot, what: st
 def _inputs(name: str, robot: Robot, what: str) -> list[int]:
     if name in robot.groups:
         return [robot.input(one) for one in robot.groups[name]]
-    expect_known(f"{what}: input or group", name, [*robot.u_names, *robot.groups])
+    expect_known("input or group", name, [*robot.u_names, *robot.groups], what)
     return [robot.input(name)]
 
 
@@ -246,7 +246,7 @@ def _wheel_limits(
         raise InputError(f"wheels: robot {robot.name} has no wheels on its main body whose rates are known")
     if isinstance(given, Mapping):
         for name in given:
-            expect_known("wheels: wheel", name, names)
+            expect_known("wheel", name, names, "wheels")
         chosen = [i for i, name in enumerate(names) if name in given]
         return tuple(names[i] for i in chosen), rows[chosen], np.array([given[names[i]] for i in chosen])
     return names, rows, np.full(len(names), float(given))

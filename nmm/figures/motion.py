@@ -9,7 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from matplotlib.path import Path
 from numpy.typing import ArrayLike
+from scipy.spatial import KDTree
 
 from nmm.arrays import Array
 from nmm.errors import InputError
@@ -19,8 +21,10 @@ from nmm.figures.views import ABOVE, SIDE, View, Viewed, page
 from nmm.playback.placements import base_position
 from nmm.runs.trajectory import Trajectory
 
-#: Distance of a time's label from what it belongs to, m.
-_LABEL = 0.12
+#: Distance of a time's label from what it belongs to, as a share of the figure's larger side.
+_LABEL = 0.03
+#: Such a label is wider than high: distances across count less.
+_FLAT = (0.35, 1.0)
 #: When no instants are given: at most so many, at least so many, a platform's length apart.
 MOST, LEAST = 11, 4
 #: Strength of the earliest drawing, of 1 for the last.
@@ -132,29 +136,39 @@ class Scene(Viewed):
 
 
 def _label_places(poses: Sequence[Pose], lines: Sequence[Array]) -> Array:
-    """Where the times are written, (k, 2): beside each platform, where the least else is drawn."""
-    drawn = [_outline(pose) for pose in poses] + [line[:: max(1, len(line) // 300), :2] for line in lines]
+    """Where the times are written, (k, 2): near each platform, clear of drawings if there is room."""
+    drawn = np.vstack(
+        [_outline(pose) for pose in poses] + [line[:: max(1, len(line) // 300), :2] for line in lines]
+    )
+    nearest = KDTree(drawn * _FLAT)
+    covered = [Path(hull(shape[:, :2])) for pose in poses for shape in [*pose.body, *pose.wheels]]
     angles = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+    directions = np.column_stack([np.cos(angles), np.sin(angles)])
+    away = _LABEL * float(np.ptp(drawn, axis=0).max())
+    width = 2.0 * away * np.array([[-1.0, 0.0], [0.0, 0.0], [1.0, 0.0]])
     places: list[Array] = []
     for pose in poses:
         body = pose.main[:, :2]
         centre = 0.5 * (body.min(axis=0) + body.max(axis=0))
-        reach = float(np.linalg.norm(body - centre, axis=1).max())
-        candidates = centre + (reach + _LABEL) * np.column_stack([np.cos(angles), np.sin(angles)])
-        occupied = np.vstack([*drawn, *[place[None] for place in places]])
-        near = occupied[np.abs(occupied - centre).max(axis=1) < 3.0 * reach + 4.0 * _LABEL]
-        # A text is wider than high: distances across count half.
-        offsets = (candidates[:, None] - near[None]) * (0.5, 1.0)
-        clearance = np.linalg.norm(offsets, axis=2).min(axis=1)
+        edge = np.max(directions @ (body - centre).T, axis=1)
+        farther = np.repeat(np.linspace(0.0, edge.max(), 9), len(angles))
+        candidates = centre + (np.tile(edge + away, 9) + farther)[:, None] * np.tile(directions, (9, 1))
+        others = np.vstack([np.full((1, 2), np.inf), *[place + width for place in places]])
+        beside = np.linalg.norm((candidates[:, None] - others) * _FLAT, axis=2).min(axis=1)
+        clear = np.minimum(nearest.query(candidates * _FLAT)[0], beside)
+        clearance = np.minimum(clear, away) - 0.1 * farther
+        clearance[np.any([shape.contains_points(candidates) for shape in covered], axis=0)] -= edge.max()
         places.append(candidates[int(np.argmax(clearance))])
     return np.array(places)
 
 
 def _outline(pose: Pose) -> Array:
-    """Points spread over a robot's drawing from above."""
-    fractions = np.linspace(0.0, 1.0, 6)[:, None]
-    links = [ends[0] + fractions * (ends[1] - ends[0]) for ends in pose.links]
-    return np.vstack([*pose.body, *pose.wheels, *links])[:, :2]
+    """Points along a robot's drawing from above."""
+    fractions = np.linspace(0.0, 1.0, 8)[:, None]
+    edges = [hull(shape[:, :2]) for shape in [*pose.body, *pose.wheels]]
+    lines = [side for edge in edges for side in zip(edge, np.roll(edge, -1, axis=0), strict=True)]
+    lines += [(ends[0, :2], ends[1, :2]) for ends in pose.links]
+    return np.vstack([start + fractions * (end - start) for start, end in lines])
 
 
 def _how_many(trajectory: Trajectory, silhouette: Silhouette) -> int:

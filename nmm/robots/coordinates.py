@@ -204,7 +204,8 @@ class Coordinates:
     def _strays(self, q: Array) -> list[str]:
         placed = self.following.placed(q)
         return [
-            f"{one.joint} is at {q[i]:g} {self.q_units[i]}, and {one.leader} has it at {placed[i]:g} ({one})"
+            f"{one.joint} is at {q[i]:g} {self.q_units[i]}; it follows {one.leader}, which has it at "
+            f"{placed[i]:g} ({one})"
             for one, i in zip(self.followers, self.following.columns, strict=True)
             if not abs(q[i] - placed[i]) <= SLACK * max(1.0, abs(placed[i]))
         ]

@@ -10,7 +10,7 @@ from nmm.arrays import Array
 from nmm.control.controller import Controller
 from nmm.errors import RunError
 from nmm.runs.integrators import Integrator
-from nmm.runs.promise import Departure, adaptive_errors, departure, step_errors
+from nmm.runs.promise import ENDS, Departure, Samples, adaptive_errors, decay, departure, step_errors
 from nmm.runs.recording import Recorder
 from nmm.runs.stability import Instability, find_instability
 
@@ -60,9 +60,20 @@ def _assess(controller: Controller, recorder: Recorder, advance: Integrator, dt:
     if found is not None:  # then it is worth the time to ask the target
         moved = _target_moves(controller, recorder)
         found = departure(samples, steps, moved)
-        own = int(np.sum(moved > 1e-9 * (1.0 + np.abs(samples.error).max())))
-        own = own if own > OFTEN * len(moved) else 0
+        own = _own_moves(samples, moved)
     return Assessment(unstable, examined, found, own)
+
+
+def _own_moves(samples: Samples, moved: Array) -> int:
+    """In how many steps the target moved otherwise than its rate says, by what counts; 0 where seldom.
+
+    What counts, were it so in every step, would add to the error as much as is judged: less is what the
+    trapezoids of `_target_moves` miss of any target that does not move uniformly.
+    """
+    decays = decay(samples.t, samples.K)
+    counts = ENDS * (1.0 + float(np.linalg.norm(samples.error[0])))
+    own = int(np.sum(moved > counts * np.maximum(1.0 - decays, 1.0 / len(moved))))
+    return own if own > OFTEN * len(moved) else 0
 
 
 def _target_moves(controller: Controller, recorder: Recorder) -> Array:

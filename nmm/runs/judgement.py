@@ -173,7 +173,7 @@ def _told(samples: Samples, found: Departure) -> str:
 
     when, worst = f"t = {t[found.first]:.4g} s", f"t = {t[found.worst]:.4g} s"
     return (
-        f"the task error was not what its gain promises: it began with {norm[0]:.3g}, left that at {when}, "
+        f"the task error was not what its gain promises from {when} on: it began with {norm[0]:.3g}, "
         f"was {at(found.worst)} at {worst} and {at(-1)} at the end"
     )
 
