@@ -13,8 +13,18 @@ import pinocchio as pin
 import pytest
 from command_line import process
 from gripping import folding
-from playback_browser import PROJECT, UPRIGHT, WALK, Window, assert_same, drawn_visuals, expected_visuals
+from playback_browser import (
+    PROJECT,
+    UPRIGHT,
+    WALK,
+    Window,
+    assert_same,
+    draw_frames,
+    drawn_visuals,
+    expected_visuals,
+)
 from playback_browser import browser as browser
+from playback_browser import empty_page as empty_page
 from playback_browser import window as window
 from playback_robot import hand_built_robot
 from playwright.sync_api import Page
@@ -166,7 +176,7 @@ def test_the_pose_of_a_frame_is_told(robot_3r: Robot, window: Window) -> None:
 
 
 def visible_names(page: Page) -> set[str]:
-    page.wait_for_timeout(150)  # names follow the picture
+    draw_frames(page)  # names follow the picture
     return set(page.locator("#labels span:visible").all_inner_texts())
 
 
