@@ -26,7 +26,7 @@ from playback_browser import small_robot as small_robot
 from playback_browser import window as window
 from playback_robot import drive, hand_built_robot
 from playwright.sync_api import Page
-from ports import listening, start_player
+from ports import MOST, listening, start_player
 
 import nmm
 from nmm.playback import LiveViewer, Motion
@@ -286,7 +286,7 @@ def test_motions_play_live_until_the_process_ends(window: Window, tmp_path: Path
             assert_same(drawn_visuals(page), expected_visuals(robot, frames.q[k], frames.wheels[k]))
         assert_in_picture(page, [motion], [0.0, 0.5, 1.0])
         process.send_signal(number)
-        process.communicate(timeout=10)
+        process.communicate(timeout=MOST)
         assert port not in listening()
         # What it got, it can go on playing.
         page.evaluate("nmm.player.seek(0.5)")

@@ -28,7 +28,7 @@ from playback_browser import empty_page as empty_page
 from playback_browser import window as window
 from playback_robot import hand_built_robot
 from playwright.sync_api import Page
-from ports import free_port, listening, wait_for
+from ports import MOST, free_port, listening, wait_for
 
 import nmm
 from nmm.playback import view
@@ -65,7 +65,7 @@ def shown(robot: Robot, **options: object) -> Iterator[str]:
         yield f"http://127.0.0.1:{port}/"
     finally:
         stop.set()
-        viewer.join(timeout=10)
+        viewer.join(timeout=MOST)
         assert port not in listening()
 
 
@@ -261,6 +261,6 @@ def test_the_command_shows_a_robot_until_it_is_interrupted(window: Window, tmp_p
     angles = Rolling(locked).settled(locked.q())
     assert_same(drawn_visuals(page), expected_visuals(locked, locked.q({"q2": q2}), angles))
     viewer.send_signal(signal.SIGINT)
-    _, err = viewer.communicate(timeout=15)
+    _, err = viewer.communicate(timeout=MOST)
     assert (viewer.returncode, err) == (0, "")
     assert port not in listening()
