@@ -24,7 +24,7 @@ def run(name: str, resolver: str = "rg", **settings: object) -> Trajectory:
 
 def check_legible(made: Figure) -> None:
     """Nothing is clipped, no legend lies over curves, every axis that has numbers says what they are."""
-    made.canvas.draw()
+    made.draw_without_rendering()  # places everything
     renderer = made.canvas.get_renderer()  # type: ignore[attr-defined]  # Agg's, which every canvas here is
     width, height = made.get_size_inches()
     box = made.get_tightbbox(renderer)

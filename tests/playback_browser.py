@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
 from playback_robot import hand_built_robot
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page, ViewportSize, sync_playwright
 
 from nmm.playback import Motion, write_html
 from nmm.playback.extent import corners, robot_boxes
@@ -68,20 +70,56 @@ def browser() -> Iterator[Browser]:
         chromium.close()
 
 
-@pytest.fixture
-def window(browser: Browser) -> Iterator[Window]:
-    """A small window (drawn by the processor); no test may leave an error or reach outside."""
-    page = browser.new_page(viewport={"width": 480, "height": 300})
-    window = Window(page)
-    page.on("pageerror", lambda error: window.errors.append(str(error)))
-    page.on("console", lambda message: message.type == "error" and window.errors.append(message.text))
-    page.on("request", lambda request: window.requests.append(request.url))
-    page.on("websocket", lambda socket: window.requests.append(socket.url))
-    yield window
+#: Small: the processor draws it.
+SIZE = ViewportSize(width=480, height=300)
+
+
+@pytest.fixture(scope="module")
+def empty_page(browser: Browser) -> Iterator[Page]:
+    """A page for one `watched` after another: another document costs half of what another page does."""
+    page = browser.new_page()
+    yield page
     page.close()
+
+
+@contextmanager
+def watched(page: Page) -> Iterator[Window]:
+    """A page's window, empty again afterwards; it may leave no error and not reach outside."""
+    page.set_viewport_size(SIZE)
+    window = Window(page)
+    handlers: dict[Any, Callable[[Any], object]] = {
+        "pageerror": lambda error: window.errors.append(str(error)),
+        "console": lambda message: message.type == "error" and window.errors.append(message.text),
+        "request": lambda request: window.requests.append(request.url),
+        "websocket": lambda socket: window.requests.append(socket.url),
+    }
+    for event, handler in handlers.items():
+        page.on(event, handler)
+    try:
+        yield window
+    finally:
+        page.goto("about:blank")
+        for event, handler in handlers.items():
+            page.remove_listener(event, handler)
     assert window.errors == []
     here = ("file:///", "http://127.0.0.1:", "ws://127.0.0.1:", "data:", "blob:")
     assert [url for url in window.requests if not url.startswith(here)] == []
+
+
+@pytest.fixture
+def window(empty_page: Page) -> Iterator[Window]:
+    with watched(empty_page) as window:
+        yield window
+
+
+def draw_frames(page: Page) -> None:
+    """Let the page draw: what follows the picture is then where the picture is."""
+    page.evaluate(
+        """() => new Promise((done) => {
+          const next = (left) => (left ? requestAnimationFrame(() => next(left - 1)) : done());
+          next(3);
+        })"""
+    )
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,9 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+#: Waited at most for what comes at once on an idle machine, s: a busy one may take its time.
+MOST = 60.0
+
 
 def listening() -> dict[int, str]:
     """Ports that something on this machine listens on, with the address, as the kernel says."""
@@ -29,7 +32,7 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def wait_for(condition: Callable[[], bool], timeout: float = 20.0) -> None:
+def wait_for(condition: Callable[[], bool], timeout: float = MOST) -> None:
     end = time.monotonic() + timeout
     while not condition():
         assert time.monotonic() < end, "waited in vain"

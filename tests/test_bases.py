@@ -439,7 +439,7 @@ def test_no_two_colours_share_a_surface(name: str, variant: int) -> None:
     drawing = Drawing(name, variant)
     places = drawing.place({})
     shapes = drawing.shapes.geometryObjects
-    bounds = []
+    bounds, faces = [], [surface(shape.geometry) for shape in shapes]
     for shape, place in zip(shapes, places, strict=True):
         shape.geometry.computeLocalAABB()
         bounds.append((place.translation, shape.geometry.aabb_radius))
@@ -449,7 +449,7 @@ def test_no_two_colours_share_a_surface(name: str, variant: int) -> None:
         if apart < 1e-4 and drawing.body[i] == drawing.body[j]:
             if np.array_equal(shapes[i].meshColor, shapes[j].meshColor):
                 continue
-            points, normals = surface(shapes[i].geometry)
+            points, normals = faces[i]
             relative = places[j].actInv(places[i])
             points = points @ relative.rotation.T + relative.translation
             if coincident(shapes[j].geometry, points, normals @ relative.rotation.T, 5e-5).any():

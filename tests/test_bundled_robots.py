@@ -372,11 +372,12 @@ def test_no_two_colours_share_a_surface(robot: str, variant: str) -> None:
     drawing = Drawing(robot, variant)
     drawing.gaps({})
     shapes = drawing.shapes.geometryObjects
+    faces = [surface(shape.geometry) for shape in shapes]
     for i, j in [*drawing.pairs, *((j, i) for i, j in drawing.pairs)]:
         if drawing.body[i] == drawing.body[j] and not np.array_equal(
             shapes[i].meshColor, shapes[j].meshColor
         ):
-            points, normals = surface(shapes[i].geometry)
+            points, normals = faces[i]
             relative = drawing.placed.oMg[j].actInv(drawing.placed.oMg[i])
             points = points @ relative.rotation.T + relative.translation
             shared = coincident(shapes[j].geometry, points, normals @ relative.rotation.T, 5e-5)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from command_line import Result, Terminal, imported, process
+from ports import MOST
 
 import nmm
 from nmm import kinds
@@ -158,7 +159,7 @@ def test_a_closed_pipe_is_no_error_to_read_about(tmp_path: Path) -> None:
 
 def test_a_pipe_that_knows_no_greek_is_written_to(tmp_path: Path) -> None:
     listing = process(tmp_path, "scenarios", "--keys", PYTHONIOENCODING="ascii")
-    out, err = listing.communicate(timeout=30)
+    out, err = listing.communicate(timeout=MOST)
     assert (listing.returncode, err) == (0, "")
     assert "duration" in out
 

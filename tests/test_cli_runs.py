@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 import yaml
 from command_line import Result, Terminal, process
+from ports import MOST
 
 import nmm
 from nmm.cli.app import status_of
@@ -151,7 +152,7 @@ def test_an_interrupted_run_leaves_its_part(tmp_path: Path, name: str) -> None:
     terminal.read_until(" 1%")  # of the progress bar: the run is under way
     terminal.process.send_signal(getattr(signal, name))
     shown = terminal.read_until(None)
-    assert terminal.process.wait(timeout=30) == 1, shown
+    assert terminal.process.wait(timeout=MOST) == 1, shown
     line = r"nmm run: RG interrupted: interrupted after .* s of 3000 s; the part .* is in part\r\n"
     assert re.search(line, shown)
     assert "Traceback" not in shown
@@ -168,7 +169,7 @@ def test_ctrl_c_where_there_is_nothing_to_write(tmp_path: Path) -> None:
     running = process(tmp_path, "run", "unicycle_2r_position", "--set", "duration=100000")
     time.sleep(0.35)
     running.send_signal(signal.SIGINT)
-    out, err = running.communicate(timeout=30)
+    out, err = running.communicate(timeout=MOST)
     assert (running.returncode, out) in {
         (130, ""),
         (-signal.SIGINT, ""),
@@ -255,7 +256,7 @@ def test_play_ends_cleanly(run: Command, tmp_path: Path, name: str) -> None:
     line = playing.stdout.readline()
     assert re.search(r"http://127\.0\.0\.1:\d+", line), line
     playing.send_signal(getattr(signal, name))
-    _, err = playing.communicate(timeout=15)
+    _, err = playing.communicate(timeout=MOST)
     assert (playing.returncode, err) == (0, "")
 
 
@@ -283,7 +284,7 @@ def test_playback_in_a_scripts_background_ends_when_told_to(
     player = int(shell.stdout.readline())
     assert "http://127.0.0.1:" in shell.stdout.readline()
     os.kill(player, number)
-    assert shell.wait(30) == 0
+    assert shell.wait(MOST) == 0
     shell.stdout.close()
     with pytest.raises(ProcessLookupError):
         os.kill(player, 0)

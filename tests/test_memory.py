@@ -139,7 +139,8 @@ class Handed(NamedTuple):
 def test_the_folder_of_compiled_kernels_is_nmms_alone(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
     """Other users of numba in the process keep theirs, whatever is set, and nmm keeps its own."""
     kernel = Circle([0, 0], 1, 1).stages(None)[0].kernel  # type: ignore[arg-type]
-    assert kernel.compiled.stats.cache_path.startswith(cache_folder())
+    # By its place in the package: where that is installed makes no difference.
+    assert kernel.compiled.stats.cache_path == f"{cache_folder()}/functions/references"
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
     theirs, ours = numba.njit(cache=True)(flat), compiled(flat)
     assert str(tmp_path) == numba.config.CACHE_DIR

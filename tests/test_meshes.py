@@ -135,6 +135,8 @@ def made(name: str) -> tuple[Robot, pin.Model, Path]:
 def assert_same_shape(mine: pin.GeometryObject, its: pin.GeometryObject) -> None:
     """All of a shape but its joint, frame and place, which the model gives."""
     assert type(mine.geometry) is type(its.geometry)
+    for one in (mine, its):  # meshes are shared, and somebody may have asked for the box of one
+        one.geometry.computeLocalAABB()
     assert mine.geometry == its.geometry  # of meshes: vertices, triangles and the tree of boxes
     assert mine.meshPath == its.meshPath or Path(mine.meshPath).samefile(its.meshPath)
     for name in ("meshScale", "meshColor"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,13 +18,15 @@ from playback_browser import (
     drawn_visuals,
     expected_visuals,
     file_url,
+    watched,
 )
 from playback_browser import browser as browser
+from playback_browser import empty_page as empty_page
 from playback_browser import small_robot as small_robot
 from playback_browser import window as window
 from playback_robot import drive, hand_built_robot
 from playwright.sync_api import Page
-from ports import listening, start_player
+from ports import MOST, listening, start_player
 
 import nmm
 from nmm.playback import LiveViewer, Motion
@@ -76,34 +79,55 @@ def robot(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
 # The file
 
 
-def test_every_visual_is_where_pinocchio_says(robot: Robot, window: Window, tmp_path: Path) -> None:
+@dataclass
+class Opened:
+    """What a file showed of a motion: as it opened, at some frames, beyond its end, and its shapes' boxes."""
+
+    motion: Motion
+    time: str
+    at_first: dict[str, np.ndarray]
+    at_frame: dict[int, dict[str, np.ndarray]]
+    beyond: dict[str, np.ndarray]
+    boxes: dict[str, np.ndarray]
+
+
+@pytest.fixture(scope="module")
+def opened(robot: Robot, empty_page: Page, tmp_path_factory: pytest.TempPathFactory) -> Opened:
     motion = drive(robot)
-    page = window.open(file_url([motion], tmp_path))
-    frames = keyframes(motion)
-    # As it opens, paused at the start, before anybody touches it.
-    assert page.locator("#time").inner_text() == "0.00 / 4.00 s"
-    assert_same(drawn_visuals(page), expected_visuals(robot, frames.q[0], frames.wheels[0]))
-    for k in (60, 7, len(frames) // 2, len(frames) - 1, 0, 200):
+    t = keyframes(motion).t
+    with watched(empty_page) as window:
+        page = window.open(file_url([motion], tmp_path_factory.mktemp("file")))
+        # As it opens, paused at the start, before anybody touches it.
+        time, at_first = page.locator("#time").inner_text(), drawn_visuals(page)
+
+        def drawn_at(time: float) -> dict[str, np.ndarray]:
+            page.evaluate(f"nmm.player.seek({time!r})")
+            return drawn_visuals(page)
+
         # The browser's animations keep time in single precision.
-        page.evaluate(f"nmm.player.seek({float(np.float32(frames.t[k]))!r})")
-        assert_same(drawn_visuals(page), expected_visuals(robot, frames.q[k], frames.wheels[k]))
-    page.evaluate("nmm.player.seek(1e9)")
-    assert_same(drawn_visuals(page), expected_visuals(robot, motion.q[-1], wheel_angles(motion)[-1]))
+        at_frame = {k: drawn_at(float(np.float32(t[k]))) for k in (60, 7, len(t) // 2, len(t) - 1, 0, 200)}
+        boxes = {path.split("/")[-1]: np.array(box) for path, box in page.evaluate(BOXES).items()}
+        return Opened(motion, time, at_first, at_frame, drawn_at(1e9), boxes)
 
 
-def test_every_visual_fills_the_room_that_its_shape_fills(
-    robot: Robot, window: Window, tmp_path: Path
-) -> None:
-    page = window.open(file_url([drive(robot, duration=0.5)], tmp_path))
-    drawn = {path.split("/")[-1]: np.array(box) for path, box in page.evaluate(BOXES).items()}
-    assert len(drawn) == len(robot.visual_model.geometryObjects)
+def test_every_visual_is_where_pinocchio_says(robot: Robot, opened: Opened) -> None:
+    motion, frames = opened.motion, keyframes(opened.motion)
+    assert opened.time == "0.00 / 4.00 s"
+    assert_same(opened.at_first, expected_visuals(robot, frames.q[0], frames.wheels[0]))
+    for k, drawn in opened.at_frame.items():
+        assert_same(drawn, expected_visuals(robot, frames.q[k], frames.wheels[k]))
+    assert_same(opened.beyond, expected_visuals(robot, motion.q[-1], wheel_angles(motion)[-1]))
+
+
+def test_every_visual_fills_the_room_that_its_shape_fills(robot: Robot, opened: Opened) -> None:
+    assert len(opened.boxes) == len(robot.visual_model.geometryObjects)
     for i, geometry in enumerate(robot.visual_model.geometryObjects):
         shape = geometry.geometry
         shape.computeLocalAABB()
         expected = np.array([shape.aabb_local.min_, shape.aabb_local.max_])
         # Round things have forty flat sides.
         close = 0.004 * np.ptp(expected, axis=0).max()
-        box = drawn[f"visual {i} {geometry.name.replace('/', '_')}"]
+        box = opened.boxes[f"visual {i} {geometry.name.replace('/', '_')}"]
         np.testing.assert_allclose(box, expected, atol=close, err_msg=geometry.name)
 
 
@@ -262,7 +286,7 @@ def test_motions_play_live_until_the_process_ends(window: Window, tmp_path: Path
             assert_same(drawn_visuals(page), expected_visuals(robot, frames.q[k], frames.wheels[k]))
         assert_in_picture(page, [motion], [0.0, 0.5, 1.0])
         process.send_signal(number)
-        process.communicate(timeout=10)
+        process.communicate(timeout=MOST)
         assert port not in listening()
         # What it got, it can go on playing.
         page.evaluate("nmm.player.seek(0.5)")

@@ -6,8 +6,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from playback_browser import UPRIGHT, WALK, Window, assert_same, drawn_visuals, expected_visuals, file_url
+from playback_browser import (
+    UPRIGHT,
+    WALK,
+    Window,
+    assert_same,
+    draw_frames,
+    drawn_visuals,
+    expected_visuals,
+    file_url,
+)
 from playback_browser import browser as browser
+from playback_browser import empty_page as empty_page
 from playback_browser import small_robot as small_robot
 from playback_browser import window as window
 from playback_robot import drive
@@ -27,7 +37,7 @@ def test_the_keyboard_and_the_bar_play(small_robot: Robot, window: Window, tmp_p
     assert page.locator("#play").get_attribute("aria-label") == "Pause"
     page.keyboard.press("Space")
     stopped = page.evaluate("nmm.player.time")
-    page.wait_for_timeout(200)
+    draw_frames(page)
     assert page.evaluate("nmm.player.time") == stopped
     page.locator("#slider").fill("3.25")
     assert page.locator("#time").inner_text() == "3.25 / 8.00 s"
@@ -54,7 +64,7 @@ def test_the_speed_is_the_clocks(small_robot: Robot, window: Window, tmp_path: P
     page.keyboard.press("Space")
     page.wait_for_function("nmm.player.time > 0")
     first = page.evaluate(measure)
-    page.wait_for_timeout(1000)
+    page.wait_for_function(f"nmm.player.time > {first[0] + 0.6 * float(speed)}")
     last = page.evaluate(measure)
     assert last[1] > first[1] + 0.5
     assert (last[0] - first[0]) / (last[1] - first[1]) == pytest.approx(float(speed), rel=1e-6)

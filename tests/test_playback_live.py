@@ -5,7 +5,6 @@ from __future__ import annotations
 import signal
 import socket
 import threading
-import time
 import urllib.error
 import urllib.request
 from pathlib import Path
@@ -13,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from playback_robot import drive, hand_built_robot, straight
-from ports import free_port, listening, start_player, wait_for
+from ports import MOST, free_port, listening, start_player, wait_for
 
 from nmm.errors import InputError, RunError
 from nmm.playback import LiveViewer, play, wheel_angles
@@ -30,7 +29,7 @@ def test_the_server_listens_on_loopback_only_and_ends(robot: Robot) -> None:
     with LiveViewer(robot) as viewer:
         port = int(viewer.url.rsplit(":", 1)[1].strip("/"))
         assert listening()[port] == "0100007F"
-        with urllib.request.urlopen(viewer.url, timeout=5) as answer:
+        with urllib.request.urlopen(viewer.url, timeout=MOST) as answer:
             assert b"MeshCat" in answer.read()
     assert port not in listening()
     assert threading.active_count() == before
@@ -43,7 +42,7 @@ def test_the_server_does_not_answer_to_other_names(robot: Robot) -> None:
     with LiveViewer(robot) as viewer:
         request = urllib.request.Request(viewer.url, headers={"Host": "example.org"})
         with pytest.raises(urllib.error.HTTPError, match="403"):
-            urllib.request.urlopen(request, timeout=5)
+            urllib.request.urlopen(request, timeout=MOST)
 
 
 @pytest.mark.parametrize("port", [0, -1, 65536])
@@ -64,20 +63,19 @@ def test_a_port_in_use_is_refused(robot: Robot) -> None:
 def test_a_page_that_never_reads_holds_up_nobody(robot: Robot) -> None:
     with LiveViewer(robot) as viewer:
         address = viewer.url.removeprefix("http://").strip("/")
-        with socket.create_connection(tuple(address.split(":")), timeout=5) as page:
+        with socket.create_connection(tuple(address.split(":")), timeout=MOST) as page:
             page.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
             page.sendall(
                 f"GET /socket HTTP/1.1\r\nHost: {address}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
                 "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n\r\n".encode()
             )
             assert b"101 Switching" in page.recv(100)
-            begin = time.monotonic()
+            # Seconds on a busy machine; held up, the loop would not come to its end.
             for k in range(2000):
                 viewer.display(np.full(6, 1e-3 * k))
-            assert time.monotonic() - begin < 2.0
-            begin = time.monotonic()
             viewer.close()
-            assert time.monotonic() - begin < 4.0
+            assert int(address.split(":")[1]) not in listening()
+            assert not [one for one in threading.enumerate() if one.name.startswith("nmm playback")]
 
 
 def test_wheels_roll_from_pose_to_pose(robot: Robot) -> None:
@@ -100,7 +98,7 @@ def test_playing_ends_when_asked(robot: Robot) -> None:
     player.start()
     wait_for(lambda: port in listening())
     stop.set()
-    player.join(timeout=5)
+    player.join(timeout=MOST)
     assert not player.is_alive()
     assert port not in listening()
 
@@ -116,9 +114,9 @@ def children(pid: int) -> list[str]:
 def test_nothing_stays_behind(tmp_path: Path, number: signal.Signals, status: int) -> None:
     process, port = start_player(tmp_path)
     assert children(process.pid) == []
-    with socket.create_connection(("127.0.0.1", port), timeout=5):
+    with socket.create_connection(("127.0.0.1", port), timeout=MOST):
         process.send_signal(number)
-        output, _ = process.communicate(timeout=10)
+        output, _ = process.communicate(timeout=MOST)
     assert process.returncode == status
     assert ("returned" in output) == (number == signal.SIGINT)
     assert port not in listening()

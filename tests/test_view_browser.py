@@ -13,12 +13,22 @@ import pinocchio as pin
 import pytest
 from command_line import process
 from gripping import folding
-from playback_browser import PROJECT, UPRIGHT, WALK, Window, assert_same, drawn_visuals, expected_visuals
+from playback_browser import (
+    PROJECT,
+    UPRIGHT,
+    WALK,
+    Window,
+    assert_same,
+    draw_frames,
+    drawn_visuals,
+    expected_visuals,
+)
 from playback_browser import browser as browser
+from playback_browser import empty_page as empty_page
 from playback_browser import window as window
 from playback_robot import hand_built_robot
 from playwright.sync_api import Page
-from ports import free_port, listening, wait_for
+from ports import MOST, free_port, listening, wait_for
 
 import nmm
 from nmm.playback import view
@@ -55,7 +65,7 @@ def shown(robot: Robot, **options: object) -> Iterator[str]:
         yield f"http://127.0.0.1:{port}/"
     finally:
         stop.set()
-        viewer.join(timeout=10)
+        viewer.join(timeout=MOST)
         assert port not in listening()
 
 
@@ -166,7 +176,7 @@ def test_the_pose_of_a_frame_is_told(robot_3r: Robot, window: Window) -> None:
 
 
 def visible_names(page: Page) -> set[str]:
-    page.wait_for_timeout(150)  # names follow the picture
+    draw_frames(page)  # names follow the picture
     return set(page.locator("#labels span:visible").all_inner_texts())
 
 
@@ -251,6 +261,6 @@ def test_the_command_shows_a_robot_until_it_is_interrupted(window: Window, tmp_p
     angles = Rolling(locked).settled(locked.q())
     assert_same(drawn_visuals(page), expected_visuals(locked, locked.q({"q2": q2}), angles))
     viewer.send_signal(signal.SIGINT)
-    _, err = viewer.communicate(timeout=15)
+    _, err = viewer.communicate(timeout=MOST)
     assert (viewer.returncode, err) == (0, "")
     assert port not in listening()

@@ -17,7 +17,8 @@ from numba.core import caching
 #: How many folders of compiled kernels are kept.
 KEPT_CACHES = 8
 
-KERNELS = Path(__file__).parent
+KERNELS = Path(__file__).resolve().parent
+PACKAGE = KERNELS.parent
 
 
 @cache
@@ -28,7 +29,7 @@ def cache_folder() -> str:
     hold what it calls; a digest of all sources that hold compiled functions does.
     """
     digest = hashlib.sha256(numba.__version__.encode())
-    for source in sorted(KERNELS.parent.rglob("*.py")):
+    for source in sorted(PACKAGE.rglob("*.py")):
         text = source.read_bytes()
         if b"nmm.kernels" in text or source.parent == KERNELS:
             digest.update(text)
@@ -53,8 +54,20 @@ class _InFolder(caching._SourceFileBackedLocatorMixin, caching._CacheLocator):
         self._py_file = source
         self._lineno = function.__code__.co_firstlineno
 
+    @property
+    def _room(self) -> Path | None:
+        """Folder of the source below nmm's own; None if the function is somebody else's."""
+        place = Path(self._py_file).resolve().parent
+        return place.relative_to(PACKAGE) if place.is_relative_to(PACKAGE) else None
+
     def get_cache_path(self) -> str:
-        return os.path.join(cache_folder(), self.get_suitable_cache_subpath(self._py_file))
+        if self._room is None:
+            return os.path.join(cache_folder(), self.get_suitable_cache_subpath(self._py_file))
+        return os.path.join(cache_folder(), self._room)
+
+    def get_source_stamp(self) -> object:
+        """The folder is that of nmm's very text: where and when it was installed makes no difference."""
+        return super().get_source_stamp() if self._room is None else None
 
 
 class _Storing(caching.CompileResultCacheImpl):
