@@ -43,12 +43,8 @@ _MEANINGS = {
     Status.SOLVED: "solved",
     Status.RELAXED: "the task's rate was scaled or damped on purpose",
     Status.INEXACT: "J u differs from the rate that the task asks for, and nobody said that it should",
-<<<<<<< HEAD
     Status.FALLBACK: "there was no answer to bring within the limits: the inputs are those nearest to rest",
-    Status.SINGULAR_J: "the task Jacobian J lost rank: the task asks for a motion that no input gives here",
-=======
     Status.SINGULAR_J: "the task Jacobian J lost rank",
->>>>>>> eyes
     Status.SINGULAR_JA: "the block Ja of the reduced gradient is singular though J is not: "
     "give more partitions, or partitions: automatic",
     Status.SINGULAR_JE: "the extended Jacobian J_e is singular though J is not (algorithmic singularity): "
