@@ -12,10 +12,11 @@ from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, Integers, positive
 from nmm.control.bounds import OFF, STAGE
-from nmm.control.equations import PLAIN, STEP, WRAPPED, Arm, ControlStep, TaskRows, drive
+from nmm.control.equations import PLAIN, STEP, WRAPPED, Arm, ControlStep, TaskRows, drive, hold_back
 from nmm.control.equations import step as compiled_step
 from nmm.control.limits import Limits
 from nmm.control.lost_directions import in_world_axes, lost_directions
+from nmm.control.retreat import Backing, Retreat
 from nmm.errors import InputError, SingularError
 from nmm.functions.function import Row, row_scales
 from nmm.functions.objectives.base import Objective
@@ -26,6 +27,7 @@ from nmm.kernels.compiled import checked_by_caller
 from nmm.kernels.memory import views
 from nmm.resolvers.answer import Status, unanswered
 from nmm.resolvers.base import Resolver
+from nmm.resolvers.limited import instead, some_inputs
 from nmm.resolvers.problem import Problem
 from nmm.resolvers.state import State
 from nmm.robots.robot import Robot
@@ -74,6 +76,7 @@ class Controller:
     added_task : the added task y = h(q) of the extended Jacobian
     limits : what the inputs are kept within; None for none
     dt : time between two calls, s, which limits of position and acceleration need; a simulation sets its own
+    retreat : what to do when the error stalls; None for a path that is tracked. It needs dt, too
 
     Attributes
     ----------
@@ -94,15 +97,19 @@ class Controller:
         added_task: Task | Stack | Sequence[Task] | None = None,
         limits: Limits | None = None,
         dt: float | None = None,
+        retreat: Retreat | None = None,
     ) -> None:
         _expect(robot, Robot, "robot")
         _expect(resolver, Resolver, "resolver")
         if objective is not None:
             _expect(objective, Objective, "objective")
+        if retreat is not None:
+            _expect(retreat, Retreat, "retreat")
         if limits is not None:
             _expect(limits, Limits, "limits")
         self.robot = robot
         self.limits = limits
+        self.retreat = retreat
         self.task = Stack.of(task)
         self.resolver = resolver
         self.objective = objective
@@ -134,6 +141,7 @@ class Controller:
             inputs=robot.u_names,
             groups=robot.groups,
             row_scales=row_scales(self.rows, robot),
+            levels=self.task.levels(robot),
             added_J=np.zeros((k, m)),
             added_rate=np.zeros(k),
             added_row_scales=row_scales(added_rows, robot),
@@ -168,6 +176,8 @@ class Controller:
         self._shape = (robot.n,)
         self._solve = self._solver()
         self.before = self._step.problem.before
+        self.backing = None if retreat is None else retreat.on(robot, self.rows)
+        self._needs_dt = self.backing is not None or (limits is not None and kept.needs_dt)
         self.dt = dt
 
     @property
@@ -193,16 +203,26 @@ class Controller:
         # Another kind of array would be compiled for anew, so anything but the plain kind is copied.
         if type(q) is not np.ndarray or q.dtype != FLOAT64 or q.shape != self._shape or not q.flags.carray:
             q = self._copied(q)
-        if self.limits is not None and self.kept.needs_dt and self.dt is None:
+        if self._needs_dt and self.dt is None:
             raise InputError(
                 "controller: limits of position, acceleration and functions need dt: give dt=0.01"
             )
-        if self._solve(float(t), q) >= _FAILED:
+        status = self._solve(float(t), q)
+        if self.backing is not None and self.backing.watch(self._step.task.error, self.dt or 0.0):
+            self._back_off(self.backing, q)
+        elif status >= _FAILED:
             self._fail(t, q)
         u = self._u.copy()
         if self.limits is not None:
             self.before[:] = u
         return u
+
+    def _back_off(self, backing: Backing, q: Array) -> None:
+        """The retreat's inputs in place of the resolver's."""
+        found, G = self._step, self._program.buffers.G
+        instead(found.problem, backing.inputs(q, G), found.answer)
+        hold_back(found.task, found.problem, found.answer)
+        drive(found.answer.u, G, found.arm, found.q_dot)
 
     def _copied(self, q: ArrayLike | None) -> Array:
         if q is None:
@@ -212,7 +232,7 @@ class Controller:
     def __reduce__(self) -> tuple[object, ...]:
         """Copies and pickles are built anew: views of memory and addresses of kernels do not travel."""
         given = (self.robot, self.task, self.resolver, self.objective, self.added_task, self.limits, self.dt)
-        return type(self), given
+        return type(self), (*given, self.retreat)
 
     def _solver(self) -> Callable[[float, Array], float]:
         """solve(t, q) -> status, with everything it needs at hand."""
@@ -227,6 +247,8 @@ class Controller:
         def solve_and_finish(t: float, q: Array) -> float:
             solve(t, q)
             resolver.finish(found.problem, dimensions, found.answer)
+            some_inputs(found.problem, found.answer)
+            hold_back(found.task, found.problem, found.answer)
             drive(found.answer.u, program.buffers.G, found.arm, found.q_dot)
             return float(found.answer.status[()])
 
@@ -272,7 +294,7 @@ class Controller:
             r=task.r.copy(),
             r_d=task.r_d.copy(),
             error=task.error.copy(),
-            rate=problem.rate.copy(),
+            rate=task.full.copy(),
             J=problem.J.copy(),
             objective=float(found.H[()]),
             h=problem.h.copy(),
@@ -327,6 +349,8 @@ class Controller:
         self.state.reset()
         self.before[:] = 0.0
         self._step.problem.active[0] = 0
+        if self.backing is not None:
+            self.backing.reset()
 
     @property
     def derivatives(self) -> tuple[Array, Array, Array]:
@@ -360,4 +384,8 @@ def _task_rows(stack: Stack, robot: Robot, table: Integers) -> TaskRows:
         block = task.gain_matrix(robot)
         K[first : first + len(block), first : first + len(block)] = block
         first += len(block)
-    return TaskRows(table, K, *np.zeros((3, s)))
+    rows = [(k, row.unit) for k, task in enumerate(stack) for row in task.rows(robot)]
+    group = np.array([rows.index(row) for row in rows], dtype=np.int64)
+    parts = [np.array(task.approach(robot)) for task in stack]
+    speed, braking = np.hstack([np.zeros((2, 0)), *parts])
+    return TaskRows(table, K, speed, braking, group, *np.zeros((4, s)))

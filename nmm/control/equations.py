@@ -23,8 +23,9 @@ from nmm.control.bounds import (
 from nmm.functions.program import BESIDE, Buffers, LaidOut, run
 from nmm.kernels.compiled import compiled, scratch
 from nmm.kernels.followers import add_to_leaders, move_followers
+from nmm.kernels.linear_algebra import residual_norm
 from nmm.kernels.memory import Cell, IntegerMatrix, IntegerVector, Matrix, Vector, views
-from nmm.resolvers.answer import NOT_FINITE, AnswerArrays
+from nmm.resolvers.answer import NOT_FINITE, RELAXED, SOLVED, AnswerArrays
 from nmm.resolvers.base import call_resolver
 from nmm.resolvers.limited import some_inputs
 from nmm.resolvers.problem import ProblemArrays
@@ -36,11 +37,18 @@ class TaskRows(NamedTuple):
     rows (s, 3) : [row of f, row of g, row of e] among the program's; the row of e is PLAIN or WRAPPED where
         e = g - f, which then is not computed elsewhere
     gain (s, s) : K
+    speed (s,), braking (s,) : ‖K e‖ <= speed, ‖K e‖² <= 2 braking ‖e‖ over the rows of a group
+    group (s,) : which group each row is in
+    full (s,) : ∂g/∂t + K e without that bound
     r, r_d, error (s,) : value, desired value and error, which a step writes
     """
 
     rows: IntegerMatrix
     gain: Matrix
+    speed: Vector
+    braking: Vector
+    group: IntegerVector
+    full: Vector
     r: Vector
     r_d: Vector
     error: Vector
@@ -151,9 +159,46 @@ def write_equation(task: TaskRows, b: Buffers, C: Arm, J: Array, rate: Array) ->
         for j in range(n):  # in place: f's derivative is not read again
             b.value_q[f, j] -= b.value_q[g, j]
         times_S(b.value_q, f, b.G, C, J[i])
+    feedback = scratch(s)
     for i in range(s):
+        feedback[i] = 0.0
         for j in range(s):
-            rate[i] += task.gain[i, j] * task.error[j]
+            feedback[i] += task.gain[i, j] * task.error[j]
+        task.full[i] = rate[i] + feedback[i]
+    for i in range(s):
+        share = 1.0
+        if not (math.isinf(task.speed[i]) and math.isinf(task.braking[i])):
+            square = 0.0
+            far = 0.0
+            for j in range(s):
+                if task.group[j] == task.group[i]:
+                    square += feedback[j] * feedback[j]
+                    far += task.error[j] * task.error[j]
+            most = min(task.speed[i] * task.speed[i], 2.0 * task.braking[i] * math.sqrt(far))
+            if square > most:
+                share = math.sqrt(most / square)
+        rate[i] = task.full[i] if share == 1.0 else rate[i] + share * feedback[i]
+
+
+@compiled
+def hold_back(task: TaskRows, problem: ProblemArrays, answer: AnswerArrays) -> None:
+    """Where feedback was bounded: the residual against all of it, and that it was on purpose."""
+    first = 0
+    bounded = False
+    for level in range(problem.ends.shape[0]):
+        asked = 0.0
+        given = 0.0
+        for i in range(first, problem.ends[level]):
+            asked += task.full[i] * task.full[i]
+            given += task.full[i] * problem.rate[i]
+            bounded = bounded or task.full[i] != problem.rate[i]
+        first = problem.ends[level]
+        if given < asked:
+            answer.scale[level] *= max(given, 0.0) / asked
+    if bounded:
+        answer.residual[()], _ = residual_norm(problem.J, answer.u, task.full)
+        if answer.status[()] == SOLVED:
+            answer.status[()] = RELAXED
 
 
 @compiled
@@ -209,5 +254,6 @@ def step(t: float, q: Array, integers: Integers, floats: Array) -> float:
     answer.excess[()] = 0.0
     call_resolver(e.resolver, problem, e.numbers, e.options, e.state, answer)
     some_inputs(problem, answer)
+    hold_back(e.task, problem, answer)
     drive(answer.u, b.G, e.arm, e.q_dot)
     return float(answer.status[()])

@@ -71,17 +71,13 @@ class Resolver(ABC):
         return
 
     def check(self, dimensions: Dimensions) -> None:
-        """`InputError` when the task has more rows than there are inputs, or levels of priority."""
+        """`InputError` when the task has more rows than there are inputs."""
         if dimensions.s < 1:
             raise InputError("task: expected at least one row")
         if dimensions.s > dimensions.m:
             raise InputError(
                 f"task: {dimensions.s} rows for {dimensions.m} inputs ({', '.join(dimensions.inputs)}); "
                 f"expected at most {dimensions.m}"
-            )
-        if len(dimensions.levels) > 1:
-            raise InputError(
-                f"levels: resolver {self.name} does all rows at one level, got {len(dimensions.levels)}"
             )
 
     def resolve(self, problem: Problem, state: State | None = None) -> Answer:

@@ -13,7 +13,7 @@ from nmm.arrays import Array, Integers
 from nmm.errors import InputError
 from nmm.kernels.compiled import Kernel, kernel
 from nmm.kernels.linear_algebra import residual_norm
-from nmm.resolvers.answer import Answer, AnswerArrays, Status, certified
+from nmm.resolvers.answer import SOLVED, Answer, AnswerArrays, Status, certified
 from nmm.resolvers.base import NO_OPTIONS, RESOLVER, Resolver, Setup
 from nmm.resolvers.limited import limit, within
 from nmm.resolvers.problem import Dimensions, Problem, ProblemArrays
@@ -26,6 +26,7 @@ def left_to_python(
     """No inputs yet: the compiled step stops short of them, and `CallableResolver.finish` finds them."""
     for j in range(answer.u.shape[0]):
         answer.u[j] = 0.0
+    answer.status[()] = SOLVED
 
 
 #: Inputs are kept near to the function's in the Euclidean norm.
@@ -58,6 +59,8 @@ class CallableResolver(Resolver):
 
     def finish(self, problem: ProblemArrays, dimensions: Dimensions, answer: AnswerArrays) -> None:
         answer.measure[()] = np.nan
+        answer.scale[:] = 1.0
+        answer.excess[()] = 0.0
         if not all(np.isfinite(given).all() for given in (problem.J, problem.rate, problem.h)):
             answer.status[()] = Status.NOT_FINITE
             return

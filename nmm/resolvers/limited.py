@@ -54,15 +54,15 @@ def times(A: Array, row: int, x: Array) -> float:
 
 
 @compiled
-def nearest_to_rest(problem: ProblemArrays, u: Array) -> float:
-    """Write the inputs (m,) within the limits that are nearest to 0; returns how far rows were widened.
+def nearest_allowed(problem: ProblemArrays, wanted: Array, u: Array) -> float:
+    """Write the inputs (m,) within the limits nearest to `wanted`; returns how far rows were widened.
 
     Limits of single inputs hold always. Where the rows leave nothing with them, all rows are widened by the
     least number, in their own units, with which they do.
     """
     m, count = u.shape[0], problem.lower.shape[0]
     for j in range(m):
-        u[j] = min(max(0.0, problem.u_lower[j]), problem.u_upper[j])
+        u[j] = min(max(wanted[j], problem.u_lower[j]), problem.u_upper[j])
     if within(problem, u):
         return 0.0
     G, lower, upper, give = (
@@ -81,16 +81,33 @@ def nearest_to_rest(problem: ProblemArrays, u: Array) -> float:
             G[i, j] = problem.limit_rows[i - m, j]
         lower[i], upper[i], give[i] = problem.lower[i - m], problem.upper[i - m], 1.0
     E, none = scratch((0, m)), scratch(0)
-    target, y = scratch(m), scratch(m)
-    clear(target)
+    y = scratch(m)
     active = integer_scratch(1 + m + count)
     active[0] = 0
-    scale = nearest_within(Rows(E, none, none, G, lower, upper, give), target, -math.inf, active, y)
+    scale = nearest_within(Rows(E, none, none, G, lower, upper, give), wanted, -math.inf, active, y)
     if math.isnan(scale):
         return math.inf
     for j in range(m):
         u[j] = min(max(y[j], problem.u_lower[j]), problem.u_upper[j])
     return 1.0 - scale
+
+
+@compiled
+def nearest_to_rest(problem: ProblemArrays, u: Array) -> float:
+    """`nearest_allowed` to 0."""
+    rest = scratch(u.shape[0])
+    clear(rest)
+    return float(nearest_allowed(problem, rest, u))
+
+
+@compiled
+def instead(problem: ProblemArrays, wanted: Array, answer: AnswerArrays) -> None:
+    """The inputs nearest to other ones than the resolver's: nothing is left of the task on purpose."""
+    answer.excess[()] = nearest_allowed(problem, wanted, answer.u)
+    answer.residual[()], _ = residual_norm(problem.J, answer.u, problem.rate)
+    answer.status[()] = RELAXED
+    for level in range(answer.scale.shape[0]):
+        answer.scale[level] = 0.0
 
 
 @compiled

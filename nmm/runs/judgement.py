@@ -7,13 +7,15 @@ where it went wrong.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from nmm.arrays import Array
 from nmm.control.controller import Controller
+from nmm.control.goal import Goal, sizes
+from nmm.functions.function import Row
 from nmm.runs import reasons
 from nmm.runs.advice import Trial, advised
 from nmm.runs.assessment import Assessment, assess
@@ -112,6 +114,21 @@ def judge(
     if stability:
         warnings.append(f"for part of the run {stability}")
     return Verdict(outcome, message, warnings)
+
+
+def reached_or_not(verdict: Verdict, recorder: Recorder, goal: Goal, rows: Sequence[Row]) -> Verdict:
+    """The verdict on a run that was to reach a target: by its tolerances, whatever its gain promised."""
+    if verdict.outcome not in (Outcome.COMPLETED, Outcome.MISSED) or not len(recorder):
+        return verdict
+    error = recorder.samples.error[-1]
+    if goal.reached(error, rows):
+        said = [verdict.message] if verdict.message else []
+        return Verdict(
+            Outcome.COMPLETED, f"reached at t = {recorder.reached:.4g} s", [*said, *verdict.warnings]
+        )
+    metres, radians = sizes(error, [row.unit for row in rows])
+    missed = f"not reached in {recorder.duration:.4g} s: {metres:.3g} m and {radians:.3g} rad are left"
+    return Verdict(Outcome.MISSED, _joined(missed, verdict.message), verdict.warnings)
 
 
 def _advice(

@@ -10,11 +10,12 @@ from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, positive
 from nmm.control.controller import Controller, Step
+from nmm.control.goal import Goal
 from nmm.control.idle_inputs import idle_inputs
 from nmm.errors import DivergedError, InputError, RunError, SingularError
 from nmm.robots.slip import slip_warnings
 from nmm.runs.integrators import Integrator, integrator
-from nmm.runs.judgement import Ended, Verdict, judge
+from nmm.runs.judgement import Ended, Verdict, judge, reached_or_not
 from nmm.runs.recording import Recorder
 from nmm.runs.trajectory import Outcome, Trajectory
 
@@ -33,6 +34,7 @@ def simulate(
     *,
     tolerance: float = 1e-9,
     progress: Callable[[float], None] | None = None,
+    until: Goal | None = None,
 ) -> Trajectory:
     """Integrate q_dot = S(q) u(t, q) from q0 over `duration`, sampled every dt.
 
@@ -49,6 +51,7 @@ def simulate(
     method : "rk4", "midpoint", "euler", "zoh" (inputs held over dt) or "adaptive" (SciPy's DOP853)
     tolerance : of the adaptive method, local error in m and rad
     progress : called with the fraction done, about a hundred times
+    until : a target to reach: the run ends where the error is within its tolerances
 
     Returns
     -------
@@ -76,7 +79,8 @@ def simulate(
             "method: limits are kept from sample to sample: expected rk4, midpoint, euler or zoh"
         )
     advance = integrator(method, robot, positive(tolerance, "tolerance"))
-    recorder, ended = _record(controller, advance, _times(0.0, dt, steps, duration), q, progress)
+    times = _times(0.0, dt, steps, duration)
+    recorder, ended = _record(controller, advance, times, q, progress, until)
 
     def retry(first: int, dt: float, most: int) -> tuple[Recorder, Outcome]:
         start = float(recorder.t[first])
@@ -96,6 +100,8 @@ def simulate(
                 outcome=Outcome.INTERRUPTED, message="interrupted while the run was judged"
             )
         verdict = Verdict(ended.outcome, ended.message, [])
+    if until is not None:
+        verdict = reached_or_not(verdict, recorder, until, controller.rows)
     recorder.warnings += verdict.warnings
     return recorder.trajectory(verdict.outcome, verdict.message, dt, method)
 
@@ -114,6 +120,7 @@ def _record(
     times: Array,
     q: Array,
     progress: Callable[[float], None] | None,
+    until: Goal | None = None,
 ) -> tuple[Recorder, Ended]:
     """Integrate over the times (N,) from q, and say how that ended."""
     recorder = Recorder(controller, times)
@@ -129,7 +136,7 @@ def _record(
     outcome, message = Outcome.COMPLETED, ""
     controller.reset()
     try:
-        _integrate(controller, advance, recorder, times, q, progress)
+        _integrate(controller, advance, recorder, times, q, progress, until)
     except SingularError as error:
         outcome, message = Outcome.SINGULAR, str(error)
     except DivergedError as error:
@@ -150,6 +157,7 @@ def _integrate(
     times: Array,
     q: Array,
     progress: Callable[[float], None] | None,
+    until: Goal | None,
 ) -> None:
     """From sample to sample, recording each.
 
@@ -175,6 +183,8 @@ def _integrate(
                 recorder.warn_once(sample.t, state.reservation(before, controller.robot.u_names))
         earlier, sample = sample.u, ahead
         recorder.add(sample)
+        if until is not None and until.reached(sample.error, controller.rows):
+            break
         if progress is not None and k % max(1, steps // 100) == 0:
             progress(k / steps)
     if progress is not None:

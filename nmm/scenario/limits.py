@@ -13,7 +13,7 @@ from nmm.robots.robot import Robot
 from nmm.scenario.function_part import FunctionPart
 from nmm.scenario.functions import FUNCTION_PARTS
 from nmm.scenario.keys import Part, at, one_of
-from nmm.scenario.numbers import Numbers, Positive, nested, number, numbers_by_name, shown
+from nmm.scenario.numbers import Numbers, Positive, Speeds, nested, shown
 
 
 class BoundPart(FunctionPart):
@@ -74,15 +74,7 @@ def _ranges(value: object) -> object:
     raise ValueError(f"expected true, false, or numbers by name, got {shown(value)}")
 
 
-def _sizes(value: object) -> object:
-    """A number, or numbers by name."""
-    if value is None:
-        return None
-    return numbers_by_name(value) if isinstance(value, Mapping) else number(value)
-
-
 Ranges = Annotated[bool | dict[str, Any], BeforeValidator(_ranges)]
-Sizes = Annotated[float | dict[str, float] | None, BeforeValidator(_sizes)]
 
 
 class LimitsPart(Part):
@@ -97,10 +89,10 @@ class LimitsPart(Part):
         True,
         description="of coordinates: true, false, or [lower, upper] by name in place of the robot's; m, rad",
     )
-    acceleration: Sizes = Field(
+    acceleration: Speeds = Field(
         None, description="of inputs: a number for all, or numbers by input or group; m/s², rad/s²"
     )
-    wheels: Sizes = Field(
+    wheels: Speeds = Field(
         None, description="largest rolling rate of the driven wheels: a number, or by joint; rad/s"
     )
     bounds: BoundList = Field(
@@ -134,8 +126,8 @@ class LimitsPart(Part):
         return limits
 
 
-def limits_or_none(value: object) -> object:
-    """true for the robot's own limits, false or nothing for none."""
+def part_or_none(value: object) -> object:
+    """true for a part with its defaults, false or nothing for none."""
     if isinstance(value, bool) or value is None:
         return {} if value else None
     return value

@@ -140,3 +140,13 @@ def numbers_by_name(value: Mapping[Any, object], what: str = "") -> dict[str, fl
         except ValueError as error:
             raise ValueError(f"{what}{name}: {error}") from None
     return result
+
+
+def number_or_by_name(value: object) -> float | dict[str, float] | None:
+    """A number for all, or numbers by name."""
+    if value is None:
+        return None
+    return numbers_by_name(value) if isinstance(value, Mapping) else number(value)
+
+
+Speeds = Annotated[float | dict[str, float] | None, BeforeValidator(number_or_by_name)]

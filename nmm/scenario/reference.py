@@ -9,6 +9,7 @@ from pydantic_core import PydanticUndefined
 
 from nmm.kinds import RESOLVERS
 from nmm.scenario.functions import FUNCTION_PARTS, REFERENCE_PARTS
+from nmm.scenario.goals import GoalPart, RetreatPart
 from nmm.scenario.keys import Part
 from nmm.scenario.limits import BoundPart, LimitsPart
 from nmm.scenario.objectives import OBJECTIVE_PARTS, TermPart
@@ -43,6 +44,8 @@ def sections() -> Iterator[Section]:
     for kind, resolver in RESOLVER_PARTS.items():
         called = RESOLVERS.words(kind)
         yield _section(f"resolver, kind: {kind}", resolver, f"{called[0].upper()}{called[1:]}. ")
+    yield _section("until", GoalPart)
+    yield _section("retreat", RetreatPart)
     yield _section("limits", LimitsPart)
     yield _section("limits.bounds: a task's function and its keys, with these", BoundPart)
 

@@ -130,6 +130,7 @@ class Scenario:
                     parts.dt,
                     parts.method,
                     tolerance=parts.tolerance,
+                    until=None if parts.until is None else parts.until.make(),
                     progress=progress,
                 )
         except KeyedError as error:

@@ -12,8 +12,9 @@ from nmm.errors import InputError
 from nmm.kinds import RESOLVERS
 from nmm.robots.robot import Robot
 from nmm.scenario.functions import REFERENCE_PARTS
+from nmm.scenario.goals import GoalPart, RetreatPart
 from nmm.scenario.keys import Part, at
-from nmm.scenario.limits import LimitsPart, limits_or_none
+from nmm.scenario.limits import LimitsPart, part_or_none
 from nmm.scenario.numbers import Nested, Positive, numbers, numbers_by_name
 from nmm.scenario.objectives import ObjectiveList, QuadraticPart, build_objective
 from nmm.scenario.resolvers import AnyResolver, WithAddedTask
@@ -57,8 +58,14 @@ class ScenarioPart(Part):
         description=f"how the redundancy is resolved: kind {in_words(list(RESOLVERS), 'or')}, with its keys"
     )
 
-    limits: Annotated[LimitsPart | None, BeforeValidator(limits_or_none)] = Field(
+    limits: Annotated[LimitsPart | None, BeforeValidator(part_or_none)] = Field(
         None, description="what the inputs are kept within: true for the robot's own limits, or a mapping"
+    )
+    until: Annotated[GoalPart | None, BeforeValidator(part_or_none)] = Field(
+        None, description="a target to reach: the run ends where the error is within tolerances"
+    )
+    retreat: Annotated[RetreatPart | None, BeforeValidator(part_or_none)] = Field(
+        None, description="whether to back off where the error stalls, and start again: true, or a mapping"
     )
 
     def build(self, robot: Robot) -> Controller:
@@ -78,6 +85,9 @@ class ScenarioPart(Part):
             objective = build_objective(self.objective, robot)
         with at("limits"):
             limits = None if self.limits is None else self.limits.build(robot)
+        with at("retreat"):
+            goal = None if self.until is None else self.until.make()
+            retreat = None if self.retreat is None else self.retreat.build(robot, goal)
         with at("resolver"):
             resolver, added = self.resolver.make(), None
             if isinstance(self.resolver, WithAddedTask):
@@ -86,9 +96,7 @@ class ScenarioPart(Part):
                     rows = sum(len(item.rows(robot)) for item in added)
                     self._check_added(self.resolver, rows, robot.n_u - s)
             with self.resolver.own_keys():
-                return Controller(
-                    robot, task, resolver, objective, added_task=added, limits=limits, dt=self.dt
-                )
+                return Controller(robot, task, resolver, objective, added, limits, self.dt, retreat)
 
     def _added_task(self, resolver: WithAddedTask) -> list[TaskPart]:
         """The task that takes up the redundancy: as given, or the objective's terms at their targets."""

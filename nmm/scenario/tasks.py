@@ -13,7 +13,7 @@ from nmm.robots.robot import Robot
 from nmm.scenario.function_part import FunctionPart
 from nmm.scenario.functions import FUNCTION_PARTS, Reference
 from nmm.scenario.keys import KeyedError, at, one_of
-from nmm.scenario.numbers import Numbers, shown
+from nmm.scenario.numbers import Numbers, Speeds, Whole, shown
 
 
 class TaskPart(FunctionPart):
@@ -29,6 +29,21 @@ class TaskPart(FunctionPart):
         "positive definite); null for planning mode, which follows the reference without feedback",
     )
 
+    priority: Whole = Field(
+        1,
+        description="1, 2, ...: where limits bind, lower numbers keep their rate, others get the rest",
+    )
+    speed: Speeds | None = Field(
+        None,
+        description="how fast feedback may approach the target: ‖K e‖ at most, a number or numbers by unit "
+        "({m: 1, rad: 2})",
+    )
+    braking: Speeds | None = Field(
+        None,
+        description="deceleration b with which it may come to rest there: ‖K e‖ at most √(2 b ‖e‖), "
+        "a number or numbers by unit",
+    )
+
     def build_task(self, robot: Robot) -> Task:
         """The task; errors know their key."""
         function = self.build(robot)
@@ -37,7 +52,9 @@ class TaskPart(FunctionPart):
         with at("reference"):
             reference = self.reference.build(robot, units.pop() if len(units) == 1 else "1")
             _check_rows(rows, reference.rows(robot))
-        task = Task(function, reference, self.gain)
+        with self.own_keys():
+            task = Task(function, reference, self.gain, self.priority, self.speed, self.braking)
+            task.approach(robot)
         with at("gain"):
             try:
                 task.gain_matrix(robot)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, array, one_line
-from nmm.errors import InputError
+from nmm.arrays import Array, array, counted, one_line, positive
+from nmm.errors import InputError, expect_known
 from nmm.functions.function import Function, Row
 from nmm.functions.references.polynomial import Constant
 from nmm.robots.robot import Robot
@@ -25,16 +25,48 @@ class Task:
         numbers stand for a constant
     gain : K in 1/s: a number, s numbers, or an (s, s) matrix with a positive definite symmetric
         part; None for planning mode, without feedback
+    priority : 1, 2, ...: where limits bind, tasks of a lower number keep their rate and the others have what
+        is left; tasks of one number are scaled together
+    speed : how fast feedback may approach the target, ‖K e‖ at most over rows of one unit: a number, or
+        numbers by unit ({"m": 1.0, "rad": 2.0}), 1/s of these; None for no bound
+    braking : deceleration b with which it may come to rest there, ‖K e‖ <= √(2 b ‖e‖), in the same way, 1/s²
+
+    Raises
+    ------
+    InputError : what is no function, a priority that is none, a speed that is not above 0
     """
 
     def __init__(
-        self, function: Function, reference: Function | ArrayLike, gain: ArrayLike | None = 1.0
+        self,
+        function: Function,
+        reference: Function | ArrayLike,
+        gain: ArrayLike | None = 1.0,
+        priority: int = 1,
+        speed: float | Mapping[str, float] | None = None,
+        braking: float | Mapping[str, float] | None = None,
     ) -> None:
         if not isinstance(function, Function):
             raise InputError(f"task: expected a function of the robot, as Position('ee'), got {function!r}")
         self.function = function
         self.reference = reference if isinstance(reference, Function) else Constant(np.atleast_1d(reference))
         self.gain = gain
+        self.priority = counted(priority, "priority")
+        self.speed = _by_unit(speed, "speed")
+        self.braking = _by_unit(braking, "braking")
+
+    def approach(self, robot: Robot) -> tuple[Array, Array]:
+        """Speed and braking for the unit of each row, (s,) each; infinite for none."""
+        rows = self.rows(robot)
+        units = {row.unit for row in rows}
+        for name, given in (("speed", self.speed), ("braking", self.braking)):
+            for unit in given:
+                if unit:
+                    expect_known("unit", unit, sorted(units), name)
+        speed, braking = (
+            np.array([given.get(row.unit, given.get("", np.inf)) for row in rows])
+            for given in (self.speed, self.braking)
+        )
+        return speed, braking
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         """The rows of f; `InputError` when g has another number of them."""
@@ -71,9 +103,15 @@ class Task:
         return gain
 
 
+def _by_unit(given: float | Mapping[str, float] | None, name: str) -> dict[str, float]:
+    """Numbers by unit; one for all has the unit ""."""
+    numbers = given if isinstance(given, Mapping) else {} if given is None else {"": given}
+    return {unit: positive(value, f"{name} {unit}".strip()) for unit, value in numbers.items()}
+
+
 @dataclass(frozen=True, eq=False)
 class Stack:
-    """Tasks executed together, one above the other, each with its own reference and gain."""
+    """Tasks executed together, one above the other by priority, each with its own reference and gain."""
 
     tasks: tuple[Task, ...] = field(default=())
 
@@ -85,13 +123,20 @@ class Stack:
         stacked = (tasks,) if isinstance(tasks, Task) else tasks
         if not isinstance(stacked, Sequence) or not all(isinstance(task, Task) for task in stacked):
             raise InputError(f"expected a Task or a list of Tasks, got {tasks!r}")
-        return cls(tuple(stacked))
+        return cls(tuple(sorted(stacked, key=lambda task: task.priority)))
 
     def __iter__(self) -> Iterator[Task]:
         return iter(self.tasks)
 
     def __len__(self) -> int:
         return len(self.tasks)
+
+    def levels(self, robot: Robot) -> tuple[int, ...]:
+        """How many rows each level of priority has, the first level first."""
+        counts: dict[int, int] = {}
+        for task in self.tasks:
+            counts[task.priority] = counts.get(task.priority, 0) + len(task.rows(robot))
+        return tuple(counts.values())
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         """The rows of all tasks, in order."""

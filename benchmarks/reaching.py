@@ -1,0 +1,171 @@
+"""Reaching random poses under limits, a Panda on a differential-drive base:
+
+    python benchmarks/reaching.py [POSES] [SEED]
+
+After Haviland, Sünderhauf and Corke, "A holistic approach to reactive mobile manipulation" (RA-L 2022): each
+pose is the end-effector's in a random configuration within the joints' limits, 0.5 to 5 m from where it is
+at the start. Reached is 5 mm and 0.02 rad within 60 s; the base goes at most 4 m/s and 4 rad/s, the joints
+keep their positions and velocities. Position first, orientation below it; a retreat when the error stalls. A
+second table adds limits of acceleration. Inputs are held over a sample, as on a robot.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+import nmm
+import nmm.control.goal
+import nmm.runs.integrators
+
+PANDA = "package://example-robot-data/robots/panda_description/urdf/panda.urdf"
+FRAME = "panda_hand"
+HOME = {"panda_joint2": -0.3, "panda_joint4": -2.2, "panda_joint6": 2.0, "panda_joint7": np.pi / 4}
+DT, LONGEST = 0.05, 60.0
+BASE = {"v": 4.0, "omega": 4.0}
+ACCELERATIONS = {"platform": 4.0, "arm": 15.0}
+
+
+class Attempt(NamedTuple):
+    """A pose tried: when it was reached (s; nan if not), limits broken at most, retreats, µs, why not."""
+
+    t: float
+    broken: float
+    retreats: int
+    step: float
+    reason: str
+
+
+def the_robot() -> nmm.Robot:
+    """A Panda on a platform whose inputs are v and ω."""
+    base = nmm.load("differential_base", platform="unicycle")
+    return nmm.mount(base, nmm.load(PANDA, lock={"panda_finger_joint1": 0.02}))
+
+
+def the_controller(
+    robot: nmm.Robot, acceleration: dict[str, float] | None
+) -> tuple[nmm.Controller, nmm.Signal, nmm.Signal]:
+    """The controller, and the targets that are set for each pose."""
+    position, orientation = nmm.Signal(np.zeros(3)), nmm.Signal(np.zeros(3))
+    braking = (None, None) if acceleration is None else (1.5, 3.0)
+    tasks = [
+        nmm.Task(nmm.Position(FRAME), position, gain=3.5, speed=4.0, braking=braking[0]),
+        nmm.Task(nmm.Orientation(FRAME), orientation, gain=3.5, priority=2, speed=2.5, braking=braking[1]),
+    ]
+    limits = nmm.Limits(velocity=BASE, acceleration=acceleration)
+    retreat = nmm.Retreat(posture=HOME, stalled=0.5 if acceleration is None else 1.0)
+    resolver = nmm.ProjectedGradient(alpha=1.0)
+    controller = nmm.Controller(robot, tasks, resolver, limits=limits, dt=DT, retreat=retreat)
+    return controller, position, orientation
+
+
+def pose(robot: nmm.Robot, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The end-effector's position (m) and rotation vector (rad) at q."""
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, q)
+    placement = data.oMf[robot.frame_id(FRAME)]
+    return placement.translation.copy(), pin.log3(placement.rotation)
+
+
+def configuration(robot: nmm.Robot, rng: np.random.Generator) -> np.ndarray:
+    """A random one: the base within 5 m, joints within their limits."""
+    q = np.zeros(robot.n)
+    q[:2] = rng.uniform(-5.0, 5.0, 2)
+    q[2] = rng.uniform(-np.pi, np.pi)
+    q[3:] = rng.uniform(*robot.q_limits[3:].T)
+    return q
+
+
+def draw(robot: nmm.Robot, q0: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """A pose 0.5 to 5 m from the end-effector's at q0."""
+    start, _ = pose(robot, q0)
+    while True:
+        found = pose(robot, configuration(robot, rng))
+        if 0.5 <= np.linalg.norm(found[0] - start) <= 5.0:
+            return found
+
+
+def attempt(controller: nmm.Controller, q: np.ndarray, goal: nmm.Goal) -> Attempt:
+    """Go there by a robot's loop: measure, command, hold."""
+    robot, kept = controller.robot, controller.kept
+    hold = nmm.runs.integrators.ZeroOrderHold(robot)
+    controller.reset()
+    before, broken, spent = np.zeros(robot.n_u), 0.0, 0.0
+    steps = round(LONGEST / DT)
+    for k in range(steps):
+        t = k * DT
+        began = time.perf_counter()
+        u = controller(t, q)
+        spent += time.perf_counter() - began
+        last = controller.last(t, q)
+        if goal.reached(last.error, controller.rows):
+            return Attempt(t, broken, controller.backing.count, spent / (k + 1) * 1e6, "")
+        ahead = hold.advance(controller.velocity, t, q, last.q_dot, u, DT)
+        beyond = [
+            kept.inputs[:, 0] - u,
+            u - kept.inputs[:, 1],
+            robot.q_limits[:, 0] - ahead,
+            ahead - robot.q_limits[:, 1],
+            np.abs(u - before) - kept.accelerations * DT,
+        ]
+        broken = max(broken, *(float(part.max()) for part in beyond))
+        q, before = ahead, u
+    stops = np.minimum(q - robot.q_limits[:, 0], robot.q_limits[:, 1] - q)
+    at = [name for name, room in zip(robot.q_names, stops, strict=True) if room < 1e-3]
+    metres, radians = nmm.control.goal.sizes(last.error, [row.unit for row in controller.rows])
+    reason = f"{metres:.3f} m and {radians:.3f} rad left, at stops: {', '.join(at) or 'none'}"
+    return Attempt(np.nan, broken, controller.backing.count, spent / steps * 1e6, reason)
+
+
+def table(count: int, seed: int, acceleration: dict[str, float] | None) -> float:
+    """Print a table: from home, and from random postures; returns the least share that was reached."""
+    robot = the_robot()
+    controller, position, orientation = the_controller(robot, acceleration)
+    goal = nmm.Goal()
+    shares = []
+    print(f"\nlimits of acceleration: {acceleration or 'none'}")
+    print(
+        f"{'start':16s}{'reached':>9s}{'median':>8s}{'p95':>7s}{'max s':>7s}{'broken':>9s}{'retreats':>9s}"
+        f"{'µs':>7s}"
+    )
+    for start in ("home", "random posture"):
+        rng = np.random.default_rng(seed)
+        attempts = []
+        for _ in range(count):
+            q0 = robot.q(HOME)
+            if start != "home":
+                q0[3:] = rng.uniform(*robot.q_limits[3:].T)
+            target = draw(robot, q0, rng)
+            position.set(target[0])
+            orientation.set(target[1])
+            attempts.append(attempt(controller, q0, goal))
+        t = np.array([one.t for one in attempts])
+        reached = t[np.isfinite(t)]
+        shares.append(len(reached) / count)
+        print(
+            f"{start:16s}{100 * shares[-1]:8.1f}%{np.median(reached):8.2f}{np.percentile(reached, 95):7.2f}"
+            f"{reached.max():7.1f}{max(one.broken for one in attempts):9.1e}"
+            f"{100 * np.mean([one.retreats > 0 for one in attempts]):8.1f}%"
+            f"{np.median([one.step for one in attempts]):7.1f}"
+        )
+        for k, one in enumerate(attempts):
+            if one.reason:
+                print(f"  pose {k}: {one.reason}")
+    return min(shares)
+
+
+def main() -> int:
+    """Both tables; exit status 1 when less than 99.5 % are reached without limits of acceleration."""
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
+    seed = int(sys.argv[2]) if len(sys.argv) > 2 else 0
+    share = table(count, seed, None)
+    table(count, seed, ACCELERATIONS)
+    return int(share < 0.995)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
