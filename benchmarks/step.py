@@ -6,6 +6,7 @@ fused     through the public API, as a user's loop calls it
 floor     Pinocchio's calls and one function written by hand for the case (`floor.py`)
 unfused   the same controller with every kernel run as plain Python (NUMBA_DISABLE_JIT=1)
 callable  fused, with the objective as a user's own Python function in the middle
+limits    a step without limits, with all of velocity, position and acceleration, and with some that bind
 """
 
 from __future__ import annotations
@@ -90,6 +91,29 @@ def compare(name: str, controller: nmm.Controller, q: np.ndarray) -> tuple[float
     return min(floors), min(fused), microseconds(lambda: user(T, q))
 
 
+def limited(name: str, q_dot: float) -> tuple[float, float, float]:
+    """Times of a scenario's step without limits, with all of them, and with some that bind (interleaved)."""
+    scenario = nmm.Scenario.load(name).override("limits", False)
+    free = scenario.controller()
+    robot = free.robot
+    q = robot.q(scenario.parts.q0)
+
+    def with_limits(limits: nmm.Limits) -> nmm.Controller:
+        return nmm.Controller(
+            robot, free.task, free.resolver, free.objective, free.added_task, limits, scenario.parts.dt
+        )
+
+    every = with_limits(nmm.Limits({"platform": 1e3}, acceleration=1e4))
+    binding = with_limits(nmm.Limits({"platform": q_dot, "arm": q_dot}, acceleration=1e4))
+    if every.evaluate(T, q).scale.min() < 1.0 or binding.evaluate(T, q).scale.min() == 1.0:
+        raise SystemExit(f"{name}: expected limits that bind only where they are meant to")
+    times: list[list[float]] = [[], [], []]
+    for _ in range(5):
+        for controller, found in zip((free, every, binding), times, strict=True):
+            found.append(microseconds(lambda c=controller: c(T, q), 0.2))
+    return min(times[0]), min(times[1]), min(times[2])
+
+
 def main() -> int:
     """Print the table; exit status 1 when a fused step takes more than 1.8 times its floor."""
     found = controllers()
@@ -104,6 +128,13 @@ def main() -> int:
         worst = max(worst, fused / floor)
         print(f"{name:12s}{floor:8.2f}{fused:8.2f}{fused / floor:8.2f}{plain[name]:9.1f}{user:10.1f}")
     print(f"worst ratio {worst:.2f} (aim: at most 1.8)")
+    print(f"\n{'limits':24s}{'none':>8s}{'all':>8s}{'ratio':>8s}{'binding':>9s}{'ratio':>8s}")
+    for name, q_dot, aim in (("unicycle_2r_position", 0.05, 1.3), ("tiago_pose", 0.02, 1.5)):
+        free, every, binding = limited(name, q_dot)
+        print(
+            f"{name:24s}{free:8.2f}{every:8.2f}{every / free:8.2f}{binding:9.2f}{binding / free:8.2f}"
+            f"  (aim for all: {aim})"
+        )
     return int(worst > 1.8)
 
 

@@ -256,7 +256,6 @@ REFUSED: list[tuple[Callable[[], Any], str]] = [
     (resolved(PG, row_scales=[1.0, 0.0]), "row_scales: expected numbers above 0, got 0"),
     (resolved(PG, row_scales=[1.0]), r"row_scales: expected 2 numbers, got shape \(1,\)"),
     (resolved(PG, levels=[1, 2]), r"levels: expected numbers of rows that add up to 2, got \[1, 2\]"),
-    (resolved(PG, levels=[1, 1]), "levels: resolver pg does all rows at one level, got 2"),
     (resolved(PG, limit_rows=np.eye(3)), "limit_rows: expected 4 columns"),
     (resolved(PG, limit_rows=np.eye(4), upper=[1, 2]), "upper: expected 4 numbers"),
     (resolved(PG, before=np.ones(3)), r"before: expected 4 numbers, got shape \(3,\)"),

@@ -42,7 +42,7 @@ class Step:
 
     r, r_d, error, rate (s,), J (s, m) of J_bar u = rate; objective H and gradient h (m,);
     u (m,), q_dot = S u (n,); status, scale (levels,), residual ‖J u - rate‖, measure, excess: see `Answer`;
-    partition (s,) the columns of Ja, -1 where there is none.
+    partition (s,) the columns of Ja, -1 where there is none; retreats so far.
     """
 
     t: float
@@ -62,6 +62,7 @@ class Step:
     measure: float
     partition: Integers
     excess: float = 0.0
+    retreats: int = 0
 
 
 class Controller:
@@ -305,6 +306,7 @@ class Controller:
             residual=float(answer.residual[()]),
             measure=float(answer.measure[()]),
             excess=float(answer.excess[()]),
+            retreats=0 if self.backing is None else self.backing.count,
             partition=self.state.partition(len(self.rows)),
         )
 

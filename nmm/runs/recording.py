@@ -43,6 +43,7 @@ class Recorder:
         self._scale: Array | None = None
         self._beyond: dict[str, tuple[int, float, float]] = {}
         self._unanswered: list[float] = []
+        self._retreats: list[float] = []
         self._J = np.empty((count, s, robot.n_u))
         self._partition = np.empty((count, s), dtype=np.int64)
         self._count = 0
@@ -117,6 +118,8 @@ class Recorder:
         self._partition[k] = sample.partition
         if sample.status is Status.FALLBACK:
             self._unanswered.append(sample.t)
+        if sample.retreats > len(self._retreats):
+            self._retreats.append(sample.t)
         if sample.excess > 0.0:
             for name, by in self._controller.beyond().items():
                 count, first, most = self._beyond.get(name, (0, sample.t, 0.0))
@@ -140,12 +143,15 @@ class Recorder:
                 f"{np.abs(self._u[: self._count]).max():.3g}"
             )
 
-    def _warn_of_limits(self) -> None:
+    def _warn_of_events(self) -> None:
         for name, (count, first, most) in self._beyond.items():
             self.warnings.append(
                 f"the limit of {name} could not be kept with the others in {count} samples, from "
                 f"t = {first:.3g} s on: its rate was beyond what would keep it by up to {most:.3g} a second"
             )
+        if self._retreats:
+            at = ", ".join(f"{t:.3g} s" for t in self._retreats)
+            self.warnings.append(f"the error stalled and the robot backed off, at t = {at}")
         if self._unanswered:
             self.warnings.append(
                 f"the resolver had no answer in {len(self._unanswered)} samples, from "
@@ -158,7 +164,7 @@ class Recorder:
         count, controller = self._count, self._controller
         robot, rows = controller.robot, controller.rows
         singular_values = np.linalg.svd(self._J[:count], compute_uv=False).astype(np.float64)
-        self._warn_of_limits()
+        self._warn_of_events()
         if outcome is not Outcome.SINGULAR:  # which says so itself
             self._warn_of_singularities(singular_values)
         ended = outcome in (Outcome.COMPLETED, Outcome.MISSED)
