@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, Integers, positive
-from nmm.control.bounds import OFF, STAGE
+from nmm.control.bounds import OFF, SAMPLE, STAGE
 from nmm.control.equations import PLAIN, STEP, WRAPPED, Arm, ControlStep, TaskRows, drive, hold_back
 from nmm.control.equations import step as compiled_step
 from nmm.control.limits import Limits
 from nmm.control.lost_directions import in_world_axes, lost_directions
-from nmm.control.retreat import Backing, Retreat
+from nmm.control.retreat import Retreat
 from nmm.errors import InputError, SingularError
 from nmm.functions.function import Row, row_scales
 from nmm.functions.objectives.base import Objective
@@ -177,6 +177,8 @@ class Controller:
         self._shape = (robot.n,)
         self._solve = self._solver()
         self.before = self._step.problem.before
+        if limits is None:
+            self._step.limits.mode[()] = OFF
         self.backing = None if retreat is None else retreat.on(robot, self.rows)
         self._needs_dt = self.backing is not None or (limits is not None and kept.needs_dt)
         self.dt = dt
@@ -204,26 +206,30 @@ class Controller:
         # Another kind of array would be compiled for anew, so anything but the plain kind is copied.
         if type(q) is not np.ndarray or q.dtype != FLOAT64 or q.shape != self._shape or not q.flags.carray:
             q = self._copied(q)
+        if self._needs_dt:
+            self._sample(float(t), q)
+        elif self._solve(float(t), q) >= _FAILED:
+            self._fail(t, q)
+        return self._u.copy()
+
+    def _expect_dt(self) -> None:
         if self._needs_dt and self.dt is None:
-            raise InputError(
-                "controller: limits of position, acceleration and functions need dt: give dt=0.01"
-            )
-        status = self._solve(float(t), q)
-        if self.backing is not None and self.backing.watch(self._step.task.error, self.dt or 0.0):
-            self._back_off(self.backing, q)
+            raise InputError("dt: expected a number, which limits and a retreat need, got none")
+
+    def _sample(self, t: float, q: Array) -> None:
+        """A call that lasts dt: the resolver's inputs, or a retreat's where the error stalls."""
+        self._expect_dt()
+        status = self._solve(t, q)
+        if self.backing is not None and self.backing.watch(
+            self._step.task.error, float(self._step.problem.dt)
+        ):
+            found, G = self._step, self._program.buffers.G
+            instead(found.problem, self.backing.inputs(q, G), found.answer)
+            hold_back(found.task, found.problem, found.answer)
+            drive(found.answer.u, G, found.arm, found.q_dot)
+            self.before[:] = self._u
         elif status >= _FAILED:
             self._fail(t, q)
-        u = self._u.copy()
-        if self.limits is not None:
-            self.before[:] = u
-        return u
-
-    def _back_off(self, backing: Backing, q: Array) -> None:
-        """The retreat's inputs in place of the resolver's."""
-        found, G = self._step, self._program.buffers.G
-        instead(found.problem, backing.inputs(q, G), found.answer)
-        hold_back(found.task, found.problem, found.answer)
-        drive(found.answer.u, G, found.arm, found.q_dot)
 
     def _copied(self, q: ArrayLike | None) -> Array:
         if q is None:
@@ -250,6 +256,8 @@ class Controller:
             resolver.finish(found.problem, dimensions, found.answer)
             some_inputs(found.problem, found.answer)
             hold_back(found.task, found.problem, found.answer)
+            if found.limits.mode == SAMPLE:
+                found.problem.before[:] = found.answer.u
             drive(found.answer.u, program.buffers.G, found.arm, found.q_dot)
             return float(found.answer.status[()])
 
@@ -281,6 +289,7 @@ class Controller:
 
         Like a call, it may change what the resolver remembers (see `reset`).
         """
+        self._expect_dt()
         q = self._copied(q)
         self._solve(float(t), q)
         return self.last(t, q)

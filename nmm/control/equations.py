@@ -255,5 +255,8 @@ def step(t: float, q: Array, integers: Integers, floats: Array) -> float:
     call_resolver(e.resolver, problem, e.numbers, e.options, e.state, answer)
     some_inputs(problem, answer)
     hold_back(e.task, problem, answer)
+    if e.limits.mode[()] == SAMPLE:
+        for j in range(answer.u.shape[0]):
+            problem.before[j] = answer.u[j]
     drive(answer.u, b.G, e.arm, e.q_dot)
     return float(answer.status[()])
