@@ -27,7 +27,7 @@ from nmm.kernels.compiled import checked_by_caller
 from nmm.kernels.memory import views
 from nmm.resolvers.answer import Status, unanswered
 from nmm.resolvers.base import Resolver
-from nmm.resolvers.limited import instead, some_inputs
+from nmm.resolvers.limited import instead, keep_limits
 from nmm.resolvers.problem import Problem
 from nmm.resolvers.state import State
 from nmm.robots.robot import Robot
@@ -254,7 +254,7 @@ class Controller:
         def solve_and_finish(t: float, q: Array) -> float:
             solve(t, q)
             resolver.finish(found.problem, dimensions, found.answer)
-            some_inputs(found.problem, found.answer)
+            keep_limits(found.problem, found.answer)
             hold_back(found.task, found.problem, found.answer)
             if found.limits.mode == SAMPLE:
                 found.problem.before[:] = found.answer.u

@@ -27,7 +27,7 @@ from nmm.kernels.linear_algebra import residual_norm
 from nmm.kernels.memory import Cell, IntegerMatrix, IntegerVector, Matrix, Vector, views
 from nmm.resolvers.answer import NOT_FINITE, RELAXED, SOLVED, AnswerArrays
 from nmm.resolvers.base import call_resolver
-from nmm.resolvers.limited import some_inputs
+from nmm.resolvers.limited import keep_limits
 from nmm.resolvers.problem import ProblemArrays
 
 
@@ -253,7 +253,7 @@ def step(t: float, q: Array, integers: Integers, floats: Array) -> float:
     answer.measure[()] = math.nan
     answer.excess[()] = 0.0
     call_resolver(e.resolver, problem, e.numbers, e.options, e.state, answer)
-    some_inputs(problem, answer)
+    keep_limits(problem, answer)
     hold_back(e.task, problem, answer)
     if e.limits.mode[()] == SAMPLE:
         for j in range(answer.u.shape[0]):

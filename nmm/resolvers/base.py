@@ -13,7 +13,7 @@ from nmm.errors import InputError
 from nmm.kernels.compiled import Kernel, caller
 from nmm.kernels.memory import record_type
 from nmm.resolvers.answer import Answer, AnswerArrays, unanswered
-from nmm.resolvers.limited import some_inputs
+from nmm.resolvers.limited import keep_limits
 from nmm.resolvers.problem import Dimensions, Problem, ProblemArrays
 from nmm.resolvers.state import State
 
@@ -42,7 +42,7 @@ class Resolver(ABC):
 
     1. `kernel`, of signature `RESOLVER`, which solves J u = rate, writes u and measure, and ends with
        `certify` (residual and status), or writes the status of what went wrong and leaves u; where u is not
-       `within` the limits it calls `limit` with its metric;
+       `within` the limits it calls `limit` with its metric, else that is done after it, in the Euclidean one;
     2. `setup(dimensions)`, the numbers that it reads; raises `InputError` for a problem that it cannot
        resolve.
 
@@ -88,7 +88,7 @@ class Resolver(ABC):
         answer = unanswered(dimensions.m, len(arrays.ends))
         self.kernel(arrays, setup.numbers, setup.options, state.memory, answer)
         self.finish(arrays, dimensions, answer)
-        some_inputs(arrays, answer)
+        keep_limits(arrays, answer)
         return Answer.of(answer)
 
 

@@ -28,10 +28,12 @@ from nmm.resolvers.problem import ProblemArrays
 
 #: A scale below 1 by no more than this is rounding.
 WHOLE = 1e-12
+#: Rows of limits that a resolver has seen to are missed by no more than this.
+LEFT = 1e-9
 
 
 @compiled
-def within(problem: ProblemArrays, u: Array) -> bool:
+def within(problem: ProblemArrays, u: Array, rounding: float = FEASIBLE) -> bool:
     """Whether the inputs are within the limits; rows of limits may be missed by rounding."""
     for j in range(u.shape[0]):
         if not problem.u_lower[j] <= u[j] <= problem.u_upper[j]:
@@ -39,7 +41,7 @@ def within(problem: ProblemArrays, u: Array) -> bool:
     for i in range(problem.lower.shape[0]):
         value = times(problem.limit_rows, i, u)
         lower, upper = problem.lower[i], problem.upper[i]
-        if value < lower - FEASIBLE * max(1.0, abs(lower)) or value > upper + FEASIBLE * max(1.0, abs(upper)):
+        if value < lower - rounding * max(1.0, abs(lower)) or value > upper + rounding * max(1.0, abs(upper)):
             return False
     return True
 
@@ -118,18 +120,6 @@ def fall_back(problem: ProblemArrays, answer: AnswerArrays) -> None:
     answer.status[()] = FALLBACK
     for level in range(answer.scale.shape[0]):
         answer.scale[level] = 0.0
-
-
-@compiled
-def some_inputs(problem: ProblemArrays, answer: AnswerArrays) -> None:
-    """Where there are limits, a resolver that found no inputs leaves those nearest to rest."""
-    if answer.status[()] < SINGULAR_J:
-        return
-    limited = problem.lower.shape[0] > 0
-    for j in range(answer.u.shape[0]):
-        limited = limited or not (math.isinf(problem.u_lower[j]) and math.isinf(problem.u_upper[j]))
-    if limited:
-        fall_back(problem, answer)
 
 
 @compiled
@@ -245,3 +235,17 @@ def judge(problem: ProblemArrays, wanted: Array, answer: AnswerArrays) -> None:
             answer.status[()] = INEXACT
     elif answer.status[()] == SOLVED:
         answer.status[()] = certified(residual, rounding, asked)
+
+
+@compiled
+def keep_limits(problem: ProblemArrays, answer: AnswerArrays) -> None:
+    """What a resolver itself did not see to: inputs it did not find, or left beyond the limits."""
+    limited = problem.lower.shape[0] > 0
+    for j in range(answer.u.shape[0]):
+        limited = limited or not (math.isinf(problem.u_lower[j]) and math.isinf(problem.u_upper[j]))
+    if not limited:
+        return
+    if answer.status[()] >= SINGULAR_J:
+        fall_back(problem, answer)
+    elif answer.excess[()] == 0.0 and not within(problem, answer.u, LEFT):
+        limit(problem, scratch((0, 0)), answer)
