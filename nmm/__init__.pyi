@@ -1,7 +1,7 @@
 from .control.controller import Controller as Controller
 from .control.controller import Step as Step
 from .control.goal import Goal as Goal
-from .control.limits import Bound as Bound
+from .control.limited_function import Bound as Bound
 from .control.limits import Limits as Limits
 from .control.retreat import Retreat as Retreat
 from .errors import DivergedError as DivergedError

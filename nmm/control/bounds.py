@@ -71,18 +71,21 @@ def approach(room: float, dt: float, acceleration: float, recovery: float) -> fl
 
 @compiled
 def bound_inputs(limits: LimitNumbers, q: Array, problem: ProblemArrays) -> None:
-    """Bounds of the inputs at q: velocity and position, then acceleration, which wins."""
+    """Bounds of the inputs at q: position wins over velocity, and acceleration over both."""
     dt = problem.dt[()]
     for j in range(limits.slowest.shape[0]):
         lower, upper = limits.slowest[j], limits.fastest[j]
         A = limits.acceleration[j]
         i = limits.coordinate[j]
         if i >= 0:
-            upper = min(upper, approach(limits.high[j] - q[i], dt, A, limits.recovery[()]))
-            lower = max(lower, -approach(q[i] - limits.low[j], dt, A, limits.recovery[()]))
-        if lower > upper:  # less room than a sample's way back: its middle
-            lower = 0.5 * (lower + upper)
-            upper = lower
+            high = approach(limits.high[j] - q[i], dt, A, limits.recovery[()])
+            low = -approach(q[i] - limits.low[j], dt, A, limits.recovery[()])
+            # The way back is no faster than the velocities allow, nor than can be braked at the other end.
+            if high < 0.0:
+                high = max(high, min(lower, 0.0), low)
+            if low > 0.0:
+                low = min(low, max(upper, 0.0), high)
+            lower, upper = min(max(lower, low), high), max(min(upper, high), low)
         if not math.isinf(A):
             least, most = problem.before[j] - A * dt, problem.before[j] + A * dt
             if least > upper:

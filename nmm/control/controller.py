@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, Integers, positive
 from nmm.control.bounds import OFF, SAMPLE, STAGE
+from nmm.control.contradiction import contradicting
 from nmm.control.equations import PLAIN, STEP, WRAPPED, Arm, ControlStep, TaskRows, drive, hold_back
 from nmm.control.equations import step as compiled_step
 from nmm.control.limits import Limits
@@ -327,6 +328,7 @@ class Controller:
         if self.limits is None:
             self(t, q)
             return self._step.q_dot.copy()
+        self._expect_dt()
         with self._mode(STAGE):
             q = self._copied(q)
             if self._solve(float(t), q) >= _FAILED:
@@ -354,6 +356,16 @@ class Controller:
         rates = problem.limit_rows @ self._u
         excess = np.maximum(rates - problem.upper, problem.lower - rates)
         return {name: float(by) for name, by in zip(self.kept.rows, excess, strict=True) if by > 1e-9}
+
+    def contradiction(self) -> tuple[str, ...]:
+        """The limits that leave no inputs between them in the last call; () where there are some."""
+        return contradicting(self._step.problem, self.robot.u_names, self.kept.rows)
+
+    def row_values(self) -> Array:
+        """What `kept.rows` names, in the last call: rates of wheels, rad/s, and values of functions."""
+        limits, wheels = self._step.limits, len(self._step.limits.spin)
+        rates = self._step.problem.limit_rows[:wheels] @ self._u
+        return np.concatenate([rates, self._program.buffers.value[limits.rows]])
 
     def reset(self) -> None:
         """Forget what the resolver remembers and the inputs before: the next call decides anew, from rest."""

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, positive
 from nmm.control.bounds import SAMPLE, LimitNumbers
+from nmm.control.limited_function import Bound, Kept
 from nmm.errors import InputError, expect_known
-from nmm.functions.function import Function
 from nmm.functions.tasks.coordinates import Coordinates
 from nmm.robots.coordinates import UNLIMITED
 from nmm.robots.robot import Robot
@@ -24,61 +23,6 @@ Named: TypeAlias = bool | Mapping[str, Range]
 
 #: Speed of the way back from beyond a limit, m/s or rad/s.
 RECOVERY = 0.1
-
-
-class Bound:
-    """lower <= c(t, q) <= upper for the values of a function: a corridor, a height, a distance.
-
-    Kept as a damper: c may approach a limit no faster than it can be slowed down to it. On wheels c's
-    direction turns, so that it cannot always be kept with the other limits: then it is broken as little as
-    can be, and the run says so.
-
-    Parameters
-    ----------
-    function : c(t, q), a task's function, a frame's position, ...
-    lower, upper : (rows,) or a number for all, in the units of the rows; infinite for none
-    braking : deceleration to count on, units of the rows per s²; None for a quarter of what the accelerations
-        of the inputs give where the robot is
-    name : for messages; the function's rows when not given
-
-    Raises
-    ------
-    InputError : no limit, one that is not a number, lower above upper
-    """
-
-    def __init__(
-        self,
-        function: Function,
-        lower: ArrayLike = -np.inf,
-        upper: ArrayLike = np.inf,
-        braking: float | None = None,
-        name: str = "",
-    ) -> None:
-        if not isinstance(function, Function):
-            raise InputError(f"bound: expected a function, got {function!r}")
-        self.function = function
-        self.lower = _numbers(lower, "lower")
-        self.upper = _numbers(upper, "upper")
-        self.braking = None if braking is None else positive(braking, "braking")
-        self.name = name
-        if np.any(self.lower > self.upper):
-            raise InputError(f"bound: lower {self.lower} is above upper {self.upper}")
-
-    def rows(self, robot: Robot) -> list[tuple[str, float, float]]:
-        """Name, lower and upper limit of each component."""
-        rows = self.function.rows(robot)
-        try:
-            lower, upper = (np.broadcast_to(ends, (len(rows),)) for ends in (self.lower, self.upper))
-        except ValueError:
-            raise InputError(
-                f"bound: expected a number or {len(rows)} ({', '.join(row.name for row in rows)}), "
-                f"got lower {self.lower} and upper {self.upper}"
-            ) from None
-        names = [
-            f"{self.name}.{row.name}" if self.name and len(rows) > 1 else self.name or row.name
-            for row in rows
-        ]
-        return list(zip(names, map(float, lower), map(float, upper), strict=True))
 
 
 class Limits:
@@ -115,24 +59,15 @@ class Limits:
         self.position = _named(position, "position")
         self.acceleration = _sizes(acceleration, "acceleration")
         self.wheels = _sizes(wheels, "wheels")
-        self.bounds: tuple[Bound, ...] = (bounds,) if isinstance(bounds, Bound) else tuple(bounds)
-        for bound in self.bounds:
-            if not isinstance(bound, Bound):
-                raise InputError(f"limits: expected a Bound in bounds, got {bound!r}")
+        given = (bounds,) if isinstance(bounds, Bound) else bounds
+        if not isinstance(given, Sequence) or not all(isinstance(bound, Bound) for bound in given):
+            raise InputError(f"bounds: expected a Bound, or several, got {bounds!r}")
+        self.bounds: tuple[Bound, ...] = tuple(given)
         self.recovery = positive(recovery, "recovery")
 
     def on(self, robot: Robot) -> LimitsOn:
         """These limits as numbers for one robot; `InputError` names what it does not have."""
         return LimitsOn(self, robot)
-
-
-class Kept(NamedTuple):
-    """A limited quantity: its name, its unit, and its limits."""
-
-    name: str
-    unit: str
-    lower: float
-    upper: float
 
 
 class LimitsOn:
@@ -143,7 +78,8 @@ class LimitsOn:
     inputs (m, 2), coordinates (n, 2) : lower and upper limits; infinite for none
     accelerations (m,) : largest change of inputs per second
     functions : whose values are limited; `braking` (f,) of their components
-    rows : the names of the limits that are rows on the inputs: wheels, then functions' components
+    row_limits, rows : the limits that are rows on the inputs, and their names: wheels, then functions'
+        components
     needs_dt : whether there are limits that are kept from sample to sample
     """
 
@@ -153,7 +89,7 @@ class LimitsOn:
         self.accelerations = _per_input(limits.acceleration, robot, "acceleration")
         self.recovery = limits.recovery
         self._moved = robot.rate_coordinates
-        self._wheel_names, self._wheels, self._spin = _wheel_limits(limits.wheels, robot)
+        wheels, self._wheels, self._spin = _wheel_limits(limits.wheels, robot)
         held = [
             Bound(Coordinates(robot.q_names[i]), *self.coordinates[i])
             for i in robot.following.independent
@@ -162,14 +98,20 @@ class LimitsOn:
         bounds = (*held, *limits.bounds)
         self.functions = tuple(bound.function for bound in bounds)
         found = [(bound, row) for bound in bounds for row in bound.rows(robot)]
-        self._names = tuple(row[0] for _, row in found)
-        self._ends = np.array([row[1:] for _, row in found]).reshape(-1, 2)
+        self._ends = np.array([row[2:] for _, row in found]).reshape(-1, 2)
         self.braking = np.array([np.nan if bound.braking is None else bound.braking for bound, _ in found])
-        self.rows = self._wheel_names + self._names
+        self.row_limits = (
+            *(
+                Kept(name, "rad/s", -spin, spin)
+                for name, spin in zip(wheels, self._spin.tolist(), strict=True)
+            ),
+            *(row for _, row in found),
+        )
+        self.rows = tuple(row.name for row in self.row_limits)
         self.needs_dt = bool(
             np.any(np.isfinite(self.accelerations))
             or np.any(np.isfinite(self.coordinates[self._moved[self._moved >= 0]]))
-            or self._names
+            or found
         )
 
     def numbers(self, first_rows: Sequence[int], robot: Robot) -> LimitNumbers:
@@ -195,17 +137,19 @@ def _velocities(given: Named, robot: Robot) -> Array:
     limits = np.column_stack([-largest, largest]) if given is not False else _none(robot.n_u)
     if isinstance(given, Mapping):
         followers = {one.joint: one for one in robot.followers}
-        for name, value in given.items():
-            lower, upper = _ends(value, f"velocity: {name}", symmetric=True)
-            if name in followers:
-                one = followers[name]
-                ends = np.sort(np.array([lower, upper]) / one.multiplier) if one.multiplier else None
-                if ends is not None:
-                    j = robot.input(one.leader)
-                    limits[j] = max(limits[j, 0], ends[0]), min(limits[j, 1], ends[1])
-                continue
-            for j in _inputs(name, robot, "velocity"):
-                limits[j] = lower, upper
+        for name, inputs in _inputs(given, robot, "velocity", [*followers]):
+            lower, upper = _ends(given[name], f"velocity: {name}", symmetric=True)
+            if name not in followers:
+                limits[inputs] = lower, upper
+            elif followers[name].multiplier:
+                (j,) = inputs
+                ends = np.sort(np.array([lower, upper]) / followers[name].multiplier)
+                limits[j] = max(limits[j, 0], ends[0]), min(limits[j, 1], ends[1])
+                if limits[j, 0] > limits[j, 1]:
+                    raise InputError(
+                        f"velocity: {name}: [{lower:g}, {upper:g}] leaves {robot.u_names[j]}, which it "
+                        "follows, no velocity within its own limits"
+                    )
     return limits
 
 
@@ -224,16 +168,24 @@ def _per_input(given: float | Mapping[str, float] | None, robot: Robot, what: st
     if not isinstance(given, Mapping):
         return np.full(robot.n_u, np.inf if given is None else given)
     found = np.full(robot.n_u, np.inf)
-    for name, value in given.items():
-        found[_inputs(name, robot, what)] = value
+    for name, inputs in _inputs(given, robot, what):
+        found[inputs] = given[name]
     return found
 
 
-def _inputs(name: str, robot: Robot, what: str) -> list[int]:
-    if name in robot.groups:
-        return [robot.input(one) for one in robot.groups[name]]
-    expect_known("input or group", name, [*robot.u_names, *robot.groups], what)
-    return [robot.input(name)]
+def _inputs(
+    given: Mapping[str, object], robot: Robot, what: str, followers: Sequence[str] = ()
+) -> list[tuple[str, list[int]]]:
+    """The inputs of each name: groups, then inputs, then joints that follow: the last word counts."""
+    leaders = {one.joint: one.leader for one in robot.followers if one.joint in followers}
+    known = [*robot.groups, *robot.u_names, *leaders]
+    for name in given:
+        expect_known(f"input{', joint that follows another' if leaders else ''} or group", name, known, what)
+    found = []
+    for name in sorted(given, key=lambda name: (name not in robot.groups, name in leaders)):
+        of = robot.groups.get(name, (leaders.get(name, name),))
+        found.append((name, [robot.input(one) for one in of]))
+    return found
 
 
 def _wheel_limits(
@@ -254,13 +206,6 @@ def _wheel_limits(
 
 def _none(count: int) -> Array:
     return np.tile([-np.inf, np.inf], (count, 1))
-
-
-def _numbers(value: ArrayLike, name: str) -> Array:
-    found = np.atleast_1d(np.array(value, dtype=np.float64))
-    if found.ndim != 1 or np.any(np.isnan(found)):
-        raise InputError(f"bound: {name}: expected numbers (infinite for none), got {value!r}")
-    return found
 
 
 def _ends(value: Range, name: str, *, symmetric: bool) -> tuple[float, float]:
@@ -292,6 +237,8 @@ def _named(value: Named, name: str) -> Named:
 def _sizes(value: float | Mapping[str, float] | None, name: str) -> float | Mapping[str, float] | None:
     if value is None:
         return None
+    if isinstance(value, bool):
+        raise InputError(f"{name}: expected a number, or numbers by name, got {value}")
     if isinstance(value, Mapping):
         return {key: positive(item, f"{name}: {key}") for key, item in value.items()}
     return positive(value, name)

@@ -25,6 +25,7 @@ OPTIONAL_ARRAYS = ("path", "desired", "target")
 LATER_ARRAYS = {
     "scale": lambda count: np.ones((count, 1)),
     "margin": lambda count: np.full(count, np.inf),
+    "shares": lambda count: np.zeros((count, 0)),
 }
 
 
@@ -131,6 +132,7 @@ def load(folder: str | Path, robot: Robot | None = None) -> Trajectory:
         frame=summary["frame"],
         unmet=unmet(summary),
         limited=summary.get("limited", False),
+        limit_names=tuple(summary.get("limit_names", ())),
         scenario=scenario,
         **arrays,
     )

@@ -18,6 +18,7 @@ from nmm.resolvers.answer import (
     EXACT,
     FALLBACK,
     INEXACT,
+    NOT_FINITE,
     RELAXED,
     SINGULAR_J,
     SOLVED,
@@ -128,6 +129,8 @@ def limit(problem: ProblemArrays, T: Array, answer: AnswerArrays) -> None:
 
     T (m, m) is the inverse of the metric B; (0, 0) where B is the identity.
     """
+    if answer.status[()] >= SINGULAR_J:
+        return
     s, m = problem.J.shape
     count = problem.lower.shape[0]
     c = m + count
@@ -238,12 +241,27 @@ def judge(problem: ProblemArrays, wanted: Array, answer: AnswerArrays) -> None:
 
 
 @compiled
+def undefined(problem: ProblemArrays) -> bool:
+    """Whether the task or the gradient is no number: that ends a run, as it does without limits."""
+    total = 0.0
+    for j in range(problem.h.shape[0]):
+        total += problem.h[j]
+        for i in range(problem.J.shape[0]):
+            total += problem.J[i, j]
+    for i in range(problem.rate.shape[0]):
+        total += problem.rate[i]
+    return not math.isfinite(total)
+
+
+@compiled
 def keep_limits(problem: ProblemArrays, answer: AnswerArrays) -> None:
     """What a resolver itself did not see to: inputs it did not find, or left beyond the limits."""
     limited = problem.lower.shape[0] > 0
     for j in range(answer.u.shape[0]):
         limited = limited or not (math.isinf(problem.u_lower[j]) and math.isinf(problem.u_upper[j]))
     if not limited:
+        return
+    if answer.status[()] == NOT_FINITE and undefined(problem):
         return
     if answer.status[()] >= SINGULAR_J:
         fall_back(problem, answer)

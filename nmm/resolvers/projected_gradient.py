@@ -66,8 +66,6 @@ def projected_gradient(
                 u[j] += W[j, k] * solution[k]
     certify(problem, answer)
     if not within(problem, u):
-        limit(problem, view(numbers, C, (0, 0) if numbers.shape[0] == C else (m, m)), answer)
-    if not within(problem, u):
         plain = numbers.shape[0] == C
         limit(problem, view(numbers, 0 if plain else C, (0, 0) if plain else (m, m)), answer)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from nmm.arrays import Array
+from nmm.control.limits import LimitsOn
 from nmm.robots.robot import Robot
 
 #: Beyond a limit by less than this part of it is rounding.
@@ -38,6 +39,22 @@ def broken_limits(robot: Robot, t: Array, q: Array, u: Array) -> list[str]:
     if inputs:
         sentences.append(f"inputs exceed their limits: {', '.join(inputs)}")
     return sentences
+
+
+def broken_rows(kept: LimitsOn, t: Array, rows: Array) -> list[str]:
+    """A sentence for the functions that leave their limits; rows (N, rows), as `kept.rows` names them."""
+    broken = []
+    for row, x in zip(kept.row_limits, rows.T, strict=False):
+        beyond = np.maximum(x - row.upper, row.lower - x)
+        ends = [abs(end) for end in (row.lower, row.upper) if np.isfinite(end)]
+        k = _first(beyond, max(1.0, *ends)) if ends else None
+        if k is not None:
+            samples = np.count_nonzero(beyond > SLACK * max(1.0, *ends))
+            broken.append(
+                f"{row.name} at {t[k]:.3g} s ({x[k]:.4g} {row.unit}; from {row.lower:.4g} to "
+                f"{row.upper:.4g}), by {beyond.max():.3g} at most, in {samples} of {len(t)} samples"
+            )
+    return [f"limits of functions are broken: {'; '.join(broken)}"] if broken else []
 
 
 def _first(beyond: Array, size: float) -> int | None:

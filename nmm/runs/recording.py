@@ -14,8 +14,8 @@ from nmm.functions.program import Program
 from nmm.functions.tasks.position import AXES, Position
 from nmm.resolvers.answer import Status
 from nmm.robots.robot import Robot
-from nmm.runs.broken_limits import broken_limits
-from nmm.runs.margins import margins
+from nmm.runs.broken_limits import broken_limits, broken_rows
+from nmm.runs.margins import margin, shares
 from nmm.runs.promise import Samples
 from nmm.runs.reasons import weakest_words
 from nmm.runs.residuals import residuals
@@ -41,7 +41,10 @@ class Recorder:
         self._rows = np.empty((4, count, s))
         self._scalars = np.empty((2, count))
         self._scale: Array | None = None
+        kept = controller.kept.row_limits if controller.limits is not None else ()
+        self._limited = np.empty((count, len(kept)))
         self._beyond: dict[str, tuple[int, float, float]] = {}
+        self._against: dict[str, str] = {}
         self._unanswered: list[float] = []
         self._retreats: list[float] = []
         self._J = np.empty((count, s, robot.n_u))
@@ -115,13 +118,19 @@ class Recorder:
         if self._scale is None:
             self._scale = np.ones((len(self._times), len(sample.scale)))
         self._scale[k] = sample.scale
+        if self._limited.shape[1]:
+            self._limited[k] = self._controller.row_values()
         self._partition[k] = sample.partition
         if sample.status is Status.FALLBACK:
             self._unanswered.append(sample.t)
         if sample.retreats > len(self._retreats):
             self._retreats.append(sample.t)
         if sample.excess > 0.0:
-            for name, by in self._controller.beyond().items():
+            beyond = self._controller.beyond()
+            if not beyond.keys() <= self._against.keys():
+                against = ", ".join(self._controller.contradiction())
+                self._against |= dict.fromkeys(beyond.keys() - self._against.keys(), against)
+            for name, by in beyond.items():
                 count, first, most = self._beyond.get(name, (0, sample.t, 0.0))
                 self._beyond[name] = count + 1, first, max(most, by)
 
@@ -148,6 +157,7 @@ class Recorder:
             self.warnings.append(
                 f"the limit of {name} could not be kept with the others in {count} samples, from "
                 f"t = {first:.3g} s on: its rate was beyond what would keep it by up to {most:.3g} a second"
+                f"{f' (what contradicts each other: {against})' if (against := self._against[name]) else ''}"
             )
         if self._retreats:
             at = ", ".join(f"{t:.3g} s" for t in self._retreats)
@@ -170,7 +180,9 @@ class Recorder:
         ended = outcome in (Outcome.COMPLETED, Outcome.MISSED)
         if ended or outcome is Outcome.INTERRUPTED:  # of one that failed it goes without saying
             self.warnings += broken_limits(robot, self.t, self.q[:count], self._u[:count])
+            self.warnings += broken_rows(controller.kept, self.t, self._limited[:count])
         kept = controller.kept if controller.limits is not None else Limits().on(robot)
+        limited, within = shares(kept, robot, self.q[:count], self._u[:count], self._limited[:count])
         frame, columns, target = self._shown
         path, desired = None, None
         if frame is not None:
@@ -196,7 +208,9 @@ class Recorder:
             residual=self._scalars[1, :count].copy(),
             scale=self.scale.copy(),
             limited=controller.limits is not None,
-            margin=margins(kept, robot, self.q[:count], self._u[:count])[1].min(axis=1, initial=np.inf),
+            margin=margin(within),
+            shares=within,
+            limit_names=limited,
             unmet=residuals(self.t, self._scalars[1, :count], self._rows[3, :count]),
             r_names=tuple(row.name for row in rows),
             r_units=tuple(row.unit for row in rows),

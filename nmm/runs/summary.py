@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nmm.arrays import Array
 from nmm.runs.residuals import NONE, Residuals
 
 if TYPE_CHECKING:
@@ -42,6 +43,7 @@ def summarise(trajectory: Trajectory) -> dict[str, Any]:
         "method": trajectory.method,
         "dt": trajectory.dt,
         "limited": trajectory.limited,
+        "limit_names": list(trajectory.limit_names),
         "samples": count,
         "redundancy": redundancy,
         "r_names": list(trajectory.r_names),
@@ -49,17 +51,20 @@ def summarise(trajectory: Trajectory) -> dict[str, Any]:
         "frame": trajectory.frame,
     }
     if count:
-        norm = trajectory.error_norm
+        norm, sizes = trajectory.error_norm, np.linalg.norm(trajectory.u, axis=1)
         half = trajectory.t >= 0.5 * (trajectory.t[0] + trajectory.t[-1])
         summary |= {
             "t_end": float(trajectory.t[-1]),
             "error_initial": float(norm[0]),
             "error_final": float(norm[-1]),
             "error_max_second_half": float(norm[half].max()),
+            "error_rms": _rms(norm),
+            "error_max": float(norm.max()),
             "objective_initial": float(trajectory.objective[0]),
             "objective_final": float(trajectory.objective[-1]),
             "objective_mean_second_half": float(trajectory.objective[half].mean()),
             "objective_max_second_half": float(trajectory.objective[half].max()),
+            "objective_integral": float(np.trapezoid(trajectory.objective, trajectory.t)),
             "sigma_min": float(trajectory.sigma_min.min()),
             "residual_max": float(trajectory.residual.max()),
             **{f"unmet_{name}": value for name, value in trajectory.unmet._asdict().items()},
@@ -68,6 +73,8 @@ def summarise(trajectory: Trajectory) -> dict[str, Any]:
             "margin_min": float(trajectory.margin.min()) if np.all(np.isfinite(trajectory.margin)) else None,
             "lateral_slip_max": lateral_slip(trajectory),
             "partition_switches": trajectory.switches,
+            "input_rms": _rms(sizes),
+            "input_peak": float(sizes.max()),
             "u_max": {
                 name: float(value)
                 for name, value in zip(robot.u_names, np.abs(trajectory.u).max(axis=0), strict=True)
@@ -84,6 +91,10 @@ def unmet(summary: dict[str, Any]) -> Residuals:
     """Where J u differed from the rate, read back from a summary; older ones do not say."""
     found = {name: summary[f"unmet_{name}"] for name in NONE._fields if f"unmet_{name}" in summary}
     return NONE._replace(**found)
+
+
+def _rms(sizes: Array) -> float:
+    return float(np.sqrt(np.mean(sizes**2)))
 
 
 def lateral_slip(trajectory: Trajectory) -> float:

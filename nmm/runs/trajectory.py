@@ -49,6 +49,7 @@ class Trajectory:
     scale (N, levels): the share λ of the task's rate that was left, a priority level a column; 1 where
         nothing was relaxed on purpose
     margin (N,): least distance to a limit, as a share of its range; infinite without limits on both sides
+    shares (N, limited): where each of `limit_names` is between its limits, 0 at the lower, 1 at the upper one
     limited : whether the controller kept limits
     unmet : where J u differed from the rate
     r_names, r_units : the task's rows
@@ -88,6 +89,8 @@ class Trajectory:
     target: Array | None = None
     unmet: Residuals = NONE
     limited: bool = False
+    shares: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    limit_names: tuple[str, ...] = ()
     scenario: dict[str, Any] | None = field(default=None)
 
     def __len__(self) -> int:

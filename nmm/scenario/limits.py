@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 from pydantic import BeforeValidator, Field, create_model, model_validator
 
-from nmm.control.limits import RECOVERY, Bound, Limits
+from nmm.control.limited_function import Bound
+from nmm.control.limits import RECOVERY, Limits
 from nmm.errors import InputError
 from nmm.robots.robot import Robot
 from nmm.scenario.function_part import FunctionPart

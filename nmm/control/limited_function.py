@@ -1,0 +1,96 @@
+"""A limited function of the robot: lower <= c(t, q) <= upper."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.arrays import Array, positive
+from nmm.errors import InputError
+from nmm.functions.function import Function
+from nmm.robots.robot import Robot
+
+
+class Kept(NamedTuple):
+    """A limited quantity: its name, its unit, and its limits."""
+
+    name: str
+    unit: str
+    lower: float
+    upper: float
+
+
+class Bound:
+    """lower <= c(t, q) <= upper for the values of a function: a corridor, a height, a distance.
+
+    Kept as a damper: c may approach a limit no faster than it can be slowed down to it. On wheels c's
+    direction turns, so that it cannot always be kept with the other limits: then it is broken as little as
+    can be, and the run says so.
+
+    Parameters
+    ----------
+    function : c(t, q), a task's function, a frame's position, ...
+    lower, upper : (rows,) or a number for all, in the units of the rows; infinite for none
+    braking : deceleration to count on, units of the rows per s²; None for a quarter of what the accelerations
+        of the inputs give where the robot is
+    name : for messages; the function's rows when not given
+
+    Raises
+    ------
+    InputError : no limit, one that is not a number, lower above upper
+    """
+
+    def __init__(
+        self,
+        function: Function,
+        lower: ArrayLike = -np.inf,
+        upper: ArrayLike = np.inf,
+        braking: float | None = None,
+        name: str = "",
+    ) -> None:
+        if not isinstance(function, Function):
+            raise InputError(f"bound: expected a function, got {function!r}")
+        self.function = function
+        self.lower = _numbers(lower, "lower")
+        self.upper = _numbers(upper, "upper")
+        self.braking = None if braking is None else positive(braking, "braking")
+        self.name = name
+        if not (np.isfinite(self.lower).any() or np.isfinite(self.upper).any()):
+            raise InputError(
+                f"bound: expected lower, upper or both, got lower {self.lower} and upper {self.upper}"
+            )
+        if self.lower.size in (1, self.upper.size) or self.upper.size == 1:
+            if np.any(self.lower > self.upper):
+                raise InputError(f"bound: lower {self.lower} is above upper {self.upper}")
+        else:
+            raise InputError(f"bound: expected as many of lower {self.lower} as of upper {self.upper}")
+
+    def rows(self, robot: Robot) -> list[Kept]:
+        """Name, unit, lower and upper limit of each component."""
+        rows = self.function.rows(robot)
+        try:
+            lower, upper = (np.broadcast_to(ends, (len(rows),)) for ends in (self.lower, self.upper))
+        except ValueError:
+            raise InputError(
+                f"bound: expected a number or {len(rows)} ({', '.join(row.name for row in rows)}), "
+                f"got lower {self.lower} and upper {self.upper}"
+            ) from None
+        return [
+            Kept(
+                f"{self.name}.{row.name}" if self.name and len(rows) > 1 else self.name or row.name,
+                *(row.unit, float(lower[i]), float(upper[i])),
+            )
+            for i, row in enumerate(rows)
+        ]
+
+
+def _numbers(value: ArrayLike, name: str) -> Array:
+    try:
+        found = np.atleast_1d(np.array(value, dtype=np.float64))
+    except (TypeError, ValueError):
+        found = np.array([np.nan])
+    if found.ndim != 1 or np.any(np.isnan(found)):
+        raise InputError(f"bound: {name}: expected numbers (infinite for none), got {value!r}")
+    return found
