@@ -112,8 +112,9 @@ def wheel_rows(limits: LimitNumbers, q: Array, G: Array, problem: ProblemArrays)
         for j in range(problem.u_lower.shape[0]):
             problem.limit_rows[i, j] = 0.0
         for j in range(G.shape[1]):
-            forward = cosine * G[0, j] + sine * G[1, j] - y * G[2, j]
-            sideways = cosine * G[1, j] - sine * G[0, j] + x * G[2, j]
+            turning = G[steer, j] if steer >= 0 else 0.0
+            forward = cosine * G[0, j] + sine * G[1, j] - y * G[2, j] - (y - limits.wheels[i, 6]) * turning
+            sideways = cosine * G[1, j] - sine * G[0, j] + x * G[2, j] + (x - limits.wheels[i, 5]) * turning
             rolling = math.cos(angle) * forward + math.sin(angle) * sideways
             problem.limit_rows[i, j] = rolling / limits.wheels[i, 3]
         problem.lower[i] = -limits.spin[i]

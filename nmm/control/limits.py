@@ -12,7 +12,6 @@ from nmm.control.bounds import SAMPLE, LimitNumbers
 from nmm.control.limited_function import Bound, Kept
 from nmm.errors import InputError, expect_known
 from nmm.functions.tasks.coordinates import Coordinates
-from nmm.robots.coordinates import UNLIMITED
 from nmm.robots.robot import Robot
 from nmm.robots.wheel_rates import wheel_rates
 
@@ -21,6 +20,8 @@ Range: TypeAlias = float | Sequence[float]
 #: What the robot's file says (True), nothing (False), or that with other numbers for some names.
 Named: TypeAlias = bool | Mapping[str, Range]
 
+#: Files write limits of this size, m or rad, for none.
+ENDLESS = 1e5
 #: Speed of the way back from beyond a limit, m/s or rad/s.
 RECOVERY = 0.1
 
@@ -159,8 +160,12 @@ def _positions(given: Named, robot: Robot) -> Array:
     )
     if isinstance(given, Mapping):
         for name, value in given.items():
-            limits[robot.independent(name)] = _ends(value, f"position: {name}", symmetric=False)
-    limits[np.abs(limits) >= UNLIMITED] *= np.inf
+            try:
+                i = robot.independent(name)
+            except InputError as error:
+                raise InputError(f"position: {error}") from None
+            limits[i] = _ends(value, f"position: {name}", symmetric=False)
+    limits[np.abs(limits) >= ENDLESS] *= np.inf
     return np.asarray(limits)
 
 

@@ -35,6 +35,8 @@ def _row(robot: Robot, wheel: Wheel) -> list[float] | None:
         return [x, y, angle, radius, -1.0, 0.0, 0.0]
     if wheel.carrier not in robot.q_names[3 : robot.platform.n_p]:
         return None
+    if robot.q_names.index(wheel.carrier) not in robot.rate_coordinates:
+        return None
     joint = robot.model.getJointId(wheel.carrier)
     placement = robot.model.jointPlacements[joint]
     if robot.model.names[robot.model.parents[joint]] != "theta" or placement.rotation[2, 2] < 1.0 - _LEVEL:

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
-from pydantic import BeforeValidator, Field, create_model, model_validator
+from pydantic import BeforeValidator, Field, create_model
 
 from nmm.control.limited_function import Bound
 from nmm.control.limits import RECOVERY, Limits
-from nmm.errors import InputError
 from nmm.robots.robot import Robot
 from nmm.scenario.function_part import FunctionPart
 from nmm.scenario.functions import FUNCTION_PARTS
@@ -106,14 +105,6 @@ class LimitsPart(Part):
     def _with(self, bounds: list[Bound]) -> Limits:
         with self.own_keys():
             return Limits(self.velocity, self.position, self.acceleration, self.wheels, bounds, self.recovery)
-
-    @model_validator(mode="after")
-    def _can_be_made(self) -> LimitsPart:
-        try:
-            self._with([])
-        except InputError as error:
-            raise ValueError(str(error)) from None
-        return self
 
     def build(self, robot: Robot) -> Limits:
         """The limits, with the robot's word on them: errors know their key."""

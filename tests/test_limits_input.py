@@ -1,0 +1,139 @@
+"""Wrong limits in Python, in scenarios and on the command line: what was expected, and where."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from urdf_parts import write
+
+import nmm
+from nmm.cli.app import status_of
+
+ROBOT = nmm.load("unicycle_3r")
+TIP = nmm.Position("ee", "xy")
+FREE = [-np.inf, np.inf]
+
+
+def on(**given: object) -> Callable[[], object]:
+    return lambda: nmm.Limits(**given).on(ROBOT)  # type: ignore[arg-type]
+
+
+def bound(*given: object, **more: object) -> Callable[[], object]:
+    return lambda: nmm.Limits(bounds=nmm.Bound(TIP, *given, **more)).on(ROBOT)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("made", "message"),
+    [
+        (on(velocity={"v": [1, -1]}), "velocity: v: lower 1 is above upper -1"),
+        (on(velocity={"v": 0}), r"velocity: v: expected a number above 0 or \[lower, upper\], got 0"),
+        (on(velocity={"v": np.nan}), "velocity: v: expected a number above 0"),
+        (on(velocity={"v": [1, 2, 3]}), "velocity: v: expected a number above 0"),
+        (on(velocity={"w": 1}), "velocity: unknown input or group 'w'; available: platform, arm, v, omega"),
+        (on(velocity=3), "velocity: expected true, false, or numbers by name, got 3"),
+        (on(position={"q1": [1, 0]}), "position: q1: lower 1 is above upper 0"),
+        (on(position={"q1": 1}), r"position: q1: expected \[lower, upper\], got 1"),
+        (on(position={"q9": [0, 1]}), "unknown coordinate 'q9'"),
+        (on(acceleration=0), "acceleration: expected a number above 0, got 0"),
+        (on(acceleration=True), "acceleration: expected a number, or numbers by name, got True"),
+        (on(acceleration={"arm": 0}), "acceleration: arm: expected a number above 0, got 0"),
+        (on(acceleration={"legs": 1}), "acceleration: unknown input or group 'legs'"),
+        (on(wheels={"front": 1}), "wheels: unknown wheel 'front'; available: left_wheel_joint"),
+        (on(wheels=True), "wheels: expected a number, or numbers by name, got True"),
+        (on(recovery=0), "recovery: expected a number above 0"),
+        (on(bounds=3), "bounds: expected a Bound, or several, got 3"),
+        (on(bounds=[TIP]), "bounds: expected a Bound, or several"),
+        (bound(), "bound: expected lower, upper or both"),
+        (bound(1, 0), "is above upper"),
+        (bound([0, 0, 0]), r"bound: expected a number or 2 \(ee.x, ee.y\), got lower"),
+        (bound([0, 0, 0], [1, 1]), "bound: expected as many of lower"),
+        (bound(np.nan), "bound: lower: expected numbers"),
+        (bound("low"), "bound: lower: expected numbers"),
+        (bound(0, braking=0), "braking: expected a number above 0"),
+        (lambda: nmm.Bound(nmm.Task(TIP, nmm.Constant([0, 0])), 0), "bound: expected a function"),  # type: ignore[arg-type]
+    ],
+)
+def test_wrong_limits(made: Callable[[], object], message: str) -> None:
+    with pytest.raises(nmm.InputError, match=message):
+        made()
+
+
+def test_wheels_of_a_robot_without_any() -> None:
+    robot = nmm.load(
+        "package://example-robot-data/robots/panda_description/urdf/panda.urdf", platform="fixed"
+    )
+    with pytest.raises(nmm.InputError, match="has no wheels on its main body"):
+        nmm.Limits(wheels=1.0).on(robot)
+
+
+@pytest.mark.parametrize("ask", ["call", "evaluate", "velocity"])
+def test_limits_from_sample_to_sample_need_dt(ask: str) -> None:
+    task = nmm.Task(TIP, nmm.Constant([1.0, 1.0]))
+    controller = nmm.Controller(ROBOT, task, nmm.ProjectedGradient(), limits=nmm.Limits(acceleration=1.0))
+    do = {"call": controller, "evaluate": controller.evaluate, "velocity": controller.velocity}[ask]
+    with pytest.raises(nmm.InputError, match=r"need dt: give dt=0\.01"):
+        do(0.0, np.zeros(ROBOT.n))
+
+
+def test_a_task_that_is_no_number_ends_the_run_as_without_limits() -> None:
+    """Inputs at rest would have it completed."""
+    reference = nmm.CallableReference(lambda t: [1.0, 1.0 if t < 0.05 else np.nan], 2)
+    task = nmm.Task(TIP, reference)
+    controller = nmm.Controller(ROBOT, task, nmm.ProjectedGradient(), limits=nmm.Limits())
+    run = nmm.simulate(controller, {"q1": 0.3, "q2": 0.5}, 0.2, 0.01)
+    assert not run.complete
+    assert "the task, its reference or the objective is undefined here" in run.message
+
+
+SCENARIO = """\
+robot: unicycle_3r
+q0: {q1: 0.3, q2: 0.5}
+duration: 1
+task: {kind: position, frame: ee, axes: xy, reference: [1, 1]}
+resolver: {kind: pg}
+limits:
+"""
+
+
+@pytest.mark.parametrize(
+    ("limits", "place", "message"),
+    [
+        ("  velocity: {w: 1}", "7: limits.velocity", "unknown input or group 'w'"),
+        ("  velocity: {v: [1, -1]}", "7: limits", "lower 1 is above upper -1"),
+        ("  position: {q9: [0, 1]}", "7: limits.position", "unknown coordinate 'q9'"),
+        ("  position: {q1: [1, 0]}", "7: limits", "lower 1 is above upper 0"),
+        ("  acceleration: 0", "7: limits", "expected a number above 0"),
+        ("  acceleration: true", "7: limits.acceleration", "expected"),
+        ("  wheels: {front: 1}", "7: limits.wheels", "unknown wheel 'front'"),
+        ("  speed: 1", "7: limits.speed", "unknown key"),
+        (
+            "  bounds: [{kind: position, frame: ee, axes: xy, lower: [0, 0, 0]}]",
+            "7: limits.bounds",
+            "expected a number or 2",
+        ),
+        ("  bounds: [{kind: position, frame: hand, lower: 0}]", "7: limits.bounds", "unknown frame 'hand'"),
+        (
+            "  bounds: [{kind: position, frame: ee, axes: x}]",
+            "7: limits.bounds",
+            "expected lower, upper or both",
+        ),
+        ("  velocity: true\nmethod: adaptive", "8: method", "expected rk4, midpoint, euler or zoh"),
+    ],
+)
+def test_a_scenario_names_file_and_key(
+    limits: str, place: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write(tmp_path / "wrong.yaml", SCENARIO + limits + "\n")
+    assert status_of(["run", str(path), "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err
+    assert f"wrong.yaml:{place}" in said
+    assert message in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_limit_on_the_command_line_is_refused_with_its_key(capsys: pytest.CaptureFixture[str]) -> None:
+    assert status_of(["run", "unicycle_3r_position", "--set", "limits.velocity={w: 1}"]) == 2
+    assert "unknown input or group 'w'" in capsys.readouterr().err
