@@ -44,9 +44,12 @@ def _rows(trajectory: Trajectory, numbers: dict[str, Any]) -> Iterator[tuple[str
     for row, (name, unit) in enumerate(zip(trajectory.r_names, trajectory.r_units, strict=True)):
         first, last = trajectory.error[0, row], trajectory.error[-1, row]
         yield f"error of {name}", f"{first:.3g} → {last:.3g} {unit}"
+    yield "tracking ‖e‖", f"RMS {numbers['error_rms']:.3g}, {numbers['error_max']:.3g} at most"
     if (trajectory.scenario or {}).get("objective"):
         yield "objective H", f"{trajectory.objective[0]:.4g} → {trajectory.objective[-1]:.4g}"
         yield "mean H, second half", f"{numbers['objective_mean_second_half']:.4g}"
+        yield "∫ H dt", f"{numbers['objective_integral']:.4g}"
+    yield "inputs ‖u‖", f"RMS {numbers['input_rms']:.3g}, {numbers['input_peak']:.3g} at most"
     yield "smallest σ_min", f"{numbers['sigma_min']:.3g}"
     if trajectory.unmet.samples:
         unmet = trajectory.unmet
@@ -55,8 +58,8 @@ def _rows(trajectory: Trajectory, numbers: dict[str, Any]) -> Iterator[tuple[str
     if trajectory.limited:
         share = numbers["scaled_share"]
         yield (
-            "left of the rate",
-            f"{numbers['scale_min']:.3g} at least; less than all {100 * share:.3g} % of the time",
+            "λ under limits",
+            f"{numbers['scale_min']:.3g} at least; below 1 {100 * share:.3g} % of the time",
         )
     if numbers["margin_min"] is not None:
         yield "least margin to a limit", f"{100 * numbers['margin_min']:.3g} % of its range"

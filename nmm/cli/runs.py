@@ -56,6 +56,8 @@ def compare_resolvers(
     ellipsoids: Wanted = False,
 ) -> int:
     """Run a scenario with several resolvers; write and print how they compare."""
+    from nmm.runs.timing import step_time
+
     scenarios = [_load(name, kind, settings, limits) for kind in kinds]
     folder = out or Path("runs") / f"{scenarios[0].name}-compare"
     check_folder(folder, comparison.is_comparison)
@@ -69,6 +71,11 @@ def compare_resolvers(
     with shielded():
         comparison.save(trajectories, folder, scenarios[0].name, ellipsoids=ellipsoids)
     table = [dict(describe(trajectory, folder / trajectory.resolver)) for trajectory in trajectories]
+    for column, scenario, trajectory in zip(table, scenarios, trajectories, strict=False):
+        if len(trajectory):
+            controller = scenario.controller()
+            controller.dt = trajectory.dt
+            column["a control step"] = f"{1e6 * step_time(controller, trajectory):.3g} µs here"
     labels = list(dict.fromkeys(label for column in table for label in column))
     show_table(
         ["", *(trajectory.resolver.upper() for trajectory in trajectories)],

@@ -2,6 +2,7 @@
 
 from nmm.figures.composed import comparison, overview, write_run_figures
 from nmm.figures.curves import coordinates, errors, inputs, singular_values, tracking
+from nmm.figures.limits import limits
 from nmm.figures.motion import stroboscopic
 from nmm.figures.objective import objective_comparison
 
@@ -10,6 +11,7 @@ __all__ = [
     "coordinates",
     "errors",
     "inputs",
+    "limits",
     "objective_comparison",
     "overview",
     "singular_values",

@@ -13,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from nmm.arrays import Array
 from nmm.errors import InputError
 from nmm.figures import curves, style
+from nmm.figures.limits import draw_scale, has_limits, limits
 from nmm.figures.motion import Scene, stroboscopic
 from nmm.figures.objective import draw_best_objective, has_objective, objective_comparison
 from nmm.runs.ellipsoid_options import Wanted
@@ -23,12 +24,18 @@ _WIDTH, _VIEW = 10.4, 4.8
 
 
 def overview(trajectory: Trajectory) -> Figure:
-    """One run at a glance: the motion, the error's norm, the objective, the inputs."""
+    """One run at a glance: the motion, the error's norm, the objective, the inputs; under limits λ, too."""
     scene = Scene(trajectory)
     parts = list(curves.input_parts(trajectory).values())
     left = style.LEFT + _VIEW + style.LEFT
     names = [curves.input_names(trajectory, columns) for columns in parts]
-    legends = [1, 1, *(style.legend_rows(part, _WIDTH - left - style.RIGHT) for part in names)]
+    limited = has_limits(trajectory)
+    legends = [
+        1,
+        1,
+        *(style.legend_rows(part, _WIDTH - left - style.RIGHT) for part in names),
+        *([1] * limited),
+    ]
     drawn = min(scene.height(scene.views[0], _VIEW), 6.2)
     each = max(1.0, (style.GAP + drawn - style.column_height([], legends)) / len(legends))
     heights = [each] * len(legends)
@@ -47,9 +54,11 @@ def overview(trajectory: Trajectory) -> Figure:
             1.0, 1.04, f"run {trajectory.outcome}", transform=panels[1].transAxes, ha="right", va="bottom",
             fontsize=style.TEXT, color=style.VERMILLION, fontweight="bold",
         )  # fmt: skip
-    for axes, columns in zip(panels[2:], parts, strict=True):
+    for axes, columns in zip(panels[2:], parts, strict=False):
         curves.draw_inputs(axes, trajectory, columns)
         style.legend(axes)
+    if limited:
+        draw_scale(panels[-1], trajectory, named=False)
     _name_last(panels)
     return made
 
@@ -137,7 +146,7 @@ def _draw_norms(
 def write_run_figures(
     trajectory: Trajectory, folder: str | Path, *, ellipsoids: Wanted = False
 ) -> list[Path]:
-    """Write motion.png, errors.png, inputs.png and, where there is an objective, objective.png.
+    """Write motion.png, errors.png, inputs.png; objective.png and limits.png where there are such.
 
     Parameters
     ----------
@@ -157,6 +166,8 @@ def write_run_figures(
     }
     if has_objective([trajectory]):
         figures["objective"] = objective_comparison([trajectory])
+    if has_limits(trajectory):
+        figures["limits"] = limits(trajectory)
     if ellipsoids is not False:
         # Not before: with it comes the whole of the analysis.
         from nmm.figures.ellipses import ellipses

@@ -1,0 +1,79 @@
+"""A run under limits: where each limited quantity is in its range, and what was left of the task."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from nmm.figures import style
+from nmm.runs.margins import margin
+from nmm.runs.trajectory import Trajectory
+
+#: A limit counts as near within this share of its range.
+NEAR = 0.05
+
+
+def has_limits(trajectory: Trajectory) -> bool:
+    """Whether a run kept limits and has the figure."""
+    return trajectory.limited and bool(trajectory.limit_names) and len(trajectory.shares) == len(trajectory)
+
+
+def limits(trajectory: Trajectory) -> Figure:
+    """Each limited quantity in the band of its range over time, 0 at its lower and 1 at its upper limit.
+
+    Inputs in one panel, coordinates and what else is limited in another; below them λ and the least margin.
+    """
+    count = trajectory.robot.n_u
+    inputs = {f"u_{name}" for name in trajectory.robot.u_names[:count]}
+    columns = range(len(trajectory.limit_names))
+    parts = {
+        "inputs": [i for i in columns if trajectory.limit_names[i] in inputs],
+        "others": [i for i in columns if trajectory.limit_names[i] not in inputs],
+    }
+    shown = {name: part for name, part in parts.items() if part}
+    legends = [style.legend_rows(_names(trajectory, part)) for part in shown.values()]
+    made, panels = style.stack([1.5] * len(shown) + [1.1], [*legends, 1])
+    for axes, (name, part) in zip(panels, shown.items(), strict=False):
+        draw_shares(axes, trajectory, part, f"{name}, share of range")
+    draw_scale(panels[-1], trajectory)
+    return made
+
+
+def _names(trajectory: Trajectory, columns: Sequence[int]) -> list[str]:
+    return [style.pretty(trajectory.limit_names[column].removeprefix("u_")) for column in columns]
+
+
+def draw_shares(axes: Axes, trajectory: Trajectory, columns: Sequence[int], y: str) -> None:
+    """Where quantities are between their limits, a curve each; what is far from both is shaded."""
+    shares = trajectory.shares[:, columns]
+    low, high = min(0.0, float(shares.min())), max(1.0, float(shares.max()))
+    axes.axhspan(NEAR, 1.0 - NEAR, color=style.GREEN, alpha=0.07, linewidth=0)
+    for end in (0.0, 1.0):
+        axes.axhline(end, color=style.VERMILLION, linewidth=1.0, zorder=1)
+    for k, (column, name) in enumerate(zip(columns, _names(trajectory, columns), strict=True)):
+        color, dashes = style.CYCLE[k % 7], style.DASHES[k // 7 % 4]
+        style.curve(axes, trajectory.t, trajectory.shares[:, column], name, color, dashes)
+    style.label(axes, y=y)
+    axes.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))
+    style.time_axis(axes, trajectory.t, named=False)
+    style.legend(axes)
+
+
+def draw_scale(axes: Axes, trajectory: Trajectory, *, named: bool = True) -> None:
+    """λ of each level, and the least margin of all limits: 0.5 in the middle of its range, 0 at a limit."""
+    levels = trajectory.scale.shape[1]
+    for level in range(levels):
+        name = "λ" if levels == 1 else f"λ, level {level + 1}"
+        style.curve(axes, trajectory.t, trajectory.scale[:, level], name, style.CYCLE[level % 7])
+    least = margin(trajectory.shares)
+    lowest = 0.0
+    if np.all(np.isfinite(least)):
+        style.curve(axes, trajectory.t, least, "least margin", style.VERMILLION, "--")
+        lowest = min(0.0, float(least.min()))
+    axes.set_ylim(lowest - 0.05, 1.05)
+    style.label(axes, y="λ, margin")
+    style.time_axis(axes, trajectory.t, named=named)
+    style.legend(axes)
