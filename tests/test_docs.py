@@ -149,3 +149,20 @@ def test_the_table_of_rooms_is_the_order_of_the_imports() -> None:
     table = text[text.index("| room |") :].split("\n\n")[0].splitlines()[2:]
     listed = [sorted(re.findall(r"`(\w+)/?`", row.split("|")[1])) for row in table]
     assert listed == stated
+
+
+def test_the_example_of_limits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = (ROOT / "docs" / "limits.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    found: dict[str, Any] = {}
+    exec(code, found)
+    assert (tmp_path / "limits.png").exists()
+    assert found["run"].margin.min() >= -1e-9
+    (limits,) = re.findall(r"```yaml\n(.*?)```", text, flags=re.DOTALL)
+    (tmp_path / "limited.yaml").write_text(
+        "robot: unicycle_3r\nq0: {q1: 0.3}\nduration: 1\n"
+        "task: {kind: position, frame: ee, axes: xy, reference: [1, 1]}\nresolver: {kind: pg}\n" + limits,
+        encoding="utf-8",
+    )
+    assert nmm.Scenario.load(tmp_path / "limited.yaml").run().limited

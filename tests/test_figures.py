@@ -28,6 +28,7 @@ from nmm.robots.loading import load
 from nmm.robots.robot import Robot
 from nmm.runs.simulation import simulate
 from nmm.runs.trajectory import Trajectory
+from nmm.scenario import Scenario
 
 #: Where the packages of example-robot-data are.
 SHARE = Path(sysconfig.get_paths()["purelib"]) / "cmeel.prefix" / "share"
@@ -266,3 +267,16 @@ def bare_run_of(robot: Robot) -> Trajectory:
     q0 = robot.q({"arm_2_joint": -0.5, "arm_4_joint": 1.2})
     task = Task(Position("arm_tool_link"), [1.2, 0.4, 0.9])
     return simulate(Controller(robot, task, ProjectedGradient()), q0, 2.0, 0.02)
+
+
+def test_figures_under_limits_show_every_limit_and_the_scale() -> None:
+    limits = {"limits.velocity": {"platform": 0.4, "arm": 0.5}, "limits.acceleration": 2, "limits.wheels": 5}
+    limited = Scenario.load("unicycle_3r_position", {"dt": 0.02, "duration": 4, **limits}).run()
+    made = figures.limits(limited)
+    check_legible(made)
+    drawn = [line for axes in made.axes[:-1] for line in axes.lines if len(line.get_xdata()) > 2]
+    assert len(drawn) == len(limited.limit_names) == limited.shares.shape[1]
+    assert np.abs(limited.shares - 0.5).max() <= 0.5 + 1e-9
+    check_legible(figures.overview(limited))
+    assert any(axes.get_ylabel() == "λ, margin" for axes in figures.overview(limited).axes)
+    assert not any(axes.get_ylabel() == "λ, margin" for axes in figures.overview(run(PAPER[0])).axes)
