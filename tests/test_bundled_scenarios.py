@@ -125,13 +125,19 @@ def test_the_sampled_controller_leaves_micrometres(runs: dict[str, nmm.Trajector
 STEERED = "car_steered_by_the_null_space"
 
 
-def test_without_the_coupling_the_car_does_not_steer(runs: dict[str, nmm.Trajectory]) -> None:
+def test_without_the_coupling_pursuit_steers_or_nothing(
+    runs: dict[str, nmm.Trajectory],
+) -> None:
     """Its column in J is zero: the arm follows the circle until it is out of reach."""
     steered = runs[STEERED]
     theta = steered.q[:, steered.robot.coordinate("theta")]
     assert theta[-1] == pytest.approx(0.3 * steered.t[-1], abs=0.5)  # it turned along with the circle
     terms = [{"of": name, "target": target} for name, target in (("q2", 0.2), ("q3", 1.7), ("q4", 0.6))]
-    straight = Scenario.load(STEERED, {"objective.terms": terms}).run()
+    uncoupled = Scenario.load(STEERED, {"objective.terms": terms})
+    pursued = uncoupled.run()
+    assert pursued.outcome is nmm.Outcome.COMPLETED
+    assert pursued.q[-1, pursued.robot.coordinate("theta")] == pytest.approx(theta[-1], abs=0.5)
+    straight = uncoupled.override("steering", False).run()
     assert np.all(np.abs(straight.q[:, straight.robot.coordinate("steering")]) < 1e-9)
     assert any("steering_rate" in warning for warning in straight.warnings)
     assert not straight.complete or any("singular" in warning for warning in straight.warnings)

@@ -19,7 +19,8 @@ def car() -> Robot:
 
 
 def controller(robot: Robot, objective: nmm.Objective | None = None) -> nmm.Controller:
-    return nmm.Controller(robot, nmm.Task(nmm.Position("ee"), TIP), nmm.ProjectedGradient(), objective)
+    task = nmm.Task(nmm.Position("ee"), TIP)
+    return nmm.Controller(robot, task, nmm.ProjectedGradient(), objective, steering=False)
 
 
 def test_neither_steering_nor_tool_roll_moves_a_position(car: Robot) -> None:

@@ -12,6 +12,7 @@ from nmm.errors import InputError
 if TYPE_CHECKING:
     from nmm.arrays import Array
     from nmm.control.controller import Controller
+    from nmm.control.steering import Steered
     from nmm.robots.loading.provenance import Provenance
     from nmm.robots.robot import Robot
     from nmm.robots.wheel import Wheel
@@ -37,16 +38,25 @@ def describe_robot(source: str | None, scenario: str | None, **loading: Any) -> 
         given = load(source, **loading, missing_meshes="skip")
     task = [("position in the plane", 2), ("position in space", 3), ("pose in space", 6)]
     without: Sequence[str] | None = None
+    steered: Steered | None
     if scenario is not None:
         name, controller, q0 = _of_scenario(scenario, given)
         from nmm.control.idle_inputs import inputs_without_effect
 
         given = controller.robot
         task, without = [(name, len(controller.rows))], inputs_without_effect(controller, q0)
+        steered = controller.steered
     robot = cast("Robot", given)  # there is a source, or a scenario
+    if scenario is None:
+        from nmm.control.steering import Steering
+
+        steered = Steering().on(robot, ())
     _show(robot, task)
     for name in without or ():
-        show_text(f"{name} has no effect on the task: only the objective can use it")
+        if steered is None or name not in steered.inputs:
+            show_text(f"{name} has no effect on the task: only the objective can use it")
+    for line in () if steered is None else steered.described():
+        show_text(line)
     if without == ():
         show_text("every input moves the task")
     _show_loading(robot)

@@ -11,13 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, Integers, positive
-from nmm.control.bounds import OFF, SAMPLE, STAGE
+from nmm.control.bounds import OFF, STAGE
 from nmm.control.contradiction import contradicting
-from nmm.control.equations import PLAIN, STEP, WRAPPED, Arm, ControlStep, TaskRows, drive, hold_back
+from nmm.control.equations import PLAIN, STEP, WRAPPED, Arm, ControlStep, TaskRows, drive, finish, hold_back
 from nmm.control.equations import step as compiled_step
+from nmm.control.idle_inputs import idle_inputs, inputs_without_effect
 from nmm.control.limits import Limits
 from nmm.control.lost_directions import in_world_axes, lost_directions
 from nmm.control.retreat import Retreat
+from nmm.control.steering import NOTHING, Steered, Steering
 from nmm.errors import InputError, SingularError
 from nmm.functions.function import Row, row_scales
 from nmm.functions.objectives.base import Objective
@@ -28,7 +30,7 @@ from nmm.kernels.compiled import checked_by_caller
 from nmm.kernels.memory import views
 from nmm.resolvers.answer import Status, unanswered
 from nmm.resolvers.base import Resolver
-from nmm.resolvers.limited import instead, keep_limits
+from nmm.resolvers.limited import instead
 from nmm.resolvers.problem import Problem
 from nmm.resolvers.state import State
 from nmm.robots.robot import Robot
@@ -79,10 +81,13 @@ class Controller:
     limits : what the inputs are kept within; None for none
     dt : time between two calls, s, which limits of position and acceleration need; a simulation sets its own
     retreat : what to do when the error stalls; None for a path that is tracked. It needs dt, too
+    steering : the law for the steering of a platform that the task does not feel (`Steering`): True for the
+        usual one, False for none
 
     Attributes
     ----------
     before : (m,) the inputs of the call before, from which accelerations count; a call changes it
+    steered : the law in force for steering that the task does not feel; None where there is none
 
     Raises
     ------
@@ -100,6 +105,7 @@ class Controller:
         limits: Limits | None = None,
         dt: float | None = None,
         retreat: Retreat | None = None,
+        steering: Steering | bool = True,
     ) -> None:
         _expect(robot, Robot, "robot")
         _expect(resolver, Resolver, "resolver")
@@ -118,6 +124,11 @@ class Controller:
         self.added_task = Stack() if added_task is None else Stack.of(added_task)
         if self.added_task.tasks and not resolver.takes_added_task:
             raise InputError(f"added_task: resolver {resolver.name} takes none, ej does")
+        if not isinstance(steering, bool):
+            _expect(steering, Steering, "steering")
+        self.steering = steering
+        law = Steering() if steering is True else steering
+        steered: Steered | None = law.on(robot, self.task) if law else None
         self.rows: tuple[Row, ...] = self.task.rows(robot)
         added_rows = self.added_task.rows(robot)
 
@@ -126,7 +137,8 @@ class Controller:
         functions = [f for task in every for f in (task.function, task.reference, Comparison(task))]
         kept = (Limits(False, False) if limits is None else limits).on(robot)
         objectives = [function for _, function in weighted]
-        program = Program(robot, [*functions, *objectives, *kept.functions])
+        pursued = [] if steered is None else [steered.pursuit]
+        program = Program(robot, [*functions, *objectives, *kept.functions, *pursued])
         first = program.first_rows
         after = 3 * len(every) + len(objectives)
         listed = [
@@ -135,7 +147,14 @@ class Controller:
             for j, row in enumerate(task.rows(robot))
         ]
         table = np.array(listed, dtype=np.int64).reshape(-1, 3)
-        s, k, m = len(self.rows), len(added_rows), robot.n_u
+        s, m = len(self.rows), robot.n_u
+        # The extended Jacobian is square with a row for each input that pursuit steers.
+        held = np.zeros((0, m))
+        if steered is not None and len(added_rows) + len(steered.inputs) == m - s:
+            held = np.eye(m)[[robot.input(name) for name in steered.inputs]]
+        elif resolver.takes_added_task:
+            steered = None
+        k = len(added_rows) + len(held)
         problem = Problem(
             J=np.zeros((s, m)),
             rate=np.zeros(s),
@@ -144,9 +163,9 @@ class Controller:
             groups=robot.groups,
             row_scales=row_scales(self.rows, robot),
             levels=self.task.levels(robot),
-            added_J=np.zeros((k, m)),
+            added_J=np.vstack([np.zeros((len(added_rows), m)), held]),
             added_rate=np.zeros(k),
-            added_row_scales=row_scales(added_rows, robot),
+            added_row_scales=np.append(row_scales(added_rows, robot), np.ones(len(held))),
             limit_rows=np.zeros((len(kept.rows), m)),
         )
         self.kept = kept
@@ -162,7 +181,10 @@ class Controller:
                 weights=np.array([weight for weight, _ in weighted]),
                 H=np.array(0.0),
                 problem=problem.arrays,
-                limits=kept.numbers(first[after:], robot),
+                limits=kept.numbers(first[after : after + len(kept.functions)], robot),
+                steering=NOTHING
+                if steered is None
+                else steered.numbers(first[-1], getattr(resolver, "alpha", 1.0)),
                 resolver=resolver.kernel.address,
                 numbers=setup.numbers,
                 options=setup.options,
@@ -183,6 +205,17 @@ class Controller:
         self.backing = None if retreat is None else retreat.on(robot, self.rows)
         self._needs_dt = self.backing is not None or (limits is not None and kept.needs_dt)
         self.dt = dt
+        self.steered: Steered | None = None
+        if steered is not None and self._unfelt(steered.inputs):
+            self.steered = steered
+        self._step.steering.on[()] = int(self.steered is not None)
+        self.reset()
+
+    def _unfelt(self, inputs: Sequence[str]) -> bool:
+        """Whether nothing moves these inputs, and the task moves the platform by others."""
+        idle = {*idle_inputs(self)}
+        platform = {*self.robot.groups["platform"]}
+        return idle >= {*inputs} and not platform <= {*inputs_without_effect(self)}
 
     @property
     def dt(self) -> float | None:
@@ -240,7 +273,7 @@ class Controller:
     def __reduce__(self) -> tuple[object, ...]:
         """Copies and pickles are built anew: views of memory and addresses of kernels do not travel."""
         given = (self.robot, self.task, self.resolver, self.objective, self.added_task, self.limits, self.dt)
-        return type(self), (*given, self.retreat)
+        return type(self), (*given, self.retreat, self.steering)
 
     def _solver(self) -> Callable[[float, Array], float]:
         """solve(t, q) -> status, with everything it needs at hand."""
@@ -252,14 +285,12 @@ class Controller:
             prepare(t, q)
             return step(t, q, integers, floats)
 
+        self.linearise: Callable[[float, Array], float] = solve
+
         def solve_and_finish(t: float, q: Array) -> float:
             solve(t, q)
             resolver.finish(found.problem, dimensions, found.answer)
-            keep_limits(found.problem, found.answer)
-            hold_back(found.task, found.problem, found.answer)
-            if found.limits.mode == SAMPLE:
-                found.problem.before[:] = found.answer.u
-            drive(found.answer.u, program.buffers.G, found.arm, found.q_dot)
+            finish(q, integers, floats)
             return float(found.answer.status[()])
 
         return solve if type(resolver).finish is Resolver.finish else solve_and_finish

@@ -20,6 +20,7 @@ from nmm.control.bounds import (
     function_bounds,
     wheel_rows,
 )
+from nmm.control.steering import SteeringNumbers, steer
 from nmm.functions.program import BESIDE, Buffers, LaidOut, run
 from nmm.kernels.compiled import compiled, scratch
 from nmm.kernels.followers import add_to_leaders, move_followers
@@ -74,6 +75,7 @@ class ControlStep(NamedTuple):
     H () : the objective
     problem, answer : what the resolver gets and gives
     limits : from which the problem's come
+    steering : what sets the steering inputs that the task does not feel
     resolver, numbers, options, state : its kernel, what that reads, and what it remembers
     q_dot (n,) : S u
     """
@@ -86,6 +88,7 @@ class ControlStep(NamedTuple):
     H: Cell
     problem: ProblemArrays
     limits: LimitNumbers
+    steering: SteeringNumbers
     resolver: int
     numbers: Vector
     options: IntegerVector
@@ -221,6 +224,21 @@ def write_limits(limits: LimitNumbers, q: Array, b: Buffers, C: Arm, problem: Pr
 
 
 @compiled
+def finish(q: Array, integers: Integers, floats: Array) -> None:
+    """From the resolver's inputs to the robot's: limits, the steering that the task does not feel, q_dot."""
+    b = views(LaidOut, integers, floats, 0).buffers
+    e = views(ControlStep, integers, floats, BESIDE)
+    keep_limits(e.problem, e.answer)
+    hold_back(e.task, e.problem, e.answer)
+    if e.steering.on[()] == 1:
+        steer(e.steering, q, b.value, b.G, e.problem, e.answer.u)
+    if e.limits.mode[()] == SAMPLE:
+        for j in range(e.answer.u.shape[0]):
+            e.problem.before[j] = e.answer.u[j]
+    drive(e.answer.u, b.G, e.arm, e.q_dot)
+
+
+@compiled
 def step(t: float, q: Array, integers: Integers, floats: Array) -> float:
     """One control step: functions, equations, gradient, inputs. Returns the resolver's status.
 
@@ -242,6 +260,10 @@ def step(t: float, q: Array, integers: Integers, floats: Array) -> float:
         e.H[()] += e.weights[i] * b.value[term]
         for j in range(n):
             gradient[0, j] += e.weights[i] * b.value_q[term, j]
+    if e.steering.on[()] == 1:
+        spring = e.steering.row[()] + e.steering.inputs.shape[0]
+        for j in range(n):
+            gradient[0, j] += e.steering.spring[()] * b.value_q[spring, j]
     times_S(gradient, 0, b.G, e.arm, problem.h)
     write_limits(e.limits, q, b, e.arm, problem)
     for j in range(answer.u.shape[0]):
@@ -253,10 +275,5 @@ def step(t: float, q: Array, integers: Integers, floats: Array) -> float:
     answer.measure[()] = math.nan
     answer.excess[()] = 0.0
     call_resolver(e.resolver, problem, e.numbers, e.options, e.state, answer)
-    keep_limits(problem, answer)
-    hold_back(e.task, problem, answer)
-    if e.limits.mode[()] == SAMPLE:
-        for j in range(answer.u.shape[0]):
-            problem.before[j] = answer.u[j]
-    drive(answer.u, b.G, e.arm, e.q_dot)
+    finish(q, integers, floats)
     return float(answer.status[()])

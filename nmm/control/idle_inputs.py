@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array
-from nmm.control.controller import Controller
+from nmm.control.steering import Steered
+from nmm.functions.tasks.task import Stack
+from nmm.resolvers.state import State
+from nmm.robots.robot import Robot
 
 #: How many configurations are looked at: one where a column is zero by chance would say nothing.
 CONFIGURATIONS = 8
@@ -16,6 +20,20 @@ CONFIGURATIONS = 8
 AROUND = 1.0
 #: A column this much smaller than J is zero.
 ZERO = 1e-12
+
+
+class Controller(Protocol):
+    """What is read of a `nmm.control.controller.Controller`, which asks this module about itself."""
+
+    robot: Robot
+    added_task: Stack
+    state: State
+    steered: Steered | None
+    linearise: Callable[[float, Array], float]
+
+    @property
+    def derivatives(self) -> tuple[Array, Array, Array]:
+        """J, the added task's and h, of the last call."""
 
 
 def inputs_without_effect(controller: Controller, q0: ArrayLike | None = None) -> tuple[str, ...]:
@@ -40,9 +58,17 @@ def inputs_without_effect(controller: Controller, q0: ArrayLike | None = None) -
 def idle_inputs(controller: Controller, q0: ArrayLike | None = None) -> tuple[str, ...]:
     """Names of the inputs without effect on the task, the added one and the objective: they stay 0.
 
-    Parameters and result as for `inputs_without_effect`.
+    Parameters and result as for `inputs_without_effect`; what pursuit steers (`Controller.steered`) is moved.
     """
-    return _zero_columns(controller, q0, lambda controller: controller.derivatives)
+    steered = () if controller.steered is None else controller.steered.inputs
+    idle = _zero_columns(controller, q0, _derivatives)
+    return tuple(name for name in idle if name not in steered)
+
+
+def _derivatives(controller: Controller) -> Sequence[Array]:
+    """J, the added task's own rows and h, without those that hold what pursuit steers."""
+    J, added_J, h = controller.derivatives
+    return J, added_J[: len(controller.added_task.rows(controller.robot))], h
 
 
 def _zero_columns(
@@ -54,7 +80,7 @@ def _zero_columns(
     remembered = controller.state.snapshot()
     try:
         for q in _configurations(controller, controller.robot.q(q0)):
-            controller.evaluate(0.0, q)
+            controller.linearise(0.0, q)
             for matrix in matrices(controller):
                 size = float(np.linalg.norm(matrix))
                 if np.isfinite(size) and size > 0.0:

@@ -14,6 +14,7 @@ from nmm.arrays import Array, positive, vector
 from nmm.errors import expect_known
 from nmm.kernels.compiled import Kernel
 from nmm.platforms.layout import Layout
+from nmm.platforms.steering import SteeredAxle
 
 
 class Platform(ABC):
@@ -27,7 +28,7 @@ class Platform(ABC):
 
     It may say more: `parameters` (the numbers that the kernel reads) and their `parameter_names`, `fit` (how
     to measure them in a robot's file), `coordinate_limits`, `problem` (where its wheels cannot roll, and
-    why), `roller`.
+    why), `roller`, `steered_axle` (what turns it where no task feels that).
 
     Parameters
     ----------
@@ -112,6 +113,15 @@ class Platform(ABC):
         direction in which it rolls, turned by γ (rad) about z. 0 for a wheel without rollers and for one
         whose rollers turn about its rolling direction; ±π/4 for a mecanum wheel."""
         return 0.0
+
+    def steered_axle(self, body: str) -> SteeredAxle | None:
+        """What steers a body where, at first order, only the speed moves it; None where nothing needs to.
+
+        Parameters
+        ----------
+        body : the coordinate that turns it: "theta" for the main body, a hitch's joint for a trailer
+        """
+        return None
 
     def described(self) -> dict[str, str]:
         """The parameters in words, with their units, for people."""

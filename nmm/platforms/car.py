@@ -25,6 +25,7 @@ from nmm.platforms.measuring import (
     wheels_on,
 )
 from nmm.platforms.own_joints import coordinates_with
+from nmm.platforms.steering import SteeredAxle, SteeringPivot
 
 #: |cos δ| below which a steering angle counts as 90 degrees.
 _ACROSS = 1e-6
@@ -68,8 +69,9 @@ class _Bicycle(Platform):
 
     inputs = ("v", "steering_rate")
     input_units = ("m/s", "rad/s")
-    #: The widest steering angle that it may be limited to, rad.
+    #: The widest steering angle that it may be limited to, rad, and to which it is steered by itself.
     _widest: float
+    _steered_to = math.radians(60.0)
 
     def __init__(
         self,
@@ -138,6 +140,12 @@ class _Bicycle(Platform):
         if self.max_steering is not None or widest < math.pi:
             limits[3] = [-widest, widest]
         return limits
+
+    def steered_axle(self, body: str) -> SteeredAxle | None:
+        if body != "theta":
+            return None
+        pivot = SteeringPivot(self.steering, "steering_rate", self.wheelbase, widest=self._steered_to)
+        return SteeredAxle((pivot,))
 
     def pfaffian(self, qp: Array) -> Array:
         """Neither the rear axle nor the steered wheel slides sideways.
@@ -215,6 +223,7 @@ class FrontDriveCar(_Bicycle):
 
     name = "front_drive_car"
     _widest = math.pi
+    _steered_to = math.radians(85.0)
 
     @property
     def velocity_map(self) -> Kernel:

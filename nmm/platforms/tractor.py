@@ -16,6 +16,7 @@ from nmm.kernels.compiled import PLATFORM, Kernel, kernel, scratch
 from nmm.platforms.base import Platform
 from nmm.platforms.layout import Layout
 from nmm.platforms.own_joints import coordinates_with
+from nmm.platforms.steering import SteeredAxle, SteeringPivot
 from nmm.platforms.trailer_layout import measure_trailers
 
 #: Beyond its limit a hitch is folded by more than this, rad.
@@ -169,6 +170,17 @@ class Tractor(Platform):
     @property
     def velocity_map(self) -> Kernel:
         return tractor
+
+    def steered_axle(self, body: str) -> SteeredAxle | None:
+        """A first trailer that is hitched on the tractor's axle: the tractor is its steered wheel.
+
+        Hitched off the axle, it feels omega.
+        """
+        trailer = self.trailers[0]
+        if body != trailer.joint or trailer.hitch != 0.0:
+            return None
+        pivot = SteeringPivot(trailer.joint, "omega", trailer.length, sign=-1.0)
+        return SteeredAxle((pivot,), x=-trailer.length)
 
     def pfaffian(self, qp: Array) -> Array:
         """No axle slides along itself, the tractor's first.

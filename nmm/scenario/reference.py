@@ -16,6 +16,7 @@ from nmm.scenario.objectives import OBJECTIVE_PARTS, TermPart
 from nmm.scenario.resolvers import RESOLVER_PARTS
 from nmm.scenario.robot import ArmPart, MountedPart, RobotPart
 from nmm.scenario.schema import ScenarioPart
+from nmm.scenario.steering import SteeringPart
 from nmm.scenario.tasks import TASK_PARTS
 
 
@@ -48,6 +49,7 @@ def sections() -> Iterator[Section]:
     yield _section("retreat", RetreatPart)
     yield _section("limits", LimitsPart)
     yield _section("limits.bounds: a task's function and its keys, with these", BoundPart)
+    yield _section("steering", SteeringPart)
 
 
 def _section(title: str, part: type[Part], called: str = "") -> Section:
@@ -65,6 +67,8 @@ def _text(value: object) -> str:
     """A default as the file would say it; nothing where there is none."""
     if isinstance(value, bool):
         return str(value).lower()
+    if isinstance(value, SteeringPart):
+        return "true"
     if isinstance(value, list) and value:
         if all(isinstance(item, str) for item in value):
             return "".join(value)

@@ -19,6 +19,7 @@ from nmm.scenario.numbers import Nested, Positive, numbers, numbers_by_name
 from nmm.scenario.objectives import ObjectiveList, QuadraticPart, build_objective
 from nmm.scenario.resolvers import AnyResolver, WithAddedTask
 from nmm.scenario.robot import RobotChoice
+from nmm.scenario.steering import SteeringPart
 from nmm.scenario.tasks import TASK_PARTS, TaskList, TaskPart, build_tasks, listed
 from nmm.words import listed as in_words
 
@@ -67,6 +68,10 @@ class ScenarioPart(Part):
     retreat: Annotated[RetreatPart | None, BeforeValidator(part_or_none)] = Field(
         None, description="whether to back off where the error stalls, and start again: true, or a mapping"
     )
+    steering: Annotated[SteeringPart | None, BeforeValidator(part_or_none)] = Field(
+        SteeringPart.model_validate({}),
+        description="what steers a platform where neither task nor objective does: true, false, or a mapping",
+    )
 
     def build(self, robot: Robot) -> Controller:
         """The controller, after a check of q0; errors know their key."""
@@ -88,15 +93,20 @@ class ScenarioPart(Part):
         with at("retreat"):
             goal = None if self.until is None else self.until.make()
             retreat = None if self.retreat is None else self.retreat.build(robot, goal)
+        steering = None if self.steering is None else self.steering.build()
         with at("resolver"):
             resolver, added = self.resolver.make(), None
             if isinstance(self.resolver, WithAddedTask):
                 with at("added_task"):
                     added = build_tasks(self._added_task(self.resolver), robot)
                     rows = sum(len(item.rows(robot)) for item in added)
-                    self._check_added(self.resolver, rows, robot.n_u - s)
+                    law = None if steering is None else steering.on(robot, task)
+                    held = 0 if law is None else len(law.inputs)
+                    self._check_added(self.resolver, rows, robot.n_u - s, held)
             with self.resolver.own_keys():
-                return Controller(robot, task, resolver, objective, added, limits, self.dt, retreat)
+                return Controller(
+                    robot, task, resolver, objective, added, limits, self.dt, retreat, steering or False
+                )
 
     def _added_task(self, resolver: WithAddedTask) -> list[TaskPart]:
         """The task that takes up the redundancy: as given, or the objective's terms at their targets."""
@@ -121,8 +131,8 @@ class ScenarioPart(Part):
         ]
 
     @staticmethod
-    def _check_added(resolver: WithAddedTask, rows: int, redundancy: int) -> None:
-        if rows == redundancy:
+    def _check_added(resolver: WithAddedTask, rows: int, redundancy: int, held: int) -> None:
+        if rows in (redundancy, redundancy - held):
             return
         came = f"none is given and the objective has {rows} quadratic terms"
         if resolver.added_task is not None:
@@ -139,6 +149,7 @@ class ScenarioPart(Part):
         for key in ("task", "objective"):
             if len(data[key]) == 1:
                 data[key] = data[key][0]
+        data["steering"] = data["steering"] or False
         return {key: _kind_first(value) for key, value in data.items()}
 
 

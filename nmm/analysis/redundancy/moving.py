@@ -170,7 +170,7 @@ class _Motion:
 
     def __init__(self, robot: Robot, task: Stack, t: float, q: Array, field: Field, rank: int) -> None:
         self.robot, self.t, self.q, self.field, self.rank = robot, t, q, field, rank
-        self.controller = Controller(robot, task, ProjectedGradient())
+        self.controller = Controller(robot, task, ProjectedGradient(), steering=False)
         self.e0 = self.controller.evaluate(t, q).error
         self.angular = np.array([row.angular for row in task.rows(robot)])
         self.last = np.zeros(robot.n_u)

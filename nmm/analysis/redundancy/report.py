@@ -221,7 +221,9 @@ def redundancy(
         null=null_space(J, rank_J),
         readable=readable,
         texts=tuple(motion_text(one, robot.u_names, robot.u_units, words, p) for one in readable),
-        without_effect=inputs_without_effect(Controller(robot, jacobians.task, ProjectedGradient()), q),
+        without_effect=inputs_without_effect(
+            Controller(robot, jacobians.task, ProjectedGradient(), steering=False), q
+        ),
         withheld=withheld,
         withheld_texts=texts,
         by_brackets=regained_by_brackets(jacobians, t, q, rank_J) if len(withheld) else 0,

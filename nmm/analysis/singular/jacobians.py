@@ -57,8 +57,10 @@ class Jacobians:
             added = Stack() if added_task is None else stacked(added_task)
         else:
             raise InputError(f"analysis: expected a Controller or (robot, task), got {subject!r}")
-        self._of_task = Controller(self.robot, self.task, ProjectedGradient())
-        self._of_added = Controller(self.robot, added, ProjectedGradient()) if len(added) else None
+        self._of_task = Controller(self.robot, self.task, ProjectedGradient(), steering=False)
+        self._of_added = (
+            Controller(self.robot, added, ProjectedGradient(), steering=False) if len(added) else None
+        )
         self.rows: tuple[Row, ...] = self._of_task.rows
         self.scales = row_scales(self.rows, self.robot)
         self.added_rows: tuple[Row, ...] = self._of_added.rows if self._of_added else ()

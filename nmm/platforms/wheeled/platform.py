@@ -14,6 +14,7 @@ from nmm.errors import InputError
 from nmm.kernels.compiled import Kernel
 from nmm.platforms.base import Platform
 from nmm.platforms.layout import Layout
+from nmm.platforms.steering import SteeredAxle
 from nmm.platforms.wheeled.descriptions import MAIN, FixedWheel, Hitch, OmniWheel, Wheel
 from nmm.platforms.wheeled.fit import parts_from
 from nmm.platforms.wheeled.geometry import Bodies
@@ -22,6 +23,7 @@ from nmm.platforms.wheeled.kernel import BODIES, SIZE, wheeled
 from nmm.platforms.wheeled.problem import contradiction, folded, singularity
 from nmm.platforms.wheeled.rates import WheelRate, wheel_rates
 from nmm.platforms.wheeled.sections import pack
+from nmm.platforms.wheeled.steering import steered_axle
 from nmm.platforms.wheeled.structure import Constraint, choose
 
 
@@ -152,6 +154,10 @@ class WheeledPlatform(Platform):
         wheels = [wheel for wheel in self.wheels if wheel.body == MAIN]
         nearest = min(wheels, key=lambda wheel: math.hypot(wheel.x - x, wheel.y - y), default=None)
         return nearest.roller if isinstance(nearest, OmniWheel) else 0.0
+
+    def steered_axle(self, body: str) -> SteeredAxle | None:
+        """The main body's, where one speed and the steering angles say all (mobility 1)."""
+        return steered_axle(self.wheels, self.inputs) if body == MAIN and self.mobility == 1 else None
 
     def wheel_rates(
         self, qp: ArrayLike, up: ArrayLike, swivels: Mapping[str, float] | None = None

@@ -1,0 +1,184 @@
+"""What steers a platform where no task feels that it steers: pursuit of the robot's own hand.
+
+At first order a task does not feel the steering rate of a car: its column of J is zero. Left alone, the car
+drives straight on. So its steering angle δ goes to δ* = atan2(2 L sin β, l), the angle with which the car
+would drive on a circle through the robot's hand, l away in the direction β, both forwards and backwards:
+
+    δ_dot = -k (δ - δ*),  δ* within the stops,
+
+whatever the resolver would do with that input, which moves nothing of the task; within the limits of the
+input. In the null space, a spring holds the hand ahead of the axle: α h gains k1 ∂(½ β²)/∂u.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from nmm.arrays import Array, positive, scalar
+from nmm.errors import InputError
+from nmm.functions.pursuit import Pursuit
+from nmm.functions.tasks.task import Task
+from nmm.kernels.compiled import compiled
+from nmm.kernels.memory import Cell, IntegerCell, IntegerVector, Vector
+from nmm.platforms.steering import SteeringPivot
+from nmm.resolvers.limited import times
+from nmm.resolvers.problem import ProblemArrays
+from nmm.robots.loading.tips import first_tip
+from nmm.robots.reach import reach
+from nmm.robots.robot import Robot
+
+
+class SteeringNumbers(NamedTuple):
+    """What a step needs to steer; k pivots.
+
+    on () : 1 where it steers
+    row () : the first of the k + 1 rows of the `Pursuit` in the program
+    coordinates, inputs (k,) : the pivots' angles, and the inputs that set their rates
+    gain () : k, 1/s
+    spring () : what ∂(½ β²)/∂u counts in h
+    """
+
+    on: IntegerCell
+    row: IntegerCell
+    coordinates: IntegerVector
+    inputs: IntegerVector
+    gain: Cell
+    spring: Cell
+
+
+@compiled
+def steer(
+    steering: SteeringNumbers, q: Array, value: Vector, G: Array, problem: ProblemArrays, u: Array
+) -> None:
+    """Set the steering inputs in u (m,): the pivots' angles go to their c* = `value`, within the limits."""
+    for i in range(steering.inputs.shape[0]):
+        j, c = steering.inputs[i], steering.coordinates[i]
+        if math.isnan(u[j]):  # no solution
+            return
+        rate = -steering.gain[()] * (q[c] - value[steering.row[()] + i])
+        for other in range(G.shape[1]):
+            if other != j:
+                rate -= G[c, other] * u[other]
+        wanted = rate / G[c, j]
+        # Rows hold with the resolver's value of this input: what they leave of it is never empty.
+        for row in range(problem.lower.shape[0]):
+            slope = problem.limit_rows[row, j]
+            if slope != 0.0:
+                rest = times(problem.limit_rows, row, u) - slope * u[j]
+                ends = (problem.lower[row] - rest) / slope, (problem.upper[row] - rest) / slope
+                wanted = min(max(wanted, min(ends[0], ends[1], u[j])), max(ends[0], ends[1], u[j]))
+        u[j] = min(max(wanted, problem.u_lower[j]), problem.u_upper[j])
+
+
+class Steering:
+    """The law for steering inputs that a task does not feel (`platforms.base.Platform.steered_axle`).
+
+    It is in force where neither the task nor the added task nor the objective moves any of these inputs, the
+    task moves the platform in another way, and the hand is on an arm that the steered body carries.
+
+    Parameters
+    ----------
+    gain : k, with which a steering angle goes to where it should be, 1/s
+    spring : k1, with which the null space turns the hand ahead of the axle, 1/s (α of the resolver times its
+        weight; the weight where it has no α); 0 for none
+
+    Raises
+    ------
+    InputError : a gain that is not above 0, a spring below 0
+
+    Source: that the null space chooses the steering, De Luca, Oriolo, Robuffo Giordano, "Kinematic control of
+    nonholonomic mobile manipulators in the presence of steering wheels", ICRA 2010; pursuit: Coulter,
+    "Implementation of the pure pursuit path tracking algorithm", CMU-RI-TR-92-01, 1992.
+    """
+
+    def __init__(self, gain: float = 5.0, spring: float = 2.0) -> None:
+        self.gain = positive(gain, "gain")
+        self.spring = scalar(spring, "spring")
+        if self.spring < 0.0:
+            raise InputError(f"spring: expected a number from 0, got {self.spring:g}")
+
+    def on(self, robot: Robot, task: Iterable[Task] = ()) -> Steered | None:
+        """The law on a robot with tasks, whichever inputs they move; None where nothing steers a body."""
+        hands = [one.function.shown().positions for one in task]
+        for hand in [*hands, first_tip(robot)]:
+            body = None if hand is None else _body(robot, hand)
+            axle = None if body is None else robot.platform.steered_axle(body)
+            arm = None if hand is None else reach(robot, hand)
+            if hand is not None and body is not None and axle is not None and arm is not None and arm.length:
+                return Steered(self, robot, Pursuit(hand, body, axle))
+        return None
+
+
+class Steered:
+    """The law of `steering` on a robot: who pursues what, and how tightly it can turn.
+
+    Attributes
+    ----------
+    pursuit : the pursuit
+    pivots : what is steered
+    inputs : their inputs' names
+    """
+
+    def __init__(self, steering: Steering, robot: Robot, pursuit: Pursuit) -> None:
+        self.steering = steering
+        self.robot = robot
+        self.pursuit = pursuit
+        self.pivots: tuple[SteeringPivot, ...] = pursuit.axle.pivots
+        self.inputs = tuple(pivot.input for pivot in self.pivots)
+
+    def numbers(self, row: int, alpha: float) -> SteeringNumbers:
+        """For a step whose program has the pursuit at `row`; it does not steer yet."""
+        robot = self.robot
+        return SteeringNumbers(
+            on=np.array(0),
+            row=np.array(row),
+            coordinates=np.array([robot.coordinate(pivot.coordinate) for pivot in self.pivots]),
+            inputs=np.array([robot.input(name) for name in self.inputs]),
+            gain=np.array(self.steering.gain),
+            spring=np.array(self.steering.spring / alpha),
+        )
+
+    @property
+    def least_radius(self) -> float:
+        """The smallest circle of the axle's middle, m."""
+        return self.pursuit.axle.least_radius(self.pursuit.limits(self.robot))
+
+    def described(self) -> tuple[str, ...]:
+        """The law in words, then what geometry forbids, if it does."""
+        law, names = self.steering, ", ".join(self.inputs)
+        said = (
+            f"{names}: no task feels {'it' if len(self.inputs) == 1 else 'them'}; pursuit of "
+            f"{self.pursuit.hand} steers, gain {law.gain:g} 1/s, spring {law.spring:g} 1/s",
+        )
+        arm, radius = reach(self.robot, self.pursuit.hand), self.least_radius
+        if arm is None or not np.isfinite(arm.length):  # as far as it likes
+            return said
+        ratio = f"least turning radius {radius:.3g} m, {radius / arm.length:.2g} times the arm's reach"
+        if radius <= arm.length:
+            return (*said, ratio)
+        return (
+            *said,
+            f"{ratio} ({arm.length:.3g} m): it cannot turn under its own arm, so that paths which turn "
+            "sharply, or begin beside it, may stretch the arm",
+        )
+
+
+#: Where nothing steers.
+NOTHING = SteeringNumbers(
+    np.array(0), np.array(0), np.zeros(0, int), np.zeros(0, int), np.array(0.0), np.array(0.0)
+)
+
+
+def _body(robot: Robot, hand: str) -> str | None:
+    """The platform's coordinate that turns the body whose arm carries the hand; None where no arm does."""
+    model = robot.model
+    chain = [
+        model.joints[j].idx_q for j in model.supports[model.frames[robot.frame_id(hand)].parentJoint] if j > 0
+    ]
+    n_p = robot.platform.n_p
+    own = [index for index in chain if index < n_p]
+    return robot.q_names[own[-1]] if len(chain) > len(own) and len(own) > 2 else None
