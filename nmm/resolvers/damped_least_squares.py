@@ -69,7 +69,8 @@ def damp(
     certify(problem, answer)
     if answer.status[()] == INEXACT and damping_squared(law, least, damping, threshold) > 0.0:
         answer.status[()] = RELAXED
-        answer.scale[0] = share
+        for level in range(answer.scale.shape[0]):
+            answer.scale[level] = share
 
 
 class DampedLeastSquares(Resolver):

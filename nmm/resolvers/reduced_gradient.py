@@ -142,9 +142,11 @@ def blend(problem: ProblemArrays, numbers: Array, weighted: bool, share: float, 
     certify(problem, answer)
     if relaxed and answer.status[()] == INEXACT:
         answer.status[()] = RELAXED
-        answer.scale[0] = 1.0 - share * (1.0 - scale)
+        scale = 1.0 - share * (1.0 - scale)
     else:
-        answer.scale[0] = 1.0
+        scale = 1.0
+    for level in range(answer.scale.shape[0]):
+        answer.scale[level] = scale
 
 
 @compiled
