@@ -112,7 +112,7 @@ def test_undamped_it_is_the_projected_gradient(
 ) -> None:
     s, m = shape
     for _ in range(20):
-        J = with_singular_values(rng.uniform(0.021, 2.0, s), m, rng)
+        J = with_singular_values(rng.uniform(0.051, 2.0, s), m, rng)
         problem = Problem(J, rng.normal(size=s), rng.normal(size=m))
         for weights in (None, rng.uniform(1.0, 3.0, m)):
             if weights is not None:
@@ -234,8 +234,8 @@ def test_a_known_step_raises_the_damping(rng: np.random.Generator) -> None:
         size = np.linalg.norm(rate)
         found = DampedLeastSquares().resolve(Problem(J, rate, np.zeros(4), dt=0.02))
         raised = DampedLeastSquares(
-            damping=max(0.02 / math.sqrt(2.0), math.sqrt(0.02 * size)),
-            threshold=max(0.02, math.sqrt(0.04 * size)),
+            damping=max(0.05 / math.sqrt(2.0), math.sqrt(0.02 * size)),
+            threshold=max(0.05, math.sqrt(0.04 * size)),
         )
         expected = raised.resolve(Problem(J, rate, np.zeros(4)))
         np.testing.assert_allclose(found.u, expected.u, rtol=1e-13)
@@ -277,7 +277,7 @@ def test_reduced_gradient_does_the_task_where_only_its_block_is_singular(rng: np
     np.testing.assert_allclose(found.u, ProjectedGradient(3.0).resolve(problem).u, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("sigma", [0.2, 0.015, 1e-3, 1e-9, 0.0])
+@pytest.mark.parametrize("sigma", [0.2, 0.04, 1e-3, 1e-9, 0.0])
 def test_the_extended_jacobian_damps_its_added_task_alone(sigma: float, rng: np.random.Generator) -> None:
     """Rows of J_added that the null space of J moves by σ only; the task is done to rounding all the same."""
     for _ in range(20):
@@ -290,13 +290,13 @@ def test_the_extended_jacobian_damps_its_added_task_alone(sigma: float, rng: np.
         found = ExtendedJacobian(singular="damped").resolve(problem)
         plain = ExtendedJacobian().resolve(problem)
         assert np.linalg.norm(J @ found.u - problem.rate) < 1e-11
-        if sigma > 0.02:
+        if sigma > 0.05:
             assert found.status is plain.status is Status.SOLVED
             np.testing.assert_array_equal(found.u, plain.u)
             continue
         assert found.status is Status.RELAXED
         assert plain.status.usable if sigma > 0.0 else plain.status is Status.SINGULAR_JE
-        assert np.linalg.norm(found.u) < 150.0 * np.linalg.norm([*problem.rate, *given["added_rate"]])
+        assert np.linalg.norm(found.u) < 60.0 * np.linalg.norm([*problem.rate, *given["added_rate"]])
         left = np.linalg.svd(inside)[0].T @ (added @ found.u - given["added_rate"])
         np.testing.assert_allclose(left[:2], 0.0, atol=1e-10)
 

@@ -13,7 +13,7 @@ from nmm.kernels.singular_values import singular_rows
 CONSTANT, VARIABLE, DIRECTIONS = 0, 1, 2
 #: λ and ε when nothing else is said. With λ = ε / √2 the inputs that do the task are at most ‖b‖ / ε (b is
 #: the rate, rows in their scales): damped, they are no larger than undamped at the threshold.
-LARGEST, BELOW = 0.02 / math.sqrt(2.0), 0.02
+LARGEST, BELOW = 0.05 / math.sqrt(2.0), 0.05
 
 
 @compiled
