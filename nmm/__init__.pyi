@@ -66,6 +66,7 @@ from .platforms import Trailer as Trailer
 from .platforms import Unicycle as Unicycle
 from .platforms import WheeledPlatform as WheeledPlatform
 from .resolvers import CallableResolver as CallableResolver
+from .resolvers import DampedLeastSquares as DampedLeastSquares
 from .resolvers import ExtendedJacobian as ExtendedJacobian
 from .resolvers import ProjectedGradient as ProjectedGradient
 from .resolvers import ReducedGradient as ReducedGradient

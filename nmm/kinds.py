@@ -109,4 +109,5 @@ RESOLVERS = Kinds(
     rg="nmm.resolvers.reduced_gradient:ReducedGradient",
     pg="nmm.resolvers.projected_gradient:ProjectedGradient",
     ej="nmm.resolvers.extended_jacobian:ExtendedJacobian",
+    dls="nmm.resolvers.damped_least_squares:DampedLeastSquares",
 )

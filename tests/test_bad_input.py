@@ -168,7 +168,7 @@ COMMANDS: list[tuple[list[str], list[str]]] = [
     (["run", "unicycle_2r_positon"], ["unknown scenario", "did you mean 'unicycle_2r_position'"]),
     (["run", "nowhere.yaml"], ["nowhere.yaml", "No such file"]),
     (["run", "."], ["unknown scenario '.'"]),
-    (["run", "given.yaml", "--resolver", "sqp"], ["resolver.kind", "unknown kind 'sqp'", "rg, pg, ej"]),
+    (["run", "given.yaml", "--resolver", "sqp"], ["resolver.kind", "unknown kind 'sqp'", "rg, pg, ej, dls"]),
     (["run", "given.yaml", "--out", "theirs"], ["theirs", "not what this writes"]),
     (["run", "given.yaml", "--out", "given.yaml"], ["given.yaml", "not what this writes"]),
     (["run", "given.yaml", "--out", "given.yaml/below"], ["given.yaml/below", "cannot be written"]),

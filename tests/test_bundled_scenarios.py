@@ -39,10 +39,14 @@ def test_the_papers_scenarios_are_the_papers(name: str, case: paper_cases.Case) 
     assert np.abs(u - case.controller(robot, case.rg())(0.0, case.q0)).max() < 1e-12
 
 
+#: Those that come to a singularity, where the task or the added task is damped: see test_damping_runs.py.
+SINGULAR = ("unicycle_3r_out_of_reach", "unicycle_3r_vertical_line", "unicycle_2r_algorithmic")
+
+
 @pytest.fixture(scope="module")
 def runs() -> dict[str, nmm.Trajectory]:
     """Every bundled scenario, run as it is."""
-    return {name: Scenario.load(name).run() for name in bundled_scenarios()}
+    return {name: Scenario.load(name).run() for name in bundled_scenarios() if name not in SINGULAR}
 
 
 def test_every_bundled_scenario_runs_to_its_end(runs: dict[str, nmm.Trajectory]) -> None:

@@ -27,6 +27,7 @@ from nmm.kernels.compiled import Kernel
 from nmm.kernels.records import At, Frames, Rows
 from nmm.resolvers import (
     CallableResolver,
+    DampedLeastSquares,
     ExtendedJacobian,
     Problem,
     ProjectedGradient,
@@ -153,7 +154,12 @@ RESOLVERS = [
     ReducedGradient(3.0, [("u0", "u1"), ("u2", "u3")]),
     ProjectedGradient(3.0),
     ProjectedGradient(3.0, [1, 2, 3, 4]),
+    ReducedGradient(3.0, singular="damped"),
+    ReducedGradient(3.0, [("u0", "u1")], weights=[1, 2, 3, 4], singular="damped"),
     ExtendedJacobian(),
+    ExtendedJacobian(singular="damped"),
+    *(DampedLeastSquares(3.0, law, 0.3, 0.6) for law in ("constant", "variable", "directions")),
+    DampedLeastSquares(3.0, weights=[1, 2, 3, 4]),
     CallableResolver(lambda problem: problem.h),
 ]
 

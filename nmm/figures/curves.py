@@ -271,7 +271,14 @@ def _draw_partition(axes: Axes, trajectory: Trajectory) -> None:
         color = colors.setdefault(columns, style.CYCLE[len(colors) % 7])
         axes.axvspan(t[first], t[last], color=color, alpha=0.25, linewidth=0)
         if t[last] - t[first] > 0.15 * (t[-1] - t[0]):
-            axes.text(0.5 * (t[first] + t[last]), 0.5, names, ha="center", va="center", fontsize=style.SMALL)
+            axes.text(
+                0.5 * (t[first] + t[last]),
+                0.5,
+                names or "none: damped",
+                ha="center",
+                va="center",
+                fontsize=style.SMALL,
+            )
     axes.set_ylim(0.0, 1.0)
     axes.set_yticks([])
     axes.grid(False)

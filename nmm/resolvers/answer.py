@@ -41,7 +41,7 @@ class Status(IntEnum):
 
 _MEANINGS = {
     Status.SOLVED: "solved",
-    Status.RELAXED: "the task's rate was scaled or damped on purpose",
+    Status.RELAXED: "the rate of the task, or of an added one, was scaled or damped on purpose",
     Status.INEXACT: "J u differs from the rate that the task asks for, and nobody said that it should",
     Status.FALLBACK: "there was no answer to bring within the limits: the inputs are those nearest to rest",
     Status.SINGULAR_J: "the task Jacobian J lost rank",
@@ -101,7 +101,8 @@ class Answer:
         where it is FALLBACK
     residual : ‖J u - rate‖
     measure : of the matrix inverted: PG and EJ, its last pivot (rows in their scales) over its first, or
-        over 1 if that is larger; RG, |det Ja|, divided by sqrt(det J Jᵀ) with automatic partitions
+        over 1 if that is larger; RG, |det Ja|, divided by sqrt(det J Jᵀ) with automatic partitions; DLS, the
+        least singular value (rows in their scales)
     excess : by how much rows of limits that contradict each other had to be widened, in their units
     """
 

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
 from nmm.arrays import Array, Integers, positive
-from nmm.errors import InputError
-from nmm.kernels.compiled import Kernel, clear, compiled, integer_scratch, kernel, scratch
-from nmm.kernels.linear_algebra import eliminate, orthonormal_rows
-from nmm.resolvers.answer import SINGULAR_J, SINGULAR_JE, AnswerArrays, certify
-from nmm.resolvers.base import NO_OPTIONS, RESOLVER, Resolver, Setup
+from nmm.errors import InputError, expect_known
+from nmm.kernels.compiled import Kernel, clear, compiled, integer_scratch, kernel, scratch, view
+from nmm.kernels.damping import BELOW, DIRECTIONS, LARGEST, damped_solution, resolved
+from nmm.kernels.linear_algebra import closest_solution, eliminate, orthonormal_rows
+from nmm.resolvers.answer import RELAXED, SINGULAR_J, SINGULAR_JE, SOLVED, AnswerArrays, certify
+from nmm.resolvers.base import RESOLVER, Resolver, Setup
 from nmm.resolvers.limited import limit, within
 from nmm.resolvers.problem import Dimensions, ProblemArrays
 
+#: Numbers: the tolerance. Options: whether the added task is damped where it asks for what the task fixes.
 TOLERANCE = 0
+DAMPED = 0
+
+
+Singular = Literal["stop", "damped"]
 
 
 @kernel(RESOLVER)
@@ -25,6 +31,10 @@ def extended_jacobian(
     """[J; J_added] u = [rate; rate_added]."""
     J = problem.J
     s, m = J.shape
+    if options[DAMPED] == 1 and damped_beside(problem, numbers[TOLERANCE], answer):
+        if not within(problem, answer.u):
+            limit(problem, view(numbers, 0, (0, 0)), answer)
+        return
     M = scratch((m, m + 1))
     scales = scratch(m)
     for i in range(m):
@@ -47,6 +57,45 @@ def extended_jacobian(
         T = scratch((m, m))
         inverse(problem, T)
         limit(problem, T, answer)
+
+
+@compiled
+def damped_beside(problem: ProblemArrays, tolerance: float, answer: AnswerArrays) -> bool:
+    """The task exactly, the added task by damped least squares in its null space; False where none is needed.
+
+    J_e loses rank with J or with J_added (I - J⁺ J), rows in their scales: the second is damped.
+    """
+    J, added_J, u = problem.J, problem.added_J, answer.u
+    s, m = J.shape
+    k = added_J.shape[0]
+    order, L, Q = integer_scratch(s), scratch((s, s)), scratch((s, m))
+    if orthonormal_rows(J, problem.row_scales, order, L, Q) <= tolerance:
+        return False
+    u0, free, b, A = scratch(m), scratch(m), scratch(k), scratch((k, m))
+    clear(u0)
+    closest_solution(problem.rate, u0, order, L, Q, u)
+    for i in range(k):
+        b[i] = problem.added_rate[i]
+        for j in range(m):
+            b[i] -= added_J[i, j] * u[j]
+            A[i, j] = added_J[i, j]
+        for row in range(s):
+            overlap = 0.0
+            for j in range(m):
+                overlap += A[i, j] * Q[row, j]
+            for j in range(m):
+                A[i, j] -= overlap * Q[row, j]
+    damping, threshold = resolved(b, problem.added_row_scales, problem.dt[()], LARGEST, BELOW)
+    _, least = damped_solution(A, problem.added_row_scales, b, u0, DIRECTIONS, damping, threshold, free)
+    if not least < threshold:
+        return False
+    for j in range(m):
+        u[j] += free[j]
+    answer.measure[()] = least
+    certify(problem, answer)
+    if answer.status[()] == SOLVED:
+        answer.status[()] = RELAXED
+    return True
 
 
 @compiled
@@ -76,13 +125,18 @@ class ExtendedJacobian(Resolver):
     ----------
     tolerance : J_e counts as singular where its last pivot, rows in their natural scales, is below this,
         times the largest pivot if that is above 1
+    singular : what happens where J_e loses rank though J does not (algorithmic singularities): "stop", the
+        run ends there; "damped", the task is done and the added task damped, as by damped least squares with
+        its usual numbers, in the directions in which the task leaves it hardly anything
     """
 
     name: ClassVar[str] = "ej"
     takes_added_task: ClassVar[bool] = True
 
-    def __init__(self, tolerance: float = 1e-10) -> None:
+    def __init__(self, tolerance: float = 1e-10, singular: Singular = "stop") -> None:
         self.tolerance = positive(tolerance, "tolerance")
+        expect_known("singular", singular, get_args(Singular))
+        self.singular = singular
 
     @property
     def kernel(self) -> Kernel:
@@ -96,4 +150,4 @@ class ExtendedJacobian(Resolver):
                 f"added_task: expected {free} rows ({dimensions.m} inputs less {dimensions.s} rows of the "
                 f"task), got {dimensions.k}"
             )
-        return Setup(np.array([self.tolerance]), NO_OPTIONS)
+        return Setup(np.array([self.tolerance]), np.array([self.singular == "damped"], dtype=np.int64))

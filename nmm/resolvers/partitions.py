@@ -22,9 +22,10 @@ Partition = Sequence[str | int]
 
 MOST_CANDIDATES = 20_000
 
-#: The integers of the state: FREE, HELD or OVERDUE; the sign of det Ja; the columns of Ja, -1 before the
-#: first call.
+#: The integers of the state: FREE, HELD or OVERDUE; the sign of det Ja; the columns of Ja, NONE before
+#: the first call and where there is no such block.
 MODE, SIGN, COLUMNS = 0, 1, 2
+NONE = -1
 #: The partition may change; it is kept; it was kept although it fell below its threshold.
 FREE, HELD, OVERDUE = 0, 1, 2
 

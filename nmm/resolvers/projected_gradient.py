@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from nmm.arrays import Array, Integers, positive
-from nmm.kernels.compiled import Kernel, integer_scratch, kernel, scratch, view
+from nmm.kernels.compiled import Kernel, compiled, integer_scratch, kernel, scratch, view
 from nmm.kernels.linear_algebra import closest_solution, orthonormal_rows
 from nmm.resolvers.answer import SINGULAR_J, AnswerArrays, certify
 from nmm.resolvers.base import NO_OPTIONS, RESOLVER, Resolver, Setup
@@ -46,28 +46,41 @@ def projected_gradient(
     else:
         W = view(numbers, C, (m, m))
         weighted_J = scratch((s, m))
-        for j in range(m):
-            u0[j] = 0.0
-            for i in range(s):
-                weighted_J[i, j] = 0.0
-            for k in range(m):
-                u0[j] -= alpha * W[k, j] * h[k]
-                for i in range(s):
-                    weighted_J[i, j] += J[i, k] * W[k, j]
+        weigh(problem, alpha, W, weighted_J, u0)
         answer.measure[()] = orthonormal_rows(weighted_J, problem.row_scales, order, L, Q)
         if answer.measure[()] <= numbers[TOLERANCE]:
             answer.status[()] = SINGULAR_J
             return
         solution = scratch(m)
         closest_solution(problem.rate, u0, order, L, Q, solution)
-        for j in range(m):
-            u[j] = 0.0
-            for k in range(m):
-                u[j] += W[j, k] * solution[k]
+        unweigh(W, solution, u)
     certify(problem, answer)
     if not within(problem, u):
         plain = numbers.shape[0] == C
         limit(problem, view(numbers, 0 if plain else C, (0, 0) if plain else (m, m)), answer)
+
+
+@compiled
+def weigh(problem: ProblemArrays, alpha: float, W: Array, weighted_J: Array, u0: Array) -> None:
+    """J C and u0 = -α Cᵀ h, in ũ = C⁻¹ u, in which the weighted norm is the Euclidean one; W holds C."""
+    s, m = problem.J.shape
+    for j in range(m):
+        u0[j] = 0.0
+        for i in range(s):
+            weighted_J[i, j] = 0.0
+        for k in range(m):
+            u0[j] -= alpha * W[k, j] * problem.h[k]
+            for i in range(s):
+                weighted_J[i, j] += problem.J[i, k] * W[k, j]
+
+
+@compiled
+def unweigh(W: Array, solution: Array, u: Array) -> None:
+    """u = C ũ."""
+    for j in range(u.shape[0]):
+        u[j] = 0.0
+        for k in range(u.shape[0]):
+            u[j] += W[j, k] * solution[k]
 
 
 class ProjectedGradient(Resolver):

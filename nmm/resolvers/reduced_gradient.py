@@ -8,15 +8,18 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from nmm.arrays import Array, Integers, positive
-from nmm.errors import InputError
+from nmm.errors import InputError, expect_known
 from nmm.kernels.compiled import Kernel, clear, compiled, kernel, scratch, view
-from nmm.resolvers.answer import SINGULAR_J, SINGULAR_JA, AnswerArrays, certify
+from nmm.kernels.damping import BELOW, DIRECTIONS, LARGEST, resolved
+from nmm.resolvers.answer import INEXACT, RELAXED, SINGULAR_J, SINGULAR_JA, AnswerArrays, certify
 from nmm.resolvers.base import RESOLVER, Resolver, Setup
+from nmm.resolvers.damped_least_squares import damp
 from nmm.resolvers.limited import limit, within
 from nmm.resolvers.partitions import (
     COLUMNS,
     FREE,
     MODE,
+    NONE,
     OVERDUE,
     SIGN,
     Partition,
@@ -31,8 +34,9 @@ from nmm.resolvers.weights import Weights, weight_diagonal
 
 #: Numbers: α, Θ, the tolerance and, with weights, c = W^(-1/2).
 ALPHA, THRESHOLD, TOLERANCE, C = 0, 1, 2, 3
-#: Options: whether measures are divided by sqrt(det J Jᵀ), then the candidates' columns.
-NORMALISED, CANDIDATES = 0, 1
+#: Options: whether measures are divided by sqrt(det J Jᵀ), whether it is damped where no partition is well
+#: conditioned, then the candidates' columns.
+NORMALISED, DAMPED, CANDIDATES = 0, 1, 2
 
 
 @kernel(RESOLVER)
@@ -45,7 +49,7 @@ def reduced_gradient(
     """
     J, h = problem.J, problem.h
     s, m = J.shape
-    weighted = numbers.shape[0] > C
+    weighted, damped = numbers.shape[0] > C, options[DAMPED] == 1
     if weighted:
         weighted_J, weighted_h = scratch((s, m)), scratch(m)
         scale_columns(J, h, view(numbers, C, (m,)), weighted_J, weighted_h)
@@ -55,12 +59,19 @@ def reduced_gradient(
     unit = 1.0
     if options[NORMALISED] == 1:
         unit = volume(J, problem.row_scales, numbers[TOLERANCE])
-        if unit == 0.0:
+        if unit == 0.0 and not damped:
             answer.status[()] = SINGULAR_J
             return
     determinant, regular = partitioned(problem, J, unit, numbers, options, state, columns, M)
-    answer.measure[()] = abs(determinant) / unit
+    answer.measure[()] = abs(determinant) / unit if unit > 0.0 else 0.0
     state[SIGN] = int(determinant > 0.0) - int(determinant < 0.0)
+    share = damped_share(problem, regular) if damped else 0.0
+    if share == 1.0:
+        state[SIGN] = 0
+        for i in range(s):
+            columns[i] = NONE
+        damp_alone(problem, numbers, weighted, answer)
+        return
     if regular <= numbers[TOLERANCE]:
         lost = volume(J, problem.row_scales, numbers[TOLERANCE]) == 0.0
         answer.status[()] = SINGULAR_J if lost else SINGULAR_JA
@@ -84,9 +95,11 @@ def reduced_gradient(
         for j in range(m):
             u[j] *= numbers[C + j]
     certify(problem, answer)
+    if share > 0.0:
+        blend(problem, numbers, weighted, share, answer)
     if not within(problem, u):
         T = scratch((m, m))
-        reduced_metric(M, columns, T)
+        reduced_metric(M, columns, 1.0 - share, T)
         if weighted:
             for i in range(m):
                 for j in range(m):
@@ -95,8 +108,61 @@ def reduced_gradient(
 
 
 @compiled
-def reduced_metric(M: Array, columns: Integers, T: Array) -> None:
-    """u = T [ua'; ub] with ua = ua' - Ja⁻¹ Jb ub: limits keep the free inputs near, and the partition."""
+def damped_share(problem: ProblemArrays, regular: float) -> float:
+    """How much of the answer is the damped one: none of it for a Ja as regular as ε, all for half of that."""
+    _, threshold = resolved(problem.rate, problem.row_scales, problem.dt[()], LARGEST, BELOW)
+    return min(max(2.0 * (1.0 - regular / threshold), 0.0), 1.0)
+
+
+@compiled
+def damp_alone(problem: ProblemArrays, numbers: Array, weighted: bool, answer: AnswerArrays) -> None:
+    """The answer of damped least squares with its own λ and ε, in the metric of the weights."""
+    m = problem.J.shape[1]
+    W = scratch((m, m))
+    metric(numbers, weighted, W)
+    damp(problem, numbers[ALPHA], DIRECTIONS, LARGEST, BELOW, W, answer)
+    if not within(problem, answer.u):
+        limit(problem, W, answer)
+
+
+@compiled
+def blend(problem: ProblemArrays, numbers: Array, weighted: bool, share: float, answer: AnswerArrays) -> None:
+    """(1 - share) of the reduced gradient's u, and as much as share of the damped one."""
+    m = problem.J.shape[1]
+    reduced, W = scratch(m), scratch((m, m))
+    metric(numbers, weighted, W)
+    for j in range(m):
+        reduced[j] = answer.u[j]
+    measure = answer.measure[()]
+    damp(problem, numbers[ALPHA], DIRECTIONS, LARGEST, BELOW, W, answer)
+    answer.measure[()] = measure
+    for j in range(m):
+        answer.u[j] = (1.0 - share) * reduced[j] + share * answer.u[j]
+    relaxed, scale = answer.status[()] == RELAXED, answer.scale[0]
+    certify(problem, answer)
+    if relaxed and answer.status[()] == INEXACT:
+        answer.status[()] = RELAXED
+        scale = 1.0 - share * (1.0 - scale)
+    else:
+        scale = 1.0
+    for level in range(answer.scale.shape[0]):
+        answer.scale[level] = scale
+
+
+@compiled
+def metric(numbers: Array, weighted: bool, W: Array) -> None:
+    """diag(c), c = 1 without weights."""
+    clear(W)
+    for j in range(W.shape[0]):
+        W[j, j] = numbers[C + j] if weighted else 1.0
+
+
+@compiled
+def reduced_metric(M: Array, columns: Integers, share: float, T: Array) -> None:
+    """u = T [ua'; ub] with ua = ua' - Ja⁻¹ Jb ub: limits keep the free inputs near, and the partition.
+
+    With a share of the coupling alone, between this metric and the inputs' own.
+    """
     s, m = columns.shape[0], T.shape[0]
     clear(T)
     free = s
@@ -109,7 +175,7 @@ def reduced_metric(M: Array, columns: Integers, T: Array) -> None:
         if not basic:
             T[j, free] = 1.0
             for i in range(s):
-                T[columns[i], free] = -M[i, s + j]
+                T[columns[i], free] = -share * M[i, s + j]
             free += 1
 
 
@@ -126,14 +192,15 @@ def partitioned(
 ) -> tuple[float, float]:
     """`solve_partition` with the partition kept, or with another where it fell below Θ and may change."""
     candidates = options[CANDIDATES:]
-    if columns[0] < 0:
+    damped = options[DAMPED] == 1
+    if columns[0] == NONE:
         choose_partition(J, candidates, columns)
     determinant, regular = solve_partition(J, problem.rate, problem.row_scales, columns, M)
     if abs(determinant) < numbers[THRESHOLD] * unit:
         if state[MODE] == FREE:
             choose_partition(J, candidates, columns)
             determinant, regular = solve_partition(J, problem.rate, problem.row_scales, columns, M)
-        else:
+        elif not damped or damped_share(problem, regular) < 1.0:
             state[MODE] = OVERDUE
     return determinant, regular
 
@@ -173,6 +240,8 @@ class ReducedGradient(Resolver):
         ("platform", "arm"), 1 for the rest. The counterpart of the weighted pseudoinverse: the method
         in the inputs sqrt(w) u. A heavy input is less often among those that do the task (its column
         counts for less in |det Ja|, weighted from here on), and descends H more slowly (α / w)
+    singular : what happens where no candidate is well conditioned: "stop", the run ends there; "damped", the
+        answer goes over, step by step, to that of damped least squares with its usual numbers, and back
     """
 
     name: ClassVar[str] = "rg"
@@ -184,6 +253,7 @@ class ReducedGradient(Resolver):
         threshold: float | None = None,
         tolerance: float = 1e-10,
         weights: Weights | None = None,
+        singular: Literal["stop", "damped"] = "stop",
     ) -> None:
         self.alpha = positive(alpha, "alpha")
         self.weights = weights
@@ -201,6 +271,8 @@ class ReducedGradient(Resolver):
         if self.automatic and self.threshold >= 1.0:
             raise InputError(f"threshold: expected below 1 with automatic partitions, got {self.threshold:g}")
         self.tolerance = positive(tolerance, "tolerance")
+        expect_known("singular", singular, ("stop", "damped"))
+        self.singular = singular
 
     @property
     def kernel(self) -> Kernel:
@@ -210,8 +282,9 @@ class ReducedGradient(Resolver):
         self.check(dimensions)
         candidates = candidate_columns(self.partitions, dimensions)
         c = np.zeros(0) if self.weights is None else weight_diagonal(self.weights, dimensions) ** -0.5
+        options = [self.automatic, self.singular == "damped", *candidates]
         numbers = np.array([self.alpha, self.threshold, self.tolerance, *c])
-        return Setup(numbers, np.array([int(self.automatic), *candidates], dtype=np.int64))
+        return Setup(numbers, np.array(options, dtype=np.int64))
 
     def start(self, dimensions: Dimensions) -> PartitionState:
         return PartitionState(dimensions.s, self.automatic)

@@ -124,7 +124,7 @@ def _record(
 ) -> tuple[Recorder, Ended]:
     """Integrate over the times (N,) from q, and say how that ended."""
     recorder = Recorder(controller, times)
-    if controller.limits is not None and len(times) > 1:
+    if len(times) > 1 and not advance.tolerance:  # adaptive steps are shorter than the samples
         controller.dt = float(times[1] - times[0])
     recorder.warnings += slip_warnings(controller.robot)
     idle = idle_inputs(controller, q)

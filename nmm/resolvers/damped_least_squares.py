@@ -1,0 +1,126 @@
+"""Damped least squares: the projected gradient, bounded where J loses rank."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal, get_args
+
+import numpy as np
+
+from nmm.arrays import Array, Integers, positive
+from nmm.errors import expect_known
+from nmm.kernels.compiled import Kernel, compiled, kernel, scratch, view
+from nmm.kernels.damping import BELOW, LARGEST, damped_solution, damping_squared, resolved
+from nmm.resolvers.answer import INEXACT, RELAXED, AnswerArrays, certify
+from nmm.resolvers.base import RESOLVER, Resolver, Setup
+from nmm.resolvers.limited import limit, within
+from nmm.resolvers.problem import Dimensions, ProblemArrays
+from nmm.resolvers.projected_gradient import unweigh, weigh
+from nmm.resolvers.weights import Weights, weight_matrix
+
+#: Numbers: α, λ, ε and, with weights, C row after row. Options: which law, in the order of `Damping`.
+ALPHA, DAMPING, THRESHOLD, C = 0, 1, 2, 3
+LAW = 0
+
+Damping = Literal["constant", "variable", "directions"]
+
+
+@kernel(RESOLVER)
+def damped_least_squares(
+    problem: ProblemArrays, numbers: Array, options: Integers, state: Integers, answer: AnswerArrays
+) -> None:
+    """`damped_solution`, with weights in the coordinates in which limits keep u near to it, too."""
+    m = problem.J.shape[1]
+    plain = numbers.shape[0] == C
+    W = view(numbers, 0 if plain else C, (0, 0) if plain else (m, m))
+    damp(problem, numbers[ALPHA], options[LAW], numbers[DAMPING], numbers[THRESHOLD], W, answer)
+    if not within(problem, answer.u):
+        limit(problem, W, answer)
+
+
+@compiled
+def damp(
+    problem: ProblemArrays,
+    alpha: float,
+    law: int,
+    damping: float,
+    threshold: float,
+    W: Array,
+    answer: AnswerArrays,
+) -> None:
+    """u, measure, residual, status and scale; W holds C (m, m), or (0, 0) where every weight is 1."""
+    s, m = problem.J.shape
+    plain = W.shape[0] == 0
+    J, u0, solution = scratch((s, m)), scratch(m), scratch(m)
+    if plain:
+        for j in range(m):
+            u0[j] = -alpha * problem.h[j]
+            for i in range(s):
+                J[i, j] = problem.J[i, j]
+    else:
+        weigh(problem, alpha, W, J, u0)
+    damping, threshold = resolved(problem.rate, problem.row_scales, problem.dt[()], damping, threshold)
+    share, least = damped_solution(J, problem.row_scales, problem.rate, u0, law, damping, threshold, solution)
+    if plain:
+        for j in range(m):
+            answer.u[j] = solution[j]
+    else:
+        unweigh(W, solution, answer.u)
+    answer.measure[()] = least
+    certify(problem, answer)
+    if answer.status[()] == INEXACT and damping_squared(law, least, damping, threshold) > 0.0:
+        answer.status[()] = RELAXED
+        for level in range(answer.scale.shape[0]):
+            answer.scale[level] = share
+
+
+class DampedLeastSquares(Resolver):
+    """The least of ‖J u - rate‖² + λ² ‖u - u0‖² with u0 = -α h: the projected gradient where λ = 0.
+
+    Rows are taken in their natural scales, weights as the projected gradient takes them. Singular
+    configurations stop no run: there the inputs stay bounded, and the task gets the share of its rate
+    that the answer's scale says. Where J is damped it feels the objective, too: the null space is damped
+    with it, so that u is continuous where the rank changes.
+
+    Parameters
+    ----------
+    alpha : step size α > 0, 1/s times the unit of H's curvature
+    law : how λ depends on the singular values σ of J, rows in their natural scales: "directions", each
+        direction by its own σ, λ_i² = λ² (1 - (σ_i / ε)²) below ε and none from there on (Maciejewski
+        and Klein 1988, Chiaverini 1997); "variable", all directions by the least σ (Nakamura and
+        Hanafusa 1986, with σ_min for the manipulability); "constant", all by λ everywhere (Wampler 1986)
+    damping : the largest λ > 0
+    threshold : ε > 0; where all σ are as large, nothing is damped and the answer is the projected
+        gradient's; "constant" does not look at it
+    weights : None; m positive numbers; a mapping from names of inputs or of their groups ("platform",
+        "arm"), 1 for the rest: a large weight spares the input; or a symmetric positive definite
+        (m, m) matrix
+    """
+
+    name: ClassVar[str] = "dls"
+
+    def __init__(
+        self,
+        alpha: float = 10.0,
+        law: Damping = "directions",
+        damping: float = LARGEST,
+        threshold: float = BELOW,
+        weights: Weights | None = None,
+    ) -> None:
+        self.alpha = positive(alpha, "alpha")
+        expect_known("law", law, get_args(Damping))
+        self.law = law
+        self.damping = positive(damping, "damping")
+        self.threshold = positive(threshold, "threshold")
+        self.weights = weights
+
+    @property
+    def kernel(self) -> Kernel:
+        return damped_least_squares
+
+    def setup(self, dimensions: Dimensions) -> Setup:
+        self.check(dimensions)
+        C = np.zeros(0)
+        if self.weights is not None:
+            C = np.linalg.inv(np.linalg.cholesky(weight_matrix(self.weights, dimensions))).T
+        numbers = np.array([self.alpha, self.damping, self.threshold, *C.ravel()])
+        return Setup(numbers, np.array([get_args(Damping).index(self.law)], dtype=np.int64))
