@@ -196,7 +196,7 @@ each_list = pytest.mark.parametrize(("listed", "parts"), REGISTERED, ids=lambda 
 @each_list
 def test_every_kind_can_be_asked_for(listed: kinds.Kinds, parts: dict[str, type[MadePart]]) -> None:
     """What a constructor takes, a file can say, and with the same default; what else it says is listed."""
-    beside = {"kind", "reference", "gain", "weight", "maximise", "added_task"}
+    beside = {"kind", "reference", "gain", "weight", "maximise", "added_task", "priority", "speed", "braking"}
     own = {"quadratic": {"terms"}, "polynomial": {"times", "points"}}
     assert set(listed) <= set(parts)
     for name, made in listed.items():

@@ -243,8 +243,9 @@ def _relaxed(scale: Array, *, limited: bool) -> str:
     least = float(scale.min(initial=1.0))
     if least >= 1.0:
         return ""
-    who = "the limits leave" if limited else "its resolver scales the rate on purpose, down to"
-    return f"{who} {least:.3g} of it"
+    if limited:
+        return f"under its limits λ falls to {least:.3g}"
+    return f"its resolver scales the rate on purpose, down to {least:.3g} of it"
 
 
 def _hopeless(seen: list[str]) -> bool:
