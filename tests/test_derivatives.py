@@ -25,9 +25,11 @@ from nmm.control.controller import Controller
 from nmm.functions.function import Function
 from nmm.functions.objectives import Manipulability, Objective, Quadratic, Square, Sum
 from nmm.functions.program import Program, evaluate
+from nmm.functions.pursuit import Pursuit
 from nmm.functions.references import CallableReference, Circle
 from nmm.functions.tasks import Coordinates, Position, Task
 from nmm.functions.tasks.comparison import Comparison
+from nmm.functions.tasks.frame_pose import PartsOfPose
 from nmm.kinds import OBJECTIVES, REFERENCES, TASKS
 from nmm.resolvers import ProjectedGradient
 from nmm.robots.configuration import Configuration
@@ -44,8 +46,9 @@ def test_value_t_and_value_q(entry: Entry, robots: dict[str, Robot], rng: np.ran
 
 def test_the_grid_holds_every_function() -> None:
     # A comparison is no function on its own: the closed loops below are its test. A target that is reached
-    # wherever the robot is stands still by definition: test_analysis_subjects.py.
-    apart = {Comparison, Reached}
+    # wherever the robot is stands still by definition: test_analysis_subjects.py. What parts of a pose share
+    # is a base, and the pursuit's angles are values alone: its spring's gradient is in test_steering.py.
+    apart = {Comparison, Reached, PartsOfPose, Pursuit}
     examples = {type(entry.function) for entry in ENTRIES}
     for listed in (TASKS, REFERENCES, OBJECTIVES):
         without = [name for name, kind in listed.items() if kind not in examples]

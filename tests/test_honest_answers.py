@@ -62,12 +62,14 @@ def controllers(name: str | tuple[str, str], frame: str) -> Iterator[nmm.Control
         added = (
             nmm.Task(nmm.Posture(*robot.q_names[robot.n - (m - s) :]), np.full(m - s, 0.2)) if m > s else None
         )
-        yield nmm.Controller(robot, stack, nmm.ProjectedGradient())
-        yield nmm.Controller(robot, stack, nmm.ProjectedGradient(weights={arm[0]: 30.0}))
-        yield nmm.Controller(robot, stack, nmm.ReducedGradient())
-        yield nmm.Controller(robot, stack, nmm.ReducedGradient(partitions=[robot.u_names[m - s :]]))
+        yield nmm.Controller(robot, stack, nmm.ProjectedGradient(), steering=False)
+        yield nmm.Controller(robot, stack, nmm.ProjectedGradient(weights={arm[0]: 30.0}), steering=False)
+        yield nmm.Controller(robot, stack, nmm.ReducedGradient(), steering=False)
+        yield nmm.Controller(
+            robot, stack, nmm.ReducedGradient(partitions=[robot.u_names[m - s :]]), steering=False
+        )
         if m - s <= len(arm):
-            yield nmm.Controller(robot, stack, nmm.ExtendedJacobian(), added_task=added)
+            yield nmm.Controller(robot, stack, nmm.ExtendedJacobian(), added_task=added, steering=False)
 
 
 def configurations(robot: nmm.Robot, rng: np.random.Generator, count: int) -> Iterator[Array]:
