@@ -143,7 +143,7 @@ RESOLVERS: dict[str, Callable[[], nmm.Resolver]] = {
 
 @pytest.mark.parametrize("kind", RESOLVERS)
 def test_each_resolver_finds_its_own_optimum(kind: str) -> None:
-    """Against a quadratic program at the same λ; that no larger λ will do, against another one."""
+    """Against a quadratic program at the same λ; λ itself is the business of test_limits_kernel.py."""
     limits = nmm.Limits({"platform": [-0.4, 0.7], "arm": 0.8}, acceleration=4.0, wheels=20.0)
     added = nmm.Task(nmm.Coordinates("q1", "q2", "q3"), nmm.Constant([0.2, 0.9, -0.6]))
     more = {"added_task": added} if kind == "ej" else {}
