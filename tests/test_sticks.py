@@ -11,6 +11,7 @@ import pinocchio as pin
 import pytest
 from playback_browser import Window, drawn_visuals, file_url
 from playback_browser import browser as browser
+from playback_browser import empty_page as empty_page
 from playback_browser import window as window
 from playback_robot import drive
 from urdf_parts import AXIS, joint, link, robot, shape, write
