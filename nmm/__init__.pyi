@@ -1,10 +1,10 @@
 from .control.controller import Controller as Controller
-from .control.controller import Step as Step
 from .control.goal import Goal as Goal
 from .control.limited_function import Bound as Bound
 from .control.limits import Limits as Limits
 from .control.retreat import Retreat as Retreat
 from .control.steering import Steering as Steering
+from .control.step import Step as Step
 from .errors import DivergedError as DivergedError
 from .errors import InputError as InputError
 from .errors import NmmError as NmmError

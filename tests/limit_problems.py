@@ -160,7 +160,7 @@ def main(count: int) -> None:
             violation(example, found.u),
             missed,
         )
-        worst[example.kind] = tuple(map(max, worst[example.kind], new))  # type: ignore[assignment]
+        worst[example.kind] = tuple(map(max, worst[example.kind], new))  # type: ignore[assignment]  # as many as before
     for kind in KINDS:
         counts = {ended: number for (of, ended), number in sorted(kinds.items()) if of == kind}
         print(kind, counts, "λ {:.1e}, u {:.1e}, limits {:.1e}, task {:.1e}".format(*worst[kind]))

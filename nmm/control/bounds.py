@@ -57,10 +57,12 @@ class LimitNumbers(NamedTuple):
 @compiled
 def approach(room: float, dt: float, acceleration: float, recovery: float) -> float:
     """The largest speed towards a limit that is `room` ahead; negative where it is behind."""
+    if math.isinf(room):  # no limit, and perhaps no dt either
+        return room
     D = room / dt
     if D < 0.0:
         return max(D, -recovery)
-    if math.isinf(D) or math.isinf(acceleration):
+    if math.isinf(acceleration):
         return D
     a = acceleration * dt
     if a <= 0.0:

@@ -5,26 +5,26 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, Integers, positive
+from nmm.arrays import Array, positive
 from nmm.control.bounds import OFF, STAGE
 from nmm.control.contradiction import contradicting
-from nmm.control.equations import PLAIN, STEP, WRAPPED, Arm, ControlStep, TaskRows, drive, finish, hold_back
+from nmm.control.equations import STEP, Arm, ControlStep, drive, finish, hold_back
 from nmm.control.equations import step as compiled_step
 from nmm.control.idle_inputs import idle_inputs, inputs_without_effect
 from nmm.control.limits import Limits
 from nmm.control.lost_directions import in_world_axes, lost_directions
 from nmm.control.retreat import Retreat
 from nmm.control.steering import NOTHING, Steered, Steering
+from nmm.control.step import Step
+from nmm.control.task_rows import task_functions, task_rows
 from nmm.errors import InputError, SingularError
 from nmm.functions.function import Row, row_scales
 from nmm.functions.objectives.base import Objective
 from nmm.functions.program import BESIDE, Program
-from nmm.functions.tasks.comparison import Comparison
 from nmm.functions.tasks.task import Stack, Task
 from nmm.kernels.compiled import checked_by_caller
 from nmm.kernels.memory import views
@@ -37,35 +37,6 @@ from nmm.robots.robot import Robot
 
 FLOAT64 = np.dtype(np.float64)
 _FAILED = float(Status.SINGULAR_J)
-
-
-@dataclass(frozen=True, eq=False)
-class Step:
-    """Everything that a controller found at (t, q): copies, in the units of the task's rows.
-
-    r, r_d, error, rate (s,), J (s, m) of J_bar u = rate; objective H and gradient h (m,);
-    u (m,), q_dot = S u (n,); status, scale (levels,), residual ‖J u - rate‖, measure, excess: see `Answer`;
-    partition (s,) the columns of Ja, -1 where there is none; retreats so far.
-    """
-
-    t: float
-    q: Array
-    r: Array
-    r_d: Array
-    error: Array
-    rate: Array
-    J: Array
-    objective: float
-    h: Array
-    u: Array
-    q_dot: Array
-    status: Status
-    scale: Array
-    residual: float
-    measure: float
-    partition: Integers
-    excess: float = 0.0
-    retreats: int = 0
 
 
 class Controller:
@@ -132,21 +103,15 @@ class Controller:
         self.rows: tuple[Row, ...] = self.task.rows(robot)
         added_rows = self.added_task.rows(robot)
 
-        every = (*self.task, *self.added_task)
         weighted = () if objective is None else objective.terms_on(robot)
-        functions = [f for task in every for f in (task.function, task.reference, Comparison(task))]
+        functions, added = task_functions(self.task), task_functions(self.added_task)
         kept = (Limits(False, False) if limits is None else limits).on(robot)
         objectives = [function for _, function in weighted]
         pursued = [] if steered is None else [steered.pursuit]
-        program = Program(robot, [*functions, *objectives, *kept.functions, *pursued])
+        program = Program(robot, [*functions, *added, *objectives, *kept.functions, *pursued])
         first = program.first_rows
-        after = 3 * len(every) + len(objectives)
-        listed = [
-            (first[3 * i] + j, first[3 * i + 1] + j, _error_row(task, first[3 * i + 2], j, row))
-            for i, task in enumerate(every)
-            for j, row in enumerate(task.rows(robot))
-        ]
-        table = np.array(listed, dtype=np.int64).reshape(-1, 3)
+        tasks = len(functions) + len(added)
+        after = tasks + len(objectives)
         s, m = len(self.rows), robot.n_u
         # The extended Jacobian is square with a row for each input that pursuit steers.
         held = np.zeros((0, m))
@@ -174,10 +139,10 @@ class Controller:
         self.state: State = resolver.start(dimensions)
         program.lay_out(
             ControlStep(
-                task=_task_rows(self.task, robot, table[:s]),
-                added=_task_rows(self.added_task, robot, table[s:]),
+                task=task_rows(self.task, robot, first),
+                added=task_rows(self.added_task, robot, first[len(functions) :]),
                 arm=Arm(robot.arm_coordinates, robot.following.table.ravel()),
-                terms=np.array(first[3 * len(every) : after], dtype=np.int64),
+                terms=np.array(first[tasks:after], dtype=np.int64),
                 weights=np.array([weight for weight, _ in weighted]),
                 H=np.array(0.0),
                 problem=problem.arrays,
@@ -421,25 +386,3 @@ class Controller:
 def _expect(given: object, kind: type, name: str) -> None:
     if not isinstance(given, kind):
         raise InputError(f"controller: expected a {kind.__name__} as {name}, got {given!r}")
-
-
-def _error_row(task: Task, computed: int, component: int, row: Row) -> int:
-    if task.function.comparison is not None:
-        return computed + component
-    return WRAPPED if row.angular else PLAIN
-
-
-def _task_rows(stack: Stack, robot: Robot, table: Integers) -> TaskRows:
-    """A stack with its block-diagonal gain, and room for what a step finds."""
-    s = len(table)
-    K = np.zeros((s, s))
-    first = 0
-    for task in stack:
-        block = task.gain_matrix(robot)
-        K[first : first + len(block), first : first + len(block)] = block
-        first += len(block)
-    rows = [(k, row.unit) for k, task in enumerate(stack) for row in task.rows(robot)]
-    group = np.array([rows.index(row) for row in rows], dtype=np.int64)
-    parts = [np.array(task.approach(robot)) for task in stack]
-    speed, braking = np.hstack([np.zeros((2, 0)), *parts])
-    return TaskRows(table, K, speed, braking, group, *np.zeros((4, s)))

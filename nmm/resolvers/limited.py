@@ -23,7 +23,7 @@ from nmm.resolvers.answer import (
     SINGULAR_J,
     SOLVED,
     AnswerArrays,
-    certified,
+    certify,
 )
 from nmm.resolvers.problem import ProblemArrays
 
@@ -226,18 +226,16 @@ def into_metric(T: Array, difference: Array, y: Array) -> None:
 @compiled
 def judge(problem: ProblemArrays, wanted: Array, answer: AnswerArrays) -> None:
     """Residual against the rate, and whether J u is what λ says."""
-    residual, rounding = residual_norm(problem.J, answer.u, problem.rate)
-    answer.residual[()] = residual
-    asked = 0.0
-    for i in range(problem.rate.shape[0]):
-        asked += problem.rate[i] * problem.rate[i]
-    asked = math.sqrt(asked)
-    if answer.status[()] == RELAXED:
+    before = float(answer.status[()])
+    certify(problem, answer)
+    if before == RELAXED:
         astray, _ = residual_norm(problem.J, answer.u, wanted)
-        if astray > EXACT * (1.0 + asked):
-            answer.status[()] = INEXACT
-    elif answer.status[()] == SOLVED:
-        answer.status[()] = certified(residual, rounding, asked)
+        asked = 0.0
+        for i in range(problem.rate.shape[0]):
+            asked += problem.rate[i] * problem.rate[i]
+        before = INEXACT if astray > EXACT * (1.0 + math.sqrt(asked)) else RELAXED
+    if before != SOLVED:
+        answer.status[()] = before
 
 
 @compiled

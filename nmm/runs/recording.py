@@ -6,8 +6,9 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from nmm.arrays import Array
-from nmm.control.controller import Controller, Step
+from nmm.control.controller import Controller
 from nmm.control.limits import Limits
+from nmm.control.step import Step
 from nmm.errors import InputError
 from nmm.functions.function import Function, Shown
 from nmm.functions.program import Program

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, positive
-from nmm.control.controller import Controller, Step
+from nmm.control.controller import Controller
 from nmm.control.goal import Goal
 from nmm.control.idle_inputs import idle_inputs
+from nmm.control.step import Step
 from nmm.errors import DivergedError, InputError, RunError, SingularError
 from nmm.robots.slip import slip_warnings
 from nmm.runs.integrators import Integrator, integrator

@@ -21,7 +21,8 @@ from nmm.analysis.singular.jacobians import Jacobians, Subject, checked
 from nmm.analysis.singular.reached import Reached
 from nmm.analysis.singular.singularity import TOLERANCE
 from nmm.arrays import Array, positive
-from nmm.control.controller import Controller, Step
+from nmm.control.controller import Controller
+from nmm.control.step import Step
 from nmm.errors import InputError, SingularError
 from nmm.functions.program import evaluate
 from nmm.functions.references.polynomial import Constant

@@ -1,0 +1,37 @@
+"""What a controller found in one call."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from nmm.arrays import Array, Integers
+from nmm.resolvers.answer import Status
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """Everything that a controller found at (t, q): copies, in the units of the task's rows.
+
+    r, r_d, error, rate (s,), J (s, m) of J_bar u = rate; objective H and gradient h (m,);
+    u (m,), q_dot = S u (n,); status, scale (levels,), residual ‖J u - rate‖, measure, excess: see `Answer`;
+    partition (s,) the columns of Ja, -1 where there is none; retreats so far.
+    """
+
+    t: float
+    q: Array
+    r: Array
+    r_d: Array
+    error: Array
+    rate: Array
+    J: Array
+    objective: float
+    h: Array
+    u: Array
+    q_dot: Array
+    status: Status
+    scale: Array
+    residual: float
+    measure: float
+    partition: Integers
+    excess: float = 0.0
+    retreats: int = 0

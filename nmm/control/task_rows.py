@@ -1,0 +1,49 @@
+"""Tasks as a control step reads them: where their rows are in a program, gains, bounds of the approach."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from nmm.control.equations import PLAIN, WRAPPED, TaskRows
+from nmm.functions.function import Function, Row
+from nmm.functions.tasks.comparison import Comparison
+from nmm.functions.tasks.task import Stack, Task
+from nmm.robots.robot import Robot
+
+
+def task_functions(stack: Stack) -> list[Function]:
+    """What a program evaluates for these tasks: f, g and e of each."""
+    return [function for task in stack for function in (task.function, task.reference, Comparison(task))]
+
+
+def task_rows(stack: Stack, robot: Robot, first: Sequence[int]) -> TaskRows:
+    """A stack with its block-diagonal gain, and room for what a step finds.
+
+    first : where the rows of its `task_functions` begin in the program
+    """
+    listed = [
+        (first[3 * i] + j, first[3 * i + 1] + j, _error_row(task, first[3 * i + 2], j, row))
+        for i, task in enumerate(stack)
+        for j, row in enumerate(task.rows(robot))
+    ]
+    table = np.array(listed, dtype=np.int64).reshape(-1, 3)
+    s = len(table)
+    K = np.zeros((s, s))
+    done = 0
+    for task in stack:
+        block = task.gain_matrix(robot)
+        K[done : done + len(block), done : done + len(block)] = block
+        done += len(block)
+    rows = [(k, row.unit) for k, task in enumerate(stack) for row in task.rows(robot)]
+    group = np.array([rows.index(row) for row in rows], dtype=np.int64)
+    parts = [np.array(task.approach(robot)) for task in stack]
+    speed, braking = np.hstack([np.zeros((2, 0)), *parts])
+    return TaskRows(table, K, speed, braking, group, *np.zeros((4, s)))
+
+
+def _error_row(task: Task, computed: int, component: int, row: Row) -> int:
+    if task.function.comparison is not None:
+        return computed + component
+    return WRAPPED if row.angular else PLAIN
