@@ -164,7 +164,9 @@ def test_each_resolver_finds_its_own_optimum(kind: str) -> None:
         lower, upper = (np.append(problem.u_lower, problem.lower), np.append(problem.u_upper, problem.upper))
         # u_ref: the limits' point nearest to rest
         rest = optimum(np.eye(5), np.zeros(5), np.zeros((0, 5)), np.zeros(0), A, lower, upper)
-        asked = step.J @ rest + step.scale[0] * step.J @ (unlimited - rest)
+        way = step.J @ (unlimited - rest)
+        scale = min(1.0, way @ step.J @ (u - rest) / (way @ way))
+        asked = step.J @ rest + scale * way
         B = metric(kind, step, kept)
         np.testing.assert_allclose(step.J @ u, asked, rtol=0, atol=1e-8)
         expected = optimum(B, unlimited, step.J, asked, A, lower, upper)
@@ -224,3 +226,40 @@ def test_limits_too_large_to_mean_anything_are_none() -> None:
         kept = nmm.Limits({"v": np.inf}, {"q1": [-large, large]}).on(ROBOT)
         assert np.all(np.isinf(kept.coordinates[3]))
         assert np.all(np.isinf(kept.inputs[0]))
+
+
+def test_a_run_starts_outside_the_robots_own_limits_where_they_are_kept() -> None:
+    scenario = nmm.Scenario.load("tiago_pose")
+    robot = scenario.robot()
+    name = "arm_2_joint"
+    j = robot.coordinate(name)
+    q0 = robot.q(scenario.parts.q0)
+    q0[j] = robot.q_limits[j, 1] + 0.05
+    kept = nmm.Controller(
+        robot, scenario.controller().task, nmm.ProjectedGradient(alpha=1.0), limits=nmm.Limits()
+    )
+    run = nmm.simulate(kept, q0, 2.0, 0.01)
+    outside = run.q[:, j] - robot.q_limits[j, 1]
+    assert np.all(np.diff(outside[outside > 0.0]) < 0.0)
+    assert outside[60] <= 1e-12  # 0.05 rad at 0.1 rad/s
+    assert any("the start is outside limits" in warning and name in warning for warning in run.warnings)
+    free = nmm.Controller(robot, kept.task, nmm.ProjectedGradient(alpha=1.0))
+    with pytest.raises(nmm.InputError, match=name):
+        nmm.simulate(free, q0, 2.0, 0.01)
+    velocities = nmm.Controller(robot, kept.task, kept.resolver, limits=nmm.Limits(position=False))
+    with pytest.raises(nmm.InputError, match=name):
+        nmm.simulate(velocities, q0, 2.0, 0.01)
+
+
+def test_the_recorded_scale_is_the_share_of_the_rate_also_where_rest_is_not_allowed() -> None:
+    """At full speed under acceleration limits λ counts from inputs that do most of the task."""
+    kept = towards((6.0, 0.5), nmm.Limits({"platform": 0.6, "arm": 0.8}, acceleration=2.0))
+    q, shares = START.copy(), []
+    for k in range(300):
+        u = kept(k * DT, q)
+        step = kept.last(k * DT, q)
+        missed = np.linalg.norm(step.J @ u - step.rate) / np.linalg.norm(step.rate)
+        assert step.scale[0] == pytest.approx(max(0.0, 1.0 - missed) if missed > 1e-9 else 1.0, abs=1e-9)
+        shares.append(step.scale[0])
+        q = q + DT * step.q_dot
+    assert 0.0 < min(shares[100:]) < 1.0

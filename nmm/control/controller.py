@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array, positive
 from nmm.control.bounds import OFF, STAGE
 from nmm.control.contradiction import contradicting
-from nmm.control.equations import STEP, Arm, ControlStep, drive, finish, hold_back
+from nmm.control.equations import STEP, Arm, ControlStep, drive, finish, told
 from nmm.control.equations import step as compiled_step
 from nmm.control.idle_inputs import idle_inputs, inputs_without_effect
 from nmm.control.limits import Limits
@@ -224,7 +224,7 @@ class Controller:
         ):
             found, G = self._step, self._program.buffers.G
             instead(found.problem, self.backing.inputs(q, G), found.answer)
-            hold_back(found.task, found.problem, found.answer)
+            told(found.task, found.problem, found.answer)
             drive(found.answer.u, G, found.arm, found.q_dot)
             self.before[:] = self._u
         elif status >= _FAILED:

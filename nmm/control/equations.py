@@ -28,7 +28,7 @@ from nmm.kernels.linear_algebra import residual_norm
 from nmm.kernels.memory import Cell, IntegerMatrix, IntegerVector, Matrix, Vector, views
 from nmm.resolvers.answer import NOT_FINITE, RELAXED, SOLVED, AnswerArrays
 from nmm.resolvers.base import call_resolver
-from nmm.resolvers.limited import keep_limits
+from nmm.resolvers.limited import keep_limits, times
 from nmm.resolvers.problem import ProblemArrays
 
 
@@ -184,20 +184,27 @@ def write_equation(task: TaskRows, b: Buffers, C: Arm, J: Array, rate: Array) ->
 
 
 @compiled
-def hold_back(task: TaskRows, problem: ProblemArrays, answer: AnswerArrays) -> None:
-    """Where feedback was bounded: the residual against all of it, and that it was on purpose."""
+def told(task: TaskRows, problem: ProblemArrays, answer: AnswerArrays) -> None:
+    """The scale of each level as its share of the rate: 1 - ‖rate - J u‖ / ‖rate‖, rows in their scales.
+
+    That is λ where rest is allowed. Where it is not, λ counts from inputs that may do most of the task. The
+    rate is all of it: where feedback was bounded, that was on purpose.
+    """
     first = 0
     bounded = False
     for level in range(problem.ends.shape[0]):
         asked = 0.0
-        given = 0.0
+        missed = 0.0
+        less = False
         for i in range(first, problem.ends[level]):
-            asked += task.full[i] * task.full[i]
-            given += task.full[i] * problem.rate[i]
-            bounded = bounded or task.full[i] != problem.rate[i]
+            weight = 1.0 / problem.row_scales[i]
+            asked += (weight * task.full[i]) ** 2
+            missed += (weight * (task.full[i] - times(problem.J, i, answer.u))) ** 2
+            less = less or task.full[i] != problem.rate[i]
         first = problem.ends[level]
-        if given < asked:
-            answer.scale[level] *= max(given, 0.0) / asked
+        bounded = bounded or less
+        if less or answer.scale[level] < 1.0:
+            answer.scale[level] = max(0.0, 1.0 - math.sqrt(missed / asked)) if asked > 0.0 else 0.0
     if bounded:
         answer.residual[()], _ = residual_norm(problem.J, answer.u, task.full)
         if answer.status[()] == SOLVED:
@@ -229,7 +236,7 @@ def finish(q: Array, integers: Integers, floats: Array) -> None:
     b = views(LaidOut, integers, floats, 0).buffers
     e = views(ControlStep, integers, floats, BESIDE)
     keep_limits(e.problem, e.answer)
-    hold_back(e.task, e.problem, e.answer)
+    told(e.task, e.problem, e.answer)
     if e.steering.on[()] == 1:
         steer(e.steering, q, b.value, b.G, e.problem, e.answer.u)
     if e.limits.mode[()] == SAMPLE:

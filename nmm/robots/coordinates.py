@@ -175,18 +175,26 @@ class Coordinates:
         lower, upper = self.q_limits.T
         return self.following.placed(np.clip(np.zeros(self.n), lower, upper))
 
-    def check_limits(self, q: ArrayLike) -> None:
-        """`InputError` names every coordinate of q (n,) that is outside its limits, and what they are, and
-        every follower that is not where its leader has it."""
+    def outside(self, q: ArrayLike, limits: Array | None = None) -> list[str]:
+        """The coordinates of q (n,) that are outside limits (n, 2), the robot's own when not given: name,
+        value, and the limits."""
         q = self.q(q)
+        limits = self.q_limits if limits is None else limits
         following = {one.joint for one in self.followers}  # their leaders' limits are theirs, too
-        outside = [
+        return [
             f"{name} = {value:g} {unit} (from {lower:g} to {upper:g})"
-            for name, value, unit, (lower, upper) in zip(
-                self.q_names, q, self.q_units, self.q_limits, strict=True
-            )
+            for name, value, unit, (lower, upper) in zip(self.q_names, q, self.q_units, limits, strict=True)
             if name not in following and not lower - SLACK <= value <= upper + SLACK
         ]
+
+    def check_limits(self, q: ArrayLike, *, come_back: bool = False) -> None:
+        """`InputError` names every coordinate of q (n,) that is outside its limits, and what they are, and
+        every follower that is not where its leader has it.
+
+        come_back : something brings back what is outside, which then is no complaint
+        """
+        q = self.q(q)
+        outside = [] if come_back else self.outside(q)
         complaints = [f"outside its limits: {', '.join(outside)}"] if outside else []
         complaints += self._strays(q)
         problem = self.platform.problem(q[: self.platform.n_p])

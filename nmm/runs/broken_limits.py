@@ -12,6 +12,17 @@ from nmm.robots.robot import Robot
 SLACK = 1e-6
 
 
+def outside_at_start(robot: Robot, kept: LimitsOn, q: Array) -> list[str]:
+    """A sentence for the coordinates of a start q (n,) that are outside limits, and come back."""
+    outside = robot.outside(q, kept.coordinates)
+    if not outside:
+        return []
+    return [
+        f"the start is outside limits: {', '.join(outside)}; what is outside comes back at "
+        f"{kept.recovery:g} m/s or rad/s"
+    ]
+
+
 def broken_limits(robot: Robot, t: Array, q: Array, u: Array) -> list[str]:
     """A sentence for the coordinates, and one for the inputs, that leave their limits.
 

@@ -15,6 +15,7 @@ from nmm.control.idle_inputs import idle_inputs
 from nmm.control.step import Step
 from nmm.errors import DivergedError, InputError, RunError, SingularError
 from nmm.robots.slip import slip_warnings
+from nmm.runs.broken_limits import outside_at_start
 from nmm.runs.integrators import Integrator, integrator
 from nmm.runs.judgement import Ended, Verdict, judge, reached_or_not
 from nmm.runs.recording import Recorder
@@ -61,12 +62,13 @@ def simulate(
 
     Raises
     ------
-    InputError : wrong q0 (also one outside the robot's limits, or with a joint that is not where the one that
-        it follows has it), duration, dt, method
+    InputError : wrong q0 (also one outside limits that the controller does not keep, or with a joint that is
+        not where the one that it follows has it), duration, dt, method
     """
     robot = controller.robot
     q = robot.q(q0)
-    robot.check_limits(q)
+    come_back = controller.limits is not None and controller.limits.position is not False
+    robot.check_limits(q, come_back=come_back)
     q = robot.following.placed(q)
     duration = positive(duration, "duration")
     dt = positive(dt, "dt")
@@ -128,6 +130,8 @@ def _record(
     if len(times) > 1 and not advance.tolerance:  # adaptive steps are shorter than the samples
         controller.dt = float(times[1] - times[0])
     recorder.warnings += slip_warnings(controller.robot)
+    if controller.limits is not None:
+        recorder.warnings += outside_at_start(controller.robot, controller.kept, q)
     idle = idle_inputs(controller, q)
     if idle:
         recorder.warnings.append(

@@ -79,7 +79,8 @@ class ScenarioPart(Part):
             for name in self.q0 if isinstance(self.q0, dict) else ():
                 with at(name):
                     robot.coordinate(name)
-            robot.check_limits(robot.q(self.q0))
+            come_back = self.limits is not None and self.limits.position is not False
+            robot.check_limits(robot.q(self.q0), come_back=come_back)
         with at("task"):
             task = build_tasks(self.task, robot)
             s = sum(len(item.rows(robot)) for item in task)
