@@ -132,6 +132,7 @@ class Controller:
             added_rate=np.zeros(k),
             added_row_scales=np.append(row_scales(added_rows, robot), np.ones(len(held))),
             limit_rows=np.zeros((len(kept.rows), m)),
+            limit_levels=[self.task.place(priority) for priority in kept.priorities],
         )
         self.kept = kept
         self._dimensions = dimensions = problem.dimensions

@@ -280,7 +280,7 @@ def step(t: float, q: Array, integers: Integers, floats: Array) -> float:
         answer.scale[level] = 1.0
     answer.residual[()] = math.nan
     answer.measure[()] = math.nan
-    answer.excess[()] = 0.0
+    answer.excess[()] = math.nan
     call_resolver(e.resolver, problem, e.numbers, e.options, e.state, answer)
     finish(q, integers, floats)
     return float(answer.status[()])

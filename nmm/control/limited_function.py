@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, positive
+from nmm.arrays import Array, counted, positive
 from nmm.errors import InputError
 from nmm.functions.function import Function
 from nmm.robots.robot import Robot
@@ -36,6 +36,8 @@ class Bound:
     braking : deceleration to count on, units of the rows per s²; None for a quarter of what the accelerations
         of the inputs give where the robot is
     name : for messages; the function's rows when not given
+    priority : None for a limit that is kept before any task; 1, 2, ... for one that is kept if possible: as
+        far as tasks of a lower number leave it, before those of this number and higher ones
 
     Raises
     ------
@@ -49,6 +51,7 @@ class Bound:
         upper: ArrayLike = np.inf,
         braking: float | None = None,
         name: str = "",
+        priority: int | None = None,
     ) -> None:
         if not isinstance(function, Function):
             raise InputError(f"bound: expected a function, got {function!r}")
@@ -57,6 +60,7 @@ class Bound:
         self.upper = _numbers(upper, "upper")
         self.braking = None if braking is None else positive(braking, "braking")
         self.name = name
+        self.priority = None if priority is None else counted(priority, "priority")
         if not (np.isfinite(self.lower).any() or np.isfinite(self.upper).any()):
             raise InputError(
                 f"bound: expected lower, upper or both, got lower {self.lower} and upper {self.upper}"

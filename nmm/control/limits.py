@@ -81,6 +81,7 @@ class LimitsOn:
     functions : whose values are limited; `braking` (f,) of their components
     row_limits, rows : the limits that are rows on the inputs, and their names: wheels, then functions'
         components
+    priorities : of these, None for those that are kept before any task
     needs_dt : whether there are limits that are kept from sample to sample
     """
 
@@ -109,6 +110,7 @@ class LimitsOn:
             *(row for _, row in found),
         )
         self.rows = tuple(row.name for row in self.row_limits)
+        self.priorities = (*(None for _ in wheels), *(bound.priority for bound, _ in found))
         self.needs_dt = bool(
             np.any(np.isfinite(self.accelerations))
             or np.any(np.isfinite(self.coordinates[self._moved[self._moved >= 0]]))

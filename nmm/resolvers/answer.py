@@ -65,8 +65,8 @@ EXACT = 1e-9
 class AnswerArrays(NamedTuple):
     """An `Answer` as kernels write it: u (m,); status, residual, measure and excess (); scale (levels,).
 
-    Before the kernel is called u, residual and measure are not numbers, status is NOT_FINITE, scale is 1 and
-    excess 0.
+    Before the kernel is called u, residual, measure and excess are not numbers (an excess that is one says
+    that limits were seen to), status is NOT_FINITE and scale is 1.
     """
 
     u: Vector
@@ -85,7 +85,7 @@ def unanswered(m: int, levels: int) -> AnswerArrays:
         scale=np.ones(levels),
         residual=np.array(np.nan),
         measure=np.array(np.nan),
-        excess=np.array(0.0),
+        excess=np.array(np.nan),
     )
 
 

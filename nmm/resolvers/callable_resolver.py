@@ -60,7 +60,7 @@ class CallableResolver(Resolver):
     def finish(self, problem: ProblemArrays, dimensions: Dimensions, answer: AnswerArrays) -> None:
         answer.measure[()] = np.nan
         answer.scale[:] = 1.0
-        answer.excess[()] = 0.0
+        answer.excess[()] = np.nan
         if not all(np.isfinite(given).all() for given in (problem.J, problem.rate, problem.h)):
             answer.status[()] = Status.NOT_FINITE
             return

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, array, scalar, vector
+from nmm.arrays import Array, Integers, array, one_line, scalar, vector
 from nmm.errors import InputError
 from nmm.kernels.memory import Cell, IntegerVector, Matrix, Vector
 
@@ -24,6 +24,7 @@ class ProblemArrays(NamedTuple):
     h (m,) : the objective's gradient, seen by the inputs
     u_lower, u_upper (m,) : u_lower <= u <= u_upper, infinite for none
     limit_rows (l, m), lower (l,), upper (l,) : lower <= limit_rows u <= upper
+    limit_levels (l,) : 0 for rows that are always kept, k for those that are kept before the k-th level
     active (1 + m + l,) : which of them held back the step before (see `nearest_within`); changed
     before (m,) : the inputs of the step before
     dt () : the time that u will stand, s; not a number where it is not known
@@ -42,6 +43,7 @@ class ProblemArrays(NamedTuple):
     limit_rows: Matrix
     lower: Vector
     upper: Vector
+    limit_levels: IntegerVector
     active: IntegerVector
     before: Vector
     dt: Cell
@@ -86,6 +88,8 @@ class Problem:
     added_J, added_rate, added_row_scales : (k, m), (k,) and (k,), the added task of the extended Jacobian
     u_lower, u_upper : (m,) u_lower <= u <= u_upper; infinite where there is none
     limit_rows, lower, upper : (l, m), (l,) and (l,): lower <= limit_rows u <= upper
+    limit_levels : (l,) 0 for rows that are always kept, as all are when not given; k for those that are kept
+        before the k-th level of priority, as far as the levels above it leave it
     before : (m,) the inputs of the step before, 0 when not given
     dt : the time that u will stand, s; not a number where it is not known
 
@@ -109,6 +113,7 @@ class Problem:
     limit_rows: ArrayLike | None = None
     lower: ArrayLike | None = None
     upper: ArrayLike | None = None
+    limit_levels: ArrayLike | None = None
     before: ArrayLike | None = None
     dt: float = float("nan")
 
@@ -140,6 +145,7 @@ class Problem:
             **_bounds(self.u_lower, self.u_upper, m, "u_lower", "u_upper"),
             "limit_rows": limit_rows,
             **_bounds(self.lower, self.upper, count, "lower", "upper"),
+            "limit_levels": _limit_levels(self.limit_levels, count, len(levels)),
             "before": np.zeros(m) if self.before is None else vector(self.before, m, "before"),
             "dt": float("nan") if np.isnan(self.dt) else scalar(self.dt, "dt"),
         }
@@ -188,6 +194,15 @@ def _scales(value: ArrayLike | None, count: int, name: str) -> Array:
     if np.any(scales <= 0.0):
         raise InputError(f"{name}: expected numbers above 0, got {scales.min():g}")
     return scales
+
+
+def _limit_levels(value: ArrayLike | None, count: int, levels: int) -> Integers:
+    given = np.zeros(count) if value is None else vector(value, count, "limit_levels")
+    if np.any((given < 0) | (given > levels + 1) | (given != np.floor(given))):
+        raise InputError(
+            f"limit_levels: expected whole numbers from 0 to {levels + 1}, got {one_line(given)}"
+        )
+    return given.astype(np.int64)
 
 
 def _bounds(lower: ArrayLike | None, upper: ArrayLike | None, count: int, *names: str) -> dict[str, Array]:

@@ -13,7 +13,7 @@ from nmm.robots.robot import Robot
 from nmm.scenario.function_part import FunctionPart
 from nmm.scenario.functions import FUNCTION_PARTS
 from nmm.scenario.keys import Part, at, one_of
-from nmm.scenario.numbers import Numbers, Positive, Speeds, nested, shown
+from nmm.scenario.numbers import Numbers, Positive, Speeds, Whole, nested, shown
 
 
 class BoundPart(FunctionPart):
@@ -29,6 +29,11 @@ class BoundPart(FunctionPart):
         "accelerations give where the robot is",
     )
     name: str = Field("", description="for messages; the function's rows when not given")
+    priority: Whole | None = Field(
+        None,
+        description="1, 2, ... where it is kept if possible, as far as tasks of a lower number leave it; "
+        "before any task when not given",
+    )
 
     def build_bound(self, robot: Robot) -> Bound:
         """The bound; errors know their key."""
@@ -41,6 +46,7 @@ class BoundPart(FunctionPart):
                 none if self.upper is None else self.upper,
                 self.braking,
                 self.name,
+                self.priority,
             )
             bound.rows(robot)
         return bound

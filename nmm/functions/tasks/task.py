@@ -138,6 +138,12 @@ class Stack:
             counts[task.priority] = counts.get(task.priority, 0) + len(task.rows(robot))
         return tuple(counts.values())
 
+    def place(self, priority: int | None) -> int:
+        """The number, from 1 on, of the first level that is not above a priority; 0 for None, above all."""
+        if priority is None:
+            return 0
+        return 1 + len({task.priority for task in self.tasks if task.priority < priority})
+
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         """The rows of all tasks, in order."""
         return tuple(row for task in self.tasks for row in task.rows(robot))
