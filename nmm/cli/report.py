@@ -55,6 +55,8 @@ def _rows(trajectory: Trajectory, numbers: dict[str, Any]) -> Iterator[tuple[str
         unmet = trajectory.unmet
         share = f"{unmet.samples} of {len(trajectory)} samples"
         yield "J u differs from the rate", f"in {share}, by {unmet.largest:.3g} at most"
+    if numbers["step_size_min"] < 1.0:
+        yield "share of α taken", f"{numbers['step_size_mean']:.3g}, {numbers['step_size_min']:.3g} at least"
     if trajectory.limited:
         share = numbers["scaled_share"]
         yield (

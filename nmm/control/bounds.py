@@ -35,6 +35,7 @@ class LimitNumbers(NamedTuple):
     wheels (w, 7) : how they turn (`nmm.robots.wheel_rates`); spin (w,) : their largest rates, rad/s
     rows (f,) : of the program; row_low, row_high (f,) : limits of these values; braking (f,) : counted on for
         them, not a number where it is a share of what the inputs' accelerations give
+    elapsed () : time since the inputs before, s
     mode () : SAMPLE, STAGE or OFF
     """
 
@@ -51,6 +52,7 @@ class LimitNumbers(NamedTuple):
     row_low: Vector
     row_high: Vector
     braking: Vector
+    elapsed: Cell
     mode: IntegerCell
 
 
@@ -89,7 +91,8 @@ def bound_inputs(limits: LimitNumbers, q: Array, problem: ProblemArrays) -> None
                 low = min(low, max(upper, 0.0), high)
             lower, upper = min(max(lower, low), high), max(min(upper, high), low)
         if not math.isinf(A):
-            least, most = problem.before[j] - A * dt, problem.before[j] + A * dt
+            change = A * limits.elapsed[()]
+            least, most = problem.before[j] - change, problem.before[j] + change
             if least > upper:
                 lower, upper = least, least
             elif most < lower:

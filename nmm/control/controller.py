@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, positive
-from nmm.control.bounds import OFF, STAGE
+from nmm.control.bounds import OFF, SAMPLE, STAGE
 from nmm.control.contradiction import contradicting
 from nmm.control.equations import STEP, Arm, ControlStep, drive, finish, told
 from nmm.control.equations import step as compiled_step
 from nmm.control.idle_inputs import idle_inputs, inputs_without_effect
 from nmm.control.limits import Limits
 from nmm.control.lost_directions import in_world_axes, lost_directions
-from nmm.control.retreat import Retreat
+from nmm.control.retreat import Backing, Retreat
+from nmm.control.sample import SampleState
 from nmm.control.steering import NOTHING, Steered, Steering
 from nmm.control.step import Step
+from nmm.control.step_size import StepSize
 from nmm.control.task_rows import task_functions, task_rows
 from nmm.errors import InputError, SingularError
 from nmm.functions.function import Row, row_scales
@@ -50,8 +52,9 @@ class Controller:
     objective : H(q) to minimise; None for the plain solution
     added_task : the added task y = h(q) of the extended Jacobian
     limits : what the inputs are kept within; None for none
-    dt : time between two calls, s, which limits of position and acceleration need; a simulation sets its own
-    retreat : what to do when the error stalls; None for a path that is tracked. It needs dt, too
+    dt : time between two calls, s, which limits of position and acceleration need, a retreat, and a resolver
+        whose step is "armijo"; a simulation sets its own
+    retreat : what to do when the error stalls; None for a path that is tracked
     steering : the law for the steering of a platform that the task does not feel (`Steering`): True for the
         usual one, False for none
 
@@ -59,11 +62,14 @@ class Controller:
     ----------
     before : (m,) the inputs of the call before, from which accelerations count; a call changes it
     steered : the law in force for steering that the task does not feel; None where there is none
+    step_size : what chooses α at each sample; None where it is constant
+    sample : what the last call leaves for the stages of its sample and for the next call
 
     Raises
     ------
     InputError : a frame, coordinate or input that the robot lacks; more rows than inputs; an
-        added task with a resolver that takes none, or none with one that does
+        added task with a resolver that takes none, or none with one that does; a step size to be chosen
+        where there is no objective
     """
 
     def __init__(
@@ -169,12 +175,22 @@ class Controller:
         if limits is None:
             self._step.limits.mode[()] = OFF
         self.backing = None if retreat is None else retreat.on(robot, self.rows)
-        self._needs_dt = self.backing is not None or (limits is not None and kept.needs_dt)
+        self.step_size: StepSize | None = None
+        self._needs_dt = (
+            self.backing is not None or resolver.step != "constant" or (limits is not None and kept.needs_dt)
+        )
         self.dt = dt
         self.steered: Steered | None = None
         if steered is not None and self._unfelt(steered.inputs):
             self.steered = steered
         self._step.steering.on[()] = int(self.steered is not None)
+        if resolver.step != "constant":
+            descended = [(weight, function, 0) for weight, function in weighted]
+            if descended and self.steered is not None:
+                spring = float(self._step.steering.spring)
+                descended.append((spring, self.steered.pursuit, len(self.steered.inputs)))
+            self.step_size = StepSize(robot, resolver, descended, self._step, program.blocks)
+        self.sample = SampleState(self._step.problem, self._step.limits, self.step_size, self.backing)
         self.reset()
 
     def _unfelt(self, inputs: Sequence[str]) -> bool:
@@ -192,6 +208,12 @@ class Controller:
     @dt.setter
     def dt(self, dt: float | None) -> None:
         self._step.problem.dt[()] = math.nan if dt is None else positive(dt, "dt")
+        self._step.limits.elapsed[()] = self._step.problem.dt
+
+    @property
+    def samples(self) -> bool:
+        """Whether something is decided at its calls and kept for the stages after them."""
+        return self.limits is not None or self._needs_dt
 
     def __call__(self, t: float, q: ArrayLike) -> Array:
         """Inputs u (m,) at time t (s) and configuration q (n,), in the units of `robot.u_units`.
@@ -214,22 +236,37 @@ class Controller:
 
     def _expect_dt(self) -> None:
         if self._needs_dt and self.dt is None:
-            raise InputError("dt: expected a number, which limits and a retreat need, got none")
+            raise InputError(
+                "dt: expected a number, which limits, a retreat and a step by Armijo's rule need, got none"
+            )
 
     def _sample(self, t: float, q: Array) -> None:
         """A call that lasts dt: the resolver's inputs, or a retreat's where the error stalls."""
         self._expect_dt()
-        status = self._solve(t, q)
-        if self.backing is not None and self.backing.watch(
-            self._step.task.error, float(self._step.problem.dt)
-        ):
-            found, G = self._step, self._program.buffers.G
-            instead(found.problem, self.backing.inputs(q, G), found.answer)
-            told(found.task, found.problem, found.answer)
-            drive(found.answer.u, G, found.arm, found.q_dot)
+        status = self._solve_whole(t, q)
+        if self.backing is not None:
+            self.backing.watch(self._step.task.error, float(self._step.problem.dt))
+        if self.backing is not None and self.backing.now:
+            self._back_off(self.backing, q)
             self.before[:] = self._u
         elif status >= _FAILED:
             self._fail(t, q)
+
+    def _solve_whole(self, t: float, q: Array) -> float:
+        """What a sample's inputs are without a retreat, its α chosen; returns the status."""
+        if self.step_size is None:
+            return self._solve(t, q)
+        self.step_size.share = 1.0
+        self._solve(t, q)
+        self.step_size.shorten(t, q)
+        return float(self._step.answer.status[()])
+
+    def _back_off(self, backing: Backing, q: Array) -> None:
+        """The retreat's inputs in place of the resolver's."""
+        found, G = self._step, self._program.buffers.G
+        instead(found.problem, backing.inputs(q, G), found.answer)
+        told(found.task, found.problem, found.answer)
+        drive(found.answer.u, G, found.arm, found.q_dot)
 
     def _copied(self, q: ArrayLike | None) -> Array:
         if q is None:
@@ -285,12 +322,14 @@ class Controller:
     def evaluate(self, t: float, q: ArrayLike) -> Step:
         """All quantities at (t, q); a singular matrix is reported in `status`, not raised.
 
+        It is a look and no sample: what the last call left for its stages and the next one stays (`sample`).
         Like a call, it may change what the resolver remembers (see `reset`).
         """
         self._expect_dt()
         q = self._copied(q)
-        self._solve(float(t), q)
-        return self.last(t, q)
+        with self.sample.aside():
+            self._solve_whole(float(t), q)
+            return self.last(t, q)
 
     def last(self, t: float, q: Array) -> Step:
         """The quantities of the call just made at (t, q), as copies."""
@@ -314,38 +353,37 @@ class Controller:
             measure=float(answer.measure[()]),
             excess=float(answer.excess[()]),
             retreats=0 if self.backing is None else self.backing.count,
+            step_size=1.0 if self.step_size is None else self.step_size.share,
             partition=self.state.partition(len(self.rows)),
         )
 
     def velocity(self, t: float, q: ArrayLike) -> Array:
         """q_dot = S(q) u (n,) of the closed loop at (t, q); raises as a call does.
 
-        With limits it is a stage of the sample that the last call began: that one's bounds hold.
+        What the last call decided holds at the stages of its sample: bounds, the step size, a retreat.
         """
-        if self.limits is None:
+        if not self.samples:
             self(t, q)
             return self._step.q_dot.copy()
         self._expect_dt()
-        with self._mode(STAGE):
-            q = self._copied(q)
-            if self._solve(float(t), q) >= _FAILED:
+        q = self._copied(q)
+        mode, before = self._step.limits.mode, self.before.copy()
+        usual = int(mode)
+        mode[()] = STAGE if usual == SAMPLE else usual
+        try:
+            failed = self._solve(float(t), q) >= _FAILED
+            if self.backing is not None and self.backing.now:
+                self._back_off(self.backing, q)
+            elif failed:
                 self._fail(t, q)
+        finally:
+            mode[()] = usual
+            self.before[:] = before
         return self._step.q_dot.copy()
 
     def without_limits(self) -> AbstractContextManager[None]:
         """`with controller.without_limits():` it answers as if there were none, and remembers no inputs."""
-        return self._mode(OFF)
-
-    @contextmanager
-    def _mode(self, mode: int) -> Iterator[None]:
-        cell, before = self._step.limits.mode, self.before.copy()
-        usual = int(cell)
-        cell[()] = mode
-        try:
-            yield
-        finally:
-            cell[()] = usual
-            self.before[:] = before
+        return self.sample.aside(OFF)
 
     def beyond(self) -> dict[str, float]:
         """The limits of wheels and functions that the last call's inputs break, and by what rate."""
@@ -371,6 +409,8 @@ class Controller:
         self._step.problem.active[0] = 0
         if self.backing is not None:
             self.backing.reset()
+        if self.step_size is not None:
+            self.step_size.share = 1.0
 
     @property
     def derivatives(self) -> tuple[Array, Array, Array]:

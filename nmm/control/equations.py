@@ -246,6 +246,24 @@ def finish(q: Array, integers: Integers, floats: Array) -> None:
 
 
 @compiled
+def resolve(q: Array, integers: Integers, floats: Array) -> float:
+    """The resolver's inputs for the equations that are there, within limits. Returns its status."""
+    e = views(ControlStep, integers, floats, BESIDE)
+    answer = e.answer
+    for j in range(answer.u.shape[0]):
+        answer.u[j] = math.nan  # what a resolver that finds no solution leaves behind
+    answer.status[()] = NOT_FINITE
+    for level in range(answer.scale.shape[0]):
+        answer.scale[level] = 1.0
+    answer.residual[()] = math.nan
+    answer.measure[()] = math.nan
+    answer.excess[()] = math.nan
+    call_resolver(e.resolver, e.problem, e.numbers, e.options, e.state, answer)
+    finish(q, integers, floats)
+    return float(answer.status[()])
+
+
+@compiled
 def step(t: float, q: Array, integers: Integers, floats: Array) -> float:
     """One control step: functions, equations, gradient, inputs. Returns the resolver's status.
 
@@ -254,7 +272,7 @@ def step(t: float, q: Array, integers: Integers, floats: Array) -> float:
     run(t, q, integers, floats)
     b = views(LaidOut, integers, floats, 0).buffers
     e = views(ControlStep, integers, floats, BESIDE)
-    problem, answer = e.problem, e.answer
+    problem = e.problem
     write_equation(e.task, b, e.arm, problem.J, problem.rate)
     write_equation(e.added, b, e.arm, problem.added_J, problem.added_rate)
     n = q.shape[0]
@@ -273,14 +291,4 @@ def step(t: float, q: Array, integers: Integers, floats: Array) -> float:
             gradient[0, j] += e.steering.spring[()] * b.value_q[spring, j]
     times_S(gradient, 0, b.G, e.arm, problem.h)
     write_limits(e.limits, q, b, e.arm, problem)
-    for j in range(answer.u.shape[0]):
-        answer.u[j] = math.nan  # what a resolver that finds no solution leaves behind
-    answer.status[()] = NOT_FINITE
-    for level in range(answer.scale.shape[0]):
-        answer.scale[level] = 1.0
-    answer.residual[()] = math.nan
-    answer.measure[()] = math.nan
-    answer.excess[()] = math.nan
-    call_resolver(e.resolver, problem, e.numbers, e.options, e.state, answer)
-    finish(q, integers, floats)
-    return float(answer.status[()])
+    return resolve(q, integers, floats)

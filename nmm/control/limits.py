@@ -131,6 +131,7 @@ class LimitsOn:
             *(positions[:, 0].copy(), positions[:, 1].copy(), np.array(self.recovery)),
             *(self._wheels, self._spin, np.array(rows, dtype=np.int64)),
             *(self._ends[:, 0].copy(), self._ends[:, 1].copy(), self.braking),
+            elapsed=np.array(np.nan),
             mode=np.array(SAMPLE, dtype=np.int64),
         )
 

@@ -77,6 +77,7 @@ class Backing:
     ----------
     count : retreats so far
     left : s, how long the one under way lasts; 0 where there is none
+    now : whether the sample is a retreat's
     """
 
     def __init__(self, retreat: Retreat, robot: Robot, rows: Sequence[Row]) -> None:
@@ -98,20 +99,24 @@ class Backing:
         """Forget: nothing has stalled yet."""
         self.count = 0
         self.left = 0.0
+        self.now = False
         self._best = np.inf
         self._waited = 0.0
 
     def snapshot(self) -> tuple[float, ...]:
         """What is remembered, for `restore`."""
-        return self.count, self.left, self._best, self._waited
+        return self.count, self.now, self.left, self._best, self._waited
 
     def restore(self, snapshot: tuple[float, ...]) -> None:
         """Remember what was remembered then."""
-        count, self.left, self._best, self._waited = snapshot
-        self.count = int(count)
+        count, now, self.left, self._best, self._waited = snapshot
+        self.count, self.now = int(count), bool(now)
 
-    def watch(self, error: Array, dt: float) -> bool:
-        """Whether the next dt is a retreat's, given the error (s,) now."""
+    def watch(self, error: Array, dt: float) -> None:
+        """See whether the next dt is a retreat's, given the error (s,) now."""
+        self.now = self._stalls(error, dt)
+
+    def _stalls(self, error: Array, dt: float) -> bool:
         retreat = self._retreat
         if self.left > 1e-9:
             self.left -= dt

@@ -25,6 +25,7 @@ OPTIONAL_ARRAYS = ("path", "desired", "target")
 LATER_ARRAYS = {
     "scale": lambda count: np.ones((count, 1)),
     "margin": lambda count: np.full(count, np.inf),
+    "step_size": lambda count: np.ones(count),
     "shares": lambda count: np.zeros((count, 0)),
 }
 
@@ -173,6 +174,7 @@ def _write_csv(trajectory: Trajectory, path: Path) -> None:
         *((f"partition_{i}", trajectory.partition[:, i]) for i in range(len(rows))),
         ("residual", trajectory.residual),
         *((f"scale_{i}", trajectory.scale[:, i]) for i in range(trajectory.scale.shape[1])),
+        ("step_size", trajectory.step_size),
         ("margin", trajectory.margin),
     ]
     with path.open("w", newline="", encoding="utf-8") as file:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
 from numba import types
 
 from nmm.arrays import Array, Integers
-from nmm.errors import InputError
+from nmm.errors import InputError, expect_known
 from nmm.kernels.compiled import Kernel, caller
 from nmm.kernels.memory import record_type
 from nmm.resolvers.answer import Answer, AnswerArrays, unanswered
@@ -30,6 +30,16 @@ RESOLVER = types.void(
 call_resolver = caller(RESOLVER)
 
 
+#: How the step size of the objective's gradient is chosen: as it is given, or at most that, by Armijo's rule.
+StepRule: TypeAlias = Literal["constant", "armijo"]
+
+
+def step_rule(step: StepRule) -> StepRule:
+    """It, if there is such a rule; `InputError` lists the names."""
+    expect_known("step", step, get_args(StepRule))
+    return step
+
+
 class Setup(NamedTuple):
     """The numbers and the integers that a resolver's kernel reads."""
 
@@ -47,11 +57,14 @@ class Resolver(ABC):
        resolve.
 
     `takes_added_task` says whether it solves the added task's rows too, `start(dimensions)` gives the state
-    of one that remembers.
+    of one that remembers, `alpha_at` where the step size α is among its numbers, if it has one. With `step`
+    "armijo" a controller shortens α at each sample; the resolver itself, which knows no motion, does not.
     """
 
     name: ClassVar[str]
     takes_added_task: ClassVar[bool] = False
+    alpha_at: ClassVar[int | None] = None
+    step: StepRule = "constant"
 
     @property
     @abstractmethod

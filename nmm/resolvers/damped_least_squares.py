@@ -11,7 +11,7 @@ from nmm.errors import expect_known
 from nmm.kernels.compiled import Kernel, compiled, kernel, scratch, view
 from nmm.kernels.damping import BELOW, LARGEST, damped_solution, damping_squared, resolved
 from nmm.resolvers.answer import INEXACT, RELAXED, AnswerArrays, certify
-from nmm.resolvers.base import RESOLVER, Resolver, Setup
+from nmm.resolvers.base import RESOLVER, Resolver, Setup, StepRule, step_rule
 from nmm.resolvers.limited import limit, within
 from nmm.resolvers.problem import Dimensions, ProblemArrays
 from nmm.resolvers.projected_gradient import unweigh, weigh
@@ -94,9 +94,12 @@ class DampedLeastSquares(Resolver):
     weights : None; m positive numbers; a mapping from names of inputs or of their groups ("platform",
         "arm"), 1 for the rest: a large weight spares the input; or a symmetric positive definite
         (m, m) matrix
+    step : "constant", α as it is; "armijo", α at most, at each sample shortened until the objective falls
+        along the sample's motion, so that no α dt is too large
     """
 
     name: ClassVar[str] = "dls"
+    alpha_at: ClassVar[int | None] = ALPHA
 
     def __init__(
         self,
@@ -105,8 +108,10 @@ class DampedLeastSquares(Resolver):
         damping: float = LARGEST,
         threshold: float = BELOW,
         weights: Weights | None = None,
+        step: StepRule = "constant",
     ) -> None:
         self.alpha = positive(alpha, "alpha")
+        self.step = step_rule(step)
         expect_known("law", law, get_args(Damping))
         self.law = law
         self.damping = positive(damping, "damping")

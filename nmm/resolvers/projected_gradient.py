@@ -10,7 +10,7 @@ from nmm.arrays import Array, Integers, positive
 from nmm.kernels.compiled import Kernel, compiled, integer_scratch, kernel, scratch, view
 from nmm.kernels.linear_algebra import closest_solution, orthonormal_rows
 from nmm.resolvers.answer import SINGULAR_J, AnswerArrays, certify
-from nmm.resolvers.base import NO_OPTIONS, RESOLVER, Resolver, Setup
+from nmm.resolvers.base import NO_OPTIONS, RESOLVER, Resolver, Setup, StepRule, step_rule
 from nmm.resolvers.limited import limit, within
 from nmm.resolvers.problem import Dimensions, ProblemArrays
 from nmm.resolvers.weights import Weights, weight_matrix
@@ -98,17 +98,22 @@ class ProjectedGradient(Resolver):
         (m, m) matrix
     tolerance : J counts as singular where its last pivot, rows in their natural scales, is below this,
         times the first pivot if that is above 1
+    step : "constant", α as it is; "armijo", α at most, at each sample shortened until the objective falls
+        along the sample's motion, so that no α dt is too large
     """
 
     name: ClassVar[str] = "pg"
+    alpha_at: ClassVar[int | None] = ALPHA
 
     def __init__(
         self,
         alpha: float = 10.0,
         weights: Weights | None = None,
         tolerance: float = 1e-10,
+        step: StepRule = "constant",
     ) -> None:
         self.alpha = positive(alpha, "alpha")
+        self.step = step_rule(step)
         self.weights = weights
         self.tolerance = positive(tolerance, "tolerance")
 

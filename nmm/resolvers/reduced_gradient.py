@@ -12,7 +12,7 @@ from nmm.errors import InputError, expect_known
 from nmm.kernels.compiled import Kernel, clear, compiled, kernel, scratch, view
 from nmm.kernels.damping import BELOW, DIRECTIONS, LARGEST, resolved
 from nmm.resolvers.answer import INEXACT, RELAXED, SINGULAR_J, SINGULAR_JA, AnswerArrays, certify
-from nmm.resolvers.base import RESOLVER, Resolver, Setup
+from nmm.resolvers.base import RESOLVER, Resolver, Setup, StepRule, step_rule
 from nmm.resolvers.damped_least_squares import damp
 from nmm.resolvers.limited import limit, within
 from nmm.resolvers.partitions import (
@@ -242,9 +242,12 @@ class ReducedGradient(Resolver):
         counts for less in |det Ja|, weighted from here on), and descends H more slowly (α / w)
     singular : what happens where no candidate is well conditioned: "stop", the run ends there; "damped", the
         answer goes over, step by step, to that of damped least squares with its usual numbers, and back
+    step : "constant", α as it is; "armijo", α at most, at each sample shortened until the objective falls
+        along the sample's motion, so that no α dt is too large
     """
 
     name: ClassVar[str] = "rg"
+    alpha_at: ClassVar[int | None] = ALPHA
 
     def __init__(
         self,
@@ -254,8 +257,10 @@ class ReducedGradient(Resolver):
         tolerance: float = 1e-10,
         weights: Weights | None = None,
         singular: Literal["stop", "damped"] = "stop",
+        step: StepRule = "constant",
     ) -> None:
         self.alpha = positive(alpha, "alpha")
+        self.step = step_rule(step)
         self.weights = weights
         self.automatic = isinstance(partitions, str)
         if self.automatic and partitions != "automatic":

@@ -44,10 +44,12 @@ class Recorder:
         self._scale: Array | None = None
         kept = controller.kept.row_limits if controller.limits is not None else ()
         self._limited = np.empty((count, len(kept)))
-        self._beyond: dict[str, tuple[int, float, float]] = {}
+        # By sample: one that is taken again counts once.
+        self._beyond: dict[int, dict[str, float]] = {}
         self._against: dict[str, str] = {}
-        self._unanswered: list[float] = []
-        self._retreats: list[float] = []
+        self._unanswered = np.zeros(count, dtype=bool)
+        self._retreats = np.zeros(count, dtype=np.int64)
+        self._step_size = np.ones(count)
         self._J = np.empty((count, s, robot.n_u))
         self._partition = np.empty((count, s), dtype=np.int64)
         self._count = 0
@@ -122,18 +124,15 @@ class Recorder:
         if self._limited.shape[1]:
             self._limited[k] = self._controller.row_values()
         self._partition[k] = sample.partition
-        if sample.status is Status.FALLBACK:
-            self._unanswered.append(sample.t)
-        if sample.retreats > len(self._retreats):
-            self._retreats.append(sample.t)
+        self._step_size[k] = sample.step_size
+        self._unanswered[k] = sample.status is Status.FALLBACK
+        self._retreats[k] = sample.retreats
+        self._beyond.pop(k, None)
         if sample.excess > 0.0:
-            beyond = self._controller.beyond()
+            self._beyond[k] = beyond = self._controller.beyond()
             if not beyond.keys() <= self._against.keys():
                 against = ", ".join(self._controller.contradiction())
                 self._against |= dict.fromkeys(beyond.keys() - self._against.keys(), against)
-            for name, by in beyond.items():
-                count, first, most = self._beyond.get(name, (0, sample.t, 0.0))
-                self._beyond[name] = count + 1, first, max(most, by)
 
     def warn_once(self, t: float, warning: str) -> None:
         """A warning about the time t, s, said once a run; an empty one is none."""
@@ -154,19 +153,24 @@ class Recorder:
             )
 
     def _warn_of_events(self) -> None:
-        for name, (count, first, most) in self._beyond.items():
+        times = self.t
+        for name in dict.fromkeys(name for beyond in self._beyond.values() for name in beyond):
+            broken = {k: beyond[name] for k, beyond in self._beyond.items() if name in beyond}
             self.warnings.append(
-                f"the limit of {name} could not be kept with the others in {count} samples, from "
-                f"t = {first:.3g} s on: its rate was beyond what would keep it by up to {most:.3g} a second"
+                f"the limit of {name} could not be kept with the others in {len(broken)} samples, from "
+                f"t = {times[min(broken)]:.3g} s on: its rate was beyond what would keep it by up to "
+                f"{max(broken.values()):.3g} a second"
                 f"{f' (what contradicts each other: {against})' if (against := self._against[name]) else ''}"
             )
-        if self._retreats:
-            at = ", ".join(f"{t:.3g} s" for t in self._retreats)
+        backed_off = times[np.diff(self._retreats[: len(self)], prepend=0) > 0]
+        if len(backed_off):
+            at = ", ".join(f"{t:.3g} s" for t in backed_off)
             self.warnings.append(f"the error stalled and the robot backed off, at t = {at}")
-        if self._unanswered:
+        unanswered = times[self._unanswered[: len(self)]]
+        if len(unanswered):
             self.warnings.append(
-                f"the resolver had no answer in {len(self._unanswered)} samples, from "
-                f"t = {self._unanswered[0]:.3g} s on, where J has lost rank: its inputs were those nearest "
+                f"the resolver had no answer in {len(unanswered)} samples, from "
+                f"t = {unanswered[0]:.3g} s on, where J has lost rank: its inputs were those nearest "
                 "to rest within the limits"
             )
 
@@ -208,6 +212,7 @@ class Recorder:
             partition=self._partition[:count].copy(),
             residual=self._scalars[1, :count].copy(),
             scale=self.scale.copy(),
+            step_size=self._step_size[:count].copy(),
             limited=controller.limits is not None,
             margin=margin(within),
             shares=within,

@@ -77,9 +77,10 @@ def simulate(
         raise InputError(
             f"dt: {duration:g} s in steps of {dt:g} s are {steps} samples; expected at most {MOST_SAMPLES}"
         )
-    if method == "adaptive" and controller.limits is not None:
+    if method == "adaptive" and controller.samples:
         raise InputError(
-            "method: limits are kept from sample to sample: expected rk4, midpoint, euler or zoh"
+            "method: limits, a retreat and a step by Armijo's rule are kept from sample to sample: "
+            "expected rk4, midpoint, euler or zoh"
         )
     advance = integrator(method, robot, positive(tolerance, "tolerance"))
     times = _times(0.0, dt, steps, duration)
@@ -170,23 +171,25 @@ def _integrate(
     that may not stand either, it is taken with the decisions free at its stages.
     """
     state, steps = controller.state, len(times) - 1
-    earlier = controller.before.copy()
+    earlier = controller.sample.snapshot()
     sample = _sample(controller, float(times[0]), q)
     recorder.add(sample)
     for k in range(steps):
         t = float(times[k + 1])
+        here = controller.sample.snapshot()
         ahead = _advanced(controller, advance, sample, t)
         if ahead is None:
             state.reset()
-            controller.before[:] = earlier
+            controller.sample.restore(earlier)
             sample = _sample(controller, sample.t, sample.q)
             recorder.replace_last(sample)
-            before = state.snapshot()
+            before, here = state.snapshot(), controller.sample.snapshot()
             ahead = _advanced(controller, advance, sample, t)
             if ahead is None:
-                ahead = _sample(controller, t, _integrated(controller, advance, sample, t))
+                controller.sample.restore(here)
+                ahead = _sample(controller, t, _integrated(controller, advance, sample, t), sample.t)
                 recorder.warn_once(sample.t, state.reservation(before, controller.robot.u_names))
-        earlier, sample = sample.u, ahead
+        earlier, sample = here, ahead
         recorder.add(sample)
         if until is not None and until.reached(sample.error, controller.rows):
             break
@@ -209,7 +212,7 @@ def _advanced(controller: Controller, advance: Integrator, sample: Step, t: floa
         return None
     if not state.may_stand(before):
         return None
-    ahead = _sample(controller, t, q)
+    ahead = _sample(controller, t, q, sample.t)
     return ahead if state.may_stand(before) else None
 
 
@@ -217,10 +220,17 @@ def _integrated(controller: Controller, advance: Integrator, sample: Step, t: fl
     return advance.advance(controller.velocity, sample.t, sample.q, sample.q_dot, sample.u, t - sample.t)
 
 
-def _sample(controller: Controller, t: float, q: Array) -> Step:
+def _sample(controller: Controller, t: float, q: Array, earlier: float = -math.inf) -> Step:
+    """The sample at t; accelerations count from the one before it, at `earlier`: less than dt in the end."""
     if not q.dot(q) < BOUND**2:  # a NaN compares false
         raise DivergedError(f"at t = {t:g} s the motion has diverged: the coordinates are beyond {BOUND:g}")
-    controller(t, q)
+    elapsed, dt = controller.sample.elapsed, math.nan if controller.dt is None else controller.dt
+    if t - earlier < dt * (1.0 - 1e-9):
+        elapsed[()] = t - earlier
+    try:
+        controller(t, q)
+    finally:
+        elapsed[()] = dt
     sample = controller.last(t, q)
     if not sample.u.dot(sample.u) < BOUND**2:
         raise DivergedError(f"at t = {t:g} s the motion has diverged: the inputs are beyond {BOUND:g}")

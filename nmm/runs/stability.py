@@ -45,7 +45,10 @@ class Instability:
 
 def linearisation(controller: Controller, t: float, q: Array) -> Array:
     """F = ∂(S u)/∂q of the closed loop at (t, q), shape (n, n), with the partition of (t, q) kept."""
-    controller.velocity(t, q)
+    if controller.step_size is None:
+        controller.velocity(t, q)
+    else:  # α is the sample's
+        controller(t, q)
     F = np.empty((q.size, q.size))
     with controller.state.held():
         for j in range(q.size):

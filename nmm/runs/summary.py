@@ -70,6 +70,8 @@ def summarise(trajectory: Trajectory) -> dict[str, Any]:
             **{f"unmet_{name}": value for name, value in trajectory.unmet._asdict().items()},
             "scale_min": float(trajectory.scale.min()),
             "scaled_share": float(np.mean(np.any(trajectory.scale < 1.0, axis=1))),
+            "step_size_min": float(trajectory.step_size.min()),
+            "step_size_mean": float(trajectory.step_size.mean()),
             "margin_min": float(trajectory.margin.min()) if np.all(np.isfinite(trajectory.margin)) else None,
             "lateral_slip_max": lateral_slip(trajectory),
             "partition_switches": trajectory.switches,

@@ -48,6 +48,7 @@ class Trajectory:
     residual (N,): ‖J u - rate‖
     scale (N, levels): the share λ of the task's rate that was left, a priority level a column; 1 where
         nothing was relaxed on purpose
+    step_size (N,): the share of α that was taken, 1 where it is constant
     margin (N,): least distance to a limit, as a share of its range; infinite without limits on both sides
     shares (N, limited): where each of `limit_names` is between its limits, 0 at the lower, 1 at the upper one
     limited : whether the controller kept limits
@@ -91,6 +92,7 @@ class Trajectory:
     limited: bool = False
     shares: Array = field(default_factory=lambda: np.zeros((0, 0)))
     limit_names: tuple[str, ...] = ()
+    step_size: Array = field(default_factory=lambda: np.ones(0))
     scenario: dict[str, Any] | None = field(default=None)
 
     def __len__(self) -> int:
