@@ -28,7 +28,7 @@ from nmm.functions.program import BESIDE, Program
 from nmm.functions.tasks.task import Stack, Task
 from nmm.kernels.compiled import checked_by_caller
 from nmm.kernels.memory import views
-from nmm.resolvers.answer import Status, unanswered
+from nmm.resolvers.answer import Status, added_residual, unanswered
 from nmm.resolvers.base import Resolver
 from nmm.resolvers.limited import instead
 from nmm.resolvers.problem import Problem
@@ -315,6 +315,7 @@ class Controller:
             excess=float(answer.excess[()]),
             retreats=0 if self.backing is None else self.backing.count,
             partition=self.state.partition(len(self.rows)),
+            added_residual=added_residual(problem, answer.u),
         )
 
     def velocity(self, t: float, q: ArrayLike) -> Array:

@@ -48,6 +48,7 @@ class Recorder:
         self._against: dict[str, str] = {}
         self._unanswered: list[float] = []
         self._retreats: list[float] = []
+        self._added: dict[float, float] = {}
         self._J = np.empty((count, s, robot.n_u))
         self._partition = np.empty((count, s), dtype=np.int64)
         self._count = 0
@@ -124,6 +125,8 @@ class Recorder:
         self._partition[k] = sample.partition
         if sample.status is Status.FALLBACK:
             self._unanswered.append(sample.t)
+        if sample.added_residual > 0.0:
+            self._added[sample.t] = sample.added_residual
         if sample.retreats > len(self._retreats):
             self._retreats.append(sample.t)
         if sample.excess > 0.0:
@@ -163,6 +166,13 @@ class Recorder:
         if self._retreats:
             at = ", ".join(f"{t:.3g} s" for t in self._retreats)
             self.warnings.append(f"the error stalled and the robot backed off, at t = {at}")
+        if self._added:
+            times, most = list(self._added), max(self._added.values())
+            back = ", and is done again from there on" if times[-1] < self.reached else ""
+            self.warnings.append(
+                f"the added task was not done in {len(times)} samples, from t = {times[0]:.4g} to "
+                f"{times[-1]:.4g} s{back}: its rate was missed by up to {most:.3g} a second"
+            )
         if self._unanswered:
             self.warnings.append(
                 f"the resolver had no answer in {len(self._unanswered)} samples, from "
