@@ -39,32 +39,46 @@ def test_the_papers_scenarios_are_the_papers(name: str, case: paper_cases.Case) 
     assert np.abs(u - case.controller(robot, case.rg())(0.0, case.q0)).max() < 1e-12
 
 
-#: Those that come to a singularity, where the task or the added task is damped: see test_damping_runs.py.
-SINGULAR = ("unicycle_3r_out_of_reach", "unicycle_3r_vertical_line", "unicycle_2r_algorithmic")
+#: Through singularities, where the task (the first two) or the added one is damped on purpose, and what the
+#: run says of it: see test_damping_runs.py.
+DAMPED = {
+    "unicycle_3r_out_of_reach": "scales the rate on purpose",
+    "unicycle_3r_vertical_line": "scales the rate on purpose",
+    "unicycle_2r_algorithmic": "the added task was not done",
+}
+#: Its target is 0.4 m above what the arm reaches.
+MISSED = "unicycle_3r_out_of_reach"
 
 
 @pytest.fixture(scope="module")
 def runs() -> dict[str, nmm.Trajectory]:
     """Every bundled scenario, run as it is."""
-    return {name: Scenario.load(name).run() for name in bundled_scenarios() if name not in SINGULAR}
+    return {name: Scenario.load(name).run() for name in bundled_scenarios()}
 
 
 def test_every_bundled_scenario_runs_to_its_end(runs: dict[str, nmm.Trajectory]) -> None:
-    assert set(PAPER) <= set(runs)
+    assert set(PAPER) | set(DAMPED) <= set(runs)
     for name, run in runs.items():
-        assert run.outcome == "completed", name
-        assert run.warnings == (), name
+        assert run.outcome == ("missed" if name == MISSED else "completed"), name
+        assert run.t[-1] == Scenario.load(name).parts.duration, name
         assert run.scenario is not None
         assert run.scenario["title"], name
+        assert run.summary()["lateral_slip_max"] <= 1e-12, name
+        if name in DAMPED:
+            assert DAMPED[name] in " ".join(run.warnings), name
+        else:
+            assert run.warnings == (), name
         # Feedback with K = 1 1/s: what is left of the initial error, and what the integrator adds.
         expected = run.error_norm[0] * np.exp(-run.t[-1])
-        assert run.error_norm[-1] <= 1.1 * expected + (
-            1e-11 * (run.dt / 0.005) ** 4 if run.method == "rk4" else 1e-5
-        ), name
-        assert run.residual.max() < 1e-10, name
-        assert run.summary()["lateral_slip_max"] <= 1e-12, name
-        # Wheel speeds as inputs (0.1 m a radian) make J small, not singular: that would be a warning.
-        assert run.sigma_min.min() > 0.05, name
+        if "task was" in DAMPED.get(name, "task was"):
+            assert run.error_norm[-1] <= 1.1 * expected + (
+                1e-11 * (run.dt / 0.005) ** 4 if run.method == "rk4" else 1e-5
+            ), name
+            assert run.residual.max() < 1e-10, name
+            # Wheel speeds as inputs (0.1 m a radian) make J small, not singular: that would be a warning.
+            assert run.sigma_min.min() > 0.05, name
+        else:  # near the singular line the task is damped
+            assert run.sigma_min.min() < 0.05, name
 
 
 def test_the_platform_makes_up_for_an_arm_that_stays_singular(runs: dict[str, nmm.Trajectory]) -> None:

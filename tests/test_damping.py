@@ -8,8 +8,7 @@ from typing import Any, get_args
 
 import numpy as np
 import pytest
-from conditioned import with_condition
-from numpy.typing import NDArray
+from conditioned import Array, each_shape, with_condition, with_singular_values
 
 from nmm.errors import InputError
 from nmm.kernels.singular_values import singular_rows
@@ -23,18 +22,8 @@ from nmm.resolvers import (
 )
 from nmm.resolvers.damped_least_squares import Damping
 
-Array = NDArray[np.float64]
 LAWS = get_args(Damping)
-SHAPES = [(1, 1), (1, 4), (2, 2), (2, 4), (3, 5), (6, 6), (6, 9)]
-each_shape = pytest.mark.parametrize("shape", SHAPES, ids=str)
 each_law = pytest.mark.parametrize("law", LAWS)
-
-
-def with_singular_values(values: Array, m: int, rng: np.random.Generator) -> Array:
-    """A random matrix (s, m) of these singular values."""
-    U = np.linalg.qr(rng.normal(size=(len(values), len(values))))[0]
-    V = np.linalg.qr(rng.normal(size=(m, len(values))))[0]
-    return np.ascontiguousarray(U * values @ V.T)
 
 
 def random_values(s: int, rng: np.random.Generator) -> Array:
@@ -75,7 +64,10 @@ def test_singular_rows_are_a_singular_value_decomposition(
 def test_the_answer_is_the_least_squares_one(
     shape: tuple[int, int], law: Any, rng: np.random.Generator
 ) -> None:
-    """‖A u - b‖² + Σ λ_i² (v_iᵀ (u - u0))², stacked and given to numpy; rows in scales, inputs in weights."""
+    """‖A u - b‖² + Σ λ_i² (v_iᵀ u)², stacked and given to numpy; rows in scales, inputs in weights.
+
+    And u0 in the null space, of which a direction is a part as far as its σ is below the threshold.
+    """
     s, m = shape
     damping, threshold = 0.4, 0.6
     for weighted in (False, True):
@@ -92,8 +84,9 @@ def test_the_answer_is_the_least_squares_one(
             U, sigma, Vt = np.linalg.svd(A, full_matrices=False)
             squared = damping_squared(law, sigma, damping, threshold)
             stacked = np.vstack([A, np.diag(np.sqrt(squared)) @ Vt])
-            right = np.concatenate([b - A @ u0, np.zeros(s)])
-            u = C @ (u0 + np.linalg.lstsq(stacked, right, rcond=None)[0])
+            task = np.linalg.lstsq(stacked, np.concatenate([b, np.zeros(s)]), rcond=None)[0]
+            lost = np.maximum(0.0, 1.0 - (sigma / threshold) ** 2) ** 2
+            u = C @ (task + u0 - Vt.T @ ((1.0 - lost) * (Vt @ u0)))
             np.testing.assert_allclose(found.u, u, rtol=0, atol=1e-9 * max(1.0, np.abs(u).max()))
             assert found.measure == pytest.approx(sigma[-1], abs=1e-13 * max(1.0, sigma[0]))
             assert found.residual == pytest.approx(np.linalg.norm(J @ found.u - rate), abs=1e-12)
@@ -226,19 +219,74 @@ def test_u_is_continuous_through_singularities(name: str, rng: np.random.Generat
             assert largest < 0.2 * np.linalg.norm(apart, axis=1).max()
 
 
-def test_a_known_step_raises_the_damping(rng: np.random.Generator) -> None:
-    """λ² >= ‖b‖ dt and ε² >= 2 ‖b‖ dt: the answer of the resolver with these numbers."""
-    for _ in range(20):
-        J = with_singular_values(np.array([1.0, 0.1]), 4, rng)
-        rate = rng.normal(size=2)
-        size = np.linalg.norm(rate)
-        found = DampedLeastSquares().resolve(Problem(J, rate, np.zeros(4), dt=0.02))
-        raised = DampedLeastSquares(
-            damping=max(0.05 / math.sqrt(2.0), math.sqrt(0.02 * size)),
-            threshold=max(0.05, math.sqrt(0.04 * size)),
+@each_law
+@each_shape
+def test_the_objective_stays_out_of_a_regular_task(
+    shape: tuple[int, int], law: Any, rng: np.random.Generator
+) -> None:
+    """However the rate is damped, J u is the same with every gradient; what is left of it descends H."""
+    s, m = shape
+    for dt in (math.nan, 0.1):
+        for weights in (None, rng.uniform(1.0, 3.0, m)):
+            J = with_singular_values(rng.uniform(0.05, 1.0, s), m, rng)
+            root = np.ones(m) if weights is None else np.sqrt(weights)
+            resolver = DampedLeastSquares(3.0, law, weights=weights)
+            given = {"J": J * root, "rate": 3.0 * rng.normal(size=s), "dt": dt}
+            h = rng.normal(size=m)
+            without, found = (resolver.resolve(Problem(h=gradient, **given)) for gradient in (0.0 * h, h))
+            moved = found.u - without.u
+            np.testing.assert_allclose(given["J"] @ moved, 0.0, atol=1e-12)
+            assert found.residual == pytest.approx(without.residual, abs=1e-12)
+            assert h @ moved <= 1e-12
+            assert without.status is Status.RELAXED or (law != "constant" and found.residual < 1e-12)
+
+
+@each_law
+def test_the_objective_moves_a_lost_direction_and_little_of_the_task(
+    law: Any, rng: np.random.Generator
+) -> None:
+    """What it does to the task is at most 0.8² / √5 ε ‖u0‖, and nothing at σ = 0 and from σ = ε on."""
+    most = 0.0
+    for sigma in (0.0, *np.linspace(0.001, 0.06, 60)):
+        J = np.array([[1.0, 0.0, 0.0], [0.0, sigma, 0.0]])
+        found = DampedLeastSquares(1.0, law).resolve(Problem(J, np.zeros(2), -np.ones(3)))
+        felt = np.abs(J @ found.u)
+        assert felt[0] < 1e-15
+        assert found.u[2] == 1.0
+        assert (felt[1] > 1e-6) == (0.0 < sigma < 0.05)
+        assert found.u[1] == (
+            1.0 if sigma == 0.0 else pytest.approx(max(0.0, 1.0 - (sigma / 0.05) ** 2) ** 2)
         )
-        expected = raised.resolve(Problem(J, rate, np.zeros(4)))
-        np.testing.assert_allclose(found.u, expected.u, rtol=1e-13)
+        most = max(most, felt[1])
+    assert most == pytest.approx(0.64 / math.sqrt(5.0) * 0.05, rel=1e-2)
+
+
+def damping_of_a_step(sigma: Array, asked: Array, dt: float) -> tuple[float, float]:
+    """λ and ε for b = Σ u_i asked_i: β counts directions that a step could carry through 0."""
+    size = np.linalg.norm(asked)
+    for _ in range(2):
+        size = (
+            math.sqrt(np.maximum(0.0, 1.0 - sigma**2 / (2.0 * size * dt)) @ asked**2) if size > 0.0 else 0.0
+        )
+    return max(0.05 / math.sqrt(2.0), math.sqrt(size * dt)), max(0.05, math.sqrt(2.0 * size * dt))
+
+
+def test_a_known_step_raises_the_damping(rng: np.random.Generator) -> None:
+    """The answer of the resolver with these numbers; none where only regular directions are asked for."""
+    raised = 0
+    for _ in range(40):
+        J = with_singular_values(np.array([1.0, 10.0 ** rng.uniform(-2.0, -0.5)]), 4, rng)
+        rate = rng.normal(size=2)
+        U, sigma, _ = np.linalg.svd(J)
+        found = DampedLeastSquares().resolve(Problem(J, rate, np.zeros(4), dt=0.02))
+        damping, threshold = damping_of_a_step(sigma, U.T @ rate, 0.02)
+        expected = DampedLeastSquares(damping=damping, threshold=threshold)
+        np.testing.assert_allclose(found.u, expected.resolve(Problem(J, rate, np.zeros(4))).u, rtol=1e-10)
+        raised += threshold > 0.05
+        regular = Problem(J, 5.0 * U[:, 0], np.zeros(4), dt=0.02)
+        unraised = DampedLeastSquares().resolve(Problem(J, 5.0 * U[:, 0], np.zeros(4)))
+        np.testing.assert_allclose(DampedLeastSquares().resolve(regular).u, unraised.u, rtol=0, atol=1e-10)
+    assert 5 < raised < 40
 
 
 def test_limits_are_kept_beside_a_singularity(rng: np.random.Generator) -> None:

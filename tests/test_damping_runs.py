@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import nmm
 from nmm import Scenario
@@ -80,46 +82,105 @@ def test_the_scenario_out_of_reach_ends_on_the_singular_line() -> None:
     assert not stopped.complete
 
 
-@pytest.mark.parametrize("resolver", ["rg", "dls"])
+#: The largest accelerations of inputs at the top, and on the whole way, m/s² and rad/s². RG's own are larger
+#: where its block Ja comes near its threshold, at t = 7.6 s, far from the top, before it takes another one.
+STEEPEST = {"rg": (2.1, 13.0), "dls": (0.4, 0.4)}
+
+
+@pytest.mark.parametrize("resolver", STEEPEST)
 def test_over_the_top_with_the_arm_upright(resolver: str) -> None:
-    """Undamped, the inputs jump at the top from one sample to the next; damped, as little as dt is small."""
+    """Undamped, the inputs jump at the top from one sample to the next; damped, they have a derivative there:
+    half of dt is half of the jump."""
     scenario = Scenario.load("unicycle_3r_vertical_line")
     scenario = scenario if resolver == "rg" else scenario.with_resolver("dls")
     jumps = []
-    for dt in (0.01, 0.005):
+    for dt in (0.01, 0.005, 0.0025):
         run = scenario.override("dt", dt).run()
         assert run.outcome == "completed"
         assert run.error_norm[-1] < 1e-6
-        late = run.t > 5.0
+        late, top = run.t > 5.0, np.abs(run.t - 10.0) < 1.5
         assert run.error_norm[late].max() < 0.003  # of 1.6 m
-        assert run.scale[late].min() < 1.0 - 1e-3
-        assert run.scale[run.t > 15.0].min() == 1.0  # and back
-        assert np.abs(run.u).max() < 1.0
+        assert run.scale[top].min() < 1.0 - 1e-3
+        assert run.scale[late & ~top].min() == 1.0  # before, and back
+        assert run.residual[~top].max() < 1e-12
+        assert np.abs(run.u[late]).max() < 1.0
         assert chattering(run.t, run.u, run.robot.u_names) is None
-        switched = np.any(np.diff(run.partition, axis=0) != 0, axis=1)  # RG's own jumps, one far from the top
-        assert switched.sum() <= 1
-        jumps.append(np.abs(np.diff(run.u, axis=0))[~switched & (run.t[:-1] > 2.0)].max())
-    assert jumps[1] < 0.6 * jumps[0]
-    assert jumps[1] < 15.0 * 0.005  # m/s², rad/s²
+        switched = np.any(np.diff(run.partition, axis=0) != 0, axis=1)  # RG's own jumps
+        assert switched.sum() == (1 if resolver == "rg" else 0)
+        assert not np.any(switched & top[:-1])
+        jump = np.abs(np.diff(run.u, axis=0)).max(axis=1)
+        jumps.append([jump[top[:-1]].max(), jump[~switched & (run.t[:-1] > 2.0)].max()])
+        assert np.all(np.array(jumps[-1]) < np.array(STEEPEST[resolver]) * dt)
+    for longer, shorter in itertools.pairwise(jumps):
+        np.testing.assert_allclose(shorter, np.array(longer) / 2.0, rtol=0.02)
     undamped = scenario.with_resolver("pg").run()
     assert np.abs(np.diff(undamped.u, axis=0)).max() > 1.0
 
 
-def test_an_algorithmic_singularity_of_ej() -> None:
-    """The task is done all along; the added task waits where J_e is singular, and is done in the end."""
+def lever(run: nmm.Trajectory) -> NDArray[np.float64]:
+    """det J_e of the scenario: how far the end-effector is ahead of the axle, m."""
+    return np.asarray(0.3 + 0.5 * np.cos(run.q[:, 3]) + 0.3 * np.cos(run.q[:, 3] + run.q[:, 4]))
+
+
+def test_ej_drives_through_an_algorithmic_singularity() -> None:
+    """The task is done all along; the added one gives way for 0.1 s and is done again.
+
+    det J_e changes its sign once, and the platform turns round. Half of dt is half of the largest jump.
+    """
     scenario = Scenario.load("unicycle_2r_algorithmic")
+    jumps = []
+    for dt in (0.01, 0.005, 0.0025):
+        run = scenario.override("dt", dt).run()
+        assert run.outcome == "completed"
+        (said,) = run.warnings
+        assert said == run.summary()["warnings"][0]
+        assert "the added task was not done in" in said
+        assert "and is done again from there on" in said
+        assert run.residual.max() < 1e-12
+        assert run.scale.min() == 1.0
+        expected = run.error_norm[0] * math.exp(-run.t[-1]) + 1e-11 * (dt / 0.005) ** 4
+        assert run.error_norm[-1] <= 1.1 * expected
+        assert np.abs(run.u).max() < 6.0
+        assert chattering(run.t, run.u, run.robot.u_names) is None
+        beside = lever(run)
+        assert np.sum(np.diff(np.sign(beside)) != 0) == 1
+        assert (beside[0], beside[-1]) == (pytest.approx(1.1), pytest.approx(-0.5))
+        through = np.abs(run.t - 5.7) < 0.2
+        assert np.abs(run.q[:, 4]).max() < 0.005  # rad, by which the arm gives way
+        share = np.minimum(run.t / 10.0, 1.0)
+        away = run.q[:, 3] + math.pi * (10.0 * share**3 - 15.0 * share**4 + 6.0 * share**5)
+        assert np.abs(away[through]).max() > 1e-3
+        assert np.abs(away[run.t < 5.5]).max() < 1e-9
+        assert np.abs(away[-1]) < 1e-12
+        assert run.sigma_min.min() > 0.2  # J is far from singular
+        assert run.u[run.t > 15.0, 0].max() < -0.3  # it drives backwards then
+        jumps.append(np.abs(np.diff(run.u, axis=0)).max())
+    for longer, shorter in itertools.pairwise(jumps):
+        assert shorter < 0.6 * longer
+    stopping = scenario.override("resolver.singular", "stop")
+    assert np.abs(stopping.run().u).max() > 40.0
+    stopped = stopping.override("method", "adaptive").run()
+    assert stopped.outcome == "singular"
+    assert "algorithmic singularity" in stopped.message
+
+
+def test_ej_waits_where_the_arm_swings_too_slowly() -> None:
+    """The end-effector drives so fast that the platform, as it turns, carries the arm back across the axle.
+
+    What grows beyond the axle grows as |lever|^(-v / |lever rate|): the power is 3 here, 0.9 in the scenario.
+    The task is done all the same, and the added one in the end, when its reference has come back.
+    """
+    swing = {"kind": "spline", "points": [[0], [2.5], [0]], "times": [0, 10, 20]}
+    changed = {"task.reference.rate": "0.08*pi", "resolver.added_task.0.reference": swing}
+    scenario = Scenario.load("unicycle_2r_algorithmic", changed)
     run = scenario.run()
     assert run.outcome == "completed"
-    assert run.warnings == ()
     assert run.residual.max() < 1e-11
-    assert run.error_norm[-1] <= 1.1 * run.error_norm[0] * math.exp(-run.t[-1]) + 1e-11
-    assert np.abs(run.u).max() < 3.0
+    assert np.abs(run.u).max() < 3.5
     assert chattering(run.t, run.u, run.robot.u_names) is None
-    lever = 0.3 + 0.5 * np.cos(run.q[:, 3]) + 0.3 * np.cos(run.q[:, 3] + run.q[:, 4])
-    assert np.abs(lever).min() < 0.01  # det J_e
-    assert np.sum(np.abs(lever) < 0.02) > 100  # it waits there
-    np.testing.assert_allclose(run.q[-1, 3:], 0.0, atol=1e-3)
-    assert run.sigma_min.min() > 0.1  # J is far from singular
+    assert np.sum(np.abs(lever(run)) < 0.02) > 100  # it waits there
+    assert lever(run).min() > -0.02
+    np.testing.assert_allclose(run.q[-1, 3:], 0.0, atol=1e-9)
     whipped = scenario.override("resolver.singular", "stop").override("method", "adaptive").run()
     assert np.abs(whipped.u).max() > 50.0
 

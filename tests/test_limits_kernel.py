@@ -6,7 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from conditioned import with_singular_values
 from limit_problems import KINDS, Example, examples, largest_scale, nearest, pull, solved, violation
+
+import nmm
+from nmm.resolvers import Problem, ProjectedGradient, Status
 
 #: In the gate; `python -m tests.limit_problems 20000` tries more.
 COUNT = 500
@@ -61,3 +65,36 @@ def test_the_active_set_of_a_step_before_changes_nothing_but_the_time() -> None:
             cold, warm = solved(near), solved(near, found.active.copy())
             assert abs(cold.scale - warm.scale) <= 1e-9
             assert np.abs(cold.u - warm.u).max() <= 1e-7 * (1.0 + np.abs(cold.u).max())
+
+
+@pytest.mark.parametrize("decade", range(3, 9))
+def test_beside_a_singularity_limits_hold_and_the_task_is_scaled(
+    decade: int, rng: np.random.Generator
+) -> None:
+    """Also where cond(J) is beyond 1e7: the answer is no worse than its λ is small."""
+    for s, m in ((2, 4), (3, 5), (6, 10)) * 10:
+        J = with_singular_values(np.array([*np.geomspace(1.0, 0.1, s - 1), 10.0**-decade]), m, rng)
+        rate, u_upper = rng.normal(size=s), rng.uniform(0.3, 1.0, m)
+        given = {"J": J, "rate": rate, "h": 0.3 * rng.normal(size=m)}
+        found = ProjectedGradient(1.0).resolve(Problem(**given, u_lower=-u_upper, u_upper=u_upper))
+        assert found.status is Status.RELAXED
+        target = np.linalg.lstsq(J, rate, rcond=None)[0]
+        example = Example("near singular", J, np.eye(m), -u_upper, u_upper, target)
+        assert abs(found.scale[0] - largest_scale(example)) <= 1e-7
+        assert np.all(np.abs(found.u) <= u_upper)
+        assert np.linalg.norm(J @ found.u - found.scale[0] * rate) <= 1e-9 * (1.0 + np.linalg.norm(rate))
+
+
+def test_an_arm_that_is_all_but_straight_comes_away() -> None:
+    """cond(J) = 1e9: called singular, as prototypes had it at 1e7, the arm would rest for ever."""
+    robot = nmm.load("unicycle_2r", platform="fixed")
+    task = nmm.Task(nmm.Position("ee", "xy"), nmm.Constant([0.55, 0.3]), gain=2.0)
+    errors = []
+    for tolerance in (1e-10, 1e-7):
+        limits = nmm.Limits(velocity={"q1": 1.0, "q2": 1.0})
+        controller = nmm.Controller(robot, task, nmm.ProjectedGradient(tolerance=tolerance), limits=limits)
+        run = nmm.simulate(controller, {"q1": 0.4, "q2": 1e-8}, 6.0, 0.01, method="zoh")
+        assert np.abs(run.u).max() <= 1.0
+        errors.append(run.error_norm[-1])
+    assert errors[0] < 1e-4
+    assert errors[1] > 0.4

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import twin
-from numpy.typing import NDArray
+from conditioned import Array, each_shape
 
 from nmm.errors import InputError
 from nmm.resolvers import (
@@ -22,11 +22,6 @@ from nmm.resolvers import (
     Status,
 )
 from nmm.resolvers.partitions import COLUMNS, HELD, MODE, OVERDUE, PartitionState
-
-Array = NDArray[np.float64]
-
-SHAPES = [(1, 1), (1, 4), (2, 4), (3, 3), (3, 4), (3, 5), (5, 6), (6, 9)]
-each_shape = pytest.mark.parametrize("shape", SHAPES, ids=str)
 
 
 def measures(J: Array) -> dict[tuple[int, ...], float]:

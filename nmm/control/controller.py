@@ -30,7 +30,7 @@ from nmm.functions.program import BESIDE, Program
 from nmm.functions.tasks.task import Stack, Task
 from nmm.kernels.compiled import checked_by_caller
 from nmm.kernels.memory import views
-from nmm.resolvers.answer import Status, unanswered
+from nmm.resolvers.answer import Status, added_residual, unanswered
 from nmm.resolvers.base import Resolver
 from nmm.resolvers.limited import instead
 from nmm.resolvers.problem import Problem
@@ -355,6 +355,7 @@ class Controller:
             retreats=0 if self.backing is None else self.backing.count,
             step_size=1.0 if self.step_size is None else self.step_size.share,
             partition=self.state.partition(len(self.rows)),
+            added_residual=added_residual(problem, answer.u),
         )
 
     def velocity(self, t: float, q: ArrayLike) -> Array:

@@ -151,3 +151,11 @@ def certify(problem: ProblemArrays, answer: AnswerArrays) -> None:
     for i in range(problem.rate.shape[0]):
         square += problem.rate[i] * problem.rate[i]
     answer.status[()] = certified(residual, rounding, math.sqrt(square))
+
+
+def added_residual(problem: ProblemArrays, u: Array) -> float:
+    """‖J_added u - rate_added‖, 0 where rounding hides it and where there is no added task."""
+    if not len(problem.added_rate):
+        return 0.0
+    missed = float(np.linalg.norm(problem.added_J @ u - problem.added_rate))
+    return missed if missed > EXACT * (1.0 + float(np.linalg.norm(problem.added_rate))) else 0.0

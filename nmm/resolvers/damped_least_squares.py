@@ -9,13 +9,13 @@ import numpy as np
 from nmm.arrays import Array, Integers, positive
 from nmm.errors import expect_known
 from nmm.kernels.compiled import Kernel, compiled, kernel, scratch, view
-from nmm.kernels.damping import BELOW, LARGEST, damped_solution, damping_squared, resolved
+from nmm.kernels.damping import BELOW, LARGEST, damped_solution
 from nmm.resolvers.answer import INEXACT, RELAXED, AnswerArrays, certify
 from nmm.resolvers.base import RESOLVER, Resolver, Setup, StepRule, step_rule
 from nmm.resolvers.limited import limit, within
 from nmm.resolvers.problem import Dimensions, ProblemArrays
 from nmm.resolvers.projected_gradient import unweigh, weigh
-from nmm.resolvers.weights import Weights, weight_matrix
+from nmm.resolvers.weights import Weights, metric_root
 
 #: Numbers: α, λ, ε and, with weights, C row after row. Options: which law, in the order of `Damping`.
 ALPHA, DAMPING, THRESHOLD, C = 0, 1, 2, 3
@@ -58,8 +58,8 @@ def damp(
                 J[i, j] = problem.J[i, j]
     else:
         weigh(problem, alpha, W, J, u0)
-    damping, threshold = resolved(problem.rate, problem.row_scales, problem.dt[()], damping, threshold)
-    share, least = damped_solution(J, problem.row_scales, problem.rate, u0, law, damping, threshold, solution)
+    scales, dt = problem.row_scales, problem.dt[()]
+    share, least, damped = damped_solution(J, scales, problem.rate, u0, law, damping, threshold, dt, solution)
     if plain:
         for j in range(m):
             answer.u[j] = solution[j]
@@ -67,19 +67,19 @@ def damp(
         unweigh(W, solution, answer.u)
     answer.measure[()] = least
     certify(problem, answer)
-    if answer.status[()] == INEXACT and damping_squared(law, least, damping, threshold) > 0.0:
+    if answer.status[()] == INEXACT and damped:
         answer.status[()] = RELAXED
         for level in range(answer.scale.shape[0]):
             answer.scale[level] = share
 
 
 class DampedLeastSquares(Resolver):
-    """The least of ‖J u - rate‖² + λ² ‖u - u0‖² with u0 = -α h: the projected gradient where λ = 0.
+    """The least of ‖J u - rate‖² + λ² ‖u‖², and -α h in J's null space: the projected gradient where λ = 0.
 
     Rows are taken in their natural scales, weights as the projected gradient takes them. Singular
     configurations stop no run: there the inputs stay bounded, and the task gets the share of its rate
-    that the answer's scale says. Where J is damped it feels the objective, too: the null space is damped
-    with it, so that u is continuous where the rank changes.
+    that the answer's scale says. The objective is felt by the task only in directions with σ below the
+    threshold, which become part of the null space as σ falls to 0: so u is continuous where the rank changes.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ class DampedLeastSquares(Resolver):
         Hanafusa 1986, with σ_min for the manipulability); "constant", all by λ everywhere (Wampler 1986)
     damping : the largest λ > 0
     threshold : ε > 0; where all σ are as large, nothing is damped and the answer is the projected
-        gradient's; "constant" does not look at it
+        gradient's ("constant" damps the rate everywhere, and keeps the objective out of the task from ε on)
     weights : None; m positive numbers; a mapping from names of inputs or of their groups ("platform",
         "arm"), 1 for the rest: a large weight spares the input; or a symmetric positive definite
         (m, m) matrix
@@ -124,8 +124,6 @@ class DampedLeastSquares(Resolver):
 
     def setup(self, dimensions: Dimensions) -> Setup:
         self.check(dimensions)
-        C = np.zeros(0)
-        if self.weights is not None:
-            C = np.linalg.inv(np.linalg.cholesky(weight_matrix(self.weights, dimensions))).T
-        numbers = np.array([self.alpha, self.damping, self.threshold, *C.ravel()])
+        C = metric_root(self.weights, dimensions)
+        numbers = np.array([self.alpha, self.damping, self.threshold, *C])
         return Setup(numbers, np.array([get_args(Damping).index(self.law)], dtype=np.int64))

@@ -9,7 +9,7 @@ import numpy as np
 from nmm.arrays import Array, Integers, positive
 from nmm.errors import InputError, expect_known
 from nmm.kernels.compiled import Kernel, clear, compiled, integer_scratch, kernel, scratch, view
-from nmm.kernels.damping import BELOW, DIRECTIONS, LARGEST, damped_solution, resolved
+from nmm.kernels.damping import BELOW, DIRECTIONS, LARGEST, damped_solution
 from nmm.kernels.linear_algebra import closest_solution, eliminate, orthonormal_rows
 from nmm.resolvers.answer import RELAXED, SINGULAR_J, SINGULAR_JE, SOLVED, AnswerArrays, certify
 from nmm.resolvers.base import RESOLVER, Resolver, Setup
@@ -85,9 +85,9 @@ def damped_beside(problem: ProblemArrays, tolerance: float, answer: AnswerArrays
                 overlap += A[i, j] * Q[row, j]
             for j in range(m):
                 A[i, j] -= overlap * Q[row, j]
-    damping, threshold = resolved(b, problem.added_row_scales, problem.dt[()], LARGEST, BELOW)
-    _, least = damped_solution(A, problem.added_row_scales, b, u0, DIRECTIONS, damping, threshold, free)
-    if not least < threshold:
+    scales, dt = problem.added_row_scales, problem.dt[()]
+    _, least, damped = damped_solution(A, scales, b, u0, DIRECTIONS, LARGEST, BELOW, dt, free)
+    if not damped:
         return False
     for j in range(m):
         u[j] += free[j]

@@ -13,7 +13,7 @@ from nmm.resolvers.answer import SINGULAR_J, AnswerArrays, certify
 from nmm.resolvers.base import NO_OPTIONS, RESOLVER, Resolver, Setup, StepRule, step_rule
 from nmm.resolvers.limited import limit, within
 from nmm.resolvers.problem import Dimensions, ProblemArrays
-from nmm.resolvers.weights import Weights, weight_matrix
+from nmm.resolvers.weights import Weights, metric_root
 
 #: Numbers: α, the tolerance and, with weights, C row after row.
 ALPHA, TOLERANCE, C = 0, 1, 2
@@ -123,7 +123,5 @@ class ProjectedGradient(Resolver):
 
     def setup(self, dimensions: Dimensions) -> Setup:
         self.check(dimensions)
-        C = np.zeros(0)
-        if self.weights is not None:
-            C = np.linalg.inv(np.linalg.cholesky(weight_matrix(self.weights, dimensions))).T
-        return Setup(np.array([self.alpha, self.tolerance, *C.ravel()]), NO_OPTIONS)
+        C = metric_root(self.weights, dimensions)
+        return Setup(np.array([self.alpha, self.tolerance, *C]), NO_OPTIONS)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import ClassVar, Literal
 
@@ -10,7 +11,7 @@ import numpy as np
 from nmm.arrays import Array, Integers, positive
 from nmm.errors import InputError, expect_known
 from nmm.kernels.compiled import Kernel, clear, compiled, kernel, scratch, view
-from nmm.kernels.damping import BELOW, DIRECTIONS, LARGEST, resolved
+from nmm.kernels.damping import BELOW, DIRECTIONS, LARGEST, step_threshold
 from nmm.resolvers.answer import INEXACT, RELAXED, SINGULAR_J, SINGULAR_JA, AnswerArrays, certify
 from nmm.resolvers.base import RESOLVER, Resolver, Setup, StepRule, step_rule
 from nmm.resolvers.damped_least_squares import damp
@@ -110,7 +111,10 @@ def reduced_gradient(
 @compiled
 def damped_share(problem: ProblemArrays, regular: float) -> float:
     """How much of the answer is the damped one: none of it for a Ja as regular as ε, all for half of that."""
-    _, threshold = resolved(problem.rate, problem.row_scales, problem.dt[()], LARGEST, BELOW)
+    square = 0.0
+    for i in range(problem.rate.shape[0]):
+        square += (problem.rate[i] / problem.row_scales[i]) ** 2
+    threshold = step_threshold(math.sqrt(square), problem.dt[()], BELOW)
     return min(max(2.0 * (1.0 - regular / threshold), 0.0), 1.0)
 
 

@@ -35,6 +35,13 @@ def weight_matrix(weights: Weights, dimensions: Dimensions) -> Array:
     return W
 
 
+def metric_root(weights: Weights | None, dimensions: Dimensions) -> Array:
+    """C (m m,), row after row, with C Cᵀ = W⁻¹: ũ = C⁻¹ u has the norm sqrt(uᵀ W u); (0,) without weights."""
+    if weights is None:
+        return np.zeros(0)
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(weight_matrix(weights, dimensions))).T).ravel()
+
+
 def weight_diagonal(weights: Weights, dimensions: Dimensions) -> Array:
     """The diagonal of W, (m,); `InputError` also for a W that is not diagonal, which couples the inputs."""
     W = weight_matrix(weights, dimensions)

@@ -50,6 +50,7 @@ class Recorder:
         self._unanswered = np.zeros(count, dtype=bool)
         self._retreats = np.zeros(count, dtype=np.int64)
         self._step_size = np.ones(count)
+        self._added = np.zeros(count)
         self._J = np.empty((count, s, robot.n_u))
         self._partition = np.empty((count, s), dtype=np.int64)
         self._count = 0
@@ -127,6 +128,7 @@ class Recorder:
         self._step_size[k] = sample.step_size
         self._unanswered[k] = sample.status is Status.FALLBACK
         self._retreats[k] = sample.retreats
+        self._added[k] = sample.added_residual
         self._beyond.pop(k, None)
         if sample.excess > 0.0:
             self._beyond[k] = beyond = self._controller.beyond()
@@ -166,6 +168,14 @@ class Recorder:
         if len(backed_off):
             at = ", ".join(f"{t:.3g} s" for t in backed_off)
             self.warnings.append(f"the error stalled and the robot backed off, at t = {at}")
+        added = self._added[: len(self)]
+        if np.any(added > 0.0):
+            missed = times[added > 0.0]
+            back = ", and is done again from there on" if missed[-1] < self.reached else ""
+            self.warnings.append(
+                f"the added task was not done in {len(missed)} samples, from t = {missed[0]:.4g} to "
+                f"{missed[-1]:.4g} s{back}: its rate was missed by up to {added.max():.3g} a second"
+            )
         unanswered = times[self._unanswered[: len(self)]]
         if len(unanswered):
             self.warnings.append(
