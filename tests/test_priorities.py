@@ -7,6 +7,7 @@ import pytest
 from level_problems import Off, compared, problems
 
 import nmm
+from nmm.resolvers.answer import Status
 from nmm.resolvers.problem import Problem
 
 RESOLVERS = {
@@ -47,3 +48,52 @@ def test_a_level_below_changes_nothing_above(name: str) -> None:
         np.testing.assert_allclose(rates[1][:first], rates[0], rtol=0, atol=1e-9)
         np.testing.assert_allclose(rates[2][:second], rates[1], rtol=0, atol=1e-9)
     assert scaled > 30
+
+
+def in_turn(problem: Problem, u0: np.ndarray) -> np.ndarray:
+    """Each level by its pseudoinverse in the null space of those above; the objective in that of all."""
+    J, rate, first = np.asarray(problem.J), np.asarray(problem.rate), 0
+    u, P = np.zeros(J.shape[1]), np.eye(J.shape[1])
+    for rows in problem.levels or ():
+        A = J[first : first + rows]
+        inverse = np.linalg.pinv(A @ P, rcond=1e-9)
+        u = u + inverse @ (rate[first : first + rows] - A @ u)
+        P = P - inverse @ (A @ P)
+        first += rows
+    return u + P @ u0
+
+
+@pytest.mark.parametrize("name", ["pg", "rg", "dls"])
+def test_levels_that_contradict_each_other_get_what_is_left(name: str) -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        J, rate, h = rng.standard_normal((6, 8)), rng.standard_normal(6), rng.standard_normal(8)
+        J[3], J[5] = J[0] + J[1], 2.0 * J[4]
+        problem = Problem(J, rate, h, levels=(2, 2, 2))
+        answer = RESOLVERS[name].resolve(problem)
+        np.testing.assert_allclose(answer.u, in_turn(problem, -0.5 * h), rtol=0, atol=1e-9)
+        assert answer.status is Status.RELAXED
+        assert answer.scale[0] == 1.0
+        assert np.all(answer.scale[1:] < 1.0)
+
+
+@pytest.mark.parametrize("name", ["pg", "dls"])
+def test_levels_below_may_have_more_rows_than_there_are_inputs(name: str) -> None:
+    rng = np.random.default_rng(6)
+    J, rate, h = rng.standard_normal((7, 5)), rng.standard_normal(7), rng.standard_normal(5)
+    answer = RESOLVERS[name].resolve(Problem(J, rate, h, levels=(3, 4)))
+    np.testing.assert_allclose(J[:3] @ answer.u, rate[:3], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(answer.u, in_turn(Problem(J, rate, h, levels=(3, 4)), -0.5 * h), atol=1e-8)
+    with pytest.raises(nmm.InputError, match="first level: 6 rows for 5 inputs"):
+        RESOLVERS[name].resolve(Problem(J, rate, h, levels=(6, 1)))
+    with pytest.raises(nmm.InputError, match="7 rows for 5 inputs"):
+        RESOLVERS["rg"].resolve(Problem(J, rate, h, levels=(3, 4)))
+
+
+@pytest.mark.parametrize("priority", [0, -1, 1.5, True])
+def test_a_priority_is_a_whole_number_above_0(priority: float) -> None:
+    function = nmm.Position("ee", axes="xy")
+    with pytest.raises(nmm.InputError, match="priority: expected a whole number above 0"):
+        nmm.Task(function, nmm.Constant([1.0, 0.0]), priority=priority)  # type: ignore[arg-type]  # bad input
+    with pytest.raises(nmm.InputError, match="priority: expected a whole number above 0"):
+        nmm.Bound(function, upper=1.0, priority=priority)  # type: ignore[arg-type]  # bad input

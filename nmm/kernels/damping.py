@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from nmm.arrays import Array
+from nmm.arrays import Array, Integers
 from nmm.kernels.compiled import compiled, scratch
 from nmm.kernels.singular_values import singular_rows
 
@@ -14,6 +14,8 @@ CONSTANT, VARIABLE, DIRECTIONS = 0, 1, 2
 #: λ and ε when nothing else is said. With λ = ε / √2 the inputs that do the task are at most ‖b‖ / ε (b is
 #: the rate, rows in their scales): damped, they are no larger than undamped at the threshold.
 LARGEST, BELOW = 0.05 / math.sqrt(2.0), 0.05
+#: A singular value below this is none: its direction is left to the levels below.
+NOTHING = 1e-9
 
 
 @compiled
@@ -32,50 +34,80 @@ def damped_solution(
     J: Array,
     row_scales: Array,
     rate: Array,
+    ends: Integers,
     u0: Array,
     mode: int,
     damping: float,
     threshold: float,
     dt: float,
     u: Array,
-) -> tuple[float, float, bool]:
+    shares: Array,
+) -> tuple[float, bool]:
     """u = Σ v_i σ_i / (σ_i² + λ_i²) u_iᵀ b + (I - Σ w_i v_i v_iᵀ) u0, shape (m,), where A = Σ u_i σ_i v_iᵀ.
 
     A and b are J and rate over row_scales; the first part is the least of ‖A u - b‖² + Σ λ_i² (v_iᵀ u)². The
     second is u0 in A's null space: w_i = 1 - (1 - (σ_i / ε)²)² for σ_i < ε, 1 from there on. So no damping
     lets the objective into the task, and u is continuous where a σ_i vanishes. λ and ε are `resolved` for dt,
     but for the ε in w_i.
-    Returns the share of b that is given, the objective's part apart, Σ σ_i² / (σ_i² + λ_i²) (u_iᵀ b)² / ‖b‖²;
-    the least σ; and whether anything is damped.
+
+    ends (levels,): the row after the last of each level of priority. A level below is solved in the same way
+    in what those above leave: A less its part along all their v_i, damped or not, b less what they do already
+    (Nakamura, Hanafusa, Yoshikawa 1987; Siciliano, Slotine 1991). No level changes what those above get.
+    Writes of each level the share of b that is given, the objective's part apart,
+    Σ σ_i² / (σ_i² + λ_i²) (u_iᵀ b)² / ‖b‖², into shares (levels,). Returns the least σ, and whether anything
+    is damped.
     """
-    s, m = J.shape
-    A, R, wanted = scratch((s, m)), scratch((s, s)), scratch(s)
-    for i in range(s):
-        for j in range(m):
-            A[i, j] = J[i, j] / row_scales[i]
-    least, _ = singular_rows(A, R)
+    m = J.shape[1]
+    done, above = scratch(m), scratch((m, m))
+    taken, first = 0, 0
+    smallest, any_damped = math.inf, False
     for j in range(m):
         u[j] = u0[j]
-    for i in range(s):
-        wanted[i] = 0.0
-        for k in range(s):
-            wanted[i] += R[i, k] * rate[k] / row_scales[k]
-    damping, limit = resolved(A, wanted, dt, damping, threshold)
-    asked, given = 0.0, 0.0
-    for i in range(s):
-        square, along = norm_squared(A, i), 0.0
-        for j in range(m):
-            along += A[i, j] * u0[j]
-        sigma = least if mode == VARIABLE else math.sqrt(square)
-        bottom = square + damping_squared(mode, sigma, damping, limit)
-        asked += wanted[i] * wanted[i]
-        given += square / bottom * wanted[i] * wanted[i]
-        share = min(square / (threshold * threshold), 1.0)
-        kept = share * (2.0 - share) / square if square > 0.0 else 0.0
-        for j in range(m):
-            u[j] += A[i, j] * (wanted[i] / bottom - kept * along)
-    damped = damping_squared(mode, least, damping, limit) > 0.0
-    return given / asked if asked > 0.0 else 1.0, least, damped
+        done[j] = 0.0
+    for level in range(ends.shape[0]):
+        s = ends[level] - first
+        A, R, b, wanted = scratch((s, m)), scratch((s, s)), scratch(s), scratch(s)
+        for i in range(s):
+            b[i] = rate[first + i] / row_scales[first + i]
+            for j in range(m):
+                A[i, j] = J[first + i, j] / row_scales[first + i]
+                b[i] -= A[i, j] * done[j]
+            for _ in range(2):  # the second time for what rounding left
+                for k in range(taken):
+                    overlap = 0.0
+                    for j in range(m):
+                        overlap += A[i, j] * above[k, j]
+                    for j in range(m):
+                        A[i, j] -= overlap * above[k, j]
+        least, _ = singular_rows(A, R)
+        for i in range(s):
+            wanted[i] = 0.0
+            for k in range(s):
+                wanted[i] += R[i, k] * b[k]
+        largest, limit = resolved(A, wanted, dt, damping, threshold)
+        asked, given = 0.0, 0.0
+        for i in range(s):
+            square, along = norm_squared(A, i), 0.0
+            for j in range(m):
+                along += A[i, j] * u0[j]
+            sigma = least if mode == VARIABLE else math.sqrt(square)
+            bottom = square + damping_squared(mode, sigma, largest, limit)
+            asked += wanted[i] * wanted[i]
+            given += square / bottom * wanted[i] * wanted[i]
+            share = min(square / (threshold * threshold), 1.0)
+            kept = share * (2.0 - share) / square if square > 0.0 else 0.0
+            for j in range(m):
+                done[j] += A[i, j] * wanted[i] / bottom
+                u[j] += A[i, j] * (wanted[i] / bottom - kept * along)
+            if square > NOTHING * NOTHING and taken < m:
+                for j in range(m):
+                    above[taken, j] = A[i, j] / math.sqrt(square)
+                taken += 1
+        shares[level] = given / asked if asked > 0.0 else 1.0
+        any_damped = any_damped or damping_squared(mode, least, largest, limit) > 0.0
+        smallest = min(smallest, least)
+        first = ends[level]
+    return smallest, any_damped
 
 
 @compiled

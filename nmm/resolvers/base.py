@@ -83,13 +83,15 @@ class Resolver(ABC):
         """What is left to do after the kernel, in Python: nothing, unless a subclass says otherwise."""
         return
 
-    def check(self, dimensions: Dimensions) -> None:
-        """`InputError` when the task has more rows than there are inputs."""
+    def check(self, dimensions: Dimensions, *, all_levels: bool = False) -> None:
+        """`InputError` when the task's first level, or all of them, have more rows than there are inputs."""
         if dimensions.s < 1:
             raise InputError("task: expected at least one row")
-        if dimensions.s > dimensions.m:
+        rows = dimensions.s if all_levels or not dimensions.levels else dimensions.levels[0]
+        if rows > dimensions.m:
+            which = "task" if rows == dimensions.s else "task: first level"
             raise InputError(
-                f"task: {dimensions.s} rows for {dimensions.m} inputs ({', '.join(dimensions.inputs)}); "
+                f"{which}: {rows} rows for {dimensions.m} inputs ({', '.join(dimensions.inputs)}); "
                 f"expected at most {dimensions.m}"
             )
 

@@ -8,13 +8,13 @@ import numpy as np
 
 from nmm.arrays import Array, Integers, positive
 from nmm.errors import expect_known
-from nmm.kernels.compiled import Kernel, compiled, kernel, scratch, view
-from nmm.kernels.damping import BELOW, LARGEST, damped_solution
-from nmm.resolvers.answer import INEXACT, RELAXED, AnswerArrays, certify
+from nmm.kernels.compiled import Kernel, kernel, view
+from nmm.kernels.damping import BELOW, LARGEST
+from nmm.resolvers.answer import AnswerArrays
 from nmm.resolvers.base import RESOLVER, Resolver, Setup, StepRule, step_rule
+from nmm.resolvers.damped import damp
 from nmm.resolvers.limited import limit, within
 from nmm.resolvers.problem import Dimensions, ProblemArrays
-from nmm.resolvers.projected_gradient import unweigh, weigh
 from nmm.resolvers.weights import Weights, metric_root
 
 #: Numbers: α, λ, ε and, with weights, C row after row. Options: which law, in the order of `Damping`.
@@ -35,42 +35,6 @@ def damped_least_squares(
     damp(problem, numbers[ALPHA], options[LAW], numbers[DAMPING], numbers[THRESHOLD], W, answer)
     if not within(problem, answer.u):
         limit(problem, W, answer)
-
-
-@compiled
-def damp(
-    problem: ProblemArrays,
-    alpha: float,
-    law: int,
-    damping: float,
-    threshold: float,
-    W: Array,
-    answer: AnswerArrays,
-) -> None:
-    """u, measure, residual, status and scale; W holds C (m, m), or (0, 0) where every weight is 1."""
-    s, m = problem.J.shape
-    plain = W.shape[0] == 0
-    J, u0, solution = scratch((s, m)), scratch(m), scratch(m)
-    if plain:
-        for j in range(m):
-            u0[j] = -alpha * problem.h[j]
-            for i in range(s):
-                J[i, j] = problem.J[i, j]
-    else:
-        weigh(problem, alpha, W, J, u0)
-    scales, dt = problem.row_scales, problem.dt[()]
-    share, least, damped = damped_solution(J, scales, problem.rate, u0, law, damping, threshold, dt, solution)
-    if plain:
-        for j in range(m):
-            answer.u[j] = solution[j]
-    else:
-        unweigh(W, solution, answer.u)
-    answer.measure[()] = least
-    certify(problem, answer)
-    if answer.status[()] == INEXACT and damped:
-        answer.status[()] = RELAXED
-        for level in range(answer.scale.shape[0]):
-            answer.scale[level] = share
 
 
 class DampedLeastSquares(Resolver):

@@ -86,7 +86,9 @@ def damped_beside(problem: ProblemArrays, tolerance: float, answer: AnswerArrays
             for j in range(m):
                 A[i, j] -= overlap * Q[row, j]
     scales, dt = problem.added_row_scales, problem.dt[()]
-    _, least, damped = damped_solution(A, scales, b, u0, DIRECTIONS, LARGEST, BELOW, dt, free)
+    ends, shares = integer_scratch(1), scratch(1)
+    ends[0] = k
+    least, damped = damped_solution(A, scales, b, ends, u0, DIRECTIONS, LARGEST, BELOW, dt, free, shares)
     if not damped:
         return False
     for j in range(m):
@@ -143,7 +145,7 @@ class ExtendedJacobian(Resolver):
         return extended_jacobian
 
     def setup(self, dimensions: Dimensions) -> Setup:
-        self.check(dimensions)
+        self.check(dimensions, all_levels=True)
         free = dimensions.m - dimensions.s
         if dimensions.k != free:
             raise InputError(

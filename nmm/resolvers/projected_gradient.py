@@ -7,10 +7,12 @@ from typing import ClassVar
 import numpy as np
 
 from nmm.arrays import Array, Integers, positive
-from nmm.kernels.compiled import Kernel, compiled, integer_scratch, kernel, scratch, view
+from nmm.kernels.compiled import Kernel, integer_scratch, kernel, scratch, view
+from nmm.kernels.damping import BELOW, DIRECTIONS, LARGEST
 from nmm.kernels.linear_algebra import closest_solution, orthonormal_rows
 from nmm.resolvers.answer import SINGULAR_J, AnswerArrays, certify
 from nmm.resolvers.base import NO_OPTIONS, RESOLVER, Resolver, Setup, StepRule, step_rule
+from nmm.resolvers.damped import damp, unweigh, weigh
 from nmm.resolvers.limited import limit, within
 from nmm.resolvers.problem import Dimensions, ProblemArrays
 from nmm.resolvers.weights import Weights, metric_root
@@ -26,11 +28,19 @@ def projected_gradient(
     """u = J⁺ rate - α (I - J⁺ J) h, with J⁺ J = Qᵀ Q from J's orthonormal rows.
 
     With weights, in the coordinates ũ = C⁻¹ u in which the weighted norm is the Euclidean one; that is
-    the metric, too, in which limits keep u near to it.
+    the metric, too, in which limits keep u near to it. With levels of priority J may lose rank, as the levels
+    may contradict each other: directions that do are damped.
     """
     J, h, u = problem.J, problem.h, answer.u
     s, m = J.shape
     alpha = numbers[ALPHA]
+    if problem.ends.shape[0] > 1:
+        plain = numbers.shape[0] == C
+        metric = view(numbers, 0 if plain else C, (0, 0) if plain else (m, m))
+        damp(problem, alpha, DIRECTIONS, LARGEST, BELOW, metric, answer)
+        if not within(problem, u):
+            limit(problem, metric, answer)
+        return
     order = integer_scratch(s)
     L = scratch((s, s))
     Q = scratch((s, m))
@@ -58,29 +68,6 @@ def projected_gradient(
     if not within(problem, u):
         plain = numbers.shape[0] == C
         limit(problem, view(numbers, 0 if plain else C, (0, 0) if plain else (m, m)), answer)
-
-
-@compiled
-def weigh(problem: ProblemArrays, alpha: float, W: Array, weighted_J: Array, u0: Array) -> None:
-    """J C and u0 = -α Cᵀ h, in ũ = C⁻¹ u, in which the weighted norm is the Euclidean one; W holds C."""
-    s, m = problem.J.shape
-    for j in range(m):
-        u0[j] = 0.0
-        for i in range(s):
-            weighted_J[i, j] = 0.0
-        for k in range(m):
-            u0[j] -= alpha * W[k, j] * problem.h[k]
-            for i in range(s):
-                weighted_J[i, j] += problem.J[i, k] * W[k, j]
-
-
-@compiled
-def unweigh(W: Array, solution: Array, u: Array) -> None:
-    """u = C ũ."""
-    for j in range(u.shape[0]):
-        u[j] = 0.0
-        for k in range(u.shape[0]):
-            u[j] += W[j, k] * solution[k]
 
 
 class ProjectedGradient(Resolver):

@@ -14,7 +14,7 @@ from nmm.kernels.compiled import Kernel, clear, compiled, kernel, scratch, view
 from nmm.kernels.damping import BELOW, DIRECTIONS, LARGEST, step_threshold
 from nmm.resolvers.answer import INEXACT, RELAXED, SINGULAR_J, SINGULAR_JA, AnswerArrays, certify
 from nmm.resolvers.base import RESOLVER, Resolver, Setup, StepRule, step_rule
-from nmm.resolvers.damped_least_squares import damp
+from nmm.resolvers.damped import damp
 from nmm.resolvers.limited import limit, within
 from nmm.resolvers.partitions import (
     COLUMNS,
@@ -288,10 +288,11 @@ class ReducedGradient(Resolver):
         return reduced_gradient
 
     def setup(self, dimensions: Dimensions) -> Setup:
-        self.check(dimensions)
+        self.check(dimensions, all_levels=True)
         candidates = candidate_columns(self.partitions, dimensions)
         c = np.zeros(0) if self.weights is None else weight_diagonal(self.weights, dimensions) ** -0.5
-        options = [self.automatic, self.singular == "damped", *candidates]
+        damped = self.singular == "damped" or len(dimensions.levels) > 1  # levels may contradict each other
+        options = [self.automatic, damped, *candidates]
         numbers = np.array([self.alpha, self.threshold, self.tolerance, *c])
         return Setup(numbers, np.array(options, dtype=np.int64))
 

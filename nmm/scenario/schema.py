@@ -9,6 +9,7 @@ from pydantic import BeforeValidator, Field
 
 from nmm.control.controller import Controller
 from nmm.errors import InputError
+from nmm.functions.tasks.task import Stack
 from nmm.kinds import RESOLVERS
 from nmm.robots.robot import Robot
 from nmm.scenario.functions import REFERENCE_PARTS
@@ -83,10 +84,14 @@ class ScenarioPart(Part):
             robot.check_limits(robot.q(self.q0), come_back=come_back)
         with at("task"):
             task = build_tasks(self.task, robot)
-            s = sum(len(item.rows(robot)) for item in task)
-            if s > robot.n_u:
+            levels = Stack.of(task).levels(robot)
+            s, first = sum(levels), levels[0]
+            if first > robot.n_u:
                 names = ", ".join(robot.u_names)
-                raise InputError(f"expected at most {robot.n_u} rows, as many as inputs ({names}), got {s}")
+                of = "" if len(levels) == 1 else " in the first level of priority"
+                raise InputError(
+                    f"expected at most {robot.n_u} rows{of}, as many as inputs ({names}), got {first}"
+                )
         with at("objective"):
             objective = build_objective(self.objective, robot)
         with at("limits"):
