@@ -109,6 +109,31 @@ def test_a_retreat_leaves_a_stall_and_keeps_limits() -> None:
     )
 
 
+@pytest.mark.parametrize("limits", [None, nmm.Limits({"platform": 0.5, "arm": 0.4}, acceleration=5.0)])
+def test_a_retreat_is_a_samples_whatever_the_method(limits: nmm.Limits | None) -> None:
+    """Stages between two samples neither count as samples nor go after the target meanwhile."""
+
+    def run(method: str) -> nmm.Trajectory:
+        there = nmm.Controller(
+            ROBOT,
+            nmm.Task(nmm.Position("ee"), [1.0, 0.0, 9.0]),
+            nmm.DampedLeastSquares(),
+            limits=limits,
+            retreat=nmm.Retreat(durations=[0.4]),
+        )
+        return nmm.simulate(there, Q0, 4.0, DT, method)
+
+    held, staged = run("zoh"), run("rk4")
+    backed = np.flatnonzero(held.scale[:, 0] == 0.0)
+    first = backed[: np.argmax(np.append(np.diff(backed) > 1, True)) + 1]
+    np.testing.assert_array_equal(
+        staged.scale[: first[-1] + 1, 0] == 0.0, held.scale[: first[-1] + 1, 0] == 0.0
+    )
+    moved = [one.q[first[-1] + 1] - one.q[first[0]] for one in (held, staged)]
+    assert np.linalg.norm(moved[1]) > 0.1
+    np.testing.assert_allclose(moved[1], moved[0], atol=0.02)
+
+
 @pytest.mark.parametrize(
     ("made", "text"),
     [
