@@ -143,6 +143,9 @@ def test_a_retreat_is_a_samples_whatever_the_method(limits: nmm.Limits | None) -
         (lambda: nmm.Goal(m=-1.0), "goal: m: expected a number above 0"),
         (lambda: nmm.Retreat(progress=1.0), "retreat: progress: expected below 1"),
         (lambda: nmm.Retreat(durations=()), "retreat: durations"),
+        (lambda: nmm.Retreat(durations=0.0), "retreat: durations: expected a number above 0"),
+        (lambda: nmm.Retreat(durations="long"), "retreat: durations: expected"),  # type: ignore[arg-type]
+        (lambda: nmm.Retreat(goal=0.01), "retreat: goal: expected a Goal, got 0.01"),  # type: ignore[arg-type]
         (lambda: controller(retreat=nmm.Retreat(posture={"q9": 1.0})), "unknown coordinate 'q9'"),
     ],
 )
