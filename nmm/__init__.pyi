@@ -1,3 +1,7 @@
+from . import analysis as analysis
+from . import figures as figures
+from . import folders as folders
+from . import playback as playback
 from .control.controller import Controller as Controller
 from .control.goal import Goal as Goal
 from .control.limited_function import Bound as Bound

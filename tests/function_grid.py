@@ -158,6 +158,7 @@ def _spatial_tasks() -> Iterator[Entry]:
     yield Entry("distance between frames", Distance("base_footprint", "ee"))
     for axes in ("xyz", "zx"):
         yield Entry(f"centre of mass {axes}", CenterOfMass(axes))
+        yield Entry(f"centre of mass {axes} in a frame", CenterOfMass(axes, "link1"))
 
 
 def _references() -> Iterator[Entry]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import re
+import subprocess
 import sys
 import tomllib
 from pathlib import Path
@@ -129,6 +130,12 @@ def test_every_public_name_is_documented() -> None:
         thing = getattr(nmm, name)
         if callable(thing):
             assert thing.__doc__, name
+
+
+@pytest.mark.parametrize("room", ["analysis", "figures", "folders", "playback"])
+def test_rooms_that_the_docs_speak_of_need_no_import_of_their_own(room: str) -> None:
+    """`import nmm` is enough for `nmm.figures.limits(run)`: asked in a process that has imported nothing."""
+    subprocess.run([sys.executable, "-c", f"import nmm; nmm.{room}.__name__"], check=True)
 
 
 def test_the_errors_have_one_root() -> None:

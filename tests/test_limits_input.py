@@ -47,8 +47,12 @@ def bound(*given: object, **more: object) -> Callable[[], object]:
         (on(bounds=3), "bounds: expected a Bound, or several, got 3"),
         (on(bounds=[TIP]), "bounds: expected a Bound, or several"),
         (bound(), "bound: expected lower, upper or both"),
-        (bound(1, 0), "is above upper"),
-        (bound([0, 0, 0]), r"bound: expected a number or 2 \(ee.x, ee.y\), got lower"),
+        (bound(1, 0), "bound: lower 1 is above upper 0"),
+        (bound([0, 1], 0, name="wall"), r"bound wall: lower \[0, 1\] is above upper 0"),
+        (
+            bound([0, 0, 0]),
+            r"bound: expected a number or 2 \(ee.x, ee.y\), got lower \[0, 0, 0\] and upper inf",
+        ),
         (bound([0, 0, 0], [1, 1]), "bound: expected as many of lower"),
         (bound(np.nan), "bound: lower: expected numbers"),
         (bound("low"), "bound: lower: expected numbers"),
@@ -106,7 +110,11 @@ limits:
         ("  position: {q9: [0, 1]}", "7: limits.position", "unknown coordinate 'q9'"),
         ("  position: {q1: [1, 0]}", "7: limits", "lower 1 is above upper 0"),
         ("  acceleration: 0", "7: limits", "expected a number above 0"),
-        ("  acceleration: true", "7: limits.acceleration", "expected"),
+        (
+            "  acceleration: true",
+            "7: limits.acceleration",
+            "expected a number, or numbers by name, got true",
+        ),
         ("  wheels: {front: 1}", "7: limits.wheels", "unknown wheel 'front'"),
         ("  speed: 1", "7: limits.speed", "unknown key"),
         (
@@ -120,6 +128,12 @@ limits:
             "7: limits.bounds",
             "expected lower, upper or both",
         ),
+        (
+            "  velocity: true\nuntil: 0.01",
+            "8: until",
+            "expected true, false or a mapping (key: value), got '0.01'",
+        ),
+        ("  velocity: true\nsteering: 3", "8: steering", "expected true, false or a mapping"),
         ("  velocity: true\nmethod: adaptive", "8: method", "expected rk4, midpoint, euler or zoh"),
     ],
 )

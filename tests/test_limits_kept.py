@@ -263,3 +263,14 @@ def test_the_recorded_scale_is_the_share_of_the_rate_also_where_rest_is_not_allo
         shares.append(step.scale[0])
         q = q + DT * step.q_dot
     assert 0.0 < min(shares[100:]) < 1.0
+
+
+def test_without_limits_the_closed_loop_has_none() -> None:
+    """Calls and stages are a controller's without limits, whatever bounds the sample before had."""
+    limited = towards((3.0, 0.0), nmm.Limits({"platform": 0.05, "arm": 0.05}, acceleration=1.0))
+    free = towards((3.0, 0.0), None)
+    limited(0.0, START)
+    with limited.without_limits():
+        np.testing.assert_array_equal(limited.velocity(0.0, START), free.velocity(0.0, START))
+        np.testing.assert_array_equal(limited(0.0, START), free(0.0, START))
+    assert np.abs(limited(0.0, START)).max() <= 0.05

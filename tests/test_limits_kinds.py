@@ -8,6 +8,7 @@ import pickle
 from collections.abc import Callable
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from gripping import FINGERS, panda
 
@@ -134,6 +135,31 @@ def test_the_height_of_a_frame() -> None:
     run = nmm.simulate(controller, q0, 3.0, DT, "zoh")
     heights = [nmm.Configuration(robot, q).placement("ur5_tool0").translation[2] for q in run.q]
     assert tool[2] - 0.1 - 1e-3 <= min(heights) <= tool[2] - 0.09
+
+
+def test_the_centre_of_mass_stays_over_the_wheels() -> None:
+    """A heavy arm that leans after a point beside the platform: Pinocchio's centre, seen by the base."""
+    robot = nmm.Scenario.load("ur5_unicycle_pose").robot()
+    q0 = robot.q(nmm.Scenario.load("ur5_unicycle_pose").parts.q0)
+    lower, upper = np.array([-0.2, -0.06]), np.array([0.15, 0.06])
+    support = nmm.Bound(nmm.CenterOfMass("xy", "base_link"), lower, upper, name="support")
+    limits = nmm.Limits({"platform": 0.1, "arm": 1.0}, acceleration=4.0, bounds=support)
+    task = nmm.Task(nmm.Position("ur5_tool0"), [0.2, 1.2, 0.5])
+
+    def seen(limits: nmm.Limits | None) -> Array:
+        run = nmm.simulate(nmm.Controller(robot, task, PG, limits=limits, dt=DT), q0, 3.0, DT, "zoh")
+        data = robot.model.createData()
+        found = []
+        for q in run.q:
+            centre = pin.centerOfMass(robot.model, data, q)
+            found.append(nmm.Configuration(robot, q).placement("base_link").actInv(centre)[:2])
+        return np.array(found)
+
+    kept = seen(limits)
+    assert np.all((kept >= lower - 1e-3) & (kept <= upper + 1e-3))
+    assert max((kept - upper).max(), (lower - kept).max()) > -0.005
+    tipped = seen(nmm.Limits({"platform": 0.1, "arm": 1.0}, acceleration=4.0))
+    assert np.any((tipped > upper + 0.02) | (tipped < lower - 0.02))
 
 
 def test_a_wall_that_wheels_cannot_avoid_is_broken_as_little_as_can_be_and_told() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -109,6 +110,30 @@ def test_a_retreat_leaves_a_stall_and_keeps_limits() -> None:
     )
 
 
+@pytest.mark.parametrize("limits", [None, nmm.Limits({"platform": 0.5, "arm": 0.4}, acceleration=5.0)])
+def test_a_retreat_is_a_samples_whatever_the_method(limits: nmm.Limits | None) -> None:
+    """Stages between two samples neither count as samples nor go after the target meanwhile."""
+
+    def run(method: str) -> nmm.Trajectory:
+        there = nmm.Controller(
+            ROBOT,
+            nmm.Task(nmm.Position("ee"), [1.0, 0.0, 9.0]),
+            nmm.DampedLeastSquares(),
+            limits=limits,
+            retreat=nmm.Retreat(durations=[0.4]),
+        )
+        return nmm.simulate(there, Q0, 4.0, DT, method)
+
+    held, staged = run("zoh"), run("rk4")
+    said = [next(one for one in each.warnings if "backed off" in one) for each in (held, staged)]
+    first = [float(re.findall(r"t = ([\d.]+) s", one)[0]) for one in said]
+    assert first[1] == first[0]
+    k = np.searchsorted(held.t, first[0] - 1e-9)
+    moved = [each.q[k + 20] - each.q[k] for each in (held, staged)]
+    assert np.linalg.norm(moved[1]) > 0.1
+    np.testing.assert_allclose(moved[1], moved[0], atol=0.02)
+
+
 @pytest.mark.parametrize(
     ("made", "text"),
     [
@@ -118,6 +143,9 @@ def test_a_retreat_leaves_a_stall_and_keeps_limits() -> None:
         (lambda: nmm.Goal(m=-1.0), "goal: m: expected a number above 0"),
         (lambda: nmm.Retreat(progress=1.0), "retreat: progress: expected below 1"),
         (lambda: nmm.Retreat(durations=()), "retreat: durations"),
+        (lambda: nmm.Retreat(durations=0.0), "retreat: durations: expected a number above 0"),
+        (lambda: nmm.Retreat(durations="long"), "retreat: durations: expected"),  # type: ignore[arg-type]
+        (lambda: nmm.Retreat(goal=0.01), "retreat: goal: expected a Goal, got 0.01"),  # type: ignore[arg-type]
         (lambda: controller(retreat=nmm.Retreat(posture={"q9": 1.0})), "unknown coordinate 'q9'"),
     ],
 )

@@ -179,6 +179,10 @@ BAD_TASKS = {
     "at: expected a point in world axes, got one in base's": lambda: Task(
         Pointing("tool0", Position("elbow_joint", "xyz", "base")), [0, 0]
     ),
+    "at: expected a point in world axes, got one in base": lambda: Task(
+        Pointing("tool0", CenterOfMass("xyz", "base")), [0, 0]
+    ),
+    "unknown frame 'bse'": lambda: Task(CenterOfMass("x", "bse"), 0.1),
     "at: expected another point than the origin of tool0": lambda: Task(Pointing("tool0", "tool0"), [0, 0]),
     "to: expected another point than the origin of tool0": lambda: Task(Distance("tool0", "tool0"), 1),
     "orientation: expected three components, rad, got bearing": lambda: Task(

@@ -59,6 +59,7 @@ def functions(tip: str, other: str) -> list[Function]:
         Distance(tip, other),
         Distance(tip, MOVING),
         CenterOfMass("yz"),
+        CenterOfMass("zx", other),
         Posture(),
         PoseReference(Position(other), Orientation(other)),
     ]
@@ -102,6 +103,9 @@ def test_center_of_mass_is_that_of_the_links(
     moments = [inertia.mass * placement.act(inertia.lever) for inertia, placement in bodies]
     expected = sum(moments) / sum(inertia.mass for inertia, _ in bodies)
     np.testing.assert_allclose(evaluate(CenterOfMass(), 0.0, here).value, expected, rtol=0, atol=1e-12)
+    other = FRAMES[name][1]
+    seen = evaluate(CenterOfMass("xyz", other), 0.0, here).value
+    np.testing.assert_allclose(seen, pose(here, other).actInv(expected), rtol=0, atol=1e-12)
 
 
 # Errors of orientations and poses

@@ -64,7 +64,8 @@ def _rows(trajectory: Trajectory, numbers: dict[str, Any]) -> Iterator[tuple[str
             f"{numbers['scale_min']:.3g} at least; below 1 {100 * share:.3g} % of the time",
         )
     if numbers["margin_min"] is not None:
-        yield "least margin to a limit", f"{100 * numbers['margin_min']:.3g} % of its range"
+        margin = round(100 * numbers["margin_min"], 9) + 0.0  # neither rounding, nor -0, is a limit broken
+        yield "least margin to a limit", f"{margin:.3g} % of its range"
     if trajectory.resolver == "rg":
         yield "switches of partition", str(numbers["partition_switches"])
     yield "lateral slip", f"{numbers['lateral_slip_max']:.1g} m/s at most"

@@ -61,15 +61,18 @@ class Bound:
         self.braking = None if braking is None else positive(braking, "braking")
         self.name = name
         self.priority = None if priority is None else counted(priority, "priority")
+        given = f"lower {_said(self.lower)} and upper {_said(self.upper)}"
         if not (np.isfinite(self.lower).any() or np.isfinite(self.upper).any()):
-            raise InputError(
-                f"bound: expected lower, upper or both, got lower {self.lower} and upper {self.upper}"
-            )
+            raise InputError(f"{self._who}: expected lower, upper or both, got {given}")
         if self.lower.size in (1, self.upper.size) or self.upper.size == 1:
             if np.any(self.lower > self.upper):
-                raise InputError(f"bound: lower {self.lower} is above upper {self.upper}")
+                raise InputError(f"{self._who}: lower {_said(self.lower)} is above upper {_said(self.upper)}")
         else:
-            raise InputError(f"bound: expected as many of lower {self.lower} as of upper {self.upper}")
+            raise InputError(f"{self._who}: expected as many of lower as of upper, got {given}")
+
+    @property
+    def _who(self) -> str:
+        return f"bound {self.name}" if self.name else "bound"
 
     def rows(self, robot: Robot) -> list[Kept]:
         """Name, unit, lower and upper limit of each component."""
@@ -78,8 +81,8 @@ class Bound:
             lower, upper = (np.broadcast_to(ends, (len(rows),)) for ends in (self.lower, self.upper))
         except ValueError:
             raise InputError(
-                f"bound: expected a number or {len(rows)} ({', '.join(row.name for row in rows)}), "
-                f"got lower {self.lower} and upper {self.upper}"
+                f"{self._who}: expected a number or {len(rows)} ({', '.join(row.name for row in rows)}), "
+                f"got lower {_said(self.lower)} and upper {_said(self.upper)}"
             ) from None
         return [
             Kept(
@@ -98,3 +101,9 @@ def _numbers(value: ArrayLike, name: str) -> Array:
     if found.ndim != 1 or np.any(np.isnan(found)):
         raise InputError(f"bound: {name}: expected numbers (infinite for none), got {value!r}")
     return found
+
+
+def _said(numbers: Array) -> str:
+    """A number, or [numbers]."""
+    said = ", ".join(f"{number:g}" for number in numbers)
+    return said if numbers.size == 1 else f"[{said}]"

@@ -30,7 +30,8 @@ class Retreat:
     ----------
     stalled : s; where the error has not fallen by the share `progress` in that time, the robot backs off
     progress : share, between 0 and 1
-    durations : s, how long it does so the first time, the second, ...; the last holds for all later ones
+    durations : s, how long it does so the first time, the second, ...; the last holds for all later ones;
+        or one number for all
     posture : where joints go meanwhile, (n,) or by name; None for the middle of their limits, or rest
     speed, turn : of the platform, m/s and rad/s
     gain : 1/s, of the joints on their way
@@ -38,14 +39,14 @@ class Retreat:
 
     Raises
     ------
-    InputError : numbers that are not above 0, no durations, a progress of 1 or more
+    InputError : numbers that are not above 0, no durations, a progress of 1 or more, a goal that is none
     """
 
     def __init__(
         self,
         stalled: float = 0.5,
         progress: float = 0.03,
-        durations: Sequence[float] = (1.0, 1.5, 2.0),
+        durations: Sequence[float] | float = (1.0, 1.5, 2.0),
         posture: ArrayLike | Mapping[str, float] | None = None,
         speed: float = 0.5,
         turn: float = 1.0,
@@ -56,13 +57,17 @@ class Retreat:
         self.progress = positive(progress, "retreat: progress")
         if self.progress >= 1.0:
             raise InputError(f"retreat: progress: expected below 1, got {self.progress:g}")
-        self.durations = tuple(positive(duration, "retreat: durations") for duration in durations)
+        self.durations = tuple(
+            positive(duration, "retreat: durations") for duration in np.ravel(np.asarray(durations)).tolist()
+        )
         if not self.durations:
             raise InputError("retreat: durations: expected at least one, got none")
         self.posture = posture
         self.speed = positive(speed, "retreat: speed")
         self.turn = positive(turn, "retreat: turn")
         self.gain = positive(gain, "retreat: gain")
+        if goal is not None and not isinstance(goal, Goal):
+            raise InputError(f"retreat: goal: expected a Goal, got {goal!r}")
         self.goal = Goal() if goal is None else goal
 
     def on(self, robot: Robot, rows: Sequence[Row]) -> Backing:

@@ -38,8 +38,8 @@ def stroboscopic(trajectory: Trajectory, instants: ArrayLike | int | None = None
     """The robot seen from above at instants of the run (the paper's Figs. 3, 5 and 7).
 
     Platform with wheels and heading, arm, end-effector's path, desired path, start, end and the
-    target looked at; drawings fade towards the start. A second view from the side, with the same
-    x axis, where the arm leaves the plane.
+    target, looked at or held; drawings fade towards the start. A second view from the side, with the
+    same x axis, where the arm leaves the plane.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class Scene(Viewed):
         """The entries of its legend."""
         names = ["desired path"] if "desired" in self.lines else []
         names += [self._path_name, "start", "end"]
-        return names if self.trajectory.target is None else [*names, "target"]
+        return names if self.trajectory.mark is None else [*names, "target"]
 
     @property
     def _path_name(self) -> str:
@@ -90,8 +90,8 @@ class Scene(Viewed):
         points = [*(pose.points() for pose in self.poses), *self.lines.values()]
         if view == ABOVE:
             points.append(np.column_stack([self.labels, np.zeros(len(self.labels))]))
-        if self.trajectory.target is not None:
-            points.append(self.trajectory.target[None])
+        if self.trajectory.mark is not None:
+            points.append(self.trajectory.mark[None])
         return [part[:, view] for part in points]
 
     def draw(self, axes: Axes, view: View) -> None:
@@ -128,9 +128,10 @@ class Scene(Viewed):
                     markersize=6, markeredgecolor="white", markeredgewidth=0.8, label=text,
                     linestyle="none", zorder=6,
                 )  # fmt: skip
-        if trajectory.target is not None:
+        mark = trajectory.mark
+        if mark is not None:
             axes.plot(
-                trajectory.target[across], trajectory.target[up], "*", color=style.ORANGE, markersize=12,
+                mark[across], mark[up], "*", color=style.ORANGE, markersize=12,
                 markeredgecolor=style.BLACK, markeredgewidth=0.7, label="target", linestyle="none", zorder=6,
             )  # fmt: skip
 
@@ -202,7 +203,7 @@ def _lines(trajectory: Trajectory) -> dict[str, Array]:
         x_y = base_position(trajectory.robot, trajectory.q[kept])
         return {"path": np.column_stack([x_y, np.zeros(len(kept))])}
     lines = {"path": trajectory.path[kept]}
-    if trajectory.desired is not None:
+    if trajectory.desired is not None and trajectory.held is None:
         lines["desired"] = trajectory.desired[kept]
     return lines
 

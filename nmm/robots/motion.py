@@ -24,7 +24,7 @@ class Motion:
     q (N, n), u (N, n_u) : coordinates and inputs, in `robot.q_units` and `robot.u_units`
     path (N, 3) : the end-effector's path, m in the world; computed from `frame` when not given
     desired (M, 3) : the desired path, m in the world
-    target (3,) : a fixed point to look at, m in the world
+    target (3,) : a fixed point to look at or to reach, m in the world
     label : name in the legend, such as "RG"
     frame : the end-effector's frame
 

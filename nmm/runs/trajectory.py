@@ -119,6 +119,18 @@ class Trajectory:
             return 0
         return int(np.sum(np.any(np.diff(self.partition, axis=0) != 0, axis=1)))
 
+    @property
+    def held(self) -> Array | None:
+        """(3,) m in the world: where the desired path stays; None where it moves, or there is none."""
+        if self.desired is None or not len(self.desired) or np.ptp(self.desired, axis=0).max() > 1e-9:
+            return None
+        return self.desired[0].copy()
+
+    @property
+    def mark(self) -> Array | None:
+        """(3,) m in the world: the fixed point that figures and playback show, looked at or held; or None."""
+        return self.held if self.target is None else self.target
+
     def with_scenario(self, scenario: dict[str, Any]) -> Trajectory:
         """The same trajectory with the scenario that it came from."""
         return replace(self, scenario=scenario)
@@ -159,8 +171,8 @@ class Trajectory:
             q=self.q,
             u=self.u,
             path=self.path,
-            desired=self.desired,
-            target=self.target,
+            desired=self.desired if self.held is None else None,
+            target=self.mark,
             label=self.resolver.upper() if label is None else label,
             frame=self.frame,
         )

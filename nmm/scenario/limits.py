@@ -128,4 +128,6 @@ def part_or_none(value: object) -> object:
     """true for a part with its defaults, false or nothing for none."""
     if isinstance(value, bool) or value is None:
         return {} if value else None
+    if not isinstance(value, Mapping | Part):
+        raise ValueError(f"expected true, false or a mapping (key: value), got {shown(value)}")
     return value

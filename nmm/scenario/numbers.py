@@ -146,6 +146,8 @@ def number_or_by_name(value: object) -> float | dict[str, float] | None:
     """A number for all, or numbers by name."""
     if value is None:
         return None
+    if isinstance(value, bool | list):
+        raise ValueError(f"expected a number, or numbers by name, got {shown(value)}")
     return numbers_by_name(value) if isinstance(value, Mapping) else number(value)
 
 

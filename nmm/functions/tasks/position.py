@@ -76,8 +76,8 @@ def check_point(point: Function, frame: str, robot: Robot, name: str) -> None:
     if len(rows) != 3 or any(row.unit == "rad" for row in rows):
         came = ", ".join(f"{row.name} ({row.unit})" for row in rows)
         raise InputError(f"{name}: expected a point with x, y and z in m, got {came}")
-    if isinstance(point, Position):
-        if point.relative_to is not None:
-            raise InputError(f"{name}: expected a point in world axes, got one in {point.relative_to}'s")
-        if robot.frame_id(point.frame) == robot.frame_id(frame):
-            raise InputError(f"{name}: expected another point than the origin of {frame} itself")
+    seen_from = getattr(point, "relative_to", None)
+    if seen_from is not None:
+        raise InputError(f"{name}: expected a point in world axes, got one in {seen_from}'s")
+    if isinstance(point, Position) and robot.frame_id(point.frame) == robot.frame_id(frame):
+        raise InputError(f"{name}: expected another point than the origin of {frame} itself")
