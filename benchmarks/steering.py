@@ -2,8 +2,8 @@
 
     python benchmarks/steering.py [starts] [spring ...]
 
-A position task with gain 1, the projected gradient with its default α, no objective, no limits; 40 s by the
-midpoint rule, dt 0.02 s. The starts: heading in ±180°, the arm's first joint in ±1 rad and its others in
+A position task with gain 1, the projected gradient with its default α, no objective; 40 s by the midpoint
+rule, dt 0.02 s; the last line of a robot with its own limits of velocity and position, the others without. The starts: heading in ±180°, the arm's first joint in ±1 rad and its others in
 ±0.2 rad about a posture, the hand within 0.2 m of the path. A run ends on the path when its error is below
 1 mm over the last 5 s; it counts when the steering angle was within its stop all along. `peak` is the largest
 input of the successes, 95 % of them below, m/s and rad/s.
@@ -92,8 +92,9 @@ def follows(controller: nmm.Controller, q: np.ndarray) -> tuple[bool, bool, floa
     for k in range(int(DURATION / DT)):
         t = k * DT
         try:
-            middle = q + 0.5 * DT * controller.velocity(t, q)
+            controller(t, q)
             step = controller.last(t, q)
+            middle = q + 0.5 * DT * step.q_dot
             q = q + DT * controller.velocity(t + 0.5 * DT, middle)
         except (nmm.SingularError, nmm.InputError):
             return False, False, np.inf
@@ -109,17 +110,22 @@ def follows(controller: nmm.Controller, q: np.ndarray) -> tuple[bool, bool, floa
 
 
 def measure(
-    name: str, steering: nmm.Steering | bool, starts: int, tell: Callable[[str], None] = print
+    name: str,
+    steering: nmm.Steering | bool,
+    starts: int,
+    limits: nmm.Limits | None = None,
+    tell: Callable[[str], None] = print,
 ) -> None:
     """A line for each path."""
     robot, hand, posture = robots()[name]
     height = float(nmm.Configuration(robot, robot.q(posture)).placement(hand).translation[2])
     law = "none" if steering is False else f"k {steering.gain:g}, k1 {steering.spring:g}"
+    law += "" if limits is None else ", limits"
     cells = []
     for path, reference in paths(height).items():
         rng = np.random.default_rng(7)
         task = nmm.Task(nmm.Position(hand), reference, gain=1.0)
-        controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), steering=steering)
+        controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), None, None, limits, DT, None, steering)
         first = nmm.evaluate(reference, 0.0, nmm.Configuration(robot, robot.q())).value
         found = []
         for _ in range(starts):
@@ -129,7 +135,7 @@ def measure(
         never = 100 * sum(kept for _, kept, _ in found) / starts
         peak = f"{np.percentile(good, 95):.1f}" if good else "-"
         cells.append(f"{path} {100 * len(good) / starts:.0f} % ({never:.0f} % never off; peak {peak})")
-    tell(f"{name:24} {law:11} " + "  ".join(cells))
+    tell(f"{name:24} {law:19} " + "  ".join(cells))
 
 
 if __name__ == "__main__":
@@ -138,3 +144,4 @@ if __name__ == "__main__":
     for name in robots():
         for law in [False, *(nmm.Steering(spring=spring) for spring in springs)]:
             measure(name, law, count)
+        measure(name, nmm.Steering(spring=springs[0]), count, nmm.Limits())

@@ -7,8 +7,9 @@ import pytest
 from level_problems import Off, compared, problems
 
 import nmm
-from nmm.resolvers.answer import Status
+from nmm.resolvers.answer import Status, unanswered
 from nmm.resolvers.problem import Problem
+from nmm.resolvers.state import State
 
 RESOLVERS = {
     "pg": nmm.ProjectedGradient(alpha=0.5),
@@ -48,6 +49,19 @@ def test_a_level_below_changes_nothing_above(name: str) -> None:
         np.testing.assert_allclose(rates[1][:first], rates[0], rtol=0, atol=1e-9)
         np.testing.assert_allclose(rates[2][:second], rates[1], rtol=0, atol=1e-9)
     assert scaled > 30
+
+
+@pytest.mark.parametrize("if_possible", [False, True])
+def test_where_the_step_before_ended_changes_no_answer(if_possible: bool) -> None:
+    resolver = nmm.ProjectedGradient(alpha=0.5)
+    for problem in problems(40, 4, if_possible=if_possible):
+        cold = resolver.resolve(problem)
+        arrays, setup = problem.arrays, resolver.setup(problem.dimensions)
+        for _ in range(2):  # the second time from the limits that held the first back
+            answer = unanswered(len(cold.u), len(arrays.ends))
+            resolver.kernel(arrays, setup.numbers, setup.options, State().memory, answer)
+        assert arrays.active[0] > 0 or cold.status is Status.SOLVED
+        np.testing.assert_allclose(answer.u, cold.u, rtol=0, atol=1e-9)
 
 
 def in_turn(problem: Problem, u0: np.ndarray) -> np.ndarray:
@@ -97,3 +111,31 @@ def test_a_priority_is_a_whole_number_above_0(priority: float) -> None:
         nmm.Task(function, nmm.Constant([1.0, 0.0]), priority=priority)  # type: ignore[arg-type]  # bad input
     with pytest.raises(nmm.InputError, match="priority: expected a whole number above 0"):
         nmm.Bound(function, upper=1.0, priority=priority)  # type: ignore[arg-type]  # bad input
+
+
+def test_in_a_hurry_the_path_gives_way_and_the_tray_stays_level() -> None:
+    """The scenario's path in 5 s instead of 20, faster than the base can follow."""
+    times = [0, 1.25, 2.5, 3.75, 5]
+    scenario = nmm.Scenario.load("tiago_tray").override("duration", 5).override("dt", 0.02)
+    for key in ("task.2.reference.times", "task.3.at.times"):
+        scenario = scenario.override(key, times)
+    run = scenario.run()
+    assert run.scale[:, 0].min() == 1.0
+    assert run.scale[:, 1].min() < 0.6
+    assert np.abs(run.error[:, :2]).max() < 0.003  # what it begins with
+    assert np.abs(run.error[:, 2:5]).max() > 0.2
+
+
+def test_limits_that_are_kept_if_possible_bind_and_disturb_no_task() -> None:
+    scenario = nmm.Scenario.load("two_arms_box").override("dt", 0.02)
+    run, free = scenario.run(), scenario.override("limits.bounds", []).run()
+    assert run.outcome is nmm.Outcome.COMPLETED
+    assert np.abs(run.error - free.error).max() < 1e-6
+    hands = [nmm.Heading(f"{side}_tool0", "z", "x") for side in ("left", "right")]
+
+    def highest(motion: nmm.Trajectory) -> float:
+        configurations = [nmm.Configuration(scenario.robot(), q) for q in motion.q[::20]]
+        return max(nmm.evaluate(hand, 0.0, at).value[0] for hand in hands for at in configurations)
+
+    assert highest(run) <= -1.4 + 1e-3  # its direction turns
+    assert highest(free) > -1.3  # without the limits they look elsewhere

@@ -248,6 +248,8 @@ def nearest_within(rows: Rows, target: Array, least: float, active: Integers, y:
     for i in range(active[0]):
         if k == m:
             break
+        if math.isinf(bound(rows, active[1 + i])[0]):  # a row that does not count this time
+            continue
         normal(rows, active[1 + i], n)
         norm = split(basis, k, n, d, v)
         if norm > 0.0:
