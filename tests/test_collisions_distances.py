@@ -75,8 +75,9 @@ def test_lower_bounds_are_below_the_distances(tiago):
         bounds = setting.queries.scene.bounds.copy()
         distances = setting.queries.distances(0.0, q, range(len(setting.names)))
         assert np.all(bounds <= distances + 1e-7)
-        assert least == pytest.approx(distances.min(), abs=1e-9)
-        assert distances[pair] == pytest.approx(least, abs=1e-9)
+        # Depths are Coal's to its tolerance, 1e-6, and depend on where its search begins.
+        assert least == pytest.approx(distances.min(), abs=2e-6)
+        assert distances[pair] == pytest.approx(least, abs=2e-6)
 
 
 def test_gradients_are_the_differences_of_the_distances(tiago):
@@ -155,3 +156,15 @@ def test_what_is_far_costs_no_query(planar):
     assert int(rows.used) == 0
     assert least == np.inf
     assert not setting.queries.scene.active.any()
+
+
+def test_a_look_at_the_nearest_pair_leaves_the_rows_right(planar):
+    """Asked for the nearest pair in between, rows are those of where the obstacle is by now."""
+    ball = nmm.Obstacle(nmm.Sphere(0.1), [0.9, 0.0, 0.3], name="ball")
+    setting = nmm.Collisions(self=False, obstacles=[ball], band=0.5).on(planar)
+    setting.queries.nearest(0.0, planar.rest)
+    ball.move_to([0.8, 0.0, 0.3])
+    rows, least = rows_at(setting, 0.0, planar.rest)
+    pairs, first = np.unique(rows.pair[: int(rows.used)], return_index=True)
+    np.testing.assert_allclose(rows.d[first], setting.queries.distances(0.0, planar.rest, pairs), atol=1e-6)
+    assert least == pytest.approx(setting.queries.nearest(0.0, planar.rest)[0], abs=1e-6)

@@ -131,13 +131,17 @@ class Queries:
     def measure(self, t: float, q: Array) -> None:
         """Find the pairs that are near, and their distances."""
         self.place(t, q)
+        self._choose()
+        pin.computeDistances(self.shapes, self.found)
+
+    def _choose(self) -> None:
+        """Which pairs are near where the shapes are, told to Pinocchio too."""
         changed, active, found = self.scene.changed, self.scene.active, self.found
         for k in changed[: self._find(*self._blocks, self.places)].tolist():
             if active[k]:
                 found.activateCollisionPair(k)
             else:
                 found.deactivateCollisionPair(k)
-        pin.computeDistances(self.shapes, found)
 
     def update(self, t: float, q: Array, integers: Integers, floats: Array, place: int) -> None:
         """Measure, and write the rows of near pairs where a record `Rows` lies in the blocks."""
@@ -200,7 +204,7 @@ class Queries:
         Pairs are measured from the least lower bound on, until that is beyond what was found.
         """
         self.place(t, q)
-        self._find(*self._blocks, self.places)
+        self._choose()
         least, nearest = np.inf, -1
         bounds = self.scene.bounds
         for k in np.argsort(bounds, kind="stable").tolist():
