@@ -2,6 +2,14 @@ from . import analysis as analysis
 from . import figures as figures
 from . import folders as folders
 from . import playback as playback
+from .collisions import Box as Box
+from .collisions import Capsule as Capsule
+from .collisions import Cylinder as Cylinder
+from .collisions import Mesh as Mesh
+from .collisions import Obstacle as Obstacle
+from .collisions import Plane as Plane
+from .collisions import Sphere as Sphere
+from .control.collisions import Collisions as Collisions
 from .control.controller import Controller as Controller
 from .control.goal import Goal as Goal
 from .control.limited_function import Bound as Bound

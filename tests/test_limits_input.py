@@ -78,7 +78,9 @@ def test_limits_from_sample_to_sample_need_dt(ask: str) -> None:
     task = nmm.Task(TIP, nmm.Constant([1.0, 1.0]))
     controller = nmm.Controller(ROBOT, task, nmm.ProjectedGradient(), limits=nmm.Limits(acceleration=1.0))
     do = {"call": controller, "evaluate": controller.evaluate, "velocity": controller.velocity}[ask]
-    with pytest.raises(nmm.InputError, match="dt: expected a number, which limits, a retreat and a step"):
+    with pytest.raises(
+        nmm.InputError, match="dt: expected a number, which limits, distances, a retreat and a step"
+    ):
         do(0.0, np.zeros(ROBOT.n))
 
 

@@ -66,6 +66,12 @@ def _rows(trajectory: Trajectory, numbers: dict[str, Any]) -> Iterator[tuple[str
     if numbers["margin_min"] is not None:
         margin = round(100 * numbers["margin_min"], 9) + 0.0  # neither rounding, nor -0, is a limit broken
         yield "least margin to a limit", f"{margin:.3g} % of its range"
+    if numbers.get("clearance_min") is not None:
+        yield (
+            "least clearance",
+            f"{numbers['clearance_min']:.4g} m ({numbers['clearance_min_pair']}) "
+            f"at t = {numbers['clearance_min_t']:.3g} s",
+        )
     if trajectory.resolver == "rg":
         yield "switches of partition", str(numbers["partition_switches"])
     yield "lateral slip", f"{numbers['lateral_slip_max']:.1g} m/s at most"

@@ -10,10 +10,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, positive
+from nmm.collisions.rows import no_rows
+from nmm.collisions.setting import Setting
 from nmm.control.bounds import OFF, SAMPLE, STAGE
+from nmm.control.clearance_rows import Clearance
+from nmm.control.collisions import Collisions
 from nmm.control.contradiction import contradicting
-from nmm.control.equations import STEP, Arm, ControlStep, drive, finish, told
+from nmm.control.equations import ANSWER, STEP, Arm, ControlStep, drive, finish, resolve, told
 from nmm.control.equations import step as compiled_step
+from nmm.control.guard import CUTS, MARGIN, Guard
 from nmm.control.idle_inputs import idle_inputs, inputs_without_effect
 from nmm.control.limits import Limits
 from nmm.control.lost_directions import in_world_axes, lost_directions
@@ -30,9 +35,9 @@ from nmm.functions.program import BESIDE, Program
 from nmm.functions.tasks.task import Stack, Task
 from nmm.kernels.compiled import checked_by_caller
 from nmm.kernels.memory import views
-from nmm.resolvers.answer import Status, added_residual, unanswered
+from nmm.resolvers.answer import RELAXED, Status, added_residual, unanswered
 from nmm.resolvers.base import Resolver
-from nmm.resolvers.limited import instead
+from nmm.resolvers.limited import LEFT, instead
 from nmm.resolvers.problem import Problem
 from nmm.resolvers.state import State
 from nmm.robots.robot import Robot
@@ -57,9 +62,12 @@ class Controller:
     retreat : what to do when the error stalls; None for a path that is tracked
     steering : the law for the steering of a platform that the task does not feel (`Steering`): True for the
         usual one, False for none
+    collisions : what the robot keeps off; None for nothing. It needs dt, too
 
     Attributes
     ----------
+    setting : the shapes whose distances are kept; None without collisions
+    guard : what keeps them; None without collisions
     before : (m,) the inputs of the call before, from which accelerations count; a call changes it
     steered : the law in force for steering that the task does not feel; None where there is none
     step_size : what chooses α at each sample; None where it is constant
@@ -83,6 +91,7 @@ class Controller:
         dt: float | None = None,
         retreat: Retreat | None = None,
         steering: Steering | bool = True,
+        collisions: Collisions | None = None,
     ) -> None:
         _expect(robot, Robot, "robot")
         _expect(resolver, Resolver, "resolver")
@@ -92,8 +101,11 @@ class Controller:
             _expect(retreat, Retreat, "retreat")
         if limits is not None:
             _expect(limits, Limits, "limits")
+        if collisions is not None:
+            _expect(collisions, Collisions, "collisions")
         self.robot = robot
         self.limits = limits
+        self.collisions = collisions
         self.retreat = retreat
         self.task = Stack.of(task)
         self.resolver = resolver
@@ -126,6 +138,8 @@ class Controller:
         elif resolver.takes_added_task:
             steered = None
         k = len(added_rows) + len(held)
+        self.setting: Setting | None = None if collisions is None else collisions.on(robot)
+        near = no_rows(robot.n) if collisions is None else no_rows(robot.n, collisions.rows, CUTS)
         problem = Problem(
             J=np.zeros((s, m)),
             rate=np.zeros(s),
@@ -137,8 +151,8 @@ class Controller:
             added_J=np.vstack([np.zeros((len(added_rows), m)), held]),
             added_rate=np.zeros(k),
             added_row_scales=np.append(row_scales(added_rows, robot), np.ones(len(held))),
-            limit_rows=np.zeros((len(kept.rows), m)),
-            limit_levels=[self.task.place(priority) for priority in kept.priorities],
+            limit_rows=np.zeros((len(kept.rows) + len(near.d), m)),
+            limit_levels=[*(self.task.place(priority) for priority in kept.priorities), *(0 for _ in near.d)],
         )
         self.kept = kept
         self._dimensions = dimensions = problem.dimensions
@@ -146,6 +160,8 @@ class Controller:
         self.state: State = resolver.start(dimensions)
         program.lay_out(
             ControlStep(
+                near=near,
+                clearance=_clearance(collisions, len(kept.rows), len(near.d)),
                 task=task_rows(self.task, robot, first),
                 added=task_rows(self.added_task, robot, first[len(functions) :]),
                 arm=Arm(robot.arm_coordinates, robot.following.table.ravel()),
@@ -170,14 +186,18 @@ class Controller:
         self.state.memory = self._step.state
         self._u = self._step.answer.u
         self._shape = (robot.n,)
+        self.guard: Guard | None = None if self.setting is None else self._guard(self.setting)
         self._solve = self._solver()
         self.before = self._step.problem.before
-        if limits is None:
+        if limits is None and collisions is None:
             self._step.limits.mode[()] = OFF
         self.backing = None if retreat is None else retreat.on(robot, self.rows)
         self.step_size: StepSize | None = None
         self._needs_dt = (
-            self.backing is not None or resolver.step != "constant" or (limits is not None and kept.needs_dt)
+            self.backing is not None
+            or self.guard is not None
+            or resolver.step != "constant"
+            or (limits is not None and kept.needs_dt)
         )
         self.dt = dt
         self.steered: Steered | None = None
@@ -190,7 +210,13 @@ class Controller:
                 spring = float(self._step.steering.spring)
                 descended.append((spring, self.steered.pursuit, len(self.steered.inputs)))
             self.step_size = StepSize(robot, resolver, descended, self._step, program.blocks)
-        self.sample = SampleState(self._step.problem, self._step.limits, self.step_size, self.backing)
+        self.sample = SampleState(
+            self._step.problem,
+            self._step.limits,
+            self.step_size,
+            self.backing,
+            (*self._step.near, self._step.clearance.least),
+        )
         self.reset()
 
     def _unfelt(self, inputs: Sequence[str]) -> bool:
@@ -237,12 +263,14 @@ class Controller:
     def _expect_dt(self) -> None:
         if self._needs_dt and self.dt is None:
             raise InputError(
-                "dt: expected a number, which limits, a retreat and a step by Armijo's rule need, got none"
+                "dt: expected a number, which limits, distances, a retreat and a step by Armijo's rule need, "
+                "got none"
             )
 
     def _sample(self, t: float, q: Array) -> None:
         """A call that lasts dt: the resolver's inputs, or a retreat's where the error stalls."""
         self._expect_dt()
+        earlier = None if self.guard is None else self.before.copy()
         status = self._solve_whole(t, q)
         if self.backing is not None:
             self.backing.watch(self._step.task.error, float(self._step.problem.dt))
@@ -251,6 +279,43 @@ class Controller:
             self.before[:] = self._u
         elif status >= _FAILED:
             self._fail(t, q)
+        if self.guard is not None and earlier is not None:
+            self.guard.certify(t, q, earlier)
+
+    def _exactly(self, wanted: Array) -> None:
+        """These inputs, which are within the limits of inputs, and none other."""
+        found = self._step
+        problem = found.problem
+        rows = problem.limit_rows @ wanted
+        found.answer.u[:] = wanted
+        found.answer.scale[:] = 0.0
+        found.answer.status[()] = RELAXED
+        found.answer.residual[()] = np.linalg.norm(problem.J @ wanted - found.task.full)
+        beyond = np.maximum(rows - problem.upper, problem.lower - rows).max(initial=0.0)
+        found.answer.excess[()] = beyond if beyond > LEFT else 0.0
+        drive(wanted, self._program.buffers.G, found.arm, found.q_dot)
+        self.before[:] = wanted
+
+    def _guard(self, setting: Setting) -> Guard:
+        found, resolver, dimensions = self._step, self.resolver, self._dimensions
+        blocks = self._program.blocks
+        once = checked_by_caller(resolve, ANSWER)
+        finishes = type(resolver).finish is not Resolver.finish
+
+        def update(t: float, q: Array) -> None:
+            setting.queries.update(t, q, *blocks, BESIDE)
+
+        def again(q: Array) -> float:
+            once(q, *blocks)
+            if finishes:
+                resolver.finish(found.problem, dimensions, found.answer)
+                finish(q, *blocks)
+            if self.backing is not None and self.backing.now:
+                self._back_off(self.backing, q)
+                self.before[:] = self._u
+            return float(found.answer.status[()])
+
+        return Guard(setting, found, update, again, self._exactly)
 
     def _solve_whole(self, t: float, q: Array) -> float:
         """What a sample's inputs are without a retreat, its α chosen; returns the status."""
@@ -276,13 +341,14 @@ class Controller:
     def __reduce__(self) -> tuple[object, ...]:
         """Copies and pickles are built anew: views of memory and addresses of kernels do not travel."""
         given = (self.robot, self.task, self.resolver, self.objective, self.added_task, self.limits, self.dt)
-        return type(self), (*given, self.retreat, self.steering)
+        return type(self), (*given, self.retreat, self.steering, self.collisions)
 
     def _solver(self) -> Callable[[float, Array], float]:
         """solve(t, q) -> status, with everything it needs at hand."""
         program, found, resolver = self._program, self._step, self.resolver
         step = checked_by_caller(compiled_step, STEP)
-        dimensions, prepare, (integers, floats) = self._dimensions, program.prepare, program.blocks
+        dimensions, (integers, floats) = self._dimensions, program.blocks
+        prepare = program.prepare if self.guard is None else self._measured(self.guard)
 
         def solve(t: float, q: Array) -> float:
             prepare(t, q)
@@ -297,6 +363,17 @@ class Controller:
             return float(found.answer.status[()])
 
         return solve if type(resolver).finish is Resolver.finish else solve_and_finish
+
+    def _measured(self, guard: Guard) -> Callable[[float, Array], None]:
+        """`prepare` of the program, and distances at samples."""
+        prepare, mode = self._program.prepare, self._step.limits.mode
+
+        def prepared(t: float, q: Array) -> None:
+            prepare(t, q)
+            if mode == SAMPLE:
+                guard.look(t, q)
+
+        return prepared
 
     def _fail(self, t: float, q: Array) -> None:
         self.robot.q(q)  # a q that is not finite is the caller's error
@@ -391,11 +468,35 @@ class Controller:
         problem = self._step.problem
         rates = problem.limit_rows @ self._u
         excess = np.maximum(rates - problem.upper, problem.lower - rates)
-        return {name: float(by) for name, by in zip(self.kept.rows, excess, strict=True) if by > 1e-9}
+        found: dict[str, float] = {}
+        for name, by in zip(self._row_names, excess, strict=True):
+            if by > 1e-9:
+                found[name] = max(float(by), found.get(name, 0.0))
+        return found
 
     def contradiction(self) -> tuple[str, ...]:
         """The limits that leave no inputs between them in the last call; () where there are some."""
-        return contradicting(self._step.problem, self.robot.u_names, self.kept.rows)
+        return contradicting(self._step.problem, self.robot.u_names, self._row_names)
+
+    @property
+    def _row_names(self) -> tuple[str, ...]:
+        """What each row of the limits is about, in the last call."""
+        if self.setting is None:
+            return self.kept.rows
+        pairs = self._step.near.pair.tolist()
+        return (*self.kept.rows, *(f"distance of {self.setting.words(pair)}" for pair in pairs))
+
+    def blocking(self) -> tuple[str, ...]:
+        """What the last call's inputs could not come nearer to: pairs whose rows hold them back, by name."""
+        if self.setting is None:
+            return ()
+        problem, near, first = self._step.problem, self._step.near, len(self.kept.rows)
+        count = int(near.used)
+        rates = problem.limit_rows[first : first + count] @ self._u
+        tight = rates - problem.lower[first : first + count] < 1e-6
+        still = near.d[:count] < self.setting.distance + 0.01
+        pairs = near.pair[:count][tight & still].tolist()
+        return tuple(dict.fromkeys(self.setting.words(pair) for pair in pairs))
 
     def row_values(self) -> Array:
         """What `kept.rows` names, in the last call: rates of wheels, rad/s, and values of functions."""
@@ -408,6 +509,8 @@ class Controller:
         self.state.reset()
         self.before[:] = 0.0
         self._step.problem.active[0] = 0
+        if self.guard is not None:
+            self.guard.reset()
         if self.backing is not None:
             self.backing.reset()
         if self.step_size is not None:
@@ -423,6 +526,20 @@ class Controller:
         """(solve, J) for loops over many configurations: solve(t, q) does a step, whose matrix is then in the
         view J (s, m). q is (n,), float64, contiguous; nothing is checked."""
         return self._solve, self._step.problem.J
+
+
+def _clearance(collisions: Collisions | None, first: int, count: int) -> Clearance:
+    """How distances are kept, as a step reads it."""
+    braking = None if collisions is None else collisions.braking
+    return Clearance(
+        first=np.array(first, dtype=np.int64),
+        distance=np.array(0.0 if collisions is None else collisions.distance),
+        margin=np.array(MARGIN),
+        gain=np.array(0.0 if collisions is None else collisions.gain),
+        recovery=np.array(0.0 if collisions is None else collisions.recovery),
+        braking=np.array(np.nan if braking is None else braking),
+        least=np.full(count, -np.inf),
+    )
 
 
 def _expect(given: object, kind: type, name: str) -> None:

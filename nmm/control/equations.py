@@ -12,6 +12,7 @@ from typing import NamedTuple
 from numba import types
 
 from nmm.arrays import Array, Integers
+from nmm.collisions.rows import Rows
 from nmm.control.bounds import (
     OFF,
     SAMPLE,
@@ -20,6 +21,7 @@ from nmm.control.bounds import (
     function_bounds,
     wheel_rows,
 )
+from nmm.control.clearance_rows import Clearance, clearance_bounds
 from nmm.control.steering import SteeringNumbers, steer
 from nmm.functions.program import BESIDE, Buffers, LaidOut, run
 from nmm.kernels.compiled import compiled, scratch
@@ -69,6 +71,7 @@ class Arm(NamedTuple):
 class ControlStep(NamedTuple):
     """What a step reads and writes beside its program's functions; its place in memory is `BESIDE`.
 
+    near, clearance : distances that are kept, and how
     task, added : the task, and the added task of the extended Jacobian
     arm : what its inputs move
     terms, weights : rows of the objective's terms, and what they count
@@ -80,6 +83,8 @@ class ControlStep(NamedTuple):
     q_dot (n,) : S u
     """
 
+    near: Rows
+    clearance: Clearance
     task: TaskRows
     added: TaskRows
     arm: Arm
@@ -99,6 +104,9 @@ class ControlStep(NamedTuple):
 
 #: A step's arguments and what it returns.
 STEP = types.float64(types.float64, types.float64[::1], types.int64[::1], types.float64[::1])
+
+#: `resolve`'s.
+ANSWER = types.float64(types.float64[::1], types.int64[::1], types.float64[::1])
 
 #: Instead of the row of an error that is computed: the error is r_d - r; an angle's, wrapped.
 PLAIN, WRAPPED = -1, -2
@@ -231,6 +239,26 @@ def write_limits(limits: LimitNumbers, q: Array, b: Buffers, C: Arm, problem: Pr
 
 
 @compiled
+def write_clearance(e: ControlStep, b: Buffers) -> None:
+    """Rows and bounds of distances; a stage keeps its sample's bounds and gradients, S is its own."""
+    count, n = e.near.d_q.shape
+    if e.limits.mode[()] == OFF:
+        return
+    gradient = scratch((1, n))
+    for k in range(count):
+        row = e.problem.limit_rows[e.clearance.first[()] + k]
+        if k < e.near.used[()]:
+            for j in range(n):
+                gradient[0, j] = e.near.d_q[k, j]
+            times_S(gradient, 0, b.G, e.arm, row)
+        elif e.limits.mode[()] == SAMPLE:
+            for j in range(row.shape[0]):
+                row[j] = 0.0
+    if e.limits.mode[()] == SAMPLE:
+        clearance_bounds(e.clearance, e.near, e.limits.acceleration, e.problem)
+
+
+@compiled
 def finish(q: Array, integers: Integers, floats: Array) -> None:
     """From the resolver's inputs to the robot's: limits, the steering that the task does not feel, q_dot."""
     b = views(LaidOut, integers, floats, 0).buffers
@@ -249,6 +277,8 @@ def finish(q: Array, integers: Integers, floats: Array) -> None:
 def resolve(q: Array, integers: Integers, floats: Array) -> float:
     """The resolver's inputs for the equations that are there, within limits. Returns its status."""
     e = views(ControlStep, integers, floats, BESIDE)
+    if e.near.d.shape[0] > 0:
+        write_clearance(e, views(LaidOut, integers, floats, 0).buffers)
     answer = e.answer
     for j in range(answer.u.shape[0]):
         answer.u[j] = math.nan  # what a resolver that finds no solution leaves behind

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple
 
@@ -28,6 +28,7 @@ class SampleState:
     ----------
     problem, limits : the controller's, in memory
     step_size, backing : its own, None for none
+    rows : of distances, in memory
 
     Attributes
     ----------
@@ -41,9 +42,10 @@ class SampleState:
         limits: LimitNumbers,
         step_size: StepSize | None,
         backing: Backing | None,
+        rows: Sequence[Array | Integers] = (),
     ) -> None:
         bounds = (problem.u_lower, problem.u_upper, problem.lower, problem.upper)
-        self._arrays = (*bounds, problem.before, problem.active)
+        self._arrays = (*bounds, problem.before, problem.active, *rows)
         self._mode = limits.mode
         self.elapsed = limits.elapsed
         self._step_size, self._backing = step_size, backing
@@ -59,7 +61,7 @@ class SampleState:
     def restore(self, snapshot: Snapshot) -> None:
         """Be as it was then."""
         for one, before in zip(self._arrays, snapshot.arrays, strict=True):
-            one[:] = before
+            one[...] = before
         if self._step_size is not None:
             self._step_size.share = snapshot.share
         if self._backing is not None:

@@ -27,6 +27,9 @@ LATER_ARRAYS = {
     "margin": lambda count: np.full(count, np.inf),
     "step_size": lambda count: np.ones(count),
     "shares": lambda count: np.zeros((count, 0)),
+    "clearance": lambda count: np.zeros(0),
+    "clearance_between": lambda count: np.zeros(0),
+    "clearance_pairs": lambda count: np.zeros(0, dtype=np.int64),
 }
 
 
@@ -134,6 +137,7 @@ def load(folder: str | Path, robot: Robot | None = None) -> Trajectory:
         unmet=unmet(summary),
         limited=summary.get("limited", False),
         limit_names=tuple(summary.get("limit_names", ())),
+        clearance_names=tuple(summary.get("clearance_names", ())),
         scenario=scenario,
         **arrays,
     )

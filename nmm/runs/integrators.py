@@ -13,7 +13,8 @@ import numpy as np
 
 from nmm.arrays import Array
 from nmm.errors import InputError, RunError, unknown
-from nmm.kernels.compiled import allocating, call_platform
+from nmm.kernels.compiled import allocating
+from nmm.robots.held import Held
 from nmm.robots.robot import Robot
 
 Velocity = Callable[[float, Array], Array]
@@ -114,27 +115,6 @@ class Adaptive:
         return ahead
 
 
-@allocating
-def drive(kernel: int, parameters: Array, n_p: int, p: int, q: Array, u: Array, dt: float) -> Array:
-    """The platform's coordinates (n_p,) after dt with the inputs held constant: RK4 on qp_dot = G(qp) up."""
-    ahead = q[:n_p].copy()
-    G = np.zeros((n_p, p))
-    G_q = np.zeros((n_p, p, n_p))
-    stage = q[:n_p].copy()
-    slope = np.zeros(n_p)
-    for k in range(4):
-        if k > 0:
-            stage[:] = q[:n_p] + (dt if k == 3 else 0.5 * dt) * slope
-        G[:] = 0.0
-        call_platform(kernel, stage, parameters, G, G_q)
-        for i in range(n_p):
-            slope[i] = 0.0
-            for j in range(p):
-                slope[i] += G[i, j] * u[j]
-            ahead[i] += dt * slope[i] / (6.0 if k == 0 or k == 3 else 3.0)
-    return ahead
-
-
 class ZeroOrderHold:
     """The inputs stay constant over dt, as on a robot with a sampled controller; the arm's part is exact."""
 
@@ -142,16 +122,10 @@ class ZeroOrderHold:
     stability: tuple[float, ...] = (1.0, 1.0)
 
     def __init__(self, robot: Robot) -> None:
-        platform = robot.platform
-        self._platform = (platform.velocity_map.address, platform.parameters, platform.n_p, platform.p)
-        self._arm = robot.arm_coordinates
+        self._held = Held(robot)
 
     def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
-        n_p, p = self._platform[2:]
-        ahead = q.copy()
-        ahead[:n_p] = drive(*self._platform, q, u, dt)
-        ahead[self._arm] += dt * u[p:]
-        return ahead
+        return self._held(q, u, dt)
 
 
 @dataclass(frozen=True)

@@ -89,7 +89,7 @@ def judge(
         return Verdict(outcome, message, warnings)
     troubled = found.unstable or found.missed or outcome is Outcome.DIVERGED
     advice = None
-    if troubled and outcome is not Outcome.SINGULAR and not _hopeless(seen):
+    if troubled and outcome is not Outcome.SINGULAR and not _hopeless(seen) and not recorder.blocking:
         advice = _advice(controller, recorder, advance, dt, found, retry)
     stability = _stability(found.unstable, advice, method, dt)
     if outcome is not Outcome.COMPLETED:
@@ -129,6 +129,15 @@ def reached_or_not(verdict: Verdict, recorder: Recorder, goal: Goal, rows: Seque
     metres, radians = sizes(error, [row.unit for row in rows])
     missed = f"not reached in {recorder.duration:.4g} s: {metres:.3g} m and {radians:.3g} rad are left"
     return Verdict(Outcome.MISSED, _joined(missed, verdict.message), verdict.warnings)
+
+
+def blocked(verdict: Verdict, blocking: Sequence[str]) -> Verdict:
+    """The verdict on a run that ends without its target, with the distances that held it back at its end."""
+    if verdict.outcome is not Outcome.MISSED or not blocking:
+        return verdict
+    return verdict._replace(
+        message=_joined(f"blocked by the distance of {', '.join(blocking)}", verdict.message)
+    )
 
 
 def _advice(

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from scipy.linalg import block_diag
 
 from nmm.arrays import Array
 from nmm.control.controller import Controller
+from nmm.control.guard import Counts
 from nmm.control.limits import Limits
 from nmm.control.step import Step
 from nmm.errors import InputError
@@ -16,6 +19,7 @@ from nmm.functions.tasks.position import AXES, Position
 from nmm.resolvers.answer import Status
 from nmm.robots.robot import Robot
 from nmm.runs.broken_limits import broken_limits, broken_rows
+from nmm.runs.clearance import swept, told
 from nmm.runs.margins import margin, shares
 from nmm.runs.promise import Samples
 from nmm.runs.reasons import weakest_words
@@ -55,6 +59,8 @@ class Recorder:
         self._partition = np.empty((count, s), dtype=np.int64)
         self._count = 0
         self.warnings: list[str] = []
+        self.blocking: tuple[str, ...] = ()
+        self._counts = Counts()
 
     def __len__(self) -> int:
         return self._count
@@ -136,6 +142,11 @@ class Recorder:
                 against = ", ".join(self._controller.contradiction())
                 self._against |= dict.fromkeys(beyond.keys() - self._against.keys(), against)
 
+    def guarded(self, controller: Controller) -> None:
+        """What the controller kept off at the end of the run, and what that took."""
+        self.blocking = controller.blocking()
+        self._counts = Counts() if controller.guard is None else controller.guard.counts
+
     def warn_once(self, t: float, warning: str) -> None:
         """A warning about the time t, s, said once a run; an empty one is none."""
         if warning and not any(warning in said for said in self.warnings):
@@ -197,6 +208,16 @@ class Recorder:
             self.warnings += broken_limits(robot, self.t, self.q[:count], self._u[:count])
             self.warnings += broken_rows(controller.kept, self.t, self._limited[:count])
         kept = controller.kept if controller.limits is not None else Limits().on(robot)
+        distances: dict[str, Any] = {}
+        if controller.setting is not None:
+            found = swept(controller.setting, self.t, self.q[:count], self._u[:count])
+            self.warnings += told(controller.setting, found, self.t, self._counts)
+            distances = {
+                "clearance": found.clearance,
+                "clearance_pairs": found.pairs,
+                "clearance_between": found.between,
+                "clearance_names": tuple(" and ".join(names) for names in controller.setting.names),
+            }
         limited, within = shares(kept, robot, self.q[:count], self._u[:count], self._limited[:count])
         frame, columns, target = self._shown
         path, desired = None, None
@@ -240,6 +261,7 @@ class Recorder:
             path=path,
             desired=desired,
             target=target if path is not None else None,
+            **distances,
         )
 
 

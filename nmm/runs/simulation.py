@@ -14,10 +14,12 @@ from nmm.control.goal import Goal
 from nmm.control.idle_inputs import idle_inputs
 from nmm.control.step import Step
 from nmm.errors import DivergedError, InputError, RunError, SingularError
+from nmm.robots.held import Held
 from nmm.robots.slip import slip_warnings
 from nmm.runs.broken_limits import outside_at_start
+from nmm.runs.clearance import Guarded
 from nmm.runs.integrators import Integrator, integrator
-from nmm.runs.judgement import Ended, Verdict, judge, reached_or_not
+from nmm.runs.judgement import Ended, Verdict, blocked, judge, reached_or_not
 from nmm.runs.recording import Recorder
 from nmm.runs.trajectory import Outcome, Trajectory
 
@@ -79,10 +81,13 @@ def simulate(
         )
     if method == "adaptive" and controller.samples:
         raise InputError(
-            "method: limits, a retreat and a step by Armijo's rule are kept from sample to sample: "
-            "expected rk4, midpoint, euler or zoh"
+            "method: limits, distances, a retreat and a step by Armijo's rule are kept from sample to "
+            "sample: expected rk4, midpoint, euler or zoh"
         )
     advance = integrator(method, robot, positive(tolerance, "tolerance"))
+    if controller.guard is not None and controller.setting is not None:
+        controller.setting.check_start(0.0, q)
+        advance = Guarded(advance, controller.guard, Held(robot))
     times = _times(0.0, dt, steps, duration)
     recorder, ended = _record(controller, advance, times, q, progress, until)
 
@@ -106,6 +111,7 @@ def simulate(
         verdict = Verdict(ended.outcome, ended.message, [])
     if until is not None:
         verdict = reached_or_not(verdict, recorder, until, controller.rows)
+    verdict = blocked(verdict, recorder.blocking)
     recorder.warnings += verdict.warnings
     return recorder.trajectory(verdict.outcome, verdict.message, dt, method)
 
@@ -152,6 +158,7 @@ def _record(
     except KeyboardInterrupt:
         outcome = Outcome.INTERRUPTED
         message = f"interrupted after {recorder.reached:g} s of {times[-1]:g} s"
+    recorder.guarded(controller)
     last = recorder.q[len(recorder) - 1] if len(recorder) else q
     return recorder, Ended(outcome, message, last, controller.derivatives[0].copy())
 

@@ -53,6 +53,7 @@ def summarise(trajectory: Trajectory) -> dict[str, Any]:
     if count:
         norm, sizes = trajectory.error_norm, np.linalg.norm(trajectory.u, axis=1)
         half = trajectory.t >= 0.5 * (trajectory.t[0] + trajectory.t[-1])
+        summary |= _clearance(trajectory)
         summary |= {
             "t_end": float(trajectory.t[-1]),
             "error_initial": float(norm[0]),
@@ -93,6 +94,20 @@ def unmet(summary: dict[str, Any]) -> Residuals:
     """Where J u differed from the rate, read back from a summary; older ones do not say."""
     found = {name: summary[f"unmet_{name}"] for name in NONE._fields if f"unmet_{name}" in summary}
     return NONE._replace(**found)
+
+
+def _clearance(trajectory: Trajectory) -> dict[str, Any]:
+    """The least distance of a run that kept some: m, when, between what."""
+    if not trajectory.clearance_names:
+        return {}
+    k = int(np.argmin(trajectory.clearance_between))
+    pair, least = int(trajectory.clearance_pairs[k]), float(trajectory.clearance_between[k])
+    return {
+        "clearance_names": list(trajectory.clearance_names),
+        "clearance_min": least if np.isfinite(least) else None,
+        "clearance_min_t": float(trajectory.t[k]),
+        "clearance_min_pair": trajectory.clearance_names[pair] if pair >= 0 else "",
+    }
 
 
 def _rms(sizes: Array) -> float:

@@ -59,6 +59,9 @@ class Trajectory:
     frame : the end-effector frame that the task positions, if any
     path, desired (N, 3): its path and, where the task says, the desired one, m in the world
     target (3,): the fixed point that a bearing looks at, if any
+    clearance (N,): least distance between shapes that are kept apart, m, infinite where none are
+    clearance_between (N,): the least on the way to the next sample, m
+    clearance_pairs (N,): which of `clearance_names` is nearest, -1 for none
     scenario : the scenario as resolved, if it came from one
     """
 
@@ -93,6 +96,10 @@ class Trajectory:
     shares: Array = field(default_factory=lambda: np.zeros((0, 0)))
     limit_names: tuple[str, ...] = ()
     step_size: Array = field(default_factory=lambda: np.ones(0))
+    clearance: Array = field(default_factory=lambda: np.zeros(0))
+    clearance_between: Array = field(default_factory=lambda: np.zeros(0))
+    clearance_pairs: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    clearance_names: tuple[str, ...] = ()
     scenario: dict[str, Any] | None = field(default=None)
 
     def __len__(self) -> int:

@@ -1,0 +1,123 @@
+"""An obstacle: a shape in the world that stands, moves along a path, or is set from outside."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeAlias
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from nmm.arrays import Array, array, scalar, vector
+from nmm.collisions.shapes import Shape
+from nmm.errors import InputError
+
+#: Where a shape is: (3,) its origin, (6,) origin and rotation vector, or (4, 4); m, rad, world axes.
+Placement: TypeAlias = ArrayLike
+#: Step of the differences that give a path's velocity, s.
+STEP = 1e-6
+
+
+class Obstacle:
+    """A shape that the robot keeps away from.
+
+    Parameters
+    ----------
+    shape : `Box`, `Sphere`, `Cylinder`, `Capsule`, `Plane` or `Mesh`
+    placement : where it is: (3,) its origin, (6,) origin and rotation vector, or a (4, 4) matrix
+    motion : where it is at t, s: a function that returns such a placement; it takes the place of `placement`
+    name : for messages; the shape's kind when not given
+
+    Raises
+    ------
+    InputError : no shape, a placement or a motion that gives no such numbers
+    """
+
+    def __init__(
+        self,
+        shape: Shape,
+        placement: Placement = (0.0, 0.0, 0.0),
+        motion: Callable[[float], Placement] | None = None,
+        name: str = "",
+    ) -> None:
+        if not isinstance(shape, Shape):
+            raise InputError(f"obstacle: expected a shape (Box, Sphere, ...), got {shape!r}")
+        self.shape = shape
+        self.name = name or type(shape).__name__.lower()
+        self.motion = motion
+        if motion is not None and not callable(motion):
+            raise InputError(f"obstacle {self.name}: motion: expected a function of t, got {motion!r}")
+        self._placement = self._checked(placement if motion is None else motion(0.0))
+        self._twist = np.zeros(6)
+
+    def __repr__(self) -> str:
+        return f"Obstacle({self.name}, {self.shape})"
+
+    @property
+    def moves(self) -> bool:
+        """Whether it moves along a path."""
+        return self.motion is not None
+
+    def placement(self, t: float) -> Array:
+        """Where it is at t, s: (4, 4), world axes, m."""
+        found: Array = self.at(t).homogeneous
+        return found
+
+    def move_to(self, placement: Placement, velocity: ArrayLike | None = None) -> None:
+        """Set where it is from now on.
+
+        Parameters
+        ----------
+        placement : as in the constructor
+        velocity : (3,) of its origin, or (6,) with its angular velocity, m/s and rad/s, world axes; 0 when
+            not given
+
+        Raises
+        ------
+        InputError : it moves along a path; no such numbers
+        """
+        if self.motion is not None:
+            raise InputError(f"obstacle {self.name}: it moves along a path and cannot be set")
+        found = self._checked(placement)
+        twist = np.zeros(6)
+        if velocity is not None:
+            given = vector(velocity, None, f"obstacle {self.name}: velocity")
+            if given.size not in (3, 6):
+                raise InputError(f"obstacle {self.name}: velocity: expected 3 or 6 numbers, got {given.size}")
+            twist[: given.size] = given
+        self._placement, self._twist = found, twist
+
+    def at(self, t: float) -> Any:
+        """As `placement`, Pinocchio's; the same object as long as nothing sets it."""
+        return self._placement if self.motion is None else self._checked(self.motion(t))
+
+    def twist(self, t: float) -> Array:
+        """Velocity of its origin over its angular velocity at t, (6,), m/s and rad/s, world axes."""
+        if self.motion is None:
+            return self._twist
+        behind, ahead = self.at(t - STEP), self.at(t + STEP)
+        turned = pin.log3(ahead.rotation @ behind.rotation.T)
+        return np.concatenate([ahead.translation - behind.translation, turned]) / (2.0 * STEP)
+
+    def _checked(self, placement: Placement) -> Any:
+        name = f"obstacle {self.name}: placement"
+        given = array(placement, name)
+        if given.shape == (4, 4):
+            rotation = given[:3, :3]
+            if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-6 or np.linalg.det(rotation) < 0.0:
+                raise InputError(f"{name}: expected a rotation in the upper left of the matrix")
+            return pin.SE3(rotation, given[:3, 3])
+        if given.shape == (3,):
+            return pin.SE3(np.eye(3), given)
+        if given.shape == (6,):
+            return pin.SE3(pin.exp3(given[3:]), given[:3])
+        raise InputError(f"{name}: expected 3 or 6 numbers or a (4, 4) matrix, got shape {given.shape}")
+
+
+def checked_distance(value: ArrayLike, name: str) -> float:
+    """A distance, m, from 0."""
+    distance = scalar(value, name)
+    if distance < 0.0:
+        raise InputError(f"{name}: expected a number from 0, got {distance:g}")
+    return distance

@@ -1,0 +1,115 @@
+"""The shapes of obstacles: lengths in m, axes of their own placement."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import coal
+import numpy as np
+
+from nmm.arrays import positive, vector
+from nmm.collisions.hulls import hull_of_file
+from nmm.errors import InputError
+
+
+class Shape(ABC):
+    """What Coal measures distances to; `geometry()` makes it."""
+
+    @abstractmethod
+    def geometry(self) -> Any:
+        """Coal's shape, convex."""
+
+
+@dataclass(frozen=True)
+class Box(Shape):
+    """A box about its placement's origin: `size` (3,), its edges along x, y, z."""
+
+    size: Sequence[float]
+
+    def __post_init__(self) -> None:
+        size = vector(self.size, 3, "box: size")
+        if np.any(size <= 0.0):
+            raise InputError(f"box: size: expected three lengths above 0, got {list(self.size)}")
+        object.__setattr__(self, "size", tuple(size.tolist()))
+
+    def geometry(self) -> Any:
+        return coal.Box(*self.size)
+
+
+@dataclass(frozen=True)
+class Sphere(Shape):
+    """A sphere about its placement's origin."""
+
+    radius: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", positive(self.radius, "sphere: radius"))
+
+    def geometry(self) -> Any:
+        return coal.Sphere(self.radius)
+
+
+@dataclass(frozen=True)
+class Cylinder(Shape):
+    """A cylinder along z, its middle in the origin."""
+
+    radius: float
+    length: float
+
+    def __post_init__(self) -> None:
+        for name in ("radius", "length"):
+            object.__setattr__(self, name, positive(getattr(self, name), f"cylinder: {name}"))
+
+    def geometry(self) -> Any:
+        return coal.Cylinder(self.radius, self.length)
+
+
+@dataclass(frozen=True)
+class Capsule(Shape):
+    """All points within `radius` of a segment of `length` along z, its middle in the origin."""
+
+    radius: float
+    length: float
+
+    def __post_init__(self) -> None:
+        for name in ("radius", "length"):
+            object.__setattr__(self, name, positive(getattr(self, name), f"capsule: {name}"))
+
+    def geometry(self) -> Any:
+        return coal.Capsule(self.radius, self.length)
+
+
+@dataclass(frozen=True)
+class Plane(Shape):
+    """A half-space: everything below the plane through the origin, whose `normal` (3,) points out of it."""
+
+    normal: Sequence[float] = (0.0, 0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        normal = vector(self.normal, 3, "plane: normal")
+        length = float(np.linalg.norm(normal))
+        if length == 0.0:
+            raise InputError("plane: normal: expected a direction, got 0, 0, 0")
+        object.__setattr__(self, "normal", tuple((normal / length).tolist()))
+
+    def geometry(self) -> Any:
+        return coal.Halfspace(np.array(self.normal), 0.0)
+
+
+@dataclass(frozen=True)
+class Mesh(Shape):
+    """The convex hull of a mesh file (STL, DAE, OBJ, PLY), its axes stretched by `scale` (3,)."""
+
+    file: str | Path
+    scale: Sequence[float] = (1.0, 1.0, 1.0)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "scale", tuple(vector(self.scale, 3, "mesh: scale").tolist()))
+        self.geometry()
+
+    def geometry(self) -> Any:
+        return hull_of_file(Path(self.file), np.array(self.scale))

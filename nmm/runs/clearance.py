@@ -1,0 +1,118 @@
+"""Distances along a run: at its samples and between them, what was nearest, and what that says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from nmm.arrays import Array, Integers
+from nmm.collisions.setting import Setting
+from nmm.control.guard import Counts, Guard
+from nmm.robots.held import Held
+from nmm.runs.integrators import Integrator, Velocity
+
+#: Between samples distances are looked at after so much motion, m and rad of the coordinates together.
+APART = 0.01
+#: Looks between two samples at most.
+LOOKS = 10
+#: A distance is kept where it is short by no more than this, m.
+ROUNDING = 1e-6
+
+
+class Swept(NamedTuple):
+    """Distances along N samples.
+
+    clearance (N,) : the least distance at each sample, m; pairs (N,) : between which pair
+    between (N,) : the least on the way to the next sample, its ends included; the last sample's own
+    """
+
+    clearance: Array
+    pairs: Integers
+    between: Array
+
+
+@dataclass(frozen=True)
+class Guarded:
+    """An integrator that holds the inputs unless everything is farther than the robot can come: what a guard
+    looked along is the way that held inputs make."""
+
+    integrator: Integrator
+    guard: Guard
+    held: Held
+
+    @property
+    def order(self) -> int:
+        return self.integrator.order
+
+    @property
+    def tolerance(self) -> float:
+        return self.integrator.tolerance
+
+    @property
+    def stability(self) -> tuple[float, ...]:
+        return self.integrator.stability
+
+    def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
+        if not self.guard.held:
+            ahead = self.integrator.advance(velocity, t, q, q_dot, u, dt)
+            if self.guard.clear(float(np.abs(ahead - q).sum())):
+                return ahead
+        return self.held(q, u, dt)
+
+
+def swept(setting: Setting, t: Array, q: Array, u: Array) -> Swept:
+    """Distances along a motion t (N,), q (N, n), u (N, m): where they could matter, between samples too."""
+    queries, held = setting.queries, Held(setting.robot)
+    found = [queries.nearest(float(time), place) for time, place in zip(t, q, strict=True)]
+    clearance = np.array([d for d, _ in found])
+    pairs = np.array([pair for _, pair in found], dtype=np.int64)
+    between = clearance.copy()
+    for k in range(len(t) - 1):
+        dt = float(t[k + 1] - t[k])
+        ends = min(clearance[k], clearance[k + 1])
+        moved = float(np.abs(u[k]).sum()) * dt
+        between[k] = ends
+        if ends - setting.distance > moved * max(1.0, setting.robot.reach):
+            continue
+        # The arc that held inputs make, and what the integrator made otherwise, by and by.
+        astray = q[k + 1] - held(q[k], u[k], dt)
+        looks = min(LOOKS, max(1, int(np.ceil(moved / APART))))
+        for i in range(1, looks + 1):
+            share = (i - 0.5) / looks
+            ahead = held(q[k], u[k], share * dt) + share * astray
+            between[k] = min(between[k], queries.nearest(float(t[k]) + share * dt, ahead)[0])
+    return Swept(clearance, pairs, between)
+
+
+def told(setting: Setting, found: Swept, t: Array, counts: Counts) -> list[str]:
+    """What a run says of its distances, a sentence each."""
+    sentences = list(setting.notes)
+    asked = setting.distance
+    below = found.between < asked - ROUNDING
+    if not len(t):
+        return sentences
+    first = 0
+    if found.clearance[0] < asked - ROUNDING:
+        kept = np.flatnonzero(found.clearance >= asked - ROUNDING)
+        name = setting.words(int(found.pairs[0]))
+        back = f"back at t = {t[kept[0]]:.3g} s" if kept.size else "not back at the end"
+        sentences.append(
+            f"the start is nearer than the distance to keep, {asked:g} m: {name}, "
+            f"{found.clearance[0]:.4g} m; {back}"
+        )
+        first = int(kept[0]) if kept.size else len(t)
+    short = np.flatnonzero(below[first:]) + first
+    if short.size:
+        k = int(short[np.argmin(found.between[short])])
+        sentences.append(
+            f"the distance of {asked:g} m could not be kept in {short.size} samples: "
+            f"{setting.words(int(found.pairs[k]))} came to {found.between[k]:.4g} m at t = {t[k]:.3g} s"
+        )
+    if counts.braked:
+        said = f", {counts.short} of them in vain" if counts.short else ""
+        sentences.append(
+            f"in {counts.braked} samples the inputs went towards braking to keep distances{said}"
+        )
+    return sentences
