@@ -3,10 +3,11 @@
     python benchmarks/steering.py [starts] [spring ...]
 
 A position task with gain 1, the projected gradient with its default α, no objective; 40 s by the midpoint
-rule, dt 0.02 s; the last line of a robot with its own limits of velocity and position, the others without. The starts: heading in ±180°, the arm's first joint in ±1 rad and its others in
-±0.2 rad about a posture, the hand within 0.2 m of the path. A run ends on the path when its error is below
-1 mm over the last 5 s; it counts when the steering angle was within its stop all along. `peak` is the largest
-input of the successes, 95 % of them below, m/s and rad/s.
+rule, dt 0.02 s; the last line of a robot with its own limits of velocity and position, the others without.
+The starts: heading in ±180°, the arm's first joint in ±1 rad and its others in ±0.2 rad about a posture,
+the hand within 0.2 m of the path. A run ends on the path when its error is below 1 mm over the last 5 s; it
+counts when the steering angle was within its stop all along. `peak` is the largest input of the successes,
+95 % of them below, m/s and rad/s.
 """
 
 from __future__ import annotations
@@ -125,7 +126,9 @@ def measure(
     for path, reference in paths(height).items():
         rng = np.random.default_rng(7)
         task = nmm.Task(nmm.Position(hand), reference, gain=1.0)
-        controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), None, None, limits, DT, None, steering)
+        controller = nmm.Controller(
+            robot, task, nmm.ProjectedGradient(), limits=limits, dt=DT, steering=steering
+        )
         first = nmm.evaluate(reference, 0.0, nmm.Configuration(robot, robot.q())).value
         found = []
         for _ in range(starts):
