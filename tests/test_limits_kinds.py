@@ -14,6 +14,7 @@ from gripping import FINGERS, panda
 
 import nmm
 from nmm.robots.robot import Robot
+from nmm.runs.margins import margin, shares
 
 Array = np.ndarray
 DT = 0.01
@@ -174,8 +175,28 @@ def test_a_wall_that_wheels_cannot_avoid_is_broken_as_little_as_can_be_and_told(
     assert "the limit of wall could not be kept with the others" in said
     assert "what contradicts each other: wall, v" in said
     assert "limits of functions are broken: wall" in said
+    # A limit on one side alone: the margin is the distance beside the robot's reach.
+    over = run.q[:, robot.coordinate("y")] - 0.02
+    assert run.margin.min() < 0.0
+    assert run.margin.min() == pytest.approx(-over.max() / robot.reach, rel=1e-9)
     # Inputs keep theirs; nothing else than v contradicts, so v stays at 0.5.
     np.testing.assert_allclose(run.u[:, 0], 0.5, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("side", ["lower", "upper"])
+def test_a_limit_on_one_side_counts_in_the_margin(side: str) -> None:
+    """As far as half a reach away, whichever side; two of one function count both, and mirrored alike."""
+    robot = nmm.load("unicycle_3r")
+    sign = 1.0 if side == "lower" else -1.0
+    bounds = [nmm.Bound(nmm.Coordinates("y"), **{side: -sign * room}) for room in (0.3, 0.2)]
+    kept = nmm.Limits(False, False, bounds=bounds).on(robot)
+    y = sign * np.array([-0.25, -0.2, 0.0, 0.1, 100.0])
+    q = np.tile(robot.rest, (len(y), 1))
+    q[:, robot.coordinate("y")] = y
+    names, found = shares(kept, robot, q, np.zeros((len(y), robot.n_u)), np.column_stack([y, y]))
+    assert names == ("y", "y")
+    expected = np.minimum((np.array([-0.25, -0.2, 0.0, 0.1, 100.0]) + 0.2) / robot.reach, 0.5)
+    np.testing.assert_allclose(margin(found), expected, atol=1e-15)
 
 
 def test_limits_that_contradict_each_other_from_the_start_are_named() -> None:

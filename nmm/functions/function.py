@@ -38,10 +38,14 @@ class Row(NamedTuple):
     scale: float | None = None
 
 
+def natural_size(unit: str, robot: Robot) -> float:
+    """What counts as 1 of a unit on a robot: its reach for metres, 1 of anything else."""
+    return robot.reach if unit == "m" else 1.0
+
+
 def row_scales(rows: Sequence[Row], robot: Robot) -> Array:
     """The natural size of each row in its unit, (s,): what a lost rank is measured by."""
-    natural = {"m": robot.reach}
-    return np.array([natural.get(row.unit, 1.0) if row.scale is None else row.scale for row in rows])
+    return np.array([natural_size(row.unit, robot) if row.scale is None else row.scale for row in rows])
 
 
 class Evaluation(NamedTuple):
