@@ -21,6 +21,7 @@ from nmm.resolvers import Answer, Problem, Status
 from nmm.robots.reach import joint_position, reach
 from nmm.robots.robot import Robot
 from nmm.runs.chattering import chattering
+from nmm.runs.feedback import Feedback
 from nmm.runs.promise import accumulated, decay, promised
 
 START = {"x": -1, "y": -1, "theta": pi}
@@ -95,17 +96,60 @@ def test_an_older_folder_without_scale_loads(robot_2r: Robot, tmp_path: Path) ->
 # The promise
 
 
+def feedback(K: np.ndarray, speed: float = np.inf, braking: float = np.inf) -> Feedback:
+    """Gains and bounds of one group of rows."""
+    s = len(K)
+    return Feedback(K, np.full(s, speed), np.full(s, braking), np.zeros(s, dtype=np.int64))
+
+
 def test_the_promise_is_the_exponential(rng: np.random.Generator) -> None:
     K = rng.normal(size=(3, 3)) + 3 * np.eye(3)
     t = np.array([0.0, 0.1, 0.2, 0.3, 0.35])
     error = np.tile(rng.normal(size=3), (5, 1))
     expected = [np.linalg.norm(expm(-K * one) @ error[0]) for one in t]
-    np.testing.assert_allclose(promised(t, error, K), expected, rtol=1e-12)
+    np.testing.assert_allclose(promised(t, error, feedback(K)), expected, rtol=1e-12)
     # An error of 1 that was made along the first step, and what is left of it.
     symmetric = K @ K.T
-    left = accumulated(np.array([1.0, 0, 0, 0]), decay(t, symmetric))
+    left = accumulated(np.array([1.0, 0, 0, 0]), decay(t, error, feedback(symmetric)))
     slowest = np.linalg.eigvalsh(symmetric)[0]
     np.testing.assert_allclose(left[1:], np.exp(-slowest * (t[1:] - t[1])), rtol=1e-9)
+
+
+def test_the_promise_counts_a_bound_of_the_feedback(rng: np.random.Generator) -> None:
+    """From 3 m at 0.5 m/s, braked at 0.4 m/s² from 0.3125 m on, and exponential below 2 b / K² = 0.2 m."""
+    K, speed, braking = 2.0, 0.5, 0.4
+    direction = rng.normal(size=3)
+    error = 3.0 * direction[np.newaxis] / np.linalg.norm(direction)
+    t = np.linspace(0.0, 9.0, 901)
+    begins = (3.0 - 0.3125) / speed  # ‖e‖ = (√e - √(b/2) t)² from there on
+    meets = begins + (np.sqrt(0.3125) - np.sqrt(0.2)) / np.sqrt(braking / 2)
+    expected = np.where(
+        t < begins, 3.0 - speed * t, (np.sqrt(0.3125) - np.sqrt(braking / 2) * (t - begins)) ** 2
+    )
+    expected = np.where(t > meets, 0.2 * np.exp(-K * (t - meets)), expected)
+    bounded = feedback(K * np.eye(3), speed, braking)
+    np.testing.assert_allclose(promised(t, error, bounded), expected, atol=1e-5)
+    np.testing.assert_array_equal(bounded.bound(expected[:, np.newaxis] * error / 3.0), t < meets)
+
+
+@pytest.mark.parametrize("bounds", [{"speed": 0.3}, {"braking": 0.1}, {"speed": {"m": 0.3}, "braking": 0.1}])
+def test_a_run_whose_feedback_is_bounded_keeps_its_promise(
+    robot_2r: Robot, bounds: dict[str, object]
+) -> None:
+    """Towards a target metres away: nothing to warn about, and a promise that other inputs do not keep."""
+    task = nmm.Task(TIP.function, [4.0, 1.0], 2.0, **bounds)
+    run = nmm.simulate(
+        nmm.Controller(robot_2r, task, nmm.ReducedGradient()), START, 40.0, 0.01, until=nmm.Goal()
+    )
+    assert run.outcome == "completed"
+    assert run.warnings == ()
+
+    def slow(problem: Problem) -> np.ndarray:
+        return 0.7 * np.linalg.pinv(problem.J) @ problem.rate
+
+    late = nmm.simulate(nmm.Controller(robot_2r, task, nmm.CallableResolver(slow)), START, 4.0, 0.01)
+    assert "the task error was not what its gain promises" in late.warnings[-1]
+    assert "did not do all that the task asked" in late.warnings[-1]
 
 
 @pytest.mark.parametrize("method", ["euler", "midpoint", "rk4", "zoh", "adaptive"])

@@ -78,6 +78,14 @@ def test_a_run_ends_where_its_goal_is_reached() -> None:
     assert radians <= goal.rad
     before = sizes(run.error[-2], units)
     assert before[0] > goal.m or before[1] > goal.rad
+    assert "promise" not in " ".join(run.warnings)  # limits bind on the way, which is no failure
+    assert "λ falls to" in " ".join(run.warnings)
+
+
+@pytest.mark.parametrize("until", [True, 0.01, {"m": 0.01}])
+def test_a_goal_that_is_none_is_refused(until: object) -> None:
+    with pytest.raises(nmm.InputError, match=r"until: expected a Goal, .* got "):
+        nmm.simulate(controller(), Q0, 1.0, DT, "zoh", until=until)  # type: ignore[arg-type]
 
 
 def test_a_goal_out_of_reach_is_missed_with_what_is_left() -> None:

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.linalg import block_diag
 
+from nmm.arrays import Array, Integers
 from nmm.control.equations import PLAIN, WRAPPED, TaskRows
 from nmm.functions.function import Function, Row
 from nmm.functions.tasks.comparison import Comparison
@@ -16,6 +18,15 @@ from nmm.robots.robot import Robot
 def task_functions(stack: Stack) -> list[Function]:
     """What a program evaluates for these tasks: f, g and e of each."""
     return [function for task in stack for function in (task.function, task.reference, Comparison(task))]
+
+
+def gain_rows(stack: Stack, robot: Robot) -> tuple[Array, Array, Array, Integers]:
+    """Feedback of a stack: K (s, s), block by block; speed, braking and group (s,), see `TaskRows`."""
+    K = block_diag(np.zeros((0, 0)), *(task.gain_matrix(robot) for task in stack))
+    rows = [(k, row.unit) for k, task in enumerate(stack) for row in task.rows(robot)]
+    group = np.array([rows.index(row) for row in rows], dtype=np.int64)
+    speed, braking = np.hstack([np.zeros((2, 0)), *(np.array(task.approach(robot)) for task in stack)])
+    return K, speed, braking, group
 
 
 def task_rows(stack: Stack, robot: Robot, first: Sequence[int]) -> TaskRows:
@@ -29,18 +40,8 @@ def task_rows(stack: Stack, robot: Robot, first: Sequence[int]) -> TaskRows:
         for j, row in enumerate(task.rows(robot))
     ]
     table = np.array(listed, dtype=np.int64).reshape(-1, 3)
-    s = len(table)
-    K = np.zeros((s, s))
-    done = 0
-    for task in stack:
-        block = task.gain_matrix(robot)
-        K[done : done + len(block), done : done + len(block)] = block
-        done += len(block)
-    rows = [(k, row.unit) for k, task in enumerate(stack) for row in task.rows(robot)]
-    group = np.array([rows.index(row) for row in rows], dtype=np.int64)
-    parts = [np.array(task.approach(robot)) for task in stack]
-    speed, braking = np.hstack([np.zeros((2, 0)), *parts])
-    return TaskRows(table, K, speed, braking, group, *np.zeros((4, s)))
+    K, speed, braking, group = gain_rows(stack, robot)
+    return TaskRows(table, K, speed, braking, group, *np.zeros((4, len(table))))
 
 
 def _error_row(task: Task, computed: int, component: int, row: Row) -> int:

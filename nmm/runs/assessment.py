@@ -70,7 +70,7 @@ def _own_moves(samples: Samples, moved: Array) -> int:
     What counts, were it so in every step, would add to the error as much as is judged: less is what the
     trapezoids of `_target_moves` miss of any target that does not move uniformly.
     """
-    decays = decay(samples.t, samples.K)
+    decays = decay(samples.t, samples.error, samples.feedback)
     counts = ENDS * (1.0 + float(np.linalg.norm(samples.error[0])))
     own = int(np.sum(moved > counts * np.maximum(1.0 - decays, 1.0 / len(moved))))
     return own if own > OFTEN * len(moved) else 0
@@ -79,6 +79,8 @@ def _own_moves(samples: Samples, moved: Array) -> int:
 def _target_moves(controller: Controller, recorder: Recorder) -> Array:
     """By how much the error changed along each step with q held, otherwise than its rate says, (N - 1,)."""
     samples, count = recorder.samples, len(recorder)
+    moved = samples.rate - samples.feedback.rates(samples.error)
+    K = samples.feedback.K
     moves = np.empty(count - 1)
     for k in range(count - 1):
         try:
@@ -86,7 +88,7 @@ def _target_moves(controller: Controller, recorder: Recorder) -> Array:
         except Exception:  # a user's function may raise anything, where it was not made for
             moves[k] = 0.0
             continue
-        rates = samples.rate[k] - samples.K @ samples.error[k] + ahead.rate - samples.K @ ahead.error
+        rates = moved[k] + ahead.rate - K @ ahead.error  # a step's rate is that of unbounded feedback
         change = ahead.error - samples.error[k] - 0.5 * (samples.t[k + 1] - samples.t[k]) * rates
         moves[k] = np.linalg.norm(change)
     controller.reset()

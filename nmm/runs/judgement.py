@@ -63,6 +63,7 @@ def judge(
     dt: float,
     ended: Ended,
     retry: Retry,
+    goal: Goal | None = None,
 ) -> Verdict:
     """Judge a run.
 
@@ -71,12 +72,15 @@ def judge(
     controller, recorder, advance, method, dt : the run
     ended : how integrating it ended
     retry : to try parts of it again with another dt
+    goal : what it was to reach; one that has reached it is not held to what its gain promised on the way
     """
     outcome, message = ended.outcome, ended.message
     samples = recorder.samples
     if not len(recorder):
         return Verdict(outcome, _joined(message, *_lost(controller, recorder, ended)), [])
     found = assess(controller, recorder, advance, dt)
+    if goal is not None and goal.reached(samples.error[-1], controller.rows):
+        found = found._replace(departure=None, target=0)
     unmet = residuals(samples.t, samples.residual, samples.rate)
     chatter = chattering(samples.t, samples.u, controller.robot.u_names)
     warnings = (

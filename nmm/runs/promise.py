@@ -9,8 +9,10 @@ known at the samples: along a step the task's rate changes by ΔJ u (the robot's
 
 to leading order, and that of a method of order p is c ρ^(p-1), where ρ is h over the time in which the motion
 changes: the share by which u, J or ∂e/∂t changed along the step. Errors made earlier decay as the error
-itself does. A step along which u or J changed by more than their own size is not resolved by the method and
-explains nothing: no allowance is made for it.
+itself does. Where a task bounds its feedback by a speed or a braking, K e is that bounded vector throughout
+(`Feedback`), the promise is its flow, and along a step on which a bound binds nothing is taken to decay. A
+step along which u or J changed by more than their own size is not resolved by the method and explains
+nothing: no allowance is made for it.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from nmm.arrays import Array, Integers
+from nmm.runs.feedback import Feedback
 from nmm.runs.residuals import differs
 
 #: The local error is estimated, not bounded: this many times the estimate is allowed.
@@ -41,7 +44,7 @@ class Samples(NamedTuple):
     t (N,) s; error (N, s); rate (N, s): ∂e/∂t + K e, asked of J u; J (N, s, m); u (N, m)
     residual (N,) : ‖J u - rate‖
     partition (N, s) : columns of Ja, -1 where there is none
-    K (s, s) : the gains, 1/s
+    feedback : K e, as the tasks bound it
     """
 
     t: Array
@@ -51,7 +54,7 @@ class Samples(NamedTuple):
     u: Array
     residual: Array
     partition: Integers
-    K: Array
+    feedback: Feedback
 
 
 class Departure(NamedTuple):
@@ -60,7 +63,7 @@ class Departure(NamedTuple):
     Attributes
     ----------
     first, worst : the samples at which it left and at which it was farthest from it
-    promise (N,) : ‖exp(-K (t - t0)) e(t0)‖
+    promise (N,) : ‖exp(-K (t - t0)) e(t0)‖, or what bounded feedback leaves
     bound (N,) : the largest ‖e‖ that the promise, integration and the target explain
     unmet (N,) : what the residual adds to it, where the inputs did not do what the task asked
     missed : whether the run did not keep its promise; else the error left it by little, or because of the
@@ -88,10 +91,10 @@ def departure(samples: Samples, step: Array, target: Array | None = None) -> Dep
     t, error = samples.t, samples.error
     if len(t) < 2:
         return None
-    decays = decay(t, samples.K)
+    decays = decay(t, error, samples.feedback)
     norm = _sizes(error)
     size = 1.0 + norm[0]
-    promise = promised(t, error, samples.K)
+    promise = promised(t, error, samples.feedback)
     bound = promise + np.minimum(accumulated(step, decays), MOST * size)
     if target is not None:
         bound = bound + accumulated(target, decays)
@@ -105,17 +108,24 @@ def departure(samples: Samples, step: Array, target: Array | None = None) -> Dep
     return Departure(int(beyond[0]), int(np.argmax(excess)), promise, bound, unmet, missed)
 
 
-def decay(t: Array, K: Array) -> Array:
-    """‖exp(-K h)‖ of each step h of the times (N,), shape (N - 1,)."""
-    steps, which = np.unique(np.round(np.diff(t), 12), return_inverse=True)
-    norms = np.array([np.linalg.norm(expm(-K * h), 2) for h in steps])
-    return np.asarray(norms[which])
+def decay(t: Array, error: Array, feedback: Feedback) -> Array:
+    """‖exp(-K h)‖ of each step h, (N - 1,); 1 where feedback is bounded at either end of it."""
+    steps, which = _steps(t)
+    norms = np.array([np.linalg.norm(expm(-feedback.K * h), 2) for h in steps])
+    bound = feedback.bound(error)
+    return np.where(bound[1:] | bound[:-1], 1.0, norms[which])
 
 
-def promised(t: Array, error: Array, K: Array) -> Array:
-    """‖exp(-K (t - t0)) e(t0)‖ at the times (N,), in the mixed units of the rows."""
-    steps, which = np.unique(np.round(np.diff(t), 12), return_inverse=True)
-    factors = [expm(-K * h) for h in steps]
+def promised(t: Array, error: Array, feedback: Feedback) -> Array:
+    """‖e‖ at the times (N,) of e_dot = -K e from error[0], in the mixed units of the rows."""
+    if feedback.has_bounds:
+        from scipy.integrate import solve_ivp  # here: a quarter of a second that most runs need not pay
+
+        span, first = (t[0], t[-1]), error[0]
+        flow = solve_ivp(lambda _, e: -feedback.rates(e[np.newaxis])[0], span, first, "LSODA", t, rtol=1e-6)
+        return _sizes(flow.y.T)
+    steps, which = _steps(t)
+    factors = [expm(-feedback.K * h) for h in steps]
     norms = np.empty(len(t))
     e = error[0]
     for k in range(len(t)):
@@ -125,13 +135,19 @@ def promised(t: Array, error: Array, K: Array) -> Array:
     return norms
 
 
+def _steps(t: Array) -> tuple[Array, Integers]:
+    """The steps that there are between the times (N,), and which of them each is, (N - 1,)."""
+    return np.unique(np.round(np.diff(t), 12), return_inverse=True)
+
+
 def step_errors(samples: Samples, order: int) -> Array:
     """The error that a method of that order may make along each step, (N - 1,); 0 where it cannot follow."""
-    t, error, rate, J, u, _, partition, K = samples
+    t, error, rate, J, u, _, partition, feedback = samples
+    K, fed = feedback.K, feedback.rates(error)
     h = np.diff(t)
-    moved = rate - error @ K.T  # ∂e/∂t
+    moved = rate - fed  # ∂e/∂t
     turned = np.einsum("kij,kj->ki", np.diff(J, axis=0), u[:-1])
-    first = 0.5 * h * (_sizes(turned) + _sizes(np.diff(moved, axis=0)) + h * _sizes(error[:-1] @ (K @ K).T))
+    first = 0.5 * h * (_sizes(turned) + _sizes(np.diff(moved, axis=0)) + h * _sizes(fed[:-1] @ K.T))
     change = _relative_change(u)
     switched = np.any(
         np.diff(partition, axis=0) != 0, axis=1

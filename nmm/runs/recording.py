@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from nmm.arrays import Array
 from nmm.control.controller import Controller
@@ -20,6 +19,7 @@ from nmm.resolvers.answer import Status
 from nmm.robots.robot import Robot
 from nmm.runs.broken_limits import broken_limits, broken_rows
 from nmm.runs.clearance import swept, told
+from nmm.runs.feedback import Feedback
 from nmm.runs.margins import margin, shares
 from nmm.runs.promise import Samples
 from nmm.runs.reasons import weakest_words
@@ -37,7 +37,7 @@ class Recorder:
         self._controller = controller
         self._times = times
         self._shown = _shown(controller)
-        self._K = block_diag(*(task.gain_matrix(controller.robot) for task in controller.task))
+        self._feedback = Feedback.of(controller.task, controller.robot)
         robot, s = controller.robot, len(controller.rows)
         count = len(times)
         self.q = np.empty((count, robot.n))
@@ -92,18 +92,14 @@ class Recorder:
 
     @property
     def samples(self) -> Samples:
-        """What was recorded of the task so far."""
-        count = self._count
-        return Samples(
-            self.t,
-            self._rows[2, :count],
-            self._rows[3, :count],
-            self._J[:count],
-            self._u[:count],
-            self._scalars[1, :count],
-            self._partition[:count],
-            self._K,
-        )
+        """What was recorded of the task so far; feedback that a task bounds is asked as bounded."""
+        count, feedback = self._count, self._feedback
+        error, rate, residual = self._rows[2, :count], self._rows[3, :count], self._scalars[1, :count]
+        J, u = self._J[:count], self._u[:count]
+        if feedback.has_bounds:
+            rate = rate - error @ feedback.K.T + feedback.rates(error)
+            residual = np.linalg.norm(np.einsum("kij,kj->ki", J, u) - rate, axis=1)
+        return Samples(self.t, error, rate, J, u, residual, self._partition[:count], feedback)
 
     def add(self, sample: Step) -> None:
         """Record one sample."""

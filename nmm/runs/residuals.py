@@ -32,10 +32,11 @@ class Residuals(NamedTuple):
         """For a warning; "" where J u was the rate everywhere."""
         if not self.samples:
             return ""
+        share = f"{100 * self.relative:.3g} % of it" if self.relative <= 1.0 else "more than the rate itself"
         return (
             f"the inputs did not do all that the task asked in {self.samples} samples "
             f"({100 * self.share:.3g} %): J u differed from the rate by up to {self.largest:.3g} "
-            f"({100 * self.relative:.3g} % of it), at t = {self.t:.4g} s"
+            f"({share}), at t = {self.t:.4g} s"
         )
 
 

@@ -65,13 +65,15 @@ def simulate(
     Raises
     ------
     InputError : wrong q0 (also one outside limits that the controller does not keep, or with a joint that is
-        not where the one that it follows has it), duration, dt, method
+        not where the one that it follows has it), duration, dt, method; an `until` that is no Goal
     """
     robot = controller.robot
     q = robot.q(q0)
     come_back = controller.limits is not None and controller.limits.position is not False
     robot.check_limits(q, come_back=come_back)
     q = robot.following.placed(q)
+    if until is not None and not isinstance(until, Goal):
+        raise InputError(f"until: expected a Goal, as Goal(m=0.005, rad=0.02), got {until!r}")
     duration = positive(duration, "duration")
     dt = positive(dt, "dt")
     steps = max(1, math.ceil(duration / dt - 1e-9))
@@ -102,7 +104,7 @@ def simulate(
         return tried, ended.outcome
 
     try:
-        verdict = judge(controller, recorder, advance, method, dt, ended, retry)
+        verdict = judge(controller, recorder, advance, method, dt, ended, retry, until)
     except KeyboardInterrupt:  # the motion is there; what is lost is what to say of it
         if ended.outcome is Outcome.COMPLETED:
             ended = ended._replace(
