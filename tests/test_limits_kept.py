@@ -274,3 +274,22 @@ def test_without_limits_the_closed_loop_has_none() -> None:
         np.testing.assert_array_equal(limited.velocity(0.0, START), free.velocity(0.0, START))
         np.testing.assert_array_equal(limited(0.0, START), free(0.0, START))
     assert np.abs(limited(0.0, START)).max() <= 0.05
+
+
+def test_a_start_from_rest_is_not_warned_about() -> None:
+    """λ says it; what limits take away later is told, with its own time."""
+    robot = nmm.load("unicycle_3r")
+
+    def run(velocity: bool | dict[str, float]) -> nmm.Trajectory:
+        task = nmm.Task(nmm.Position("ee", "xy"), nmm.Circle([2, 0], 1.0, rate=0.3))
+        limits = nmm.Limits(velocity, acceleration=2.0)
+        controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), limits=limits, dt=0.01)
+        return nmm.simulate(controller, {"q1": 0.3, "q2": 0.6}, 6.0, 0.01)
+
+    free = run(False)
+    assert free.unmet.samples > 0
+    assert free.scale.min() < 0.1
+    assert not any("J u differed" in said for said in free.warnings)
+    slow = run({"platform": 0.3, "arm": 0.3})
+    (said,) = (said for said in slow.warnings if "J u differed" in said)
+    assert float(said.split("at t = ")[1].split(" s")[0]) > 0.1

@@ -23,7 +23,7 @@ from nmm.runs.chattering import Chattering, chattering
 from nmm.runs.integrators import Integrator
 from nmm.runs.promise import Departure, Samples
 from nmm.runs.recording import Recorder
-from nmm.runs.residuals import residuals
+from nmm.runs.residuals import residuals, run_up
 from nmm.runs.stability import Advice, Instability
 from nmm.runs.trajectory import Outcome
 
@@ -81,7 +81,10 @@ def judge(
     found = assess(controller, recorder, advance, dt)
     if goal is not None and goal.reached(samples.error[-1], controller.rows):
         found = found._replace(departure=None, target=0)
-    unmet = residuals(samples.t, samples.residual, samples.rate)
+    residual = samples.residual.copy()
+    if controller.limits is not None:  # of a start from rest λ says it
+        residual[: run_up(samples.t, samples.u, controller.kept.accelerations, dt)] = 0.0
+    unmet = residuals(samples.t, residual, samples.rate)
     chatter = chattering(samples.t, samples.u, controller.robot.u_names)
     warnings = (
         [_joined(unmet.sentence, _relaxed(recorder.scale, limited=controller.limits is not None))]

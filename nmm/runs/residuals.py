@@ -58,3 +58,13 @@ def residuals(t: Array, residual: Array, rate: Array) -> Residuals:
     asked = float(np.linalg.norm(rate[k]))
     relative = float(residual[k]) / asked if asked > 0.0 else 1.0
     return Residuals(len(found), len(found) / len(t), float(residual[k]), relative, float(t[k]))
+
+
+def run_up(t: Array, u: Array, accelerations: Array, dt: float) -> int:
+    """How many samples a run from rest spends on taking up speed as fast as accelerations (m,) allow.
+
+    t (N,) s, u (N, m), the first of them dt from rest. What is not done meanwhile is not done by design.
+    """
+    most = np.append(dt, np.diff(t))[:, np.newaxis] * accelerations
+    fast = np.any(np.abs(np.diff(u, axis=0, prepend=0.0)) >= most * (1.0 - 1e-6), axis=1)
+    return len(t) if fast.all() else int(np.argmin(fast))
