@@ -51,6 +51,10 @@ def law(controller: nmm.Controller) -> Steered:
     return controller.steered
 
 
+def test_the_law_says_what_it_is(car: Robot) -> None:
+    assert repr(law(steered(car))) == "Steered(steering_rate: pursuit of ee, gain 5 1/s, spring 2 1/s)"
+
+
 def configurations(robot: Robot, count: int) -> Array:
     lower, upper = np.clip(robot.q_limits.T, -1.5, 1.5)
     return np.random.default_rng(3).uniform(lower, upper, (count, robot.n))

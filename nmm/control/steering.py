@@ -130,6 +130,13 @@ class Steered:
         self.pivots: tuple[SteeringPivot, ...] = pursuit.axle.pivots
         self.inputs = tuple(pivot.input for pivot in self.pivots)
 
+    def __repr__(self) -> str:
+        law = self.steering
+        return (
+            f"Steered({', '.join(self.inputs)}: pursuit of {self.pursuit.hand}, gain {law.gain:g} 1/s, "
+            f"spring {law.spring:g} 1/s)"
+        )
+
     def numbers(self, row: int, alpha: float) -> SteeringNumbers:
         """For a step whose program has the pursuit at `row`; it does not steer yet."""
         robot = self.robot
