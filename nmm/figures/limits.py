@@ -9,11 +9,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from nmm.figures import style
+from nmm.robots.wheel_rates import wheel_rates
 from nmm.runs.margins import margin
 from nmm.runs.trajectory import Trajectory
 
 #: A limit counts as near within this share of its range.
 NEAR = 0.05
+#: What the lines and the shading are called.
+LIMIT, FREE = "limit", f"farther than {100 * NEAR:g} % of the range from both"
 
 
 def has_limits(trajectory: Trajectory) -> bool:
@@ -34,7 +37,7 @@ def limits(trajectory: Trajectory) -> Figure:
         "others": [i for i in columns if trajectory.limit_names[i] not in inputs],
     }
     shown = {name: part for name, part in parts.items() if part}
-    legends = [style.legend_rows(_names(trajectory, part)) for part in shown.values()]
+    legends = [style.legend_rows([*_names(trajectory, part), LIMIT, FREE]) for part in shown.values()]
     made, panels = style.stack([1.5] * len(shown) + [1.1], [*legends, 1])
     for axes, (name, part) in zip(panels, shown.items(), strict=False):
         draw_shares(axes, trajectory, part, f"{name}, share of range")
@@ -43,19 +46,21 @@ def limits(trajectory: Trajectory) -> Figure:
 
 
 def _names(trajectory: Trajectory, columns: Sequence[int]) -> list[str]:
-    return [style.pretty(trajectory.limit_names[column].removeprefix("u_")) for column in columns]
+    wheels, _ = wheel_rates(trajectory.robot)
+    names = [trajectory.limit_names[column] for column in columns]
+    return [style.pretty(name.removeprefix("u_")) + " rate" * (name in wheels) for name in names]
 
 
 def draw_shares(axes: Axes, trajectory: Trajectory, columns: Sequence[int], y: str) -> None:
     """Where quantities are between their limits, a curve each; what is far from both is shaded."""
     shares = trajectory.shares[:, columns]
     low, high = min(0.0, float(shares.min())), max(1.0, float(shares.max()))
-    axes.axhspan(NEAR, 1.0 - NEAR, color=style.GREEN, alpha=0.07, linewidth=0)
-    for end in (0.0, 1.0):
-        axes.axhline(end, color=style.VERMILLION, linewidth=1.0, zorder=1)
     for k, (column, name) in enumerate(zip(columns, _names(trajectory, columns), strict=True)):
         color, dashes = style.CYCLE[k % 7], style.DASHES[k // 7 % 4]
         style.curve(axes, trajectory.t, trajectory.shares[:, column], name, color, dashes)
+    for end in (0.0, 1.0):
+        axes.axhline(end, color=style.VERMILLION, linewidth=1.0, zorder=1, label=None if end else LIMIT)
+    axes.axhspan(NEAR, 1.0 - NEAR, color=style.GREEN, alpha=0.07, linewidth=0, label=FREE)
     style.label(axes, y=y)
     axes.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))
     style.time_axis(axes, trajectory.t, named=False)
