@@ -63,6 +63,10 @@ def _rows(trajectory: Trajectory, numbers: dict[str, Any]) -> Iterator[tuple[str
             "λ under limits",
             f"{numbers['scale_min']:.3g} at least; below 1 {100 * share:.3g} % of the time",
         )
+    if free := numbers["without_velocity_limit"]:
+        groups = [name for name, inputs in trajectory.robot.groups.items() if not {*free}.isdisjoint(inputs)]
+        keys = ", ".join(f"limits.velocity.{name}" for name in groups)
+        yield "no velocity limit for", f"{', '.join(free)} (give {keys})"
     if numbers["margin_min"] is not None:
         margin = round(100 * numbers["margin_min"], 9) + 0.0  # neither rounding, nor -0, is a limit broken
         yield "least margin to a limit", f"{margin:.3g} % of its range"

@@ -44,6 +44,7 @@ def summarise(trajectory: Trajectory) -> dict[str, Any]:
         "dt": trajectory.dt,
         "limited": trajectory.limited,
         "limit_names": list(trajectory.limit_names),
+        "without_velocity_limit": without_velocity_limit(trajectory),
         "samples": count,
         "redundancy": redundancy,
         "r_names": list(trajectory.r_names),
@@ -88,6 +89,18 @@ def summarise(trajectory: Trajectory) -> dict[str, Any]:
             "the task has as many rows as there are inputs: no redundancy is left to resolve"
         )
     return summary
+
+
+def without_velocity_limit(trajectory: Trajectory) -> list[str]:
+    """The inputs that limits of velocity say nothing of, where limits were kept: its file has none, say.
+
+    An input that equal limits hold at one value has no range: one that never changes is not named.
+    """
+    if not trajectory.limited or not len(trajectory):
+        return []
+    named, moved = {*trajectory.limit_names}, np.ptp(trajectory.u, axis=0) > 0.0
+    names = trajectory.robot.u_names
+    return [name for name, moves in zip(names, moved, strict=True) if moves and f"u_{name}" not in named]
 
 
 def unmet(summary: dict[str, Any]) -> Residuals:
