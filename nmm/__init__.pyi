@@ -15,6 +15,8 @@ from .control.goal import Goal as Goal
 from .control.limited_function import Bound as Bound
 from .control.limits import Limits as Limits
 from .control.retreat import Retreat as Retreat
+from .control.sequence import Event as Event
+from .control.sequenced import SequencedController as SequencedController
 from .control.steering import Steering as Steering
 from .control.step import Step as Step
 from .errors import DivergedError as DivergedError
@@ -45,6 +47,8 @@ from .functions.references import Slerp as Slerp
 from .functions.references import Spline as Spline
 from .functions.references import Turn as Turn
 from .functions.references import rotation_vector as rotation_vector
+from .functions.tasks import After as After
+from .functions.tasks import Between as Between
 from .functions.tasks import CallableFunction as CallableFunction
 from .functions.tasks import CenterOfMass as CenterOfMass
 from .functions.tasks import Coordinates as Coordinates
@@ -57,6 +61,7 @@ from .functions.tasks import Position as Position
 from .functions.tasks import Posture as Posture
 from .functions.tasks import Stack as Stack
 from .functions.tasks import Task as Task
+from .functions.tasks import While as While
 from .platforms import Car as Car
 from .platforms import CasterWheel as CasterWheel
 from .platforms import CommonSpeed as CommonSpeed

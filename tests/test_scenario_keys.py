@@ -14,6 +14,7 @@ import nmm.resolvers
 from nmm import Scenario, ScenarioError, kinds
 from nmm.robots.configuration import Configuration
 from nmm.runs.integrators import METHODS
+from nmm.scenario.conditions import CONDITION_PARTS
 from nmm.scenario.constructors import documented, parameters
 from nmm.scenario.functions import FUNCTION_PARTS, REFERENCE_PARTS
 from nmm.scenario.made_part import MadePart
@@ -197,6 +198,7 @@ each_list = pytest.mark.parametrize(("listed", "parts"), REGISTERED, ids=lambda 
 def test_every_kind_can_be_asked_for(listed: kinds.Kinds, parts: dict[str, type[MadePart]]) -> None:
     """What a constructor takes, a file can say, and with the same default; what else it says is listed."""
     beside = {"kind", "reference", "gain", "weight", "maximise", "added_task", "priority", "speed", "braking"}
+    beside |= {"name", "when"}
     own = {"quadratic": {"terms"}, "polynomial": {"times", "points"}}
     assert set(listed) <= set(parts)
     for name, made in listed.items():
@@ -242,6 +244,7 @@ def test_every_key_is_described() -> None:
     shared = [kind for kind, part in REFERENCE_PARTS.items() if part is FUNCTION_PARTS.get(kind)]
     others = ("the file", "robot", "robot, with arms mounted", "robot.arms", "objective.terms")
     others = (*others, "limits", "limits.bounds", "until", "retreat", "steering")
+    others = (*others, *(f"task.when, kind: {kind}" for kind in CONDITION_PARTS))
     assert len(titles) == len(others) + sum(len(parts) for _, parts in REGISTERED) - len(shared)
 
 

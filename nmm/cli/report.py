@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from nmm.cli.output import show_table, warn
 
 if TYPE_CHECKING:
@@ -42,8 +44,11 @@ def _rows(trajectory: Trajectory, numbers: dict[str, Any]) -> Iterator[tuple[str
     if not len(trajectory):
         return
     for row, (name, unit) in enumerate(zip(trajectory.r_names, trajectory.r_units, strict=True)):
-        first, last = trajectory.error[0, row], trajectory.error[-1, row]
-        yield f"error of {name}", f"{first:.3g} → {last:.3g} {unit}"
+        seen = trajectory.error[:, row]
+        seen = seen[~np.isnan(seen)]
+        yield f"error of {name}", f"{seen[0]:.3g} → {seen[-1]:.3g} {unit}" if len(seen) else "never active"
+    for event in trajectory.events:
+        yield f"t = {event.t:.4g} s", f"{event.task} {event.what}{f': {event.why}' if event.why else ''}"
     yield "tracking ‖e‖", f"RMS {numbers['error_rms']:.3g}, {numbers['error_max']:.3g} at most"
     if (trajectory.scenario or {}).get("objective"):
         yield "objective H", f"{trajectory.objective[0]:.4g} → {trajectory.objective[-1]:.4g}"

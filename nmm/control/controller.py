@@ -113,6 +113,11 @@ class Controller:
         self.added_task = Stack() if added_task is None else Stack.of(added_task)
         if self.added_task.tasks and not resolver.takes_added_task:
             raise InputError(f"added_task: resolver {resolver.name} takes none, ej does")
+        for one in (*self.task, *self.added_task):
+            if one.when:
+                raise InputError(
+                    f"task {one.called(robot)}: when: a SequencedController takes tasks that come and go"
+                )
         if not isinstance(steering, bool):
             _expect(steering, Steering, "steering")
         self.steering = steering

@@ -42,7 +42,30 @@ def draw_components(axes: Axes, trajectory: Trajectory, rows: Sequence[int], uni
         color, dashes = style.CYCLE[k % 7], style.DASHES[k % 4]
         style.curve(axes, trajectory.t, trajectory.error[:, row], name, color, dashes)
     axes.axhline(0.0, color=style.GREY, linewidth=0.7, zorder=1)
+    draw_events(axes, trajectory, named=False)
     _finish(axes, trajectory, f"error [{unit}]", named=False)
+
+
+def draw_events(axes: Axes, trajectory: Trajectory, *, named: bool) -> None:
+    """A line where a task begins (dashed) or ends (dotted) after the run's beginning, with its name."""
+    at: dict[float, list[str]] = {}
+    for event in trajectory.events:
+        if event.t > trajectory.t[0]:
+            at.setdefault(event.t, []).append(f"{event.task} {event.what}")
+    for t, said in at.items():
+        dashes = "--" if any(one.endswith("begins") for one in said) else ":"
+        axes.axvline(t, color=style.GREY, linestyle=dashes, linewidth=1.0, zorder=1)
+        if named:
+            axes.annotate(
+                f"{', '.join(said)} ",
+                (t, 0.02),
+                xycoords=("data", "axes fraction"),
+                rotation=90,
+                ha="right",
+                va="bottom",
+                fontsize=style.SMALL,
+                color=style.GREY,
+            )
 
 
 def _error_names(trajectory: Trajectory, rows: Sequence[int]) -> list[str]:
@@ -65,7 +88,8 @@ def draw_error_norm(
     lowest, highest = max(float(positive.min()), 1e-16), float(positive.max())
     gain = _stated_gain(trajectory) if gain is None else gain
     rate = fitted_rate(t, norm) if gain is None else gain
-    if rate is not None and rate > 0.0:
+    draw_events(axes, trajectory, named=True)
+    if rate is not None and rate > 0.0 and not trajectory.events:  # what begins later decays from there on
         guide = norm[0] * np.exp(-rate * (t - t[0]))
         seen = guide >= lowest * 0.5
         name = f"‖e(0)‖ exp(−K t), K = {rate:.4g} 1/s{' (fitted)' if gain is None else ''}"
@@ -113,7 +137,9 @@ def _unwrapped(trajectory: Trajectory, row: int, *, reference: bool = False) -> 
     """A component without the jumps of 2π that an angle's display would make."""
     target: Array = trajectory.r_d[:, row]
     if trajectory.r_units[row] == "rad":
-        target = np.unwrap(target)
+        known = ~np.isnan(target)  # a task that comes and goes has none meanwhile
+        target = target.copy()
+        target[known] = np.unwrap(target[known])
     return target if reference else target - trajectory.error[:, row]
 
 

@@ -99,6 +99,7 @@ def load(folder: str | Path, robot: Robot | None = None) -> Trajectory:
     ------
     InputError : names what is missing, or says that the robot is another
     """
+    from nmm.control.sequence import Event
     from nmm.runs.trajectory import Outcome, Trajectory
     from nmm.scenario import Scenario
 
@@ -139,6 +140,7 @@ def load(folder: str | Path, robot: Robot | None = None) -> Trajectory:
         limit_names=tuple(summary.get("limit_names", ())),
         clearance_names=tuple(summary.get("clearance_names", ())),
         scenario=scenario,
+        events=tuple(Event(**event) for event in summary.get("events", ())),
         **arrays,
     )
 
@@ -161,6 +163,8 @@ def _arrays(trajectory: Trajectory) -> dict[str, Any]:
     arrays["q_names"] = np.array(trajectory.robot.q_names)
     arrays["u_names"] = np.array(trajectory.robot.u_names)
     arrays["r_names"] = np.array(trajectory.r_names)
+    arrays["event_t"] = np.array([event.t for event in trajectory.events])
+    arrays["event_names"] = np.array([f"{event.task} {event.what}" for event in trajectory.events], dtype=str)
     return arrays
 
 

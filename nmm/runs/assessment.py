@@ -56,10 +56,10 @@ def _assess(controller: Controller, recorder: Recorder, advance: Integrator, dt:
         steps = adaptive_errors(samples, recorder.q[: len(recorder)], advance.tolerance)
     else:
         steps = step_errors(samples, advance.order)
-    found, own = departure(samples, steps), 0
+    found, own = departure(samples, steps, goes_on=recorder.goes_on), 0
     if found is not None:  # then it is worth the time to ask the target
         moved = _target_moves(controller, recorder)
-        found = departure(samples, steps, moved)
+        found = departure(samples, steps, moved, goes_on=recorder.goes_on)
         own = _own_moves(samples, moved)
     return Assessment(unstable, examined, found, own)
 

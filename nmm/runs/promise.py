@@ -78,7 +78,9 @@ class Departure(NamedTuple):
     missed: bool
 
 
-def departure(samples: Samples, step: Array, target: Array | None = None) -> Departure | None:
+def departure(
+    samples: Samples, step: Array, target: Array | None = None, *, goes_on: bool = False
+) -> Departure | None:
     """Where and how far ‖e‖ left what was promised; None where it did not.
 
     Parameters
@@ -87,6 +89,7 @@ def departure(samples: Samples, step: Array, target: Array | None = None) -> Dep
     step (N - 1,) : the error that each integration step may add (`step_errors`)
     target (N - 1,) : by how much the target moved along each step otherwise than its rate says: a target that
         jumps restarts the promise
+    goes_on : whether the task goes on after the last sample, so that the error need not have returned there
     """
     t, error = samples.t, samples.error
     if len(t) < 2:
@@ -101,7 +104,8 @@ def departure(samples: Samples, step: Array, target: Array | None = None) -> Dep
     short = np.where(differs(samples.residual, samples.rate), samples.residual, 0.0)
     unmet = accumulated(np.diff(t) * np.maximum(short[1:], short[:-1]), decays)
     excess = norm - bound
-    missed = bool(np.any(excess - unmet > LEFT * size) or norm[-1] > RETURNED * bound[-1] + ENDS * size)
+    ends_off = not goes_on and norm[-1] > RETURNED * bound[-1] + ENDS * size
+    missed = bool(np.any(excess - unmet > LEFT * size) or ends_off)
     (beyond,) = np.nonzero(excess > ENDS * size)
     if not beyond.size:
         return None

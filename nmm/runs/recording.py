@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from nmm.errors import InputError
 from nmm.functions.function import Function, Shown
 from nmm.functions.program import Program
 from nmm.functions.tasks.position import AXES, Position
+from nmm.functions.tasks.task import Task
 from nmm.resolvers.answer import Status
 from nmm.robots.robot import Robot
 from nmm.runs.broken_limits import broken_limits, broken_rows
@@ -31,12 +33,17 @@ NEARLY_SINGULAR = 1e-3
 
 
 class Recorder:
-    """Collects the samples of a run."""
+    """Collects the samples of a run.
+
+    Attributes
+    ----------
+    goes_on : whether the run goes on after the last sample, with other tasks
+    """
 
     def __init__(self, controller: Controller, times: Array) -> None:
         self._controller = controller
         self._times = times
-        self._shown = _shown(controller)
+        self._shown = shown(controller.task, controller.robot)
         self._feedback = Feedback.of(controller.task, controller.robot)
         robot, s = controller.robot, len(controller.rows)
         count = len(times)
@@ -61,6 +68,7 @@ class Recorder:
         self.warnings: list[str] = []
         self.blocking: tuple[str, ...] = ()
         self._counts = Counts()
+        self.goes_on = False
 
     def __len__(self) -> int:
         return self._count
@@ -69,6 +77,11 @@ class Recorder:
     def t(self) -> Array:
         """The times recorded so far."""
         return self._times[: self._count]
+
+    @property
+    def start(self) -> float:
+        """The time of the first sample, s."""
+        return float(self._times[0])
 
     @property
     def reached(self) -> float:
@@ -151,7 +164,8 @@ class Recorder:
     def _warn_of_singularities(self, singular_values: Array) -> None:
         if not len(singular_values):
             return
-        ratio = singular_values[:, -1] / singular_values[:, 0]
+        largest = singular_values[:, 0]
+        ratio = np.divide(singular_values[:, -1], largest, out=np.ones(len(largest)), where=largest > 0.0)
         worst = int(np.argmin(ratio))
         if ratio[worst] < NEARLY_SINGULAR:
             self.warnings.append(
@@ -218,7 +232,7 @@ class Recorder:
         frame, columns, target = self._shown
         path, desired = None, None
         if frame is not None:
-            path = _frame_path(robot, frame, self.q[:count])
+            path = frame_path(robot, frame, self.q[:count])
             desired = path.copy()
             for axis, column in columns.items():
                 desired[:, axis] = self._rows[1, :count, column]
@@ -261,7 +275,7 @@ class Recorder:
         )
 
 
-def _shown(controller: Controller) -> tuple[str | None, dict[int, int], Array | None]:
+def shown(tasks: Iterable[Task], robot: Robot) -> tuple[str | None, dict[int, int], Array | None]:
     """The positioned frame, for each world axis the task's row that holds it, and the target looked at.
 
     Where no task positions a frame, the one that a task turns. `InputError` for what cannot be drawn.
@@ -271,14 +285,14 @@ def _shown(controller: Controller) -> tuple[str | None, dict[int, int], Array | 
     columns: dict[int, int] = {}
     target: Array | None = None
     row = 0
-    for task in controller.task:
-        count = len(task.rows(controller.robot))
-        said = _said(task.function, controller.robot, count)
+    for task in tasks:
+        count = len(task.rows(robot))
+        said = _said(task.function, robot, count)
         if said.positions is not None and frame in (None, said.positions):
             frame = said.positions
             columns |= {AXES[axis]: row + i for axis, i in said.axes.items()}
         turned = turned or said.turns
-        for part in (_said(task.reference, controller.robot, count), said):
+        for part in (_said(task.reference, robot, count), said):
             target = target if part.looks_at is None else np.array(part.looks_at, dtype=np.float64)
         row += count
     return frame or turned, columns, target
@@ -299,7 +313,7 @@ def _said(function: Function, robot: Robot, rows: int) -> Shown:
     return said
 
 
-def _frame_path(robot: Robot, frame: str, q: Array) -> Array:
+def frame_path(robot: Robot, frame: str, q: Array) -> Array:
     """Position of a frame's origin at each configuration, (N, 3)."""
     program = Program(robot, (Position(frame, "xyz"),))
     program.lay_out()

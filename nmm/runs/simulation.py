@@ -12,6 +12,8 @@ from nmm.arrays import Array, positive
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
 from nmm.control.idle_inputs import idle_inputs
+from nmm.control.sample import Snapshot
+from nmm.control.sequenced import SequencedController
 from nmm.control.step import Step
 from nmm.errors import DivergedError, InputError, RunError, SingularError
 from nmm.robots.held import Held
@@ -19,6 +21,7 @@ from nmm.robots.slip import slip_warnings
 from nmm.runs.broken_limits import outside_at_start
 from nmm.runs.clearance import Guarded
 from nmm.runs.integrators import Integrator, integrator
+from nmm.runs.joining import Leg, join
 from nmm.runs.judgement import Ended, Verdict, blocked, judge, reached_or_not
 from nmm.runs.recording import Recorder
 from nmm.runs.trajectory import Outcome, Trajectory
@@ -87,35 +90,129 @@ def simulate(
             "sample: expected rk4, midpoint, euler or zoh"
         )
     advance = integrator(method, robot, positive(tolerance, "tolerance"))
-    if controller.guard is not None and controller.setting is not None:
+    if controller.setting is not None:
         controller.setting.check_start(0.0, q)
-        advance = Guarded(advance, controller.guard, Held(robot))
     times = _times(0.0, dt, steps, duration)
+    if isinstance(controller, SequencedController):
+        legs = _legs(controller, advance, times, q, progress, until)
+        for leg in legs:
+            kept = _guarded(advance, leg.controller)
+            goal = until if leg is legs[-1] else None
+            leg.verdict = _judged(leg.controller, leg.recorder, leg.ended, kept, method, dt, leg.end, goal)
+        return join(controller, legs, until, dt, method)
+    advance = _guarded(advance, controller)
     recorder, ended = _record(controller, advance, times, q, progress, until)
-
-    def retry(first: int, dt: float, most: int) -> tuple[Recorder, Outcome]:
-        start = float(recorder.t[first])
-        steps = min(most, max(1, math.ceil((duration - start) / dt - 1e-9)))
-        tried, ended = _record(
-            controller, advance, _times(start, dt, steps, duration), recorder.q[first], None
-        )
-        if ended.outcome is Outcome.INTERRUPTED:
-            raise KeyboardInterrupt
-        return tried, ended.outcome
-
-    try:
-        verdict = judge(controller, recorder, advance, method, dt, ended, retry, until)
-    except KeyboardInterrupt:  # the motion is there; what is lost is what to say of it
-        if ended.outcome is Outcome.COMPLETED:
-            ended = ended._replace(
-                outcome=Outcome.INTERRUPTED, message="interrupted while the run was judged"
-            )
-        verdict = Verdict(ended.outcome, ended.message, [])
+    verdict = _judged(controller, recorder, ended, advance, method, dt, duration, until)
     if until is not None:
         verdict = reached_or_not(verdict, recorder, until, controller.rows)
     verdict = blocked(verdict, recorder.blocking)
     recorder.warnings += verdict.warnings
     return recorder.trajectory(verdict.outcome, verdict.message, dt, method)
+
+
+def _guarded(advance: Integrator, controller: Controller) -> Integrator:
+    """The integrator, between samples at which a controller keeps distances, too."""
+    return advance if controller.guard is None else Guarded(advance, controller.guard, Held(controller.robot))
+
+
+def _judged(
+    controller: Controller,
+    recorder: Recorder,
+    ended: Ended,
+    advance: Integrator,
+    method: str,
+    dt: float,
+    end: float,
+    until: Goal | None,
+) -> Verdict:
+    """What the run, or the leg of one, until `end` (s) amounts to; parts of it are tried again."""
+
+    def retry(first: int, dt: float, most: int) -> tuple[Recorder, Outcome]:
+        start = float(recorder.t[first])
+        steps = min(most, max(1, math.ceil((end - start) / dt - 1e-9)))
+        tried, ended = _record(controller, advance, _times(start, dt, steps, end), recorder.q[first], None)
+        if ended.outcome is Outcome.INTERRUPTED:
+            raise KeyboardInterrupt
+        return tried, ended.outcome
+
+    try:
+        return judge(controller, recorder, advance, method, dt, ended, retry, until)
+    except KeyboardInterrupt:  # the motion is there; what is lost is what to say of it
+        if ended.outcome is Outcome.COMPLETED:
+            ended = ended._replace(
+                outcome=Outcome.INTERRUPTED, message="interrupted while the run was judged"
+            )
+        return Verdict(ended.outcome, ended.message, [])
+
+
+def _legs(
+    controller: SequencedController,
+    advance: Integrator,
+    times: Array,
+    q: Array,
+    progress: Callable[[float], None] | None,
+    until: Goal | None,
+) -> list[Leg]:
+    """The run from event to event, each leg with the controller of the tasks then active.
+
+    The sample at an event is the next leg's. The last leg is one whose end is no event.
+    """
+    legs: list[Leg] = []
+    controller.reset()
+    controller.changes(float(times[0]), q)
+    first, steps = 0, max(1, len(times) - 1)
+    while True:
+        try:
+            inner = controller.switch()
+        except RunError as error:
+            if not legs:
+                raise InputError(str(error)) from None
+            legs[-1].ended = legs[-1].ended._replace(outcome=Outcome.FAILED, message=str(error))
+            return legs
+        leaving = Leaving(
+            controller, inner.sample.snapshot(), float(times[first - 1]) if first else -math.inf
+        )
+        waiting = controller.sequence.waiting(controller.moment)
+        active = controller.moment.active
+        recorder, ended = _record(
+            *(inner, _guarded(advance, inner), times[first:], q),
+            None if progress is None else _from(first / steps, progress),
+            until if any(active) and not waiting else None,
+            leaving,
+        )
+        end = float(times[-1]) if leaving.q is None else float(times[first + len(recorder)])
+        recorder.goes_on = leaving.q is not None
+        legs.append(Leg(inner, active, recorder, ended, end))
+        if leaving.q is None:
+            return legs
+        first, q = first + len(recorder), leaving.q
+
+
+def _from(done: float, progress: Callable[[float], None]) -> Callable[[float], None]:
+    """Progress of a leg that begins where that share of the run is done."""
+    return lambda share: progress(done + share * (1.0 - done))
+
+
+class Leaving:
+    """The beginning of a leg and its end, where other tasks are active.
+
+    Attributes
+    ----------
+    handed : what the leg before leaves to its first sample
+    earlier : the time of the sample before it, s
+    q : (n,) where the event is at which the leg ends; None where it does not end at one
+    """
+
+    def __init__(self, controller: SequencedController, handed: Snapshot, earlier: float) -> None:
+        self._controller = controller
+        self.handed, self.earlier = handed, earlier
+        self.q: Array | None = None
+
+    def changes(self, t: float, q: Array) -> bool:
+        """Whether the sample at t and q is another leg's."""
+        if self._controller.changes(t, q):
+            self.q = q
+        return self.q is not None
 
 
 def _times(start: float, dt: float, steps: int, end: float) -> Array:
@@ -133,6 +230,7 @@ def _record(
     q: Array,
     progress: Callable[[float], None] | None,
     until: Goal | None = None,
+    leg: Leaving | None = None,
 ) -> tuple[Recorder, Ended]:
     """Integrate over the times (N,) from q, and say how that ended."""
     recorder = Recorder(controller, times)
@@ -149,8 +247,10 @@ def _record(
         )
     outcome, message = Outcome.COMPLETED, ""
     controller.reset()
+    if leg is not None:
+        controller.sample.restore(leg.handed)
     try:
-        _integrate(controller, advance, recorder, times, q, progress, until)
+        _integrate(controller, advance, recorder, times, q, progress, until, leg)
     except SingularError as error:
         outcome, message = Outcome.SINGULAR, str(error)
     except DivergedError as error:
@@ -173,31 +273,34 @@ def _integrate(
     q: Array,
     progress: Callable[[float], None] | None,
     until: Goal | None,
+    leg: Leaving | None,
 ) -> None:
-    """From sample to sample, recording each.
+    """From sample to sample, recording each; to the event that ends a leg, whose sample is the next leg's.
 
     A step that the resolver's state does not let stand is taken again, decided anew at its beginning; if
     that may not stand either, it is taken with the decisions free at its stages.
     """
     state, steps = controller.state, len(times) - 1
     earlier = controller.sample.snapshot()
-    sample = _sample(controller, float(times[0]), q)
+    sample = _sample(controller, float(times[0]), q, -math.inf if leg is None else leg.earlier)
     recorder.add(sample)
     for k in range(steps):
         t = float(times[k + 1])
         here = controller.sample.snapshot()
-        ahead = _advanced(controller, advance, sample, t)
+        ahead = _advanced(controller, advance, sample, t, leg)
         if ahead is None:
             state.reset()
             controller.sample.restore(earlier)
             sample = _sample(controller, sample.t, sample.q)
             recorder.replace_last(sample)
             before, here = state.snapshot(), controller.sample.snapshot()
-            ahead = _advanced(controller, advance, sample, t)
+            ahead = _advanced(controller, advance, sample, t, leg)
             if ahead is None:
                 controller.sample.restore(here)
-                ahead = _sample(controller, t, _integrated(controller, advance, sample, t), sample.t)
+                ahead = _ahead(controller, t, _integrated(controller, advance, sample, t), sample.t, leg)
                 recorder.warn_once(sample.t, state.reservation(before, controller.robot.u_names))
+        if isinstance(ahead, Leaving):
+            return
         earlier, sample = here, ahead
         recorder.add(sample)
         if until is not None and until.reached(sample.error, controller.rows):
@@ -208,8 +311,10 @@ def _integrate(
         progress(1.0)
 
 
-def _advanced(controller: Controller, advance: Integrator, sample: Step, t: float) -> Step | None:
-    """The next sample, at t; None where the step to it may not stand."""
+def _advanced(
+    controller: Controller, advance: Integrator, sample: Step, t: float, leg: Leaving | None
+) -> Step | Leaving | None:
+    """The next sample, at t, or the event there; None where the step to it may not stand."""
     state = controller.state
     before = state.snapshot()
     try:
@@ -221,8 +326,15 @@ def _advanced(controller: Controller, advance: Integrator, sample: Step, t: floa
         return None
     if not state.may_stand(before):
         return None
-    ahead = _sample(controller, t, q, sample.t)
-    return ahead if state.may_stand(before) else None
+    ahead = _ahead(controller, t, q, sample.t, leg)
+    return ahead if isinstance(ahead, Leaving) or state.may_stand(before) else None
+
+
+def _ahead(controller: Controller, t: float, q: Array, earlier: float, leg: Leaving | None) -> Step | Leaving:
+    """The sample at t, or the event that leaves it to other tasks."""
+    if leg is not None and leg.changes(t, q):
+        return leg
+    return _sample(controller, t, q, earlier)
 
 
 def _integrated(controller: Controller, advance: Integrator, sample: Step, t: float) -> Array:

@@ -21,10 +21,10 @@ def summarise(trajectory: Trajectory) -> dict[str, Any]:
     from nmm import __version__
 
     robot, count = trajectory.robot, len(trajectory)
-    redundancy = {
-        "static": robot.n_independent - len(trajectory.r_names),
-        "kinematic": robot.n_u - len(trajectory.r_names),
-    }
+    rows = len(trajectory.r_names)
+    if np.isnan(trajectory.error).any():  # of tasks that come and go: the most at one time
+        rows = int(np.isfinite(trajectory.error).sum(axis=1).max())
+    redundancy = {"static": robot.n_independent - rows, "kinematic": robot.n_u - rows}
     summary: dict[str, Any] = {
         "format": FORMAT,
         "nmm": __version__,
@@ -50,6 +50,7 @@ def summarise(trajectory: Trajectory) -> dict[str, Any]:
         "r_names": list(trajectory.r_names),
         "r_units": list(trajectory.r_units),
         "frame": trajectory.frame,
+        "events": [event._asdict() for event in trajectory.events],
     }
     if count:
         norm, sizes = trajectory.error_norm, np.linalg.norm(trajectory.u, axis=1)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nmm.arrays import Array, Integers
+from nmm.control.sequence import Event
 from nmm.doors import door
 from nmm.robots.motion import Motion
 from nmm.robots.robot import Robot
@@ -41,7 +42,8 @@ class Trajectory:
     robot : the robot that moved
     t (N,) s; q (N, n); u (N, n_u): times, coordinates, inputs, in `robot.q_units`, `robot.u_units`
     q_dot (N, n): S(q) u, per second
-    r, r_d, error (N, s): task value, target and error (angles wrapped), in `r_units`
+    r, r_d, error (N, s): task value, target and error (angles wrapped), in `r_units`; not a number where a
+        task that comes and goes is not active
     objective (N,): H(q)
     sigma_min (N,): smallest singular value of J_bar
     partition (N, s): columns of Ja (RG), -1 elsewhere
@@ -64,6 +66,7 @@ class Trajectory:
     clearance_between (N,): the least on the way to the next sample, m
     clearance_pairs (N,): which of `clearance_names` is nearest, -1 for none
     scenario : the scenario as resolved, if it came from one
+    events : when tasks that come and go began and ended, and why
     """
 
     robot: Robot
@@ -102,6 +105,7 @@ class Trajectory:
     clearance_pairs: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     clearance_names: tuple[str, ...] = ()
     scenario: dict[str, Any] | None = field(default=None)
+    events: tuple[Event, ...] = ()
 
     def __len__(self) -> int:
         return len(self.t)
@@ -117,8 +121,8 @@ class Trajectory:
 
     @property
     def error_norm(self) -> Array:
-        """‖e‖ at each sample, (N,), in the mixed units of the rows."""
-        return np.asarray(np.linalg.norm(self.error, axis=1))
+        """‖e‖ of the tasks active at each sample, (N,), in the mixed units of the rows."""
+        return np.asarray(np.linalg.norm(np.where(np.isnan(self.error), 0.0, self.error), axis=1))
 
     @property
     def switches(self) -> int:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from pydantic_core import PydanticUndefined
 
 from nmm.kinds import RESOLVERS
+from nmm.scenario.conditions import CONDITION_PARTS
 from nmm.scenario.functions import FUNCTION_PARTS, REFERENCE_PARTS
 from nmm.scenario.goals import GoalPart, RetreatPart
 from nmm.scenario.keys import Part
@@ -36,6 +37,8 @@ def sections() -> Iterator[Section]:
     yield _section("robot.arms", ArmPart)
     for kind, task in TASK_PARTS.items():
         yield _section(f"task, kind: {kind}", task)
+    for kind, condition in CONDITION_PARTS.items():
+        yield _section(f"task.when, kind: {kind}", condition)
     for kind, reference in REFERENCE_PARTS.items():
         if reference is not FUNCTION_PARTS.get(kind):
             yield _section(f"reference, kind: {kind}", reference)

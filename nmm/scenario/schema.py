@@ -8,6 +8,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 
 from nmm.control.controller import Controller
+from nmm.control.sequence import Sequence
+from nmm.control.sequenced import SequencedController
 from nmm.errors import InputError
 from nmm.functions.tasks.task import Stack
 from nmm.kinds import RESOLVERS
@@ -84,9 +86,12 @@ class ScenarioPart(Part):
             robot.check_limits(robot.q(self.q0), come_back=come_back)
         with at("task"):
             task = build_tasks(self.task, robot)
+            sequenced = any(one.when for one in task)
+            if sequenced:
+                Sequence(Stack.of(task), robot)
             levels = Stack.of(task).levels(robot)
             s, first = sum(levels), levels[0]
-            if first > robot.n_u:
+            if first > robot.n_u and not sequenced:
                 names = ", ".join(robot.u_names)
                 of = "" if len(levels) == 1 else " in the first level of priority"
                 raise InputError(
@@ -102,6 +107,10 @@ class ScenarioPart(Part):
         steering = None if self.steering is None else self.steering.build()
         with at("resolver"):
             resolver, added = self.resolver.make(), None
+            if sequenced:
+                return SequencedController(
+                    robot, task, resolver, objective, limits, self.dt, retreat, steering or False
+                )
             if isinstance(self.resolver, WithAddedTask):
                 with at("added_task"):
                     added = build_tasks(self._added_task(self.resolver), robot)

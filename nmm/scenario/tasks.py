@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, cast
 
-from pydantic import Field, create_model
+from pydantic import BeforeValidator, Field, create_model
 
 from nmm.errors import InputError
 from nmm.functions.function import Row
 from nmm.functions.tasks.task import Task
 from nmm.robots.robot import Robot
+from nmm.scenario.conditions import ConditionList, build_conditions
 from nmm.scenario.function_part import FunctionPart
 from nmm.scenario.functions import FUNCTION_PARTS, Reference
 from nmm.scenario.keys import KeyedError, at, one_of
 from nmm.scenario.numbers import Numbers, Speeds, Whole, shown
+
+
+def listed(value: object) -> object:
+    """A mapping without its list."""
+    if isinstance(value, list | tuple):
+        return value
+    if isinstance(value, dict):
+        return [value]
+    raise ValueError(f"expected a mapping with a kind, or a list of such, got {shown(value)}")
 
 
 class TaskPart(FunctionPart):
@@ -43,17 +54,26 @@ class TaskPart(FunctionPart):
         description="deceleration b with which it may come to rest there: ‖K e‖ at most √(2 b ‖e‖), "
         "a number or numbers by unit",
     )
+    name: str = Field("", description="for messages, and for tasks that come after it")
+    when: Annotated[ConditionList, BeforeValidator(listed)] = Field(
+        default_factory=list,
+        description="a condition of kind between, while or after, or a list of such, which all have to hold, "
+        "for a task that comes and goes; none for one that is always there",
+    )
 
-    def build_task(self, robot: Robot) -> Task:
-        """The task; errors know their key."""
+    def build_task(self, robot: Robot, names: Sequence[str] = ()) -> Task:
+        """The task, among others of these names; errors know their key."""
         function = self.build(robot)
         rows = function.rows(robot)
         units = {row.unit for row in rows}
         with at("reference"):
             reference = self.reference.build(robot, units.pop() if len(units) == 1 else "1")
             _check_rows(rows, reference.rows(robot))
+        when = build_conditions(self.when, list(names), robot)
         with self.own_keys():
-            task = Task(function, reference, self.gain, self.priority, self.speed, self.braking)
+            task = Task(
+                function, reference, self.gain, self.priority, self.speed, self.braking, self.name, when
+            )
             task.approach(robot)
         with at("gain"):
             try:
@@ -71,15 +91,6 @@ def _check_rows(rows: tuple[Row, ...], targets: tuple[Row, ...]) -> None:
     for row, target in zip(rows, targets, strict=True):
         if row.unit != target.unit and "1" not in (row.unit, target.unit):
             raise InputError(f"expected {row.unit} as {row.name} of the task, got {target.unit}")
-
-
-def listed(value: object) -> object:
-    """A mapping without its list."""
-    if isinstance(value, list | tuple):
-        return value
-    if isinstance(value, dict):
-        return [value]
-    raise ValueError(f"expected a mapping with a kind, or a list of such, got {shown(value)}")
 
 
 #: By kind: the function's part, with a reference and a gain.
@@ -101,8 +112,8 @@ else:
 
 def build_tasks(parts: list[TaskPart], robot: Robot) -> list[Task]:
     """The tasks; errors know their key."""
-    tasks = []
+    tasks, names = [], [part.name for part in parts if part.name]
     for i, part in enumerate(parts):
         with at(i):
-            tasks.append(part.build_task(robot))
+            tasks.append(part.build_task(robot, names))
     return tasks

@@ -2,6 +2,7 @@
 
 from nmm.functions.tasks.callable_function import CallableFunction
 from nmm.functions.tasks.center_of_mass import CenterOfMass
+from nmm.functions.tasks.conditions import After, Between, While
 from nmm.functions.tasks.coordinates import Coordinates
 from nmm.functions.tasks.distance import Distance
 from nmm.functions.tasks.heading import Heading
@@ -13,6 +14,8 @@ from nmm.functions.tasks.posture import Posture
 from nmm.functions.tasks.task import Stack, Task
 
 __all__ = [
+    "After",
+    "Between",
     "CallableFunction",
     "CenterOfMass",
     "Coordinates",
@@ -25,4 +28,5 @@ __all__ = [
     "Posture",
     "Stack",
     "Task",
+    "While",
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,6 +13,7 @@ from nmm.arrays import Array, array, counted, one_line, positive
 from nmm.errors import InputError, expect_known
 from nmm.functions.function import Function, Row
 from nmm.functions.references.polynomial import Constant
+from nmm.functions.tasks.conditions import After, Between, Condition, While
 from nmm.robots.robot import Robot
 
 
@@ -30,6 +32,9 @@ class Task:
     speed : how fast feedback may approach the target, ‖K e‖ at most over rows of one unit: a number, or
         numbers by unit ({"m": 1.0, "rad": 2.0}), 1/s of these; None for no bound
     braking : deceleration b with which it may come to rest there, ‖K e‖ <= √(2 b ‖e‖), in the same way, 1/s²
+    name : for messages, and for the conditions of other tasks; its rows' names when not given
+    when : a `Between`, `While` or `After`, or several, which all have to hold, for a task that comes and goes
+        (`SequencedController`); none for one that is always there
 
     Raises
     ------
@@ -44,6 +49,8 @@ class Task:
         priority: int = 1,
         speed: float | Mapping[str, float] | None = None,
         braking: float | Mapping[str, float] | None = None,
+        name: str = "",
+        when: Condition | Sequence[Condition] = (),
     ) -> None:
         if not isinstance(function, Function):
             raise InputError(f"task: expected a function of the robot, as Position('ee'), got {function!r}")
@@ -53,6 +60,24 @@ class Task:
         self.priority = counted(priority, "priority")
         self.speed = _by_unit(speed, "speed")
         self.braking = _by_unit(braking, "braking")
+        self.name = name
+        conditions = (when,) if isinstance(when, Between | While | After) else when
+        if not isinstance(conditions, Sequence) or not all(
+            isinstance(one, Between | While | After) for one in conditions
+        ):
+            raise InputError(f"when: expected Between, While or After, or several of these, got {when!r}")
+        self.when: tuple[Condition, ...] = tuple(conditions)
+
+    @property
+    def always(self) -> Task:
+        """The same task without conditions."""
+        task = copy(self)
+        task.when = ()
+        return task
+
+    def called(self, robot: Robot) -> str:
+        """Its name, or those of its rows."""
+        return self.name or ", ".join(row.name for row in self.rows(robot))
 
     def approach(self, robot: Robot) -> tuple[Array, Array]:
         """Speed and braking for the unit of each row, (s,) each; infinite for none."""

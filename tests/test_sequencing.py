@@ -1,0 +1,252 @@
+"""Tasks that come and go: when, without a jump of the inputs, and what a run says of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import nmm
+
+ROBOT = nmm.load("unicycle_3r")
+START = ROBOT.q({"q1": 0.4, "q2": 0.6, "q3": 0.9})
+#: Largest change of an input a second.
+A = 2.0
+DT = 0.01
+RESOLVERS = {"pg": nmm.ProjectedGradient(alpha=1.0), "rg": nmm.ReducedGradient(alpha=1.0)}
+
+
+def reach(name: str = "reach", target: tuple[float, ...] = (1.4, 0.3, 0.8), **more: object) -> nmm.Task:
+    return nmm.Task(nmm.Position("ee", "xyz"), target, 2.0, name=name, **more)  # type: ignore[arg-type]
+
+
+def aim(when: object, **more: object) -> nmm.Task:
+    task = {"gain": 1.0, "priority": 2, "name": "aim"} | more
+    return nmm.Task(nmm.Coordinates("q1"), [0.0], when=when, **task)  # type: ignore[arg-type]
+
+
+def controlled(*tasks: nmm.Task, resolver: str = "pg", **more: object) -> nmm.SequencedController:
+    return nmm.SequencedController(ROBOT, tasks, RESOLVERS[resolver], **more)  # type: ignore[arg-type]
+
+
+def told(run: nmm.Trajectory) -> list[tuple[float, str, str]]:
+    return [(round(event.t, 9), event.task, event.what) for event in run.events]
+
+
+@pytest.mark.parametrize("method", ["rk4", "zoh"])
+@pytest.mark.parametrize("resolver", RESOLVERS)
+def test_inputs_change_by_no_more_than_accelerations_allow(resolver: str, method: str) -> None:
+    tasks = reach(), aim(nmm.Between(0.5, 1.2)), reach("later", (1.2, 0.5, 0.9), when=nmm.Between(1.0))
+    tasks = (
+        tasks[0],
+        tasks[1],
+        nmm.Task(nmm.Coordinates("q3"), [0.2], name="bend", priority=3, when=nmm.Between(0.8)),
+    )
+    free = nmm.simulate(controlled(*tasks, resolver=resolver), START, 1.6, DT, method)
+    run = nmm.simulate(
+        controlled(*tasks, resolver=resolver, limits=nmm.Limits(acceleration=A)), START, 1.6, DT, method
+    )
+    assert told(run) == told(free) == [(0.5, "aim", "begins"), (0.8, "bend", "begins"), (1.2, "aim", "ends")]
+    assert np.abs(np.diff(free.u, axis=0)).max() > 3 * A * DT  # there is something to be bounded
+    assert np.abs(np.diff(run.u, axis=0)).max() <= A * DT + 1e-12
+
+
+def test_stages_keep_the_bounds_of_their_sample() -> None:
+    controller = controlled(reach(), aim(nmm.Between(0.5)), limits=nmm.Limits(acceleration=A), dt=DT)
+    q, before = START, np.zeros(ROBOT.n_u)
+    for k in range(60):
+        u = controller(k * DT, q)
+        assert np.abs(u - before).max() <= A * DT + 1e-12
+        for share in (0.5, 1.0):
+            q_dot = controller.velocity((k + share) * DT, q + share * DT * controller.velocity(k * DT, q))
+            S = nmm.Configuration(ROBOT, q + share * DT * controller.velocity(k * DT, q)).S
+            stage = np.linalg.lstsq(S, q_dot, rcond=None)[0]
+            assert np.abs(stage - before).max() <= A * DT + 1e-9
+        q, before = q + DT * controller.velocity(k * DT, q), u
+    assert [event.task for event in controller.events] == ["aim"]
+
+
+@pytest.mark.parametrize("resolver", RESOLVERS)
+def test_a_lower_task_that_comes_and_goes_changes_nothing_above(resolver: str) -> None:
+    """At every sample, the same robot at the same q with the same inputs before, without the lower task."""
+    run = nmm.simulate(controlled(reach(), aim(nmm.Between(0.3, 0.8)), resolver=resolver), START, 1.2, DT)
+    alone = nmm.Controller(ROBOT, reach(), RESOLVERS[resolver])
+    differ = 0.0
+    for k in range(len(run)):
+        alone.reset()
+        step = alone.evaluate(float(run.t[k]), run.q[k])
+        np.testing.assert_allclose(step.J @ run.u[k], step.J @ step.u, rtol=0, atol=1e-9)
+        differ = max(differ, float(np.abs(step.u - run.u[k]).max()))
+    assert differ > 1e-2
+
+
+def test_a_run_is_its_parts_glued_by_hand() -> None:
+    run = nmm.simulate(controlled(reach(), aim(nmm.Between(0.5))), START, 1.0, DT)
+    first = nmm.simulate(nmm.Controller(ROBOT, reach(), RESOLVERS["pg"]), START, 0.5, DT)
+    both = nmm.Controller(ROBOT, [reach(), aim(())], RESOLVERS["pg"])
+    second = nmm.simulate(both, first.q[-1], 0.5, DT)
+    np.testing.assert_allclose(run.q, np.vstack([first.q[:-1], second.q]), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(run.u, np.vstack([first.u[:-1], second.u]), rtol=0, atol=1e-11)
+    assert np.isnan(run.error[:50, 3]).all()
+    np.testing.assert_allclose(run.error[50:], second.error, rtol=0, atol=1e-12)
+
+
+def test_after_a_task_in_its_place() -> None:
+    then = reach("then", (1.0, 0.4, 1.0), when=nmm.After("reach", within=0.02, hold=0.1, instead=True))
+    run = nmm.simulate(controlled(reach(), then), START, 4.0, DT)
+    size = np.linalg.norm(run.error[:, :3], axis=1)
+    k = int(np.flatnonzero(size <= 0.02)[0])
+    assert told(run) == [
+        (round((k + 10) * DT, 9), "reach", "ends"),
+        (round((k + 10) * DT, 9), "then", "begins"),
+    ]
+    assert np.isnan(run.error[k + 10 :, :3]).all()
+    assert np.isfinite(run.error[k + 10 :, 3:]).all()
+    assert run.r_names[0] == "reach: ee.x"
+    assert run.r_names[3] == "then: ee.x"
+    assert run.complete
+    assert np.linalg.norm(run.error[-1, 3:]) < 0.01
+
+
+def test_while_a_function_is_within_bounds_with_hysteresis() -> None:
+    """The arm swings through the bound: events where the coordinate says, and at no other time."""
+    turns = nmm.CallableReference(
+        lambda t: [0.5 * np.cos(3.0 * t)], 1, rate=lambda t: [-1.5 * np.sin(3.0 * t)], unit="rad"
+    )
+    swing = nmm.Task(nmm.Coordinates("q1"), turns, 5.0, name="swing")
+    bend = nmm.Task(
+        nmm.Coordinates("q3"), [0.5], name="bend", when=nmm.While(nmm.Coordinates("q1"), 0.1, margin=0.2)
+    )
+    run = nmm.simulate(controlled(swing, bend), START, 3.5, DT)
+    q1, inside, expected = run.q[:, 3], False, []
+    for k, value in enumerate(q1):
+        now = value >= (-0.1 if inside else 0.1)
+        if now != inside:
+            expected.append((round(k * DT, 9), "bend", "begins" if now else "ends"))
+        inside = now
+    assert told(run) == expected
+    assert len(expected) >= 3
+
+
+def test_where_no_task_is_active_the_objective_is_left_and_rest_where_there_is_none() -> None:
+    between = aim(nmm.Between(0.5, 1.0), priority=1)
+    rest = nmm.simulate(controlled(between), START, 2.0, DT)
+    np.testing.assert_array_equal(rest.u[:50], 0.0)
+    np.testing.assert_array_equal(rest.u[100:], 0.0)
+    moved = nmm.simulate(controlled(between, objective=nmm.Quadratic(nmm.Square("q3", 0.0))), START, 0.4, DT)
+    step = nmm.Controller(ROBOT, reach(), RESOLVERS["pg"], nmm.Quadratic(nmm.Square("q3", 0.0))).evaluate(
+        0.0, START
+    )
+    np.testing.assert_allclose(moved.u[0], -step.h, rtol=0, atol=1e-14)  # α = 1
+    rate = step.h[ROBOT.input("q3")] / START[5]  # h is linear in q3
+    np.testing.assert_allclose(moved.q[:, 5], START[5] * np.exp(-rate * moved.t), rtol=0, atol=1e-8)
+
+
+def test_a_condition_that_never_held_is_told() -> None:
+    later = aim(nmm.After("reach", within=1e-9)), aim(nmm.While(nmm.Coordinates("q2"), 5.0), name="far")
+    run = nmm.simulate(controlled(reach(), *later), START, 0.5, DT)
+    assert run.events == ()
+    assert any(
+        "task aim never began: at the end of the run, reach did not stay within 1e-09" in one
+        for one in run.warnings
+    )
+    assert any("task far never began" in one and "q2 is not at least 5" in one for one in run.warnings)
+    goal = nmm.simulate(controlled(reach(), *later), START, 0.5, DT, until=nmm.Goal())
+    assert goal.outcome is nmm.Outcome.MISSED
+    assert "aim never began" in goal.message
+
+
+def test_events_are_kept_shown_and_read_back(tmp_path: Path) -> None:
+    run = nmm.simulate(controlled(reach(), aim(nmm.Between(0.2, 0.4))), START, 0.6, DT)
+    folder = run.save(tmp_path / "run")
+    again = nmm.Trajectory.load(folder)
+    assert again.events == run.events
+    np.testing.assert_array_equal(again.error, run.error)
+    summary = run.summary()
+    assert [event["what"] for event in summary["events"]] == ["begins", "ends"]
+    assert np.isfinite(summary["error_max"])
+    assert summary["redundancy"]["kinematic"] == ROBOT.n_u - 4
+    drawn = {line.get_xdata()[0] for axes in nmm.figures.errors(run).axes for line in axes.lines}
+    assert {0.2, 0.4} <= drawn
+
+
+def refused(*tasks: nmm.Task, resolver: nmm.Resolver | None = None) -> str:
+    with pytest.raises(nmm.InputError) as error:
+        nmm.SequencedController(ROBOT, tasks, resolver or RESOLVERS["pg"])
+    return str(error.value)
+
+
+def test_what_does_not_fit_is_said() -> None:
+    assert "did you mean 'reach'" in refused(reach(), aim(nmm.After("reech")))
+    first, second = reach(when=nmm.After("aim")), aim(nmm.After("reach"))
+    assert "tasks wait for each other: reach after aim after reach" in refused(first, second)
+    assert "aim after aim" in refused(reach(), aim(nmm.After("aim")))
+    assert "reach twice" in refused(reach(), reach())
+    assert "unit" in refused(reach(), aim(nmm.After("reach", within={"rad": 0.1})))
+    assert "upper: expected a number, or 1" in refused(
+        reach(), aim(nmm.While(nmm.Coordinates("q1"), upper=[1.0, 2.0]))
+    )
+    added = nmm.ExtendedJacobian()
+    assert "resolver ej" in refused(reach(), aim(nmm.Between(1.0)), resolver=added)
+    with pytest.raises(nmm.InputError, match="SequencedController"):
+        nmm.Controller(ROBOT, [reach(), aim(nmm.Between(1.0))], RESOLVERS["pg"])
+
+
+@pytest.mark.parametrize(
+    ("made", "said"),
+    [
+        (lambda: nmm.Between(2.0, 1.0), "end: expected a time after the start, 2 s, got 1"),
+        (lambda: nmm.While(nmm.Coordinates("q1")), "expected a bound"),
+        (lambda: nmm.While(nmm.Coordinates("q1"), 1.0, 0.0), "is above upper"),
+        (lambda: nmm.While("q1", 0.0), "expected a function"),
+        (lambda: nmm.While(nmm.Coordinates("q1"), 0.0, margin=-1.0), "margin: expected a number from 0"),
+        (lambda: nmm.After(""), "expected the name of a task"),
+        (lambda: nmm.After("reach", within=0.0), "within"),
+        (lambda: nmm.After("reach", hold=-1.0), "hold: expected a time from 0"),
+        (lambda: aim("soon"), "when: expected Between, While or After"),
+    ],
+)
+def test_conditions_that_are_none_are_refused(made: object, said: str) -> None:
+    with pytest.raises(nmm.InputError, match=said):
+        made()  # type: ignore[operator]
+
+
+def test_more_rows_than_inputs_at_an_event_end_the_run() -> None:
+    crowded = nmm.Task(nmm.Posture(), [0.0, 0.5, 0.5], name="posture", when=nmm.Between(0.2))
+    run = nmm.simulate(controlled(reach(), crowded), START, 0.5, DT)
+    assert run.outcome is nmm.Outcome.FAILED
+    assert "at t = 0.2 s: with reach and posture: task: 6 rows" in run.message
+    assert run.t[-1] == pytest.approx(0.19)
+
+
+def test_a_scenario_names_the_key() -> None:
+    scenario = nmm.Scenario.load("unicycle_3r_sequence")
+    with pytest.raises(nmm.ScenarioError, match=r"task\.1\.when\.task: .*firts.*did you mean 'first'"):
+        scenario.override("task.1.when.task", "firts").controller()
+    with pytest.raises(nmm.ScenarioError, match=r"task\.2\.when\.upper"):
+        scenario.override("task.2.when.upper", "[1, 2, 3, high]").controller()
+    with pytest.raises(nmm.ScenarioError, match=r"task\.2\.when\.margin: expected a number from 0"):
+        scenario.override("task.2.when.margin", "-1").controller()
+    run = scenario.run()
+    assert [(event.task, event.what) for event in run.events] == [
+        ("first", "ends"),
+        ("second", "begins"),
+        ("turn", "begins"),
+    ]
+    assert run.complete
+    assert np.abs(np.diff(run.u, axis=0)).max() <= 2.0 * run.dt + 1e-12
+
+
+def test_a_distance_is_kept_across_events() -> None:
+    """A post stands on the way; the least distance is swept over the events, too."""
+    post = nmm.Obstacle(nmm.Cylinder(0.1, 3.0), [1.5, 0.0, 0.5])
+    tasks = [reach(target=(2.6, 0.3, 0.8)), aim(nmm.Between(0.5, 1.0))]
+    kept = nmm.Collisions(0.03, self=False, obstacles=[post])
+    run = nmm.simulate(
+        controlled(*tasks, collisions=kept, limits=nmm.Limits(acceleration=A)), START, 1.5, 0.02
+    )
+    assert [event.what for event in run.events] == ["begins", "ends"]
+    assert len(run.clearance) == len(run.clearance_between) == len(run)
+    assert run.clearance_between.min() >= 0.03 - 1e-6
+    assert run.clearance.min() < 0.5
