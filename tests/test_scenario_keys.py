@@ -21,6 +21,7 @@ from nmm.scenario.objectives import OBJECTIVE_PARTS
 from nmm.scenario.reference import sections
 from nmm.scenario.resolvers import RESOLVER_PARTS
 from nmm.scenario.schema import ScenarioPart
+from nmm.scenario.shapes import SHAPE_PARTS
 from nmm.scenario.tasks import TASK_PARTS
 
 
@@ -242,6 +243,7 @@ def test_every_key_is_described() -> None:
     shared = [kind for kind, part in REFERENCE_PARTS.items() if part is FUNCTION_PARTS.get(kind)]
     others = ("the file", "robot", "robot, with arms mounted", "robot.arms", "objective.terms")
     others = (*others, "limits", "limits.bounds", "until", "retreat", "steering")
+    others = (*others, "collisions", "collisions.obstacles", *SHAPE_PARTS)
     assert len(titles) == len(others) + sum(len(parts) for _, parts in REGISTERED) - len(shared)
 
 

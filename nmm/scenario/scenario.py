@@ -49,6 +49,8 @@ class Scenario:
             raise self._located(first_error(error, data)) from None
         self.name = self.parts.name
         self.title = self.parts.title
+        #: The absolute path of a file that is named at a place of it.
+        self.absolute = document.absolute
         self._robot: Robot | None = None
 
     @classmethod
@@ -107,7 +109,7 @@ class Scenario:
         """
         robot = self.robot()
         try:
-            return self.parts.build(robot)
+            return self.parts.build(robot, self.absolute)
         except KeyedError as error:
             raise self._located(error) from None
 
@@ -144,6 +146,8 @@ class Scenario:
         """
         data = self.parts.explicit()
         data["robot"] = self._explicit_robot()
+        if self.parts.collisions is not None:
+            data["collisions"] = self.parts.collisions.explicit(self.absolute, ("collisions",))
         return data
 
     def _explicit_robot(self) -> dict[str, Any]:
