@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import nmm
@@ -156,3 +157,42 @@ def test_a_mesh_is_found_beside_the_scenario_and_kept_by_its_whole_path(tmp_path
     setting = given.controller().setting
     assert setting is not None
     assert isinstance(setting.obstacles[0].shape, nmm.Mesh)
+
+
+# The bundled ones
+
+
+def least(run: nmm.Trajectory, given: Scenario) -> float:
+    """The least distance at the samples and half-way, of every pair, by Pinocchio's own loop over pairs."""
+    setting = given.controller().setting
+    assert setting is not None
+    model, shapes = run.robot.model, setting.queries.shapes
+    data, found = model.createData(), pin.GeometryData(shapes)
+    first = len(shapes.geometryObjects) - len(setting.obstacles)
+    distances = []
+    half = 0.5 * (run.q[1:] + run.q[:-1])
+    for t, q in [*zip(run.t, run.q, strict=True), *zip(run.t[:-1] + 0.5 * run.dt, half, strict=True)]:
+        for i, obstacle in enumerate(setting.obstacles):
+            shapes.geometryObjects[first + i].placement = pin.SE3(obstacle.placement(float(t)))
+        pin.computeDistances(model, data, shapes, found, q)
+        distances.append(min(one.min_distance for one in found.distanceResults))
+    return min(distances)
+
+
+@pytest.mark.parametrize("name", ["omni_small_arm_door", "unicycle_3r_crossing"])
+def test_the_bundled_scenarios_touch_nothing_and_would(name: str, tmp_path: Path) -> None:
+    given = Scenario.load(name)
+    asked = given.parts.collisions
+    assert asked is not None
+    run = given.run()
+    assert run.outcome is nmm.Outcome.COMPLETED
+    assert run.clearance_between.min() >= asked.distance - 1e-6
+    # What is measured half-way between samples is not quite the arc that the robot drives.
+    assert least(run, given) >= asked.distance - 1e-4
+    assert least(given.override("collisions", "null").run(), given) < 0.0
+    run.save(tmp_path / "run")
+    assert (tmp_path / "run" / "clearance.png").exists()
+    again = nmm.Trajectory.load(tmp_path / "run")
+    assert again.clearance_asked == asked.distance
+    assert [one.name for one in again.obstacles] == [one.name for one in run.obstacles]
+    assert np.array_equal(again.obstacles[0].placement(2.0), run.obstacles[0].placement(2.0))

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
+from nmm.collisions.obstacle import Obstacle
 from nmm.control.collisions import Collisions
 from nmm.robots.loading.packages import package_file
 from nmm.robots.robot import Robot
@@ -67,15 +68,20 @@ class CollisionsPart(Part):
         with super().own_keys(), without("collisions: "):
             yield
 
+    def build_obstacles(this, robot: Robot, absolute: Absolute, place: Place) -> list[Obstacle]:
+        """The obstacles; errors know their key."""
+        obstacles = []
+        for i, part in enumerate(this.obstacles):
+            with at("obstacles", i):
+                obstacles.append(part.build(robot, absolute, (*place, "obstacles", i)))
+        return obstacles
+
     def build(this, robot: Robot, absolute: Absolute, place: Place) -> Collisions:
         """The distances, with the robot's word on them: errors know their key.
 
         `place` is where this part stands in the scenario.
         """
-        obstacles = []
-        for i, part in enumerate(this.obstacles):
-            with at("obstacles", i):
-                obstacles.append(part.build(robot, absolute, (*place, "obstacles", i)))
+        obstacles = this.build_obstacles(robot, absolute, place)
         given = {key: getattr(this, key) for key in type(this).model_fields}
         with at("srdf"):
             given["srdf"] = this._srdf(absolute, place)

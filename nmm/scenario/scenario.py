@@ -16,6 +16,7 @@ from nmm.scenario.document import Document, read_file
 from nmm.scenario.keys import KeyedError, as_written, at, first_error
 
 if TYPE_CHECKING:
+    from nmm.collisions.obstacle import Obstacle
     from nmm.control.controller import Controller
     from nmm.robots.robot import Robot
     from nmm.runs.trajectory import Trajectory
@@ -110,6 +111,17 @@ class Scenario:
         robot = self.robot()
         try:
             return self.parts.build(robot, self.absolute)
+        except KeyedError as error:
+            raise self._located(error) from None
+
+    def obstacles(self, robot: Robot) -> tuple[Obstacle, ...]:
+        """What a robot keeps off in it; `ScenarioError` for a mesh that is not there."""
+        part = self.parts.collisions
+        try:
+            with at("collisions"):
+                return (
+                    () if part is None else tuple(part.build_obstacles(robot, self.absolute, ("collisions",)))
+                )
         except KeyedError as error:
             raise self._located(error) from None
 
