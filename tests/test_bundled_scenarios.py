@@ -46,6 +46,8 @@ DAMPED = {
     "unicycle_3r_vertical_line": "scales the rate on purpose",
     "unicycle_2r_algorithmic": "the added task was not done",
 }
+#: The task gives way to what is in its way, and is done at the end.
+GIVE_WAY = ("omni_small_arm_door", "unicycle_3r_crossing")
 #: Its target is 0.4 m above what the arm reaches.
 MISSED = "unicycle_3r_out_of_reach"
 
@@ -66,6 +68,10 @@ def test_every_bundled_scenario_runs_to_its_end(runs: dict[str, nmm.Trajectory])
         assert run.summary()["lateral_slip_max"] <= 1e-12, name
         if name in DAMPED:
             assert DAMPED[name] in " ".join(run.warnings), name
+        elif name in GIVE_WAY:
+            assert "did not do all that the task asked" in run.warnings[0], name
+            assert run.error_norm[-1] < 1e-3, name
+            continue
         else:
             assert run.warnings == (), name
         # Feedback with K = 1 1/s: what is left of the initial error, and what the integrator adds.

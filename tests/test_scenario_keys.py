@@ -22,6 +22,7 @@ from nmm.scenario.objectives import OBJECTIVE_PARTS
 from nmm.scenario.reference import sections
 from nmm.scenario.resolvers import RESOLVER_PARTS
 from nmm.scenario.schema import ScenarioPart
+from nmm.scenario.shapes import SHAPE_PARTS
 from nmm.scenario.tasks import TASK_PARTS
 
 
@@ -245,6 +246,7 @@ def test_every_key_is_described() -> None:
     others = ("the file", "robot", "robot, with arms mounted", "robot.arms", "objective.terms")
     others = (*others, "limits", "limits.bounds", "until", "retreat", "steering")
     others = (*others, *(f"task.when, kind: {kind}" for kind in CONDITION_PARTS))
+    others = (*others, "collisions", "collisions.obstacles", *SHAPE_PARTS)
     assert len(titles) == len(others) + sum(len(parts) for _, parts in REGISTERED) - len(shared)
 
 

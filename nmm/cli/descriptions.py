@@ -72,7 +72,7 @@ def _of_scenario(name: str, robot: Robot | None) -> tuple[str, Controller, Array
         controller = scenario.controller()
     else:
         try:
-            controller = scenario.parts.build(robot)
+            controller = scenario.parts.build(robot, scenario.absolute)
         except KeyedError as error:
             key = ".".join(map(str, error.place))
             raise InputError(

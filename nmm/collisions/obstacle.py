@@ -28,6 +28,8 @@ class Obstacle:
     placement : where it is: (3,) its origin, (6,) origin and rotation vector, or a (4, 4) matrix
     motion : where it is at t, s: a function that returns such a placement; it takes the place of `placement`
     name : for messages; the shape's kind when not given
+    velocity : that of its origin along `motion` at t: a function that returns (3,), m/s, world axes, or (6,)
+        with the angular velocity, rad/s; differences of `motion` when not given
 
     Raises
     ------
@@ -40,6 +42,7 @@ class Obstacle:
         placement: Placement = (0.0, 0.0, 0.0),
         motion: Callable[[float], Placement] | None = None,
         name: str = "",
+        velocity: Callable[[float], ArrayLike] | None = None,
     ) -> None:
         if not isinstance(shape, Shape):
             raise InputError(f"obstacle: expected a shape (Box, Sphere, ...), got {shape!r}")
@@ -48,6 +51,11 @@ class Obstacle:
         self.motion = motion
         if motion is not None and not callable(motion):
             raise InputError(f"obstacle {self.name}: motion: expected a function of t, got {motion!r}")
+        if velocity is not None and (motion is None or not callable(velocity)):
+            raise InputError(
+                f"obstacle {self.name}: velocity: expected a function of t, with motion, got {velocity!r}"
+            )
+        self._velocity = velocity
         self._placement = self._checked(placement if motion is None else motion(0.0))
         self._twist = np.zeros(6)
 
@@ -80,13 +88,8 @@ class Obstacle:
         if self.motion is not None:
             raise InputError(f"obstacle {self.name}: it moves along a path and cannot be set")
         found = self._checked(placement)
-        twist = np.zeros(6)
-        if velocity is not None:
-            given = vector(velocity, None, f"obstacle {self.name}: velocity")
-            if given.size not in (3, 6):
-                raise InputError(f"obstacle {self.name}: velocity: expected 3 or 6 numbers, got {given.size}")
-            twist[: given.size] = given
-        self._placement, self._twist = found, twist
+        self._twist = np.zeros(6) if velocity is None else self._six(velocity)
+        self._placement = found
 
     def at(self, t: float) -> Any:
         """As `placement`, Pinocchio's; the same object as long as nothing sets it."""
@@ -96,9 +99,17 @@ class Obstacle:
         """Velocity of its origin over its angular velocity at t, (6,), m/s and rad/s, world axes."""
         if self.motion is None:
             return self._twist
+        if self._velocity is not None:
+            return self._six(self._velocity(t))
         behind, ahead = self.at(t - STEP), self.at(t + STEP)
         turned = pin.log3(ahead.rotation @ behind.rotation.T)
         return np.concatenate([ahead.translation - behind.translation, turned]) / (2.0 * STEP)
+
+    def _six(self, velocity: ArrayLike) -> Array:
+        given = vector(velocity, None, f"obstacle {self.name}: velocity")
+        if given.size not in (3, 6):
+            raise InputError(f"obstacle {self.name}: velocity: expected 3 or 6 numbers, got {given.size}")
+        return np.concatenate([given, np.zeros(6 - given.size)])
 
     def _checked(self, placement: Placement) -> Any:
         name = f"obstacle {self.name}: placement"

@@ -1,5 +1,6 @@
 """Figures of runs, drawn with matplotlib's objects alone: no display, no pyplot, no global state."""
 
+from nmm.figures.clearance import clearance
 from nmm.figures.composed import comparison, overview, write_run_figures
 from nmm.figures.curves import coordinates, errors, inputs, singular_values, tracking
 from nmm.figures.limits import limits
@@ -7,6 +8,7 @@ from nmm.figures.motion import stroboscopic
 from nmm.figures.objective import objective_comparison
 
 __all__ = [
+    "clearance",
     "comparison",
     "coordinates",
     "errors",

@@ -13,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from nmm.arrays import Array
 from nmm.errors import InputError
 from nmm.figures import curves, style
+from nmm.figures.clearance import clearance, has_clearance
 from nmm.figures.limits import draw_scale, has_limits, limits
 from nmm.figures.motion import Scene, stroboscopic
 from nmm.figures.objective import draw_best_objective, has_objective, objective_comparison
@@ -157,7 +158,7 @@ def _draw_norms(
 def write_run_figures(
     trajectory: Trajectory, folder: str | Path, *, ellipsoids: Wanted = False
 ) -> list[Path]:
-    """Write motion.png, errors.png, inputs.png; objective.png and limits.png where there are such.
+    """Write motion.png, errors.png, inputs.png; where there are such objective, limits and clearance, too.
 
     Parameters
     ----------
@@ -179,6 +180,8 @@ def write_run_figures(
         figures["objective"] = objective_comparison([trajectory])
     if has_limits(trajectory):
         figures["limits"] = limits(trajectory)
+    if has_clearance(trajectory):
+        figures["clearance"] = clearance(trajectory)
     if ellipsoids is not False:
         # Not before: with it comes the whole of the analysis.
         from nmm.figures.ellipses import ellipses

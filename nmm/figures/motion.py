@@ -17,6 +17,7 @@ from nmm.arrays import Array
 from nmm.errors import InputError
 from nmm.figures import style
 from nmm.figures.silhouette import Pose, Silhouette
+from nmm.figures.solids import outline_points
 from nmm.figures.views import ABOVE, SIDE, View, Viewed, page
 from nmm.playback.placements import base_position
 from nmm.runs.trajectory import Trajectory
@@ -31,6 +32,7 @@ MOST, LEAST = 11, 4
 FAINTEST = 0.4
 #: A run whose arm rises or falls by more than this is drawn from the side too, m.
 _RISES = 0.01
+_OBSTACLE = style.ORANGE
 _PATH_COLOR, _BODY, _EDGE, _ARM = style.BLUE, "#B9C0CA", "#3F4652", style.VERMILLION
 
 
@@ -70,6 +72,7 @@ class Scene(Viewed):
         self.poses: list[Pose] = [silhouette.at(trajectory.q[k]) for k in samples]
         self.lines = _lines(trajectory)
         self.labels = _label_places(self.poses, list(self.lines.values()))
+        self.outlines = _outlines(trajectory, self.times)
         heights = np.array([[*pose.joints[:, 2], *pose.tip[:, 2]] for pose in self.poses])
         rises = heights.size > 0 and float(np.ptp(heights, axis=0).max()) > _RISES
         self.views = (ABOVE, SIDE) if rises else (ABOVE,)
@@ -78,7 +81,7 @@ class Scene(Viewed):
     def names(self) -> list[str]:
         """The entries of its legend."""
         names = ["desired path"] if "desired" in self.lines else []
-        names += [self._path_name, "start", "end"]
+        names += [self._path_name, "start", "end", *["obstacle"] * bool(self.outlines)]
         return names if self.trajectory.mark is None else [*names, "target"]
 
     @property
@@ -90,6 +93,7 @@ class Scene(Viewed):
         points = [*(pose.points() for pose in self.poses), *self.lines.values()]
         if view == ABOVE:
             points.append(np.column_stack([self.labels, np.zeros(len(self.labels))]))
+        points += [outline for _, outline in self.outlines]
         if self.trajectory.mark is not None:
             points.append(self.trajectory.mark[None])
         return [part[:, view] for part in points]
@@ -111,6 +115,12 @@ class Scene(Viewed):
                     f"{style.number(round(float(self.times[k]), 2))} s", color=style.GREY,
                     fontsize=style.SMALL - 1.0, ha="center", va="center", zorder=7,
                 )  # fmt: skip
+        for k, (strength, outline) in enumerate(self.outlines):
+            shade = _faded(_OBSTACLE, strength)
+            axes.fill(
+                *hull(outline[:, view]).T, facecolor=(*shade, 0.25), edgecolor=shade, linewidth=1.0,
+                zorder=2.5, label=None if k else "obstacle",
+            )  # fmt: skip
         desired, path = self.lines.get("desired"), self.lines.get("path")
         if desired is not None:
             axes.plot(
@@ -170,6 +180,22 @@ def _outline(pose: Pose) -> Array:
     lines = [side for edge in edges for side in zip(edge, np.roll(edge, -1, axis=0), strict=True)]
     lines += [(ends[0, :2], ends[1, :2]) for ends in pose.links]
     return np.vstack([start + fractions * (end - start) for start, end in lines])
+
+
+def _outlines(trajectory: Trajectory, times: Array) -> list[tuple[float, Array]]:
+    """Obstacles as points (k, 3) whose hull they are, with the strength to draw them: those that move at each
+    of the times. Half-spaces have no outline."""
+    found = []
+    for obstacle in trajectory.obstacles:
+        points = outline_points(obstacle.shape.geometry())
+        if points is None:
+            continue
+        at = times if obstacle.moves else times[-1:]
+        strengths = np.linspace(FAINTEST, 1.0, len(at)) if len(at) > 1 else [1.0]
+        for t, strength in zip(at, strengths, strict=True):
+            place = obstacle.placement(float(t))
+            found.append((float(strength), points @ place[:3, :3].T + place[:3, 3]))
+    return found
 
 
 def _how_many(trajectory: Trajectory, silhouette: Silhouette) -> int:

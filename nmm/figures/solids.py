@@ -44,9 +44,27 @@ def platform_shapes(robot: Robot, platform: Sequence[int]) -> list[Solid]:
     return []
 
 
+def outline_points(geometry: Any) -> Array | None:
+    """Points (k, 3), m, whose convex hull is nearly a shape of Coal's, in its axes; None for a half-space."""
+    name = type(geometry).__name__
+    if name == "Halfspace":
+        return None
+    if name in ("Sphere", "Capsule"):
+        k = np.linspace(-0.5 * np.pi, 0.5 * np.pi, _AROUND // 2 + 1)
+        lift = float(geometry.halfLength) if name == "Capsule" else 0.0
+        radius = float(geometry.radius)
+        rings = [_cylinder(radius * np.cos(a), lift + radius * np.sin(a)) for a in k[k >= 0.0]]
+        return np.vstack(rings)
+    return _geometry_points(geometry)
+
+
 def _shape_points(shape: Any) -> Array:
     """Points whose convex hull is that of a Pinocchio geometry object, in its joint's frame."""
-    geometry = shape.geometry
+    points = _geometry_points(shape.geometry)
+    return points @ np.array(shape.placement.rotation).T + np.array(shape.placement.translation)
+
+
+def _geometry_points(geometry: Any) -> Array:
     if hasattr(geometry, "halfSide"):
         points = _corners(-np.array(geometry.halfSide), np.array(geometry.halfSide))
     elif type(geometry).__name__ == "Cylinder":
@@ -58,7 +76,7 @@ def _shape_points(shape: Any) -> Array:
         geometry.computeLocalAABB()
         box = geometry.aabb_local
         points = _corners(np.array(box.min_), np.array(box.max_))
-    return points @ np.array(shape.placement.rotation).T + np.array(shape.placement.translation)
+    return points
 
 
 def _corners(low: Array, high: Array) -> Array:

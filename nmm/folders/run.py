@@ -15,6 +15,7 @@ from nmm.folders.whole import has_format, replaced_folder
 from nmm.runs.summary import FORMAT, unmet
 
 if TYPE_CHECKING:
+    from nmm.collisions.obstacle import Obstacle
     from nmm.robots.robot import Robot
     from nmm.runs.ellipsoid_options import Wanted
     from nmm.runs.trajectory import Trajectory
@@ -116,10 +117,12 @@ def load(folder: str | Path, robot: Robot | None = None) -> Trajectory:
     except (OSError, ValueError, KeyError) as error:
         raise InputError(f"{folder / 'trajectory.npz'}: cannot be read: {error}") from None
     scenario = None
+    obstacles: tuple[Obstacle, ...] = ()
     if (folder / "scenario.yaml").exists():
         loaded = Scenario.load(folder / "scenario.yaml")
         scenario = loaded.resolved()
         robot = loaded.robot() if robot is None else robot
+        obstacles = loaded.obstacles(robot)
     elif robot is None:
         robot = _from_its_file(folder, summary["robot"])
     if robot.fingerprint != summary["robot"].get("fingerprint", robot.fingerprint):
@@ -139,6 +142,8 @@ def load(folder: str | Path, robot: Robot | None = None) -> Trajectory:
         limited=summary.get("limited", False),
         limit_names=tuple(summary.get("limit_names", ())),
         clearance_names=tuple(summary.get("clearance_names", ())),
+        clearance_asked=summary.get("clearance_asked", 0.0),
+        obstacles=obstacles,
         scenario=scenario,
         events=tuple(Event(**event) for event in summary.get("events", ())),
         **arrays,

@@ -227,6 +227,8 @@ class Recorder:
                 "clearance_pairs": found.pairs,
                 "clearance_between": found.between,
                 "clearance_names": tuple(" and ".join(names) for names in controller.setting.names),
+                "clearance_asked": controller.setting.distance,
+                "obstacles": controller.setting.obstacles,
             }
         limited, within = shares(kept, robot, self.q[:count], self._u[:count], self._limited[:count])
         frame, columns, target = self._shown

@@ -118,6 +118,7 @@ def _clearance(trajectory: Trajectory) -> dict[str, Any]:
     pair, least = int(trajectory.clearance_pairs[k]), float(trajectory.clearance_between[k])
     return {
         "clearance_names": list(trajectory.clearance_names),
+        "clearance_asked": trajectory.clearance_asked,
         "clearance_min": least if np.isfinite(least) else None,
         "clearance_min_t": float(trajectory.t[k]),
         "clearance_min_pair": trajectory.clearance_names[pair] if pair >= 0 else "",

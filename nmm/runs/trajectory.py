@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nmm.arrays import Array, Integers
+from nmm.collisions.obstacle import Obstacle
 from nmm.control.sequence import Event
 from nmm.doors import door
 from nmm.robots.motion import Motion
@@ -65,6 +66,8 @@ class Trajectory:
     clearance (N,): least distance between shapes that are kept apart, m, infinite where none are
     clearance_between (N,): the least on the way to the next sample, m
     clearance_pairs (N,): which of `clearance_names` is nearest, -1 for none
+    clearance_asked : the distance that was to be kept, m
+    obstacles : what the robot kept off, to draw it
     scenario : the scenario as resolved, if it came from one
     events : when tasks that come and go began and ended, and why
     """
@@ -104,6 +107,8 @@ class Trajectory:
     clearance_between: Array = field(default_factory=lambda: np.zeros(0))
     clearance_pairs: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     clearance_names: tuple[str, ...] = ()
+    clearance_asked: float = 0.0
+    obstacles: tuple[Obstacle, ...] = ()
     scenario: dict[str, Any] | None = field(default=None)
     events: tuple[Event, ...] = ()
 

@@ -8,15 +8,18 @@ from typing import NamedTuple
 from pydantic_core import PydanticUndefined
 
 from nmm.kinds import RESOLVERS
+from nmm.scenario.collisions import CollisionsPart
 from nmm.scenario.conditions import CONDITION_PARTS
 from nmm.scenario.functions import FUNCTION_PARTS, REFERENCE_PARTS
 from nmm.scenario.goals import GoalPart, RetreatPart
 from nmm.scenario.keys import Part
 from nmm.scenario.limits import BoundPart, LimitsPart
 from nmm.scenario.objectives import OBJECTIVE_PARTS, TermPart
+from nmm.scenario.obstacles import ObstaclePart
 from nmm.scenario.resolvers import RESOLVER_PARTS
 from nmm.scenario.robot import ArmPart, MountedPart, RobotPart
 from nmm.scenario.schema import ScenarioPart
+from nmm.scenario.shapes import SHAPE_PARTS
 from nmm.scenario.steering import SteeringPart
 from nmm.scenario.tasks import TASK_PARTS
 
@@ -52,6 +55,10 @@ def sections() -> Iterator[Section]:
     yield _section("retreat", RetreatPart)
     yield _section("limits", LimitsPart)
     yield _section("limits.bounds: a task's function and its keys, with these", BoundPart)
+    yield _section("collisions", CollisionsPart)
+    yield _section("collisions.obstacles", ObstaclePart)
+    for kind, shape in SHAPE_PARTS.items():
+        yield _section(f"collisions.obstacles.shape, kind: {kind}", shape)
     yield _section("steering", SteeringPart)
 
 

@@ -16,6 +16,7 @@ from nmm.scenario.document import Document, read_file
 from nmm.scenario.keys import KeyedError, as_written, at, first_error
 
 if TYPE_CHECKING:
+    from nmm.collisions.obstacle import Obstacle
     from nmm.control.controller import Controller
     from nmm.robots.robot import Robot
     from nmm.runs.trajectory import Trajectory
@@ -49,6 +50,8 @@ class Scenario:
             raise self._located(first_error(error, data)) from None
         self.name = self.parts.name
         self.title = self.parts.title
+        #: The absolute path of a file that is named at a place of it.
+        self.absolute = document.absolute
         self._robot: Robot | None = None
 
     @classmethod
@@ -107,7 +110,18 @@ class Scenario:
         """
         robot = self.robot()
         try:
-            return self.parts.build(robot)
+            return self.parts.build(robot, self.absolute)
+        except KeyedError as error:
+            raise self._located(error) from None
+
+    def obstacles(self, robot: Robot) -> tuple[Obstacle, ...]:
+        """What a robot keeps off in it; `ScenarioError` for a mesh that is not there."""
+        part = self.parts.collisions
+        try:
+            with at("collisions"):
+                return (
+                    () if part is None else tuple(part.build_obstacles(robot, self.absolute, ("collisions",)))
+                )
         except KeyedError as error:
             raise self._located(error) from None
 
@@ -144,6 +158,8 @@ class Scenario:
         """
         data = self.parts.explicit()
         data["robot"] = self._explicit_robot()
+        if self.parts.collisions is not None:
+            data["collisions"] = self.parts.collisions.explicit(self.absolute, ("collisions",))
         return data
 
     def _explicit_robot(self) -> dict[str, Any]:

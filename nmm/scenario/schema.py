@@ -14,6 +14,7 @@ from nmm.errors import InputError
 from nmm.functions.tasks.task import Stack
 from nmm.kinds import RESOLVERS
 from nmm.robots.robot import Robot
+from nmm.scenario.collisions import CollisionsPart
 from nmm.scenario.functions import REFERENCE_PARTS
 from nmm.scenario.goals import GoalPart, RetreatPart
 from nmm.scenario.keys import Part, at
@@ -21,7 +22,7 @@ from nmm.scenario.limits import LimitsPart, part_or_none
 from nmm.scenario.numbers import Nested, Positive, numbers, numbers_by_name
 from nmm.scenario.objectives import ObjectiveList, QuadraticPart, build_objective
 from nmm.scenario.resolvers import AnyResolver, WithAddedTask
-from nmm.scenario.robot import RobotChoice
+from nmm.scenario.robot import Absolute, RobotChoice
 from nmm.scenario.steering import SteeringPart
 from nmm.scenario.tasks import TASK_PARTS, TaskList, TaskPart, build_tasks, listed
 from nmm.words import listed as in_words
@@ -65,6 +66,9 @@ class ScenarioPart(Part):
     limits: Annotated[LimitsPart | None, BeforeValidator(part_or_none)] = Field(
         None, description="what the inputs are kept within: true for the robot's own limits, or a mapping"
     )
+    collisions: Annotated[CollisionsPart | None, BeforeValidator(part_or_none)] = Field(
+        None, description="what the robot keeps off: true for itself, or a mapping with obstacles"
+    )
     until: Annotated[GoalPart | None, BeforeValidator(part_or_none)] = Field(
         None, description="a target to reach: the run ends where the error is within tolerances"
     )
@@ -76,8 +80,8 @@ class ScenarioPart(Part):
         description="what steers a platform where neither task nor objective does: true, false, or a mapping",
     )
 
-    def build(self, robot: Robot) -> Controller:
-        """The controller, after a check of q0; errors know their key."""
+    def build(self, robot: Robot, absolute: Absolute) -> Controller:
+        """The controller, after a check of q0; errors know their key. `absolute` finds the files named."""
         with at("q0"):
             for name in self.q0 if isinstance(self.q0, dict) else ():
                 with at(name):
@@ -101,6 +105,9 @@ class ScenarioPart(Part):
             objective = build_objective(self.objective, robot)
         with at("limits"):
             limits = None if self.limits is None else self.limits.build(robot)
+        with at("collisions"):
+            place = ("collisions",)
+            collisions = None if self.collisions is None else self.collisions.build(robot, absolute, place)
         with at("retreat"):
             goal = None if self.until is None else self.until.make()
             retreat = None if self.retreat is None else self.retreat.build(robot, goal)
@@ -120,7 +127,16 @@ class ScenarioPart(Part):
                     self._check_added(self.resolver, rows, robot.n_u - s, held)
             with self.resolver.own_keys():
                 return Controller(
-                    robot, task, resolver, objective, added, limits, self.dt, retreat, steering or False
+                    robot,
+                    task,
+                    resolver,
+                    objective,
+                    added,
+                    limits,
+                    self.dt,
+                    retreat,
+                    steering or False,
+                    collisions,
                 )
 
     def _added_task(self, resolver: WithAddedTask) -> list[TaskPart]:
