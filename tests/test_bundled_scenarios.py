@@ -46,8 +46,8 @@ DAMPED = {
     "unicycle_3r_vertical_line": "scales the rate on purpose",
     "unicycle_2r_algorithmic": "the added task was not done",
 }
-#: The task gives way to what is in its way, and is done at the end.
-GIVE_WAY = ("omni_small_arm_door", "unicycle_3r_crossing")
+#: The task gives way to what is in its way, or to limits where it begins anew, and is done at the end.
+GIVE_WAY = ("omni_small_arm_door", "unicycle_3r_crossing", "unicycle_3r_sequence")
 #: Its target is 0.4 m above what the arm reaches.
 MISSED = "unicycle_3r_out_of_reach"
 

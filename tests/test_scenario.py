@@ -219,7 +219,8 @@ def test_another_resolver_keeps_what_it_knows() -> None:
     given = Scenario.load("unicycle_2r_position", {"resolver.alpha": 4})
     assert given.with_resolver("rg") is given
     pg = given.with_resolver("pg")
-    assert pg.parts.resolver.model_dump() == {"kind": "pg", "tolerance": 1e-10, "alpha": 4.0, "weights": None}
+    knows = {"kind": "pg", "tolerance": 1e-10, "alpha": 4.0, "weights": None, "step": "constant"}
+    assert pg.parts.resolver.model_dump() == knows
     assert given.with_resolver("ej").parts.resolver.kind == "ej"
     with pytest.raises(ScenarioError, match=r"set resolver\.kind: unknown kind 'sqp'; available: rg, pg, ej"):
         given.with_resolver("sqp")
@@ -290,7 +291,9 @@ def test_a_resolved_scenario_gives_the_same_run(name: str, resolver: str, tmp_pa
     second = again.run()
     assert again.resolved() == first.scenario
     for array in ("t", "q", "u", "r", "r_d", "error", "objective", "sigma_min", "partition"):
-        assert np.array_equal(getattr(first, array), getattr(second, array)), array
+        # not a number where a task that comes and goes is not there
+        one, other = getattr(first, array), getattr(second, array)
+        assert np.array_equal(one, other, equal_nan=array in ("r", "r_d", "error")), array
 
 
 def test_resolved_holds_every_default_as_plain_data() -> None:
