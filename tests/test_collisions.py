@@ -56,7 +56,9 @@ def least_between(run, obstacles, robot):
 
 @pytest.mark.parametrize("method", ["zoh", "rk4"])
 @pytest.mark.parametrize("limits", [None, limited()], ids=["free", "limited"])
-@pytest.mark.parametrize("resolver", [nmm.ProjectedGradient(), nmm.ReducedGradient(alpha=0.5)], ids=["pg", "rg"])
+@pytest.mark.parametrize(
+    "resolver", [nmm.ProjectedGradient(), nmm.ReducedGradient(alpha=0.5)], ids=["pg", "rg"]
+)
 def test_a_pillar_in_the_way_is_not_touched(robot, method, limits, resolver):
     one = controller(robot, [pillar()], limits=limits, resolver=resolver)
     run = nmm.simulate(one, START, 4.0, 0.02, method, until=nmm.Goal())
