@@ -67,7 +67,8 @@ def test_run_takes_resolver_settings_folder_and_html(run: Command) -> None:
     assert result.value("resolver") == "PG, rk4, dt 0.01 s"
     assert result.value("files in") == "here/there"
     written = yaml.safe_load(Path("here/there/scenario.yaml").read_text())
-    assert written["resolver"] == {"kind": "pg", "tolerance": 1e-10, "alpha": 5.0, "weights": {"v": 2.0}}
+    given = {"kind": "pg", "tolerance": 1e-10, "alpha": 5.0, "weights": {"v": 2.0}, "step": "constant"}
+    assert written["resolver"] == given
     assert Path("here/there/playback.html").stat().st_size > 100_000
 
 

@@ -17,11 +17,9 @@ from nmm.control.retreat import Retreat
 from nmm.control.sequence import Event, Moment, Sequence
 from nmm.control.steering import Steering
 from nmm.errors import InputError, RunError
-from nmm.functions.function import Function, Row, Stage
 from nmm.functions.objectives.base import Objective
+from nmm.functions.references import Constant
 from nmm.functions.tasks.task import Stack, Task
-from nmm.kernels.compiled import kernel
-from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.resolvers.base import Resolver
 from nmm.resolvers.callable_resolver import CallableResolver
 from nmm.resolvers.problem import Problem
@@ -101,7 +99,7 @@ class SequencedController(Controller):
             robot, stack, resolver, objective, limits, _, retreat, steering, collisions = self._given
             tasks = [task.always for task, on in zip(stack, active, strict=True) if on]
             if not tasks:
-                tasks, resolver, retreat = [Task(Nothing(), [0.0], gain=None)], descent(resolver), None
+                tasks, resolver, retreat = [Task(Constant([0.0]), [0.0], gain=None)], descent(resolver), None
             self._controllers[active] = Controller(
                 robot, tasks, resolver, objective, None, limits, dt, retreat, steering, collisions
             )
@@ -191,19 +189,3 @@ def descent(resolver: Resolver) -> Resolver:
         return -alpha * np.asarray(problem.h)
 
     return CallableResolver(descend)
-
-
-@kernel(FUNCTION)
-def nothing(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
-    """φ = 0."""
-    rows.value[0] = 0.0
-
-
-class Nothing(Function):
-    """0, whatever q: what is asked where no task is."""
-
-    def rows(self, robot: Robot) -> tuple[Row, ...]:
-        return (Row("nothing", "1"),)
-
-    def stages(self, robot: Robot) -> tuple[Stage, ...]:
-        return (Stage(nothing, 1),)
