@@ -54,30 +54,27 @@ class Sphere(Shape):
 
 
 @dataclass(frozen=True)
-class Cylinder(Shape):
-    """A cylinder along z, its middle in the origin."""
+class Round(Shape):
+    """A shape of `radius` and `length` along z, its middle in the origin."""
 
     radius: float
     length: float
 
     def __post_init__(self) -> None:
         for name in ("radius", "length"):
-            object.__setattr__(self, name, positive(getattr(self, name), f"cylinder: {name}"))
+            positive_size = positive(getattr(self, name), f"{type(self).__name__.lower()}: {name}")
+            object.__setattr__(self, name, positive_size)
+
+
+class Cylinder(Round):
+    """A cylinder along z, its middle in the origin."""
 
     def geometry(self) -> Any:
         return coal.Cylinder(self.radius, self.length)
 
 
-@dataclass(frozen=True)
-class Capsule(Shape):
+class Capsule(Round):
     """All points within `radius` of a segment of `length` along z, its middle in the origin."""
-
-    radius: float
-    length: float
-
-    def __post_init__(self) -> None:
-        for name in ("radius", "length"):
-            object.__setattr__(self, name, positive(getattr(self, name), f"capsule: {name}"))
 
     def geometry(self) -> Any:
         return coal.Capsule(self.radius, self.length)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from collections.abc import Sequence as Several
 from typing import NamedTuple
 
@@ -184,10 +185,10 @@ class Sequence:
         before: Moment,
         t: float,
         errors: dict[str, Array],
-        values: object,
+        values: Iterator[Evaluation],
     ) -> float:
         if isinstance(one, While):
-            value = next(values).value  # type: ignore[call-overload]
+            value = next(values).value
             wider = one.margin if was else 0.0
             return float(np.all((one.lower - wider <= value) & (value <= one.upper + wider)))
         if isinstance(one, After):

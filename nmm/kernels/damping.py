@@ -6,6 +6,7 @@ import math
 
 from nmm.arrays import Array, Integers
 from nmm.kernels.compiled import compiled, scratch
+from nmm.kernels.linear_algebra import project_out
 from nmm.kernels.singular_values import singular_rows
 
 #: What is damped: every direction by the same λ; every one, by a λ that grows from 0 as the least singular
@@ -73,12 +74,7 @@ def damped_solution(
                 A[i, j] = J[first + i, j] / row_scales[first + i]
                 b[i] -= A[i, j] * done[j]
             for _ in range(2):  # the second time for what rounding left
-                for k in range(taken):
-                    overlap = 0.0
-                    for j in range(m):
-                        overlap += A[i, j] * above[k, j]
-                    for j in range(m):
-                        A[i, j] -= overlap * above[k, j]
+                project_out(A, i, above, taken)
         least, _ = singular_rows(A, R)
         for i in range(s):
             wanted[i] = 0.0

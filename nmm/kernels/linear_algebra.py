@@ -84,6 +84,17 @@ def orthonormal_rows(J: Array, row_scales: Array, order: Array, L: Array, Q: Arr
 
 
 @compiled
+def project_out(A: Array, row: int, Q: Array, count: int) -> None:
+    """A[row] less its parts along the first `count` rows of Q, which are orthonormal; in place."""
+    for k in range(count):
+        overlap = 0.0
+        for j in range(A.shape[1]):
+            overlap += A[row, j] * Q[k, j]
+        for j in range(A.shape[1]):
+            A[row, j] -= overlap * Q[k, j]
+
+
+@compiled
 def closest_solution(rate: Array, u0: Array, order: Array, L: Array, Q: Array, u: Array) -> None:
     """The solution of J u = rate closest to u0, J⁺ rate + (I - J⁺ J) u0, from `orthonormal_rows`.
 

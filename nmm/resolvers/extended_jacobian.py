@@ -10,7 +10,7 @@ from nmm.arrays import Array, Integers, positive
 from nmm.errors import InputError, expect_known
 from nmm.kernels.compiled import Kernel, clear, compiled, integer_scratch, kernel, scratch, view
 from nmm.kernels.damping import BELOW, DIRECTIONS, LARGEST, damped_solution
-from nmm.kernels.linear_algebra import closest_solution, eliminate, orthonormal_rows
+from nmm.kernels.linear_algebra import closest_solution, eliminate, orthonormal_rows, project_out
 from nmm.resolvers.answer import RELAXED, SINGULAR_J, SINGULAR_JE, SOLVED, AnswerArrays, certify
 from nmm.resolvers.base import RESOLVER, Resolver, Setup
 from nmm.resolvers.limited import limit, within
@@ -79,12 +79,7 @@ def damped_beside(problem: ProblemArrays, tolerance: float, answer: AnswerArrays
         for j in range(m):
             b[i] -= added_J[i, j] * u[j]
             A[i, j] = added_J[i, j]
-        for row in range(s):
-            overlap = 0.0
-            for j in range(m):
-                overlap += A[i, j] * Q[row, j]
-            for j in range(m):
-                A[i, j] -= overlap * Q[row, j]
+        project_out(A, i, Q, s)
     scales, dt = problem.added_row_scales, problem.dt[()]
     ends, shares = integer_scratch(1), scratch(1)
     ends[0] = k

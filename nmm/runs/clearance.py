@@ -11,7 +11,7 @@ from nmm.arrays import Array, Integers
 from nmm.collisions.setting import Setting
 from nmm.control.guard import Counts, Guard
 from nmm.robots.held import Held
-from nmm.runs.integrators import Integrator, Velocity
+from nmm.runs.integrators import Around, Velocity
 
 #: Between samples distances are looked at after so much motion, m and rad of the coordinates together.
 APART = 0.01
@@ -34,25 +34,12 @@ class Swept(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Guarded:
+class Guarded(Around):
     """An integrator that holds the inputs unless everything is farther than the robot can come: what a guard
     looked along is the way that held inputs make."""
 
-    integrator: Integrator
     guard: Guard
     held: Held
-
-    @property
-    def order(self) -> int:
-        return self.integrator.order
-
-    @property
-    def tolerance(self) -> float:
-        return self.integrator.tolerance
-
-    @property
-    def stability(self) -> tuple[float, ...]:
-        return self.integrator.stability
 
     def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
         if not self.guard.held:

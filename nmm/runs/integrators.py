@@ -129,11 +129,10 @@ class ZeroOrderHold:
 
 
 @dataclass(frozen=True)
-class Followed:
-    """An integrator after which the joints that follow others are where these have them, to the digit."""
+class Around:
+    """What changes the steps of another integrator, and is of its order and stability."""
 
     integrator: Integrator
-    robot: Robot
 
     @property
     def order(self) -> int:
@@ -146,6 +145,13 @@ class Followed:
     @property
     def stability(self) -> tuple[float, ...]:
         return self.integrator.stability
+
+
+@dataclass(frozen=True)
+class Followed(Around):
+    """An integrator after which the joints that follow others are where these have them, to the digit."""
+
+    robot: Robot
 
     def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
         return self.robot.following.placed(self.integrator.advance(velocity, t, q, q_dot, u, dt))

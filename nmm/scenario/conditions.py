@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field
@@ -24,9 +25,9 @@ else:
 class ConditionPart(Part):
     """A condition."""
 
+    @abstractmethod
     def build(self, robot: Robot) -> Condition:
         """The condition; errors know their key."""
-        raise NotImplementedError
 
 
 class BetweenPart(ConditionPart):
