@@ -24,7 +24,8 @@ class Scene(NamedTuple):
     first_corner (G + 1,), corners (..., 3), rounding (G,) : corners in a shape's axes, and the radius
         about them
     active (P,) : whether a pair is near; changed (P,) : those that came near or went in the last step
-    bounds (P,) : the distances, m, of pairs that are not near lower bounds; risky (P,) : see `at_risk`
+    bounds (P,) : the distances, m, of pairs that are not near lower bounds
+    risky (P,), watched (P,) : pairs that were listed to be looked at, and whether one was
     kept (P,) : what a pair's distance may not fall below, m
     """
 
@@ -43,6 +44,7 @@ class Scene(NamedTuple):
     changed: IntegerVector
     bounds: Vector
     risky: IntegerVector
+    watched: IntegerVector
     kept: Vector
 
 
@@ -113,61 +115,5 @@ def find_near(scene: Scene, places: Array) -> int:
         if near != scene.active[k]:
             scene.active[k] = near
             scene.changed[found] = k
-            found += 1
-    return found
-
-
-@compiled
-def at_risk(scene: Scene, places: Array, J: Array, q_dot: Array, times: Array) -> int:
-    """Which pairs could come nearer than they may while the coordinates go on; returns how many.
-
-    J (n, 6) : the joints' twists about the world's origin; q_dot (n,)
-    times (n,) : for how long each coordinate goes on like this, s
-    """
-    count, n = scene.supports.shape
-    centers, moved, total = scratch((1, 3)), scratch((count, n)), scratch(count)
-    for i in range(count):
-        total[i] = 0.0
-        if i >= scene.planes[()]:
-            continue
-        radius = scene.boxes[i, 6]
-        to_world(places, i, scene.boxes[i, 0], scene.boxes[i, 1], scene.boxes[i, 2], centers, 0)
-        x, y, z = centers[0, 0], centers[0, 1], centers[0, 2]
-        for c in range(n):
-            moved[i, c] = 0.0
-            if scene.supports[i, c] == 0.0 or q_dot[c] == 0.0:
-                continue
-            a, b, w = J[c, 3], J[c, 4], J[c, 5]
-            u = J[c, 0] + b * z - w * y
-            v = J[c, 1] + w * x - a * z
-            r = J[c, 2] + a * y - b * x
-            turn = math.sqrt(a * a + b * b + w * w)
-            # The lever changes while other joints move: a tenth more.
-            moved[i, c] = 1.1 * abs(q_dot[c]) * times[c] * (math.sqrt(u * u + v * v + r * r) + turn * radius)
-            total[i] += moved[i, c]
-    found = 0
-    longest = 0.0
-    for c in range(n):
-        longest = max(longest, times[c])
-    for k in range(scene.pairs.shape[0]):
-        i, j = scene.pairs[k, 0], scene.pairs[k, 1]
-        room = scene.bounds[k] - scene.kept[k]
-        one = 0.0
-        two = 0.0
-        few = room >= total[i] + (total[j] if j < scene.planes[()] else 0.0)
-        for c in range(0 if few else n):
-            if scene.apart[k, c] > 0.0:
-                one += moved[i, c]
-                two += moved[j, c] if j < scene.planes[()] and scene.supports[j, c] > 0.0 else moved[i, c]
-        t = scene.twists[j]
-        speed = math.sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2])
-        turn = math.sqrt(t[3] * t[3] + t[4] * t[4] + t[5] * t[5])
-        if turn > 0.0:
-            square = 0.0
-            for a in range(3):
-                square += (places[i, 9 + a] - places[j, 9 + a]) ** 2
-            speed += turn * (math.sqrt(square) + 2.0 * scene.boxes[i, 6])
-        if room < max(one, two) + longest * speed:
-            scene.risky[found] = k
             found += 1
     return found

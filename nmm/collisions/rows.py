@@ -161,7 +161,8 @@ def facing(
 ) -> int:
     """Write the corners of a shape that lie along the other one; returns how many.
 
-    found (CORNERS, 3) : where they are in e (2, 3) about the nearest point, and how far behind it, m
+    found (CORNERS, 4) : where they are in e (2, 3) about the nearest point, how far behind it, m, and how far
+        away in e, squared
     """
     sign = 1.0 if side == 0 else -1.0
     count = 0
@@ -187,20 +188,20 @@ def facing(
         depth = max(depth, 0.0)
         u = local[1, 0] * X + local[1, 1] * Y + local[1, 2] * Z - u0
         v = local[2, 0] * X + local[2, 1] * Y + local[2, 2] * Z - v0
-        away = math.hypot(u, v)
-        if depth > SLOPE * away + ROUNDED or away < APART:
+        square = u * u + v * v
+        if square < APART * APART or (depth > ROUNDED and (depth - ROUNDED) ** 2 > SLOPE * SLOPE * square):
             continue
         slot = count
         if count == CORNERS:  # the one nearest to the middle goes
             slot = 0
             for k in range(CORNERS):
-                if math.hypot(found[k, 0], found[k, 1]) < math.hypot(found[slot, 0], found[slot, 1]):
+                if found[k, 3] < found[slot, 3]:
                     slot = k
-            if math.hypot(u, v) <= math.hypot(found[slot, 0], found[slot, 1]):
+            if square <= found[slot, 3]:
                 continue
         else:
             count += 1
-        found[slot, 0], found[slot, 1], found[slot, 2] = u, v, depth
+        found[slot, 0], found[slot, 1], found[slot, 2], found[slot, 3] = u, v, depth, square
     return count
 
 
@@ -210,7 +211,7 @@ def add_faces(scene: Scene, places: Array, J: Array, rows: Rows, slot: int, used
     pair = rows.pair[slot]
     i, j = scene.pairs[pair, 0], scene.pairs[pair, 1]
     x = rows.points[slot]
-    e, extent = scratch((2, 3)), scratch((2, COUNT))
+    e, inverse = scratch((2, 3)), scratch((2, COUNT))
     least = 0
     for k in range(3):
         if abs(x[6 + k]) < abs(x[6 + least]):
@@ -223,35 +224,34 @@ def add_faces(scene: Scene, places: Array, J: Array, rows: Rows, slot: int, used
     e[1, 0] = x[7] * e[0, 2] - x[8] * e[0, 1]
     e[1, 1] = x[8] * e[0, 0] - x[6] * e[0, 2]
     e[1, 2] = x[6] * e[0, 1] - x[7] * e[0, 0]
-    one, two = scratch((CORNERS, 3)), scratch((CORNERS, 3))
+    one, two = scratch((CORNERS, 4)), scratch((CORNERS, 4))
     plane = j >= scene.planes[()]
     first = facing(scene, places, i, x, 0, e, DEEPEST, one)
     second = 0 if plane else facing(scene, places, j, x, 1, e, DEEPEST, two)
-    if first == 0 and second == 0:
+    if first == 0 or (second == 0 and not plane):  # a part in common takes two
         return used
-    for k in range(COUNT):
-        c, s = DIRECTIONS[k, 0], DIRECTIONS[k, 1]
-        extent[0, k], extent[1, k] = 0.0, 0.0
-        for a in range(first):
-            extent[0, k] = max(extent[0, k], c * one[a, 0] + s * one[a, 1])
-        for b in range(second):
-            extent[1, k] = max(extent[1, k], c * two[b, 0] + s * two[b, 1])
+    for side in range(0 if plane else 2):
+        corners = one if side == 0 else two
+        for k in range(COUNT):
+            reach = 0.0
+            for a in range(first if side == 0 else second):
+                reach = max(reach, DIRECTIONS[k, 0] * corners[a, 0] + DIRECTIONS[k, 1] * corners[a, 1])
+            inverse[side, k] = 1.0 / (reach + APART)
     best = scratch((4, 4))
     for k in range(4):
         best[k, 0] = 0.0
     for side in range(2):
+        corners = one if side == 0 else two
         for a in range(first if side == 0 else second):
-            u, v, depth = (
-                (one[a, 0], one[a, 1], one[a, 2]) if side == 0 else (two[a, 0], two[a, 1], two[a, 2])
-            )
-            share = 1.0
-            if not plane:
-                for k in range(COUNT):
-                    along = DIRECTIONS[k, 0] * u + DIRECTIONS[k, 1] * v
-                    if along > 0.0:
-                        share = min(share, (extent[1 - side, k] + APART) / along)
-            away = share * math.hypot(u, v)
+            u, v, depth, size = corners[a, 0], corners[a, 1], corners[a, 2], math.sqrt(corners[a, 3])
             quadrant = (2 if u > 0.0 else 0) + (1 if v > 0.0 else 0)
+            if size <= best[quadrant, 0]:
+                continue
+            beyond = 1.0
+            for k in range(0 if plane else COUNT):
+                beyond = max(beyond, (DIRECTIONS[k, 0] * u + DIRECTIONS[k, 1] * v) * inverse[1 - side, k])
+            share = 1.0 / beyond
+            away = share * size
             if away > 2.0 * APART and away > best[quadrant, 0]:
                 best[quadrant, 0] = away
                 best[quadrant, 1], best[quadrant, 2] = share * u, share * v

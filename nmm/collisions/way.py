@@ -1,0 +1,261 @@
+"""The way that inputs make, compiled: where the robot will be, and which pairs are surely apart there.
+
+Two convex shapes are apart by the gap between two parallel planes with all of the one before the first and
+all of the other behind the second: whatever their direction, the distance is no less. So the direction in
+which Coal last found a pair's nearest points, carried along with either shape, tells without Coal that a
+pair is farther than it has to be; where it does not tell, Coal is asked, and the direction is new.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from nmm.arrays import Array
+from nmm.collisions.near import Scene
+from nmm.kernels.compiled import compiled, scratch
+from nmm.kernels.kinematics import Joints, compose, place_joints
+from nmm.kernels.memory import IntegerCell, IntegerVector, Matrices, Matrix, Vector
+from nmm.robots.held import Inputs, hold
+
+#: Looks along a way are no farther apart than this, in m and rad of the coordinates together.
+APART = 0.01
+#: Looks within the sample, and samples of braking, at most.
+LOOKS, BRAKING = 20, 400
+#: The lever of a joint changes while others move: so much more than it is now.
+LEVERS = 1.1
+
+
+class Way(NamedTuple):
+    """L looks ahead.
+
+    joints, inputs : the robot's
+    deceleration (m,) : by how much inputs can change a second; infinite where nothing says so
+    carrier (G,), place (G, 12) : the joint that carries a shape, and where the shape is in its axes; an
+        obstacle's are the world and where it is now
+    path (G,), paths (..., L, 12) : which of the paths an obstacle moves along, and where it will be; -1 for
+        an obstacle that stands or is set, -2 for a shape of the robot
+    disc (G,) : radius of a cylinder, 0 of others
+    planes (P, 2, 4) : for a pair and either of its shapes the direction to the other one, in the shape's
+        axes, and how far it reaches that way, m; infinite where there is none
+    looks () : how many there are; after, weight (L,) : s from now, and for how long the inputs would have
+        gone as far; q (L, n) : where
+    """
+
+    joints: Joints
+    inputs: Inputs
+    deceleration: Vector
+    carrier: IntegerVector
+    place: Matrix
+    path: IntegerVector
+    paths: Matrices
+    disc: Vector
+    planes: Matrices
+    looks: IntegerCell
+    after: Vector
+    weight: Vector
+    q: Matrix
+
+
+@compiled
+def braking_share(deceleration: Array, u: Array, dt: float) -> float:
+    """The share of the inputs that one sample of braking takes, all of them alike: directions stay."""
+    share = 1.0
+    for j in range(u.shape[0]):
+        share = min(share, deceleration[j] * dt / max(abs(u[j]), 1e-12))
+    return share
+
+
+@compiled
+def lay(way: Way, q: Array, u: Array, dt: float) -> int:
+    """Write the looks along dt with u and the braking after it; returns how many."""
+    size = 0.0
+    brakes = False
+    for j in range(u.shape[0]):
+        size += abs(u[j])
+        brakes = brakes or math.isfinite(way.deceleration[j])
+    count = max(2, math.ceil(min(dt * size / APART, float(LOOKS))))
+    for i in range(count):
+        way.after[i] = way.weight[i] = dt * (i + 1) / count
+        hold(way.inputs, q, u, dt * (i + 1) / count, way.q[i])
+    step = braking_share(way.deceleration, u, dt)
+    share, gone = 1.0, 0.0
+    weight = after = dt
+    here, ahead, slower = scratch(q.shape[0]), scratch(q.shape[0]), scratch(u.shape[0])
+    for a in range(q.shape[0]):
+        here[a] = way.q[count - 1, a]
+    for _ in range(BRAKING if brakes else 0):
+        share -= step
+        last = share <= 0.0
+        if not last:
+            for j in range(u.shape[0]):
+                slower[j] = share * u[j]
+            hold(way.inputs, here, slower, dt, ahead)
+            for a in range(q.shape[0]):
+                here[a] = ahead[a]
+            after += dt
+            weight += share * dt
+            gone += dt * share * size
+        if gone > (0.0 if last else APART):
+            way.after[count], way.weight[count] = after, weight
+            for a in range(q.shape[0]):
+                way.q[count, a] = here[a]
+            count += 1
+            gone = 0.0
+        if last:
+            break
+    way.looks[()] = count
+    return count
+
+
+@compiled
+def reach(scene: Scene, way: Way, shape: int, x: float, y: float, z: float) -> float:
+    """How far a shape reaches along a direction in its axes, m; infinite where that is not known."""
+    if way.disc[shape] > 0.0:
+        return way.disc[shape] * math.hypot(x, y) + scene.boxes[shape, 5] * abs(z)
+    found = -math.inf
+    for c in range(scene.first_corner[shape], scene.first_corner[shape + 1]):
+        found = max(found, x * scene.corners[c, 0] + y * scene.corners[c, 1] + z * scene.corners[c, 2])
+    return found + scene.rounding[shape] if found > -math.inf else math.inf
+
+
+@compiled
+def renew(scene: Scene, way: Way, results: Array, places: Array, pair: int) -> None:
+    """A pair's planes, from what Coal found where the shapes are."""
+    square = results[pair, 1] ** 2 + results[pair, 2] ** 2 + results[pair, 3] ** 2
+    if not abs(square - 1.0) < 1e-9:  # no direction: crossing axes, centres that coincide
+        return
+    for side in range(2):
+        shape = scene.pairs[pair, side]
+        if shape >= scene.planes[()]:  # a half-space has one direction for good
+            for k in range(4):
+                way.planes[pair, side, k] = scene.boxes[shape, k]
+            continue
+        for k in range(3):
+            along = 0.0
+            for i in range(3):
+                along += places[shape, 3 * k + i] * results[pair, 1 + i]
+            way.planes[pair, side, k] = along if side == 0 else -along
+        x = way.planes[pair, side]
+        way.planes[pair, side, 3] = reach(scene, way, shape, x[0], x[1], x[2])
+
+
+@compiled
+def gap(scene: Scene, way: Way, pair: int, ends: Array) -> float:
+    """A lower bound of a pair's distance, m; ends (2, 12): where its shapes are."""
+    best = -math.inf
+    for side in range(2):
+        other = scene.pairs[pair, 1 - side]
+        x = way.planes[pair, side]
+        if math.isinf(x[3]) or other >= scene.planes[()]:
+            continue
+        n = scratch(3)
+        apart = -x[3]
+        for i in range(3):
+            n[i] = ends[side, i] * x[0] + ends[side, 3 + i] * x[1] + ends[side, 6 + i] * x[2]
+            apart += n[i] * (ends[1 - side, 9 + i] - ends[side, 9 + i])
+        back = scratch(3)
+        for k in range(3):
+            back[k] = 0.0
+            for i in range(3):
+                back[k] -= ends[1 - side, 3 * k + i] * n[i]
+        best = max(best, apart - reach(scene, way, other, back[0], back[1], back[2]))
+    return best
+
+
+@compiled
+def unsure(scene: Scene, way: Way, listed: int, look: int, first: int) -> int:
+    """The first of the listed pairs that may be too near, from a look and a place in the list on.
+
+    Returns the look times the number of pairs, and its place in `scene.risky`; -1 where all are clear.
+    """
+    joints, ends = scratch((way.joints.parent.shape[0], 12)), scratch((2, 12))
+    for i in range(look, way.looks[()]):
+        place_joints(way.joints, way.q[i], joints)
+        for k in range(first if i == look else 0, listed):
+            pair = scene.risky[k]
+            for side in range(2):
+                shape = scene.pairs[pair, side]
+                if way.path[shape] >= 0:
+                    for a in range(12):
+                        ends[side, a] = way.paths[way.path[shape], i, a]
+                else:
+                    compose(joints, way.carrier[shape], way.place, shape, ends, side)
+            if gap(scene, way, pair, ends) < scene.kept[pair]:
+                return i * scene.kept.shape[0] + k
+    return -1
+
+
+@compiled
+def allow(scene: Scene, asked: float, target: float) -> None:
+    """What a pair's distance may not fall below: the target; of one that is there already, what it is."""
+    for k in range(scene.kept.shape[0]):
+        d = scene.bounds[k]
+        scene.kept[k] = target if d >= target else (d - 1e-9 if d < asked else max(asked, d - 1e-7))
+
+
+@compiled
+def list_risky(
+    scene: Scene, way: Way, results: Array, places: Array, J: Array, q_dot: Array, time: float, listed: int
+) -> int:
+    """Add to `scene.risky`, which holds `listed` pairs, those that could come nearer than they may.
+
+    J (n, 6) : the joints' twists about the world's origin; q_dot (n,)
+    time : for how long the coordinates go on like this, s
+
+    Returns how many there are then.
+    """
+    count, n = scene.supports.shape
+    moved, total = scratch((count, n)), scratch(count)
+    for i in range(count):
+        total[i] = 0.0
+        if i >= scene.planes[()]:
+            continue
+        radius, centre = scene.boxes[i, 6], scratch(3)
+        for k in range(3):
+            centre[k] = places[i, 9 + k]
+            for a in range(3):
+                centre[k] += places[i, 3 * a + k] * scene.boxes[i, a]
+        x, y, z = centre[0], centre[1], centre[2]
+        for c in range(n):
+            moved[i, c] = 0.0
+            if scene.supports[i, c] == 0.0 or q_dot[c] == 0.0:
+                continue
+            a, b, w = J[c, 3], J[c, 4], J[c, 5]
+            u = J[c, 0] + b * z - w * y
+            v = J[c, 1] + w * x - a * z
+            r = J[c, 2] + a * y - b * x
+            turn = math.sqrt(a * a + b * b + w * w)
+            lever = math.sqrt(u * u + v * v + r * r) + turn * radius
+            moved[i, c] = LEVERS * abs(q_dot[c]) * time * lever
+            total[i] += moved[i, c]
+    if listed == 0:
+        for k in range(scene.pairs.shape[0]):
+            scene.watched[k] = 0
+    for k in range(scene.pairs.shape[0]):
+        if scene.watched[k] == 1:
+            continue
+        i, j = scene.pairs[k, 0], scene.pairs[k, 1]
+        room = scene.bounds[k] - scene.kept[k]
+        one = 0.0
+        two = 0.0
+        few = room >= total[i] + (total[j] if j < scene.planes[()] else 0.0)
+        for c in range(0 if few else n):
+            if scene.apart[k, c] > 0.0:
+                one += moved[i, c]
+                two += moved[j, c] if j < scene.planes[()] and scene.supports[j, c] > 0.0 else moved[i, c]
+        t = scene.twists[j]
+        speed = math.sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2])
+        turn = math.sqrt(t[3] * t[3] + t[4] * t[4] + t[5] * t[5])
+        if turn > 0.0:
+            square = 0.0
+            for a in range(3):
+                square += (places[i, 9 + a] - places[j, 9 + a]) ** 2
+            speed += turn * (math.sqrt(square) + 2.0 * scene.boxes[i, 6])
+        if room < max(one, two) + time * speed:
+            scene.watched[k] = 1
+            scene.risky[listed] = k
+            listed += 1
+            if scene.active[k] == 1:
+                renew(scene, way, results, places, k)
+    return listed

@@ -1,0 +1,143 @@
+"""The way ahead without Coal: configurations, placements and lower bounds of distances."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import nmm
+from nmm.collisions import way as ways
+from nmm.collisions.lookout import Lookout
+from nmm.collisions.pairs import sampled
+from nmm.kernels.kinematics import place_joints
+from nmm.robots.held import Held
+from nmm.robots.joint_table import as_row, joint_table
+
+SHAPES = [
+    nmm.Box([0.2, 0.5, 0.4]),
+    nmm.Sphere(0.2),
+    nmm.Cylinder(0.15, 0.6),
+    nmm.Capsule(0.1, 0.5),
+    nmm.Plane([0.2, -0.1, 1.0]),
+]
+LOW = [1.2, 0.0, 0.4, 0.3, -0.2, 0.5], [0.0, 0.0, -0.2]
+
+
+def lookout(robot, shape, acceleration=3.0):
+    placement = LOW[1] if isinstance(shape, nmm.Plane) else LOW[0]
+    setting = nmm.Collisions(0.02, obstacles=[nmm.Obstacle(shape, placement, name="thing")]).on(robot)
+    return setting, Lookout(setting.queries, np.full(robot.n_u, acceleration), 0.02, 0.0201)
+
+
+@pytest.fixture(scope="module")
+def tiago():
+    return nmm.Scenario.load("tiago_pose").robot()
+
+
+@pytest.fixture(scope="module")
+def planar():
+    return nmm.load("unicycle_3r")
+
+
+@pytest.mark.parametrize("name", ["unicycle_2r_position", "tiago_pose", "ur5_unicycle_pose", "kinova_car"])
+def test_joints_are_where_pinocchio_has_them(name):
+    robot = nmm.Scenario.load(name).robot()
+    table, data = joint_table(robot.model), robot.model.createData()
+    found = np.zeros((len(table.parent), 12))
+    for q in sampled(robot, 50, seed=4):
+        place_joints(table, q, found)
+        pin.forwardKinematics(robot.model, data, q)
+        np.testing.assert_allclose(found, [as_row(placement) for placement in data.oMi], atol=1e-13)
+
+
+def test_unaligned_sliding_and_helical_joints_too():
+    model = pin.Model()
+    axis = np.array([0.6, 0.0, 0.8])
+    kinds = [pin.JointModelRevoluteUnaligned(axis), pin.JointModelPrismaticUnaligned(axis)]
+    kinds += [pin.JointModelHelicalUnaligned(axis, 0.1), pin.JointModelHZ(0.2), pin.JointModelRY()]
+    for i, kind in enumerate(kinds):
+        model.addJoint(i, kind, pin.SE3.Random(), f"joint{i}")
+    table, data = joint_table(model), model.createData()
+    found = np.zeros((len(table.parent), 12))
+    for q in np.random.default_rng(5).normal(size=(20, len(kinds))):
+        place_joints(table, q, found)
+        pin.forwardKinematics(model, data, q)
+        np.testing.assert_allclose(found, [as_row(placement) for placement in data.oMi], atol=1e-13)
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: type(shape).__name__)
+@pytest.mark.parametrize("robot", ["planar", "tiago"])
+def test_gaps_are_below_distances_and_meet_them_where_they_were_measured(robot, shape, request):
+    setting, look = lookout(request.getfixturevalue(robot), shape)
+    queries, scene, ahead = setting.queries, setting.queries.scene, look._way
+    every = range(len(setting.names))
+    rng = np.random.default_rng(6)
+
+    def gaps():
+        ends = [queries.places[pair] for pair in scene.pairs]
+        return np.array([ways.gap(scene, ahead, k, np.array(both)) for k, both in enumerate(ends)])
+
+    met = np.zeros(len(every), dtype=bool)
+    for q in sampled(setting.robot, 8, seed=7):
+        distances = queries.distances(0.0, q, every)
+        for k in every:
+            ways.renew(scene, ahead, queries.results, queries.places, k)
+        here = gaps()
+        assert np.all(here <= distances + 1e-7)
+        met |= np.abs(here - distances) < 1e-5
+        for size in (0.003, 0.05, 1.0):
+            near = queries.distances(0.0, q + size * rng.normal(size=len(q)), every)
+            assert np.all(gaps() <= near + 1e-7)
+    assert met.all()
+
+
+def test_the_way_is_that_of_inputs_held_and_then_braked(planar):
+    ahead, held = lookout(planar, SHAPES[0])[1]._way, Held(planar)
+    dt, q, u = 0.02, planar.rest, np.array([0.5, 0.7, -1.0, 0.4, 0.9])
+    count = ways.lay(ahead, q, u, dt)
+    share = min(3.0 * dt / np.abs(u))
+    for k in range(count):
+        there, after, left = q, float(ahead.after[k]), 1.0
+        while after > 1e-9:
+            step = min(dt, after)
+            there, after, left = held(there, left * u, step), after - step, max(left - share, 0.0)
+        np.testing.assert_allclose(ahead.q[k], there, atol=1e-12)
+    assert ahead.after[count - 1] == pytest.approx(dt * (np.ceil(1.0 / share)))
+    assert left <= share
+    apart = np.abs(np.diff(ahead.q[:count], axis=0)).sum(axis=1)
+    assert apart.max() < 0.01 + np.abs(u).sum() * dt  # a look after the sample in which it has gone so far
+
+
+def test_what_is_found_short_is_what_coal_finds_along_the_way(tiago):
+    """Against a look at every pair at every place."""
+    setting, look = lookout(tiago, SHAPES[0])
+    queries, ahead = setting.queries, look._way
+    every, rng = list(range(len(setting.names))), np.random.default_rng(8)
+    found = []
+    for q in sampled(tiago, 25, seed=9):
+        u = rng.normal(size=tiago.n_u)
+        queries.measure(0.0, q)
+        queries.scene.bounds[:] = queries.distances(0.0, q, every)
+        q_dot = tiago.S(q) @ u
+        look.list_risky(q_dot, u, 0.05, anew=True)
+        short = look.first_short(0.0, q, u, 0.05)
+        kept = queries.scene.kept.copy()
+        worst = [kept - queries.distances(0.0, one, every) for one in ahead.q[: int(ahead.looks)].copy()]
+        first = next((k for k, by in enumerate(worst) if by.max() > 1e-7), None)
+        if first is None:
+            assert short is None or short.by < 1e-6
+            continue
+        assert short is not None
+        assert short.by >= worst[first].max() - 1e-6
+        found.append(short.pair)
+    assert len(found) > 5
+
+
+def test_distances_do_not_depend_on_what_was_asked_before(planar):
+    setting, _ = lookout(planar, SHAPES[2])
+    every = range(len(setting.names))
+    for q in sampled(planar, 30, seed=10):
+        setting.queries.distances(0.0, q, every)
+        before = setting.queries.results.copy()
+        setting.queries.distances(0.3, q + 0.1, every)
+        setting.queries.distances(0.0, q, every)
+        assert np.array_equal(setting.queries.results, before, equal_nan=True)
