@@ -27,12 +27,19 @@ from .errors import RunError as RunError
 from .errors import ScenarioError as ScenarioError
 from .errors import SingularError as SingularError
 from .functions.function import Function as Function
+from .functions.objectives import Alignment as Alignment
 from .functions.objectives import CallableObjective as CallableObjective
+from .functions.objectives import DirectionalManipulability as DirectionalManipulability
+from .functions.objectives import InverseCondition as InverseCondition
 from .functions.objectives import JointRange as JointRange
+from .functions.objectives import LimitBarrier as LimitBarrier
 from .functions.objectives import Manipulability as Manipulability
 from .functions.objectives import Objective as Objective
+from .functions.objectives import PotentialEnergy as PotentialEnergy
+from .functions.objectives import PreferredPosture as PreferredPosture
 from .functions.objectives import Quadratic as Quadratic
 from .functions.objectives import Square as Square
+from .functions.objectives import WeighedManipulability as WeighedManipulability
 from .functions.program import evaluate as evaluate
 from .functions.references import Bearing as Bearing
 from .functions.references import CallableReference as CallableReference
@@ -46,6 +53,7 @@ from .functions.references import Signal as Signal
 from .functions.references import Slerp as Slerp
 from .functions.references import Spline as Spline
 from .functions.references import Turn as Turn
+from .functions.references import Velocity as Velocity
 from .functions.references import rotation_vector as rotation_vector
 from .functions.tasks import After as After
 from .functions.tasks import Between as Between

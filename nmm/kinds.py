@@ -97,12 +97,20 @@ REFERENCES = Kinds(
     slerp="nmm.functions.references.orientation:Slerp",
     turn="nmm.functions.references.orientation:Turn",
     pose="nmm.functions.references.pose:PoseReference",
+    velocity="nmm.functions.references.velocity:Velocity",
 )
 OBJECTIVES = Kinds(
     "objective",
     quadratic="nmm.functions.objectives.quadratic:Quadratic",
-    joint_range="nmm.functions.objectives.quadratic:JointRange",
+    posture="nmm.functions.objectives.preferred_posture:PreferredPosture",
+    alignment="nmm.functions.objectives.alignment:Alignment",
+    joint_range="nmm.functions.objectives.joint_range:JointRange",
+    limit_barrier="nmm.functions.objectives.limit_barrier:LimitBarrier",
     manipulability="nmm.functions.objectives.manipulability:Manipulability",
+    weighed_manipulability="nmm.functions.objectives.manipulability:WeighedManipulability",
+    directional_manipulability="nmm.functions.objectives.directional_manipulability:DirectionalManipulability",
+    inverse_condition="nmm.functions.objectives.inverse_condition:InverseCondition",
+    potential_energy="nmm.functions.objectives.potential_energy:PotentialEnergy",
 )
 RESOLVERS = Kinds(
     "resolver",

@@ -20,14 +20,22 @@ from scipy.interpolate import PPoly
 
 from nmm.functions.function import Evaluation, Function
 from nmm.functions.objectives import (
+    Alignment,
     CallableObjective,
+    DirectionalManipulability,
+    InverseCondition,
     JointRange,
+    LimitBarrier,
     Manipulability,
     Objective,
+    PotentialEnergy,
+    PreferredPosture,
     Quadratic,
     Square,
     Sum,
+    WeighedManipulability,
 )
+from nmm.functions.product import Product
 from nmm.functions.program import evaluate
 from nmm.functions.references import (
     Bearing,
@@ -42,6 +50,7 @@ from nmm.functions.references import (
     Slerp,
     Spline,
     Turn,
+    Velocity,
 )
 from nmm.functions.tasks import (
     CallableFunction,
@@ -183,6 +192,10 @@ def _references() -> Iterator[Entry]:
     yield Entry(
         "bearing of a callable", Bearing(CallableReference(_moving, 2, of_configuration=True), _TARGET)
     )
+    yield Entry("velocity of a circle", Velocity(Circle([2, -1, 0.5], 0.7, -1.3, 0.4, "yz")))
+    for name, way in (("constant", Constant([1, 2])), ("line", Line([0, 1], [3, -1], 3.5))):
+        yield Entry(f"velocity of a {name}", Velocity(way))
+    yield Entry("velocity of a spline", Velocity(Spline(_BREAKS, _POINTS, 5)))
     yield Entry("callable of time", CallableReference(lambda t: [np.sin(3 * t), t**3], 2))
     yield Entry(
         "callable of time, rate",
@@ -245,6 +258,8 @@ def _objectives() -> Iterator[Entry]:
         function = Manipulability("ee", rows, of)
         yield Entry(f"manipulability of the {of}, {' '.join(rows)}", function, (*robots, *folding))
     yield Entry("manipulability of a link", Manipulability("link2", "xy"), (*BOTH, *FOLDING))
+    yield from _of_the_jacobian()
+    yield from _of_coordinates()
     yield Entry("callable objective", CallableObjective(_height))
     yield Entry("callable objective, gradient", CallableObjective(_height, _height_gradient))
     yield Entry(
@@ -255,14 +270,71 @@ def _objectives() -> Iterator[Entry]:
     yield Entry("difference", 2.0 * h1 - Manipulability("ee", "xy") * 0.3)
 
 
+def _of_the_jacobian() -> Iterator[Entry]:
+    everywhere, heavy = (*BOTH, *FOLDING), {"platform": 4.0, "q1": 0.5}
+    turning = Velocity(Circle([0, 0], 2.0, 0.3, 0.4))
+    yield Entry("manipulability of the platform", Manipulability("ee", ("x", "rz"), "platform"), everywhere)
+    yield Entry("manipulability, weights", Manipulability("ee", "xy", weights=heavy), everywhere)
+    yield Entry("manipulability, weighed", WeighedManipulability("ee", "xy", 0.3, heavy), everywhere)
+    for of, rows, robots in (
+        ("robot", "xy", everywhere),
+        ("robot", ("x", "y", "rz"), everywhere),
+        ("arm", "xy", everywhere),
+        ("robot", ("x", "y", "z", "rx"), SPATIAL),
+    ):
+        condition = InverseCondition("ee", rows, of, heavy, 0.3 if of == "arm" else None)
+        yield Entry(f"inverse condition of the {of}, {' '.join(rows)}", condition, robots)
+    for of, direction, rows, robots in (
+        ("robot", [1.0, -2.0], "xy", everywhere),
+        ("arm", [0.3, 0.4], "xy", everywhere),
+        ("robot", [2.0], "y", everywhere),
+        ("robot", [1, 2, -3], "xyz", SPATIAL),
+        ("robot", turning, "xy", everywhere),
+        ("robot", Position("link1", "xy"), "xy", everywhere),
+    ):
+        directional = DirectionalManipulability("ee", direction, rows, of, heavy)
+        name = type(direction).__name__ if isinstance(direction, Function) else direction
+        yield Entry(f"directional manipulability of the {of} along {name}", directional, robots)
+
+
+def _of_coordinates() -> Iterator[Entry]:
+    everywhere = (*BOTH, *FOLDING)
+    line, spline = Line([0.2], [1.4], 3.5, "smooth"), Spline(_BREAKS, _POINTS[:, 0])
+    circle = Circle([2, 2], 3, 0.8, 5 / 4 * pi)
+    bent = Quadratic(Square("q1", line, 2.0), Square({"theta": 1, "q2": -1}, 0.3), Square("x", spline))
+    yield Entry("quadratic, moving targets", bent, everywhere)
+    yield Entry("quadratic, targets of the robot", Quadratic(Square("q1", Heading("link2")), Square("q2", 1)))
+    prefers = PreferredPosture({"q1": 0.4, "theta": line, "x": Constant(2.0)}, {"q1": 3.0})
+    yield Entry("preferred posture", prefers, everywhere)
+    yield Entry("barrier", LimitBarrier(["q1", "x"], [-7, -6], [8, 7], margin=0.2), everywhere)
+    yield Entry("potential energy", PotentialEnergy(), everywhere)
+    yield Entry("potential energy, tilted", PotentialEnergy([1.0, 2.0, -9.0]), everywhere)
+    for name, one in (
+        ("an angle", Alignment(0.4)),
+        ("an angle that moves", Alignment(line, offset=0.3)),
+        ("a direction", Alignment([-1.0, 2.0], of={"theta": 1, "q1": -2})),
+        ("a motion", Alignment(Velocity(circle), offset=pi)),
+        ("a direction of the robot", Alignment(Position("ee", "xyz"))),
+        ("a bearing", Alignment(Bearing(circle, _TARGET))),
+        ("a point", Alignment(at=[6.0, 2.0])),
+        ("a point that moves", Alignment(at=circle)),
+        ("a frame", Alignment(at="ee")),
+    ):
+        yield Entry(f"alignment with {name}", one, everywhere)
+    w = Manipulability("ee", "xy")
+    yield Entry("product", Product(w, line), everywhere)
+    yield Entry("product with a pose's function", Product(PreferredPosture({"q1": line}), Heading("link1")))
+    yield Entry("weights that change", line * w + spline * (bent - 2.0 * w), everywhere)
+
+
 ENTRIES = (*_tasks(), *_spatial_tasks(), *_references(), *_signals(), *_pose_references(), *_objectives())
 
 
 def evaluated(function: Function, t: float, configuration: Configuration) -> Evaluation:
     """Value and derivatives, of an objective too (a sum is evaluated by its terms)."""
     if isinstance(function, Objective):
-        gradient = function.gradient(configuration)
-        return Evaluation(np.array([function.value(configuration)]), np.zeros(1), gradient[None])
+        value, rate = function.value(configuration, t), function.rate(configuration, t)
+        return Evaluation(np.array([value]), np.array([rate]), function.gradient(configuration, t)[None])
     return evaluate(function, t, configuration)
 
 
@@ -279,7 +351,8 @@ KINDS = ("tasks", "references", "objectives")
 
 def modules() -> list[ModuleType]:
     """All modules of the mathematics."""
-    loose = ("control.equations", "functions.program", "control.controller", "runs.integrators")
+    loose = ("control.equations", "functions.program", "functions.product", "functions.stacking")
+    loose += ("control.controller", "runs.integrators")
     names = [f"nmm.{name}" for name in loose]
     for package in ("platforms", *(f"functions.{kind}" for kind in KINDS), "resolvers"):
         found = importlib.import_module(f"nmm.{package}")

@@ -138,6 +138,19 @@ def test_rooms_that_the_docs_speak_of_need_no_import_of_their_own(room: str) -> 
     subprocess.run([sys.executable, "-c", f"import nmm; nmm.{room}.__name__"], check=True)
 
 
+def test_the_python_on_objectives_runs() -> None:
+    text = (ROOT / "docs" / "objectives.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    names: dict[str, Any] = {}
+    exec(code, names)
+    run, here = names["run"], names["here"]
+    assert run.complete
+    before, after = nmm.Configuration(here.robot, run.q[0]), here
+    assert names["ahead"].value(after, 10.0) < 0.2 * names["ahead"].value(before, 0.0)
+    (listed,) = re.findall(r"^\| class.*?\n\n", text, flags=re.DOTALL | re.MULTILINE)
+    assert set(re.findall(r", `(\w+)` \|", listed)) == set(OBJECTIVES)
+
+
 def test_the_errors_have_one_root() -> None:
     for name in nmm.__all__:
         thing = getattr(nmm, name)

@@ -213,8 +213,11 @@ def test_on_by_default_and_off_with_one_key(car: Robot) -> None:
 
 @pytest.mark.parametrize("square", ["steering", "theta", "x"])
 def test_an_objective_that_moves_the_steering_or_not(car: Robot, square: str) -> None:
-    controller = steered(car, objective=nmm.Quadratic(nmm.Square(square)))
-    assert (controller.steered is None) is (square == "steering")
+    """Also where its weight is 0 to begin with, so that pursuit would be at odds with it later."""
+    square_alone = nmm.Quadratic(nmm.Square(square))
+    for objective in (square_alone, nmm.Line([0.0], [1.0], 5.0) * square_alone):
+        controller = steered(car, objective=objective)
+        assert (controller.steered is None) is (square == "steering")
 
 
 def test_a_task_that_feels_the_steering_keeps_it(car: Robot) -> None:

@@ -10,8 +10,12 @@ from numpy.typing import ArrayLike
 
 from nmm.arrays import Array
 from nmm.control.steering import Steered
+from nmm.functions.objectives.base import Objective
+from nmm.functions.product import Product
+from nmm.functions.program import evaluate
 from nmm.functions.tasks.task import Stack
 from nmm.resolvers.state import State
+from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 
 #: How many configurations are looked at: one where a column is zero by chance would say nothing.
@@ -26,6 +30,7 @@ class Controller(Protocol):
     """What is read of a `nmm.control.controller.Controller`, which asks this module about itself."""
 
     robot: Robot
+    objective: Objective | None
     added_task: Stack
     state: State
     steered: Steered | None
@@ -52,7 +57,7 @@ def inputs_without_effect(controller: Controller, q0: ArrayLike | None = None) -
     -------
     Names as in `robot.u_names`; none when J could not be evaluated (a user's function raised, say)
     """
-    return _zero_columns(controller, q0, lambda controller: controller.derivatives[:1])
+    return _zero_columns(controller, q0, lambda controller, q: controller.derivatives[:1])
 
 
 def idle_inputs(controller: Controller, q0: ArrayLike | None = None) -> tuple[str, ...]:
@@ -65,14 +70,21 @@ def idle_inputs(controller: Controller, q0: ArrayLike | None = None) -> tuple[st
     return tuple(name for name in idle if name not in steered)
 
 
-def _derivatives(controller: Controller) -> Sequence[Array]:
-    """J, the added task's own rows and h, without those that hold what pursuit steers."""
+def _derivatives(controller: Controller, q: Array) -> Sequence[Array]:
+    """J, the added task's own rows and h, without those that hold what pursuit steers.
+
+    Terms of the objective whose weight changes are there without it, too: it may be 0 at first.
+    """
+    robot, objective = controller.robot, controller.objective
     J, added_J, h = controller.derivatives
-    return J, added_J[: len(controller.added_task.rows(controller.robot))], h
+    here = Configuration(robot, q)
+    terms = [] if objective is None else [term for _, term in objective.terms() if isinstance(term, Product)]
+    whole = [evaluate(term.function, 0.0, here).value_q @ here.S for term in terms]
+    return J, added_J[: len(controller.added_task.rows(robot))], h, *whole
 
 
 def _zero_columns(
-    controller: Controller, q0: ArrayLike | None, matrices: Callable[[Controller], Sequence[Array]]
+    controller: Controller, q0: ArrayLike | None, matrices: Callable[[Controller, Array], Sequence[Array]]
 ) -> tuple[str, ...]:
     """Inputs whose columns are zero, wherever the robot stands, in all matrices (rows, n_u)."""
     largest = np.zeros(controller.robot.n_u)
@@ -81,7 +93,7 @@ def _zero_columns(
     try:
         for q in _configurations(controller, controller.robot.q(q0)):
             controller.linearise(0.0, q)
-            for matrix in matrices(controller):
+            for matrix in matrices(controller, q):
                 size = float(np.linalg.norm(matrix))
                 if np.isfinite(size) and size > 0.0:
                     largest = np.maximum(largest, np.linalg.norm(matrix, axis=0) / size)

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, array, scalar
-from nmm.errors import InputError, unknown
+from nmm.arrays import Array, array
+from nmm.errors import InputError
 from nmm.resolvers.problem import Dimensions
+from nmm.robots.input_weights import Weights, by_name
 
-#: Numbers above 0: by input or by group ("platform", "arm"), an input's own deciding; 1 for the rest.
-Weights = ArrayLike | Mapping[str, float]
+__all__ = ["Weights", "metric_root", "weight_diagonal", "weight_matrix"]
 
 
 def weight_matrix(weights: Weights, dimensions: Dimensions) -> Array:
@@ -23,7 +22,7 @@ def weight_matrix(weights: Weights, dimensions: Dimensions) -> Array:
     InputError : an unknown name, a wrong number of weights, weights that are not positive (definite)
     """
     if isinstance(weights, Mapping):
-        W = np.diag(_by_name(weights, dimensions))
+        W = np.diag(by_name(weights, dimensions.inputs, dimensions.groups))
     else:
         given = array(weights, "weights")
         W = np.diag(given) if given.ndim == 1 else given
@@ -48,20 +47,4 @@ def weight_diagonal(weights: Weights, dimensions: Dimensions) -> Array:
     diagonal = np.diag(W).copy()
     if np.any(np.diag(diagonal) != W):
         raise InputError("weights: expected a number for each input (a matrix that couples inputs is for pg)")
-    return diagonal
-
-
-def _by_name(weights: Mapping[str, float], dimensions: Dimensions) -> Array:
-    diagonal = np.ones(dimensions.m)
-    for name in weights:
-        if name not in dimensions.inputs and name not in dimensions.groups:
-            raise InputError(
-                unknown("input or group", name, [*dimensions.inputs, *dimensions.groups], "weights")
-            )
-    # An input's own weight has the last word, a smaller group's the one before.
-    order = sorted(weights, key=lambda name: name in dimensions.inputs or -len(dimensions.groups[name]))
-    for name in order:
-        members = (name,) if name in dimensions.inputs else dimensions.groups[name]
-        for member in members:
-            diagonal[dimensions.inputs.index(member)] = scalar(weights[name], f"weight of {name}")
     return diagonal

@@ -20,16 +20,26 @@ class FunctionPart(MadePart):
     def build(self, robot: Robot, unit: str = "m") -> Function:
         """The function, with the robot's word on it: errors know their key."""
         check_names(self, robot)
-        for key in type(self).model_fields:
-            inner = getattr(self, key)
-            if isinstance(inner, FunctionPart):
-                with at(key):
-                    inner.build(robot)
+        check_functions(self, robot)
         function: Function = self.make(unit)
         with self.own_keys():
             function.rows(robot)
             function.stages(robot)
         return function
+
+
+def check_functions(part: MadePart, robot: Robot) -> None:
+    """`InputError`, at its key, for a function in a part that the robot has not."""
+    for key in type(part).model_fields:
+        value = getattr(part, key)
+        for place, inner in (
+            {(key, name): one for name, one in value.items()}.items()
+            if isinstance(value, dict)
+            else [((key,), value)]
+        ):
+            if isinstance(inner, FunctionPart):
+                with at(*place):
+                    inner.build(robot)
 
 
 def check_names(part: MadePart, robot: Robot) -> None:

@@ -20,8 +20,11 @@ from nmm.scenario.special_references import (
     is_orientation,
 )
 
-#: A target that does not move may be one number.
-SPELLED: dict[str, dict[str, Any]] = {"constant": {"value": Numbers}}
+#: A target of one component may be a number.
+SPELLED: dict[str, dict[str, Any]] = {
+    "constant": {"value": Numbers},
+    "line": {"start": Numbers, "end": Numbers},
+}
 SPECIAL: dict[str, type[FunctionPart]] = {"polynomial": PolynomialPart, "rotation": RotationPart}
 
 
@@ -46,14 +49,17 @@ REFERENCE_PARTS = {
 }
 REFERENCE_PARTS |= {kind: part for kind, part in FUNCTION_PARTS.items() if kind not in REFERENCE_PARTS}
 
+#: What annotations of parts that hold functions stand for (`nmm.scenario.spelling`).
+REFERENCES_BY_NAME: dict[str, Any]
+
 if TYPE_CHECKING:
     Reference = FunctionPart
 else:
     Reference = Annotated[one_of(REFERENCE_PARTS), BeforeValidator(_short)]
-    _named = {
+    REFERENCES_BY_NAME = {
         "Reference": Reference,
         "Point": Annotated[one_of(REFERENCE_PARTS), BeforeValidator(_point)],
         "FixedOrientation": FixedOrientation,
     }
     for _part in {*FUNCTION_PARTS.values(), *REFERENCE_PARTS.values()}:
-        _part.model_rebuild(_types_namespace=_named)
+        _part.model_rebuild(_types_namespace=REFERENCES_BY_NAME)

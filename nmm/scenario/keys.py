@@ -15,6 +15,9 @@ from nmm.errors import InputError, unknown
 from nmm.scenario.document import Place
 from nmm.scenario.numbers import shown
 
+#: Which of two a value is, where a number or a function may stand: pydantic puts it into its locations.
+NUMBER, FUNCTION = "<number>", "<function>"
+
 
 class KeyedError(InputError):
     """What is wrong, and at which place of the scenario; `Scenario` adds the file and the line."""
@@ -147,7 +150,7 @@ def as_written(place: Place, data: Any) -> Place:
         if isinstance(data, Mapping):
             if step in data:
                 data = data[step]
-            elif isinstance(step, int) or step == data.get("kind", _kind_of_short(data)):
+            elif isinstance(step, int) or step in (NUMBER, FUNCTION, data.get("kind", _kind_of_short(data))):
                 continue
             else:  # a key that is missing, or left at its default
                 return (*written, *place[depth:])

@@ -33,9 +33,9 @@ class MadePart(Part):
         named: dict[str, Any] = {}
         for parameter in parameters(self.makes):
             value = getattr(self, parameter.key)
-            if isinstance(value, MadePart):
-                with at(parameter.key):
-                    value = value.argument()
+            value = _argument(value, parameter.key)
+            if isinstance(value, dict):
+                value = {name: _argument(one, parameter.key, name) for name, one in value.items()}
             if parameter.starred:
                 listed += value or ()
             else:
@@ -66,6 +66,14 @@ class MadePart(Part):
         open_keys = [key for key in type(self).model_fields if getattr(self, key) is None]
         chosen = {key: getattr(made, key, None) for key in open_keys}
         return self.model_dump() | {key: value for key, value in chosen.items() if type(value) is float}
+
+
+def _argument(value: Any, *place: str) -> Any:
+    """What a part makes; anything else as it is."""
+    if not isinstance(value, MadePart):
+        return value
+    with at(*place):
+        return value.argument()
 
 
 P = TypeVar("P", bound=MadePart)

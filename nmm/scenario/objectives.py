@@ -2,34 +2,61 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Discriminator, Field, Tag
 
+from nmm.functions.function import Function
 from nmm.functions.objectives.base import Objective
 from nmm.functions.objectives.quadratic import Quadratic, Square
 from nmm.kinds import OBJECTIVES
 from nmm.robots.robot import Robot
-from nmm.scenario.function_part import check_coordinates, check_names
-from nmm.scenario.keys import Part, at, one_of
+from nmm.scenario.function_part import FunctionPart, check_coordinates, check_functions, check_names
+from nmm.scenario.functions import REFERENCES_BY_NAME, Reference
+from nmm.scenario.keys import FUNCTION, NUMBER, Part, at, one_of
 from nmm.scenario.made_part import MadePart, part_of
 from nmm.scenario.numbers import Number, Positive
 from nmm.scenario.spelling import Combination
 
 
+def _spelled(value: object) -> str:
+    """Whether a value is a function of time or of the configuration, or a number."""
+    return FUNCTION if isinstance(value, Mapping | FunctionPart) else NUMBER
+
+
+if TYPE_CHECKING:
+    Target = float | FunctionPart
+    Weight = float | FunctionPart
+else:
+    _function, _told = Annotated[Reference, Tag(FUNCTION)], Discriminator(_spelled)
+    Target = Annotated[Annotated[Number, Tag(NUMBER)] | _function, _told]
+    Weight = Annotated[Annotated[Positive, Tag(NUMBER)] | _function, _told]
+
+
 class ObjectivePart(MadePart):
     """An objective H(q), minimised."""
 
-    weight: Positive = Field(1.0, description="factor on this objective in the sum, above 0")
+    weight: Weight = Field(
+        1.0,
+        description="factor on this objective in the sum: a number above 0, or a reference of one row, as "
+        "its weight over time ({kind: line, start: 0, end: 1, duration: 5})",
+    )
     maximise: bool = Field(False, description="whether to maximise it: its negative is minimised")
 
     def build(self, robot: Robot) -> Objective:
         """The weighted objective; errors know their key."""
         check_names(self, robot)
+        check_functions(self, robot)
         objective: Objective = self.make()
         with self.own_keys():
-            objective.rows(robot)
-            objective.stages(robot)
+            for _, term in objective.terms_on(robot):
+                term.stages(robot)
+        if isinstance(self.weight, FunctionPart):
+            objective = self.weight.build(robot, "1") * objective
+            with at("weight"):
+                objective.terms_on(robot)
+            return -objective if self.maximise else objective
         factor = -self.weight if self.maximise else self.weight
         return objective if factor == 1.0 else factor * objective
 
@@ -38,8 +65,16 @@ class TermPart(Part):
     """½ weight (of - target)²."""
 
     of: Combination = Field(description="a coordinate (q1) or a combination ({theta: 1, q1: 1, q2: 1})")
-    target: Number = Field(0.0, description="rad or m")
+    target: Target = Field(0.0, description="rad or m: a number, or a reference of one row")
     weight: Positive = Field(1.0, description="above 0")
+
+    def aim(self, i: int) -> float | Function:
+        """The target; errors know the key of term i."""
+        if isinstance(self.target, FunctionPart):
+            with at("terms", i, "target"):
+                target: Function = self.target.make("rad")
+            return target
+        return self.target
 
 
 class QuadraticPart(ObjectivePart):
@@ -50,12 +85,15 @@ class QuadraticPart(ObjectivePart):
     terms: list[TermPart] = Field(description="the squares that are added up", min_length=1)
 
     def make(self, unit: str = "m") -> Objective:
-        return Quadratic(*(Square(term.of, term.target, term.weight) for term in self.terms))
+        return Quadratic(*(Square(term.of, term.aim(i), term.weight) for i, term in enumerate(self.terms)))
 
     def build(self, robot: Robot) -> Objective:
         for i, term in enumerate(self.terms):
             with at("terms", i, "of"):
                 check_coordinates([term.of], robot)
+            if isinstance(term.target, FunctionPart):
+                with at("terms", i, "target"):
+                    term.target.build(robot, "rad")
         return super().build(robot)
 
 
@@ -66,11 +104,17 @@ class MaximisedPart(ObjectivePart):
 
 
 SPECIAL: dict[str, type[ObjectivePart]] = {"quadratic": QuadraticPart}
-BASES = {"manipulability": MaximisedPart}
+BASES = dict.fromkeys(
+    ("manipulability", "weighed_manipulability", "directional_manipulability", "inverse_condition"),
+    MaximisedPart,
+)
 OBJECTIVE_PARTS: dict[str, type[ObjectivePart]] = {
     kind: SPECIAL.get(kind) or part_of(kind, made, BASES.get(kind, ObjectivePart))
     for kind, made in OBJECTIVES.items()
 }
+
+for _part in OBJECTIVE_PARTS.values():
+    _part.model_rebuild(_types_namespace=REFERENCES_BY_NAME)
 
 
 def _listed(value: object) -> object:

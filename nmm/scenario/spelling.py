@@ -29,6 +29,12 @@ def _weights(value: object) -> object:
     return numbers(value)
 
 
+def _by_name(value: object) -> dict[str, float]:
+    if isinstance(value, Mapping):
+        return numbers_by_name(value)
+    raise ValueError(f"expected numbers by name ({{q1: 2, q2: 1}}), got {shown(value)}")
+
+
 Combination = Annotated[str | dict[str, float], BeforeValidator(_combination)]
 #: A direction by its name or as three numbers.
 Direction = Annotated[str | list[float], BeforeValidator(lambda v: v if isinstance(v, str) else nested(v))]
@@ -56,6 +62,8 @@ SPELLINGS: dict[str, Any] = {
     "Function | str | ArrayLike": POINT,
     "Function | RotationVector": REFERENCE,
     "Weights": Weights,
+    "Mapping[str, Function | float]": dict[str, REFERENCE],  # type: ignore[valid-type]  # a value, not a type
+    "Mapping[str, float]": Annotated[dict[str, float], BeforeValidator(_by_name)],
 }
 _OTHER_NOTATIONS = "; or {rpy: [...]}, or {quaternion: [x, y, z, w]}"
 #: What files can say beside what the docstring says, by the same annotations.

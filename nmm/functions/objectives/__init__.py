@@ -1,8 +1,30 @@
-"""Objectives H(q), minimised in the null space of the task, one idea a file."""
+"""Objectives H(t, q), minimised in the null space of the task, one idea a file."""
 
+from nmm.functions.objectives.alignment import Alignment
 from nmm.functions.objectives.base import Objective, Sum
 from nmm.functions.objectives.callable_objective import CallableObjective
-from nmm.functions.objectives.manipulability import Manipulability
-from nmm.functions.objectives.quadratic import JointRange, Quadratic, Square
+from nmm.functions.objectives.directional_manipulability import DirectionalManipulability
+from nmm.functions.objectives.inverse_condition import InverseCondition
+from nmm.functions.objectives.joint_range import JointRange
+from nmm.functions.objectives.limit_barrier import LimitBarrier
+from nmm.functions.objectives.manipulability import Manipulability, WeighedManipulability
+from nmm.functions.objectives.potential_energy import PotentialEnergy
+from nmm.functions.objectives.preferred_posture import PreferredPosture
+from nmm.functions.objectives.quadratic import Quadratic, Square
 
-__all__ = ["CallableObjective", "JointRange", "Manipulability", "Objective", "Quadratic", "Square", "Sum"]
+__all__ = [
+    "Alignment",
+    "CallableObjective",
+    "DirectionalManipulability",
+    "InverseCondition",
+    "JointRange",
+    "LimitBarrier",
+    "Manipulability",
+    "Objective",
+    "PotentialEnergy",
+    "PreferredPosture",
+    "Quadratic",
+    "Square",
+    "Sum",
+    "WeighedManipulability",
+]

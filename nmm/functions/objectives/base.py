@@ -1,10 +1,11 @@
-"""Objectives H(q), minimised: one row each, added and scaled like numbers."""
+"""Objectives H(t, q), minimised: one row each, added and scaled like numbers."""
 
 from __future__ import annotations
 
 from nmm.arrays import Array, scalar
 from nmm.errors import InputError
-from nmm.functions.function import Function, Row, Stage
+from nmm.functions.function import Evaluation, Function, Row, Stage
+from nmm.functions.product import Product
 from nmm.functions.program import evaluate
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
@@ -13,7 +14,8 @@ from nmm.robots.robot import Robot
 class Objective(Function):
     """H(q), a function with one row. It is minimised: to maximise w, minimise `-w`.
 
-    `a + b`, `2.0 * a` and `-a` make sums and multiples.
+    `a + b`, `2.0 * a` and `-a` make sums and multiples; `ramp * a` with a function of one row (a line, a
+    spline, a signal, ...) is a term whose weight changes.
     """
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
@@ -32,21 +34,27 @@ class Objective(Function):
                 raise InputError(f"objective: expected terms of one row, got one with {len(rows)} ({names})")
         return self.terms()
 
-    def value(self, configuration: Configuration) -> float:
-        """H(q)."""
-        return sum(
-            weight * float(evaluate(function, 0.0, configuration).value[0])
-            for weight, function in self.terms_on(configuration.robot)
-        )
+    def value(self, configuration: Configuration, t: float = 0.0) -> float:
+        """H(t, q), t in s."""
+        return float(self._evaluated(configuration, t).value[0])
 
-    def gradient(self, configuration: Configuration) -> Array:
+    def gradient(self, configuration: Configuration, t: float = 0.0) -> Array:
         """∂H/∂q, shape (n,): ordinary partial derivatives in the coordinates."""
-        parts = [
-            weight * evaluate(function, 0.0, configuration).value_q[0]
-            for weight, function in self.terms_on(configuration.robot)
-        ]
-        gradient: Array = sum(parts[1:], parts[0])
+        gradient: Array = self._evaluated(configuration, t).value_q[0]
         return gradient
+
+    def rate(self, configuration: Configuration, t: float = 0.0) -> float:
+        """∂H/∂t, 1/s, at a standing configuration: 0 but for weights, targets and directions that move.
+
+        No resolver reads it: they descend H as it is now.
+        """
+        return float(self._evaluated(configuration, t).value_t[0])
+
+    def _evaluated(self, configuration: Configuration, t: float) -> Evaluation:
+        terms = self.terms_on(configuration.robot)
+        found = [(weight, evaluate(function, t, configuration)) for weight, function in terms]
+        parts = ([weight * one[i] for weight, one in found] for i in range(3))
+        return Evaluation(*(sum(part[1:], part[0]) for part in parts))
 
     def __add__(self, other: Objective) -> Objective:
         return Sum((1.0, self), (1.0, other))
@@ -57,7 +65,7 @@ class Objective(Function):
             return self
         raise InputError(f"objective: expected an objective to add, got {other!r}")
 
-    def __mul__(self, factor: float) -> Objective:
+    def __mul__(self, factor: float | Function) -> Objective:
         return Sum((factor, self))
 
     __rmul__ = __mul__
@@ -70,16 +78,23 @@ class Objective(Function):
 
 
 class Sum(Objective):
-    """A weighted sum of objectives, or of other functions of one row: `Sum((2.0, a), (-1.0, b))`."""
+    """A weighted sum of objectives, or of other functions of one row: `Sum((2.0, a), (-1.0, b))`.
 
-    def __init__(self, *terms: tuple[float, Function]) -> None:
+    Parameters
+    ----------
+    terms : (weight, function); a weight is a number, or a function of one row itself, of time as a rule
+    """
+
+    def __init__(self, *terms: tuple[float | Function, Function]) -> None:
         if not terms:
             raise InputError("sum of objectives: expected at least one")
         for _, function in terms:
             if not isinstance(function, Function):
                 raise InputError(f"objective: expected an objective to add, got {function!r}")
         self._terms = tuple(
-            (scalar(weight, "weight") * inner, part)
+            (inner, Product(part, weight))
+            if isinstance(weight, Function)
+            else (scalar(weight, "weight") * inner, part)
             for weight, function in terms
             for inner, part in (function.terms() if isinstance(function, Objective) else ((1.0, function),))
         )

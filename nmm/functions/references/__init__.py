@@ -7,6 +7,7 @@ from nmm.functions.references.orientation import Slerp, Turn, rotation_vector
 from nmm.functions.references.polynomial import Constant, Line, PiecewisePolynomial, Polynomial, Spline
 from nmm.functions.references.pose import PoseReference
 from nmm.functions.references.signal import Signal
+from nmm.functions.references.velocity import Velocity
 
 __all__ = [
     "Bearing",
@@ -21,5 +22,6 @@ __all__ = [
     "Slerp",
     "Spline",
     "Turn",
+    "Velocity",
     "rotation_vector",
 ]

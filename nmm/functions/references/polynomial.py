@@ -59,32 +59,28 @@ class PiecewisePolynomial(Function):
 
     def __init__(self, breaks: ArrayLike, coefficients: ArrayLike, unit: str = "m") -> None:
         self.unit = unit
-        self._breaks = vector(breaks, None, "breaks")
-        self._coefficients = array(coefficients, "coefficients")
-        pieces = self._breaks.size - 1
+        self.breaks = vector(breaks, None, "breaks")
+        self.coefficients = array(coefficients, "coefficients")
+        pieces = self.breaks.size - 1
         if pieces < 1:
             raise InputError(f"breaks: expected at least 2, got {pieces + 1}")
-        if (
-            self._coefficients.ndim != 3
-            or self._coefficients.shape[1] != pieces
-            or not self._coefficients.size
-        ):
+        if self.coefficients.ndim != 3 or self.coefficients.shape[1] != pieces or not self.coefficients.size:
             raise InputError(
                 f"coefficients: expected shape (order, {pieces}, components) for {pieces + 1} breaks, "
-                f"got {self._coefficients.shape}"
+                f"got {self.coefficients.shape}"
             )
-        if np.any(np.diff(self._breaks) <= 0.0):
+        if np.any(np.diff(self.breaks) <= 0.0):
             raise InputError("breaks: expected them to increase")
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        return tuple(Row(f"r{i}", self.unit) for i in range(self._coefficients.shape[2]))
+        return tuple(Row(f"r{i}", self.unit) for i in range(self.coefficients.shape[2]))
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
-        order, pieces, s = self._coefficients.shape
+        order, pieces, s = self.coefficients.shape
         numbers = [
             np.array([pieces, order], dtype=np.float64),
-            self._breaks,
-            self._coefficients.transpose(2, 1, 0).ravel(),
+            self.breaks,
+            self.coefficients.transpose(2, 1, 0).ravel(),
         ]
         return (Stage(piecewise_polynomial, s, (), np.concatenate(numbers)),)
 
