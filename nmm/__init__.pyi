@@ -5,6 +5,7 @@ from . import playback as playback
 from .collisions import Box as Box
 from .collisions import Capsule as Capsule
 from .collisions import Cylinder as Cylinder
+from .collisions import Hull as Hull
 from .collisions import Mesh as Mesh
 from .collisions import Obstacle as Obstacle
 from .collisions import Plane as Plane

@@ -15,6 +15,9 @@ from urdf_parts import AXIS, inertial, joint, link, random_tree, robot, shape, w
 import nmm
 from nmm.bundled import bundled_robots
 from nmm.cli.app import status_of
+from nmm.collisions.pairs import SAMPLES, touching
+from nmm.collisions.robot_shapes import link_names, query_shapes
+from nmm.collisions.touch import touching_links
 from nmm.errors import RobotError
 from nmm.robots.loading.packages import package_file
 from nmm.robots.loading.report import Report, report
@@ -364,6 +367,44 @@ def test_the_summary_counts_what_the_file_holds(run: Command) -> None:
     assert (found, of) == (total, "of")
     assert result.value("packages").startswith("example-robot-data in ")
     assert result.value("wheels") == "wheel_left_joint, wheel_right_joint"
+
+
+def test_links_that_touch_are_counted_and_named(run: Command) -> None:
+    """The same configurations, one pair of shapes at a time, by distances."""
+    result = run("check", f"package://example-robot-data/{TIAGO}")
+    made = nmm.load(package_file(f"package://example-robot-data/{TIAGO}"))
+    shapes = query_shapes(made)
+    links = link_names(made, shapes)
+    pairs = [(pair.first, pair.second) for pair in made.collision_model.collisionPairs]
+    found = touching_links(made, count=SAMPLES)
+    shares = touching(made, shapes, pairs, 0.0)
+    for pair, share in found.shares.items():
+        own = [shares[i, j] for i, j in pairs if (links[i], links[j]) == pair]
+        assert max(own) <= share <= sum(own)
+        assert len(own) > 1 or share == own[0]
+    found = touching_links(made)
+    never, sometimes, always = len(found.never), len(found.sometimes), len(found.always)
+    said = f"{len(found.shares)} pairs of links: {never} never, {sometimes} sometimes, {always} always touch"
+    assert result.value("collisions") == f"{said}, in 1000 random configurations"
+    assert 0 < sometimes < never
+    (one, other), share = next(iter(found.sometimes.items()))
+    assert re.search(rf"{one} and {other} +{share:.1%}", result.out)
+
+
+def test_a_robot_without_collision_shapes_says_so(run: Command, tmp_path: Path) -> None:
+    write(tmp_path / "bare.urdf", robot(HEAVY_LINKS + joint()))
+    result = run("check", "bare.urdf")
+    assert result.value("collisions") == "no shapes: nothing keeps it from touching anything"
+
+
+def test_what_is_drawn_into_one_another_touches_always(tmp_path: Path) -> None:
+    """Balls of 1 m at joints 0.1 m apart: those that no joint connects overlap at every angle."""
+    ball = inertial() + shape('<sphere radius="1"/>', "collision")
+    joints = [joint(a + b, a, b, "continuous", AXIS, '<origin xyz="0.1 0 0"/>') for a, b in ("ab", "bc")]
+    text = robot(*(link(name, ball) for name in "abc"), *joints)
+    found = touching_links(nmm.load(write(tmp_path / "balls.urdf", text), platform="fixed"))
+    assert found.always == [("a", "c")]
+    assert found.shares == {("a", "c"): 1.0}
 
 
 def test_a_report_says_what_was_used(tmp_path: Path) -> None:

@@ -141,17 +141,16 @@ def test_incomplete_runs(name: str, count: int) -> None:
 def test_a_held_target_is_marked_and_no_path() -> None:
     """What a robot is to reach, or stretches towards, is in the picture and in the legend."""
     held = run("unicycle_3r_out_of_reach", "dls")
-    assert held.mark is not None
-    np.testing.assert_array_equal(held.mark, [2.0, 1.0, 2.0])
-    assert (held.motion().desired, held.motion().target) == (None, pytest.approx(held.mark))
+    np.testing.assert_array_equal(held.marks, [[2.0, 1.0, 2.0]])
+    assert (held.motion().desired, held.motion().target) == (None, pytest.approx(held.marks))
     for made in (figures.stroboscopic(held), figures.comparison(two(held))):
         check_legible(made)
         marked = [line for axes in made.axes for line in axes.lines if line.get_label() == "target"]
         assert marked
         assert not [line for axes in made.axes for line in axes.lines if line.get_label() == "desired path"]
-        np.testing.assert_array_equal(marked[0].get_xydata(), [held.mark[:2]])
+        np.testing.assert_array_equal(marked[0].get_xydata(), held.marks[:, :2])
     moved = run(PAPER[0])
-    assert (moved.held, moved.mark) == (None, None)
+    assert (len(moved.held), len(moved.marks)) == (0, 0)
     np.testing.assert_array_equal(moved.motion().desired, moved.desired)
 
 

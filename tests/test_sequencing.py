@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -236,6 +237,23 @@ def test_a_scenario_names_the_key() -> None:
     ]
     assert run.complete
     assert np.abs(np.diff(run.u, axis=0)).max() <= 2.0 * run.dt + 1e-12
+
+
+def test_points_held_one_after_another_are_marks_not_a_path() -> None:
+    """A desired path between them was drawn, which no task asked for; what moves stays a path."""
+    run = nmm.Scenario.load("unicycle_3r_sequence").override("dt", "0.02").override("duration", "5").run()
+    assert len(run.events) == 2
+    assert run.marks == pytest.approx(np.array([[-2.0, 1.0, 0.6], [-3.0, 3.0, 0.8]]))
+    assert run.moving is None
+    motion = run.motion()
+    assert motion.desired is None
+    assert np.array_equal(motion.target, run.marks)
+    still = run.desired.copy()
+    still[: len(run) // 3, 0] = np.linspace(0.0, 1.0, len(run) // 3)
+    moved = replace(run, desired=still)
+    event = int(np.searchsorted(run.t, run.events[0].t))
+    assert np.array_equal(moved.moving, still[:event])
+    assert moved.marks == pytest.approx(np.array([[-3.0, 3.0, 0.8]]))
 
 
 def test_a_distance_is_kept_across_events() -> None:

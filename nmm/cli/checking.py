@@ -14,6 +14,7 @@ from nmm.cli.output import complain, show_table, show_text
 if TYPE_CHECKING:
     from nmm.robots.loading.findings import Problem
     from nmm.robots.loading.report import Report
+    from nmm.robots.robot import Robot
 
 OK, BAD_INPUT = 0, 2
 
@@ -40,8 +41,30 @@ def check_file(file: str, arguments: Mapping[str, object], package_dirs: Sequenc
         return BAD_INPUT
     if made.warnings:
         show_text()
-    show_table(["", ""], [[label, value] for label, value in made.facts.items()], title=f"{file}: {counts}")
+    facts, pairs = dict(made.facts), list[list[str]]()
+    if made.robot is not None:
+        facts["collisions"], pairs = _touching(made.robot)
+    show_table(["", ""], [[label, value] for label, value in facts.items()], title=f"{file}: {counts}")
+    if pairs:
+        show_table(["links that touch", "in"], pairs)
     return OK
+
+
+def _touching(robot: Robot) -> tuple[str, list[list[str]]]:
+    """How many of the robot's links can touch each other, and which, with how often they do."""
+    from nmm.collisions.touch import touching_links
+
+    found = touching_links(robot)
+    if not found.shapes:
+        return "no shapes: nothing keeps it from touching anything", []
+    if not found.shares:
+        return "no two of its links can touch: the model has no pairs", []
+    counts = f"{len(found.never)} never, {len(found.sometimes)} sometimes, {len(found.always)} always"
+    said = (
+        f"{len(found.shares)} pairs of links: {counts} touch, in {found.configurations} random configurations"
+    )
+    often = {pair: share for pair, share in found.shares.items() if share > 0.0}
+    return said, [[f"{one} and {other}", f"{share:.1%}"] for (one, other), share in often.items()]
 
 
 def _line(file: str, problem: Problem, made: Report, kind: str = "") -> str:

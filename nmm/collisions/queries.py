@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import coal
@@ -125,6 +126,16 @@ class Queries:
                 self._seen[i] = now
                 self.scene.twists[i] = obstacle.twist(t)
         pin.updateGeometryPlacements(self._model, self._data, self.shapes, self.found)
+
+    @contextmanager
+    def among(self, obstacles: Sequence[Obstacle]) -> Iterator[None]:
+        """In the block the obstacles are where these are, one each, in order: as a record has them."""
+        own = self.moving
+        self.moving = [(i, one) for (i, _), one in zip(own, obstacles, strict=True)]
+        try:
+            yield
+        finally:
+            self.moving = own
 
     def measure(self, t: float, q: Array) -> None:
         """Find the pairs that are near, and their distances."""

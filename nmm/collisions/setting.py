@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -48,6 +49,10 @@ class Setting:
     def words(self, pair: int) -> str:
         """The two of a pair, for messages; "nothing" for -1."""
         return "nothing" if pair < 0 else " and ".join(self.names[pair])
+
+    def places(self, t: float) -> tuple[Any, ...]:
+        """Where the obstacles are at t, s, Pinocchio's; of those that move along a path the record knows."""
+        return tuple(None if one.moves else one.at(t) for one in self.obstacles)
 
     def check_start(self, t: float, q: Array) -> list[str]:
         """What is nearer than the distance at q (n,), a sentence each pair, the nearest first.

@@ -11,8 +11,8 @@ from typing import Any
 import coal
 import numpy as np
 
-from nmm.arrays import positive, vector
-from nmm.collisions.hulls import hull_of_file
+from nmm.arrays import Array, array, positive, vector
+from nmm.collisions.hulls import hull, hull_of_file
 from nmm.errors import InputError
 
 
@@ -110,3 +110,20 @@ class Mesh(Shape):
 
     def geometry(self) -> Any:
         return hull_of_file(Path(self.file), np.array(self.scale))
+
+
+@dataclass(frozen=True, eq=False)
+class Hull(Shape):
+    """The convex hull of `points` (N, 3)."""
+
+    points: Array
+
+    def __post_init__(self) -> None:
+        points = array(self.points, "hull: points")
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise InputError(f"hull: points: expected shape (N, 3), got {points.shape}")
+        object.__setattr__(self, "points", points)
+        self.geometry()
+
+    def geometry(self) -> Any:
+        return hull(self.points)

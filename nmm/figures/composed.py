@@ -116,10 +116,10 @@ def _name_last(panels: Sequence[Axes]) -> None:
 
 
 def _draw_paths(axes: Axes, runs: Sequence[Trajectory], looks: Sequence[style.Look]) -> None:
-    desired, held = runs[0].desired, runs[0].held
-    if held is not None:
+    desired, held = runs[0].moving, runs[0].held
+    if len(held):
         axes.plot(
-            *held[:2],
+            *held[:, :2].T,
             "*",
             color=style.ORANGE,
             markersize=12,
@@ -128,7 +128,7 @@ def _draw_paths(axes: Axes, runs: Sequence[Trajectory], looks: Sequence[style.Lo
             linestyle="none",
             zorder=6,
         )
-    elif desired is not None:
+    if desired is not None:
         axes.plot(desired[:, 0], desired[:, 1], color="#C3C8D0", linewidth=5.0, label="desired path")
     for run, (name, color, dashes) in zip(runs, looks, strict=True):
         if run.path is not None:

@@ -16,8 +16,8 @@ from scipy.spatial import KDTree
 from nmm.arrays import Array
 from nmm.errors import InputError
 from nmm.figures import style
+from nmm.figures.obstacles import FAINTEST, OBSTACLE, OBSTACLE_TEXT, outlines, with_the_nearest
 from nmm.figures.silhouette import Pose, Silhouette
-from nmm.figures.solids import outline_points
 from nmm.figures.views import ABOVE, SIDE, View, Viewed, page
 from nmm.playback.placements import base_position
 from nmm.runs.trajectory import Trajectory
@@ -28,11 +28,8 @@ _LABEL = 0.03
 _FLAT = (0.35, 1.0)
 #: When no instants are given: at most so many, at least so many, a platform's length apart.
 MOST, LEAST = 11, 4
-#: Strength of the earliest drawing, of 1 for the last.
-FAINTEST = 0.4
 #: A run whose arm rises or falls by more than this is drawn from the side too, m.
 _RISES = 0.01
-_OBSTACLE = style.ORANGE
 _PATH_COLOR, _BODY, _EDGE, _ARM = style.BLUE, "#B9C0CA", "#3F4652", style.VERMILLION
 
 
@@ -65,14 +62,17 @@ class Scene(Viewed):
         self.trajectory = trajectory
         silhouette = Silhouette(trajectory.robot, trajectory.frame)
         if instants is None:
-            instants = _how_many(trajectory, silhouette)
-        wanted = _instants(trajectory.t, instants)
+            wanted = _instants(trajectory.t, _how_many(trajectory, silhouette))
+            wanted = with_the_nearest(trajectory, wanted)
+        else:
+            wanted = _instants(trajectory.t, instants)
         samples = np.unique(np.searchsorted(trajectory.t, wanted - 1e-9).clip(0, len(trajectory) - 1))
         self.times = trajectory.t[samples]
         self.poses: list[Pose] = [silhouette.at(trajectory.q[k]) for k in samples]
         self.lines = _lines(trajectory)
-        self.labels = _label_places(self.poses, list(self.lines.values()))
-        self.outlines = _outlines(trajectory, self.times)
+        self.outlines = outlines(trajectory, self.times)
+        solid = [hull(outline.points[:, :2]) for outline in self.outlines]
+        self.labels = _label_places(self.poses, list(self.lines.values()), solid)
         heights = np.array([[*pose.joints[:, 2], *pose.tip[:, 2]] for pose in self.poses])
         rises = heights.size > 0 and float(np.ptp(heights, axis=0).max()) > _RISES
         self.views = (ABOVE, SIDE) if rises else (ABOVE,)
@@ -82,7 +82,7 @@ class Scene(Viewed):
         """The entries of its legend."""
         names = ["desired path"] if "desired" in self.lines else []
         names += [self._path_name, "start", "end", *["obstacle"] * bool(self.outlines)]
-        return names if self.trajectory.mark is None else [*names, "target"]
+        return names if not len(self.trajectory.marks) else [*names, "target"]
 
     @property
     def _path_name(self) -> str:
@@ -93,9 +93,8 @@ class Scene(Viewed):
         points = [*(pose.points() for pose in self.poses), *self.lines.values()]
         if view == ABOVE:
             points.append(np.column_stack([self.labels, np.zeros(len(self.labels))]))
-        points += [outline for _, outline in self.outlines]
-        if self.trajectory.mark is not None:
-            points.append(self.trajectory.mark[None])
+        points += [outline.points for outline in self.outlines]
+        points.append(self.trajectory.marks)
         return [part[:, view] for part in points]
 
     def draw(self, axes: Axes, view: View) -> None:
@@ -112,15 +111,21 @@ class Scene(Viewed):
             if view == ABOVE:
                 axes.text(
                     float(self.labels[k, 0]), float(self.labels[k, 1]),
-                    f"{style.number(round(float(self.times[k]), 2))} s", color=style.GREY,
+                    _seconds(float(self.times[k])), color=style.GREY,
                     fontsize=style.SMALL - 1.0, ha="center", va="center", zorder=7,
                 )  # fmt: skip
-        for k, (strength, outline) in enumerate(self.outlines):
-            shade = _faded(_OBSTACLE, strength)
+        for k, outline in enumerate(self.outlines):
+            shade, edge = _faded(OBSTACLE, outline.strength), hull(outline.points[:, view])
             axes.fill(
-                *hull(outline[:, view]).T, facecolor=(*shade, 0.25), edgecolor=shade, linewidth=1.0,
+                *edge.T, facecolor=(*shade, 0.25), edgecolor=shade, linewidth=1.0,
                 zorder=2.5, label=None if k else "obstacle",
             )  # fmt: skip
+            if view == ABOVE and outline.t is not None:
+                x, y = 0.5 * (edge.min(axis=0) + edge.max(axis=0))
+                axes.text(
+                    float(x), float(y), _seconds(outline.t), color=OBSTACLE_TEXT,
+                    fontsize=style.SMALL - 1.0, ha="center", va="center", zorder=7,
+                )  # fmt: skip
         desired, path = self.lines.get("desired"), self.lines.get("path")
         if desired is not None:
             axes.plot(
@@ -138,21 +143,27 @@ class Scene(Viewed):
                     markersize=6, markeredgecolor="white", markeredgewidth=0.8, label=text,
                     linestyle="none", zorder=6,
                 )  # fmt: skip
-        mark = trajectory.mark
-        if mark is not None:
+        marks = trajectory.marks
+        if len(marks):
             axes.plot(
-                mark[across], mark[up], "*", color=style.ORANGE, markersize=12,
+                marks[:, across], marks[:, up], "*", color=style.ORANGE, markersize=12,
                 markeredgecolor=style.BLACK, markeredgewidth=0.7, label="target", linestyle="none", zorder=6,
             )  # fmt: skip
 
 
-def _label_places(poses: Sequence[Pose], lines: Sequence[Array]) -> Array:
-    """Where the times are written, (k, 2): near each platform, clear of drawings if there is room."""
+def _seconds(t: float) -> str:
+    return f"{style.number(round(t, 2))} s"
+
+
+def _label_places(poses: Sequence[Pose], lines: Sequence[Array], solid: Sequence[Array]) -> Array:
+    """Where the times are written, (k, 2): near each platform, clear of drawings if there is room; not within
+    the outlines `solid`, (k, 2) each."""
     drawn = np.vstack(
         [_outline(pose) for pose in poses] + [line[:: max(1, len(line) // 300), :2] for line in lines]
     )
     nearest = KDTree(drawn * _FLAT)
     covered = [Path(hull(shape[:, :2])) for pose in poses for shape in [*pose.body, *pose.wheels]]
+    covered += [Path(edge) for edge in solid]
     angles = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
     directions = np.column_stack([np.cos(angles), np.sin(angles)])
     away = _LABEL * float(np.ptp(drawn, axis=0).max())
@@ -180,22 +191,6 @@ def _outline(pose: Pose) -> Array:
     lines = [side for edge in edges for side in zip(edge, np.roll(edge, -1, axis=0), strict=True)]
     lines += [(ends[0, :2], ends[1, :2]) for ends in pose.links]
     return np.vstack([start + fractions * (end - start) for start, end in lines])
-
-
-def _outlines(trajectory: Trajectory, times: Array) -> list[tuple[float, Array]]:
-    """Obstacles as points (k, 3) whose hull they are, with the strength to draw them: those that move at each
-    of the times. Half-spaces have no outline."""
-    found = []
-    for obstacle in trajectory.obstacles:
-        points = outline_points(obstacle.shape.geometry())
-        if points is None:
-            continue
-        at = times if obstacle.moves else times[-1:]
-        strengths = np.linspace(FAINTEST, 1.0, len(at)) if len(at) > 1 else [1.0]
-        for t, strength in zip(at, strengths, strict=True):
-            place = obstacle.placement(float(t))
-            found.append((float(strength), points @ place[:3, :3].T + place[:3, 3]))
-    return found
 
 
 def _how_many(trajectory: Trajectory, silhouette: Silhouette) -> int:
@@ -229,8 +224,10 @@ def _lines(trajectory: Trajectory) -> dict[str, Array]:
         x_y = base_position(trajectory.robot, trajectory.q[kept])
         return {"path": np.column_stack([x_y, np.zeros(len(kept))])}
     lines = {"path": trajectory.path[kept]}
-    if trajectory.desired is not None and trajectory.held is None:
-        lines["desired"] = trajectory.desired[kept]
+    desired = trajectory.moving
+    if desired is not None:
+        thinned = np.unique([*range(0, len(desired), max(1, len(desired) // 1500)), len(desired) - 1])
+        lines["desired"] = desired[thinned]
     return lines
 
 

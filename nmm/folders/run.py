@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import csv
 import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import yaml
 
+from nmm.collisions.recorded import described, made, places, shape_of
 from nmm.errors import InputError, RobotError
 from nmm.folders.whole import has_format, replaced_folder
 from nmm.runs.summary import FORMAT, unmet
@@ -31,6 +33,7 @@ LATER_ARRAYS = {
     "clearance": lambda count: np.zeros(0),
     "clearance_between": lambda count: np.zeros(0),
     "clearance_pairs": lambda count: np.zeros(0, dtype=np.int64),
+    "clearance_points": lambda count: np.zeros((0, 6)),
 }
 
 
@@ -114,15 +117,16 @@ def load(folder: str | Path, robot: Robot | None = None) -> Trajectory:
             arrays |= {name: file.get(name) for name in OPTIONAL_ARRAYS}
             count = len(arrays["t"])
             arrays |= {name: file[name] if name in file else was(count) for name, was in LATER_ARRAYS.items()}
+            obstacles = _obstacles(summary.get("obstacles", ()), file)
     except (OSError, ValueError, KeyError) as error:
         raise InputError(f"{folder / 'trajectory.npz'}: cannot be read: {error}") from None
     scenario = None
-    obstacles: tuple[Obstacle, ...] = ()
     if (folder / "scenario.yaml").exists():
         loaded = Scenario.load(folder / "scenario.yaml")
         scenario = loaded.resolved()
         robot = loaded.robot() if robot is None else robot
-        obstacles = loaded.obstacles(robot)
+        if "obstacles" not in summary:
+            obstacles = loaded.obstacles(robot)
     elif robot is None:
         robot = _from_its_file(folder, summary["robot"])
     if robot.fingerprint != summary["robot"].get("fingerprint", robot.fingerprint):
@@ -165,12 +169,28 @@ def _arrays(trajectory: Trajectory) -> dict[str, Any]:
     arrays |= {
         name: getattr(trajectory, name) for name in OPTIONAL_ARRAYS if getattr(trajectory, name) is not None
     }
+    for i, one in enumerate(trajectory.obstacles):
+        arrays[f"obstacle_{i}_places"] = places(one, trajectory.t)
+        arrays[f"obstacle_{i}_points"] = described(one.shape)[1]
     arrays["q_names"] = np.array(trajectory.robot.q_names)
     arrays["u_names"] = np.array(trajectory.robot.u_names)
     arrays["r_names"] = np.array(trajectory.r_names)
     arrays["event_t"] = np.array([event.t for event in trajectory.events])
     arrays["event_names"] = np.array([f"{event.task} {event.what}" for event in trajectory.events], dtype=str)
     return arrays
+
+
+def _obstacles(listed: Sequence[dict[str, Any]], file: Mapping[str, Any]) -> tuple[Obstacle, ...]:
+    """The obstacles of a summary, where the arrays say that they were."""
+    return tuple(
+        made(
+            shape_of(one["shape"], file[f"obstacle_{i}_points"]),
+            one["name"],
+            file["t"],
+            file[f"obstacle_{i}_places"],
+        )
+        for i, one in enumerate(listed)
+    )
 
 
 def _write_csv(trajectory: Trajectory, path: Path) -> None:

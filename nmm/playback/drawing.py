@@ -36,14 +36,22 @@ class Drawing:
         self.add("set_transform", path=path, matrix=matrix.T.ravel().tolist())
 
     def object(
-        self, path: str, geometry: Mapping[str, Any], color: Rgb, *, opacity: float = 1.0, rank: int = 0
+        self,
+        path: str,
+        geometry: Mapping[str, Any],
+        color: Rgb,
+        *,
+        opacity: float = 1.0,
+        rank: int = 0,
+        sheet: bool = False,
     ) -> None:
-        """A mesh. Where surfaces coincide, the one of the lowest rank is seen."""
+        """A mesh. Where surfaces coincide, the one of the lowest rank is seen. A sheet hides nothing and has
+        no shadow."""
         identity = hashlib.sha1(encode(geometry).encode("utf-8"), usedforsecurity=False).hexdigest()
         if identity not in self._geometries:
             self._geometries[identity] = f"geometry{len(self._geometries)}"
             self.add("geometry", id=self._geometries[identity], data=dict(geometry))
-        material = {"color": list(color), "opacity": opacity, "rank": rank}
+        material = {"color": list(color), "opacity": opacity, "rank": rank, "sheet": sheet}
         self.add("object", path=path, geometry=self._geometries[identity], material=material)
 
 

@@ -38,8 +38,7 @@ def keyframes(motion: Motion, fps: float = 60.0) -> Keyframes:
     than `LARGEST_TURN` between two samples are frames put in between, linear in the coordinates.
     """
     t, wheels = motion.t, wheel_angles(motion)
-    count = min(int(np.ceil(motion.duration * fps)) + 1, MOST_FRAMES)
-    kept = np.unique(np.concatenate([_nearest(t, np.linspace(t[0], t[-1], count)), [0, len(t) - 1]]))
+    kept = samples_kept(t, fps)
     everything = np.column_stack([motion.q, wheels])[kept]
     times = t[kept]
     turning = [unit == "rad" for unit in motion.robot.q_units] + [True] * wheels.shape[1]
@@ -53,6 +52,12 @@ def keyframes(motion: Motion, fps: float = 60.0) -> Keyframes:
         times = np.interp(at, index, times)
     n = motion.robot.n
     return Keyframes(times, everything[:, :n], everything[:, n:])
+
+
+def samples_kept(t: Array, fps: float) -> Array:
+    """Which of the samples at t (N,), s, are frames: about `fps` a second, both ends among them."""
+    count = min(int(np.ceil((t[-1] - t[0]) * fps)) + 1, MOST_FRAMES)
+    return np.unique(np.concatenate([_nearest(t, np.linspace(t[0], t[-1], count)), [0, len(t) - 1]]))
 
 
 def ghost_samples(motion: Motion, count: int) -> list[int]:

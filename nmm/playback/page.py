@@ -13,7 +13,16 @@ from nmm.playback.drawing import Command
 from nmm.playback.encoding import encode
 
 #: In the order in which they depend on one another.
-SCRIPTS = ("commands.js", "scenery.js", "ghosts.js", "ellipsoids.js", "camera.js", "player.js", "start.js")
+SCRIPTS = (
+    "commands.js",
+    "scenery.js",
+    "ghosts.js",
+    "ellipsoids.js",
+    "obstacles.js",
+    "camera.js",
+    "player.js",
+    "start.js",
+)
 
 #: What the browser may load: nothing but the page itself (and the socket that it came with). MeshCat
 #: evaluates text, and so do the tools that test pages.

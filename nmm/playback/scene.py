@@ -13,6 +13,7 @@ from nmm.playback.drawing import Command, Drawing, DrawnRobot, Rgb
 from nmm.playback.encoding import packed
 from nmm.playback.extent import corners, robot_boxes
 from nmm.playback.keyframes import Keyframes, ghost_samples, keyframes
+from nmm.playback.obstacles import SceneObstacles, draw_nearest
 from nmm.playback.placements import base_position
 from nmm.playback.rolling import wheel_angles
 from nmm.playback.shapes import Y_TO_Z, cylinder, sphere
@@ -35,6 +36,8 @@ COLORS: tuple[Rgb, ...] = (
 DESIRED: Rgb = (0.16, 0.18, 0.22)
 TARGET: Rgb = (0.83, 0.10, 0.22)
 
+#: A robot's name tag is so much higher than the robot.
+TAG = 1.1
 #: Instants at which the room that the robots take is measured, and poses for the room that one can take.
 INSTANTS = 80
 POSES = 100
@@ -74,7 +77,9 @@ def playback_scene(
     shown = _ellipsoids(motions, frames, ellipsoids)
     if shown is not None:
         boxes = shown.around(boxes, times)
-    size = _size(boxes, motions)
+    obstacles = SceneObstacles(motions, boxes, fps)
+    view = np.vstack([_view(boxes, motions), obstacles.points()])
+    size = max(0.5 * float(np.linalg.norm(np.ptp(view, axis=0))), 1e-3)
     several = len(motions) > 1
     if ghosts is None:
         ghosts = 3 if several else 6
@@ -86,11 +91,12 @@ def playback_scene(
         autoplay=autoplay,
         start=start,
         duration=end - start,
-        view=packed(_view(boxes, motions), np.float64),
+        view=packed(view, np.float64),
+        tags=packed(_tags(motions, boxes, times) if several else np.zeros((0, 3)), np.float64),
         follow=_held(boxes, _middle(motions, frames, times)),
         size=size,
     )
-    animations = []
+    animations = obstacles.draw(drawing, size, start)
     for i, (motion, frame) in enumerate(zip(motions, frames, strict=True)):
         color = COLORS[i % len(COLORS)]
         path = f"/nmm/motion {i}"
@@ -108,7 +114,7 @@ def playback_scene(
             label=motion.label or ("" if motion.driven is not None else motion.robot.name),
             color=list(color),
             tag=motion.label if several else "",
-            height=float(boxes[i, 0, 1, 2]),
+            height=TAG * float(boxes[i, 0, 1, 2]),
         )
         if motion.driven is not None:
             drawing.add(
@@ -118,8 +124,10 @@ def playback_scene(
                 points=packed(motion.driven, np.float32),
                 times=packed(motion.t - start, np.float64),
             )
+        draw_nearest(drawing, motion, path, color if several else None, start, fps)
         if shown is not None:
             animations += shown.draw(drawing, i, path, color, start)
+    obstacles.tell(drawing)
     _desired(drawing, motions)
     _targets(drawing, motions, size)
     if shown is not None:
@@ -162,7 +170,7 @@ def live_scene(
         label=robot.name,
         color=list(COLORS[0]),
         tag="",
-        height=float(box[1, 2]),
+        height=TAG * float(box[1, 2]),
     )
     drawing.add("ready")
     return drawing.commands, drawn
@@ -210,7 +218,8 @@ def _desired(drawing: Drawing, motions: Sequence[Motion]) -> None:
 
 def _targets(drawing: Drawing, motions: Sequence[Motion], size: float) -> None:
     """A ball on a pole at each target."""
-    targets = {tuple(motion.target.tolist()) for motion in motions if motion.target is not None}
+    given = [np.atleast_2d(motion.target) for motion in motions if motion.target is not None]
+    targets = {tuple(target) for several in given for target in several.tolist()}
     radius = min(max(0.015 * size, 0.02), 0.2)
     for i, (x, y, z) in enumerate(sorted(targets)):
         path = f"/nmm/target {i}"
@@ -260,13 +269,17 @@ def _view(boxes: Array, motions: Sequence[Motion]) -> Array:
             line[:: max(1, len(line) // 200)] for line in (motion.driven, motion.desired) if line is not None
         ]
         if motion.target is not None:
-            points.append(motion.target[np.newaxis])
+            points.append(np.atleast_2d(motion.target))
     return np.vstack(points)
 
 
-def _size(boxes: Array, motions: Sequence[Motion]) -> float:
-    """Half the diagonal of everything that is shown, m."""
-    return max(0.5 * float(np.linalg.norm(np.ptp(_view(boxes, motions), axis=0))), 1e-3)
+def _tags(motions: Sequence[Motion], boxes: Array, times: Array) -> Array:
+    """Where the motions' name tags are at the times, (P, 3); the page writes them so high above the roots."""
+    found = []
+    for i, motion in enumerate(motions):
+        at = interpolated(times, motion.t, base_position(motion.robot, motion.q))
+        found.append(np.column_stack([at, np.full(len(at), TAG * boxes[i, 0, 1, 2])]))
+    return np.vstack(found)
 
 
 def _held(boxes: Array, middle: Array) -> dict[str, float]:

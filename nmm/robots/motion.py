@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from nmm.arrays import Array, array, matrix, vector
 from nmm.errors import InputError
+from nmm.robots.bodies import Body, Nearest
 from nmm.robots.robot import Robot
 
 
@@ -24,9 +25,11 @@ class Motion:
     q (N, n), u (N, n_u) : coordinates and inputs, in `robot.q_units` and `robot.u_units`
     path (N, 3) : the end-effector's path, m in the world; computed from `frame` when not given
     desired (M, 3) : the desired path, m in the world
-    target (3,) : a fixed point to look at or to reach, m in the world
+    target (3,), or (T, 3) : a fixed point to look at or to reach, or several, m in the world
     label : name in the legend, such as "RG"
     frame : the end-effector's frame
+    bodies : what stands or moves beside the robot
+    nearest : which points are nearest to each other, and how near
 
     Raises
     ------
@@ -43,6 +46,8 @@ class Motion:
     target: Array | None = None
     label: str = ""
     frame: str | None = None
+    bodies: tuple[Body, ...] = ()
+    nearest: Nearest | None = None
 
     def __post_init__(self) -> None:
         t = vector(self.t, None, "t")
@@ -56,7 +61,7 @@ class Motion:
             "u": matrix(self.u, (t.size, self.robot.n_u), "u"),
             "path": None if self.path is None else matrix(self.path, (t.size, 3), "path"),
             "desired": None if self.desired is None else _points(self.desired, "desired"),
-            "target": None if self.target is None else vector(self.target, 3, "target"),
+            "target": None if self.target is None else _target(self.target),
         }
         for name, value in checked.items():
             if value is not None:
@@ -64,6 +69,14 @@ class Motion:
             object.__setattr__(self, name, value)
         if self.frame is not None:
             self.robot.frame_id(self.frame)
+        for body in self.bodies:
+            if body.places.shape not in ((t.size, 4, 4), (1, 4, 4)):
+                raise InputError(
+                    f"bodies: {body.name}: expected placements of shape ({t.size}, 4, 4) or (1, 4, 4), "
+                    f"got {body.places.shape}"
+                )
+        if self.nearest is not None:
+            matrix(np.nan_to_num(self.nearest.points), (t.size, 6), "nearest: points")
 
     @property
     def duration(self) -> float:
@@ -89,3 +102,7 @@ def _points(value: Array, name: str) -> Array:
     if points.ndim != 2 or points.shape[1] != 3:
         raise InputError(f"{name}: expected points of shape (M, 3), got shape {points.shape}")
     return points
+
+
+def _target(value: Array) -> Array:
+    return vector(value, 3, "target") if np.ndim(value) < 2 else _points(value, "target")

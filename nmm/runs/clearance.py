@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from nmm.arrays import Array, Integers
+from nmm.collisions.obstacle import Obstacle
+from nmm.collisions.recorded import as_passed
 from nmm.collisions.setting import Setting
 from nmm.control.guard import Counts, Guard
 from nmm.robots.held import Held
@@ -26,11 +29,16 @@ class Swept(NamedTuple):
 
     clearance (N,) : the least distance at each sample, m; pairs (N,) : between which pair
     between (N,) : the least on the way to the next sample, its ends included; the last sample's own
+    points (N, 6) : the two points that are nearest at each sample, of the pair's first shape and of its
+        second, m, world axes; not a number where nothing is near
+    obstacles : as they were
     """
 
     clearance: Array
     pairs: Integers
     between: Array
+    points: Array
+    obstacles: tuple[Obstacle, ...]
 
 
 @dataclass(frozen=True)
@@ -49,12 +57,24 @@ class Guarded(Around):
         return self.held(q, u, dt)
 
 
-def swept(setting: Setting, t: Array, q: Array, u: Array) -> Swept:
-    """Distances along a motion t (N,), q (N, n), u (N, m): where they could matter, between samples too."""
+def swept(setting: Setting, t: Array, q: Array, u: Array, places: Sequence[Sequence[Any]]) -> Swept:
+    """Distances along a motion t (N,), q (N, n), u (N, m): where they could matter, between samples too.
+
+    places : of each sample what `Setting.places` said then
+    """
+    obstacles = tuple(as_passed(one, t, [at[i] for at in places]) for i, one in enumerate(setting.obstacles))
+    with setting.queries.among(obstacles):
+        return _swept(setting, t, q, u, obstacles)
+
+
+def _swept(setting: Setting, t: Array, q: Array, u: Array, obstacles: tuple[Obstacle, ...]) -> Swept:
     queries, held = setting.queries, Held(setting.robot)
-    found = [queries.nearest(float(time), place) for time, place in zip(t, q, strict=True)]
-    clearance = np.array([d for d, _ in found])
-    pairs = np.array([pair for _, pair in found], dtype=np.int64)
+    clearance, points = np.full(len(t), np.inf), np.full((len(t), 6), np.nan)
+    pairs = np.full(len(t), -1, dtype=np.int64)
+    for k, (time, place) in enumerate(zip(t, q, strict=True)):
+        clearance[k], pairs[k] = queries.nearest(float(time), place)
+        if pairs[k] >= 0:
+            points[k] = queries.results[pairs[k], 4:]
     between = clearance.copy()
     for k in range(len(t) - 1):
         dt = float(t[k + 1] - t[k])
@@ -70,7 +90,7 @@ def swept(setting: Setting, t: Array, q: Array, u: Array) -> Swept:
             share = (i - 0.5) / looks
             ahead = held(q[k], u[k], share * dt) + share * astray
             between[k] = min(between[k], queries.nearest(float(t[k]) + share * dt, ahead)[0])
-    return Swept(clearance, pairs, between)
+    return Swept(clearance, pairs, between, points, obstacles)
 
 
 def told(setting: Setting, found: Swept, t: Array, counts: Counts) -> list[str]:

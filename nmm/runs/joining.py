@@ -77,11 +77,14 @@ def join(
 
     distances: dict[str, Any] = {}
     if controller.setting is not None:
-        found = swept(controller.setting, along("t"), along("q"), along("u"))
+        where = [place for leg in legs for place in leg.recorder.places]
+        found = swept(controller.setting, along("t"), along("q"), along("u"), where)
         distances = {
             "clearance": found.clearance,
             "clearance_pairs": found.pairs,
             "clearance_between": found.between,
+            "clearance_points": found.points,
+            "obstacles": found.obstacles,
         }
     frame, axes, target = shown(stack, robot)
     q = along("q")

@@ -68,6 +68,7 @@ class Recorder:
         self.warnings: list[str] = []
         self.blocking: tuple[str, ...] = ()
         self._counts = Counts()
+        self._places: list[tuple[Any, ...]] = []
         self.goes_on = False
 
     def __len__(self) -> int:
@@ -97,6 +98,11 @@ class Recorder:
     def target(self) -> Array:
         """The targets recorded so far, (N, s)."""
         return self._rows[1, : self._count]
+
+    @property
+    def places(self) -> list[tuple[Any, ...]]:
+        """Where obstacles were at the samples so far (`Setting.places`)."""
+        return self._places[: self._count]
 
     @property
     def scale(self) -> Array:
@@ -134,6 +140,8 @@ class Recorder:
         self._scalars[0, k] = sample.objective
         self._scalars[1, k] = sample.residual
         self._J[k] = sample.J
+        if (setting := self._controller.setting) is not None:
+            self._places[k:] = [setting.places(sample.t)]
         if self._scale is None:
             self._scale = np.ones((len(self._times), len(sample.scale)))
         self._scale[k] = sample.scale
@@ -220,15 +228,16 @@ class Recorder:
         kept = controller.kept if controller.limits is not None else Limits().on(robot)
         distances: dict[str, Any] = {}
         if controller.setting is not None:
-            found = swept(controller.setting, self.t, self.q[:count], self._u[:count])
+            found = swept(controller.setting, self.t, self.q[:count], self._u[:count], self.places)
             self.warnings += told(controller.setting, found, self.t, self._counts)
             distances = {
                 "clearance": found.clearance,
                 "clearance_pairs": found.pairs,
                 "clearance_between": found.between,
+                "clearance_points": found.points,
                 "clearance_names": tuple(" and ".join(names) for names in controller.setting.names),
                 "clearance_asked": controller.setting.distance,
-                "obstacles": controller.setting.obstacles,
+                "obstacles": found.obstacles,
             }
         limited, within = shares(kept, robot, self.q[:count], self._u[:count], self._limited[:count])
         frame, columns, target = self._shown

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nmm.arrays import Array
+from nmm.collisions.recorded import described
 from nmm.runs.residuals import NONE, Residuals
 
 if TYPE_CHECKING:
@@ -51,6 +52,10 @@ def summarise(trajectory: Trajectory) -> dict[str, Any]:
         "r_units": list(trajectory.r_units),
         "frame": trajectory.frame,
         "events": [event._asdict() for event in trajectory.events],
+        "obstacles": [
+            {"name": one.name, "moves": one.moves, "shape": described(one.shape)[0]}
+            for one in trajectory.obstacles
+        ],
     }
     if count:
         norm, sizes = trajectory.error_norm, np.linalg.norm(trajectory.u, axis=1)

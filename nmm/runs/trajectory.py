@@ -11,8 +11,10 @@ import numpy as np
 
 from nmm.arrays import Array, Integers
 from nmm.collisions.obstacle import Obstacle
+from nmm.collisions.recorded import places
 from nmm.control.sequence import Event
 from nmm.doors import door
+from nmm.robots.bodies import Body, Nearest
 from nmm.robots.motion import Motion
 from nmm.robots.robot import Robot
 from nmm.runs.ellipsoid_options import Wanted
@@ -66,8 +68,9 @@ class Trajectory:
     clearance (N,): least distance between shapes that are kept apart, m, infinite where none are
     clearance_between (N,): the least on the way to the next sample, m
     clearance_pairs (N,): which of `clearance_names` is nearest, -1 for none
+    clearance_points (N, 6): the two points that are nearest, in the order of the names, m in the world
     clearance_asked : the distance that was to be kept, m
-    obstacles : what the robot kept off, to draw it
+    obstacles : what the robot kept off, where it was
     scenario : the scenario as resolved, if it came from one
     events : when tasks that come and go began and ended, and why
     """
@@ -106,6 +109,7 @@ class Trajectory:
     clearance: Array = field(default_factory=lambda: np.zeros(0))
     clearance_between: Array = field(default_factory=lambda: np.zeros(0))
     clearance_pairs: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    clearance_points: Array = field(default_factory=lambda: np.zeros((0, 6)))
     clearance_names: tuple[str, ...] = ()
     clearance_asked: float = 0.0
     obstacles: tuple[Obstacle, ...] = ()
@@ -137,16 +141,31 @@ class Trajectory:
         return int(np.sum(np.any(np.diff(self.partition, axis=0) != 0, axis=1)))
 
     @property
-    def held(self) -> Array | None:
-        """(3,) m in the world: where the desired path stays; None where it moves, or there is none."""
-        if self.desired is None or not len(self.desired) or np.ptp(self.desired, axis=0).max() > 1e-9:
-            return None
-        return self.desired[0].copy()
+    def moving(self) -> Array | None:
+        """(M, 3) m in the world: the desired path, of tasks that come and go without those that hold a point;
+        None where there is none."""
+        parts = [part for part in self._stretches if not _stays(part)]
+        return np.vstack(parts) if parts else None
 
     @property
-    def mark(self) -> Array | None:
-        """(3,) m in the world: the fixed point that figures and playback show, looked at or held; or None."""
-        return self.held if self.target is None else self.target
+    def held(self) -> Array:
+        """(K, 3) m in the world: the points where the desired path stays, from event to event."""
+        points = [part[0] for part in self._stretches if _stays(part)]
+        new = [not any(np.allclose(one, other) for other in points[:i]) for i, one in enumerate(points)]
+        return np.array(points).reshape(-1, 3)[np.array(new, dtype=bool)]
+
+    @property
+    def marks(self) -> Array:
+        """(K, 3) m in the world: the fixed points that figures and playback show, looked at or held."""
+        return self.held if self.target is None else self.target[np.newaxis]
+
+    @property
+    def _stretches(self) -> list[Array]:
+        """The desired path from event to event."""
+        if self.desired is None:
+            return []
+        events = np.searchsorted(self.t, sorted({event.t for event in self.events}))
+        return [part for part in np.split(self.desired, events) if len(part)]
 
     def with_scenario(self, scenario: dict[str, Any]) -> Trajectory:
         """The same trajectory with the scenario that it came from."""
@@ -188,10 +207,23 @@ class Trajectory:
             q=self.q,
             u=self.u,
             path=self.path,
-            desired=self.desired if self.held is None else None,
-            target=self.mark,
+            desired=self.moving,
+            target=self.marks if len(self.marks) else None,
             label=self.resolver.upper() if label is None else label,
             frame=self.frame,
+            bodies=tuple(Body(one.name, one.shape.geometry(), places(one, self.t)) for one in self.obstacles),
+            nearest=self._nearest(),
+        )
+
+    def _nearest(self) -> Nearest | None:
+        if not len(self) or len(self.clearance_points) != len(self):
+            return None
+        return Nearest(
+            self.clearance_points,
+            self.clearance,
+            self.clearance_pairs,
+            self.clearance_names,
+            self.clearance_asked,
         )
 
     def play(self, *, port: int | None = None, open_browser: bool = True, ellipsoids: Wanted = False) -> None:
@@ -199,3 +231,7 @@ class Trajectory:
         door("nmm.playback:play")(
             [self.motion()], port=port, open_browser=open_browser, ellipsoids=ellipsoids
         )
+
+
+def _stays(path: Array) -> bool:
+    return float(np.ptp(path, axis=0).max()) <= 1e-9

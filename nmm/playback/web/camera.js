@@ -9,11 +9,13 @@
   // Not the window: a page may have something beside the view.
   const view = document.getElementById("view");
   const upright = (v) => new THREE.Vector3(v.x, v.z, -v.y);
-  let eye, points, last;
+  let eye, points, tags, last;
+  const vectors = (numbers = []) =>
+    Array.from({ length: numbers.length / 3 }, (_, i) => upright(new THREE.Vector3().fromArray(numbers, 3 * i)));
 
-  camera.build = (held, size) => {
-    points = [];
-    for (let i = 0; i < held.length; i += 3) points.push(upright(new THREE.Vector3().fromArray(held, i)));
+  camera.build = (held, size, named) => {
+    tags = vectors(named);
+    points = [...vectors(held), ...tags];
     eye = new THREE.PerspectiveCamera(FIELD, view.clientWidth / view.clientHeight, 0.01 * size, 80 * size);
     nmm.viewer.set_camera(eye);
     nmm.viewer.set_object(["Cameras", "default", "rotated"], eye);
@@ -26,24 +28,51 @@
     camera.reset();
   };
 
-  // Pixels at the upper and lower edge that the controls cover.
-  function covered() {
+  // Pixels at the upper, lower, left and right edge that are kept free: several ways to have nothing behind
+  // the heading and the tools.
+  function covered(named) {
     const bar = document.getElementById("bar").getBoundingClientRect();
-    const head = document.getElementById("heading").getBoundingClientRect();
+    const [head, tools] = cards();
     const narrow = window.innerWidth < 640;
-    const below = window.innerHeight - bar.top + (narrow ? 44 : 10);
     const under = view.clientHeight < window.innerHeight ? 56 : 24; // where a panel is below the view
-    return [narrow || camera.held ? head.bottom + 4 : 24, bar.height ? below : under];
+    const bottom = bar.height ? window.innerHeight - bar.top + (narrow ? 44 : 10) : under;
+    if (narrow || camera.held) return [[head.bottom + 4, bottom, 0, 0]];
+    const [aside, above] = room(named.length > 0).map((pixels) => pixels + 4);
+    const tops = [24, tools.bottom + above, Math.max(head.bottom, tools.bottom) + above];
+    const lefts = [0, head.right + aside];
+    const rights = [0, view.clientWidth - tools.left + aside];
+    return tops.flatMap((top) => lefts.flatMap((left) => rights.map((right) => [top, bottom, left, right])));
+  }
+
+  // Pixels beside and above a point that what stands there takes: a ball, or the tags one over another.
+  const room = (tagged) => (tagged ? [44, 14 + 26 * nmm.motions.length] : [14, 14]);
+  const cards = () => ["heading", "tools"].map((id) => document.getElementById(id).getBoundingClientRect());
+
+  // Whether something that is held is behind a card.
+  function hidden(held, named) {
+    eye.updateMatrixWorld();
+    eye.updateProjectionMatrix();
+    const [width, height] = [view.clientWidth, view.clientHeight];
+    const shown = cards();
+    const behind = (p, aside, above) => {
+      const { x, y } = p.clone().project(eye);
+      const [px, py] = [0.5 * (1 + x) * width, 0.5 * (1 - y) * height];
+      return shown.some(
+        (card) => px > card.left - aside && px < card.right + aside && py > card.top && py - above < card.bottom,
+      );
+    };
+    return held.some((p) => behind(p, ...room(false))) || named.some((p) => behind(p, ...room(true)));
   }
 
   // Where, along one axis of the picture, what is held leaves the same room on both sides.
-  function centred(held, axis, forward, z, [low, high], more, less) {
+  function centred(along, depths, z, [low, high], more, less) {
     for (let k = 0; k < 40; k++) {
       const middle = 0.5 * (low + high);
       let [most, least] = [-Infinity, Infinity];
-      for (const p of held) {
-        const slope = (axis.dot(p) - middle) / (forward.dot(p) - z);
-        [most, least] = [Math.max(most, slope), Math.min(least, slope)];
+      for (let i = 0; i < along.length; i++) {
+        const slope = (along[i] - middle) / (depths[i] - z);
+        if (slope > most) most = slope;
+        if (slope < least) least = slope;
       }
       if (most / more + least / less > 0) low = middle;
       else high = middle;
@@ -52,34 +81,46 @@
   }
 
   // The nearest place for an eye that looks along -towards and has all that is held in the free part of the
-  // window.
-  function look(held, towards) {
-    const [width, height] = [view.clientWidth, view.clientHeight];
-    const [top, bottom] = covered();
-    const across = Math.tan((FIELD * Math.PI) / 360);
-    const tx = ((across * width) / height) * 0.94;
-    const above = across * Math.max(0.1, 1 - (2 * top) / height);
-    const below = across * Math.max(0.1, 1 - (2 * bottom) / height);
+  // window, with nothing behind a card.
+  function look(held, towards, named) {
     const forward = towards.clone().negate().normalize();
     const right = new THREE.Vector3().crossVectors(forward, new THREE.Vector3(0, 1, 0)).normalize();
     const up = new THREE.Vector3().crossVectors(right, forward);
-    const bounds = [[-Infinity, Infinity], [-Infinity, Infinity]];
-    let [sum, near] = [0, Infinity];
-    for (const p of held) {
-      const [x, y, z] = [right.dot(p), up.dot(p), forward.dot(p)];
-      bounds[0] = [Math.max(bounds[0][0], x - tx * z), Math.min(bounds[0][1], x + tx * z)];
-      bounds[1] = [Math.max(bounds[1][0], y - above * z), Math.min(bounds[1][1], y + below * z)];
-      sum += z;
-      near = Math.min(near, z);
+    const [xs, ys, zs] = [right, up, forward].map((axis) => held.map((p) => axis.dot(p)));
+    const ways = covered(named).map((free) => aim(xs, ys, zs, free));
+    ways.sort((one, other) => other.z - one.z);
+    for (const { z, across, upwards } of ways) {
+      const [x, y] = [centred(xs, zs, z, ...across), centred(ys, zs, z, ...upwards)];
+      eye.position.set(0, 0, 0).addScaledVector(right, x).addScaledVector(up, y).addScaledVector(forward, z);
+      eye.lookAt(eye.position.clone().add(forward));
+      if (ways.length === 1 || !hidden(held, named)) break;
     }
-    const [[left, rightmost], [highest, lowest]] = bounds;
-    const depths = [(rightmost - left) / (2 * tx), (lowest - highest) / (above + below), near - 2 * eye.near];
-    const z = Math.min(...depths);
-    const x = centred(held, right, forward, z, [left + tx * z, rightmost - tx * z], tx, tx);
-    const y = centred(held, up, forward, z, [highest + above * z, lowest - below * z], above, below);
-    eye.position.copy(right.multiplyScalar(x)).addScaledVector(up, y).addScaledVector(forward, z);
-    nmm.viewer.controls.target.copy(eye.position).addScaledVector(forward, sum / held.length - z);
+    const depth = zs.reduce((sum, z) => sum + z, 0) / zs.length - forward.dot(eye.position);
+    nmm.viewer.controls.target.copy(eye.position).addScaledVector(forward, depth);
     nmm.viewer.controls.update();
+  }
+
+  // How far forward the eye may be, and between what, aside and upwards, where so many pixels are not free.
+  function aim(xs, ys, zs, [top, bottom, left, right]) {
+    const [width, height] = [view.clientWidth, view.clientHeight];
+    const half = Math.tan((FIELD * Math.PI) / 360);
+    const share = (length, taken) => Math.max(0.1, 1 - (2 * taken) / length);
+    const [west, east] = [left, right].map((side) => ((half * width) / height) * Math.min(0.94, share(width, side)));
+    const [above, below] = [top, bottom].map((end) => half * share(height, end));
+    let [x0, x1, y0, y1, near] = [-Infinity, Infinity, -Infinity, Infinity, Infinity];
+    for (let i = 0; i < zs.length; i++) {
+      x0 = Math.max(x0, xs[i] - east * zs[i]);
+      x1 = Math.min(x1, xs[i] + west * zs[i]);
+      y0 = Math.max(y0, ys[i] - above * zs[i]);
+      y1 = Math.min(y1, ys[i] + below * zs[i]);
+      near = Math.min(near, zs[i]);
+    }
+    const z = Math.min((x1 - x0) / (east + west), (y1 - y0) / (above + below), near - 2 * eye.near);
+    return {
+      z,
+      across: [[x0 + east * z, x1 - west * z], east, west],
+      upwards: [[y0 + above * z, y1 - below * z], above, below],
+    };
   }
 
   // The middle of the robots that are shown, in the camera's axes.
@@ -97,10 +138,10 @@
   camera.reset = () => {
     camera.moved = false;
     const towards = upright(TOWARDS);
-    if (!camera.following && !camera.held) return look(points, towards);
+    if (!camera.following && !camera.held) return look(points, towards, tags);
     last = middle();
     // A page may say itself what there is to hold, as points in three.js's axes.
-    if (camera.held) return look(camera.held(), towards);
+    if (camera.held) return look(camera.held(), towards, []);
     const { radius, low, high } = nmm.stage.follow;
     const half = 0.5 * (high - low);
     const around = [];
@@ -111,7 +152,7 @@
         around.push(last.clone().add(new THREE.Vector3(x, y, z)));
       }
     }
-    return look(around, towards);
+    return look(around, towards, []);
   };
 
   camera.follow = (on) => {

@@ -48,6 +48,7 @@ nmm.viewer = window.viewer = new MeshCat.Viewer(document.getElementById("view"))
         shininess: 40,
         opacity: material.opacity,
         transparent: material.opacity < 1,
+        depthWrite: !material.sheet,
         // Files of meshes do not always agree on which side is outside.
         side: shape.type === "BufferGeometry" ? THREE.DoubleSide : THREE.FrontSide,
         polygonOffset: material.rank > 0,
@@ -55,7 +56,7 @@ nmm.viewer = window.viewer = new MeshCat.Viewer(document.getElementById("view"))
         polygonOffsetUnits: 2 * material.rank,
       }),
     );
-    mesh.castShadow = mesh.receiveShadow = true;
+    mesh.castShadow = mesh.receiveShadow = !material.sheet;
     nmm.viewer.set_object(nmm.split(path), mesh);
   };
 

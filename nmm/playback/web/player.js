@@ -12,13 +12,13 @@
     nmm.stage = stage;
     document.body.classList.toggle("live", stage.live);
     nmm.scenery.build(stage.view, stage.size, stage.follow.radius);
-    nmm.camera.build(stage.view, stage.size);
+    nmm.camera.build(stage.view, stage.size, stage.tags);
   };
 
   nmm.hooks.motion = (motion) => {
     const row = nmm.motions.push(motion) - 1;
     const { tag, color, height } = motion;
-    if (tag) nmm.scenery.tag(nmm.node(motion.root), tag, color, 1.1 * height, row);
+    if (tag) nmm.scenery.tag(nmm.node(motion.root), tag, color, height, row);
     if (nmm.stage.live) return;
     const text = motion.label || "end-effector";
     nmm.legend({ kind: "line", color: motion.color, text, path: motion.path });
@@ -48,6 +48,7 @@
     player.time = Math.min(Math.max(Number.isFinite(time) ? time : 0, 0), duration);
     nmm.viewer.animator.seek(player.time);
     nmm.scenery.update(player.time);
+    nmm.obstacles.update(player.time);
     nmm.camera.update();
     get("slider").value = player.time;
     get("slider").setAttribute("aria-valuetext", `${player.time.toFixed(2)} s`);
@@ -116,6 +117,7 @@
     },
     ghosts: () => setShown("ghosts", nmm.ghosts, !isPressed("ghosts")),
     ellipsoids: () => setShown("ellipsoids", nmm.ellipsoids, !isPressed("ellipsoids")),
+    distances: () => setShown("distances", nmm.obstacles.lines, !isPressed("distances")),
     paths: () => setShown("paths", nmm.scenery.paths, !isPressed("paths")),
   };
   for (const [id, action] of Object.entries(actions)) get(id).addEventListener("click", action);
@@ -139,6 +141,7 @@
     r: actions.reset,
     g: actions.ghosts,
     e: actions.ellipsoids,
+    d: actions.distances,
     p: actions.paths,
     m: () => document.body.classList.toggle("panel"),
   };
@@ -158,12 +161,13 @@
   const SIGNS = {
     line: '<path d="M2 6h20" stroke="currentColor" stroke-width="4" stroke-linecap="round"/>',
     dashed: '<path d="M1 6h22" stroke="currentColor" stroke-width="3" stroke-dasharray="6 4"/>',
+    box: '<path d="M5 1h14v10H5z" fill="currentColor"/>',
     ball: '<circle cx="12" cy="6" r="5" fill="currentColor"/>',
   };
 
   // path: a node that the entry shows and hides, or several.
   nmm.legend = ({ kind, color, text, path }) => {
-    if (path === undefined && [...get("legend").children].some((item) => item.textContent === text)) return;
+    if (path === undefined && text && [...get("legend").children].some((item) => item.textContent === text)) return;
     const item = document.createElement("li");
     const sign = document.createElement("span");
     sign.style.color = `rgb(${color.map((c) => Math.round(255 * c)).join(",")})`;
@@ -181,5 +185,6 @@
       });
     }
     get("legend").append(item);
+    return item;
   };
 }

@@ -164,6 +164,7 @@
     return sprite;
   }
 
+  scenery.label = label;
   scenery.tag = (parent, text, rgb, height, row) => {
     const sprite = label(text, rgb, true);
     // Tags of robots that stand at one place are stacked.

@@ -41,6 +41,7 @@ class Report:
     problems : why it cannot be loaded; none when it can
     warnings : what `load` takes, or takes with an option that the warning names
     facts : what it holds, in words, by label
+    robot : it, where it could be loaded, without the shapes whose meshes are missing
     """
 
     file: Path
@@ -49,6 +50,7 @@ class Report:
     problems: tuple[Problem, ...] = ()
     warnings: tuple[Problem, ...] = ()
     facts: Mapping[str, str] = field(default_factory=dict)
+    robot: Robot | None = None
 
 
 def report(
@@ -144,6 +146,7 @@ class _Report:
         self.meshes: dict[str, Path | str] = {}
         self.warnings: list[Problem] = [Problem(note) for note in description.notes]
         self.facts: dict[str, str] = {}
+        self.robot: Robot | None = None
 
     def made(self, found: Sequence[Problem] = ()) -> Report:
         """The report, with problems that were found before."""
@@ -166,6 +169,7 @@ class _Report:
             tuple(sorted(problems, key=_by_line)),
             tuple(sorted(self.warnings, key=_by_line)),
             self.facts,
+            self.robot,
         )
 
     def _mesh(self, name: str) -> Path | str | None:
@@ -225,6 +229,7 @@ class _Report:
         self.warnings += [Problem(text) for text in limit_notes(robot)]
         self.warnings += [Problem(text) for text in second_opinion(self.description.xml)]
         self._about(robot)
+        self.robot = robot
         return []
 
     def _about(self, robot: Robot) -> None:

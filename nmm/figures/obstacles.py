@@ -1,0 +1,52 @@
+"""Obstacles in the figures of a motion, and the instants at which a run passes them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from nmm.arrays import Array
+from nmm.figures import style
+from nmm.figures.solids import outline_points
+from nmm.runs.trajectory import Trajectory
+
+OBSTACLE, OBSTACLE_TEXT = style.ORANGE, "#7A5200"
+#: Strength of the earliest drawing, of 1 for the last.
+FAINTEST = 0.4
+
+
+class Outline(NamedTuple):
+    """An obstacle as points (k, 3) whose hull it is, and the strength to draw it; at t, s, where it moves."""
+
+    points: Array
+    strength: float
+    t: float | None
+
+
+def outlines(trajectory: Trajectory, times: Array) -> list[Outline]:
+    """The obstacles, those that move at each of the times. Half-spaces have no outline."""
+    found = []
+    for obstacle in trajectory.obstacles:
+        points = outline_points(obstacle.shape.geometry())
+        if points is None:
+            continue
+        at = times if obstacle.moves else times[-1:]
+        strengths = np.linspace(FAINTEST, 1.0, len(at)) if len(at) > 1 else [1.0]
+        for t, strength in zip(at, strengths, strict=True):
+            place = obstacle.placement(float(t))
+            moved = points @ place[:3, :3].T + place[:3, 3]
+            found.append(Outline(moved, float(strength), float(t) if obstacle.moves else None))
+    return found
+
+
+def with_the_nearest(trajectory: Trajectory, times: Array) -> Array:
+    """The times, with when the robot was nearest to something in the place of the one next to it: even
+    instants may show nothing of what was passed."""
+    d = trajectory.clearance
+    if not trajectory.obstacles or len(d) != len(trajectory) or len(times) < 3 or not np.isfinite(d).any():
+        return times
+    nearest = float(trajectory.t[int(np.argmin(d))])
+    inner = times[1:-1]
+    inner[int(np.argmin(np.abs(inner - nearest)))] = nearest
+    return np.sort(times)

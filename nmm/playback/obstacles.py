@@ -1,0 +1,179 @@
+"""Obstacles in the page, and a line between the two points that are nearest to each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from nmm.arrays import Array
+from nmm.playback.drawing import Command, Drawing, Rgb, animation, page_times
+from nmm.playback.encoding import encode, packed
+from nmm.playback.extent import corners
+from nmm.playback.keyframes import samples_kept
+from nmm.playback.placements import position_and_quaternion
+from nmm.playback.shapes import shapes, triangles
+from nmm.robots.bodies import Body
+from nmm.robots.motion import Motion
+
+OBSTACLE: Rgb = (0.62, 0.55, 0.38)
+NEAR: Rgb = (0.12, 0.14, 0.18)
+TOO_NEAR: Rgb = (0.83, 0.10, 0.22)
+#: How much of what is behind a half-space's face it covers.
+SHEET = 0.28
+#: The nearest points are shown where they are nearer than this beyond the distance to keep, m.
+REACH = 0.3
+#: A distance counts as kept where it is short by no more than this, m.
+ROUNDING = 1e-6
+
+
+class SceneObstacles:
+    """The obstacles of several motions, each drawn once where motions share it.
+
+    Parameters
+    ----------
+    motions : at least one
+    boxes (motions, K, 2, 3) : around the robots at K instants, m
+    fps : frames for each second of motion
+    """
+
+    def __init__(self, motions: Sequence[Motion], boxes: Array, fps: float) -> None:
+        self._fps = fps
+        self._room = np.array([boxes[..., 0, :].min(axis=(0, 1)), boxes[..., 1, :].max(axis=(0, 1))])
+        self.drawn: list[tuple[Body, Motion]] = []
+        # Of runs that ended early the longer one knows more.
+        for motion in sorted(motions, key=lambda motion: -len(motion.t)):
+            for body in motion.bodies:
+                if not any(_same(body, motion, *other) for other in self.drawn):
+                    self.drawn.append((body, motion))
+
+    def points(self) -> Array:
+        """Corners (K, 3) that a camera has to hold, m: of what comes near the robots' room, not of what is
+        far away, nor of half-spaces."""
+        middle, half = self._room.mean(axis=0), 0.5 * np.ptp(self._room, axis=0)
+        # As much again on each side as the room is wide, so that a wall's end is seen where it is near.
+        around = half + max(0.5 * float(np.linalg.norm(half)), 0.5)
+        found = [np.zeros((0, 3))]
+        for body, motion in self.drawn:
+            box = _box(body)
+            if box is None:
+                continue
+            every = max(1, len(body.places) // 100)
+            places = body.places[samples_kept(motion.t, self._fps)] if len(body.places) > 1 else body.places
+            for place in places[::every]:
+                at = box @ place[:3, :3].T + place[:3, 3]
+                if np.all(at.min(axis=0) < middle + around) and np.all(at.max(axis=0) > middle - around):
+                    found.append(np.clip(at, middle - around, middle + around))
+        return np.vstack(found)
+
+    def draw(self, drawing: Drawing, size: float, start: float) -> list[Command]:
+        """Draw them; returns their animations. size : half the diagonal of what is shown, m."""
+        animations: list[Command] = []
+        for i, (body, motion) in enumerate(self.drawn):
+            path = f"/nmm/obstacle {i}"
+            drawing.transform(path, body.places[0])
+            if isinstance(body.geometry, coal.Halfspace):
+                sheet, top = self._sheet(body, size)
+                drawing.object(f"{path}/sheet", sheet, OBSTACLE, opacity=SHEET, sheet=True)
+            else:
+                for k, shape in enumerate(shapes(pin.GeometryObject(body.name, 0, pin.SE3(), body.geometry))):
+                    drawing.object(f"{path}/{k}", shape.geometry, OBSTACLE)
+                    drawing.transform(f"{path}/{k}", shape.matrix)
+                top = _top(body)
+            drawing.add("obstacle", path=path, name=body.name, color=list(OBSTACLE), top=top.tolist())
+            if len(body.places) > 1:
+                kept = samples_kept(motion.t, self._fps)
+                times, distinct = page_times(motion.t[kept] - start)
+                positions, quaternions = position_and_quaternion(body.places[kept][distinct])
+                animations += animation(path, times, {"position": positions, "quaternion": quaternions})
+        return animations
+
+    def tell(self, drawing: Drawing) -> None:
+        """Their entry in the legend."""
+        if self.drawn:
+            paths = [f"/nmm/obstacle {i}" for i in range(len(self.drawn))]
+            drawing.add("obstacles", paths=paths, color=list(OBSTACLE))
+
+    def _sheet(self, body: Body, size: float) -> tuple[dict[str, Any], Array]:
+        """A square of a half-space's face, in its axes, about the middle of the robots' room, and where its
+        name is written."""
+        place = body.places[0]
+        normal, offset = np.array(body.geometry.n), float(body.geometry.d)
+        middle = place[:3, :3].T @ (self._room.mean(axis=0) - place[:3, 3])
+        middle -= (normal @ middle - offset) * normal
+        across = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
+        across /= np.linalg.norm(across)
+        along = np.cross(normal, across)
+        ends = [middle + size * (a * across + b * along) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.uint32)
+        return triangles(np.array(ends), faces), ends[2]
+
+
+def draw_nearest(
+    drawing: Drawing, motion: Motion, path: str, color: Rgb | None, start: float, fps: float
+) -> None:
+    """The line between a motion's nearest points; of one of several motions in its colour."""
+    found = motion.nearest
+    if found is None or not np.isfinite(found.distance).any():
+        return
+    kept = samples_kept(motion.t, fps)
+    shown = (found.pairs[kept] >= 0) & (found.distance[kept] < found.asked + REACH)
+    if not shown.any():
+        return
+    drawing.add(
+        "nearest",
+        path=f"{path}/nearest",
+        of=motion.label if color is not None else "",
+        color=list(NEAR if color is None else color),
+        alarm=list(TOO_NEAR),
+        times=packed(motion.t[kept] - start, np.float64),
+        points=packed(np.where(shown[:, np.newaxis], found.points[kept], 0.0), np.float64),
+        distance=packed(np.where(shown, found.distance[kept], 1e9), np.float64),
+        pairs=np.where(shown, found.pairs[kept], -1).tolist(),
+        names=list(found.names),
+        asked=found.asked - ROUNDING,
+    )
+
+
+def _same(body: Body, motion: Motion, other: Body, others: Motion) -> bool:
+    """Whether two runs say the same of an obstacle, for as long as both last."""
+    if body.name != other.name or _identity(body) != _identity(other):
+        return False
+    if len(body.places) == len(other.places) == 1:
+        return bool(np.allclose(body.places, other.places))
+    if len(body.places) == 1 or len(other.places) == 1:
+        return False
+    common = min(len(motion.t), len(others.t))
+    return bool(
+        np.allclose(motion.t[:common], others.t[:common])
+        and np.allclose(body.places[:common], other.places[:common])
+    )
+
+
+def _identity(body: Body) -> str:
+    if isinstance(body.geometry, coal.Halfspace):
+        return f"{body.geometry.n} {body.geometry.d}"
+    drawn = shapes(pin.GeometryObject(body.name, 0, pin.SE3(), body.geometry))
+    return " ".join(encode(shape.geometry) for shape in drawn)
+
+
+def _box(body: Body) -> Array | None:
+    """Corners of the box around a shape in its axes, (8, 3), m; None of a half-space, which has none."""
+    if isinstance(body.geometry, coal.Halfspace):
+        return None
+    body.geometry.computeLocalAABB()
+    return corners(np.array([body.geometry.aabb_local.min_, body.geometry.aabb_local.max_]))
+
+
+def _top(body: Body) -> Array:
+    """Above the middle of a shape, in its axes, (3,) m: where its name is written."""
+    box, place = _box(body), body.places[0]
+    if box is None:
+        return np.zeros(3)
+    at = box @ place[:3, :3].T
+    above = at.mean(axis=0)
+    above[2] = at[:, 2].max()
+    return np.asarray(place[:3, :3].T @ above)
