@@ -119,7 +119,7 @@ def test_an_obstacle_set_live_counts_from_then_on(robot):
     q = robot.q(START)
     before = one(0.0, q)
     one.reset()
-    assert not one.blocking()
+    assert not one.report.blocking()
     block.move_to([0.75, 0.0, 0.2])
     after = one(0.0, q)
     assert one.setting.queries.least < 0.2

@@ -205,7 +205,7 @@ def test_limits_that_contradict_each_other_from_the_start_are_named() -> None:
     bounds = [nmm.Bound(x, lower=here + 0.2, name="far"), nmm.Bound(x, upper=here - 0.2, name="near")]
     controller = towards((1.0, 1.0), nmm.Limits(bounds=bounds))
     controller(0.0, START)
-    assert set(controller.contradiction()) == {"far", "near"}
+    assert set(controller.report.contradiction()) == {"far", "near"}
     assert controller.last(0.0, START).excess == pytest.approx(0.1, abs=1e-9)
     (said,) = (one for one in nmm.simulate(controller, START, 0.1, DT).warnings if "near could not" in one)
     assert "what contradicts each other: far, near" in said

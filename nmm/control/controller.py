@@ -10,35 +10,30 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, positive
-from nmm.collisions.rows import no_rows
 from nmm.collisions.setting import Setting
 from nmm.control.bounds import OFF, SAMPLE, STAGE
-from nmm.control.clearance_rows import Clearance
 from nmm.control.collisions import Collisions
-from nmm.control.contradiction import contradicting
-from nmm.control.equations import ANSWER, STEP, Arm, ControlStep, drive, finish, resolve, told
+from nmm.control.equations import ANSWER, STEP, drive, finish, resolve, told
 from nmm.control.equations import step as compiled_step
-from nmm.control.guard import CUTS, MARGIN, Guard
+from nmm.control.failure import reason
+from nmm.control.guard import Guard
 from nmm.control.idle_inputs import idle_inputs, inputs_without_effect
+from nmm.control.layout import lay_out
+from nmm.control.limit_report import LimitReport
 from nmm.control.limits import Limits
-from nmm.control.lost_directions import in_world_axes, lost_directions
 from nmm.control.retreat import Backing, Retreat
 from nmm.control.sample import SampleState
-from nmm.control.steering import NOTHING, Steered, Steering
+from nmm.control.steering import Steered, Steering
 from nmm.control.step import Step
 from nmm.control.step_size import StepSize
-from nmm.control.task_rows import task_functions, task_rows
 from nmm.errors import InputError, SingularError
-from nmm.functions.function import Row, row_scales
+from nmm.functions.function import Row
 from nmm.functions.objectives.base import Objective
-from nmm.functions.program import BESIDE, Program
 from nmm.functions.tasks.task import Stack, Task
 from nmm.kernels.compiled import checked_by_caller
-from nmm.kernels.memory import views
-from nmm.resolvers.answer import RELAXED, Status, added_residual, unanswered
+from nmm.resolvers.answer import Status, added_residual
 from nmm.resolvers.base import Resolver
-from nmm.resolvers.limited import LEFT, instead
-from nmm.resolvers.problem import Problem
+from nmm.resolvers.limited import instead
 from nmm.resolvers.state import State
 from nmm.robots.robot import Robot
 
@@ -68,6 +63,7 @@ class Controller:
     ----------
     setting : the shapes whose distances are kept; None without collisions
     guard : what keeps them; None without collisions
+    report : what limits and distances did in the last call
     before : (m,) the inputs of the call before, from which accelerations count; a call changes it
     steered : the law in force for steering that the task does not feel; None where there is none
     step_size : what chooses α at each sample; None where it is constant
@@ -124,74 +120,17 @@ class Controller:
         law = Steering() if steering is True else steering
         steered: Steered | None = law.on(robot, self.task) if law else None
         self.rows: tuple[Row, ...] = self.task.rows(robot)
-        added_rows = self.added_task.rows(robot)
-
-        weighted = () if objective is None else objective.terms_on(robot)
-        functions, added = task_functions(self.task), task_functions(self.added_task)
-        kept = (Limits(False, False) if limits is None else limits).on(robot)
-        objectives = [function for _, function in weighted]
-        pursued = [] if steered is None else [steered.pursuit]
-        program = Program(robot, [*functions, *added, *objectives, *kept.functions, *pursued])
-        first = program.first_rows
-        tasks = len(functions) + len(added)
-        after = tasks + len(objectives)
-        s, m = len(self.rows), robot.n_u
-        # The extended Jacobian is square with a row for each input that pursuit steers.
-        held = np.zeros((0, m))
-        if steered is not None and len(added_rows) + len(steered.inputs) == m - s:
-            held = np.eye(m)[[robot.input(name) for name in steered.inputs]]
-        elif resolver.takes_added_task:
-            steered = None
-        k = len(added_rows) + len(held)
         self.setting: Setting | None = None if collisions is None else collisions.on(robot)
-        near = no_rows(robot.n) if collisions is None else no_rows(robot.n, collisions.rows, CUTS)
-        problem = Problem(
-            J=np.zeros((s, m)),
-            rate=np.zeros(s),
-            h=np.zeros(m),
-            inputs=robot.u_names,
-            groups=robot.groups,
-            row_scales=row_scales(self.rows, robot),
-            levels=self.task.levels(robot),
-            added_J=np.vstack([np.zeros((len(added_rows), m)), held]),
-            added_rate=np.zeros(k),
-            added_row_scales=np.append(row_scales(added_rows, robot), np.ones(len(held))),
-            limit_rows=np.zeros((len(kept.rows) + len(near.d), m)),
-            limit_levels=[*(self.task.place(priority) for priority in kept.priorities), *(0 for _ in near.d)],
-        )
-        self.kept = kept
-        self._dimensions = dimensions = problem.dimensions
-        setup = resolver.setup(dimensions)
-        self.state: State = resolver.start(dimensions)
-        program.lay_out(
-            ControlStep(
-                near=near,
-                clearance=_clearance(collisions, len(kept.rows), len(near.d)),
-                task=task_rows(self.task, robot, first),
-                added=task_rows(self.added_task, robot, first[len(functions) :]),
-                arm=Arm(robot.arm_coordinates, robot.following.table.ravel()),
-                terms=np.array(first[tasks:after], dtype=np.int64),
-                weights=np.array([weight for weight, _ in weighted]),
-                H=np.array(0.0),
-                problem=problem.arrays,
-                limits=kept.numbers(first[after : after + len(kept.functions)], robot),
-                steering=NOTHING
-                if steered is None
-                else steered.numbers(first[-1], getattr(resolver, "alpha", 1.0)),
-                resolver=resolver.kernel.address,
-                numbers=setup.numbers,
-                options=setup.options,
-                state=self.state.memory,
-                answer=unanswered(m, len(dimensions.levels)),
-                q_dot=np.zeros(robot.n),
-            )
-        )
-        self._program = program
-        self._step = views(ControlStep, *program.blocks, BESIDE)
-        self.state.memory = self._step.state
+        laid = lay_out(robot, self.task, self.added_task, resolver, objective, limits, steered, collisions)
+        self._program, self._step, self._dimensions = laid.program, laid.step, laid.dimensions
+        self.state: State = laid.state
+        self.kept, steered = laid.kept, laid.steered
         self._u = self._step.answer.u
+        self.report = LimitReport(robot, self.kept, self.setting, self._step, self._program)
         self._shape = (robot.n,)
-        self.guard: Guard | None = None if self.setting is None else self._guard(self.setting)
+        self.guard: Guard | None = (
+            None if self.setting is None else Guard(self.setting, self._step, self._program, self._answerer())
+        )
         self._solve = self._solver()
         self.before = self._step.problem.before
         if limits is None and collisions is None:
@@ -202,7 +141,7 @@ class Controller:
             self.backing is not None
             or self.guard is not None
             or resolver.step != "constant"
-            or (limits is not None and kept.needs_dt)
+            or (limits is not None and self.kept.needs_dt)
         )
         self.dt = dt
         self.steered: Steered | None = None
@@ -210,11 +149,11 @@ class Controller:
             self.steered = steered
         self._step.steering.on[()] = int(self.steered is not None)
         if resolver.step != "constant":
-            descended = [(weight, function, 0) for weight, function in weighted]
+            descended = [(weight, function, 0) for weight, function in laid.terms]
             if descended and self.steered is not None:
                 spring = float(self._step.steering.spring)
                 descended.append((spring, self.steered.pursuit, len(self.steered.inputs)))
-            self.step_size = StepSize(robot, resolver, descended, self._step, program.blocks)
+            self.step_size = StepSize(robot, resolver, descended, self._step, self._program.blocks)
         self.sample = SampleState(
             self._step.problem,
             self._step.limits,
@@ -287,40 +226,22 @@ class Controller:
         if self.guard is not None and earlier is not None:
             self.guard.certify(t, q, earlier)
 
-    def _exactly(self, wanted: Array) -> None:
-        """These inputs, which are within the limits of inputs, and none other."""
-        found = self._step
-        problem = found.problem
-        rows = problem.limit_rows @ wanted
-        found.answer.u[:] = wanted
-        found.answer.scale[:] = 0.0
-        found.answer.status[()] = RELAXED
-        found.answer.residual[()] = np.linalg.norm(problem.J @ wanted - found.task.full)
-        beyond = np.maximum(rows - problem.upper, problem.lower - rows).max(initial=0.0)
-        found.answer.excess[()] = beyond if beyond > LEFT else 0.0
-        drive(wanted, self._program.buffers.G, found.arm, found.q_dot)
-        self.before[:] = wanted
-
-    def _guard(self, setting: Setting) -> Guard:
-        found, resolver, dimensions = self._step, self.resolver, self._dimensions
-        blocks = self._program.blocks
-        once = checked_by_caller(resolve, ANSWER)
-        finishes = type(resolver).finish is not Resolver.finish
-
-        def update(t: float, q: Array) -> None:
-            setting.queries.update(t, q, *blocks, BESIDE)
+    def _answerer(self) -> Callable[[Array], float]:
+        """again(q) -> status: the inputs for the equations that are there, once more."""
+        once, blocks = checked_by_caller(resolve, ANSWER), self._program.blocks
+        resolver, finishes = self.resolver, type(self.resolver).finish is not Resolver.finish
 
         def again(q: Array) -> float:
             once(q, *blocks)
             if finishes:
-                resolver.finish(found.problem, dimensions, found.answer)
+                resolver.finish(self._step.problem, self._dimensions, self._step.answer)
                 finish(q, *blocks)
             if self.backing is not None and self.backing.now:
                 self._back_off(self.backing, q)
                 self.before[:] = self._u
-            return float(found.answer.status[()])
+            return float(self._step.answer.status[()])
 
-        return Guard(setting, found, update, again, self._exactly)
+        return again
 
     def _solve_whole(self, t: float, q: Array) -> float:
         """What a sample's inputs are without a retreat, its α chosen; returns the status."""
@@ -382,24 +303,12 @@ class Controller:
 
     def _fail(self, t: float, q: Array) -> None:
         self.robot.q(q)  # a q that is not finite is the caller's error
-        problem = self.robot.platform.problem(q[: self.robot.platform.n_p])
-        status = Status(int(self._step.answer.status[()]))
-        also = "" if problem is None else f"; {problem}"
-        raise SingularError(f"at t = {t:g} s: {status.meaning}{self._reason(status, q)}{also}")
-
-    def _reason(self, status: Status, q: Array) -> str:
-        """What no input gives, where J lost rank; what is not finite, where something is not."""
+        apart = self.robot.platform.problem(q[: self.robot.platform.n_p])
         problem = self._step.problem
-        J = problem.J
-        if status is Status.NOT_FINITE:
-            if all(np.isfinite(part).all() for part in (J, problem.rate, problem.h)):
-                return ": the resolver's answer, though J, rate and h are finite"
-            return ": the task, its reference or the objective is undefined here"
-        if status is not Status.SINGULAR_J or not np.all(np.isfinite(J)):
-            return ""
-        turned = in_world_axes(J, self.task, self.robot, q)
-        lost = lost_directions(turned, self.rows, row_scales(self.rows, self.robot))
-        return f", and the task asks for what no input gives: {', '.join(lost)}" if lost else ""
+        status = Status(int(self._step.answer.status[()]))
+        also = "" if apart is None else f"; {apart}"
+        why = reason(status, problem, self.robot, self.task, q)
+        raise SingularError(f"at t = {t:g} s: {status.meaning}{why}{also}")
 
     def evaluate(self, t: float, q: ArrayLike) -> Step:
         """All quantities at (t, q); a singular matrix is reported in `status`, not raised.
@@ -468,47 +377,6 @@ class Controller:
         """`with controller.without_limits():` it answers as if there were none, and remembers no inputs."""
         return self.sample.aside(OFF)
 
-    def beyond(self) -> dict[str, float]:
-        """The limits of wheels and functions that the last call's inputs break, and by what rate."""
-        problem = self._step.problem
-        rates = problem.limit_rows @ self._u
-        excess = np.maximum(rates - problem.upper, problem.lower - rates)
-        found: dict[str, float] = {}
-        for name, by in zip(self._row_names, excess, strict=True):
-            if by > 1e-9:
-                found[name] = max(float(by), found.get(name, 0.0))
-        return found
-
-    def contradiction(self) -> tuple[str, ...]:
-        """The limits that leave no inputs between them in the last call; () where there are some."""
-        return contradicting(self._step.problem, self.robot.u_names, self._row_names)
-
-    @property
-    def _row_names(self) -> tuple[str, ...]:
-        """What each row of the limits is about, in the last call."""
-        if self.setting is None:
-            return self.kept.rows
-        pairs = self._step.near.pair.tolist()
-        return (*self.kept.rows, *(f"distance of {self.setting.words(pair)}" for pair in pairs))
-
-    def blocking(self) -> tuple[str, ...]:
-        """What the last call's inputs could not come nearer to: pairs whose rows hold them back, by name."""
-        if self.setting is None:
-            return ()
-        problem, near, first = self._step.problem, self._step.near, len(self.kept.rows)
-        count = int(near.used)
-        rates = problem.limit_rows[first : first + count] @ self._u
-        tight = rates - problem.lower[first : first + count] < 1e-6
-        still = near.d[:count] < self.setting.distance + 0.01
-        pairs = near.pair[:count][tight & still].tolist()
-        return tuple(dict.fromkeys(self.setting.words(pair) for pair in pairs))
-
-    def row_values(self) -> Array:
-        """What `kept.rows` names, in the last call: rates of wheels, rad/s, and values of functions."""
-        limits, wheels = self._step.limits, len(self._step.limits.spin)
-        rates = self._step.problem.limit_rows[:wheels] @ self._u
-        return np.concatenate([rates, self._program.buffers.value[limits.rows]])
-
     def reset(self) -> None:
         """Forget what the resolver remembers and the inputs before: the next call decides anew, from rest."""
         self.state.reset()
@@ -531,20 +399,6 @@ class Controller:
         """(solve, J) for loops over many configurations: solve(t, q) does a step, whose matrix is then in the
         view J (s, m). q is (n,), float64, contiguous; nothing is checked."""
         return self._solve, self._step.problem.J
-
-
-def _clearance(collisions: Collisions | None, first: int, count: int) -> Clearance:
-    """How distances are kept, as a step reads it."""
-    braking = None if collisions is None else collisions.braking
-    return Clearance(
-        first=np.array(first, dtype=np.int64),
-        distance=np.array(0.0 if collisions is None else collisions.distance),
-        margin=np.array(MARGIN),
-        gain=np.array(0.0 if collisions is None else collisions.gain),
-        recovery=np.array(0.0 if collisions is None else collisions.recovery),
-        braking=np.array(np.nan if braking is None else braking),
-        least=np.full(count, -np.inf),
-    )
 
 
 def _expect(given: object, kind: type, name: str) -> None:

@@ -17,8 +17,10 @@ import numpy as np
 from nmm.arrays import Array
 from nmm.collisions.lookout import Lookout, Short
 from nmm.collisions.setting import Setting
-from nmm.control.equations import ControlStep
-from nmm.resolvers.answer import Status
+from nmm.control.equations import ControlStep, drive
+from nmm.functions.program import BESIDE, Program
+from nmm.resolvers.answer import RELAXED, Status
+from nmm.resolvers.limited import LEFT
 
 #: Rows keep distances by MARGIN more than asked for, m; ways have to keep them by SLACK more: between
 #: looks they may dip.
@@ -45,6 +47,12 @@ class Counts(NamedTuple):
 class Guard:
     """A controller's part for distances.
 
+    Parameters
+    ----------
+    setting : what is kept apart
+    step, program : what the controller computes with, in memory
+    again : again(q) -> status: the inputs for the equations that are there, once more
+
     Attributes
     ----------
     counts : what it had to do
@@ -55,13 +63,12 @@ class Guard:
         self,
         setting: Setting,
         step: ControlStep,
-        update: Callable[[float, Array], None],
+        program: Program,
         again: Callable[[Array], float],
-        instead: Callable[[Array], None],
     ) -> None:
         self._setting, self._queries = setting, setting.queries
         self._near, self._keep, self._step = step.near, step.clearance, step
-        self._update, self._again, self._instead = update, again, instead
+        self._program, self._again = program, again
         self._lookout = Lookout(
             setting.queries, step.limits.acceleration, setting.distance, setting.distance + SLACK
         )
@@ -78,7 +85,7 @@ class Guard:
         if self._cut:
             self._keep.least[:] = -np.inf
             self._cut = False
-        self._update(t, q)
+        self._queries.update(t, q, *self._program.blocks, BESIDE)
 
     def clear(self, moved: float) -> bool:
         """Whether all was farther away than coordinates reach that move so far, m and rad."""
@@ -138,6 +145,19 @@ class Guard:
         if least > 0.0:
             self._count("short")
         self._instead(best)
+
+    def _instead(self, wanted: Array) -> None:
+        """These inputs, which are within the limits of inputs, and none other."""
+        found, problem = self._step, self._step.problem
+        rows = problem.limit_rows @ wanted
+        found.answer.u[:] = wanted
+        found.answer.scale[:] = 0.0
+        found.answer.status[()] = RELAXED
+        found.answer.residual[()] = np.linalg.norm(problem.J @ wanted - found.task.full)
+        beyond = np.maximum(rows - problem.upper, problem.lower - rows).max(initial=0.0)
+        found.answer.excess[()] = beyond if beyond > LEFT else 0.0
+        drive(wanted, self._program.buffers.G, found.arm, found.q_dot)
+        problem.before[:] = wanted
 
     def _add_row(self, t: float, q: Array, short: Short) -> bool:
         """A row for the points that come too near; whether there was room for it."""

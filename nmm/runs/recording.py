@@ -146,7 +146,7 @@ class Recorder:
             self._scale = np.ones((len(self._times), len(sample.scale)))
         self._scale[k] = sample.scale
         if self._limited.shape[1]:
-            self._limited[k] = self._controller.row_values()
+            self._limited[k] = self._controller.report.row_values()
         self._partition[k] = sample.partition
         self._step_size[k] = sample.step_size
         self._unanswered[k] = sample.status is Status.FALLBACK
@@ -154,14 +154,14 @@ class Recorder:
         self._added[k] = sample.added_residual
         self._beyond.pop(k, None)
         if sample.excess > 0.0:
-            self._beyond[k] = beyond = self._controller.beyond()
+            self._beyond[k] = beyond = self._controller.report.beyond()
             if not beyond.keys() <= self._against.keys():
-                against = ", ".join(self._controller.contradiction())
+                against = ", ".join(self._controller.report.contradiction())
                 self._against |= dict.fromkeys(beyond.keys() - self._against.keys(), against)
 
     def guarded(self, controller: Controller) -> None:
         """What the controller kept off at the end of the run, and what that took."""
-        self.blocking = controller.blocking()
+        self.blocking = controller.report.blocking()
         self._counts = Counts() if controller.guard is None else controller.guard.counts
 
     def warn_once(self, t: float, warning: str) -> None:
