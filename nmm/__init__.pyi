@@ -30,6 +30,7 @@ from .errors import SingularError as SingularError
 from .functions.function import Function as Function
 from .functions.objectives import Alignment as Alignment
 from .functions.objectives import CallableObjective as CallableObjective
+from .functions.objectives import Clearance as Clearance
 from .functions.objectives import DirectionalManipulability as DirectionalManipulability
 from .functions.objectives import InverseCondition as InverseCondition
 from .functions.objectives import JointRange as JointRange

@@ -111,6 +111,7 @@ OBJECTIVES = Kinds(
     directional_manipulability="nmm.functions.objectives.directional_manipulability:DirectionalManipulability",
     inverse_condition="nmm.functions.objectives.inverse_condition:InverseCondition",
     potential_energy="nmm.functions.objectives.potential_energy:PotentialEnergy",
+    clearance="nmm.functions.objectives.clearance:Clearance",
 )
 RESOLVERS = Kinds(
     "resolver",

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
+from nmm.control.collisions import Collisions
 from nmm.functions.function import Function
 from nmm.functions.objectives.base import Objective
+from nmm.functions.objectives.clearance import Clearance
 from nmm.functions.objectives.quadratic import Quadratic, Square
 from nmm.kinds import OBJECTIVES
 from nmm.robots.robot import Robot
@@ -18,6 +20,8 @@ from nmm.scenario.keys import FUNCTION, NUMBER, Part, at, one_of
 from nmm.scenario.made_part import MadePart, part_of
 from nmm.scenario.numbers import Number, Positive
 from nmm.scenario.spelling import Combination
+
+USUAL = Clearance()
 
 
 def _spelled(value: object) -> str:
@@ -44,11 +48,16 @@ class ObjectivePart(MadePart):
     )
     maximise: bool = Field(False, description="whether to maximise it: its negative is minimised")
 
-    def build(self, robot: Robot) -> Objective:
+    def among(self, collisions: Collisions | None) -> Objective:
+        """The objective of a run that keeps these distances."""
+        objective: Objective = self.make()
+        return objective
+
+    def build(self, robot: Robot, collisions: Collisions | None = None) -> Objective:
         """The weighted objective; errors know their key."""
         check_names(self, robot)
         check_functions(self, robot)
-        objective: Objective = self.make()
+        objective = self.among(collisions)
         with self.own_keys():
             for _, term in objective.terms_on(robot):
                 term.stages(robot)
@@ -87,14 +96,36 @@ class QuadraticPart(ObjectivePart):
     def make(self, unit: str = "m") -> Objective:
         return Quadratic(*(Square(term.of, term.aim(i), term.weight) for i, term in enumerate(self.terms)))
 
-    def build(self, robot: Robot) -> Objective:
+    def build(self, robot: Robot, collisions: Collisions | None = None) -> Objective:
         for i, term in enumerate(self.terms):
             with at("terms", i, "of"):
                 check_coordinates([term.of], robot)
             if isinstance(term.target, FunctionPart):
                 with at("terms", i, "target"):
                     term.target.build(robot, "rad")
-        return super().build(robot)
+        return super().build(robot, collisions)
+
+
+class ClearancePart(ObjectivePart):
+    """Grows where the robot comes near to the obstacles of `collisions`, so that it turns away early."""
+
+    makes = Clearance
+    kind: Literal["clearance"]
+    reach: Positive = Field(
+        USUAL.reach, description="how far beyond the distance to keep a pair of shapes is felt, m"
+    )
+    own: bool = Field(USUAL.own, description="whether the robot keeps off itself, too")
+    ahead: Number | None = Field(
+        None,
+        description="how far ahead the robot is looked at, too, m, below 0 for one that drives backwards; "
+        "when not given, 1 with wheels that have to roll to turn (a car's) and 0 with others",
+    )
+
+    def make(self, unit: str = "m") -> Clearance:
+        return Clearance(None, self.reach, self.own, self.ahead)
+
+    def among(self, collisions: Collisions | None) -> Objective:
+        return self.make() if collisions is None else self.make().among(collisions)
 
 
 class MaximisedPart(ObjectivePart):
@@ -103,7 +134,7 @@ class MaximisedPart(ObjectivePart):
     maximise: bool = Field(True, description="whether to maximise it: its negative is minimised")
 
 
-SPECIAL: dict[str, type[ObjectivePart]] = {"quadratic": QuadraticPart}
+SPECIAL: dict[str, type[ObjectivePart]] = {"quadratic": QuadraticPart, "clearance": ClearancePart}
 BASES = dict.fromkeys(
     ("manipulability", "weighed_manipulability", "directional_manipulability", "inverse_condition"),
     MaximisedPart,
@@ -130,11 +161,13 @@ else:
     ObjectiveList = Annotated[list[one_of(OBJECTIVE_PARTS)], BeforeValidator(_listed)]
 
 
-def build_objective(parts: list[ObjectivePart], robot: Robot) -> Objective | None:
-    """The sum of the parts, if there are any."""
+def build_objective(
+    parts: list[ObjectivePart], robot: Robot, collisions: Collisions | None = None
+) -> Objective | None:
+    """The sum of the parts, if there are any; `collisions` are those of the run."""
     total: Objective | None = None
     for i, part in enumerate(parts):
         with at(i):
-            objective = part.build(robot)
+            objective = part.build(robot, collisions)
         total = objective if total is None else total + objective
     return total

@@ -101,13 +101,13 @@ class ScenarioPart(Part):
                 raise InputError(
                     f"expected at most {robot.n_u} rows{of}, as many as inputs ({names}), got {first}"
                 )
-        with at("objective"):
-            objective = build_objective(self.objective, robot)
         with at("limits"):
             limits = None if self.limits is None else self.limits.build(robot)
         with at("collisions"):
             place = ("collisions",)
             collisions = None if self.collisions is None else self.collisions.build(robot, absolute, place)
+        with at("objective"):
+            objective = build_objective(self.objective, robot, collisions)
         with at("retreat"):
             goal = None if self.until is None else self.until.make()
             retreat = None if self.retreat is None else self.retreat.build(robot, goal)

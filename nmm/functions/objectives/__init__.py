@@ -3,6 +3,7 @@
 from nmm.functions.objectives.alignment import Alignment
 from nmm.functions.objectives.base import Objective, Sum
 from nmm.functions.objectives.callable_objective import CallableObjective
+from nmm.functions.objectives.clearance import Clearance
 from nmm.functions.objectives.directional_manipulability import DirectionalManipulability
 from nmm.functions.objectives.inverse_condition import InverseCondition
 from nmm.functions.objectives.joint_range import JointRange
@@ -15,6 +16,7 @@ from nmm.functions.objectives.quadratic import Quadratic, Square
 __all__ = [
     "Alignment",
     "CallableObjective",
+    "Clearance",
     "DirectionalManipulability",
     "InverseCondition",
     "JointRange",
