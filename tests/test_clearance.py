@@ -33,32 +33,28 @@ def robots():
 
 
 @pytest.mark.parametrize("name", ["unicycle", "car", "omni"])
-def test_the_gradient_is_that_of_differences_but_where_nearest_points_jump(robots, name):
+def test_the_gradient_is_that_of_differences(robots, name):
     robot = robots[name]
     clearance = nmm.Clearance(nmm.Collisions(obstacles=obstacles()), reach=1.0, ahead=0.8)
     program = Program(robot, [clearance])
     program.lay_out()
-    h, seen, jumped = 1e-5, 0, 0
+    h, off = 1e-5, []
     for q in sampled(robot, 40, seed=4):
         q[:2] *= 0.5
         found = program.evaluate(0.0, q)[0]
-        steps = [
+        behind, ahead = (
             np.array([program.evaluate(0.0, q + side * h * one)[0].value[0] for one in np.eye(robot.n)])
             for side in (-1.0, 1.0)
-        ]
-        behind, ahead = (found.value[0] - steps[0]) / h, (steps[1] - found.value[0]) / h
+        )
         if found.value[0] == 0.0:
             assert not found.value_q.any()
             continue
-        seen += 1
         size = max(1.0, np.abs(found.value_q).max())
-        if np.abs(ahead - behind).max() > 2e-2 * size:  # a kink; H'' h and Coal's last digits make 2e-3
-            jumped += 1
-            continue
-        central = (ahead + behind) / 2.0
-        assert np.abs(found.value_q[0] - central).max() < 1e-2 * size
-    assert seen >= 30
-    assert jumped <= seen // 3
+        off.append(np.abs((ahead - behind) / (2.0 * h) - found.value_q[0]).max() / size)
+    assert len(off) >= 30
+    # Where shapes are curved, Coal's normals are right to 1e-4.
+    assert np.median(off) < 1e-5
+    assert max(off) < 1e-3
 
 
 def test_a_moving_obstacle_changes_it_in_time(robots):
