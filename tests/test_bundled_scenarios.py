@@ -47,7 +47,7 @@ DAMPED = {
     "unicycle_2r_algorithmic": "the added task was not done",
 }
 #: The task gives way to what is in its way, or to limits where it begins anew, and is done at the end.
-GIVE_WAY = ("omni_small_arm_door", "unicycle_3r_crossing", "unicycle_3r_sequence")
+GIVE_WAY = ("car_parks", "omni_small_arm_door", "unicycle_3r_crossing", "unicycle_3r_sequence")
 #: Its target is 0.4 m above what the arm reaches.
 MISSED = "unicycle_3r_out_of_reach"
 
@@ -69,7 +69,7 @@ def test_every_bundled_scenario_runs_to_its_end(runs: dict[str, nmm.Trajectory])
         if name in DAMPED:
             assert DAMPED[name] in " ".join(run.warnings), name
         elif name in GIVE_WAY:
-            assert "did not do all that the task asked" in run.warnings[0], name
+            assert any("did not do all that the task asked" in one for one in run.warnings), name
             assert run.error_norm[-1] < 1e-3, name
             continue
         else:
@@ -185,3 +185,30 @@ def test_weights_say_who_does_the_work(resolver: str) -> None:
     else:  # which keeps a partition that is good enough: the arm alone until it is stretched, then v helps
         assert moved["platform"][0] < moved["arm"][0]
         assert moved["arm"][1] < 0.3 * moved["platform"][1]
+
+
+def test_the_car_comes_into_its_place_while_the_hand_stays(runs: dict[str, nmm.Trajectory]) -> None:
+    """Its pose is the place's, to 1 mm and 1 mrad, though no row is its heading; from other starts, too."""
+    scenario = Scenario.load("car_parks")
+    for start in ({}, {"y": 0.24, "theta": 0.1}, {"x": 0.2, "theta": -0.05}):
+        moved = scenario.override("dt", 0.02)
+        for name, value in start.items():
+            moved = moved.override(f"q0.{name}", value)
+        run = moved.run() if start else runs["car_parks"]
+        assert run.complete
+        assert [event.what for event in run.events] == ["ends", "begins"] * 3
+        assert np.abs(run.q[-1, :3]).max() < 1e-3
+        assert (
+            np.abs(np.diff(np.sign(run.u[:, 0][np.abs(run.u[:, 0]) > 0.05]))).sum() == 6.0
+        )  # three turns back
+        held = np.linalg.norm(run.error[:, :3], axis=1)
+        assert np.all(held <= held[0] + 1e-5)  # the point, m: as from where it began
+        assert start or run.scale[:, 0].min() > 0.99
+        assert np.abs(run.q[:, 3]).max() < 0.6
+        assert np.abs(run.u[:, 0]).max() <= 0.5 + 1e-12
+    assert held[0] > 0.1  # the last one began elsewhere
+    # Without the rows that lead it onto the line it stays beside its place.
+    straight = scenario.override("dt", 0.02)
+    for k in range(3, 7):
+        straight = straight.override(f"task.{k}.of", [{"steering": 1}, "x"])
+    assert straight.run().q[-1, 1] == pytest.approx(0.28, abs=1e-9)

@@ -256,6 +256,93 @@ def test_points_held_one_after_another_are_marks_not_a_path() -> None:
     assert moved.marks == pytest.approx(np.array([[-3.0, 3.0, 0.8]]))
 
 
+@pytest.mark.parametrize("method", ["rk4", "zoh"])
+def test_a_retreat_goes_on_over_events_and_is_told_once(method: str) -> None:
+    """A robot that backs off does no task: a lower one that begins meanwhile changes nothing of it."""
+    far = reach("far", (1.4, 0.3, 3.0))
+    given = {"limits": nmm.Limits(acceleration=A), "retreat": nmm.Retreat()}
+    damped = nmm.DampedLeastSquares(alpha=1.0)
+    plain = nmm.simulate(nmm.Controller(ROBOT, far, damped, **given), START, 3.2, 0.02, method)
+    lower = aim(nmm.Between(1.5, 2.2))
+    run = nmm.simulate(
+        nmm.SequencedController(ROBOT, [far, lower], damped, **given), START, 3.2, 0.02, method
+    )
+    assert told(run) == [(1.5, "aim", "begins"), (2.2, "aim", "ends")]
+    backed_off = [one.split("backed off, at ")[1] for one in plain.warnings if "backed off" in one]
+    assert backed_off == ["t = 1.26 s, 2.76 s"]
+    while_off = plain.t < 2.26  # from 1.26 s for a second
+    np.testing.assert_allclose(run.u[while_off], plain.u[while_off], rtol=0, atol=1e-9)
+    said = [one for one in run.warnings if "backed off" in one]
+    assert len(said) == 1
+    assert said[0].startswith("with far from t = 0 to 1.5 s: ")
+    assert said[0].endswith("at t = 1.26 s; likewise with the tasks from t = 2.2 s on")
+
+
+@pytest.mark.parametrize("then", ["by time", "converged"])
+def test_an_adaptive_method_sees_the_events_of_one_with_fixed_steps(then: str) -> None:
+    """Steps end at samples, where conditions are looked at: no step goes over an event."""
+    tasks = {
+        "by time": [reach(), aim(nmm.Between(0.5, 1.1))],
+        "converged": [reach(), reach("then", (1.0, 0.4, 1.0), when=nmm.After("reach", 0.02, instead=True))],
+    }[then]
+    adaptive = nmm.simulate(controlled(*tasks), START, 2.5, 0.05, "adaptive")
+    fixed = nmm.simulate(controlled(*tasks), START, 2.5, 0.005)
+    assert adaptive.complete
+    assert adaptive.warnings == ()
+    if then == "by time":
+        assert told(adaptive) == told(fixed)
+        np.testing.assert_allclose(adaptive.q, fixed.q[::10], rtol=0, atol=1e-8)
+    else:  # a coarser grid of samples sees it later, by less than two of them
+        assert [one[1:] for one in told(adaptive)] == [one[1:] for one in told(fixed)]
+        assert 0.0 <= told(adaptive)[0][0] - told(fixed)[0][0] < 0.1
+        same = nmm.simulate(controlled(*tasks), START, 2.5, 0.05)
+        assert told(adaptive) == told(same)
+        np.testing.assert_allclose(adaptive.q, same.q, rtol=0, atol=1e-5)
+    with pytest.raises(nmm.InputError, match="expected rk4, midpoint, euler or zoh"):
+        nmm.simulate(controlled(*tasks, limits=nmm.Limits(acceleration=A)), START, 1.0, DT, "adaptive")
+
+
+def test_what_legs_have_in_common_is_told_once() -> None:
+    """Three targets too far for a slow robot: one warning a kind, with when the legs began."""
+    slow = nmm.Limits(velocity={"platform": 0.3, "arm": 0.3})
+    goals = [(2.0, 0.3, 0.8), (2.5, 0.3, 0.8), (3.0, 0.3, 0.8)]
+    tasks = [reach("a", goals[0], when=nmm.Between(0, 1)), reach("b", goals[1], when=nmm.Between(1, 2))]
+    tasks.append(reach("c", goals[2], when=nmm.Between(2)))
+    run = nmm.simulate(controlled(*tasks, limits=slow), START, 12.0, 0.02)
+    assert run.complete
+    kinds = [one.split(": ", 1)[1][:30] for one in run.warnings]
+    assert len(set(kinds)) == len(kinds)
+    first = next(one for one in run.warnings if "did not do all" in one)
+    assert first.startswith("with a from t = 0 to 1 s: the inputs did not do all")
+    assert first.endswith("likewise with the tasks from t = 1 and 2 s on")
+
+
+@pytest.mark.parametrize("lazy", [0, 4, 3], ids=["none", "first leg", "last leg"])
+def test_a_leg_is_judged_from_its_beginning_and_the_one_that_did_too_little_is_named(lazy: int) -> None:
+    """A target that goes away once its task has ended is nobody's fault; rates not given are told."""
+
+    def resolved(problem: nmm.Problem) -> np.ndarray:
+        share = 0.3 if len(problem.rate) == lazy else 1.0
+        return share * np.linalg.pinv(problem.J) @ problem.rate
+
+    away = nmm.CallableReference(
+        lambda t: [0.5 + 4.0 * max(t - 1.0, 0.0)], 1, rate=lambda t: [4.0 * (t > 1.0)], unit="rad"
+    )
+    swing = nmm.Task(nmm.Coordinates("q3"), away, 5.0, name="swing", when=nmm.Between(0.0, 1.0))
+    run = nmm.simulate(
+        nmm.SequencedController(ROBOT, [reach(), swing], nmm.CallableResolver(resolved)), START, 4.0, DT
+    )
+    assert run.error_norm[-1] == pytest.approx(np.linalg.norm(run.error[-1, :3]))  # of what is then active
+    assert run.summary()["error_final"] == run.error_norm[-1]
+    called = {0: "", 4: "with reach and swing from t = 0 to 1 s", 3: "with reach from t = 1 to 4 s"}[lazy]
+    if lazy == 3:
+        assert run.outcome is nmm.Outcome.MISSED
+        assert run.message.startswith(f"{called}: the task error was not what its gain promises from t = 1")
+    else:  # an event ended the leg before it had to be where it was promised
+        assert (run.outcome, run.message) == (nmm.Outcome.COMPLETED, "")
+    assert {one.split(": ")[0] for one in run.warnings} == ({called} if lazy else set())
+
+
 def test_a_distance_is_kept_across_events() -> None:
     """A post stands on the way; the least distance is swept over the events, too."""
     post = nmm.Obstacle(nmm.Cylinder(0.1, 3.0), [1.5, 0.0, 0.5])

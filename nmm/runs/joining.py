@@ -15,6 +15,7 @@ from nmm.control.sequenced import SequencedController
 from nmm.runs.clearance import swept
 from nmm.runs.judgement import Ended, Verdict, blocked, reached_or_not
 from nmm.runs.recording import Recorder, frame_path, shown
+from nmm.runs.repeated import told_once
 from nmm.runs.residuals import NONE, Residuals
 from nmm.runs.trajectory import Outcome, Trajectory
 from nmm.words import listed
@@ -46,7 +47,7 @@ def join(
     """One trajectory of all tasks' rows: not a number where a task is not active."""
     robot, stack = controller.robot, controller.all_tasks
     verdict = _verdict(controller, legs, until)
-    parts = []
+    parts: list[Trajectory] = []
     for leg in legs:
         one = leg.verdict or Verdict(leg.ended.outcome, leg.ended.message, [])
         parts.append(leg.recorder.trajectory(one.outcome, one.message, dt, method))
@@ -70,7 +71,14 @@ def join(
             whole[here, columns] = own
         places = sorted({stack.tasks[i].priority for i in on})
         scale[here, [levels.index(priority) for priority in places]] = part.scale
-    warnings = [warning for part in parts for warning in part.warnings] + verdict.warnings
+    # What a leg's recorder has to say is complete only once its trajectory is made.
+    warnings = told_once(
+        [
+            (_called(controller, leg, legs), leg.recorder.start, [*part.warnings, *_judged(leg)])
+            for leg, part in zip(legs, parts, strict=True)
+        ]
+    )
+    warnings += verdict.warnings
 
     def along(name: str) -> Array:
         return np.concatenate([getattr(part, name) for part in parts])
@@ -137,33 +145,39 @@ def _names(controller: SequencedController) -> tuple[str, ...]:
 
 
 def _verdict(controller: SequencedController, legs: Sequence[Leg], until: Goal | None) -> Verdict:
-    """How the run ended; of legs that kept no promise, the first; what each is warned of, and when it was."""
+    """How the run ended; of legs that kept no promise, the first. It warns of what concerns the whole run."""
     sequence, moment = controller.sequence, controller.settle()
     last = legs[-1].verdict or Verdict(legs[-1].ended.outcome, legs[-1].ended.message, [])
-    warnings: list[str] = []
-    worst: Verdict | None = None
-    for leg in legs:
-        if leg.verdict is None:
-            continue
-        names = [name for name, on in zip(sequence.names, leg.active, strict=True) if on]
-        place = (
-            f"with {listed(names)} from t = {leg.recorder.start:.4g} s: " if len(legs) > 1 and names else ""
-        )
-        warnings += [place + warning for warning in leg.verdict.warnings]
-        if leg.verdict.outcome in (Outcome.MISSED, Outcome.UNSTABLE) and worst is None:
-            worst = Verdict(leg.verdict.outcome, place + leg.verdict.message, [])
+    missed = [
+        one._replace(message=_called(controller, leg, legs) + one.message)
+        for leg in legs
+        if (one := leg.verdict) is not None and one.outcome in (Outcome.MISSED, Outcome.UNSTABLE)
+    ]
     ended = last.outcome in (Outcome.COMPLETED, Outcome.MISSED, Outcome.UNSTABLE)
-    verdict = worst if ended and worst is not None else last
-    verdict = Verdict(verdict.outcome, verdict.message, warnings)
+    verdict = (missed[0] if ended and missed else last)._replace(warnings=[])
     never = sequence.never_began(moment)
     if until is not None and ended:
         if never or not any(legs[-1].active):
             why = "; ".join(never) or "no task was active at the end"
-            verdict = Verdict(Outcome.MISSED, f"not reached: {why}", warnings)
+            verdict = Verdict(Outcome.MISSED, f"not reached: {why}", [])
         else:
             verdict = reached_or_not(verdict, legs[-1].recorder, until, legs[-1].controller.rows)
     verdict = blocked(verdict, legs[-1].recorder.blocking)
     return Verdict(verdict.outcome, verdict.message, [*verdict.warnings, *never])
+
+
+def _called(controller: SequencedController, leg: Leg, legs: Sequence[Leg]) -> str:
+    """Which leg, before what is said of it: "with reach from t = 0 to 2 s: "; "" where it is the run."""
+    if len(legs) == 1:
+        return ""
+    names = [name for name, on in zip(controller.sequence.names, leg.active, strict=True) if on]
+    recorder = leg.recorder
+    end = leg.end if recorder.goes_on else recorder.reached
+    return f"with {listed(names) or 'no task'} from t = {recorder.start:.4g} to {end:.4g} s: "
+
+
+def _judged(leg: Leg) -> list[str]:
+    return [] if leg.verdict is None else leg.verdict.warnings
 
 
 def _unmet(found: Sequence[Residuals], count: int) -> Residuals:

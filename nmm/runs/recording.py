@@ -38,6 +38,7 @@ class Recorder:
     Attributes
     ----------
     goes_on : whether the run goes on after the last sample, with other tasks
+    backed_off : how often the robot had backed off before the first sample, with other tasks
     """
 
     def __init__(self, controller: Controller, times: Array) -> None:
@@ -70,6 +71,7 @@ class Recorder:
         self._counts = Counts()
         self._places: list[tuple[Any, ...]] = []
         self.goes_on = False
+        self.backed_off = 0
 
     def __len__(self) -> int:
         return self._count
@@ -193,7 +195,7 @@ class Recorder:
                 f"{max(broken.values()):.3g} a second"
                 f"{f' (what contradicts each other: {against})' if (against := self._against[name]) else ''}"
             )
-        backed_off = times[np.diff(self._retreats[: len(self)], prepend=0) > 0]
+        backed_off = times[np.diff(self._retreats[: len(self)], prepend=self.backed_off) > 0]
         if len(backed_off):
             at = ", ".join(f"{t:.3g} s" for t in backed_off)
             self.warnings.append(f"the error stalled and the robot backed off, at t = {at}")

@@ -249,6 +249,7 @@ def _record(
     controller.reset()
     if leg is not None:
         controller.sample.restore(leg.handed)
+        recorder.backed_off = 0 if controller.backing is None else controller.backing.count
     try:
         _integrate(controller, advance, recorder, times, q, progress, until, leg)
     except SingularError as error:
