@@ -300,3 +300,17 @@ def test_laps_that_end_in_the_middle_of_the_first_are_written(
     lines = (out / "laps.csv").read_text(encoding="utf-8").splitlines()
     assert [line.split(",")[:2] for line in lines[1:]] == [["rg", "0"]]
     assert (out / "rg" / "trajectory.npz").exists()
+
+
+def test_tasks_that_come_and_go_are_told_to_be_left_out(capsys: Printed) -> None:
+    """Those are looked at that are active at the start, or where a condition on q holds."""
+    redundancy("unicycle_3r_sequence")
+    seen = capsys.readouterr()
+    assert "this is about first, active there at t = 0 s, and not about second and turn" in seen.err
+    assert "s = 3 rows of the task" in seen.out
+    redundancy("unicycle_3r_sequence", at=["x=-3", "y=2.5"])
+    seen = capsys.readouterr()
+    assert "this is about first and turn, active there" in seen.err
+    assert "base_footprint.heading" in seen.out
+    redundancy("unicycle_3r_position")
+    assert capsys.readouterr().err == ""

@@ -96,6 +96,8 @@ def studied(
             raise InputError(f"--at: {name} is locked, and no coordinate then")
         q[robot.coordinate(name)] = scalar(value, f"--at: {name}")
     first = 0.0 if run is None or not len(run) else float(run.t[0])
+    if not given and own is not None:
+        _decide(own, first if t is None else t, q)
     return Studied(
         name=robot.name if scenario is None else scenario.name,
         robot=robot,
@@ -106,6 +108,26 @@ def studied(
         trajectory=run,
         scenario=scenario,
     )
+
+
+def _decide(controller: Controller, t: float, q: Array) -> None:
+    """Of tasks that come and go, those active at t (s) and q (n,) are looked at; the others are told."""
+    from nmm.cli.output import warn
+    from nmm.control.sequenced import SequencedController
+    from nmm.words import listed
+
+    if not isinstance(controller, SequencedController):
+        return
+    controller.changes(t, q)
+    controller.switch()
+    names, active = controller.sequence.names, controller.moment.active
+    off = [name for name, on in zip(names, active, strict=True) if not on]
+    if off:
+        seen = listed([name for name, on in zip(names, active, strict=True) if on]) or "no task"
+        warn(
+            f"tasks come and go: this is about {seen}, active there at t = {t:g} s, "
+            f"and not about {listed(off)}"
+        )
 
 
 def _opened(
