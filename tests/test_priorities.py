@@ -139,3 +139,32 @@ def test_limits_that_are_kept_if_possible_bind_and_disturb_no_task() -> None:
 
     assert highest(run) <= -1.4 + 1e-3  # its direction turns
     assert highest(free) > -1.35  # without the limits they look elsewhere
+
+
+def test_the_extended_jacobian_names_the_level_that_contradicts_and_damps_it() -> None:
+    """A distance that the hand's position decides: the added task is then one more level, as of `pg`."""
+    robot = nmm.load("unicycle_3r")
+    hand = nmm.Task(nmm.Position("ee"), [1.2, 0.3, 0.8], 1.0)
+    far = nmm.Task(nmm.Distance("ee", [0, 0, 0]), [1.0], priority=2, name="far")
+    bend = nmm.Task(nmm.Coordinates("q2"), [0.5])
+    q = robot.q({"q1": 0.4, "q2": 0.6, "q3": 0.9})
+    stops = nmm.Controller(robot, [hand, far], nmm.ExtendedJacobian(), added_task=bend)
+    with pytest.raises(
+        nmm.SingularError, match=r"ee\.distance; level 2 \(far\) asks for what the levels above"
+    ):
+        stops(0.0, q)
+    damped = nmm.ExtendedJacobian(singular="damped")
+    step = nmm.Controller(robot, [hand, far], damped, added_task=bend).evaluate(0.0, q)
+    levels = [hand, far, nmm.Task(bend.function, bend.reference, priority=3)]
+    three = nmm.Controller(robot, levels, nmm.ProjectedGradient()).evaluate(0.0, q)
+    assert step.status is Status.RELAXED
+    assert step.scale[1] < 1.0 == step.scale[0]
+    np.testing.assert_allclose(step.u, three.u, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(step.J[:3] @ step.u, step.rate[:3], rtol=0, atol=1e-12)
+    assert step.u[robot.input("q2")] == pytest.approx(0.5 - 0.6)
+    # Where no level contradicts another it is J_e's answer, to the bit.
+    look = nmm.Task(nmm.Coordinates("q1"), [0.0], priority=2)
+    u = [
+        nmm.Controller(robot, [hand, look], one, added_task=bend)(0.0, q) for one in (damped, stops.resolver)
+    ]
+    assert np.array_equal(u[0], u[1])

@@ -11,7 +11,15 @@ from nmm.errors import InputError, expect_known
 from nmm.kernels.compiled import Kernel, clear, compiled, integer_scratch, kernel, scratch, view
 from nmm.kernels.damping import BELOW, DIRECTIONS, LARGEST, damped_solution
 from nmm.kernels.linear_algebra import closest_solution, eliminate, orthonormal_rows, project_out
-from nmm.resolvers.answer import RELAXED, SINGULAR_J, SINGULAR_JE, SOLVED, AnswerArrays, certify
+from nmm.resolvers.answer import (
+    INEXACT,
+    RELAXED,
+    SINGULAR_J,
+    SINGULAR_JE,
+    SOLVED,
+    AnswerArrays,
+    certify,
+)
 from nmm.resolvers.base import RESOLVER, Resolver, Setup
 from nmm.resolvers.limited import limit, within
 from nmm.resolvers.problem import Dimensions, ProblemArrays
@@ -63,8 +71,11 @@ def extended_jacobian(
 def damped_beside(problem: ProblemArrays, tolerance: float, answer: AnswerArrays) -> bool:
     """The task exactly, the added task by damped least squares in its null space; False where none is needed.
 
-    J_e loses rank with J or with J_added (I - J⁺ J), rows in their scales: the second is damped.
+    J_e loses rank with J or with J_added (I - J⁺ J), rows in their scales: the second is damped. Where the
+    task has levels the added task is one more below them, and all are damped as levels are.
     """
+    if problem.ends.shape[0] > 1:
+        return damped_levels(problem, answer)
     J, added_J, u = problem.J, problem.added_J, answer.u
     s, m = J.shape
     k = added_J.shape[0]
@@ -92,6 +103,37 @@ def damped_beside(problem: ProblemArrays, tolerance: float, answer: AnswerArrays
     certify(problem, answer)
     if answer.status[()] == SOLVED:
         answer.status[()] = RELAXED
+    return True
+
+
+@compiled
+def damped_levels(problem: ProblemArrays, answer: AnswerArrays) -> bool:
+    """Level by level, the added task the last, each in what those above leave; False where none is damped."""
+    s, m = problem.J.shape
+    levels = problem.ends.shape[0]
+    A, b, scales, u0, u = scratch((m, m)), scratch(m), scratch(m), scratch(m), scratch(m)
+    ends, shares = integer_scratch(levels + 1), scratch(levels + 1)
+    for i in range(m):
+        for j in range(m):
+            A[i, j] = problem.J[i, j] if i < s else problem.added_J[i - s, j]
+        b[i] = problem.rate[i] if i < s else problem.added_rate[i - s]
+        scales[i] = problem.row_scales[i] if i < s else problem.added_row_scales[i - s]
+    for level in range(levels):
+        ends[level] = problem.ends[level]
+    ends[levels] = m
+    clear(u0)
+    dt = problem.dt[()]
+    least, damped = damped_solution(A, scales, b, ends, u0, DIRECTIONS, LARGEST, BELOW, dt, u, shares)
+    if not damped:
+        return False
+    for j in range(m):
+        answer.u[j] = u[j]
+    answer.measure[()] = least
+    certify(problem, answer)
+    if answer.status[()] == INEXACT:
+        for level in range(levels):
+            answer.scale[level] = shares[level]
+    answer.status[()] = RELAXED
     return True
 
 
@@ -124,7 +166,8 @@ class ExtendedJacobian(Resolver):
         times the largest pivot if that is above 1
     singular : what happens where J_e loses rank though J does not (algorithmic singularities): "stop", the
         run ends there; "damped", the task is done and the added task damped, as by damped least squares with
-        its usual numbers, in the directions in which the task leaves it hardly anything
+        its usual numbers, in the directions in which the task leaves it hardly anything; levels of priority
+        are damped, too, where those above leave them hardly anything
     """
 
     name: ClassVar[str] = "ej"
