@@ -74,10 +74,11 @@ def lay_out(
     s, m = len(rows), robot.n_u
     # The extended Jacobian is square with a row for each input that pursuit steers.
     held = np.zeros((0, m))
-    if steered is not None and len(added_rows) + len(steered.inputs) == m - s:
-        held = np.eye(m)[[robot.input(name) for name in steered.inputs]]
-    elif resolver.takes_added_task:
-        steered = None
+    if steered is not None and resolver.takes_added_task:
+        if len(added_rows) + len(steered.inputs) == m - s:
+            held = np.eye(m)[[robot.input(name) for name in steered.inputs]]
+        else:
+            steered = None
     near = no_rows(robot.n) if collisions is None else no_rows(robot.n, collisions.rows, CUTS)
     problem = Problem(
         J=np.zeros((s, m)),
