@@ -26,9 +26,10 @@ from nmm.control.sample import SampleState
 from nmm.control.steering import Steered, Steering
 from nmm.control.step import Step
 from nmm.control.step_size import StepSize
-from nmm.errors import InputError, SingularError
+from nmm.errors import InputError, SingularError, expect_known
 from nmm.functions.function import Row
 from nmm.functions.objectives.base import Objective
+from nmm.functions.program import COMPILED, PINOCCHIO, nothing
 from nmm.functions.tasks.task import Stack, Task
 from nmm.kernels.compiled import checked_by_caller
 from nmm.resolvers.answer import Status, added_residual
@@ -58,6 +59,7 @@ class Controller:
     steering : the law for the steering of a platform that the task does not feel (`Steering`): True for the
         usual one, False for none
     collisions : what the robot keeps off; None for nothing. It needs dt, too
+    kinematics : "pinocchio", or "compiled": nmm's own, to the last digits the same and a multiple as fast
 
     Attributes
     ----------
@@ -88,6 +90,7 @@ class Controller:
         retreat: Retreat | None = None,
         steering: Steering | bool = True,
         collisions: Collisions | None = None,
+        kinematics: str = PINOCCHIO,
     ) -> None:
         _expect(robot, Robot, "robot")
         _expect(resolver, Resolver, "resolver")
@@ -102,6 +105,8 @@ class Controller:
         self.robot = robot
         self.limits = limits
         self.collisions = collisions
+        expect_known("kinematics", kinematics, (PINOCCHIO, COMPILED), "controller")
+        self.kinematics = kinematics
         self.retreat = retreat
         self.task = Stack.of(task)
         self.resolver = resolver
@@ -121,7 +126,9 @@ class Controller:
         steered: Steered | None = law.on(robot, self.task) if law else None
         self.rows: tuple[Row, ...] = self.task.rows(robot)
         self.setting: Setting | None = None if collisions is None else collisions.on(robot)
-        laid = lay_out(robot, self.task, self.added_task, resolver, objective, limits, steered, collisions)
+        laid = lay_out(
+            robot, self.task, self.added_task, resolver, objective, limits, steered, collisions, kinematics
+        )
         self._program, self._step, self._dimensions = laid.program, laid.step, laid.dimensions
         self.state: State = laid.state
         self.kept, steered = laid.kept, laid.steered
@@ -153,7 +160,9 @@ class Controller:
             if descended and self.steered is not None:
                 spring = float(self._step.steering.spring)
                 descended.append((spring, self.steered.pursuit, len(self.steered.inputs)))
-            self.step_size = StepSize(robot, resolver, descended, self._step, self._program.blocks)
+            self.step_size = StepSize(
+                robot, resolver, descended, self._step, self._program.blocks, kinematics
+            )
         self.sample = SampleState(
             self._step.problem,
             self._step.limits,
@@ -267,7 +276,7 @@ class Controller:
     def __reduce__(self) -> tuple[object, ...]:
         """Copies and pickles are built anew: views of memory and addresses of kernels do not travel."""
         given = (self.robot, self.task, self.resolver, self.objective, self.added_task, self.limits, self.dt)
-        return type(self), (*given, self.retreat, self.steering, self.collisions)
+        return type(self), (*given, self.retreat, self.steering, self.collisions, self.kinematics)
 
     def _solver(self) -> Callable[[float, Array], float]:
         """solve(t, q) -> status, with everything it needs at hand."""
@@ -277,7 +286,8 @@ class Controller:
         prepare = program.prepare if self.guard is None else self._measured(self.guard)
 
         def solve(t: float, q: Array) -> float:
-            prepare(t, q)
+            if prepare is not nothing:
+                prepare(t, q)
             return step(t, q, integers, floats)
 
         self.linearise: Callable[[float, Array], float] = solve
