@@ -20,7 +20,7 @@ import pinocchio as pin
 
 import nmm
 import nmm.control.goal
-import nmm.runs.integrators
+import nmm.control.integrators
 
 PANDA = "package://example-robot-data/robots/panda_description/urdf/panda.urdf"
 FRAME = "panda_hand"
@@ -92,7 +92,7 @@ def draw(robot: nmm.Robot, q0: np.ndarray, rng: np.random.Generator) -> tuple[np
 def attempt(controller: nmm.Controller, q: np.ndarray, goal: nmm.Goal) -> Attempt:
     """Go there by a robot's loop: measure, command, hold."""
     robot, kept = controller.robot, controller.kept
-    hold = nmm.runs.integrators.ZeroOrderHold(robot)
+    hold = nmm.control.integrators.ZeroOrderHold(robot)
     controller.reset()
     before, broken, spent = np.zeros(robot.n_u), 0.0, 0.0
     steps = round(LONGEST / DT)

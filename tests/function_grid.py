@@ -352,7 +352,7 @@ KINDS = ("tasks", "references", "objectives")
 def modules() -> list[ModuleType]:
     """All modules of the mathematics."""
     loose = ("control.equations", "functions.program", "functions.product", "functions.stacking")
-    loose += ("control.controller", "runs.integrators")
+    loose += ("control.controller", "control.integrators")
     names = [f"nmm.{name}" for name in loose]
     for package in ("platforms", *(f"functions.{kind}" for kind in KINDS), "resolvers"):
         found = importlib.import_module(f"nmm.{package}")

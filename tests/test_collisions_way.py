@@ -1,16 +1,13 @@
 """The way ahead without Coal: configurations, placements and lower bounds of distances."""
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 import nmm
 from nmm.collisions import way as ways
 from nmm.collisions.lookout import Lookout
 from nmm.collisions.pairs import sampled
-from nmm.kernels.kinematics import place_joints
 from nmm.robots.held import Held
-from nmm.robots.joint_table import as_row, joint_table
 
 SHAPES = [
     nmm.Box([0.2, 0.5, 0.4]),
@@ -36,32 +33,6 @@ def tiago():
 @pytest.fixture(scope="module")
 def planar():
     return nmm.load("unicycle_3r")
-
-
-@pytest.mark.parametrize("name", ["unicycle_2r_position", "tiago_pose", "ur5_unicycle_pose", "kinova_car"])
-def test_joints_are_where_pinocchio_has_them(name):
-    robot = nmm.Scenario.load(name).robot()
-    table, data = joint_table(robot.model), robot.model.createData()
-    found = np.zeros((len(table.parent), 12))
-    for q in sampled(robot, 50, seed=4):
-        place_joints(table, q, found)
-        pin.forwardKinematics(robot.model, data, q)
-        np.testing.assert_allclose(found, [as_row(placement) for placement in data.oMi], atol=1e-13)
-
-
-def test_unaligned_sliding_and_helical_joints_too():
-    model = pin.Model()
-    axis = np.array([0.6, 0.0, 0.8])
-    kinds = [pin.JointModelRevoluteUnaligned(axis), pin.JointModelPrismaticUnaligned(axis)]
-    kinds += [pin.JointModelHelicalUnaligned(axis, 0.1), pin.JointModelHZ(0.2), pin.JointModelRY()]
-    for i, kind in enumerate(kinds):
-        model.addJoint(i, kind, pin.SE3.Random(), f"joint{i}")
-    table, data = joint_table(model), model.createData()
-    found = np.zeros((len(table.parent), 12))
-    for q in np.random.default_rng(5).normal(size=(20, len(kinds))):
-        place_joints(table, q, found)
-        pin.forwardKinematics(model, data, q)
-        np.testing.assert_allclose(found, [as_row(placement) for placement in data.oMi], atol=1e-13)
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: type(shape).__name__)

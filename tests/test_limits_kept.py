@@ -11,9 +11,9 @@ import pytest
 from wandering import DT, ROBOTS, beyond, wander, wanderer
 
 import nmm
+from nmm.control.integrators import integrator
 from nmm.resolvers.answer import Status
 from nmm.robots.robot import Robot
-from nmm.runs.integrators import integrator
 
 Array = np.ndarray
 ROBOT = nmm.load("unicycle_3r")

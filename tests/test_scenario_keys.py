@@ -12,8 +12,8 @@ from short_scenario import scenario
 import nmm
 import nmm.resolvers
 from nmm import Scenario, ScenarioError, kinds
+from nmm.control.integrators import METHODS
 from nmm.robots.configuration import Configuration
-from nmm.runs.integrators import METHODS
 from nmm.scenario.conditions import CONDITION_PARTS
 from nmm.scenario.constructors import documented, parameters
 from nmm.scenario.functions import FUNCTION_PARTS, REFERENCE_PARTS

@@ -7,8 +7,8 @@ import pytest
 from numpy import pi
 
 import nmm
+from nmm.control.integrators import METHODS
 from nmm.robots.robot import Robot
-from nmm.runs.integrators import METHODS
 from nmm.runs.stability import find_instability
 
 START = {"x": -1, "y": -1, "theta": pi}
@@ -89,7 +89,7 @@ def test_the_stability_limit_is_the_textbooks(robot_2r: Robot, method: str, limi
     task = nmm.Task(nmm.Coordinates("theta", "q1"), [0.0, 0.0])
     alpha = 50.0
     controller = nmm.Controller(robot_2r, task, nmm.ProjectedGradient(alpha), nmm.Quadratic(nmm.Square("q2")))
-    from nmm.runs.integrators import integrator
+    from nmm.control.integrators import integrator
 
     stability = integrator(method, robot_2r, 1e-9).stability
     q = np.array([0, 0, 0.1, 0.1, 0.1])

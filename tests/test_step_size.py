@@ -10,8 +10,8 @@ import pytest
 import yaml
 
 import nmm
+from nmm.control.integrators import integrator
 from nmm.control.step_size import DECREASE
-from nmm.runs.integrators import integrator
 
 ROBOT = nmm.load("unicycle_3r")
 Q0 = ROBOT.q({"q1": 0.3, "q2": 0.6, "q3": 0.9})

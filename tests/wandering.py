@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 import nmm
-from nmm.runs.integrators import integrator
+from nmm.control.integrators import integrator
 
 #: Scenario, frame and resolver.
 ROBOTS = {

@@ -16,7 +16,7 @@ from nmm.collisions.way import BRAKING, LOOKS, Way
 from nmm.kernels.compiled import checked_by_caller, compiled
 from nmm.kernels.memory import Memory, views
 from nmm.robots.held import inputs_of
-from nmm.robots.joint_table import as_row, joint_table
+from nmm.robots.joint_table import as_row, joint_table, own_axes
 
 _FLAT, _INTEGERS, _STRIDED = types.float64[::1], types.int64[::1], types.float64[:, :]
 _BOTH = (_INTEGERS, _FLAT, _INTEGERS, _FLAT)
@@ -173,6 +173,7 @@ class Lookout:
 def _way(queries: Queries, deceleration: Array) -> Way:
     objects, robot = queries.shapes.geometryObjects, queries.robot
     scene, L = queries.scene, LOOKS + BRAKING + 1
+    turned = own_axes(robot.model)
     carrier = np.array([shape.parentJoint for shape in objects], dtype=np.int64)
     path = np.full(len(objects), -2)
     moving = 0
@@ -188,7 +189,7 @@ def _way(queries: Queries, deceleration: Array) -> Way:
         inputs=inputs_of(robot),
         deceleration=deceleration,
         carrier=carrier,
-        place=np.array([as_row(shape.placement) for shape in objects]),
+        place=np.array([as_row(turned[shape.parentJoint].inverse() * shape.placement) for shape in objects]),
         path=path,
         paths=np.zeros((moving, L, 12)),
         disc=np.array(

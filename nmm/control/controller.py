@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 
@@ -18,6 +19,7 @@ from nmm.control.equations import step as compiled_step
 from nmm.control.failure import reason
 from nmm.control.guard import Guard
 from nmm.control.idle_inputs import idle_inputs, inputs_without_effect
+from nmm.control.integrators import integrator
 from nmm.control.layout import lay_out
 from nmm.control.limit_report import LimitReport
 from nmm.control.limits import Limits
@@ -26,9 +28,11 @@ from nmm.control.sample import SampleState
 from nmm.control.steering import Steered, Steering
 from nmm.control.step import Step
 from nmm.control.step_size import StepSize
-from nmm.errors import InputError, SingularError
+from nmm.control.stepping import Stepper, tableau
+from nmm.errors import InputError, RunError, SingularError, expect_known
 from nmm.functions.function import Row
 from nmm.functions.objectives.base import Objective
+from nmm.functions.program import COMPILED, PINOCCHIO, nothing
 from nmm.functions.tasks.task import Stack, Task
 from nmm.kernels.compiled import checked_by_caller
 from nmm.resolvers.answer import Status, added_residual
@@ -58,6 +62,7 @@ class Controller:
     steering : the law for the steering of a platform that the task does not feel (`Steering`): True for the
         usual one, False for none
     collisions : what the robot keeps off; None for nothing. It needs dt, too
+    kinematics : "pinocchio", or "compiled": nmm's own, to the last digits the same and a multiple as fast
 
     Attributes
     ----------
@@ -88,6 +93,7 @@ class Controller:
         retreat: Retreat | None = None,
         steering: Steering | bool = True,
         collisions: Collisions | None = None,
+        kinematics: str = PINOCCHIO,
     ) -> None:
         _expect(robot, Robot, "robot")
         _expect(resolver, Resolver, "resolver")
@@ -102,6 +108,8 @@ class Controller:
         self.robot = robot
         self.limits = limits
         self.collisions = collisions
+        expect_known("kinematics", kinematics, (PINOCCHIO, COMPILED), "controller")
+        self.kinematics = kinematics
         self.retreat = retreat
         self.task = Stack.of(task)
         self.resolver = resolver
@@ -121,7 +129,9 @@ class Controller:
         steered: Steered | None = law.on(robot, self.task) if law else None
         self.rows: tuple[Row, ...] = self.task.rows(robot)
         self.setting: Setting | None = None if collisions is None else collisions.on(robot)
-        laid = lay_out(robot, self.task, self.added_task, resolver, objective, limits, steered, collisions)
+        laid = lay_out(
+            robot, self.task, self.added_task, resolver, objective, limits, steered, collisions, kinematics
+        )
         self._program, self._step, self._dimensions = laid.program, laid.step, laid.dimensions
         self.state: State = laid.state
         self.kept, steered = laid.kept, laid.steered
@@ -153,7 +163,11 @@ class Controller:
             if descended and self.steered is not None:
                 spring = float(self._step.steering.spring)
                 descended.append((spring, self.steered.pursuit, len(self.steered.inputs)))
-            self.step_size = StepSize(robot, resolver, descended, self._step, self._program.blocks)
+            self.step_size = StepSize(
+                robot, resolver, descended, self._step, self._program.blocks, kinematics
+            )
+        self._lock = threading.Lock()
+        self._steppers: dict[str, Callable[[float, Array, float], tuple[Array, Array]]] = {}
         self.sample = SampleState(
             self._step.problem,
             self._step.limits,
@@ -198,11 +212,76 @@ class Controller:
         # Another kind of array would be compiled for anew, so anything but the plain kind is copied.
         if type(q) is not np.ndarray or q.dtype != FLOAT64 or q.shape != self._shape or not q.flags.carray:
             q = self._copied(q)
-        if self._needs_dt:
-            self._sample(float(t), q)
-        elif self._solve(float(t), q) >= _FAILED:
-            self._fail(t, q)
-        return self._u.copy()
+        if not self._lock.acquire(False):
+            self._refuse()
+        try:
+            if self._needs_dt:
+                self._sample(float(t), q)
+            elif self._solve(float(t), q) >= _FAILED:
+                self._fail(t, q)
+            return self._u.copy()
+        finally:
+            self._lock.release()
+
+    def step(self, t: float, q: ArrayLike, dt: float, method: str = "rk4") -> tuple[Array, Array]:
+        """One sample of the closed loop: q (n,) at t + dt, and the inputs u (m,) at t.
+
+        With compiled kinematics, without users' Python functions, distances, a retreat and a step by Armijo's
+        rule it is one compiled call.
+
+        Parameters
+        ----------
+        dt : s; the controller's, from now on, where it needs one
+        method : "rk4", "midpoint", "euler" or "zoh"
+
+        Raises
+        ------
+        SingularError, InputError : as a call
+        """
+        if type(q) is not np.ndarray or q.dtype != FLOAT64 or q.shape != self._shape or not q.flags.carray:
+            q = self._copied(q)
+        if not 0.0 < dt < math.inf:
+            positive(dt, "dt")
+        if self.samples and dt != self.dt:
+            self.dt = dt
+        if method not in self._steppers:
+            self._steppers[method] = self._stepper(method)
+        return self._steppers[method](float(t), q, dt)
+
+    def _stepper(self, method: str) -> Callable[[float, Array, float], tuple[Array, Array]]:
+        integrates = integrator(method, self.robot, 1e-9)
+        if integrates.tolerance:
+            raise InputError("method: expected rk4, midpoint, euler or zoh for one step, got adaptive")
+        placed, follows = self.robot.following.placed, bool(self.robot.followers)
+        found = tableau(integrates)
+        whole = type(self.resolver).finish is Resolver.finish and self._program.prepare is nothing
+        if found is None or not whole or self.guard or self.backing or self.step_size:
+
+            def from_python(t: float, q: Array, dt: float) -> tuple[Array, Array]:
+                u, q_dot = self(t, q), self._step.q_dot.copy()
+                return integrates.advance(self.velocity, t, q, q_dot, u, dt), u
+
+            return from_python
+        advance = Stepper(self._program.blocks, found, self.robot.n, self.robot.n_u)
+
+        def compiled(t: float, q: Array, dt: float) -> tuple[Array, Array]:
+            if not self._lock.acquire(False):
+                self._refuse()
+            try:
+                status, ahead, u = advance(t, q, dt)
+                if status >= _FAILED:
+                    self._fail(t, q)
+            finally:
+                self._lock.release()
+            return (placed(ahead) if follows else ahead), u
+
+        return compiled
+
+    def _refuse(self) -> None:
+        raise RunError(
+            f"controller: called in thread {threading.current_thread().name} while a call is under way; a "
+            "controller does one thing at a time: give each thread a copy of its own (copy.copy(controller))"
+        )
 
     def _expect_dt(self) -> None:
         if self._needs_dt and self.dt is None:
@@ -267,7 +346,7 @@ class Controller:
     def __reduce__(self) -> tuple[object, ...]:
         """Copies and pickles are built anew: views of memory and addresses of kernels do not travel."""
         given = (self.robot, self.task, self.resolver, self.objective, self.added_task, self.limits, self.dt)
-        return type(self), (*given, self.retreat, self.steering, self.collisions)
+        return type(self), (*given, self.retreat, self.steering, self.collisions, self.kinematics)
 
     def _solver(self) -> Callable[[float, Array], float]:
         """solve(t, q) -> status, with everything it needs at hand."""
@@ -277,7 +356,8 @@ class Controller:
         prepare = program.prepare if self.guard is None else self._measured(self.guard)
 
         def solve(t: float, q: Array) -> float:
-            prepare(t, q)
+            if prepare is not nothing:
+                prepare(t, q)
             return step(t, q, integers, floats)
 
         self.linearise: Callable[[float, Array], float] = solve

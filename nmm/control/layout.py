@@ -54,6 +54,7 @@ def lay_out(
     limits: Limits | None,
     steered: Steered | None,
     collisions: Collisions | None,
+    kinematics: str,
 ) -> LaidOut:
     """Lay out what a `Controller` is given.
 
@@ -67,7 +68,7 @@ def lay_out(
     kept = (Limits(False, False) if limits is None else limits).on(robot)
     objectives = [function for _, function in weighted]
     pursued = [] if steered is None else [steered.pursuit]
-    program = Program(robot, [*functions, *added, *objectives, *kept.functions, *pursued])
+    program = Program(robot, [*functions, *added, *objectives, *kept.functions, *pursued], kinematics)
     first = program.first_rows
     tasks = len(functions) + len(added)
     after = tasks + len(objectives)

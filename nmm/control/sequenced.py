@@ -18,6 +18,7 @@ from nmm.control.sequence import Event, Moment, Sequence
 from nmm.control.steering import Steering
 from nmm.errors import InputError, RunError
 from nmm.functions.objectives.base import Objective
+from nmm.functions.program import PINOCCHIO
 from nmm.functions.references import Constant
 from nmm.functions.tasks.task import Stack, Task
 from nmm.resolvers.base import Resolver
@@ -39,7 +40,7 @@ class SequencedController(Controller):
 
     Parameters
     ----------
-    robot, task, resolver, objective, limits, dt, retreat, steering, collisions : see `Controller`
+    robot, task, resolver, objective, limits, dt, retreat, steering, collisions, kinematics : see `Controller`
 
     Attributes
     ----------
@@ -66,6 +67,7 @@ class SequencedController(Controller):
         retreat: Retreat | None = None,
         steering: Steering | bool = True,
         collisions: Collisions | None = None,
+        kinematics: str = PINOCCHIO,
     ) -> None:
         self.all_tasks = Stack.of(task)
         if not self.all_tasks.tasks:
@@ -76,7 +78,18 @@ class SequencedController(Controller):
                 "changes where tasks come and go; expected pg, rg or dls"
             )
         self.sequence = Sequence(self.all_tasks, robot)
-        self._given = (robot, self.all_tasks, resolver, objective, limits, dt, retreat, steering, collisions)
+        self._given = (
+            robot,
+            self.all_tasks,
+            resolver,
+            objective,
+            limits,
+            dt,
+            retreat,
+            steering,
+            collisions,
+            kinematics,
+        )
         self._controllers: dict[tuple[bool, ...], Controller] = {}
         for one in self.all_tasks:  # what is wrong with a task is said now, not when it begins
             one.function.stages(robot), one.reference.stages(robot)
@@ -96,12 +109,12 @@ class SequencedController(Controller):
     def _controller(self, active: tuple[bool, ...], dt: float | None) -> Controller:
         """The one for a set of active tasks."""
         if active not in self._controllers:
-            robot, stack, resolver, objective, limits, _, retreat, steering, collisions = self._given
+            robot, stack, resolver, objective, limits, _, retreat, steering, keep, kinematics = self._given
             tasks = [task.always for task, on in zip(stack, active, strict=True) if on]
             if not tasks:
                 tasks, resolver, retreat = [Task(Constant([0.0]), [0.0], gain=None)], descent(resolver), None
             self._controllers[active] = Controller(
-                robot, tasks, resolver, objective, None, limits, dt, retreat, steering, collisions
+                robot, tasks, resolver, objective, None, limits, dt, retreat, steering, keep, kinematics
             )
         found = self._controllers[active]
         if dt is not None:

@@ -86,12 +86,13 @@ class StepSize:
         terms: Sequence[tuple[float, Function, int]],
         found: ControlStep,
         blocks: Blocks,
+        kinematics: str,
     ) -> None:
         if resolver.alpha_at is None:
             raise InputError(f"step: resolver {resolver.name} has no α to choose")
         if not terms:
             raise InputError("step: armijo chooses α by the objective, and there is none")
-        self._program = Program(robot, [function for _, function, _ in terms])
+        self._program = Program(robot, [function for _, function, _ in terms], kinematics)
         self._program.lay_out()
         rows = zip(self._program.first_rows, terms, strict=True)
         self._rows = np.array([first + row for first, (_, _, row) in rows])

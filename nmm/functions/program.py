@@ -10,6 +10,7 @@ import numpy as np
 from nmm.arrays import Array, Integers
 from nmm.functions.function import Callback, Evaluation, Function, Stage
 from nmm.kernels.compiled import call_platform, clear, compiled, view
+from nmm.kernels.kinematics import Kinematics, place_frames
 from nmm.kernels.memory import (
     Blocks,
     IntegerVector,
@@ -23,7 +24,8 @@ from nmm.kernels.memory import (
 )
 from nmm.kernels.records import At, Frames, Rows, call_function
 from nmm.robots.configuration import Configuration, kinematics_updater
-from nmm.robots.robot import Robot
+from nmm.robots.joint_table import frame_table, joint_table
+from nmm.robots.robot import CENTER_OF_MASS, Robot
 
 
 class Buffers(NamedTuple):
@@ -47,10 +49,12 @@ class Buffers(NamedTuple):
 class LaidOut(NamedTuple):
     """A program in memory; it is the first record there.
 
+    kinematics : where its record `Kinematics` is; 0 where Pinocchio computes them before the program runs
     stages : where the records of the stages (`LaidOutStage`) are, in the order in which they run
     """
 
     buffers: Buffers
+    kinematics: int
     platform_kernel: int
     platform_numbers: Vector
     stages: IntegerVector
@@ -66,19 +70,29 @@ class LaidOutStage(NamedTuple):
     numbers: Vector
 
 
+#: Who computes the kinematics of a program's frames.
+PINOCCHIO, COMPILED = "pinocchio", "compiled"
+
 #: Where a caller's own record begins (see `Program.lay_out`).
 BESIDE = header_length(LaidOut)
+
+
+def nothing(t: float, q: Array) -> None:
+    """What is to be done before a program runs whose kinematics are compiled, without users' functions."""
 
 
 @compiled
 def run(t: float, q: Array, integers: Integers, floats: Array) -> None:
     """Evaluate the platform and every stage at (t, q), into the program's buffers.
 
-    The kinematics of the frames are there already.
+    The kinematics of the frames are there already, unless they are compiled.
     """
     program = views(LaidOut, integers, floats, 0)
     b = program.buffers
     n = q.shape[0]
+    if program.kinematics > 0:
+        here = views(Kinematics, integers, floats, program.kinematics)
+        place_frames(here.joints, here.frames, q, b.placements, b.jacobians, b.hessians)
     clear(b.G)
     clear(b.G_q)
     clear(b.value)
@@ -102,20 +116,26 @@ def run(t: float, q: Array, integers: Integers, floats: Array) -> None:
 class Program:
     """Functions of one robot, with the tables and the memory in which they are evaluated.
 
+    Parameters
+    ----------
+    kinematics : who computes them: PINOCCHIO in `prepare`, or `nmm.kernels.kinematics` in `run`, COMPILED
+
     Attributes
     ----------
     first_rows : where the rows of each function begin in `buffers.value`
     blocks : what `run` takes, made by `lay_out`
     buffers : what it reads and writes, as views
-    prepare : prepare(t, q) does Pinocchio's part at q and the users' Python functions at (t, q)
+    prepare : prepare(t, q) does Pinocchio's part at q and the users' Python functions at (t, q); `nothing`
+        where there is neither
     """
 
     blocks: Blocks
     buffers: Buffers
     prepare: Callable[[float, Array], None]
 
-    def __init__(self, robot: Robot, functions: Sequence[Function]) -> None:
+    def __init__(self, robot: Robot, functions: Sequence[Function], kinematics: str = PINOCCHIO) -> None:
         self.robot = robot
+        self._compiled = kinematics == COMPILED
         self.first_rows: list[int] = []
         self._lengths = [len(function.rows(robot)) for function in functions]
         self._frames: list[str] = []
@@ -137,6 +157,7 @@ class Program:
         length = header_length(LaidOutStage)
         first = BESIDE + (0 if beside is None else header_length(type(beside)))
         places = first + length * np.arange(len(self._stages))
+        table = first + length * len(self._stages)
         buffers = Buffers(
             np.zeros((k, 3, 4)),
             np.zeros((k, 6, n)),
@@ -148,17 +169,32 @@ class Program:
             np.zeros((rows, n)),
         )
         memory = Memory()
-        memory.add(LaidOut(buffers, platform.velocity_map.address, platform.parameters, places))
+        memory.add(
+            LaidOut(
+                buffers,
+                table if self._compiled else 0,
+                platform.velocity_map.address,
+                platform.parameters,
+                places,
+            )
+        )
         if beside is not None:
             memory.add(beside)
         for stage, row in self._stages:
             slots = np.array([self._frames.index(frame) for frame in stage.frames], dtype=np.int64)
             bounds = row - stage.before, row + stage.rows
             memory.add(LaidOutStage(stage.kernel.address, *bounds, slots, stage.numbers))
+        if self._compiled:
+            ids = [None if name == CENTER_OF_MASS else robot.frame_id(name) for name in self._frames]
+            memory.add(Kinematics(joint_table(robot.model), frame_table(robot.model, ids)))
         self.blocks = memory.blocks()
         self.buffers = found = views(LaidOut, *self.blocks, 0).buffers
-        self.prepare = update = kinematics_updater(
-            robot, tuple(self._frames), found.placements, found.jacobians, found.hessians
+        self.prepare = update = (
+            nothing
+            if self._compiled
+            else kinematics_updater(
+                robot, tuple(self._frames), found.placements, found.jacobians, found.hessians
+            )
         )
         stages = [stage for stage, _ in self._stages]
         self._numbers = [views(LaidOutStage, *self.blocks, int(place)).numbers for place in places]

@@ -1,4 +1,9 @@
-"""Where a robot's joints are, compiled: for loops that look at many configurations."""
+"""A robot's kinematics, compiled: joints, frames, their Jacobians and Hessians, the centre of mass.
+
+It is what Pinocchio computes (`nmm.robots.configuration`), for loops that cannot wait for calls from Python.
+World axes (LOCAL_WORLD_ALIGNED). Every joint's axes are turned so that it turns about its own z: one form
+for all of them.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +12,7 @@ from typing import NamedTuple
 
 from nmm.arrays import Array
 from nmm.kernels.compiled import compiled, scratch
-from nmm.kernels.memory import IntegerVector, Matrix
+from nmm.kernels.memory import IntegerVector, Matrix, Vector
 
 
 class Joints(NamedTuple):
@@ -15,14 +20,40 @@ class Joints(NamedTuple):
 
     parent (J,), coordinate (J,) : the joint before it, and which of q moves it
     placement (J, 12) : in its parent's axes where its number is 0: R column by column, then p, m
-    twist (J, 6) : how its number moves it, in its own axes: linear (1 or m/rad) over angular; a unit axis
-        where it turns, along which it slides where it does that, too
+    turns (J,) : 1 where its number turns it about its z, in rad, 0 where it does not
+    slide (J, 3) : by how much its number moves it, in its own axes, 1 or m/rad
     """
 
     parent: IntegerVector
     coordinate: IntegerVector
     placement: Matrix
-    twist: Matrix
+    turns: Vector
+    slide: Matrix
+
+
+class FrameTable(NamedTuple):
+    """K frames of a program.
+
+    carrier (K,), placement (K, 12) : the joint that carries a frame, and where it is in its axes; the
+        centre of mass is carried by joint -1
+    first (K + 1,), chain (...) : the joints that move a frame, from the world on:
+        chain[first[k]:first[k + 1]]
+    masses (J, 4) : of what each joint carries its mass, kg, and its centre in the joint's axes, m; of the
+        world what stands
+    """
+
+    carrier: IntegerVector
+    placement: Matrix
+    first: IntegerVector
+    chain: IntegerVector
+    masses: Matrix
+
+
+class Kinematics(NamedTuple):
+    """A robot's joints and a program's frames."""
+
+    joints: Joints
+    frames: FrameTable
 
 
 @compiled
@@ -40,18 +71,122 @@ def compose(A: Array, a: int, B: Array, b: int, out: Array, row: int) -> None:
 @compiled
 def place_joints(joints: Joints, q: Array, out: Array) -> None:
     """out (J, 12): the joints' placements in the world at q (n,)."""
-    moved, between = scratch((1, 12)), scratch((1, 12))
     for k in range(12):
         out[0, k] = 1.0 if k in (0, 4, 8) else 0.0
     for i in range(1, joints.parent.shape[0]):
         value = q[joints.coordinate[i]]
-        x, y, z = joints.twist[i, 3], joints.twist[i, 4], joints.twist[i, 5]
-        c, s = (1.0, 0.0) if x == 0.0 and y == 0.0 and z == 0.0 else (math.cos(value), math.sin(value))
-        v = 1.0 - c
-        moved[0, 0], moved[0, 1], moved[0, 2] = c + v * x * x, v * x * y + s * z, v * x * z - s * y
-        moved[0, 3], moved[0, 4], moved[0, 5] = v * x * y - s * z, c + v * y * y, v * y * z + s * x
-        moved[0, 6], moved[0, 7], moved[0, 8] = v * x * z + s * y, v * y * z - s * x, c + v * z * z
-        for k in range(3):
-            moved[0, 9 + k] = value * joints.twist[i, k]
-        compose(out, joints.parent[i], joints.placement, i, between, 0)
-        compose(between, 0, moved, 0, out, i)
+        compose(out, joints.parent[i], joints.placement, i, out, i)
+        x, y, z = value * joints.slide[i, 0], value * joints.slide[i, 1], value * joints.slide[i, 2]
+        if x != 0.0 or y != 0.0 or z != 0.0:
+            for a in range(3):
+                out[i, 9 + a] += out[i, a] * x + out[i, 3 + a] * y + out[i, 6 + a] * z
+        if joints.turns[i] != 0.0:
+            c, s = math.cos(value), math.sin(value)
+            for a in range(3):
+                first, second = out[i, a], out[i, 3 + a]
+                out[i, a], out[i, 3 + a] = c * first + s * second, c * second - s * first
+
+
+@compiled
+def axes(joints: Joints, places: Array, out: Array) -> None:
+    """out (J, 6): of each joint the velocity of its origin, and its angular velocity, for a rate of 1."""
+    for i in range(1, joints.parent.shape[0]):
+        for a in range(3):
+            out[i, a] = (
+                places[i, a] * joints.slide[i, 0]
+                + places[i, 3 + a] * joints.slide[i, 1]
+                + places[i, 6 + a] * joints.slide[i, 2]
+            )
+            out[i, 3 + a] = joints.turns[i] * places[i, 6 + a]
+
+
+@compiled
+def moved(places: Array, twists: Array, i: int, x: float, y: float, z: float, out: Array) -> None:
+    """out[:3]: the velocity of the point (x, y, z) for a rate 1 of joint i."""
+    x, y, z = x - places[i, 9], y - places[i, 10], z - places[i, 11]
+    a, b, c = twists[i, 3], twists[i, 4], twists[i, 5]
+    out[0] = twists[i, 0] + b * z - c * y
+    out[1] = twists[i, 1] + c * x - a * z
+    out[2] = twists[i, 2] + a * y - b * x
+
+
+@compiled
+def place_frames(
+    joints: Joints, frames: FrameTable, q: Array, placements: Array, jacobians: Array, hessians: Array
+) -> None:
+    """placements (K, 3, 4) = [R | p], jacobians (K, 6, n) and, if there are any, hessians (K, 6, n, n).
+
+    Of the last two only what can be other than 0 is written.
+    """
+    count = joints.parent.shape[0]
+    places, twists, here, v = scratch((count, 12)), scratch((count, 6)), scratch((1, 12)), scratch(3)
+    place_joints(joints, q, places)
+    axes(joints, places, twists)
+    for k in range(frames.carrier.shape[0]):
+        if frames.carrier[k] < 0:
+            center_of_mass(joints, frames, places, twists, placements[k], jacobians[k])
+            continue
+        compose(places, frames.carrier[k], frames.placement, k, here, 0)
+        for i in range(3):
+            for a in range(4):
+                placements[k, i, a] = here[0, 3 * a + i]
+        J = jacobians[k]
+        first, last = frames.first[k], frames.first[k + 1]
+        for c in range(first, last):
+            i = frames.chain[c]
+            j = joints.coordinate[i]
+            moved(places, twists, i, here[0, 9], here[0, 10], here[0, 11], v)
+            for a in range(3):
+                J[a, j] = v[a]
+                J[3 + a, j] = twists[i, 3 + a]
+        if hessians.shape[0] > 0:
+            differentiate(joints, frames.chain, first, last, J, hessians[k])
+
+
+@compiled
+def differentiate(joints: Joints, chain: Array, first: int, last: int, J: Array, H: Array) -> None:
+    """H (6, n, n) = dJ[:, j] / dq[k]: what is before a joint turns it, what is after it moves the point."""
+    for c in range(first, last):
+        j = joints.coordinate[chain[c]]
+        for d in range(first, last):
+            k = joints.coordinate[chain[d]]
+            one, two = (
+                (j, k) if d > c else (k, j)
+            )  # the one nearer to the world turns the other one's velocity
+            for a in range(3):
+                x, y = (a + 1) % 3, (a + 2) % 3
+                H[a, j, k] = J[3 + x, one] * J[y, two] - J[3 + y, one] * J[x, two]
+                H[3 + a, j, k] = 0.0 if d >= c else J[3 + x, k] * J[3 + y, j] - J[3 + y, k] * J[3 + x, j]
+
+
+@compiled
+def center_of_mass(
+    joints: Joints, frames: FrameTable, places: Array, twists: Array, placement: Array, J: Array
+) -> None:
+    """The centre of mass and its Jacobian's upper rows, as of a frame with the world's axes."""
+    count = joints.parent.shape[0]
+    sums, v = scratch((count, 4)), scratch(3)  # of each joint and what it carries: mass times centre, mass
+    for i in range(count):
+        m = frames.masses[i, 0]
+        for a in range(3):
+            sums[i, a] = places[i, 9 + a]
+            for k in range(3):
+                sums[i, a] += places[i, 3 * k + a] * frames.masses[i, 1 + k]
+            sums[i, a] *= m
+        sums[i, 3] = m
+    for i in range(count - 1, 0, -1):
+        for a in range(4):
+            sums[joints.parent[i], a] += sums[i, a]
+    total = sums[0, 3]
+    for i in range(1, count):
+        m = sums[i, 3]
+        for a in range(3):
+            v[a] = 0.0
+        if m > 0.0:
+            moved(places, twists, i, sums[i, 0] / m, sums[i, 1] / m, sums[i, 2] / m, v)
+        for a in range(3):
+            J[a, joints.coordinate[i]] = v[a] * m / total
+    for i in range(3):
+        for a in range(3):
+            placement[i, a] = 1.0 if a == i else 0.0
+        placement[i, 3] = sums[0, i] / total

@@ -1,31 +1,76 @@
-"""A model's joints as compiled kinematics read them."""
+"""A model's joints and frames as compiled kinematics read them."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 import pinocchio as pin
 
 from nmm.arrays import Array
-from nmm.kernels.kinematics import Joints
+from nmm.kernels.kinematics import FrameTable, Joints
 
 
 def joint_table(model: pin.Model) -> Joints:
     """The joints of a model whose joints have one number each (`Robot.model`)."""
     count = len(model.joints)
-    twists = np.zeros((count, 6))
-    q = pin.neutral(model)
-    for i in range(1, count):
-        data = model.joints[i].createData()
-        model.joints[i].calc(data, q)  # the only way to the axis that all joint types offer
-        twists[i] = np.array(data.S).reshape(6)
+    turned = own_axes(model)
+    placements, turns, slide = np.zeros((count, 12)), np.zeros(count), np.zeros((count, 3))
+    for i in range(count):
+        placements[i] = as_row(turned[model.parents[i]].inverse() * model.jointPlacements[i] * turned[i])
+        if i:
+            linear, angular = _twist(model.joints[i], pin.neutral(model))
+            turns[i] = float(angular.any())
+            slide[i] = turned[i].rotation.T @ linear
     return Joints(
         parent=np.array(list(model.parents), dtype=np.int64),
         coordinate=np.array([0, *(joint.idx_q for joint in list(model.joints)[1:])], dtype=np.int64),
-        placement=np.array([as_row(placement) for placement in model.jointPlacements]),
-        twist=twists,
+        placement=placements,
+        turns=turns,
+        slide=slide,
+    )
+
+
+def own_axes(model: pin.Model) -> list[pin.SE3]:
+    """For each joint its axes as `joint_table` turns them, in its axes as Pinocchio has them."""
+    found = [pin.SE3.Identity()]
+    for i in range(1, len(model.joints)):
+        _, angular = _twist(model.joints[i], pin.neutral(model))
+        rotation = np.eye(3)
+        if angular.any():
+            rotation = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), angular).toRotationMatrix()
+        found.append(pin.SE3(rotation, np.zeros(3)))
+    return found
+
+
+def frame_table(model: pin.Model, frames: Sequence[int | None]) -> FrameTable:
+    """Frames of a model by their numbers, None for the centre of mass."""
+    turned = own_axes(model)
+    carrier = [-1 if k is None else model.frames[k].parentJoint for k in frames]
+    places = [pin.SE3.Identity() if k is None else model.frames[k].placement for k in frames]
+    chains = [[] if i < 0 else list(model.supports[i])[1:] for i in carrier]
+    masses = np.zeros((len(model.joints), 4))
+    for i, inertia in enumerate(model.inertias):
+        masses[i] = [inertia.mass, *(turned[i].rotation.T @ inertia.lever)]
+    return FrameTable(
+        carrier=np.array(carrier, dtype=np.int64),
+        placement=np.array(
+            [as_row(turned[max(i, 0)].inverse() * place) for i, place in zip(carrier, places, strict=True)]
+        ).reshape(-1, 12),
+        first=np.cumsum([0, *map(len, chains)], dtype=np.int64),
+        chain=np.array([i for chain in chains for i in chain], dtype=np.int64),
+        masses=masses,
     )
 
 
 def as_row(placement: pin.SE3) -> Array:
     """(12,): R column by column, then p."""
     return np.concatenate([placement.rotation.ravel(order="F"), placement.translation])
+
+
+def _twist(joint: pin.JointModel, q: Array) -> tuple[Array, Array]:
+    """How a joint's number moves it, in its own axes: linear, angular."""
+    data = joint.createData()
+    joint.calc(data, q)  # the only way to the axis that all joint types offer
+    linear, angular = np.array(data.S).reshape(2, 3)
+    return linear, angular

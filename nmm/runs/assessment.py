@@ -8,8 +8,8 @@ import numpy as np
 
 from nmm.arrays import Array
 from nmm.control.controller import Controller
+from nmm.control.integrators import Integrator
 from nmm.errors import RunError
-from nmm.runs.integrators import Integrator
 from nmm.runs.promise import ENDS, Departure, Samples, adaptive_errors, decay, departure, step_errors
 from nmm.runs.recording import Recorder
 from nmm.runs.stability import Instability, find_instability

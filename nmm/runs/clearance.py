@@ -13,8 +13,8 @@ from nmm.collisions.obstacle import Obstacle
 from nmm.collisions.recorded import as_passed
 from nmm.collisions.setting import Setting
 from nmm.control.guard import Counts, Guard
+from nmm.control.integrators import Around, Velocity
 from nmm.robots.held import Held
-from nmm.runs.integrators import Around, Velocity
 
 #: Between samples distances are looked at after so much motion, m and rad of the coordinates together.
 APART = 0.01

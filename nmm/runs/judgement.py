@@ -15,12 +15,12 @@ import numpy as np
 from nmm.arrays import Array
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal, sizes
+from nmm.control.integrators import Integrator
 from nmm.functions.function import Row
 from nmm.runs import reasons
 from nmm.runs.advice import Trial, advised
 from nmm.runs.assessment import Assessment, assess
 from nmm.runs.chattering import Chattering, chattering
-from nmm.runs.integrators import Integrator
 from nmm.runs.promise import Departure, Samples
 from nmm.runs.recording import Recorder
 from nmm.runs.residuals import residuals, run_up

@@ -12,6 +12,7 @@ from nmm.arrays import Array, positive
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
 from nmm.control.idle_inputs import idle_inputs
+from nmm.control.integrators import Integrator, integrator
 from nmm.control.sample import Snapshot
 from nmm.control.sequenced import SequencedController
 from nmm.control.step import Step
@@ -20,7 +21,6 @@ from nmm.robots.held import Held
 from nmm.robots.slip import slip_warnings
 from nmm.runs.broken_limits import outside_at_start
 from nmm.runs.clearance import Guarded
-from nmm.runs.integrators import Integrator, integrator
 from nmm.runs.joining import Leg, join
 from nmm.runs.judgement import Ended, Verdict, blocked, judge, reached_or_not
 from nmm.runs.recording import Recorder

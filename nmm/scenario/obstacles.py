@@ -49,9 +49,14 @@ class Along:
         units = [row.unit for row in reference.rows(robot)]
         if units != ["m"] * 3:
             raise InputError(f"expected 3 rows in m (x, y, z), got {len(units)} in {', '.join({*units})}")
+        self._given = reference, robot, turned
         self._program = Program(robot, (reference,))
         self._program.lay_out()
         self._q, self._turned = np.zeros(robot.n), turned
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Copies lay out programs of their own."""
+        return type(self), self._given
 
     def __call__(self, t: float) -> Array:
         """Origin and rotation vector at t, s: (6,) m and rad."""

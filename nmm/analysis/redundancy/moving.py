@@ -22,6 +22,7 @@ from nmm.analysis.singular.reached import Reached
 from nmm.analysis.singular.singularity import TOLERANCE
 from nmm.arrays import Array, positive
 from nmm.control.controller import Controller
+from nmm.control.integrators import RK4
 from nmm.control.step import Step
 from nmm.errors import InputError, SingularError
 from nmm.functions.program import evaluate
@@ -31,7 +32,6 @@ from nmm.resolvers.answer import Status
 from nmm.resolvers.projected_gradient import ProjectedGradient
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
-from nmm.runs.integrators import RK4
 from nmm.runs.recording import Recorder
 from nmm.runs.trajectory import Outcome, Trajectory
 from nmm.words import listed

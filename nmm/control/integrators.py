@@ -69,6 +69,15 @@ class RungeKutta:
         self._stages = [(node, np.array(row)) for node, row in zip(nodes, matrix, strict=True)]
         self._weights = np.array(weights)
 
+    @property
+    def tableau(self) -> tuple[Array, Array, Array]:
+        """Nodes (s,), the matrix (s, s) and weights (s,), the stage at the beginning included."""
+        s = self._weights.size
+        A = np.zeros((s, s))
+        for k, (_, row) in enumerate(self._stages, start=1):
+            A[k, : row.size] = row
+        return np.array([0.0, *(node for node, _ in self._stages)]), A, self._weights
+
     def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
         slopes = np.empty((self._weights.size, q.size))
         slopes[0] = q_dot
