@@ -43,9 +43,10 @@ def test_gaps_are_below_distances_and_meet_them_where_they_were_measured(robot, 
     every = range(len(setting.names))
     rng = np.random.default_rng(6)
 
-    def gaps():
-        ends = [queries.places[pair] for pair in scene.pairs]
-        return np.array([ways.gap(scene, ahead, k, np.array(both)) for k, both in enumerate(ends)])
+    def gaps(enough=None):
+        enough = np.full(len(every), np.inf) if enough is None else enough
+        ends = [np.array(queries.places[pair]) for pair in scene.pairs]
+        return np.array([ways.gap(scene, ahead, k, ends[k], enough[k]) for k in every])
 
     met = np.zeros(len(every), dtype=bool)
     for q in sampled(setting.robot, 8, seed=7):
@@ -54,6 +55,9 @@ def test_gaps_are_below_distances_and_meet_them_where_they_were_measured(robot, 
             ways.renew(scene, ahead, queries.results, queries.places, k)
         here = gaps()
         assert np.all(here <= distances + 1e-7)
+        enough = 0.5 * here
+        rough = gaps(enough)
+        assert np.all((rough == here) | ((rough >= enough) & (rough <= here + 1e-12)))
         met |= np.abs(here - distances) < 1e-5
         for size in (0.003, 0.05, 1.0):
             near = queries.distances(0.0, q + size * rng.normal(size=len(q)), every)

@@ -21,6 +21,8 @@ from nmm.robots.robot import Robot
 
 #: So many names are told.
 SHOWN = 6
+#: An obstacle that holds every shape at least this deep, m, is not one that the robot stands on.
+DEEP = 0.01
 #: Rows of a pair's further points are made where it is nearer than this beyond the distance to keep, m.
 FACES = 0.05
 
@@ -135,6 +137,14 @@ def set_up(
             f"left out, as nearer than {distance:g} m in every configuration tried: {len(always)} "
             f"pairs of shapes: {_some(told)}"
         )
+    for j, one in enumerate(sorted_obstacles, count):
+        pairs = [pair for pair in wanted if pair[1] == j]
+        if (
+            pairs
+            and {*pairs} <= {*always}
+            and len(choice.always_near(robot, shapes, pairs, -DEEP)) == len(pairs)
+        ):
+            raise InputError(f"obstacle {one.name} contains {robot.name} in every configuration tried")
     kept = [pair for pair in wanted if pair not in {*always}]
     if not kept:
         raise InputError(

@@ -141,8 +141,8 @@ def renew(scene: Scene, way: Way, results: Array, places: Array, pair: int) -> N
 
 
 @compiled
-def gap(scene: Scene, way: Way, pair: int, ends: Array) -> float:
-    """A lower bound of a pair's distance, m; ends (2, 12): where its shapes are."""
+def gap(scene: Scene, way: Way, pair: int, ends: Array, enough: float = math.inf) -> float:
+    """A lower bound of a pair's distance, m; ends (2, 12): where its shapes are. Rough from `enough` on."""
     best = -math.inf
     for side in range(2):
         other = scene.pairs[pair, 1 - side]
@@ -159,6 +159,12 @@ def gap(scene: Scene, way: Way, pair: int, ends: Array) -> float:
             back[k] = 0.0
             for i in range(3):
                 back[k] -= ends[1 - side, 3 * k + i] * n[i]
+        box = scene.boxes[other]  # what reaches no farther than its box need not be told corner by corner
+        far = 0.0
+        for k in range(3):
+            far += back[k] * box[k] + abs(back[k]) * box[3 + k]
+        if apart - far >= enough:
+            return apart - far
         best = max(best, apart - reach(scene, way, other, back[0], back[1], back[2]))
     return best
 
@@ -181,7 +187,7 @@ def unsure(scene: Scene, way: Way, listed: int, look: int, first: int) -> int:
                         ends[side, a] = way.paths[way.path[shape], i, a]
                 else:
                     compose(joints, way.carrier[shape], way.place, shape, ends, side)
-            if gap(scene, way, pair, ends) < scene.kept[pair]:
+            if gap(scene, way, pair, ends, scene.kept[pair]) < scene.kept[pair]:
                 return i * scene.kept.shape[0] + k
     return -1
 

@@ -7,10 +7,13 @@ from typing import NamedTuple
 
 from nmm.arrays import Array
 from nmm.collisions.rows import Rows
-from nmm.control.bounds import COUNTED_ON, approach
+from nmm.control.bounds import COUNTED_ON, LimitNumbers, approach
 from nmm.kernels.compiled import compiled
 from nmm.kernels.memory import Cell, IntegerCell, Vector
 from nmm.resolvers.problem import ProblemArrays
+
+#: As far as an input goes in a sample, m or rad, where nothing limits its velocity.
+FARTHEST = 0.1
 
 
 class Clearance(NamedTuple):
@@ -30,6 +33,20 @@ class Clearance(NamedTuple):
     recovery: Cell
     braking: Cell
     least: Vector
+
+
+@compiled
+def bound_unlimited(limits: LimitNumbers, problem: ProblemArrays) -> None:
+    """Bounds of the inputs whose velocity nothing limits: what the way ahead is looked at for.
+
+    The most of the task's rate that rows leave would cost any inputs where they leave hardly a direction.
+    """
+    most = FARTHEST / problem.dt[()]
+    for j in range(limits.slowest.shape[0]):
+        if math.isinf(limits.fastest[j]):
+            problem.u_upper[j] = max(min(problem.u_upper[j], most), problem.u_lower[j])
+        if math.isinf(limits.slowest[j]):
+            problem.u_lower[j] = min(max(problem.u_lower[j], -most), problem.u_upper[j])
 
 
 @compiled

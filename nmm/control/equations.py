@@ -21,7 +21,7 @@ from nmm.control.bounds import (
     function_bounds,
     wheel_rows,
 )
-from nmm.control.clearance_rows import Clearance, clearance_bounds
+from nmm.control.clearance_rows import Clearance, bound_unlimited, clearance_bounds
 from nmm.control.steering import SteeringNumbers, steer
 from nmm.functions.program import BESIDE, Buffers, LaidOut, run
 from nmm.kernels.compiled import compiled, scratch
@@ -242,7 +242,7 @@ def write_limits(limits: LimitNumbers, q: Array, b: Buffers, C: Arm, problem: Pr
 def write_clearance(e: ControlStep, b: Buffers) -> None:
     """Rows and bounds of distances; a stage keeps its sample's bounds and gradients, S is its own."""
     count, n = e.near.d_q.shape
-    if e.limits.mode[()] == OFF:
+    if e.limits.mode[()] == OFF or count == 0:
         return
     gradient = scratch((1, n))
     for k in range(count):
@@ -255,6 +255,7 @@ def write_clearance(e: ControlStep, b: Buffers) -> None:
             for j in range(row.shape[0]):
                 row[j] = 0.0
     if e.limits.mode[()] == SAMPLE:
+        bound_unlimited(e.limits, e.problem)
         clearance_bounds(e.clearance, e.near, e.limits.acceleration, e.problem)
 
 

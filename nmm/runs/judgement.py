@@ -96,7 +96,9 @@ def judge(
         return Verdict(outcome, message, warnings)
     troubled = found.unstable or found.missed or outcome is Outcome.DIVERGED
     advice = None
-    if troubled and outcome is not Outcome.SINGULAR and not _hopeless(seen) and not recorder.blocking:
+    # A task that distances hold back departs from its promise with any dt.
+    held_back = bool(recorder.blocking) or (recorder.avoided and not found.unstable)
+    if troubled and outcome is not Outcome.SINGULAR and not _hopeless(seen) and not held_back:
         advice = _advice(controller, recorder, advance, dt, found, retry)
     stability = _stability(found.unstable, advice, method, dt)
     if outcome is not Outcome.COMPLETED:

@@ -161,6 +161,11 @@ class Recorder:
                 against = ", ".join(self._controller.report.contradiction())
                 self._against |= dict.fromkeys(beyond.keys() - self._against.keys(), against)
 
+    @property
+    def avoided(self) -> bool:
+        """Whether the inputs were changed to keep distances, or could come too near within a sample."""
+        return self._counts != Counts()
+
     def guarded(self, controller: Controller) -> None:
         """What the controller kept off at the end of the run, and what that took."""
         self.blocking = controller.report.blocking()
