@@ -35,8 +35,8 @@ START = {
     "ur5_wrist_1_joint": -1.87,
     "ur5_wrist_2_joint": -np.pi / 2,
 }
-#: Within reach, and 3 cm farther than the tip comes with the distance kept.
-GOALS = {"within reach": np.array([1.9, 0.35, 0.8]), "out of reach": np.array([2.0, 0.35, 0.75])}
+#: The second is lower, and nearer to the table's edge.
+GOALS = {"one goal": np.array([1.9, 0.35, 0.8]), "a lower one": np.array([2.0, 0.35, 0.75])}
 TABLE = nmm.Obstacle(nmm.Box([0.8, 1.6, 0.6]), [1.9, 0.3, 0.3], name="table")
 DT, DURATION, MOVES, GAIN, DISTANCE = 0.02, 12.0, 6.0, 1.5, 0.03
 LOOKS = 10
