@@ -47,7 +47,14 @@ DAMPED = {
     "unicycle_2r_algorithmic": "the added task was not done",
 }
 #: The task gives way to what is in its way, or to limits where it begins anew, and is done at the end.
-GIVE_WAY = ("car_parks", "omni_small_arm_door", "unicycle_3r_crossing", "unicycle_3r_sequence")
+GIVE_WAY = (
+    "car_parks",
+    "omni_small_arm_door",
+    "tiago_shelf",
+    "unicycle_3r_crossing",
+    "unicycle_3r_door",
+    "unicycle_3r_sequence",
+)
 #: Its target is 0.4 m above what the arm reaches.
 MISSED = "unicycle_3r_out_of_reach"
 
@@ -73,7 +80,8 @@ def test_every_bundled_scenario_runs_to_its_end(runs: dict[str, nmm.Trajectory])
             assert run.error_norm[-1] < 1e-3, name
             continue
         else:
-            assert run.warnings == (), name
+            # Links that are built close to each other are no fault of the run.
+            assert [one for one in run.warnings if not one.startswith("left out, as nearer")] == [], name
         # Feedback with K = 1 1/s: what is left of the initial error, and what the integrator adds.
         expected = run.error_norm[0] * np.exp(-run.t[-1])
         if "task was" in DAMPED.get(name, "task was"):

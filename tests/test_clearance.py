@@ -158,7 +158,7 @@ def test_a_scenario_hands_over_its_obstacles():
     ((weight, found),) = controller.objective.terms()
     assert weight == 2.0
     assert [one.name for one in found.collisions.obstacles] == ["cart"]
-    assert found.value(Configuration(robot, robot.q({"x": 0.6, "q2": 0.5, "q3": 0.9}))) > 0.0
+    assert found.value(Configuration(robot, robot.q({"x": 0.9, "q1": -1.2, "q2": 0.5, "q3": 0.9}))) > 0.0
     with pytest.raises(ScenarioError, match=r"objective.*clearance: expected collisions"):
         scenario.override("collisions", "null").controller()
 
