@@ -247,3 +247,24 @@ def test_an_srdf_is_taken_and_told(robot, tmp_path):
     some = nmm.Collisions(srdf=file).on(robot)
     assert len(some.names) == len(every.names) - 1
     assert any("left out by the SRDF: 1 pairs" in note for note in some.notes)
+
+
+@pytest.mark.parametrize("sequenced", [False, True])
+def test_a_run_that_is_run_over_is_not_completed(robot, sequenced):
+    """A ball at 4 m/s comes from behind; the task is done all the while."""
+    ball = nmm.Obstacle(nmm.Sphere(0.15), motion=lambda t: [-2.0 + 4.0 * t, 0.0, 0.15], name="ball")
+    q0 = robot.q(START)
+    hand = nmm.Configuration(robot, q0).placement("ee").translation[:2]
+    when = {"when": nmm.Between(0.0, 9.0)} if sequenced else {}
+    make = nmm.SequencedController if sequenced else nmm.Controller
+    given = make(
+        robot,
+        nmm.Task(nmm.Position("ee", "xy"), hand, gain=1.0, **when),
+        nmm.ProjectedGradient(),
+        limits=nmm.Limits({"platform": 0.2, "arm": 0.2}),
+        collisions=nmm.Collisions(obstacles=[ball]),
+    )
+    run = nmm.simulate(given, q0, 1.2, 0.02, "zoh")
+    assert run.clearance.min() < -0.01
+    assert run.outcome is nmm.Outcome.MISSED
+    assert "ball ran into each other from t = 0." in run.message

@@ -123,3 +123,17 @@ def told(setting: Setting, found: Swept, t: Array, counts: Counts) -> list[str]:
             f"in {counts.braked} samples the inputs went towards braking to keep distances{said}"
         )
     return sentences
+
+
+def ran_into(setting: Setting, found: Swept, t: Array) -> str:
+    """What was run into after it had been clear, and when; "" for nothing. Such a run is not completed."""
+    clear = np.flatnonzero(found.between >= -ROUNDING)
+    if not clear.size:
+        return ""
+    first = int(clear[0])
+    into = np.flatnonzero(found.between[first:] < -ROUNDING) + first
+    if not into.size:
+        return ""
+    begun, worst = int(into[0]), int(into[np.argmin(found.between[into])])
+    pair = setting.words(int(found.pairs[worst]))
+    return f"{pair} ran into each other from t = {t[begun]:.3g} s on, by up to {-found.between[worst]:.3g} m"

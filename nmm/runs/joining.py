@@ -12,7 +12,7 @@ from nmm.arrays import Array
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
 from nmm.control.sequenced import SequencedController
-from nmm.runs.clearance import swept
+from nmm.runs.clearance import ran_into, swept
 from nmm.runs.judgement import Ended, Verdict, blocked, reached_or_not
 from nmm.runs.recording import Recorder, frame_path, shown
 from nmm.runs.repeated import told_once
@@ -87,6 +87,10 @@ def join(
     if controller.setting is not None:
         where = [place for leg in legs for place in leg.recorder.places]
         found = swept(controller.setting, along("t"), along("q"), along("u"), where)
+        into = ran_into(controller.setting, found, along("t"))
+        if into and verdict.outcome in (Outcome.COMPLETED, Outcome.MISSED):
+            message = into if verdict.outcome is Outcome.COMPLETED else f"{into}; {verdict.message}"
+            verdict = verdict._replace(outcome=Outcome.MISSED, message=message)
         distances = {
             "clearance": found.clearance,
             "clearance_pairs": found.pairs,

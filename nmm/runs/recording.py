@@ -20,7 +20,7 @@ from nmm.functions.tasks.task import Task
 from nmm.resolvers.answer import Status
 from nmm.robots.robot import Robot
 from nmm.runs.broken_limits import broken_limits, broken_rows
-from nmm.runs.clearance import swept, told
+from nmm.runs.clearance import ran_into, swept, told
 from nmm.runs.feedback import Feedback
 from nmm.runs.margins import margin, shares
 from nmm.runs.promise import Samples
@@ -237,6 +237,9 @@ class Recorder:
         if controller.setting is not None:
             found = swept(controller.setting, self.t, self.q[:count], self._u[:count], self.places)
             self.warnings += told(controller.setting, found, self.t, self._counts)
+            if ended and (into := ran_into(controller.setting, found, self.t)):
+                message = into if outcome is Outcome.COMPLETED else f"{into}; {message}"
+                outcome = Outcome.MISSED
             distances = {
                 "clearance": found.clearance,
                 "clearance_pairs": found.pairs,
