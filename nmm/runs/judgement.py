@@ -86,11 +86,7 @@ def judge(
         residual[: run_up(samples.t, samples.u, controller.kept.accelerations, dt)] = 0.0
     unmet = residuals(samples.t, residual, samples.rate)
     chatter = chattering(samples.t, samples.u, controller.robot.u_names)
-    warnings = (
-        [_joined(unmet.sentence, _relaxed(recorder.scale, limited=controller.limits is not None))]
-        if unmet.samples
-        else []
-    )
+    warnings = [_joined(unmet.sentence, _relaxed(recorder.scale, controller))] if unmet.samples else []
     seen = _seen(controller, recorder, samples, found, chatter)
     if outcome is Outcome.INTERRUPTED:
         return Verdict(outcome, message, warnings)
@@ -257,12 +253,14 @@ def _lost(controller: Controller, recorder: Recorder, ended: Ended) -> list[str]
     return [sentence for sentence in sentences if sentence]
 
 
-def _relaxed(scale: Array, *, limited: bool) -> str:
+def _relaxed(scale: Array, controller: Controller) -> str:
     least = float(scale.min(initial=1.0))
     if least >= 1.0:
         return ""
-    if limited:
-        return f"under its limits λ falls to {least:.3g}"
+    limits = ["limits"] if controller.limits is not None else []
+    kept = [*limits, "distances"] if controller.setting is not None else limits
+    if kept:
+        return f"under its {' and '.join(kept)} λ falls to {least:.3g}"
     return f"its resolver scales the rate on purpose, down to {least:.3g} of it"
 
 
