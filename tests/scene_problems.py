@@ -36,6 +36,8 @@ STEPS, METHODS = (0.01, 0.02, 0.05), ("zoh", "rk4")
 #: The share of scenes that begin nearer than the distance; the others begin this far away at least, m.
 NEAR, FAR = 0.04, 0.05
 DISTANCE, DURATION = 0.025, 3.0
+#: As long as the farthest goal takes without obstacles, s: for `main`.
+WHOLE = 8.0
 #: What is kept to, m, and looks a sample.
 ROUNDING, LOOKS = 1e-6, 5
 
@@ -57,9 +59,9 @@ class Scene(NamedTuple):
         resolver = RESOLVERS[self.kinds["resolver"]]
         return nmm.Controller(self.robot, self.task, resolver, limits=self.limits, collisions=collisions)
 
-    def run(self, controller: nmm.Controller) -> nmm.Trajectory:
+    def run(self, controller: nmm.Controller, duration: float) -> nmm.Trajectory:
         """What comes of it."""
-        return nmm.simulate(controller, self.q, DURATION, self.dt, self.kinds["method"], until=nmm.Goal())
+        return nmm.simulate(controller, self.q, duration, self.dt, self.kinds["method"], until=nmm.Goal())
 
 
 @lru_cache
@@ -242,18 +244,18 @@ class Found(NamedTuple):
         ]
 
 
-def outcome_of(one: Scene, *, without: bool = True) -> Found:
+def outcome_of(one: Scene, duration: float = DURATION, *, without: bool = True) -> Found:
     """Run a scene, and look along it; the same without avoidance where that is asked for."""
     began = time.perf_counter()
     controller = one.controller(avoids=True)
     setting = controller.setting
     assert setting is not None
     pairs = tuple((pair.first, pair.second) for pair in setting.queries.shapes.collisionPairs)
-    run = one.run(controller)
+    run = one.run(controller, duration)
     seconds = time.perf_counter() - began
     apart = Distances(one.robot, pairs).with_obstacles(setting.obstacles)
     least, pair = least_along(run, apart)
-    free = one.run(one.controller(avoids=False)) if without else None
+    free = one.run(one.controller(avoids=False), duration) if without else None
     return Found(
         least,
         pair,
@@ -272,7 +274,7 @@ def main(count: int, first: int = 0) -> None:
     counts: dict[str, Counter[str]] = {}
     for seed in range(first, first + count):
         one = scene(seed)
-        found = outcome_of(one)
+        found = outcome_of(one, WHOLE)
         for group in ("all", *(f"{key} {one.kinds[key]}" for key in ("robot", "limits", "motion", "start"))):
             counts.setdefault(group, Counter()).update(["scenes", *found.classes])
         if not found.kept or found.fastest > 50.0 or found.seconds > 20.0:
