@@ -61,7 +61,7 @@ def test_true_keeps_the_robot_off_itself(tmp_path: Path) -> None:
         ("{kind: sphere, radius: 0.1}", nmm.Sphere(0.1)),
         ("{kind: cylinder, radius: 0.1, length: 1}", nmm.Cylinder(0.1, 1.0)),
         ("{kind: capsule, radius: 0.1, length: 1}", nmm.Capsule(0.1, 1.0)),
-        ("{kind: plane, normal: [0, 3, 4]}", nmm.Plane([0.0, 0.6, 0.8])),
+        ("{kind: plane, normal: [0, -3, 4]}", nmm.Plane([0.0, -0.6, 0.8])),
     ],
 )
 def test_shapes(tmp_path: Path, shape: str, made: nmm.Shape) -> None:
