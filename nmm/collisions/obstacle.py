@@ -112,6 +112,11 @@ class Obstacle:
         return np.concatenate([given, np.zeros(6 - given.size)])
 
     def _checked(self, placement: Placement) -> Any:
+        # What a motion usually returns: it is asked along the way ahead, many times a sample.
+        if isinstance(placement, np.ndarray) and placement.dtype == np.float64 and placement.shape == (6,):
+            six: Array = placement
+            if six.dot(six) < np.inf:
+                return pin.SE3(pin.exp3(six[3:]), six[:3])
         name = f"obstacle {self.name}: placement"
         given = array(placement, name)
         if given.shape == (4, 4):

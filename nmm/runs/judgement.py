@@ -92,8 +92,8 @@ def judge(
         return Verdict(outcome, message, warnings)
     troubled = found.unstable or found.missed or outcome is Outcome.DIVERGED
     advice = None
-    # A task that distances hold back departs from its promise with any dt.
-    held_back = bool(recorder.blocking) or (recorder.avoided and not found.unstable)
+    # A task that distances hold back departs from its promise with any dt, and to try costs many runs.
+    held_back = bool(recorder.blocking) or recorder.avoided
     if troubled and outcome is not Outcome.SINGULAR and not _hopeless(seen) and not held_back:
         advice = _advice(controller, recorder, advance, dt, found, retry)
     stability = _stability(found.unstable, advice, method, dt)
