@@ -278,3 +278,21 @@ def test_a_placement_is_the_same_however_it_is_given():
     np.testing.assert_array_equal(listed.placement(1.0), packed.placement(1.0))
     with pytest.raises(nmm.InputError, match="placement"):
         nmm.Obstacle(box, motion=lambda t: np.array([np.nan, *six[1:]]))
+
+
+def test_what_passes_between_two_samples_is_seen(robot):
+    """A ball at 20 m/s is in front of the robot at one sample and behind it at the next."""
+    ball = nmm.Obstacle(
+        nmm.Sphere(0.05), motion=lambda t: np.array([0, 20 * (t - 0.35), 0.15, 0, 0, 0.0]), name="ball"
+    )
+    hand = nmm.Configuration(robot, robot.q(START)).placement("ee").translation[:2]
+    task = nmm.Task(nmm.Position("ee", "xy"), hand, gain=1.0)
+    collisions = nmm.Collisions(obstacles=[ball])
+    given = nmm.Controller(
+        robot, task, nmm.ProjectedGradient(), limits=nmm.Limits({"platform": 0.1}), collisions=collisions
+    )
+    run = nmm.simulate(given, START, 0.6, 0.1, "zoh")
+    assert run.clearance.min() > 0.1
+    assert run.clearance_between.min() < 0.0
+    assert run.outcome is nmm.Outcome.MISSED
+    assert "ball ran into each other" in run.message

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -71,6 +72,23 @@ def places(obstacle: Obstacle, t: Array) -> Array:
     """Where an obstacle is at t (N,), s: (N, 4, 4), or (1, 4, 4) of one that stands."""
     times = t if obstacle.moves and len(t) else [0.0]
     return np.array([obstacle.placement(float(time)) for time in times])
+
+
+def shifts(obstacles: Sequence[Obstacle], t: Array) -> Array:
+    """How far a point of an obstacle goes from sample to sample of t (N,), s, at most: (N - 1,), m."""
+    found = np.zeros(max(len(t) - 1, 0))
+    for one in obstacles:
+        if not one.moves:
+            continue
+        geometry = one.shape.geometry()
+        geometry.computeLocalAABB()
+        size = float(np.linalg.norm(geometry.aabb_center)) + float(geometry.aabb_radius)
+        at = [one.at(float(time)) for time in t]
+        for k, (before, after) in enumerate(pairwise(at)):
+            turned = float(np.linalg.norm(pin.log3(before.rotation.T @ after.rotation)))
+            way = float(np.linalg.norm(after.translation - before.translation))
+            found[k] = max(found[k], way + (turned * size if turned else 0.0))
+    return found
 
 
 def described(shape: Shape) -> tuple[dict[str, Any], Array]:

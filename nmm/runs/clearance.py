@@ -10,13 +10,14 @@ import numpy as np
 
 from nmm.arrays import Array, Integers
 from nmm.collisions.obstacle import Obstacle
-from nmm.collisions.recorded import as_passed
+from nmm.collisions.recorded import as_passed, shifts
 from nmm.collisions.setting import Setting
 from nmm.control.guard import Counts, Guard
 from nmm.control.integrators import Around, Velocity
 from nmm.robots.held import Held
 
-#: Between samples distances are looked at after so much motion, m and rad of the coordinates together.
+#: Between samples distances are looked at after so much motion, m and rad of the coordinates together, and m
+#: of the obstacles.
 APART = 0.01
 #: Looks between two samples at most.
 LOOKS = 10
@@ -29,6 +30,7 @@ class Swept(NamedTuple):
 
     clearance (N,) : the least distance at each sample, m; pairs (N,) : between which pair
     between (N,) : the least on the way to the next sample, its ends included; the last sample's own
+    between_pairs (N,) : between which pair that is
     points (N, 6) : the two points that are nearest at each sample, of the pair's first shape and of its
         second, m, world axes; not a number where nothing is near
     obstacles : as they were
@@ -37,6 +39,7 @@ class Swept(NamedTuple):
     clearance: Array
     pairs: Integers
     between: Array
+    between_pairs: Integers
     points: Array
     obstacles: tuple[Obstacle, ...]
 
@@ -75,22 +78,26 @@ def _swept(setting: Setting, t: Array, q: Array, u: Array, obstacles: tuple[Obst
         clearance[k], pairs[k] = queries.nearest(float(time), place)
         if pairs[k] >= 0:
             points[k] = queries.results[pairs[k], 4:]
-    between = clearance.copy()
+    between, between_pairs, shifted = clearance.copy(), pairs.copy(), shifts(obstacles, t)
     for k in range(len(t) - 1):
         dt = float(t[k + 1] - t[k])
         ends = min(clearance[k], clearance[k + 1])
         moved = float(np.abs(u[k]).sum()) * dt
         between[k] = ends
-        if ends - setting.distance > moved * max(1.0, setting.robot.reach):
+        if clearance[k + 1] < clearance[k]:
+            between_pairs[k] = pairs[k + 1]
+        if ends - setting.distance > moved * max(1.0, setting.robot.reach) + shifted[k]:
             continue
         # The arc that held inputs make, and what the integrator made otherwise, by and by.
         astray = q[k + 1] - held(q[k], u[k], dt)
-        looks = min(LOOKS, max(1, int(np.ceil(moved / APART))))
+        looks = min(LOOKS, max(1, int(np.ceil((moved + shifted[k]) / APART))))
         for i in range(1, looks + 1):
             share = (i - 0.5) / looks
             ahead = held(q[k], u[k], share * dt) + share * astray
-            between[k] = min(between[k], queries.nearest(float(t[k]) + share * dt, ahead)[0])
-    return Swept(clearance, pairs, between, points, obstacles)
+            d, pair = queries.nearest(float(t[k]) + share * dt, ahead)
+            if d < between[k]:
+                between[k], between_pairs[k] = d, pair
+    return Swept(clearance, pairs, between, between_pairs, points, obstacles)
 
 
 def told(setting: Setting, found: Swept, t: Array, counts: Counts) -> list[str]:
@@ -113,9 +120,10 @@ def told(setting: Setting, found: Swept, t: Array, counts: Counts) -> list[str]:
     short = np.flatnonzero(below[first:]) + first
     if short.size:
         k = int(short[np.argmin(found.between[short])])
+        name = setting.words(int(found.between_pairs[k]))
         sentences.append(
             f"the distance of {asked:g} m could not be kept in {short.size} samples: "
-            f"{setting.words(int(found.pairs[k]))} came to {found.between[k]:.4g} m at t = {t[k]:.3g} s"
+            f"{name} came to {found.between[k]:.4g} m at t = {t[k]:.3g} s"
         )
     if counts.braked:
         said = f", {counts.short} of them in vain" if counts.short else ""
@@ -135,5 +143,5 @@ def ran_into(setting: Setting, found: Swept, t: Array) -> str:
     if not into.size:
         return ""
     begun, worst = int(into[0]), int(into[np.argmin(found.between[into])])
-    pair = setting.words(int(found.pairs[worst]))
+    pair = setting.words(int(found.between_pairs[worst]))
     return f"{pair} ran into each other from t = {t[begun]:.3g} s on, by up to {-found.between[worst]:.3g} m"
