@@ -79,10 +79,33 @@ def test_a_second_thread_is_refused_by_name_and_copies_work() -> None:
     first = threading.Thread(target=lambda: found.append(controller(0.0, q)), name="first")
     first.start()
     assert inside.wait(20.0)
-    with pytest.raises(nmm.RunError, match=r"MainThread.*copy\.copy"):
-        controller(0.0, q)
+    for ask in (
+        controller,
+        controller.evaluate,
+        controller.velocity,
+        lambda t, q: controller.step(t, q, 0.01),
+    ):
+        with pytest.raises(nmm.RunError, match=r"MainThread.*copy\.copy"):
+            ask(0.0, q)
     np.testing.assert_array_equal(copy.copy(controller)(0.0, q), expected)
     go_on.set()
     first.join()
     np.testing.assert_array_equal(found[0], expected)
     np.testing.assert_array_equal(controller(0.0, q), expected)
+
+
+@pytest.mark.parametrize("kinematics", ["pinocchio", "compiled"])
+def test_steps_of_tasks_that_come_and_go_are_those_of_a_simulation(kinematics: str) -> None:
+    robot = nmm.load("unicycle_3r")
+    tasks = [
+        nmm.Task(nmm.Position("ee", "xy"), target, gain=1.0, when=nmm.Between(*when))
+        for target, when in (([2.0, 0.5], (0.0, 0.1)), ([1.8, -0.4], (0.1, 9.0)))
+    ]
+    q = q0 = robot.q({"q1": 0.4, "q2": 0.7})
+    run = nmm.simulate(nmm.SequencedController(robot, tasks, nmm.ProjectedGradient()), q0, 0.2, 0.01)
+    one = nmm.SequencedController(robot, tasks, nmm.ProjectedGradient(), kinematics=kinematics)
+    for k in range(20):
+        q, u = one.step(run.t[k], q, 0.01)
+        np.testing.assert_allclose(u, run.u[k], atol=1e-11)
+        np.testing.assert_allclose(q, run.q[k + 1], atol=1e-12)
+    assert len(run.events) >= 2

@@ -105,6 +105,7 @@ class Controller:
             _expect(limits, Limits, "limits")
         if collisions is not None:
             _expect(collisions, Collisions, "collisions")
+        self._busy = False
         self.robot = robot
         self.limits = limits
         self.collisions = collisions
@@ -166,7 +167,6 @@ class Controller:
             self.step_size = StepSize(
                 robot, resolver, descended, self._step, self._program.blocks, kinematics
             )
-        self._busy = False
         self._steppers: dict[str, Callable[[float, Array, float], tuple[Array, Array]]] = {}
         self.sample = SampleState(
             self._step.problem,
@@ -279,6 +279,11 @@ class Controller:
             return (placed(ahead) if follows else ahead), u
 
         return compiled
+
+    def _begin(self) -> None:
+        if self._busy:
+            self._refuse()
+        self._busy = True
 
     def _refuse(self) -> None:
         raise RunError(
@@ -401,9 +406,13 @@ class Controller:
         """
         self._expect_dt()
         q = self._copied(q)
-        with self.sample.aside():
-            self._solve_whole(float(t), q)
-            return self.last(t, q)
+        self._begin()
+        try:
+            with self.sample.aside():
+                self._solve_whole(float(t), q)
+                return self.last(t, q)
+        finally:
+            self._busy = False
 
     def last(self, t: float, q: Array) -> Step:
         """The quantities of the call just made at (t, q), as copies."""
@@ -442,6 +451,7 @@ class Controller:
             return self._step.q_dot.copy()
         self._expect_dt()
         q = self._copied(q)
+        self._begin()
         mode, before = self._step.limits.mode, self.before.copy()
         usual = int(mode)
         mode[()] = STAGE if usual == SAMPLE else usual
@@ -454,6 +464,7 @@ class Controller:
         finally:
             mode[()] = usual
             self.before[:] = before
+            self._busy = False
         return self._step.q_dot.copy()
 
     def without_limits(self) -> AbstractContextManager[None]:

@@ -182,6 +182,13 @@ class SequencedController(Controller):
             self.switch()
         return self.current(t, q)
 
+    def step(self, t: float, q: ArrayLike, dt: float, method: str = "rk4") -> tuple[Array, Array]:
+        """As a `Controller`'s; decides which tasks are active, for the whole step."""
+        q = self.robot.q(q)
+        if self.changes(float(t), q):
+            self.switch()
+        return self.current.step(t, q, dt, method)
+
     def velocity(self, t: float, q: ArrayLike) -> Array:
         """q_dot = S(q) u (n,) at (t, q), with the tasks that the last call decided."""
         return self.current.velocity(t, q)
