@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import daqp
 import numpy as np
+from scipy.linalg import null_space
 from scipy.optimize import linprog
 
 import nmm
@@ -19,7 +20,6 @@ from nmm.resolvers.problem import Problem
 
 #: (rows of each level, inputs, rows of limits)
 SIZES = (((1, 1, 1), 5, 3), ((2, 1, 2), 8, 4), ((3, 3, 2), 10, 8), ((3, 2, 3), 12, 6))
-EQUAL = 5
 
 
 def problems(count: int, seed: int, *, if_possible: bool) -> Iterator[Problem]:
@@ -53,17 +53,15 @@ class Room(NamedTuple):
 
 def nearest(point: Array, E: Array, room: Room) -> Array:
     """The d with E d = 0 in the room that is nearest to a point."""
-    m = len(point)
-    rows = np.ascontiguousarray(np.vstack([room.A, E]))
-    sense = np.append(np.zeros(len(room.A), dtype=np.int32), np.full(len(E), EQUAL, dtype=np.int32))
+    # In the null space: a vertex where E d = 0 and other rows than that meet has been called empty.
+    Z = null_space(E)
+    rows = np.ascontiguousarray(room.A @ Z)
     upper, lower = np.minimum(room.upper, 1e6), np.maximum(room.lower, -1e6)
-    none = np.zeros(len(E))
-    x, _, flag, _ = daqp.solve(
-        np.eye(m), -point, rows, np.append(upper, none), np.append(lower, none), sense, primal_tol=1e-11
-    )
+    sense = np.zeros(len(rows), dtype=np.int32)
+    z, _, flag, _ = daqp.solve(np.eye(Z.shape[1]), -Z.T @ point, rows, upper, lower, sense, primal_tol=1e-11)
     if flag < 1:
         raise ArithmeticError(f"the quadratic program is not solved: {flag}")
-    return np.array(x)
+    return Z @ z
 
 
 def farthest(E: Array, along: Array, room: Room, gives: Array) -> float:
