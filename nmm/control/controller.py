@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,6 +35,7 @@ from nmm.functions.objectives.base import Objective
 from nmm.functions.program import COMPILED, PINOCCHIO, nothing
 from nmm.functions.tasks.task import Stack, Task
 from nmm.kernels.compiled import checked_by_caller
+from nmm.kernels.memory import Blocks
 from nmm.resolvers.answer import Status, added_residual
 from nmm.resolvers.base import Resolver
 from nmm.resolvers.limited import instead
@@ -254,10 +255,8 @@ class Controller:
         integrates = integrator(method, self.robot, 1e-9)
         if integrates.tolerance:
             raise InputError("method: expected rk4, midpoint, euler or zoh for one step, got adaptive")
-        placed, follows = self.robot.following.placed, bool(self.robot.followers)
         found = tableau(integrates)
-        whole = type(self.resolver).finish is Resolver.finish and self._program.prepare is nothing
-        if found is None or not whole or self.guard or self.backing or self.step_size:
+        if found is None or not self.compilable or self._program.prepare is not nothing:
 
             def from_python(t: float, q: Array, dt: float) -> tuple[Array, Array]:
                 u, q_dot = self(t, q), self._step.q_dot.copy()
@@ -267,18 +266,37 @@ class Controller:
         advance = Stepper(self._program.blocks, found, self.robot.n, self.robot.n_u)
 
         def compiled(t: float, q: Array, dt: float) -> tuple[Array, Array]:
-            if self._busy:
-                self._refuse()
-            self._busy = True
+            self._begin()
             try:
                 status, ahead, u = advance(t, q, dt)
                 if status >= _FAILED:
                     self._fail(t, q)
             finally:
                 self._busy = False
-            return (placed(ahead) if follows else ahead), u
+            return ahead, u
 
         return compiled
+
+    @property
+    def compilable(self) -> bool:
+        """Whether nothing but its kinematics needs Python, so that `compiled` makes it one compiled call."""
+        whole = type(self.resolver).finish is Resolver.finish and not self._program.calls_python
+        return whole and not (self.guard or self.backing or self.step_size)
+
+    @contextmanager
+    def compiled(self) -> Iterator[Blocks]:
+        """`with controller.compiled() as blocks:` for compiled code that makes the steps: with compiled
+        kinematics, and no other thread may call."""
+        self._begin()
+        try:
+            with self._program.compiled_kinematics():
+                yield self._program.blocks
+        finally:
+            self._busy = False
+
+    def kinematics_off(self, configurations: Array) -> float:
+        """The most by which Pinocchio's kinematics and the compiled ones differ at q (N, n), m and rad."""
+        return self._program.kinematics_off(configurations)
 
     def _begin(self) -> None:
         if self._busy:

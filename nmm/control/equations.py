@@ -61,7 +61,7 @@ class Arm(NamedTuple):
     """C of S = blkdiag(G, C): the identity, with a row of its own for every coordinate that follows another.
 
     moved (m - p,) : the coordinate that input p + j moves
-    followers (3 k,) : see `nmm.kernels.followers`
+    followers (4 k,) : see `nmm.kernels.followers`
     """
 
     moved: IntegerVector

@@ -1,4 +1,4 @@
-"""A step of the closed loop in one compiled call: a control step at its beginning and one at each stage."""
+"""The closed loop in compiled calls: from a sample to the next one, a control step at each stage between."""
 
 from __future__ import annotations
 
@@ -10,33 +10,89 @@ from numba import types
 from nmm.arrays import Array, Integers
 from nmm.control.bounds import SAMPLE, STAGE
 from nmm.control.equations import ControlStep, step
-from nmm.control.integrators import Integrator, RungeKutta, ZeroOrderHold
+from nmm.control.integrators import Followed, Integrator, RungeKutta, ZeroOrderHold
 from nmm.functions.program import BESIDE, LaidOut
 from nmm.kernels.compiled import checked_by_caller, compiled, scratch
-from nmm.kernels.memory import Blocks, views
-from nmm.resolvers.answer import SINGULAR_J
+from nmm.kernels.followers import place_followers
+from nmm.kernels.memory import Blocks, Matrix, Vector, record_type, views
+from nmm.resolvers.answer import SINGULAR_J, SOLVED
 from nmm.robots.held import Inputs, hold
-
-_FLAT, _BLOCKS = types.float64[::1], (types.int64[::1], types.float64[::1])
-_ADVANCE = types.float64(
-    *(types.float64, types.float64, _FLAT, *_BLOCKS),
-    *(_FLAT, types.float64[:, ::1], _FLAT, _FLAT, _FLAT),
-)
 
 
 class Tableau(NamedTuple):
     """An explicit method of s stages: nodes (s,), matrix (s, s), weights (s,); none where inputs are held."""
 
-    nodes: Array
-    matrix: Array
-    weights: Array
+    nodes: Vector
+    matrix: Matrix
+    weights: Vector
+
+
+_FLAT = types.float64[::1]
+_ADVANCE = types.float64(
+    *(types.float64, types.float64, _FLAT, types.int64[::1], _FLAT),
+    *(record_type(Tableau), _FLAT, _FLAT),
+)
 
 
 def tableau(integrator: Integrator) -> Tableau | None:
-    """That of an integrator; None of one that has none."""
+    """That of an integrator; None of one that has none. `go_on` places joints that follow, whatever it is."""
     if isinstance(integrator, ZeroOrderHold):
         return Tableau(np.zeros(0), np.zeros((0, 0)), np.zeros(0))
+    if isinstance(integrator, Followed):
+        return tableau(integrator.integrator)
     return Tableau(*integrator.tableau) if isinstance(integrator, RungeKutta) else None
+
+
+@compiled
+def hold_inputs(q: Array, u: Array, dt: float, integers: Integers, floats: Array, ahead: Array) -> None:
+    """ahead (n,): q after dt with the inputs u (m,)."""
+    laid = views(LaidOut, integers, floats, 0)
+    arm = views(ControlStep, integers, floats, BESIDE).arm
+    n_p = laid.buffers.G.shape[0]
+    hold(Inputs(laid.platform_kernel, laid.platform_numbers, n_p, arm.moved, arm.followers), q, u, dt, ahead)
+
+
+@compiled
+def go_on(
+    t: float, dt: float, q: Array, integers: Integers, floats: Array, method: Tableau, ahead: Array
+) -> float:
+    """ahead (n,): q at t + dt, from the sample at (t, q) that was just made. Returns the status of the first
+    stage that failed, else SOLVED.
+
+    Bounds and the inputs before are the sample's: its stages change neither.
+    """
+    e = views(ControlStep, integers, floats, BESIDE)
+    n, m = q.shape[0], e.answer.u.shape[0]
+    stages = method.weights.shape[0]
+    if stages == 0:
+        hold_inputs(q, e.answer.u, dt, integers, floats, ahead)
+        return SOLVED
+    slopes, stage, before = scratch((stages, n)), scratch(n), scratch(m)
+    for j in range(m):
+        before[j] = e.problem.before[j]
+    mode = e.limits.mode[()]
+    if mode == SAMPLE:
+        e.limits.mode[()] = STAGE
+    status = float(SOLVED)
+    for k in range(1, stages + 1):
+        for i in range(n):
+            slopes[k - 1, i] = e.q_dot[i]
+        for i in range(n):
+            total = 0.0
+            for a in range(k):
+                total += (method.weights[a] if k == stages else method.matrix[k, a]) * slopes[a, i]
+            stage[i] = q[i] + dt * total
+        if k < stages:
+            status = step(t + method.nodes[k] * dt, stage, integers, floats)
+            if status >= SINGULAR_J:
+                break
+    e.limits.mode[()] = mode
+    for j in range(m):
+        e.problem.before[j] = before[j]
+    place_followers(stage, e.arm.followers)
+    for i in range(n):
+        ahead[i] = stage[i]
+    return status if status >= SINGULAR_J else SOLVED
 
 
 @compiled
@@ -46,62 +102,19 @@ def advance(
     q: Array,
     integers: Integers,
     floats: Array,
-    nodes: Array,
-    matrix: Array,
-    weights: Array,
+    method: Tableau,
     ahead: Array,
     u: Array,
 ) -> float:
-    """ahead (n,): q at t + dt; u (m,): the inputs at t. Returns the status of the first step that failed,
-    else that of the step at t.
-
-    Bounds and the inputs before are the sample's: its stages change neither.
-    """
+    """A sample at (t, q) and the way to the next. ahead (n,): q at t + dt; u (m,): the inputs at t. Returns
+    the status of the first step that failed, else that of the step at t."""
     status = step(t, q, integers, floats)
     e = views(ControlStep, integers, floats, BESIDE)
-    n, m = q.shape[0], u.shape[0]
-    for j in range(m):
+    for j in range(u.shape[0]):
         u[j] = e.answer.u[j]
     if status >= SINGULAR_J:
         return status
-    stages = weights.shape[0]
-    if stages == 0:
-        laid = views(LaidOut, integers, floats, 0)
-        inputs = Inputs(
-            laid.platform_kernel,
-            laid.platform_numbers,
-            laid.buffers.G.shape[0],
-            e.arm.moved,
-            e.arm.followers,
-        )
-        hold(inputs, q, u, dt, ahead)
-        return status
-    slopes, stage, before = scratch((stages, n)), scratch(n), scratch(m)
-    for j in range(m):
-        before[j] = e.problem.before[j]
-    mode = e.limits.mode[()]
-    if mode == SAMPLE:
-        e.limits.mode[()] = STAGE
-    failed = status
-    for k in range(stages + 1):
-        if k > 0:
-            for i in range(n):
-                slopes[k - 1, i] = e.q_dot[i]
-        for i in range(n):
-            total = 0.0
-            for a in range(k):
-                total += (weights[a] if k == stages else matrix[k, a]) * slopes[a, i]
-            stage[i] = q[i] + dt * total
-        if k == 0 or k == stages:
-            continue
-        failed = step(t + nodes[k] * dt, stage, integers, floats)
-        if failed >= SINGULAR_J:
-            break
-    e.limits.mode[()] = mode
-    for j in range(m):
-        e.problem.before[j] = before[j]
-    for i in range(n):
-        ahead[i] = stage[i]
+    failed = go_on(t, dt, q, integers, floats, method, ahead)
     return failed if failed >= SINGULAR_J else status
 
 
@@ -117,5 +130,5 @@ class Stepper:
         """Status, q (n,) at t + dt, u (m,) at t; q is contiguous float64."""
         n, m = self._shapes
         ahead, u = np.empty(n), np.empty(m)
-        status = self._advance(t, dt, q, *self._blocks, *self._method, ahead, u)
+        status = self._advance(t, dt, q, *self._blocks, self._method, ahead, u)
         return status, ahead, u

@@ -144,6 +144,7 @@ def load(folder: str | Path, robot: Robot | None = None) -> Trajectory:
         frame=summary["frame"],
         unmet=unmet(summary),
         limited=summary.get("limited", False),
+        kinematics_off=float("nan") if (off := summary.get("kinematics_off")) is None else off,
         limit_names=tuple(summary.get("limit_names", ())),
         clearance_names=tuple(summary.get("clearance_names", ())),
         clearance_asked=summary.get("clearance_asked", 0.0),

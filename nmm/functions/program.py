@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from nmm.kernels.compiled import call_platform, clear, compiled, view
 from nmm.kernels.kinematics import Kinematics, place_frames
 from nmm.kernels.memory import (
     Blocks,
+    IntegerCell,
     IntegerVector,
     Matrices,
     Matrix,
@@ -49,12 +51,12 @@ class Buffers(NamedTuple):
 class LaidOut(NamedTuple):
     """A program in memory; it is the first record there.
 
-    kinematics : where its record `Kinematics` is; 0 where Pinocchio computes them before the program runs
+    kinematics () : where its record `Kinematics` is; 0 while Pinocchio computes them before the program runs
     stages : where the records of the stages (`LaidOutStage`) are, in the order in which they run
     """
 
     buffers: Buffers
-    kinematics: int
+    kinematics: IntegerCell
     platform_kernel: int
     platform_numbers: Vector
     stages: IntegerVector
@@ -90,8 +92,8 @@ def run(t: float, q: Array, integers: Integers, floats: Array) -> None:
     program = views(LaidOut, integers, floats, 0)
     b = program.buffers
     n = q.shape[0]
-    if program.kinematics > 0:
-        here = views(Kinematics, integers, floats, program.kinematics)
+    if program.kinematics[()] > 0:
+        here = views(Kinematics, integers, floats, int(program.kinematics[()]))
         place_frames(here.joints, here.frames, q, b.placements, b.jacobians, b.hessians)
     clear(b.G)
     clear(b.G_q)
@@ -113,6 +115,21 @@ def run(t: float, q: Array, integers: Integers, floats: Array) -> None:
         call_function(stage.kernel, at, frames, stage.numbers, rows)
 
 
+@compiled
+def _place(
+    integers: Integers,
+    floats: Array,
+    table: int,
+    q: Array,
+    placements: Array,
+    jacobians: Array,
+    hessians: Array,
+) -> None:
+    """The compiled kinematics alone."""
+    here = views(Kinematics, integers, floats, table)
+    place_frames(here.joints, here.frames, q, placements, jacobians, hessians)
+
+
 class Program:
     """Functions of one robot, with the tables and the memory in which they are evaluated.
 
@@ -125,12 +142,14 @@ class Program:
     first_rows : where the rows of each function begin in `buffers.value`
     blocks : what `run` takes, made by `lay_out`
     buffers : what it reads and writes, as views
+    calls_python : whether users' Python functions are among them
     prepare : prepare(t, q) does Pinocchio's part at q and the users' Python functions at (t, q); `nothing`
         where there is neither
     """
 
     blocks: Blocks
     buffers: Buffers
+    calls_python: bool
     prepare: Callable[[float, Array], None]
 
     def __init__(self, robot: Robot, functions: Sequence[Function], kinematics: str = PINOCCHIO) -> None:
@@ -172,7 +191,7 @@ class Program:
         memory.add(
             LaidOut(
                 buffers,
-                table if self._compiled else 0,
+                np.array(table if self._compiled else 0, dtype=np.int64),
                 platform.velocity_map.address,
                 platform.parameters,
                 places,
@@ -184,11 +203,12 @@ class Program:
             slots = np.array([self._frames.index(frame) for frame in stage.frames], dtype=np.int64)
             bounds = row - stage.before, row + stage.rows
             memory.add(LaidOutStage(stage.kernel.address, *bounds, slots, stage.numbers))
-        if self._compiled:
-            ids = [None if name == CENTER_OF_MASS else robot.frame_id(name) for name in self._frames]
-            memory.add(Kinematics(joint_table(robot.model), frame_table(robot.model, ids)))
+        ids = [None if name == CENTER_OF_MASS else robot.frame_id(name) for name in self._frames]
+        memory.add(Kinematics(joint_table(robot.model), frame_table(robot.model, ids)))
         self.blocks = memory.blocks()
-        self.buffers = found = views(LaidOut, *self.blocks, 0).buffers
+        laid = views(LaidOut, *self.blocks, 0)
+        self._kinematics, self._table = laid.kinematics, table
+        self.buffers = found = laid.buffers
         self.prepare = update = (
             nothing
             if self._compiled
@@ -206,8 +226,33 @@ class Program:
             for stage, block in zip(stages, self._numbers, strict=True)
             if stage.callback is not None
         ]
+        self.calls_python = bool(callbacks)
         if callbacks:
             self.prepare = _with_callbacks(robot, update, callbacks)
+
+    @contextmanager
+    def compiled_kinematics(self) -> Iterator[None]:
+        """In the block `run` computes the kinematics, whoever does otherwise; nothing has to be prepared."""
+        usual = int(self._kinematics)
+        self._kinematics[()] = self._table
+        try:
+            yield
+        finally:
+            self._kinematics[()] = usual
+
+    def kinematics_off(self, configurations: Array) -> float:
+        """The most by which Pinocchio's kinematics and the compiled ones differ at q (N, n), m and rad."""
+        robot, b = self.robot, self.buffers
+        theirs, ours = ([np.zeros_like(one) for one in b[:3]] for _ in range(2))
+        update = kinematics_updater(robot, tuple(self._frames), *theirs)
+        off = 0.0
+        for q in configurations:
+            update(0.0, q)
+            _place(*self.blocks, self._table, q, *ours)
+            off = max(
+                off, *(float(np.abs(a - z).max(initial=0.0)) for a, z in zip(theirs, ours, strict=True))
+            )
+        return off
 
     def evaluate(self, t: float, q: Array) -> list[Evaluation]:
         """Every function's value, time derivative and Jacobian at (t, q), as copies."""

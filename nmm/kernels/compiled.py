@@ -79,14 +79,14 @@ class Kernel:
 _plain_by_address: dict[int, Plain] = {}
 
 
-def compiled(function: Callable[..., Any], allocates: bool = False) -> Any:
+def compiled(function: Callable[..., Any], allocates: bool = False, nogil: bool = False) -> Any:
     """`numba.njit` with nmm's options and nmm's cache folder; `.py_func` is the plain function.
 
     Divisions by zero give inf and nan as in numpy (`error_model`): a singular matrix is a case
     that the resolvers report, not an exception out of compiled code. Arrays are neither made (but see
     `scratch`) nor returned: counting references to them would take half of a control step.
     """
-    made = numba.njit(error_model="numpy", _nrt=allocates)(function)
+    made = numba.njit(error_model="numpy", _nrt=allocates, nogil=nogil)(function)
     if isinstance(made, Dispatcher):  # the function itself with NUMBA_DISABLE_JIT=1
         made._cache = KernelCache(function)  # type: ignore[attr-defined]  # as `enable_caching` does with numba's own
     return made
@@ -94,6 +94,9 @@ def compiled(function: Callable[..., Any], allocates: bool = False) -> Any:
 
 #: Decorator for functions that make or return arrays.
 allocating = functools.partial(compiled, allocates=True)
+
+#: Decorator for functions that run for so long that other threads should, too.
+compiled_without_gil = functools.partial(compiled, nogil=True)
 
 #: Decorator for helpers of compiled functions that stay plain Python when called from Python.
 inlined = numba.extending.register_jitable

@@ -107,8 +107,8 @@ class Following:
 
     @property
     def table(self) -> Array:
-        """A follower, its leader and its multiplier in each row, (k, 3): for `nmm.kernels.followers`."""
-        return np.column_stack([self.columns, self.leaders, self.multipliers])
+        """A follower, its leader, its multiplier and its offset in each row, (k, 4), for compiled code."""
+        return np.column_stack([self.columns, self.leaders, self.multipliers, self.offsets])
 
     @property
     def carried(self) -> Array:

@@ -4,14 +4,37 @@ from __future__ import annotations
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.arrays import Array, Integers
+from nmm.kernels.compiled import clear, compiled, scratch, view
+from nmm.kernels.kinematics import Kinematics, place_frames
+from nmm.kernels.memory import Memory, views
 from nmm.progress import Progress
-from nmm.robots.configuration import kinematics_updater
-from nmm.robots.robot import Robot
+from nmm.robots.joint_table import frame_table, joint_table
+from nmm.robots.robot import CENTER_OF_MASS, Robot
+
+#: Configurations a compiled call: what nothing interrupts.
+AT_ONCE = 10_000
+
+
+@compiled
+def follow(integers: Integers, floats: Array, q: Array, points: Array, jacobians: Array) -> None:
+    """points (N, 3) of the one frame at q (N, n), and, if there is room for them, jacobians (N, 3, n)."""
+    here = views(Kinematics, integers, floats, 0)
+    n = q.shape[1]
+    placement, J, none = scratch((1, 3, 4)), scratch((1, 6, n)), scratch((0, 6, n, n))
+    clear(J)
+    for k in range(q.shape[0]):
+        place_frames(here.joints, here.frames, view(q, k * n, (n,)), placement, J, none)
+        for i in range(3):
+            points[k, i] = placement[0, i, 3]
+        if jacobians.shape[0] > 0:
+            for i in range(3):
+                for j in range(n):
+                    jacobians[k, i, j] = J[0, i, j]
 
 
 class FramePath:
-    """The kinematics of one frame's origin, some microseconds a configuration.
+    """The kinematics of one frame's origin, or of the centre of mass, a fraction of a microsecond each.
 
     Raises
     ------
@@ -20,28 +43,23 @@ class FramePath:
 
     def __init__(self, robot: Robot, frame: str) -> None:
         self.robot, self.frame = robot, frame
-        placements, jacobians = np.empty((1, 3, 4)), np.empty((1, 6, robot.n))
-        self._origin, self._jacobian = placements[0, :, 3], jacobians[0, :3]
-        self._update = kinematics_updater(robot, (frame,), placements, jacobians, np.empty(0))
+        ids = [None if frame == CENTER_OF_MASS else robot.frame_id(frame)]
+        memory = Memory()
+        memory.add(Kinematics(joint_table(robot.model), frame_table(robot.model, ids)))
+        self._blocks = memory.blocks()
 
     def positions(self, q: Array, progress: Progress | None = None) -> Array:
         """Where the origin is (N, 3), m in the world, at q (N, n)."""
-        found = np.empty((len(q), 3))
-        update, origin = self._update, self._origin
-        every = max(1, len(q) // 50)
-        for k, point in enumerate(q):
-            update(0.0, point)
-            found[k] = origin
-            if progress is not None and k % every == 0:
-                progress(k / len(q))
+        found, none = np.empty((len(q), 3)), np.empty((0, 3, self.robot.n))
+        for first in range(0, len(q), AT_ONCE):
+            some = slice(first, first + AT_ONCE)
+            follow(*self._blocks, np.ascontiguousarray(q[some]), found[some], none)
+            if progress is not None:
+                progress(min(1.0, (first + AT_ONCE) / len(q)))
         return found
 
     def jacobians(self, q: Array) -> tuple[Array, Array]:
         """Where the origin is (N, 3), and ∂p/∂q (N, 3, n), world axes, at q (N, n)."""
         points, found = np.empty((len(q), 3)), np.empty((len(q), 3, self.robot.n))
-        update, origin, jacobian = self._update, self._origin, self._jacobian
-        for k, point in enumerate(q):
-            update(0.0, point)
-            points[k] = origin
-            found[k] = jacobian
+        follow(*self._blocks, np.ascontiguousarray(q), points, found)
         return points, found

@@ -9,6 +9,7 @@ from numba import types
 
 from nmm.arrays import Array, Integers
 from nmm.kernels.compiled import call_platform, checked_by_caller, clear, compiled, scratch
+from nmm.kernels.followers import place_followers
 from nmm.kernels.memory import IntegerVector, Memory, Vector, views
 from nmm.robots.robot import Robot
 
@@ -19,7 +20,7 @@ class Inputs(NamedTuple):
     platform : the kernel of its velocity map, qp_dot = G(qp) up; parameters : what that reads
     coordinates : how many the platform has, n_p
     moved (m - p,) : the coordinates that the arm's inputs move
-    followers (3 k,) : see `nmm.kernels.followers`
+    followers (4 k,) : see `nmm.kernels.followers`
     """
 
     platform: int
@@ -49,9 +50,7 @@ def hold(inputs: Inputs, q: Array, u: Array, dt: float, ahead: Array) -> None:
             ahead[i] += dt * slope[i] / (6.0 if k == 0 or k == 3 else 3.0)
     for j in range(inputs.moved.shape[0]):
         ahead[inputs.moved[j]] += dt * u[p + j]
-    who = inputs.followers
-    for i in range(0, who.shape[0], 3):
-        ahead[int(who[i])] += who[i + 2] * (ahead[int(who[i + 1])] - q[int(who[i + 1])])
+    place_followers(ahead, inputs.followers)
 
 
 @compiled
@@ -83,7 +82,6 @@ class Held:
         memory.add(inputs_of(robot))
         self._blocks = memory.blocks()
         self._hold = checked_by_caller(_hold, _HOLD)
-        self._following = robot.following if robot.followers else None
 
     def __call__(self, q: Array, u: Array, dt: float) -> Array:
         """q (n,) after dt, s, with the inputs u (m,)."""
@@ -91,4 +89,4 @@ class Held:
         u = np.ascontiguousarray(u, dtype=np.float64)
         ahead = np.empty_like(q)
         self._hold(*self._blocks, q, u, dt, ahead)
-        return ahead if self._following is None else self._following.placed(ahead)
+        return ahead

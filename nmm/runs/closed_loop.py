@@ -18,12 +18,10 @@ from nmm.control.step import Step
 from nmm.errors import DivergedError, RunError, SingularError
 from nmm.robots.slip import slip_warnings
 from nmm.runs.broken_limits import outside_at_start
+from nmm.runs.compiled_loop import BOUND, compiled_loop
 from nmm.runs.judgement import Ended
 from nmm.runs.recording import Recorder
 from nmm.runs.trajectory import Outcome
-
-#: Coordinates or inputs whose norm is beyond this have diverged, m, rad, m/s or rad/s.
-BOUND = 1e6
 
 
 class Leaving:
@@ -114,35 +112,60 @@ def _integrate(
     A step that the resolver's state does not let stand is taken again, decided anew at its beginning; if
     that may not stand either, it is taken with the decisions free at its stages.
     """
-    state, steps = controller.state, len(times) - 1
+    steps = len(times) - 1
     earlier = controller.sample.snapshot()
     sample = _sample(controller, float(times[0]), q, -math.inf if leg is None else leg.earlier)
     recorder.add(sample)
-    for k in range(steps):
-        t = float(times[k + 1])
-        here = controller.sample.snapshot()
-        ahead = _advanced(controller, advance, sample, t, leg)
-        if ahead is None:
-            state.reset()
-            controller.sample.restore(earlier)
-            sample = _sample(controller, sample.t, sample.q)
-            recorder.replace_last(sample)
-            before, here = state.snapshot(), controller.sample.snapshot()
-            ahead = _advanced(controller, advance, sample, t, leg)
-            if ahead is None:
-                controller.sample.restore(here)
-                ahead = _ahead(controller, t, _integrated(controller, advance, sample, t), sample.t, leg)
-                recorder.warn_once(sample.t, state.reservation(before, controller.robot.u_names))
-        if isinstance(ahead, Leaving):
-            return
-        earlier, sample = here, ahead
-        recorder.add(sample)
-        if until is not None and until.reached(sample.error, controller.rows):
-            break
-        if progress is not None and k % max(1, steps // 100) == 0:
+    fly = compiled_loop(controller, advance, until) if leg is None else None
+    told, k, there = 0, 0, False
+    while k < steps and not there:
+        whole = False
+        if fly is not None:
+            reached, whole = fly(times, k, steps, recorder.found)
+            if reached > k:
+                recorder.flown(reached)
+                k, earlier = reached, controller.sample.snapshot()
+                sample = _sample(controller, float(times[k]), recorder.q[k].copy(), float(times[k - 1]))
+                recorder.replace_last(sample)
+                there = until is not None and until.reached(sample.error, controller.rows)
+        if not (whole or there or k == steps):
+            ahead, here = _next(controller, advance, recorder, sample, float(times[k + 1]), earlier, leg)
+            if isinstance(ahead, Leaving):
+                return
+            k, earlier, sample = k + 1, here, ahead
+            recorder.add(sample)
+            there = until is not None and until.reached(sample.error, controller.rows)
+        if progress is not None and 100 * k // steps > told:
+            told = 100 * k // steps
             progress(k / steps)
     if progress is not None:
         progress(1.0)
+
+
+def _next(
+    controller: Controller,
+    advance: Integrator,
+    recorder: Recorder,
+    sample: Step,
+    t: float,
+    earlier: Snapshot,
+    leg: Leaving | None,
+) -> tuple[Step | Leaving, Snapshot]:
+    """The sample at t, or the event there, and what `sample` left to it; `earlier` is what that one found."""
+    state, here = controller.state, controller.sample.snapshot()
+    ahead = _advanced(controller, advance, sample, t, leg)
+    if ahead is None:
+        state.reset()
+        controller.sample.restore(earlier)
+        sample = _sample(controller, sample.t, sample.q)
+        recorder.replace_last(sample)
+        before, here = state.snapshot(), controller.sample.snapshot()
+        ahead = _advanced(controller, advance, sample, t, leg)
+        if ahead is None:
+            controller.sample.restore(here)
+            ahead = _ahead(controller, t, _integrated(controller, advance, sample, t), sample.t, leg)
+            recorder.warn_once(sample.t, state.reservation(before, controller.robot.u_names))
+    return ahead, here
 
 
 def _advanced(

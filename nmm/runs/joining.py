@@ -12,9 +12,10 @@ from nmm.arrays import Array
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
 from nmm.control.sequenced import SequencedController
+from nmm.robots.frame_path import FramePath
 from nmm.runs.clearance import ran_into, swept
 from nmm.runs.judgement import Ended, Verdict, blocked, reached_or_not
-from nmm.runs.recording import Recorder, frame_path, shown
+from nmm.runs.recording import Recorder, shown
 from nmm.runs.repeated import told_once
 from nmm.runs.residuals import NONE, Residuals
 from nmm.runs.trajectory import Outcome, Trajectory
@@ -102,7 +103,7 @@ def join(
     q = along("q")
     path, desired = None, None
     if frame is not None:
-        path = frame_path(robot, frame, q)
+        path = FramePath(robot, frame).positions(q)
         desired = _desired(controller, path, r_d, first, frame)
     if target is not None and path is not None and len(path) and target.size == 2:
         target = np.array([*target, path[0, 2]])
@@ -112,6 +113,7 @@ def join(
         q=q,
         u=along("u"),
         q_dot=along("q_dot"),
+        kinematics_off=float(np.fmax.reduce([part.kinematics_off for part in parts])),
         objective=along("objective"),
         sigma_min=along("sigma_min"),
         residual=along("residual"),

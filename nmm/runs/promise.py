@@ -23,6 +23,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from nmm.arrays import Array, Integers
+from nmm.kernels.compiled import compiled
 from nmm.runs.feedback import Feedback
 from nmm.runs.residuals import differs
 
@@ -129,14 +130,21 @@ def promised(t: Array, error: Array, feedback: Feedback) -> Array:
         flow = solve_ivp(lambda _, e: -feedback.rates(e[np.newaxis])[0], span, first, "LSODA", t, rtol=1e-6)
         return _sizes(flow.y.T)
     steps, which = _steps(t)
-    factors = [expm(-feedback.K * h) for h in steps]
-    norms = np.empty(len(t))
-    e = error[0]
-    for k in range(len(t)):
-        norms[k] = np.linalg.norm(e)
-        if k < len(which):
-            e = factors[which[k]] @ e
-    return norms
+    factors = np.array([expm(-feedback.K * h) for h in steps])
+    errors = np.empty((len(t), error.shape[1]))
+    errors[0] = error[0]
+    carry_on(factors, which, errors)
+    return _sizes(errors)
+
+
+@compiled
+def carry_on(factors: Array, which: Integers, errors: Array) -> None:
+    """errors (N, s) from the first: errors[k + 1] = factors[which[k]] errors[k]."""
+    for k in range(which.shape[0]):
+        for i in range(errors.shape[1]):
+            errors[k + 1, i] = 0.0
+            for j in range(errors.shape[1]):
+                errors[k + 1, i] += factors[which[k], i, j] * errors[k, j]
 
 
 def _steps(t: Array) -> tuple[Array, Integers]:
@@ -173,9 +181,15 @@ def adaptive_errors(samples: Samples, q: Array, tolerance: float) -> Array:
 def accumulated(added: Array, decays: Array) -> Array:
     """What errors added along each step (N - 1,) come to at the samples (N,), each decaying from there on."""
     total = np.zeros(len(added) + 1)
-    for k, (one, factor) in enumerate(zip(added, decays, strict=True)):
-        total[k + 1] = factor * total[k] + one
+    add_up(np.ascontiguousarray(added), np.ascontiguousarray(decays), total)
     return total
+
+
+@compiled
+def add_up(added: Array, decays: Array, total: Array) -> None:
+    """total[k + 1] = decays[k] total[k] + added[k]."""
+    for k in range(added.shape[0]):
+        total[k + 1] = decays[k] * total[k] + added[k]
 
 
 def _sizes(rows: Array) -> Array:

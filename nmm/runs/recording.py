@@ -14,10 +14,11 @@ from nmm.control.limits import Limits
 from nmm.control.step import Step
 from nmm.errors import InputError
 from nmm.functions.function import Function, Shown
-from nmm.functions.program import Program
-from nmm.functions.tasks.position import AXES, Position
+from nmm.functions.program import COMPILED
+from nmm.functions.tasks.position import AXES
 from nmm.functions.tasks.task import Task
 from nmm.resolvers.answer import Status
+from nmm.robots.frame_path import FramePath
 from nmm.robots.robot import Robot
 from nmm.runs.broken_limits import broken_limits, broken_rows
 from nmm.runs.clearance import ran_into, swept, told
@@ -25,8 +26,12 @@ from nmm.runs.feedback import Feedback
 from nmm.runs.margins import margin, shares
 from nmm.runs.promise import Samples
 from nmm.runs.reasons import weakest_words
+from nmm.runs.recorded import Recorded, room
 from nmm.runs.residuals import residuals
 from nmm.runs.trajectory import Outcome, Trajectory
+
+#: What `Recorded` and `Step` call by one name.
+SAME_NAME = tuple(name for name in Recorded._fields if name not in ("limited", "unanswered"))
 
 #: Below this ratio of smallest to largest singular value a run is warned about.
 NEARLY_SINGULAR = 1e-3
@@ -48,33 +53,33 @@ class Recorder:
         self._feedback = Feedback.of(controller.task, controller.robot)
         robot, s = controller.robot, len(controller.rows)
         count = len(times)
-        self.q = np.empty((count, robot.n))
-        self._u = np.empty((count, robot.n_u))
-        self._q_dot = np.empty((count, robot.n))
-        self._rows = np.empty((4, count, s))
-        self._scalars = np.empty((2, count))
-        self._scale: Array | None = None
         kept = controller.kept.row_limits if controller.limits is not None else ()
-        self._limited = np.empty((count, len(kept)))
+        self.found = room(count, robot.n, robot.n_u, s, len(controller.task.levels(robot)), len(kept))
         # By sample: one that is taken again counts once.
         self._beyond: dict[int, dict[str, float]] = {}
         self._against: dict[str, str] = {}
-        self._unanswered = np.zeros(count, dtype=bool)
         self._retreats = np.zeros(count, dtype=np.int64)
         self._step_size = np.ones(count)
-        self._added = np.zeros(count)
-        self._J = np.empty((count, s, robot.n_u))
-        self._partition = np.empty((count, s), dtype=np.int64)
         self._count = 0
         self.warnings: list[str] = []
         self.blocking: tuple[str, ...] = ()
         self._counts = Counts()
         self._places: list[tuple[Any, ...]] = []
-        self.goes_on = False
+        self.goes_on = self._flown = False
         self.backed_off = 0
 
     def __len__(self) -> int:
         return self._count
+
+    @property
+    def so_far(self) -> Recorded:
+        """What was recorded so far."""
+        return Recorded._make(whole[: self._count] for whole in self.found)
+
+    @property
+    def q(self) -> Array:
+        """The configurations, (N, n); those that come are not written yet."""
+        return self.found.q
 
     @property
     def t(self) -> Array:
@@ -99,7 +104,7 @@ class Recorder:
     @property
     def target(self) -> Array:
         """The targets recorded so far, (N, s)."""
-        return self._rows[1, : self._count]
+        return self.so_far.r_d
 
     @property
     def places(self) -> list[tuple[Any, ...]]:
@@ -109,18 +114,17 @@ class Recorder:
     @property
     def scale(self) -> Array:
         """The shares of the task's rate that were left so far, (N, levels)."""
-        return np.ones((0, 1)) if self._scale is None else self._scale[: self._count]
+        return self.so_far.scale
 
     @property
     def samples(self) -> Samples:
         """What was recorded of the task so far; feedback that a task bounds is asked as bounded."""
-        count, feedback = self._count, self._feedback
-        error, rate, residual = self._rows[2, :count], self._rows[3, :count], self._scalars[1, :count]
-        J, u = self._J[:count], self._u[:count]
+        feedback, found = self._feedback, self.so_far
+        error, rate, residual, J, u = found.error, found.rate, found.residual, found.J, found.u
         if feedback.has_bounds:
             rate = rate - error @ feedback.K.T + feedback.rates(error)
             residual = np.linalg.norm(np.einsum("kij,kj->ki", J, u) - rate, axis=1)
-        return Samples(self.t, error, rate, J, u, residual, self._partition[:count], feedback)
+        return Samples(self.t, error, rate, J, u, residual, found.partition, feedback)
 
     def add(self, sample: Step) -> None:
         """Record one sample."""
@@ -132,34 +136,28 @@ class Recorder:
         self._write(self._count - 1, sample)
 
     def _write(self, k: int, sample: Step) -> None:
-        self.q[k] = sample.q
-        self._u[k] = sample.u
-        self._q_dot[k] = sample.q_dot
-        self._rows[0, k] = sample.r
-        self._rows[1, k] = sample.r_d
-        self._rows[2, k] = sample.error
-        self._rows[3, k] = sample.rate
-        self._scalars[0, k] = sample.objective
-        self._scalars[1, k] = sample.residual
-        self._J[k] = sample.J
+        found = self.found
+        for name in SAME_NAME:
+            getattr(found, name)[k] = getattr(sample, name)
+        if found.limited.shape[1]:
+            found.limited[k] = self._controller.report.row_values()
+        found.unanswered[k] = sample.status is Status.FALLBACK
         if (setting := self._controller.setting) is not None:
             self._places[k:] = [setting.places(sample.t)]
-        if self._scale is None:
-            self._scale = np.ones((len(self._times), len(sample.scale)))
-        self._scale[k] = sample.scale
-        if self._limited.shape[1]:
-            self._limited[k] = self._controller.report.row_values()
-        self._partition[k] = sample.partition
         self._step_size[k] = sample.step_size
-        self._unanswered[k] = sample.status is Status.FALLBACK
         self._retreats[k] = sample.retreats
-        self._added[k] = sample.added_residual
         self._beyond.pop(k, None)
         if sample.excess > 0.0:
             self._beyond[k] = beyond = self._controller.report.beyond()
             if not beyond.keys() <= self._against.keys():
                 against = ", ".join(self._controller.report.contradiction())
                 self._against |= dict.fromkeys(beyond.keys() - self._against.keys(), against)
+
+    def flown(self, last: int) -> None:
+        """Compiled code has recorded all samples up to that one."""
+        self._flown = True
+        self._retreats[self._count : last + 1] = self._retreats[self._count - 1]
+        self._count = last + 1
 
     @property
     def avoided(self) -> bool:
@@ -176,6 +174,12 @@ class Recorder:
         if warning and not any(warning in said for said in self.warnings):
             self.warnings.append(f"at t = {t:.3g} s {warning}")
 
+    def _kinematics_off(self) -> float:
+        """By how much compiled kinematics are off at the first, the middle and the last sample."""
+        if not len(self) or not (self._flown or self._controller.kinematics == COMPILED):
+            return np.nan
+        return self._controller.kinematics_off(self.so_far.q[[0, len(self) // 2, -1]])
+
     def _warn_of_singularities(self, singular_values: Array) -> None:
         if not len(singular_values):
             return
@@ -186,8 +190,8 @@ class Recorder:
             self.warnings.append(
                 f"at t = {self._times[worst]:.3g} s the task Jacobian is nearly singular (condition "
                 f"number {1.0 / max(ratio[worst], 1e-300):.2g}), nearly lost: "
-                f"{weakest_words(self._controller, self.q[worst], self._J[worst])}; inputs reach "
-                f"{np.abs(self._u[: self._count]).max():.3g}"
+                f"{weakest_words(self._controller, self.found.q[worst], self.found.J[worst])}; inputs reach "
+                f"{np.abs(self.so_far.u).max():.3g}"
             )
 
     def _warn_of_events(self) -> None:
@@ -204,7 +208,7 @@ class Recorder:
         if len(backed_off):
             at = ", ".join(f"{t:.3g} s" for t in backed_off)
             self.warnings.append(f"the error stalled and the robot backed off, at t = {at}")
-        added = self._added[: len(self)]
+        added = self.so_far.added_residual
         if np.any(added > 0.0):
             missed = times[added > 0.0]
             back = ", and is done again from there on" if missed[-1] < self.reached else ""
@@ -212,7 +216,7 @@ class Recorder:
                 f"the added task was not done in {len(missed)} samples, from t = {missed[0]:.4g} to "
                 f"{missed[-1]:.4g} s{back}: its rate was missed by up to {added.max():.3g} a second"
             )
-        unanswered = times[self._unanswered[: len(self)]]
+        unanswered = times[self.so_far.unanswered > 0]
         if len(unanswered):
             self.warnings.append(
                 f"the resolver had no answer in {len(unanswered)} samples, from "
@@ -222,64 +226,64 @@ class Recorder:
 
     def trajectory(self, outcome: Outcome, message: str, dt: float, method: str) -> Trajectory:
         """What was recorded."""
-        count, controller = self._count, self._controller
+        found, controller = self.so_far, self._controller
         robot, rows = controller.robot, controller.rows
-        singular_values = np.linalg.svd(self._J[:count], compute_uv=False).astype(np.float64)
+        singular_values = np.linalg.svd(found.J, compute_uv=False).astype(np.float64)
         self._warn_of_events()
         if outcome is not Outcome.SINGULAR:  # which says so itself
             self._warn_of_singularities(singular_values)
         ended = outcome in (Outcome.COMPLETED, Outcome.MISSED)
         if ended or outcome is Outcome.INTERRUPTED:  # of one that failed it goes without saying
-            self.warnings += broken_limits(robot, self.t, self.q[:count], self._u[:count])
-            self.warnings += broken_rows(controller.kept, self.t, self._limited[:count])
+            self.warnings += broken_limits(robot, self.t, found.q, found.u)
+            self.warnings += broken_rows(controller.kept, self.t, found.limited)
         kept = controller.kept if controller.limits is not None else Limits().on(robot)
         distances: dict[str, Any] = {}
         if controller.setting is not None:
-            found = swept(controller.setting, self.t, self.q[:count], self._u[:count], self.places)
-            self.warnings += told(controller.setting, found, self.t, self._counts)
-            if ended and (into := ran_into(controller.setting, found, self.t)):
+            distance = swept(controller.setting, self.t, found.q, found.u, self.places)
+            self.warnings += told(controller.setting, distance, self.t, self._counts)
+            if ended and (into := ran_into(controller.setting, distance, self.t)):
                 message = into if outcome is Outcome.COMPLETED else f"{into}; {message}"
                 outcome = Outcome.MISSED
             distances = {
-                "clearance": found.clearance,
-                "clearance_pairs": found.pairs,
-                "clearance_between": found.between,
-                "clearance_points": found.points,
+                "clearance": distance.clearance,
+                "clearance_pairs": distance.pairs,
+                "clearance_between": distance.between,
+                "clearance_points": distance.points,
                 "clearance_names": tuple(" and ".join(names) for names in controller.setting.names),
                 "clearance_asked": controller.setting.distance,
-                "obstacles": found.obstacles,
+                "obstacles": distance.obstacles,
             }
-        limited, within = shares(kept, robot, self.q[:count], self._u[:count], self._limited[:count])
+        limited, within = shares(kept, robot, found.q, found.u, found.limited)
         frame, columns, target = self._shown
         path, desired = None, None
         if frame is not None:
-            path = frame_path(robot, frame, self.q[:count])
+            path = FramePath(robot, frame).positions(found.q)
             desired = path.copy()
             for axis, column in columns.items():
-                desired[:, axis] = self._rows[1, :count, column]
+                desired[:, axis] = found.r_d[:, column]
             desired = desired if columns else None
         if target is not None and path is not None and len(path) and target.size == 2:
             target = np.array([*target, path[0, 2]])
         return Trajectory(
             robot=robot,
             t=self.t.copy(),
-            q=self.q[:count].copy(),
-            u=self._u[:count].copy(),
-            q_dot=self._q_dot[:count].copy(),
-            r=self._rows[0, :count].copy(),
-            r_d=self._rows[1, :count].copy(),
-            error=self._rows[2, :count].copy(),
-            objective=self._scalars[0, :count].copy(),
+            q=found.q.copy(),
+            u=found.u.copy(),
+            q_dot=found.q_dot.copy(),
+            r=found.r.copy(),
+            r_d=found.r_d.copy(),
+            error=found.error.copy(),
+            objective=found.objective.copy(),
             sigma_min=singular_values[:, -1],
-            partition=self._partition[:count].copy(),
-            residual=self._scalars[1, :count].copy(),
-            scale=self.scale.copy(),
-            step_size=self._step_size[:count].copy(),
+            partition=found.partition.copy(),
+            residual=found.residual.copy(),
+            scale=found.scale.copy(),
+            step_size=self._step_size[: len(self)].copy(),
             limited=controller.limits is not None,
             margin=margin(within),
             shares=within,
             limit_names=limited,
-            unmet=residuals(self.t, self._scalars[1, :count], self._rows[3, :count]),
+            unmet=residuals(self.t, found.residual, found.rate),
             r_names=tuple(row.name for row in rows),
             r_units=tuple(row.unit for row in rows),
             resolver=controller.resolver.name,
@@ -292,6 +296,7 @@ class Recorder:
             path=path,
             desired=desired,
             target=target if path is not None else None,
+            kinematics_off=self._kinematics_off(),
             **distances,
         )
 
@@ -332,14 +337,3 @@ def _said(function: Function, robot: Robot, rows: int) -> Shown:
     if said.looks_at is not None and np.shape(said.looks_at) not in ((2,), (3,)):
         raise InputError(f"{name}: expected 2 or 3 numbers as looks_at, got {said.looks_at!r}")
     return said
-
-
-def frame_path(robot: Robot, frame: str, q: Array) -> Array:
-    """Position of a frame's origin at each configuration, (N, 3)."""
-    program = Program(robot, (Position(frame, "xyz"),))
-    program.lay_out()
-    path = np.empty((len(q), 3))
-    for k in range(len(q)):
-        program.prepare(0.0, q[k])
-        path[k] = program.buffers.placements[0, :, 3]
-    return path

@@ -47,6 +47,8 @@ def summarise(trajectory: Trajectory) -> dict[str, Any]:
         "limit_names": list(trajectory.limit_names),
         "without_velocity_limit": without_velocity_limit(trajectory),
         "samples": count,
+        "kinematics": "pinocchio" if np.isnan(trajectory.kinematics_off) else "compiled",
+        "kinematics_off": None if np.isnan(trajectory.kinematics_off) else trajectory.kinematics_off,
         "redundancy": redundancy,
         "r_names": list(trajectory.r_names),
         "r_units": list(trajectory.r_units),

@@ -71,6 +71,8 @@ class Trajectory:
     clearance_points (N, 6): the two points that are nearest, in the order of the names, m in the world
     clearance_asked : the distance that was to be kept, m
     obstacles : what the robot kept off, where it was
+    kinematics_off : the most by which kinematics that were compiled differ from Pinocchio's at the first, the
+        middle and the last sample, m and rad; not a number where Pinocchio computed all
     scenario : the scenario as resolved, if it came from one
     events : when tasks that come and go began and ended, and why
     """
@@ -113,6 +115,7 @@ class Trajectory:
     clearance_names: tuple[str, ...] = ()
     clearance_asked: float = 0.0
     obstacles: tuple[Obstacle, ...] = ()
+    kinematics_off: float = float("nan")
     scenario: dict[str, Any] | None = field(default=None)
     events: tuple[Event, ...] = ()
 

@@ -99,7 +99,7 @@ def contract(at: At, frames: Frames, numbers: Array, J_q: Array, X: Array, gradi
                     gradient[k] += x * J_q[i, a] * at.G_q[a, j, k]
         for j in range(arm):
             z[int(moved[j])] = X[i, p + j] * factors[p + j]
-        for f in range(first, numbers.shape[0], 3):
+        for f in range(first, numbers.shape[0], 4):
             z[int(numbers[f])] += numbers[f + 2] * z[int(numbers[f + 1])]
         for a in range(n):
             x = numbers[3 + s + i] * z[a]
