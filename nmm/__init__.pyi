@@ -105,6 +105,8 @@ from .robots.loading import mount as mount
 from .robots.loading import pinocchio_model as pinocchio_model
 from .robots.loading import pinocchio_models as pinocchio_models
 from .robots.robot import Robot as Robot
+from .rollouts.rollout import Rollouts as Rollouts
+from .rollouts.rollout import rollout as rollout
 from .runs.simulation import simulate as simulate
 from .runs.trajectory import Outcome as Outcome
 from .runs.trajectory import Trajectory as Trajectory

@@ -283,13 +283,17 @@ class Controller:
         whole = type(self.resolver).finish is Resolver.finish and not self._program.calls_python
         return whole and not (self.guard or self.backing or self.step_size)
 
+    def compiled_kinematics(self) -> AbstractContextManager[None]:
+        """`with controller.compiled_kinematics():` steps compute them, whatever `kinematics` says."""
+        return self._program.compiled_kinematics()
+
     @contextmanager
     def compiled(self) -> Iterator[Blocks]:
         """`with controller.compiled() as blocks:` for compiled code that makes the steps: with compiled
         kinematics, and no other thread may call."""
         self._begin()
         try:
-            with self._program.compiled_kinematics():
+            with self.compiled_kinematics():
                 yield self._program.blocks
         finally:
             self._busy = False
@@ -408,13 +412,22 @@ class Controller:
         return prepared
 
     def _fail(self, t: float, q: Array) -> None:
-        self.robot.q(q)  # a q that is not finite is the caller's error
+        raise self.failure(t, q)
+
+    @property
+    def failed(self) -> bool:
+        """Whether the last call left no inputs."""
+        return bool(self._step.answer.status >= _FAILED)
+
+    def failure(self, t: float, q: Array) -> SingularError:
+        """Why the last call, at (t, q), left no inputs; `InputError` for a q that is not finite."""
+        self.robot.q(q)
         apart = self.robot.platform.problem(q[: self.robot.platform.n_p])
         problem = self._step.problem
         status = Status(int(self._step.answer.status[()]))
         also = "" if apart is None else f"; {apart}"
         why = reason(status, problem, self.robot, self.task, q)
-        raise SingularError(f"at t = {t:g} s: {status.meaning}{why}{also}")
+        return SingularError(f"at t = {t:g} s: {status.meaning}{why}{also}")
 
     def evaluate(self, t: float, q: ArrayLike) -> Step:
         """All quantities at (t, q); a singular matrix is reported in `status`, not raised.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import nullcontext
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from nmm.control.step import Step
 from nmm.errors import DivergedError, RunError, SingularError
 from nmm.robots.slip import slip_warnings
 from nmm.runs.broken_limits import outside_at_start
-from nmm.runs.compiled_loop import BOUND, compiled_loop
+from nmm.runs.compiled_loop import BOUND, CompiledLoop, compiled_loop
 from nmm.runs.judgement import Ended
 from nmm.runs.recording import Recorder
 from nmm.runs.trajectory import Outcome
@@ -76,13 +77,33 @@ def record(
             f"without effect on task and objective: {', '.join(idle)}; at first order nothing moves "
             f"{'it' if len(idle) == 1 else 'them'} (an objective can)"
         )
+    outcome, message = driven(controller, advance, recorder, times, q, progress, until, leg)
+    recorder.guarded(controller)
+    last = recorder.q[len(recorder) - 1] if len(recorder) else q
+    return recorder, Ended(outcome, message, last, controller.derivatives[0].copy())
+
+
+def driven(
+    controller: Controller,
+    advance: Integrator,
+    recorder: Recorder,
+    times: Array,
+    q: Array,
+    progress: Callable[[float], None] | None = None,
+    until: Goal | None = None,
+    leg: Leaving | None = None,
+) -> tuple[Outcome, str]:
+    """Integrate and record; how that ended, and why."""
     outcome, message = Outcome.COMPLETED, ""
     controller.reset()
     if leg is not None:
         controller.sample.restore(leg.handed)
         recorder.backed_off = 0 if controller.backing is None else controller.backing.count
     try:
-        _integrate(controller, advance, recorder, times, q, progress, until, leg)
+        fly = compiled_loop(controller, advance, until) if leg is None else None
+        # What is taken in Python, too: otherwise digits would depend on where compiled code stops.
+        with nullcontext() if fly is None else controller.compiled_kinematics():
+            _integrate(controller, advance, recorder, times, q, progress, until, leg, fly)
     except SingularError as error:
         outcome, message = Outcome.SINGULAR, str(error)
     except DivergedError as error:
@@ -92,9 +113,7 @@ def record(
     except KeyboardInterrupt:
         outcome = Outcome.INTERRUPTED
         message = f"interrupted after {recorder.reached:g} s of {times[-1]:g} s"
-    recorder.guarded(controller)
-    last = recorder.q[len(recorder) - 1] if len(recorder) else q
-    return recorder, Ended(outcome, message, last, controller.derivatives[0].copy())
+    return outcome, message
 
 
 def _integrate(
@@ -106,6 +125,7 @@ def _integrate(
     progress: Callable[[float], None] | None,
     until: Goal | None,
     leg: Leaving | None,
+    fly: CompiledLoop | None,
 ) -> None:
     """From sample to sample, recording each; to the event that ends a leg, whose sample is the next leg's.
 
@@ -116,12 +136,14 @@ def _integrate(
     earlier = controller.sample.snapshot()
     sample = _sample(controller, float(times[0]), q, -math.inf if leg is None else leg.earlier)
     recorder.add(sample)
-    fly = compiled_loop(controller, advance, until) if leg is None else None
-    told, k, there = 0, 0, False
+    k, there = 0, False
+    a_share = steps if progress is None else max(1, steps // 100)
     while k < steps and not there:
+        if progress is not None and k % a_share == 0:
+            progress(k / steps)
         whole = False
         if fly is not None:
-            reached, whole = fly(times, k, steps, recorder.found)
+            reached, whole = fly(times, k, min(steps, (k // a_share + 1) * a_share), recorder.found)
             if reached > k:
                 recorder.flown(reached)
                 k, earlier = reached, controller.sample.snapshot()
@@ -135,9 +157,6 @@ def _integrate(
             k, earlier, sample = k + 1, here, ahead
             recorder.add(sample)
             there = until is not None and until.reached(sample.error, controller.rows)
-        if progress is not None and 100 * k // steps > told:
-            told = 100 * k // steps
-            progress(k / steps)
     if progress is not None:
         progress(1.0)
 

@@ -107,6 +107,18 @@ def small(numbers: Array) -> bool:
 
 
 @compiled
+def sample(t: float, earlier: float, q: Array, integers: Integers, floats: Array) -> float:
+    """The sample at (t, q); accelerations count from the one before it, at `earlier`."""
+    e = views(ControlStep, integers, floats, BESIDE)
+    usual = e.limits.elapsed[()]
+    if t - earlier < e.problem.dt[()] * (1.0 - 1e-9):
+        e.limits.elapsed[()] = t - earlier
+    status = step(t, q, integers, floats)
+    e.limits.elapsed[()] = usual
+    return status
+
+
+@compiled
 def arrived(error: Array, ends: Ends) -> bool:
     """`Goal.reached`."""
     square_m, square_rad = 0.0, 0.0
@@ -144,7 +156,6 @@ def fly(
     was, now, decided = scratch(size), scratch(size), integer_scratch(e.state.shape[0] + 1)
     was_integers, now_integers = integer_scratch(count + 1), integer_scratch(count + 1)
     ahead = scratch(n)
-    dt, elapsed = p.dt[()], e.limits.elapsed[()]
     remember(e, was, was_integers)
     reached = first
     for k in range(first + 1, last + 1):
@@ -161,10 +172,7 @@ def fly(
         if not fine:
             break
         remember(e, now, now_integers)
-        if times[k] - times[k - 1] < dt * (1.0 - 1e-9):
-            e.limits.elapsed[()] = times[k] - times[k - 1]
-        status = step(times[k], ahead, integers, floats)
-        e.limits.elapsed[()] = elapsed
+        status = sample(times[k], times[k - 1], ahead, integers, floats)
         if status >= SINGULAR_J or not small(e.answer.u):
             break
         if partitioned == 1 and passed_zero(e, decided):

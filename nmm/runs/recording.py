@@ -71,6 +71,13 @@ class Recorder:
     def __len__(self) -> int:
         return self._count
 
+    def clear(self) -> None:
+        """Forget all samples: another run over the same times follows."""
+        self._count, self._flown = 0, False
+        self._beyond.clear()
+        self._places.clear()
+        self.warnings.clear()
+
     @property
     def so_far(self) -> Recorded:
         """What was recorded so far."""

@@ -89,11 +89,11 @@ def simulate(
     if isinstance(controller, SequencedController):
         legs = _legs(controller, advance, times, q, progress, until)
         for leg in legs:
-            kept = _guarded(advance, leg.controller)
+            kept = guarded(advance, leg.controller)
             goal = until if leg is legs[-1] else None
             leg.verdict = _judged(leg.controller, leg.recorder, leg.ended, kept, method, dt, leg.end, goal)
         return join(controller, legs, until, dt, method)
-    advance = _guarded(advance, controller)
+    advance = guarded(advance, controller)
     recorder, ended = record(controller, advance, times, q, progress, until)
     verdict = _judged(controller, recorder, ended, advance, method, dt, duration, until)
     if until is not None:
@@ -103,7 +103,7 @@ def simulate(
     return recorder.trajectory(verdict.outcome, verdict.message, dt, method)
 
 
-def _guarded(advance: Integrator, controller: Controller) -> Integrator:
+def guarded(advance: Integrator, controller: Controller) -> Integrator:
     """The integrator, between samples at which a controller keeps distances, too."""
     return advance if controller.guard is None else Guarded(advance, controller.guard, Held(controller.robot))
 
@@ -170,7 +170,7 @@ def _legs(
         waiting = controller.sequence.waiting(controller.moment)
         active = controller.moment.active
         recorder, ended = record(
-            *(inner, _guarded(advance, inner), times[first:], q),
+            *(inner, guarded(advance, inner), times[first:], q),
             None if progress is None else _from(first / steps, progress),
             until if any(active) and not waiting else None,
             leaving,

@@ -1,0 +1,96 @@
+"""What is kept of many runs: in memory, or in files, a bounded part at a time."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from nmm.arrays import Array
+from nmm.errors import InputError, expect_known
+from nmm.runs.recorded import Recorded
+
+#: What can be kept: quantities of a sample, by the names of a trajectory.
+QUANTITIES = ("q", "q_dot", "u", "r", "r_d", "error", "objective", "residual", "scale", "partition")
+#: How much of the memory that is free may be filled, and how large a file of a part is, bytes.
+SHARE, PART = 0.7, 64e6
+
+
+class Kept:
+    """Room for some quantities of every `every`-th sample of B runs.
+
+    Parameters
+    ----------
+    names : of QUANTITIES
+    times (N,) : of the samples, s
+    count : how many runs there are
+    shapes : of one run's quantities
+    folder : where parts go as npz files; None to hold all in memory
+
+    Raises
+    ------
+    InputError : a name that is none; more than there is memory for
+    """
+
+    def __init__(
+        self,
+        names: Sequence[str],
+        times: Array,
+        every: int,
+        count: int,
+        shapes: Recorded,
+        folder: Path | None,
+    ) -> None:
+        for name in names:
+            expect_known("keep", name, QUANTITIES, "rollout")
+        self.names, self.every, self._folder = tuple(names), every, folder
+        self.t = times[::every].copy()
+        each = {name: getattr(shapes, name)[::every] for name in names}
+        of_one = sum(one.nbytes for one in each.values())
+        self.part = count if folder is None else max(1, min(count, int(PART / max(of_one, 1))))
+        free = free_memory()
+        if of_one * self.part > SHARE * free:
+            raise InputError(
+                f"keep: {', '.join(names)} of {count} runs with {len(self.t)} samples each are "
+                f"{of_one * count / 1e9:.3g} GB, and {free / 1e9:.3g} GB are free; keep less, every "
+                "so many samples (every=), or in files (folder=)"
+            )
+        self._each, self.count = each, count
+        self.files: list[Path] = []
+
+    def room(self, runs: int) -> dict[str, Array]:
+        """Room for so many runs: not numbers (-1 for integers) where a run has no sample."""
+        return {
+            name: np.full((runs, *one.shape), -1 if one.dtype.kind == "i" else np.nan, dtype=one.dtype)
+            for name, one in self._each.items()
+        }
+
+    def put(self, room: dict[str, Array], row: int, found: Recorded, count: int) -> None:
+        """The first `count` samples of a run, in a row of the room."""
+        for name, whole in room.items():
+            some = getattr(found, name)[: count : self.every]
+            whole[row, : len(some)] = some
+
+    def write(self, first: int, room: dict[str, Array]) -> None:
+        """A part as a file, whole or not at all."""
+        if self._folder is None:
+            return
+        self._folder.mkdir(parents=True, exist_ok=True)
+        path = self._folder / f"rollouts-{first:09d}.npz"
+        unfinished = path.with_suffix(".part")
+        with unfinished.open("wb") as file:
+            arrays: dict[str, Any] = {"t": self.t, "first": np.array(first), **room}
+            np.savez(file, **arrays)
+        os.replace(unfinished, path)
+        self.files.append(path)
+
+
+def free_memory() -> float:
+    """Bytes that are free; as good as no bound where the system does not say."""
+    try:
+        return float(os.sysconf("SC_AVPHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
+    except (ValueError, OSError, AttributeError):
+        return float("inf")
