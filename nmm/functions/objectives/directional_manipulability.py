@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array
+from nmm.arrays import Array, vector
 from nmm.errors import InputError, expect_known
 from nmm.functions.function import Function, Stage
 from nmm.functions.objectives.base import Objective
@@ -101,7 +101,11 @@ class DirectionalManipulability(Objective):
     ) -> None:
         self.frame = frame
         self.selected = picked_rows(rows, "directional manipulability")
-        self.direction = direction if isinstance(direction, Function) else Constant(direction, "1")
+        self.direction = (
+            direction
+            if isinstance(direction, Function)
+            else Constant(vector(direction, None, "direction"), "1")
+        )
         if isinstance(self.direction, Constant) and not self.direction.value.any():
             raise InputError("direction: expected a vector that is not zero")
         expect_known("directional manipulability of", of, ("robot", "arm", "platform"))
