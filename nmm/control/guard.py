@@ -88,7 +88,7 @@ class Guard:
         self._queries.update(t, q, *self._program.blocks, BESIDE)
 
     def clear(self, moved: float) -> bool:
-        """Whether all was farther away than coordinates reach that move so far, m and rad."""
+        """Whether nothing comes too near while coordinates move by no more than this, m and rad together."""
         room = float(self._queries.scene.bounds.min(initial=np.inf)) - self._setting.distance
         return moved * (1.0 + self._setting.robot.reach) < room
 

@@ -30,7 +30,7 @@ class Outline(NamedTuple):
 
 
 def outlines(trajectory: Trajectory, times: Array) -> list[Outline]:
-    """The obstacles, those that move at each of the times, once where they rest. Half-spaces have no outline."""
+    """The obstacles, those that move at each of the times, once where they rest; half-spaces have none."""
     found: list[Outline] = []
     for obstacle in trajectory.obstacles:
         points = outline_points(obstacle.shape.geometry())
