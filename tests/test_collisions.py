@@ -1,6 +1,7 @@
 """Controllers that keep distances: kept at samples and between them, recovered, or said."""
 
 import pickle
+import re
 
 import numpy as np
 import pytest
@@ -165,11 +166,24 @@ def test_a_run_is_read_back_with_its_distances(robot, tmp_path):
         (lambda: nmm.Obstacle("box"), "expected a shape"),
         (lambda: nmm.Obstacle(nmm.Sphere(0.1), [1.0, 2.0]), "expected 3 or 6 numbers"),
         (lambda: nmm.Obstacle(nmm.Sphere(0.1), motion=lambda t: [t]), "expected 3 or 6 numbers"),
-        (lambda: pillar(motion=lambda t: [t, 0, 0]).move_to([0, 0, 0]), "moves along a path"),
+        (
+            lambda: nmm.Obstacle(nmm.Sphere(0.1), motion=nmm.Line([0, 0, 0], [1, 0, 0], 1)),
+            "as in lambda t: [0.1",
+        ),
+        (lambda: nmm.Obstacle(nmm.Sphere(0.1), np.diag([1.0, 1.0, 1.0, 2.0])), "0, 0, 0, 1 in the last row"),
+        (lambda: pillar(motion=lambda t: [t, 0, 0]), "expected a placement or a motion, got both"),
+        (
+            lambda: nmm.Obstacle(nmm.Sphere(0.1), motion=lambda t: [t, 0, 0]).move_to([0, 0, 0]),
+            "moves along a path",
+        ),
+        (
+            lambda: nmm.Collisions(0.03, [pillar()]),
+            "obstacles go by their name, Collisions(0.03, obstacles=[",
+        ),
     ],
 )
 def test_bad_input_is_refused_in_words(make, said):
-    with pytest.raises(nmm.InputError, match=said.replace("[", r"\[")):
+    with pytest.raises(nmm.InputError, match=re.escape(said)):
         make()
 
 

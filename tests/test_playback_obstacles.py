@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import coal
@@ -15,6 +16,7 @@ from playback_browser import window as window
 
 import nmm
 from nmm.collisions.recorded import Passed, described, made, shape_of
+from nmm.figures.obstacles import outlines
 from nmm.playback.obstacles import REACH
 from nmm.playback.scene import playback_scene
 from nmm.runs.clearance import ROUNDING, swept
@@ -307,3 +309,15 @@ def test_nothing_that_is_held_is_behind_a_card(window: Window, tmp_path: Path, s
         beside = np.maximum(left - pixels[:, 0], pixels[:, 0] - right)
         away = np.maximum(top - pixels[:, 1], pixels[:, 1] - bottom)
         assert np.all(np.maximum(beside, away) > margin)
+
+
+def test_what_moves_and_then_rests_is_drawn_once_there() -> None:
+    """And twice where it comes back, as it was elsewhere in between."""
+    goes = nmm.Obstacle(nmm.Sphere(0.1), motion=lambda t: [min(t, 1.0), 0.0, 0.0], name="goes")
+    returns = nmm.Obstacle(nmm.Sphere(0.1), motion=lambda t: [abs(t - 1.0), 0.0, 0.0], name="returns")
+    stands = nmm.Obstacle(nmm.Sphere(0.1), name="stands")
+    run: Any = SimpleNamespace(obstacles=[goes, returns, stands])
+    found = outlines(run, np.array([0.0, 1.0, 2.0, 3.0]))
+    spans = [(0.0, 0.0), (1.0, 3.0), (0.0, 0.0), (1.0, 1.0), (2.0, 2.0), (3.0, 3.0), None]
+    assert [one.times for one in found] == spans
+    assert [one.strength for one in found if one.times and one.times[1] == 3.0] == [1.0, 1.0]

@@ -34,7 +34,8 @@ def hull_of_file(file: Path, scale: Array) -> Any:
     try:
         mesh = mesh_of(str(file), scale)
     except (OSError, ValueError, RuntimeError) as error:
-        raise InputError(f"mesh: {file} cannot be read: {one_line(str(error))}") from None
+        said = one_line(str(error)).rpartition("message: ")[2]  # before it, where in Coal's source
+        raise InputError(f"mesh: {file} cannot be read: {said}") from None
     try:
         return hull(np.array(mesh.vertices()).reshape(-1, 3))
     except InputError as error:

@@ -24,7 +24,7 @@ class Scene(NamedTuple):
     first_corner (G + 1,), corners (..., 3), rounding (G,) : corners in a shape's axes, and the radius
         about them
     active (P,) : whether a pair is near; changed (P,) : those that came near or went in the last step
-    bounds (P,) : the distances, m, of pairs that are not near lower bounds
+    bounds (P,) : m, the distances of near pairs, once measured, and lower bounds of the others'
     risky (P,), watched (P,) : pairs that were listed to be looked at, and whether one was
     kept (P,) : what a pair's distance may not fall below, m
     """

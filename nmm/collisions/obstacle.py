@@ -25,21 +25,22 @@ class Obstacle:
     Parameters
     ----------
     shape : `Box`, `Sphere`, `Cylinder`, `Capsule`, `Plane` or `Mesh`
-    placement : where it is: (3,) its origin, (6,) origin and rotation vector, or a (4, 4) matrix
-    motion : where it is at t, s: a function that returns such a placement; it takes the place of `placement`
+    placement : where it is: (3,) its origin, (6,) origin and rotation vector, or a (4, 4) matrix; the world's
+        origin when not given
+    motion : in its place, where it is at t, s: a function that returns such a placement
     name : for messages; the shape's kind when not given
     velocity : that of its origin along `motion` at t: a function that returns (3,), m/s, world axes, or (6,)
         with the angular velocity, rad/s; differences of `motion` when not given
 
     Raises
     ------
-    InputError : no shape, a placement or a motion that gives no such numbers
+    InputError : no shape, a placement or a motion that gives no such numbers, both of them
     """
 
     def __init__(
         self,
         shape: Shape,
-        placement: Placement = (0.0, 0.0, 0.0),
+        placement: Placement | None = None,
         motion: Callable[[float], Placement] | None = None,
         name: str = "",
         velocity: Callable[[float], ArrayLike] | None = None,
@@ -50,13 +51,19 @@ class Obstacle:
         self.name = name or type(shape).__name__.lower()
         self.motion = motion
         if motion is not None and not callable(motion):
-            raise InputError(f"obstacle {self.name}: motion: expected a function of t, got {motion!r}")
+            raise InputError(
+                f"obstacle {self.name}: motion: expected a Python function of t that returns a placement, as "
+                f"in lambda t: [0.1 * t, 0, 0.3], got {motion!r}"
+            )
+        if motion is not None and placement is not None:
+            raise InputError(f"obstacle {self.name}: expected a placement or a motion, got both")
         if velocity is not None and (motion is None or not callable(velocity)):
             raise InputError(
                 f"obstacle {self.name}: velocity: expected a function of t, with motion, got {velocity!r}"
             )
         self._velocity = velocity
-        self._placement = self._checked(placement if motion is None else motion(0.0))
+        standing = (0.0, 0.0, 0.0) if placement is None else placement
+        self._placement = self._checked(standing if motion is None else motion(0.0))
         self._twist = np.zeros(6)
 
     def __repr__(self) -> str:
@@ -117,12 +124,14 @@ class Obstacle:
             six: Array = placement
             if six.dot(six) < np.inf:
                 return pin.SE3(pin.exp3(six[3:]), six[:3])
-        name = f"obstacle {self.name}: placement"
+        name = f"obstacle {self.name}: {'placement' if self.motion is None else 'motion'}"
         given = array(placement, name)
         if given.shape == (4, 4):
             rotation = given[:3, :3]
             if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-6 or np.linalg.det(rotation) < 0.0:
                 raise InputError(f"{name}: expected a rotation in the upper left of the matrix")
+            if np.abs(given[3] - (0.0, 0.0, 0.0, 1.0)).max() > 1e-6:
+                raise InputError(f"{name}: expected 0, 0, 0, 1 in the last row of the matrix, got {given[3]}")
             return pin.SE3(rotation, given[:3, 3])
         if given.shape == (3,):
             return pin.SE3(np.eye(3), given)

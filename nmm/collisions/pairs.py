@@ -106,7 +106,7 @@ def named_pairs(
     known = list(dict.fromkeys(name for of_one in names for name in of_one))
     found: set[tuple[int, int]] = set()
     for pair in given:
-        if isinstance(pair, str) or len(pair) != 2:
+        if isinstance(pair, str) or not isinstance(pair, Sequence) or len(pair) != 2:
             raise InputError(f"{what}: expected two names, got {pair!r}")
         first, second = ([i for i, of_one in enumerate(names) if name in of_one] for name in pair)
         for name in pair:

@@ -62,9 +62,8 @@ def write_row(scene: Scene, J: Array, places: Array, rows: Rows, slot: int) -> N
     b0, b1, b2 = x[4] * n2 - x[5] * n1, x[5] * n0 - x[3] * n2, x[3] * n1 - x[4] * n0
     for c in range(J.shape[0]):
         total = 0.0
-        if (
-            scene.apart[rows.pair[slot], c] > 0.0
-        ):  # what carries both changes nothing: their ways differ along n
+        # What carries both shapes changes nothing: their points differ along n alone.
+        if scene.apart[rows.pair[slot], c] > 0.0:
             along = n0 * J[c, 0] + n1 * J[c, 1] + n2 * J[c, 2]
             if scene.supports[j, c] > 0.0:
                 total = along + b0 * J[c, 3] + b1 * J[c, 4] + b2 * J[c, 5]
@@ -91,7 +90,8 @@ def write_row(scene: Scene, J: Array, places: Array, rows: Rows, slot: int) -> N
 
 @compiled
 def set_points(scene: Scene, results: Array, places: Array, pair: int, x: Array) -> None:
-    """x (9,): nearest points and normal of a pair; where Coal found no normal, the way between the scene."""
+    """x (9,): nearest points and normal of a pair; where Coal found no normal, the way between the
+    middles of their boxes stands for it."""
     for k in range(3):
         x[k], x[3 + k], x[6 + k] = results[pair, 4 + k], results[pair, 7 + k], results[pair, 1 + k]
     size = x[6] * x[6] + x[7] * x[7] + x[8] * x[8]

@@ -40,7 +40,8 @@ class Collisions:
 
     Raises
     ------
-    InputError : a negative distance, no obstacles, two of one name, a band that is not beyond the distance
+    InputError : a negative distance, no obstacles, two of one name, a band that is not beyond the distance,
+        obstacles in the place of `self`
     """
 
     distance: float = 0.03
@@ -56,6 +57,13 @@ class Collisions:
     rows: int = 40
 
     def __post_init__(this) -> None:  # self is a field
+        if not isinstance(
+            this.self, bool
+        ):  # or obstacles, given by position, would be what nothing keeps off
+            raise InputError(
+                f"collisions: self: expected True or False, got {this.self!r}; obstacles go by their name, "
+                "Collisions(0.03, obstacles=[...])"
+            )
         given = (this.obstacles,) if isinstance(this.obstacles, Obstacle) else tuple(this.obstacles)
         for one in given:
             if not isinstance(one, Obstacle):

@@ -88,7 +88,7 @@ class Guard:
         self._queries.update(t, q, *self._program.blocks, BESIDE)
 
     def clear(self, moved: float) -> bool:
-        """Whether all was farther away than coordinates reach that move so far, m and rad."""
+        """Whether nothing comes too near while coordinates move by no more than this, m and rad together."""
         room = float(self._queries.scene.bounds.min(initial=np.inf)) - self._setting.distance
         return moved * (1.0 + self._setting.robot.reach) < room
 
@@ -161,15 +161,14 @@ class Guard:
 
     def _add_row(self, t: float, q: Array, short: Short) -> bool:
         """A row for the points that come too near; whether there was room for it."""
-        near, keep, step = self._near, self._keep, self._step
+        near, keep = self._near, self._keep
         slot = int(near.used)
-        u_dot = step.q_dot.copy()
         if slot == len(near.d):
-            self._queries.place(t, q)
+            self._queries.place(t, q)  # looking along the way has moved the shapes
             return False
         self._queries.carry(short.pair, (t, q), (t + short.after, short.q), near, slot)
         near.used[()] = slot + 1
-        rate = float(near.d_q[slot] @ u_dot + near.d_t[slot])
+        rate = float(near.d_q[slot] @ self._step.q_dot + near.d_t[slot])
         keep.least[slot] = rate + (short.by + 1e-6) / short.weight
         self._cut = True
         return True

@@ -72,7 +72,7 @@ class Sequence:
         self._conditions = [(i, one) for i, task in enumerate(stack) for one in task.when]
         for i, one in self._conditions:
             if isinstance(one, After):
-                expect_known("task", one.task, named, f"task {self.names[i]}: when: after")
+                expect_known("task name", one.task, named, f"task {self.names[i]}: when: after")
             if isinstance(one, While):
                 _check_rows(one, robot, f"task {self.names[i]}: when: while")
         self._refuse_circles()
@@ -227,6 +227,8 @@ class Sequence:
             ]
             return f"{rows} is {'' if now else 'not '}{' and '.join(ends)}"
         sizes = ", ".join(f"{value:g} {unit}".strip() for unit, value in one.within.items())
+        if one.hold == 0.0:
+            return f"{one.task} {'came' if now else 'did not come'} within {sizes}"
         return f"{one.task} {'stayed' if now else 'did not stay'} within {sizes} for {one.hold:g} s"
 
 

@@ -120,10 +120,10 @@ class Scene(Viewed):
                 *edge.T, facecolor=(*shade, 0.25), edgecolor=shade, linewidth=1.0,
                 zorder=2.5, label=None if k else "obstacle",
             )  # fmt: skip
-            if view == ABOVE and outline.t is not None:
+            if view == ABOVE and outline.times is not None:
                 x, y = 0.5 * (edge.min(axis=0) + edge.max(axis=0))
                 axes.text(
-                    float(x), float(y), _seconds(outline.t), color=OBSTACLE_TEXT,
+                    float(x), float(y), _span(*outline.times), color=OBSTACLE_TEXT,
                     fontsize=style.SMALL - 1.0, ha="center", va="center", zorder=7,
                 )  # fmt: skip
         desired, path = self.lines.get("desired"), self.lines.get("path")
@@ -153,6 +153,10 @@ class Scene(Viewed):
 
 def _seconds(t: float) -> str:
     return f"{style.number(round(t, 2))} s"
+
+
+def _span(first: float, last: float) -> str:
+    return _seconds(last) if first == last else f"{style.number(round(first, 2))} to {_seconds(last)}"
 
 
 def _label_places(poses: Sequence[Pose], lines: Sequence[Array], solid: Sequence[Array]) -> Array:

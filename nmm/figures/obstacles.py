@@ -14,29 +14,40 @@ from nmm.runs.trajectory import Trajectory
 OBSTACLE, OBSTACLE_TEXT = style.ORANGE, "#7A5200"
 #: Strength of the earliest drawing, of 1 for the last.
 FAINTEST = 0.4
+#: What moves by less between two drawings rests, m.
+RESTS = 1e-3
 
 
 class Outline(NamedTuple):
-    """An obstacle as points (k, 3) whose hull it is, and the strength to draw it; at t, s, where it moves."""
+    """An obstacle as points (k, 3) whose hull it is, and the strength to draw it.
+
+    times : first and last at which it is there, s; None where it never moves
+    """
 
     points: Array
     strength: float
-    t: float | None
+    times: tuple[float, float] | None
 
 
 def outlines(trajectory: Trajectory, times: Array) -> list[Outline]:
-    """The obstacles, those that move at each of the times. Half-spaces have no outline."""
-    found = []
+    """The obstacles, those that move at each of the times, once where they rest; half-spaces have none."""
+    found: list[Outline] = []
     for obstacle in trajectory.obstacles:
         points = outline_points(obstacle.shape.geometry())
         if points is None:
             continue
         at = times if obstacle.moves else times[-1:]
         strengths = np.linspace(FAINTEST, 1.0, len(at)) if len(at) > 1 else [1.0]
-        for t, strength in zip(at, strengths, strict=True):
-            place = obstacle.placement(float(t))
+        own: list[Outline] = []
+        for t, strength in zip(at.tolist(), strengths, strict=True):
+            place = obstacle.placement(t)
             moved = points @ place[:3, :3].T + place[:3, 3]
-            found.append(Outline(moved, float(strength), float(t) if obstacle.moves else None))
+            before = own[-1] if own else None
+            if before and before.times and np.allclose(before.points, moved, rtol=0.0, atol=RESTS):
+                own[-1] = Outline(moved, float(strength), (before.times[0], t))
+            else:
+                own.append(Outline(moved, float(strength), (t, t) if obstacle.moves else None))
+        found += own
     return found
 
 

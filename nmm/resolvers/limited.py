@@ -122,11 +122,10 @@ def instead(problem: ProblemArrays, wanted: Array, answer: AnswerArrays) -> None
 @compiled
 def fall_back(problem: ProblemArrays, answer: AnswerArrays) -> None:
     """The inputs nearest to rest instead of an answer, and say so."""
-    answer.excess[()] = nearest_to_rest(problem, answer.u)
-    answer.residual[()], _ = residual_norm(problem.J, answer.u, problem.rate)
+    rest = scratch(answer.u.shape[0])
+    clear(rest)
+    instead(problem, rest, answer)
     answer.status[()] = FALLBACK
-    for level in range(answer.scale.shape[0]):
-        answer.scale[level] = 0.0
 
 
 @compiled

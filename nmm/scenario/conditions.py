@@ -105,6 +105,6 @@ def build_conditions(parts: list[ConditionPart], names: list[str], robot: Robot)
         with at("when", i):
             if isinstance(part, AfterPart):
                 with at("task"):
-                    expect_known("task", part.task, names)
+                    expect_known("task name", part.task, names)
             found.append(part.build(robot))
     return found

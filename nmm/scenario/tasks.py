@@ -42,7 +42,7 @@ class TaskPart(FunctionPart):
 
     priority: Whole = Field(
         1,
-        description="1, 2, ...: where limits bind, lower numbers keep their rate, others get the rest",
+        description="1, 2, ...: a task gets what those of lower numbers leave, and takes nothing from them",
     )
     speed: Speeds | None = Field(
         None,

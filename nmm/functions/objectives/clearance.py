@@ -65,7 +65,8 @@ class Clearance(Objective):
 
     Raises
     ------
-    InputError : a reach that is not above 0, numbers that are not finite; on a robot, no collisions
+    InputError : a reach that is not above 0, numbers that are not finite; on a robot, no collisions, or
+        neither obstacles nor `own`
     """
 
     def __init__(
@@ -99,6 +100,10 @@ class Clearance(Objective):
             raise InputError("clearance: expected collisions, whose obstacles it keeps off, got none")
         if self._setting is None or self._setting.robot is not robot:
             given = self.collisions
+            if not self.own and not given.obstacles:
+                raise InputError(
+                    "clearance: expected collisions with obstacles, got none (own: the robot itself)"
+                )
             self._setting = set_up(
                 robot,
                 given.obstacles,

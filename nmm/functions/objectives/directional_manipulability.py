@@ -7,18 +7,10 @@ from collections.abc import Sequence
 
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array
-from nmm.errors import InputError, expect_known
+from nmm.arrays import Array, vector
+from nmm.errors import InputError
 from nmm.functions.function import Function, Stage
-from nmm.functions.objectives.base import Objective
-from nmm.functions.objectives.jacobian import (
-    Part,
-    contract,
-    decomposed,
-    jacobian_numbers,
-    picked_rows,
-    shape_of,
-)
+from nmm.functions.objectives.jacobian import JacobianObjective, Part, contract, decomposed, shape_of
 from nmm.functions.references.polynomial import Constant
 from nmm.kernels.compiled import integer_scratch, kernel, scratch
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
@@ -73,7 +65,7 @@ def directional_manipulability(at: At, frames: Frames, numbers: Array, rows: Row
         rows.value_q[0, k] = gradient[k]
 
 
-class DirectionalManipulability(Objective):
+class DirectionalManipulability(JacobianObjective):
     """Velocity transmission ratio β(q) = (dᵀ (J Jᵀ)⁻¹ d)^-1/2 along a unit vector d (Chiu 1988).
 
     That is how fast a frame moves that way, and no other, with inputs of size 1; to maximise, minimise
@@ -91,6 +83,8 @@ class DirectionalManipulability(Objective):
     weights : of the inputs, as for manipulability
     """
 
+    called = "directional manipulability"
+
     def __init__(
         self,
         frame: str,
@@ -99,20 +93,19 @@ class DirectionalManipulability(Objective):
         of: Part = "robot",
         weights: Weights | None = None,
     ) -> None:
-        self.frame = frame
-        self.selected = picked_rows(rows, "directional manipulability")
-        self.direction = direction if isinstance(direction, Function) else Constant(direction, "1")
+        super().__init__(frame, rows, of, weights)
+        self.direction = (
+            direction
+            if isinstance(direction, Function)
+            else Constant(vector(direction, None, "direction"), "1")
+        )
         if isinstance(self.direction, Constant) and not self.direction.value.any():
             raise InputError("direction: expected a vector that is not zero")
-        expect_known("directional manipulability of", of, ("robot", "arm", "platform"))
-        self.of = of
-        self.weights = weights
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
         s, came = len(self.selected), len(self.direction.rows(robot))
         if came != s:
             names = ", ".join(self.selected)
             raise InputError(f"direction: expected {s} components, as there are rows ({names}), got {came}")
-        numbers = jacobian_numbers(robot, self.selected, self.of, "directional manipulability", self.weights)
-        own = Stage(directional_manipulability, s, (self.frame,), numbers, hessians=True)
+        own = Stage(directional_manipulability, s, (self.frame,), self.numbers(robot), hessians=True)
         return (*self.direction.stages(robot), own)

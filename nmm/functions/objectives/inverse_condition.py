@@ -6,17 +6,9 @@ import math
 from collections.abc import Sequence
 
 from nmm.arrays import Array, positive
-from nmm.errors import InputError, expect_known
+from nmm.errors import InputError
 from nmm.functions.function import Stage
-from nmm.functions.objectives.base import Objective
-from nmm.functions.objectives.jacobian import (
-    Part,
-    contract,
-    decomposed,
-    jacobian_numbers,
-    picked_rows,
-    shape_of,
-)
+from nmm.functions.objectives.jacobian import JacobianObjective, Part, contract, decomposed, shape_of
 from nmm.kernels.compiled import integer_scratch, kernel, scratch
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.input_weights import Weights
@@ -50,7 +42,7 @@ def inverse_condition(at: At, frames: Frames, numbers: Array, rows: Rows) -> Non
     contract(at, frames, numbers, J_q, J, rows.value_q[0])
 
 
-class InverseCondition(Objective):
+class InverseCondition(JacobianObjective):
     """Inverse condition number 1/κ_F = s / (‖J‖_F ‖J⁺‖_F) of s rows of a frame's Jacobian, Frobenius norms
     (Angeles 2003), from 0 (rank lost) to 1 (isotropic); to maximise, minimise `-InverseCondition(...)`.
 
@@ -69,6 +61,8 @@ class InverseCondition(Objective):
         when not given. Without rows rx, ry, rz it has no effect
     """
 
+    called = "condition number"
+
     def __init__(
         self,
         frame: str,
@@ -77,17 +71,10 @@ class InverseCondition(Objective):
         weights: Weights | None = None,
         length: float | None = None,
     ) -> None:
-        self.frame = frame
-        self.selected = picked_rows(rows, "condition number")
+        super().__init__(frame, rows, of, weights)
         if len(self.selected) < 2:
             raise InputError("condition number rows: expected at least two, that of one row is always 1")
-        expect_known("condition number of", of, ("robot", "arm", "platform"))
-        self.of = of
-        self.weights = weights
         self.length = None if length is None else positive(length, "length")
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
-        numbers = jacobian_numbers(
-            robot, self.selected, self.of, "condition number", self.weights, self.length
-        )
-        return (Stage(inverse_condition, 1, (self.frame,), numbers, hessians=True),)
+        return (Stage(inverse_condition, 1, (self.frame,), self.numbers(robot), hessians=True),)

@@ -5,17 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from nmm.arrays import Array, scalar
-from nmm.errors import InputError, expect_known
+from nmm.errors import InputError
 from nmm.functions.function import Stage
-from nmm.functions.objectives.base import Objective, Sum
-from nmm.functions.objectives.jacobian import (
-    Part,
-    contract,
-    decomposed,
-    jacobian_numbers,
-    picked_rows,
-    shape_of,
-)
+from nmm.functions.objectives.base import Sum
+from nmm.functions.objectives.jacobian import JacobianObjective, Part, contract, decomposed, shape_of
 from nmm.kernels.compiled import integer_scratch, kernel, scratch
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.input_weights import Weights
@@ -39,7 +32,7 @@ def manipulability(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     contract(at, frames, numbers, J_q, X, rows.value_q[0])
 
 
-class Manipulability(Objective):
+class Manipulability(JacobianObjective):
     """Manipulability w(q) = sqrt(det(J Jᵀ)) (Yoshikawa 1985) of a frame; minimise `-Manipulability(...)`.
 
     Parameters
@@ -53,6 +46,8 @@ class Manipulability(Objective):
         {"platform": 4} makes the platform count half
     """
 
+    called = "manipulability"
+
     def __init__(
         self,
         frame: str,
@@ -60,15 +55,10 @@ class Manipulability(Objective):
         of: Part = "robot",
         weights: Weights | None = None,
     ) -> None:
-        self.frame = frame
-        self.selected = picked_rows(rows, "manipulability")
-        expect_known("manipulability of", of, ("robot", "arm", "platform"))
-        self.of = of
-        self.weights = weights
+        super().__init__(frame, rows, of, weights)
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
-        numbers = jacobian_numbers(robot, self.selected, self.of, "manipulability", self.weights)
-        return (Stage(manipulability, 1, (self.frame,), numbers, hessians=True),)
+        return (Stage(manipulability, 1, (self.frame,), self.numbers(robot), hessians=True),)
 
 
 class WeighedManipulability(Sum):

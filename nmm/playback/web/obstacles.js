@@ -20,14 +20,15 @@
     return new THREE.MeshBasicMaterial({ depthTest: false, depthWrite: false, transparent: true });
   }
 
-  // A text in front of everything, with a white rim; it keeps its size on the screen.
-  function written(height) {
+  // A text in front of everything, with a white rim, or on a white plate before the others; it keeps its size
+  // on the screen.
+  function written(height, plate = false) {
     const canvas = document.createElement("canvas");
     const pen = canvas.getContext("2d");
     const sprite = new THREE.Sprite(
       new THREE.SpriteMaterial({ depthTest: false, depthWrite: false, sizeAttenuation: false }),
     );
-    sprite.renderOrder = 1001;
+    sprite.renderOrder = plate ? 1002 : 1001;
     const font = "600 40px system-ui, sans-serif";
     sprite.write = (text, color) => {
       if (sprite.text === text + color) return;
@@ -37,6 +38,14 @@
       Object.assign(canvas, { width, height: 60 });
       Object.assign(pen, { font, textAlign: "center", textBaseline: "middle", lineWidth: 9, lineJoin: "round" });
       Object.assign(pen, { strokeStyle: "rgba(255,255,255,0.85)", fillStyle: color });
+      if (plate) {
+        pen.fillStyle = pen.strokeStyle;
+        pen.beginPath();
+        pen.arc(26, 30, 26, Math.PI / 2, 1.5 * Math.PI);
+        pen.arc(width - 26, 30, 26, -Math.PI / 2, Math.PI / 2);
+        pen.fill();
+        pen.fillStyle = color;
+      }
       pen.strokeText(text, width / 2, 32);
       pen.fillText(text, width / 2, 32);
       sprite.scale.set((height * width) / 60, height, 1);
@@ -56,7 +65,7 @@
     const material = painted();
     const line = new THREE.Mesh(new THREE.CylinderGeometry(radius, radius, 1, 8), material);
     const ends = [0, 1].map(() => new THREE.Mesh(new THREE.SphereGeometry(2.2 * radius, 12, 8), material));
-    const text = written(0.028);
+    const text = written(0.028, true);
     text.center.set(0.5, -0.35 - 1.05 * obstacles.shown.length); // runs at one place, one over another
     const group = new THREE.Group();
     group.add(line, ...ends, text);
