@@ -5,7 +5,6 @@ Every message says what was expected, what came, and what is available.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Collection, Iterable
 from typing import Any
 
@@ -44,6 +43,8 @@ def unknown(kind: str, name: object, available: Iterable[str], where: str = "") 
     >>> unknown("frame", "eee", ["ee", "link1"])
     "unknown frame 'eee' (did you mean 'ee'?); available: ee, link1"
     """
+    import difflib  # here: every start would pay
+
     names = list(available)
     near = difflib.get_close_matches(str(name), names, n=1)
     hint = f" (did you mean {near[0]!r}?)" if near else ""

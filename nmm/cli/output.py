@@ -7,9 +7,10 @@ import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
-from rich.console import Console, JustifyMethod
-from rich.table import Table
+if TYPE_CHECKING:
+    from rich.console import Console, JustifyMethod
 
 #: A pipe has no width of its own: lines end where the text does.
 WIDTH_OF_A_PIPE = 500
@@ -17,6 +18,8 @@ WIDTH_OF_A_PIPE = 500
 
 def console() -> Console:
     """Standard output; in a pipe without colours and without breaking lines."""
+    from rich.console import Console
+
     piped = not sys.stdout.isatty() and "COLUMNS" not in os.environ
     return Console(markup=False, highlight=False, emoji=False, width=WIDTH_OF_A_PIPE if piped else None)
 
@@ -25,6 +28,8 @@ def show_table(
     columns: Sequence[str], rows: Iterable[Sequence[str]], *, title: str = "", numeric: Sequence[str] = ()
 ) -> None:
     """Print a table; columns named in `numeric` are aligned to the right. All but the first column fold."""
+    from rich.table import Table
+
     out = console()
     table = Table(
         box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold", show_header=any(columns)
@@ -78,6 +83,7 @@ def progress(label: str) -> Iterator[Callable[[float], None] | None]:
     if not sys.stderr.isatty():
         yield None
         return
+    from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
     bar = Progress(

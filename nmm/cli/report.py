@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
+import sys
 from collections.abc import Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,17 +14,21 @@ if TYPE_CHECKING:
     from nmm.runs.trajectory import Trajectory
 
 
-def show_run(trajectory: Trajectory, folder: Path) -> None:
-    """Print the table of a run that was saved in `folder`, and its warnings."""
+def show_run(trajectory: Trajectory, numbers: dict[str, Any]) -> int:
+    """Print the table of a run, and its warnings; returns the width of its first column.
+
+    numbers : its summary
+    """
     scenario = trajectory.scenario or {}
     title = f"{scenario.get('name', '')}: {scenario.get('title', '')}".strip(": ")
-    rows = describe(trajectory, folder)
-    show_table(["", ""], [*rows, ("files in", str(folder))], title=title)
+    rows = describe(trajectory, numbers)
+    show_table(["", ""], rows, title=title)
+    sys.stdout.flush()
+    return max(len(label) for label, _ in rows)
 
 
-def describe(trajectory: Trajectory, folder: Path) -> list[tuple[str, str]]:
-    """Labels and values of the numbers of a run that was saved in `folder`; warnings go to standard error."""
-    numbers = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+def describe(trajectory: Trajectory, numbers: dict[str, Any]) -> list[tuple[str, str]]:
+    """Labels and values of the numbers of a run, by its summary; warnings go to standard error."""
     for warning in numbers["warnings"]:
         warn(f"{trajectory.resolver.upper()}: {warning}")
     return list(_rows(trajectory, numbers))

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from nmm.cli.output import complain, progress, shielded, show_table
 from nmm.cli.report import describe, show_run
 from nmm.errors import InputError
 from nmm.folders import comparison
 from nmm.folders.run import is_run
+from nmm.folders.run import save as save_run
 from nmm.folders.whole import check_folder
 from nmm.scenario import Scenario
 
@@ -38,12 +39,29 @@ def run_scenario(
     check_folder(folder, is_run)
     trajectory = _run(scenario)
     with shielded():
-        trajectory.save(folder, html=html, ellipsoids=ellipsoids)
-    show_run(trajectory, folder)
+        _tell_and_save(trajectory, folder, html=html, ellipsoids=ellipsoids)
     status = _status("nmm run", [trajectory], folder)
     if play and len(trajectory):
         trajectory.play(ellipsoids=ellipsoids)
     return status
+
+
+def _tell_and_save(trajectory: Trajectory, folder: Path, *, html: bool, ellipsoids: Wanted) -> None:
+    """The numbers first: nobody has to wait for figures to see them."""
+    width = 0
+    gone: OSError | None = None
+
+    def tell(numbers: dict[str, Any]) -> None:
+        nonlocal width, gone
+        try:
+            width = show_run(trajectory, numbers)
+        except OSError as error:  # their reader has gone (`nmm run … | head -3`): the folder is written still
+            gone = error
+
+    save_run(trajectory, folder, html=html, ellipsoids=ellipsoids, tell=tell)
+    if gone is not None:
+        raise gone
+    show_table(["", ""], [["files in".ljust(width), str(folder)]])
 
 
 def compare_resolvers(
@@ -70,7 +88,7 @@ def compare_resolvers(
             break
     with shielded():
         comparison.save(trajectories, folder, scenarios[0].name, ellipsoids=ellipsoids)
-    table = [dict(describe(trajectory, folder / trajectory.resolver)) for trajectory in trajectories]
+    table = [dict(describe(trajectory, trajectory.summary())) for trajectory in trajectories]
     for column, scenario, trajectory in zip(table, scenarios, trajectories, strict=False):
         if len(trajectory):
             controller = scenario.controller()

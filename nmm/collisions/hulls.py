@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-import os
-import tempfile
+import io
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ import coal
 import numpy as np
 import platformdirs
 
+from nmm import kept
 from nmm.arrays import Array, Integers
 from nmm.errors import InputError
 from nmm.robots.meshes import mesh_of
@@ -63,19 +64,16 @@ def _hull(data: bytes) -> Any:
 
 def _kept(name: str, points: Array) -> tuple[Array, Integers]:
     """Corners (V, 3) and triangles (F, 3) of the hull, read where they were made before."""
-    path = Path(platformdirs.user_cache_dir("nmm")) / "hulls" / f"{name}.npz"
-    try:
-        with np.load(path) as file:
+    path = Path(platformdirs.user_cache_dir("nmm")) / "hulls" / f"{name}.hull"
+    data = kept.read(path)
+    if data is not None:
+        with np.load(io.BytesIO(data)) as file:
             return file["corners"], file["faces"]
-    except (OSError, ValueError, KeyError, EOFError):
-        corners, faces = _made(points)
-    try:  # whole or not at all; a disk that is full or read-only costs time, nothing else
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".npz", delete=False) as file:
-            np.savez(file, corners=corners, faces=faces)
-        os.replace(file.name, path)
-    except OSError:
-        pass
+    corners, faces = _made(points)
+    made = io.BytesIO()
+    np.savez(made, corners=corners, faces=faces)
+    with suppress(OSError):  # a disk that is full or read-only costs time, nothing else
+        kept.write(path, made.getvalue())
     return corners, faces
 
 

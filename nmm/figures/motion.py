@@ -11,7 +11,6 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.path import Path
 from numpy.typing import ArrayLike
-from scipy.spatial import KDTree
 
 from nmm.arrays import Array
 from nmm.errors import InputError
@@ -165,7 +164,7 @@ def _label_places(poses: Sequence[Pose], lines: Sequence[Array], solid: Sequence
     drawn = np.vstack(
         [_outline(pose) for pose in poses] + [line[:: max(1, len(line) // 300), :2] for line in lines]
     )
-    nearest = KDTree(drawn * _FLAT)
+    flat = drawn * _FLAT
     covered = [Path(hull(shape[:, :2])) for pose in poses for shape in [*pose.body, *pose.wheels]]
     covered += [Path(edge) for edge in solid]
     angles = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
@@ -181,11 +180,17 @@ def _label_places(poses: Sequence[Pose], lines: Sequence[Array], solid: Sequence
         candidates = centre + (np.tile(edge + away, 9) + farther)[:, None] * np.tile(directions, (9, 1))
         others = np.vstack([np.full((1, 2), np.inf), *[place + width for place in places]])
         beside = np.linalg.norm((candidates[:, None] - others) * _FLAT, axis=2).min(axis=1)
-        clear = np.minimum(nearest.query(candidates * _FLAT)[0], beside)
+        clear = np.minimum(_distances(candidates * _FLAT, flat), beside)
         clearance = np.minimum(clear, away) - 0.1 * farther
         clearance[np.any([shape.contains_points(candidates) for shape in covered], axis=0)] -= edge.max()
         places.append(candidates[int(np.argmax(clearance))])
     return np.array(places)
+
+
+def _distances(points: Array, others: Array) -> Array:
+    """How far each of points (P, 2) is from the nearest of others (O, 2): (P,)."""
+    squares = np.sum(points**2, axis=1)[:, None] + np.sum(others**2, axis=1) - 2.0 * points @ others.T
+    return np.sqrt(np.maximum(squares.min(axis=1), 0.0))
 
 
 def _outline(pose: Pose) -> Array:

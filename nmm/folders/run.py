@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -49,6 +49,7 @@ def save(
     figures: bool = True,
     html: bool = False,
     ellipsoids: Wanted = False,
+    tell: Callable[[dict[str, Any]], None] | None = None,
 ) -> Path:
     """Write trajectory.npz, trajectory.csv, summary.json, scenario.yaml, figures and playback.html.
 
@@ -59,6 +60,7 @@ def save(
     html : whether to write playback.html
     ellipsoids : whether manipulability ellipsoids are drawn, in ellipses.png and playback.html, or how
         (`nmm.playback.EllipsoidOptions`)
+    tell : called with the summary before what takes time, the figures, is drawn
 
     Raises
     ------
@@ -67,8 +69,10 @@ def save(
     """
     with replaced_folder(folder, is_run) as temporary:
         np.savez(temporary / "trajectory.npz", **_arrays(trajectory))  # compressing gains little on doubles
-        _write_csv(trajectory, temporary / "trajectory.csv")
         summary = trajectory.summary()
+        if tell is not None:
+            tell(summary)
+        _write_csv(trajectory, temporary / "trajectory.csv")
         (temporary / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
         if trajectory.scenario is not None:
             text = yaml.safe_dump(trajectory.scenario, sort_keys=False, allow_unicode=True)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,6 +19,9 @@ def replaced_folder(folder: str | Path, is_ours: Callable[[Path], bool]) -> Iter
     ------
     InputError : `folder` exists and is not one of ours, or cannot be written
     """
+    import shutil  # here, both: `nmm --help` would pay
+    import tempfile
+
     final = Path(folder)
     check_replaceable(final, is_ours)
     try:

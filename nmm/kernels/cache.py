@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
+import pickle
+import re
 import shutil
+import sys
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -13,6 +18,9 @@ from typing import Any
 import numba
 import platformdirs
 from numba.core import caching
+from numba.core.compiler import CompileResult
+
+from nmm import kept
 
 #: How many folders of compiled kernels are kept.
 KEPT_CACHES = 8
@@ -22,8 +30,8 @@ PACKAGE = KERNELS.parent
 
 
 @cache
-def cache_folder() -> str:
-    """Folder of numba's cache for this very text of nmm's kernels.
+def cache_folder() -> Path:
+    """Folder of what is compiled from this very text of nmm's kernels.
 
     numba notices a change of the file that holds a compiled function, but not of the files that
     hold what it calls; a digest of all sources that hold compiled functions does.
@@ -34,48 +42,93 @@ def cache_folder() -> str:
         if b"nmm.kernels" in text or source.parent == KERNELS:
             digest.update(text)
     folder = Path(platformdirs.user_cache_dir("nmm")) / digest.hexdigest()[:16]
-    if not folder.exists():
-        _forget_old_caches(folder.parent)
-    return str(folder)
+    with suppress(OSError):  # nobody else's to see, or gone in the meantime
+        if not folder.exists():
+            _forget_old_caches(folder.parent)
+    return folder
 
 
 def _forget_old_caches(parent: Path) -> None:
     """Keep the latest few: each text of the kernels, each version of nmm, leaves a folder behind."""
-    siblings = [path for path in parent.glob("*") if path.is_dir()]
+    siblings = [path for path in parent.iterdir() if re.fullmatch("[0-9a-f]{16}", path.name)]
     siblings.sort(key=lambda path: path.stat().st_mtime, reverse=True)
     for old in siblings[KEPT_CACHES - 1 :]:
         shutil.rmtree(old, ignore_errors=True)
 
 
-class _InFolder(caching._SourceFileBackedLocatorMixin, caching._CacheLocator):
-    """What numba asks where a function's compiled form lies: in `cache_folder`."""
+class KernelCache(caching.FunctionCache):
+    """numba's cache of one function, in `cache_folder`; other users of numba in the process keep theirs.
 
-    def __init__(self, function: Callable[..., Any], source: str) -> None:
-        self._py_file = source
-        self._lineno = function.__code__.co_firstlineno
+    A file for each signature, written whole or not at all, and read only as it was written. numba keeps
+    an index beside them, in which two processes that compile at once lose each other's entries, and
+    trusts whatever it reads. Where nothing can be written, functions are compiled in memory.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        # Not numba's, which tries to write into the folder, for each function of each start.
+        self._py_func, self._name = function, repr(function)
+        self._source = Path(function.__code__.co_filename)
+        self.enable()
 
     @property
-    def _room(self) -> Path | None:
-        """Folder of the source below nmm's own; None if the function is somebody else's."""
-        place = Path(self._py_file).resolve().parent
-        return place.relative_to(PACKAGE) if place.is_relative_to(PACKAGE) else None
+    def cache_path(self) -> str:
+        """Folder of the function's files: the source's place in nmm, or one for each other source."""
+        place = self._source.resolve().parent
+        if place.is_relative_to(PACKAGE):
+            return str(cache_folder() / place.relative_to(PACKAGE))
+        return str(cache_folder() / f"{place.name}_{hashlib.sha256(os.fsencode(place)).hexdigest()[:16]}")
 
-    def get_cache_path(self) -> str:
-        if self._room is None:
-            return os.path.join(cache_folder(), self.get_suitable_cache_subpath(self._py_file))
-        return os.path.join(cache_folder(), self._room)
+    def flush(self) -> None:
+        """Forget what is kept of the function."""
+        for path in Path(self.cache_path).glob(f"{self._stem}.*.nbc"):
+            with suppress(OSError):
+                path.unlink()
 
-    def get_source_stamp(self) -> object:
-        """The folder is that of nmm's very text: where and when it was installed makes no difference."""
-        return super().get_source_stamp() if self._room is None else None
+    def _load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
+        key = self._key(sig, target_context.codegen())
+        data = None if key is None else kept.read(self._path(key))
+        if data is None:
+            return None
+        try:
+            found, parts = pickle.loads(data)
+            return CompileResult._rebuild(target_context, *parts) if found == key else None
+        except Exception:  # whole, but what it names is no longer to be had
+            return None
+
+    def _save_overload(self, sig: Any, data: Any) -> None:
+        key = self._key(sig, data.codegen)
+        # Addresses that only this process has cannot be kept.
+        if key is None or data.library.has_dynamic_globals:
+            return
+        try:
+            kept.write(self._path(key), caching.dumps((key, data._reduce())))
+        except OSError:
+            _tell_once()
+
+    def _key(self, sig: Any, codegen: Any) -> object | None:
+        """What the compiled form depends on beside nmm's text; None for a function that no file holds."""
+        if self._source.resolve().is_relative_to(PACKAGE):
+            text = ""  # the folder is that of nmm's very text, wherever and whenever it was installed
+        else:
+            try:
+                text = hashlib.sha256(self._source.read_bytes()).hexdigest()
+            except OSError:
+                return None
+        return text, sys.implementation.cache_tag, *self._index_key(sig, codegen)
+
+    def _path(self, key: object) -> Path:
+        digest = hashlib.sha256(repr(key).encode()).hexdigest()[:24]
+        return Path(self.cache_path) / f"{self._stem}.{digest}.nbc"
+
+    @property
+    def _stem(self) -> str:
+        code = self._py_func.__code__
+        name = re.sub(r"[^\w.]", "", code.co_qualname)[-80:]
+        return f"{self._source.stem[:80]}.{name}-{code.co_firstlineno}"
 
 
-class _Storing(caching.CompileResultCacheImpl):
-    # Where the user's cache folder cannot be written, numba looks for a place as it does for any function.
-    _locator_classes = (_InFolder, *caching.CompileResultCacheImpl._locator_classes)
-
-
-class KernelCache(caching.FunctionCache):
-    """numba's cache of one function, in `cache_folder`; other users of numba in the process keep theirs."""
-
-    _impl_class = _Storing
+@cache  # it has not changed when the next function is compiled
+def _tell_once() -> None:
+    logging.getLogger("nmm").warning(
+        "%s cannot be written: what nmm compiles lasts for this process only", cache_folder()
+    )

@@ -20,7 +20,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import expm
 
 from nmm.arrays import Array, Integers
 from nmm.kernels.compiled import compiled
@@ -113,10 +112,20 @@ def departure(
     return Departure(int(beyond[0]), int(np.argmax(excess)), promise, bound, unmet, missed)
 
 
+def _exponential(A: Array) -> Array:
+    """e^A of a square matrix; most feedback is a diagonal."""
+    diagonal = np.diagonal(A)
+    if np.array_equal(A, np.diag(diagonal)):
+        return np.diag(np.exp(diagonal))
+    from scipy.linalg import expm  # here: a fifth of a second that most runs need not pay
+
+    return expm(A)
+
+
 def decay(t: Array, error: Array, feedback: Feedback) -> Array:
     """‖exp(-K h)‖ of each step h, (N - 1,); 1 where feedback is bounded at either end of it."""
     steps, which = _steps(t)
-    norms = np.array([np.linalg.norm(expm(-feedback.K * h), 2) for h in steps])
+    norms = np.array([np.linalg.norm(_exponential(-feedback.K * h), 2) for h in steps])
     bound = feedback.bound(error)
     return np.where(bound[1:] | bound[:-1], 1.0, norms[which])
 
@@ -130,7 +139,7 @@ def promised(t: Array, error: Array, feedback: Feedback) -> Array:
         flow = solve_ivp(lambda _, e: -feedback.rates(e[np.newaxis])[0], span, first, "LSODA", t, rtol=1e-6)
         return _sizes(flow.y.T)
     steps, which = _steps(t)
-    factors = np.array([expm(-feedback.K * h) for h in steps])
+    factors = np.array([_exponential(-feedback.K * h) for h in steps])
     errors = np.empty((len(t), error.shape[1]))
     errors[0] = error[0]
     carry_on(factors, which, errors)
