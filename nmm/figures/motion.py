@@ -164,12 +164,12 @@ def _label_places(poses: Sequence[Pose], lines: Sequence[Array], solid: Sequence
     drawn = np.vstack(
         [_outline(pose) for pose in poses] + [line[:: max(1, len(line) // 300), :2] for line in lines]
     )
-    flat = drawn * _FLAT
     covered = [Path(hull(shape[:, :2])) for pose in poses for shape in [*pose.body, *pose.wheels]]
     covered += [Path(edge) for edge in solid]
     angles = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
     directions = np.column_stack([np.cos(angles), np.sin(angles)])
     away = _LABEL * float(np.ptp(drawn, axis=0).max())
+    flat = _thinned(drawn * _FLAT, away / 20.0)
     width = 2.0 * away * np.array([[-1.0, 0.0], [0.0, 0.0], [1.0, 0.0]])
     places: list[Array] = []
     for pose in poses:
@@ -180,17 +180,28 @@ def _label_places(poses: Sequence[Pose], lines: Sequence[Array], solid: Sequence
         candidates = centre + (np.tile(edge + away, 9) + farther)[:, None] * np.tile(directions, (9, 1))
         others = np.vstack([np.full((1, 2), np.inf), *[place + width for place in places]])
         beside = np.linalg.norm((candidates[:, None] - others) * _FLAT, axis=2).min(axis=1)
-        clear = np.minimum(_distances(candidates * _FLAT, flat), beside)
+        clear = np.minimum(_distances(candidates * _FLAT, flat, away), beside)
         clearance = np.minimum(clear, away) - 0.1 * farther
         clearance[np.any([shape.contains_points(candidates) for shape in covered], axis=0)] -= edge.max()
         places.append(candidates[int(np.argmax(clearance))])
     return np.array(places)
 
 
-def _distances(points: Array, others: Array) -> Array:
-    """How far each of points (P, 2) is from the nearest of others (O, 2): (P,)."""
-    squares = np.sum(points**2, axis=1)[:, None] + np.sum(others**2, axis=1) - 2.0 * points @ others.T
-    return np.sqrt(np.maximum(squares.min(axis=1), 0.0))
+def _thinned(points: Array, width: float) -> Array:
+    """One of points (N, 2) for each square of that width with some in it."""
+    squares = np.floor((points - points.min(axis=0)) / width)
+    _, kept = np.unique(squares @ [squares[:, 1].max() + 1.0, 1.0], return_index=True)
+    return points[kept]
+
+
+def _distances(points: Array, others: Array, most: float) -> Array:
+    """How far each of points (P, 2) is from the nearest of others (O, 2), of those no farther than `most`."""
+    lower, upper = points.min(axis=0) - most, points.max(axis=0) + most
+    near = others[np.all((others > lower) & (others < upper), axis=1)]
+    if not len(near):
+        return np.full(len(points), most)
+    x, y = (np.subtract.outer(points[:, k], near[:, k]) for k in range(2))
+    return np.sqrt((x * x + y * y).min(axis=1))
 
 
 def _outline(pose: Pose) -> Array:
