@@ -20,7 +20,9 @@ from command_line import Result, Terminal, process
 from ports import MOST
 
 import nmm
+import nmm.cli.runs
 from nmm.cli.app import status_of
+from nmm.cli.runs import run_scenario
 
 SHORT = ("--set", "duration=0.5")
 Command = Callable[..., Result]
@@ -56,6 +58,25 @@ def test_run_writes_its_folder_and_prints_its_numbers(run: Command) -> None:
     assert (first, last) == pytest.approx((error[0, 0], error[-1, 0]), rel=5e-3)
     assert float(result.value("smallest σ_min")) == pytest.approx(numbers["sigma_min"], rel=5e-3)
     assert numbers["lateral_slip_max"] <= 1e-12
+
+
+def test_the_folder_is_written_though_nobody_reads_the_numbers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They are told before figures are drawn: `nmm run … | head -1` ends with a folder all the same."""
+    seen: list[bool] = []
+
+    def gone(trajectory: nmm.Trajectory, numbers: dict[str, object]) -> int:
+        seen.append((tmp_path / "here").exists())
+        raise BrokenPipeError
+
+    monkeypatch.setattr(nmm.cli.runs, "show_run", gone)
+    with pytest.raises(BrokenPipeError):
+        run_scenario(
+            "unicycle_2r_position", None, {"duration": 0.5}, None, tmp_path / "here", html=False, play=False
+        )
+    assert seen == [False]
+    assert {"summary.json", "motion.png"} <= {path.name for path in (tmp_path / "here").iterdir()}
 
 
 def test_run_takes_resolver_settings_folder_and_html(run: Command) -> None:
