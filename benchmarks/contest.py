@@ -1,4 +1,4 @@
-"""Interleaved rounds of programs that stay alive: one library takes its turn, then the next, over the same samples."""
+"""Interleaved rounds of programs that stay alive: each library takes its turn on the same samples."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pinocchio as pin
 from workloads import WORKLOADS, Workload
 
 WORKERS = Path(__file__).resolve().parent / "workers"
-#: A library has a time only if its end-effector is this near to its path, m and rad, in the path's second half,
+#: A library has a time only if its end-effector is this near to its path, m and rad, in the second half,
 #: and if it keeps the limits that are on, m/s, rad/s, m, rad, within a thousandth.
 NEAR, KEPT = 5e-3, 1e-3
 #: Turns that a path is driven in.
@@ -21,8 +21,8 @@ TURNS = 10
 
 
 class Followed(NamedTuple):
-    """What a library's motion is like: largest errors in the second half (m, rad), the base's fastest sideways
-    (m/s), by how much limits are broken at most; why it has no time, or nothing."""
+    """What a library's motion is like: largest errors in the second half (m, rad), how fast its base goes
+    sideways (m/s), by how much limits are broken at most; why it has no time, or nothing."""
 
     position: float
     orientation: float

@@ -1,4 +1,4 @@
-"""How the time of nmm's step grows with rows, inputs, frames and priority levels, on snake arms made as URDF text."""
+"""How the time of nmm's step grows with rows, inputs, frames and priority levels, on snake arms."""
 
 from __future__ import annotations
 
@@ -38,8 +38,9 @@ def snakes(folder: Path, *lengths: int) -> tuple[nmm.Robot, np.ndarray]:
             axis = "0 0 1" if k % 2 else "0 1 0"
             limit = f'<limit lower="{-RANGE}" upper="{RANGE}" velocity="{FASTEST}" effort="9"/>'
             parts.append(
-                f'<link name="{arm}{k}_link"/><joint name="{arm}{k}" type="revolute"><parent link="{parent}"/>'
-                f'<child link="{arm}{k}_link"/><origin xyz="{at}"/><axis xyz="{axis}"/>{limit}</joint>'
+                f'<link name="{arm}{k}_link"/><joint name="{arm}{k}" type="revolute">'
+                f'<parent link="{parent}"/><child link="{arm}{k}_link"/>'
+                f'<origin xyz="{at}"/><axis xyz="{axis}"/>{limit}</joint>'
             )
             parent, at = f"{arm}{k}_link", "0.2 0 0.05"
         parts.append(
@@ -62,7 +63,7 @@ def task(robot: nmm.Robot, q: np.ndarray, function: nmm.Function, priority: int 
 def measure(robot: nmm.Robot, q: np.ndarray, tasks: Tasks) -> list[str]:
     """µs of u = controller(t, q), a cell a column of `COLUMNS`, and of a compiled Euler step, interleaved."""
     resolver = nmm.ProjectedGradient()
-    objective = nmm.PreferredPosture({name: 0.0 for name in robot.q_names[3:]})
+    objective = nmm.PreferredPosture(dict.fromkeys(robot.q_names[3:], 0.0))
     calls = []
     for kinematics, limits, _ in COLUMNS:
         kept = nmm.Limits({"platform": FASTEST}) if limits else None

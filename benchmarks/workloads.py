@@ -36,7 +36,7 @@ BASES = {
 
 
 class Chosen(NamedTuple):
-    """A workload: the scenario, its end-effector, its limits when they are on, and what the peers' posture is.
+    """A workload: the scenario, its end-effector, its limits when they are on, and the peers' posture.
 
     velocity : of inputs that the robot's file leaves free, m/s or rad/s
     position : of coordinates that the robot's file leaves free
@@ -119,8 +119,8 @@ class Workload:
         return data.oMf[self.robot.frame_id(self.frame)].copy()
 
     def targets(self) -> tuple[np.ndarray, np.ndarray]:
-        """Positions (N, 3) and orientations (N, 3, 3) to be at after each sample: the path, and what the gain K
-        leaves of the error at the start, which shrinks by 1 - K dt a sample."""
+        """Positions (N, 3) and orientations (N, 3, 3) to be at after each sample: the path, and what the gain
+        K leaves of the error at the start, which shrinks by 1 - K dt a sample."""
         start = self.placement(self.q0)
         share = (1.0 - self.gain * self.dt) ** np.arange(1, len(self.t) + 1)
         p = self.p[1:] + share[:, None] * (start.translation - self.p[0])
@@ -195,7 +195,7 @@ def urdf(workload: Workload, base: str) -> str:
     joints.append(
         _joint("tool_joint", "fixed", f"link{frame.parentJoint}", workload.frame, frame.placement, "", None)
     )
-    # MuJoCo reads URDF too, and is asked to keep bodies that do not move apart, and to give the light ones mass.
+    # MuJoCo reads URDF, too: it is asked to keep bodies that do not move apart, and to give light ones mass.
     compiler = '<mujoco><compiler fusestatic="false" boundmass="1e-3" boundinertia="1e-6"/></mujoco>'
     return "\n".join(['<robot name="robot">', compiler, *links, *joints, "</robot>"])
 
@@ -205,7 +205,8 @@ def _link(name: str, inertia: pin.Inertia) -> str:
         return f'<link name="{name}"/>'
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = (map(float, row) for row in inertia.inertia)
     return (
-        f'<link name="{name}"><inertial><origin xyz="{_numbers(inertia.lever)}"/><mass value="{inertia.mass!r}"/>'
+        f'<link name="{name}"><inertial><origin xyz="{_numbers(inertia.lever)}"/>'
+        f'<mass value="{inertia.mass!r}"/>'
         f'<inertia ixx="{xx!r}" ixy="{xy!r}" ixz="{xz!r}" iyy="{yy!r}" iyz="{yz!r}" izz="{zz!r}"/>'
         "</inertial></link>"
     )

@@ -29,7 +29,7 @@ Told = dict[str, Any]
 
 
 class Rolling:
-    """A base with the joints `forward` and `turn`, at 0 before each step: where it is, and targets in its frame."""
+    """A base with joints `forward` and `turn`, at 0 before each step: where it is, targets in its frame."""
 
     joints = ("forward", "turn")
     speeds = ("v", "omega")

@@ -1,6 +1,6 @@
-"""mink (a QP by DAQP, kinematics by MuJoCo): a frame task, a posture task, limits of configuration and velocity.
+"""mink (a QP by DAQP, kinematics by MuJoCo): frame task, posture task, limits of configuration and velocity.
 
-MuJoCo reads the URDF itself. As with Pink, a position alone is asked for with the orientation that the frame has.
+MuJoCo reads the URDF itself. As with Pink, a position alone is asked for with the frame's own orientation.
 """
 
 from __future__ import annotations

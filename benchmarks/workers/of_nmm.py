@@ -1,5 +1,5 @@
-"""nmm, and the floor of `step.py`, by the same loop: with Pinocchio's kinematics u = controller(t, q) and Euler's rule
-in Python, with its own one compiled call a step."""
+"""nmm, and the floor of `step.py`: with Pinocchio's kinematics u = controller(t, q) and Euler's rule here,
+with its own one compiled call a step."""
 
 from __future__ import annotations
 

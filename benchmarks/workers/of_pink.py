@@ -1,14 +1,14 @@
 """Pink (a QP by DAQP): a frame task, a posture task, limits of configuration and velocity.
 
-The error of its frame task is the logarithm of a placement, in which a turn bends the way to a position. A position
-alone is therefore asked for with the orientation that the frame has.
+The error of its frame task is the logarithm of a placement, in which a turn bends the way to a position. So
+a position alone is asked for with the orientation that the frame has.
 """
 
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 import pink
+import pinocchio as pin
 from loop import POSTURE_GAIN, REGULAR, Peer, Told, serve
 from pink.limits import ConfigurationLimit, VelocityLimit
 from pink.tasks import FrameTask, PostureTask

@@ -1,4 +1,4 @@
-"""placo's kinematics solver (a QP), its floating base masked: a position or frame task, a joints' task, limits."""
+"""placo's kinematics solver (a QP), its floating base masked: position or frame, joints' task, limits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""roboplan's OInK (a QP by ProxQP), as its examples use it: a frame task, a configuration task, limits as constraints.
+"""roboplan's OInK (a QP by ProxQP), as its examples use it: frame task, configuration task, limits.
 
 Its constraints are made in C++, and none is a rolling base's: the base rolls by the joints `forward` and
 `turn`, or slides.
