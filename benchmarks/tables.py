@@ -127,9 +127,9 @@ def into(page: Path, sections: list[Section]) -> None:
     """Put the sections between their marks, `<!-- NAME -->` and `<!-- end -->`, in a page that has them."""
     words = page.read_text(encoding="utf-8")
     for section in sections:
-        mark, end = f"<!-- {section.name} -->\n", "\n<!-- end -->"
+        mark, end = f"<!-- {section.name} -->\n", "<!-- end -->"
         if mark not in words:
             raise SystemExit(f"{page}: expected a line {mark.strip()}")
         head, tail = words.split(mark, 1)
-        words = head + mark + markdown(section) + end + tail.split(end, 1)[1]
+        words = f"{head}{mark}{markdown(section)}\n{end}{tail.split(end, 1)[1]}"
     page.write_text(words, encoding="utf-8")

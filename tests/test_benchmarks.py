@@ -165,7 +165,8 @@ def test_the_tables_tell_ratios_of_the_same_rounds_and_who_is_missing(tmp_path: 
     assert compared.rows[2][1:3] == ["does not track", ""]
     assert sections[-1].rows == [[job, "rolls", "pinocchio", "0.50 (0.50 to 0.75)", "at most 0.8", "yes"]]
     page = tmp_path / "page.md"
-    page.write_text("".join(f"<!-- {one.name} -->\nold\n<!-- end -->\n" for one in sections) + "after\n")
+    page.write_text("".join(f"<!-- {one.name} -->\n<!-- end -->\n" for one in sections) + "after\n")
+    tables.into(page, [one._replace(after=["old"]) for one in sections])
     tables.into(page, sections)
     assert "old" not in page.read_text()
     assert page.read_text().endswith("<!-- end -->\nafter\n")
@@ -200,4 +201,6 @@ def test_snake_arms_have_the_inputs_that_are_said(tmp_path: Path, monkeypatch: p
     robot, q = growth.snakes(tmp_path, 3, 3)
     assert robot.n_u == 8
     tasks = [growth.task(robot, q, growth.nmm.Position(hand)) for hand in "ab"]
-    assert len(growth.measure(robot, q, tasks)) == len(growth.COLUMNS) + 1
+    ((said, *cells),) = growth.timed([("8, two arms", growth.calls(robot, q, tasks))])
+    assert said == "8, two arms"
+    assert len(cells) == len(growth.COLUMNS) + 1
