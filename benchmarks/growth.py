@@ -72,7 +72,9 @@ def calls(robot: nmm.Robot, q: np.ndarray, tasks: Tasks) -> Calls:
         controller = nmm.Controller(*given, limits=kept, dt=0.01, kinematics=kinematics)
         step = controller.evaluate(0.0, q)
         if step.residual > 1e-8 or step.scale.min() < 1.0:
-            raise SystemExit(f"{robot.n_u} inputs, {len(step.r)} rows: expected the whole rate, got {step.scale}")
+            raise SystemExit(
+                f"{robot.n_u} inputs, {len(step.r)} rows: expected the whole rate, got {step.scale}"
+            )
         found.append(lambda c=controller: c(0.0, q))
     found.append(lambda c=controller: c.step(0.0, q, 0.01, "euler"))
     return found
