@@ -1,0 +1,83 @@
+"""nmm, and the floor of `step.py`: with Pinocchio's kinematics u = controller(t, q) and Euler's rule here,
+with its own one compiled call a step."""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from floor import floor_controller
+from loop import Told, serve
+from workloads import Workload
+
+
+class Ours:
+    """A follower by a control law u = law(t, q)."""
+
+    def __init__(self, workload: Workload) -> None:
+        self.workload, self.dt = workload, workload.dt
+        self.t = workload.t.tolist()
+        self.now = workload.q0.copy()
+
+    def law(self, t: float, q: np.ndarray) -> np.ndarray:
+        """u (m,)."""
+        raise NotImplementedError
+
+    def reset(self) -> None:
+        self.now = self.workload.q0.copy()
+        self._moves = np.zeros(len(self.now))
+        self._by_inputs = self._moves[1:]
+
+    def step(self, k: int) -> None:
+        q, moves = self.now, self._moves
+        np.multiply(self.law(self.t[k], q), self.dt, self._by_inputs)
+        forward, theta = moves.item(1), q.item(2)
+        moves[0], moves[1] = forward * math.cos(theta), forward * math.sin(theta)
+        q += moves
+
+    def q(self) -> list[float]:
+        return self.now.tolist()
+
+
+class Pinocchio(Ours):
+    def __init__(self, workload: Workload, limits: bool) -> None:
+        super().__init__(workload)
+        self.law = self.controller = workload.controller("pinocchio", limits)
+
+    def reset(self) -> None:
+        super().reset()
+        self.controller.reset()
+
+
+class Compiled(Pinocchio):
+    def __init__(self, workload: Workload, limits: bool) -> None:
+        super().__init__(workload, limits)
+        self.controller = workload.controller("compiled", limits)
+        self._step = self.controller.step
+
+    def step(self, k: int) -> None:
+        self.now, _ = self._step(self.t[k], self.now, self.dt, "euler")
+
+
+class Floor(Ours):
+    """The planar case by hand: Pinocchio's calls and one compiled function with every number in its text."""
+
+    def __init__(self, workload: Workload) -> None:
+        super().__init__(workload)
+        self.law = floor_controller(1, "pg", workload.robot.model)
+
+
+def make(told: Told, variant: str, limits: bool) -> Ours | None:
+    workload = Workload(told["name"])
+    if variant == "floor":
+        return Floor(workload) if workload.name == "planar" and not limits else None
+    return {"pinocchio": Pinocchio, "compiled": Compiled}[variant](workload, limits)
+
+
+if __name__ == "__main__":
+    serve(make, ("nmm", "pin", "numba", "numpy"))
