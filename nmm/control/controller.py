@@ -229,8 +229,8 @@ class Controller:
     def step(self, t: float, q: ArrayLike, dt: float, method: str = "rk4") -> tuple[Array, Array]:
         """One sample of the closed loop: q (n,) at t + dt, and the inputs u (m,) at t.
 
-        With compiled kinematics, without users' Python functions, distances, a retreat and a step by Armijo's
-        rule it is one compiled call.
+        Without users' Python functions, distances, a retreat and a step by Armijo's rule it is one compiled
+        call, whose kinematics are compiled, too, or whose method has one stage ("euler", "zoh").
 
         Parameters
         ----------
@@ -255,8 +255,10 @@ class Controller:
         integrates = integrator(method, self.robot, 1e-9)
         if integrates.tolerance:
             raise InputError("method: expected rk4, midpoint, euler or zoh for one step, got adaptive")
-        found = tableau(integrates)
-        if found is None or not self.compilable or self._program.prepare is not nothing:
+        found, prepare = tableau(integrates), self._program.prepare
+        # What is prepared in Python holds at (t, q); methods with stages ask elsewhere, too.
+        at_stages = found is not None and len(found.weights) > 1 and prepare is not nothing
+        if found is None or at_stages or not self.compilable:
 
             def from_python(t: float, q: Array, dt: float) -> tuple[Array, Array]:
                 u, q_dot = self(t, q), self._step.q_dot.copy()
@@ -268,6 +270,7 @@ class Controller:
         def compiled(t: float, q: Array, dt: float) -> tuple[Array, Array]:
             self._begin()
             try:
+                prepare(t, q)
                 status, ahead, u = advance(t, q, dt)
                 if status >= _FAILED:
                     self._fail(t, q)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from nmm.arrays import Array, Integers
 from nmm.control.equations import PLAIN, WRAPPED, TaskRows
@@ -22,7 +21,13 @@ def task_functions(stack: Stack) -> list[Function]:
 
 def gain_rows(stack: Stack, robot: Robot) -> tuple[Array, Array, Array, Integers]:
     """Feedback of a stack: K (s, s), block by block; speed, braking and group (s,), see `TaskRows`."""
-    K = block_diag(np.zeros((0, 0)), *(task.gain_matrix(robot) for task in stack))
+    blocks = [task.gain_matrix(robot) for task in stack]
+    K = np.zeros((sum(map(len, blocks)),) * 2)
+    first = 0
+    for block in blocks:  # SciPy's block_diag would be all that loads its linear algebra
+        after = first + len(block)
+        K[first:after, first:after] = block
+        first = after
     rows = [(k, row.unit) for k, task in enumerate(stack) for row in task.rows(robot)]
     group = np.array([rows.index(row) for row in rows], dtype=np.int64)
     speed, braking = np.hstack([np.zeros((2, 0)), *(np.array(task.approach(robot)) for task in stack)])

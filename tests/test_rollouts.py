@@ -1,0 +1,199 @@
+"""Rollouts: many runs at once are the runs one by one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import nmm
+from nmm.robots.held import Held
+from nmm.rollouts import kept
+
+START = np.array([0.0, 0.0, 0.0, 0.5, 0.5])
+
+
+def controller(gain: float = 1.0, **more: object) -> nmm.Controller:
+    robot = nmm.load("unicycle_2r")
+    task = nmm.Task(nmm.Position("ee", "xy"), nmm.Circle([2.0, 0.0], 0.5, 10.0), gain=gain)
+    return nmm.Controller(robot, task, nmm.ProjectedGradient(), **more)
+
+
+def starts(count: int) -> np.ndarray:
+    return START + 0.1 * np.random.default_rng(3).standard_normal((count, 5))
+
+
+@pytest.mark.parametrize("method", ["rk4", "zoh"])
+@pytest.mark.parametrize("name", ["unicycle_2r_switching", "tiago_tray"])
+def test_each_run_is_simulates_to_the_bit(name: str, method: str) -> None:
+    scenario = nmm.Scenario.load(name, {"method": method, "duration": 2.0, "dt": 0.02})
+    robot, parts = scenario.robot(), scenario.parts
+    q0 = robot.q(parts.q0) + 0.01 * np.random.default_rng(0).standard_normal((5, robot.n))
+    found = nmm.rollout(scenario, q0, keep=("q", "u", "error", "scale", "partition"), threads=2)
+    for k, q in enumerate(q0):
+        run = nmm.simulate(scenario.controller(), q, parts.duration, parts.dt, method)
+        for quantity in ("q", "u", "error", "scale", "partition"):
+            assert np.array_equal(found[quantity][k], getattr(run, quantity)), quantity
+        summary = run.summary()
+        for measure in ("t_end", "error_initial", "error_final", "error_rms", "error_max", "sigma_min"):
+            assert found[measure][k] == pytest.approx(summary[measure], rel=1e-9, abs=1e-12), measure
+        for measure in ("objective_final", "objective_integral", "residual_max", "scale_min"):
+            assert found[measure][k] == pytest.approx(summary[measure], rel=1e-9, abs=1e-12), measure
+        for measure in ("partition_switches", "input_rms", "input_peak"):
+            assert found[measure][k] == pytest.approx(summary[measure], rel=1e-9, abs=1e-12), measure
+
+
+def test_threads_change_no_bit() -> None:
+    q0 = starts(24)
+    one, several = (nmm.rollout(controller(), q0, 3.0, 0.01, keep=("q",), threads=n) for n in (1, 5))
+    assert np.array_equal(one["q"], several["q"])
+    assert all(np.array_equal(one[name], several[name]) for name in one.measures)
+
+
+def test_a_rollout_is_the_flow_of_the_closed_loop() -> None:
+    """DOP853 on u = controller(t, q), q_dot = S u: an integrator and a loop that are not ours."""
+    found = nmm.rollout(controller(), START, 3.0, 0.005, keep=("q",))
+    ours = controller()
+    flow = solve_ivp(ours.velocity, (0.0, 3.0), START, "DOP853", [3.0], rtol=1e-11, atol=1e-11)
+    np.testing.assert_allclose(found["q"][0, -1], flow.y[:, -1], atol=1e-8)
+
+
+def test_each_controller_has_its_own_gain() -> None:
+    gains = [0.5, 1.0, 2.0]
+    found = nmm.rollout([controller(gain) for gain in gains], START, 2.0, 0.002, keep=("error",))
+    for k, gain in enumerate(gains):
+        norm = np.linalg.norm(found["error"][k], axis=1)
+        np.testing.assert_allclose(norm, norm[0] * np.exp(-gain * found.t), rtol=1e-6)
+
+
+def test_noise_delay_and_slip_are_what_they_say() -> None:
+    """The same loop, written in Python."""
+    noise, delay, slip = np.array([0.01, 0.01, 0.02, 0.005, 0.0]), 3, np.array([0.9, 1.0, 1.0, 0.8])
+    found = nmm.rollout(
+        controller(),
+        starts(3),
+        1.0,
+        0.02,
+        "zoh",
+        noise=noise,
+        delay=delay,
+        slip=slip,
+        seed=7,
+        keep=("q", "u"),
+    )
+    for k, start in enumerate(starts(3)):
+        ours = controller()
+        drawn = noise * np.random.default_rng([7, k]).standard_normal((51, 5))
+        held, q, u = Held(ours.robot), start, []
+        for i in range(51):
+            np.testing.assert_allclose(found["q"][k, i], q, atol=1e-12)
+            u.append(ours(0.02 * i, q + drawn[i]))
+            q = held(q, slip * u[i - delay] if i >= delay else np.zeros(4), 0.02)
+        np.testing.assert_allclose(found["u"][k], u, atol=1e-9)
+
+
+def test_errors_under_noise_are_the_robots_not_what_was_measured() -> None:
+    found = nmm.rollout(controller(), START, 1.0, 0.02, "zoh", noise=0.05, keep=("q", "error", "r_d"))
+    robot = nmm.load("unicycle_2r")
+    for q, error, target in zip(found["q"][0], found["error"][0], found["r_d"][0], strict=True):
+        position = nmm.Configuration(robot, q).placement("ee").translation[:2]
+        np.testing.assert_allclose(error, target - position, atol=1e-12)
+
+
+def test_no_disturbance_is_no_other_run() -> None:
+    still = nmm.rollout(controller(), starts(2), 1.0, 0.02, "zoh", keep=("q",))
+    same = nmm.rollout(controller(), starts(2), 1.0, 0.02, "zoh", noise=0.0, delay=0, slip=1.0, keep=("q",))
+    assert np.array_equal(still["q"], same["q"])
+    slow = nmm.rollout(controller(), starts(2), 1.0, 0.02, "zoh", slip=1.0 - 1e-15, keep=("q",))
+    np.testing.assert_allclose(still["q"], slow["q"], atol=1e-12)
+
+
+def test_every_other_sample_and_files_hold_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = nmm.rollout(controller(), starts(7), 1.0, 0.02, keep=("q", "partition"))
+    some = nmm.rollout(controller(), starts(7), 1.0, 0.02, keep=("q",), every=5)
+    assert np.array_equal(some["q"], whole["q"][:, ::5])
+    assert np.array_equal(some.t, whole.t[::5])
+    monkeypatch.setattr(kept, "PART", 3 * whole["q"][0].nbytes)
+    filed = nmm.rollout(controller(), starts(7), 1.0, 0.02, keep=("q",), folder=tmp_path / "runs")
+    assert filed.kept == {}
+    parts = [np.load(file) for file in filed.files]
+    assert [int(part["first"]) for part in parts] == [0, 3, 6]
+    assert np.array_equal(np.concatenate([part["q"] for part in parts]), whole["q"])
+    assert all(np.array_equal(filed[name], whole[name]) for name in whole.measures)
+
+
+def test_how_runs_end_is_told_run_by_run() -> None:
+    """By Euler's rule an error is multiplied by 1 - 4 a step; nothing of a planar robot moves the height."""
+    found = nmm.rollout(controller(), starts(2), 400.0, 4.0, "euler", keep=("q",))
+    assert found.outcome == ("diverged", "diverged")
+    for k, count in enumerate(found.samples):
+        assert "diverged" in found.message[k]
+        assert 5 < count < 40
+        assert np.all(np.isnan(found["q"][k, count:]))
+        assert np.all(np.isfinite(found["q"][k, :count]))
+        assert found["t_end"][k] == found.t[count - 1]
+    task = nmm.Task(nmm.Position("ee", "xyz"), [2.0, 0.5, 0.0], gain=1.0)
+    stuck = nmm.Controller(nmm.load("unicycle_2r"), task, nmm.ProjectedGradient())
+    for method, more in (("rk4", {}), ("zoh", {"delay": 1})):
+        found = nmm.rollout(stuck, starts(2), 1.0, 0.01, method, keep=("q",), **more)
+        assert found.outcome == ("singular", "singular")
+        assert "lost rank" in found.message[1]
+        assert found.samples.tolist() == [0, 0]
+        assert np.all(np.isnan(found["error_rms"]))
+
+
+def test_a_goal_is_reached_or_missed() -> None:
+    robot = nmm.load("unicycle_2r")
+    task = nmm.Task(nmm.Position("ee", "xy"), [2.0, 0.5], gain=1.0)
+    ours = nmm.Controller(robot, task, nmm.ProjectedGradient())
+    near, far = START, START - np.array([40.0, 0.0, 0.0, 0.0, 0.0])
+    found = nmm.rollout(ours, [near, far], 6.0, 0.01, until=nmm.Goal(m=0.01))
+    assert found.outcome == ("reached", "missed")
+    assert found["t_end"][0] < 6.0
+    assert found["error_final"][0] <= 0.01 < found["error_final"][1]
+
+
+def test_the_same_controller_may_stand_there_twice() -> None:
+    ours = controller()
+    found = nmm.rollout([ours, ours], starts(2), 0.5, 0.01, keep=("q",), threads=2)
+    assert np.array_equal(found["q"], nmm.rollout(ours, starts(2), 0.5, 0.01, keep=("q",))["q"])
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"q0": np.zeros((0, 5))}, "at least one run"),
+        ({"q0": np.zeros((3, 4))}, "got (3, 4)"),
+        ({"q0": np.full((2, 5), np.nan)}, "run 0"),
+        ({"duration": -1.0}, "duration"),
+        ({"dt": 1e-10}, "samples"),
+        ({"method": "rk5"}, "rk4"),
+        ({"keep": ("speed",)}, "q_dot"),
+        ({"every": 0}, "every"),
+        ({"threads": -1}, "threads"),
+        ({"noise": 0.1}, "zoh"),
+        ({"noise": -0.1, "method": "zoh"}, "at least 0"),
+        ({"slip": [1.0, 2.0], "method": "zoh"}, "slip"),
+        ({"delay": 0.5, "method": "zoh"}, "whole samples"),
+        ({"slip": np.nan, "method": "zoh"}, "finite"),
+    ],
+)
+def test_bad_input_is_named(given: dict[str, object], words: str) -> None:
+    with pytest.raises(nmm.InputError, match=r".+") as caught:
+        nmm.rollout(controller(), **({"q0": START, "duration": 1.0} | given))
+    assert words in str(caught.value)
+
+
+def test_what_does_not_fit_in_memory_is_asked_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kept, "free_memory", lambda: 1e5)
+    with pytest.raises(nmm.InputError, match=r"GB are free; keep less, every so many samples"):
+        nmm.rollout(controller(), starts(40), 1.0, 0.001, keep=("q",))
+    assert len(nmm.rollout(controller(), starts(2), 0.1, 0.01)) == 2  # measures alone need none
+
+
+def test_tasks_that_come_and_go_are_left_to_simulate() -> None:
+    scenario = nmm.Scenario.load("unicycle_3r_sequence")
+    with pytest.raises(nmm.InputError, match="simulate"):
+        nmm.rollout(scenario)
