@@ -1,5 +1,4 @@
-"""nmm, and the floor of `step.py`: with Pinocchio's kinematics u = controller(t, q) and Euler's rule here,
-with its own one compiled call a step."""
+"""nmm, with Pinocchio's kinematics and with its own, and the floor of `step.py` with Euler's rule in Python."""
 
 from __future__ import annotations
 
@@ -44,21 +43,17 @@ class Ours:
         return self.now.tolist()
 
 
-class Pinocchio(Ours):
-    def __init__(self, workload: Workload, limits: bool) -> None:
+class Nmm(Ours):
+    """A control step and Euler's rule in one call."""
+
+    def __init__(self, workload: Workload, kinematics: str, limits: bool) -> None:
         super().__init__(workload)
-        self.law = self.controller = workload.controller("pinocchio", limits)
+        self.controller = workload.controller(kinematics, limits)
+        self._step = self.controller.step
 
     def reset(self) -> None:
         super().reset()
         self.controller.reset()
-
-
-class Compiled(Pinocchio):
-    def __init__(self, workload: Workload, limits: bool) -> None:
-        super().__init__(workload, limits)
-        self.controller = workload.controller("compiled", limits)
-        self._step = self.controller.step
 
     def step(self, k: int) -> None:
         self.now, _ = self._step(self.t[k], self.now, self.dt, "euler")
@@ -76,7 +71,7 @@ def make(told: Told, variant: str, limits: bool) -> Ours | None:
     workload = Workload(told["name"])
     if variant == "floor":
         return Floor(workload) if workload.name == "planar" and not limits else None
-    return {"pinocchio": Pinocchio, "compiled": Compiled}[variant](workload, limits)
+    return Nmm(workload, variant, limits)
 
 
 if __name__ == "__main__":
