@@ -1,4 +1,4 @@
-"""nmm, with Pinocchio's kinematics and with its own, and the floor of `step.py` with Euler's rule in Python."""
+"""nmm, with Pinocchio's kinematics and with its own, and the floor of `step.py` with Euler's rule."""
 
 from __future__ import annotations
 
