@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
@@ -38,16 +39,8 @@ def cluster(address: str) -> Iterator[Any]:
     level = logger.level
     logger.setLevel(logging.CRITICAL + 1)  # what goes wrong is told once, by us
     try:
-        try:
-            client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
-        except (OSError, TimeoutError):
-            raise InputError(
-                f"--scheduler {address}: no scheduler answers there within {PATIENCE:g} s"
-            ) from None
-        except (ValueError, TypeError) as error:
-            raise InputError(
-                f"--scheduler: expected an address such as tcp://127.0.0.1:8786, got {address!r} ({error})"
-            ) from None
+        _check_answers(distributed, address)
+        client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
         try:
             _check_workers(client, address)
             yield client
@@ -55,6 +48,25 @@ def cluster(address: str) -> Iterator[Any]:
             client.close(timeout=PATIENCE)
     finally:
         logger.setLevel(level)
+
+
+def _check_answers(distributed: Any, address: str) -> None:
+    """A question of our own, before there is a client: one that could not connect goes on trying to the end."""
+
+    async def kind() -> str:
+        async with asyncio.timeout(PATIENCE), distributed.rpc(address, timeout=PATIENCE) as server:
+            return str((await server.identity()).get("type", ""))
+
+    try:
+        found = asyncio.run(kind())
+    except (OSError, TimeoutError):
+        raise InputError(f"--scheduler {address}: no scheduler answers there within {PATIENCE:g} s") from None
+    except (ValueError, TypeError) as error:
+        raise InputError(
+            f"--scheduler: expected an address such as tcp://127.0.0.1:8786, got {address!r} ({error})"
+        ) from None
+    if found != "Scheduler":
+        raise InputError(f"--scheduler {address}: expected a Dask scheduler, found a {found or 'stranger'}")
 
 
 def _check_workers(client: Any, address: str) -> None:
@@ -105,7 +117,7 @@ def as_done_by(
             made.append(future)
         return made
 
-    done = distributed.as_completed(following((1 + AHEAD) * threads))
+    done = distributed.as_completed(following((1 + AHEAD) * threads), loop=client.loop)
     try:
         for future in done:
             try:

@@ -31,10 +31,11 @@ class Definition:
 
     Attributes
     ----------
-    name : of the sweep
+    name, title : of the sweep
     scenario : a bundled name or a file's absolute path, as `nmm run` takes it
     settings : values set in it before anything varies, by dotted key
     document : the scenario's text, with the settings
+    keys : every key of it, as `Scenario.resolved` has them
     vary : what varies, in the order of the columns
     samples : points of the ranges; 1 without any
     sampler : one of `sampling.SAMPLERS`, or "grid"
@@ -46,9 +47,11 @@ class Definition:
     """
 
     name: str
+    title: str
     scenario: str
     settings: dict[str, Any]
     document: Document
+    keys: dict[str, Any]
     vary: tuple[Varied, ...]
     samples: int
     sampler: str
@@ -132,7 +135,7 @@ class Definition:
         content = {
             "nmm": self.version,
             "scenario": self.scenario,
-            "keys": self.document.data,
+            "keys": self.keys,
             "robot": self.robot,
             "vary": {one.key: {k: v for k, v in one.plain().items() if k != "key"} for one in self.vary},
             "samples": self.samples,

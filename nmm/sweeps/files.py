@@ -15,7 +15,7 @@ from nmm.scenario.scenario import SUFFIXES
 #: The keys of a file, and the keyword of `Sweep` that each is.
 KEYS = {
     "name": "name",
-    "title": None,
+    "title": "title",
     "scenario": "scenario",
     "set": "settings",
     "vary": "vary",
@@ -60,7 +60,7 @@ def read_sweep(name_or_path: str | Path) -> dict[str, Any]:
             raise ScenarioError(
                 f"{document.where((key,))}: expected a mapping (key: value), got {shown(data[key])}"
             )
-    found = {keyword: data[key] for key, keyword in KEYS.items() if keyword is not None and key in data}
+    found = {keyword: data[key] for key, keyword in KEYS.items() if key in data}
     name = data["scenario"]
     if not isinstance(name, str):
         raise ScenarioError(f"{document.where(('scenario',))}: expected a scenario's name, got {shown(name)}")

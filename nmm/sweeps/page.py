@@ -33,7 +33,8 @@ def write_page(swept: Swept) -> None:
     )
     data = _data(swept)
     text = environment.get_template("page.html").render(
-        title=definition.name,
+        name=definition.name,
+        title=definition.title,
         about=_about(definition),
         version=definition.version,
         rows=definition.rows,
@@ -75,6 +76,7 @@ def _data(swept: Swept) -> dict[str, Any]:
     return {
         "shown": len(rows),
         "command": definition.command(0)[: 3 + 2 * len(definition.settings)],
+        "combinations": count if points else 1,
         "keep": definition.keep,
         "outcomes": swept.outcomes,
         "columns": [

@@ -73,7 +73,7 @@ class Sweep:
     seed : of the sampler; the parameters of a row depend on it and the row's number alone
     settings : set before anything varies, by dotted key
     keep : None, "trajectories" (a run folder a row) or "playback" (with playback.html)
-    name : the scenario's, when not given
+    name, title : the scenario's, when not given
 
     Raises
     ------
@@ -91,6 +91,7 @@ class Sweep:
         settings: Mapping[str, object] | None = None,
         keep: str | None = None,
         name: str = "",
+        title: str = "",
     ) -> None:
         loaded = scenario if isinstance(scenario, Scenario) else Scenario.load(scenario)
         self.scenario = loaded.with_settings(settings) if settings else loaded
@@ -106,9 +107,11 @@ class Sweep:
         bundled = {path: name for name, path in bundled_scenarios().items()}
         self.definition = Definition(
             name=name or self.scenario.name,
+            title=title or self.scenario.title or name or self.scenario.name,
             scenario=bundled.get(self.scenario.path) or str(self.scenario.path.resolve()),
             settings={dotted(place): _value(document.data, place) for place in document.settings},
             document=document,
+            keys=self.scenario.resolved(),
             vary=varying,
             samples=points,
             sampler=sampler,

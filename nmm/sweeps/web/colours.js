@@ -3,6 +3,7 @@ const OUTCOMES = {
   completed: "#1f8fd0", missed: "#e69f00", singular: "#b05fc9", unstable: "#f0703c", diverged: "#d62f4b",
   failed: "#a5673f", refused: "#8c95a3", error: "#6b6bd6", interrupted: "#8c95a3",
 };
+const ROWS = [...Array(N).keys()];
 const NAMED = ["#1f8fd0", "#e69f00", "#12a37b", "#d62f4b", "#b05fc9", "#7a8b2a", "#f0703c", "#5c9aa8"];
 const VIRIDIS = [
   [68, 1, 84], [71, 44, 122], [59, 81, 139], [44, 113, 142], [33, 144, 141], [39, 173, 129], [92, 200, 99],
@@ -16,21 +17,24 @@ function viridis(share) {
   return `rgb(${mix.join(",")})`;
 }
 
-// A function of the row, and what the legend shows.
+// A function of the row, what the legend shows, and the order to draw in: what is rare comes last, on top.
 function colouring(column) {
   if (isText(column) || (column.listed && new Set(numbersOf(column)).size <= NAMED.length)) {
     const names = isText(column)
       ? ("same" in column ? [column.same] : column.levels)
       : [...new Set(numbersOf(column))].sort((a, b) => a - b);
     const colours = new Map(names.map((name, i) => [name, OUTCOMES[name] || NAMED[i % NAMED.length]]));
-    return { of: (row) => colours.get(valueOf(column, row)) || NAMED[6], names: colours };
+    const count = new Map();
+    for (let row = 0; row < N; row++) count.set(valueOf(column, row), (count.get(valueOf(column, row)) || 0) + 1);
+    const order = [...ROWS].sort((a, b) => count.get(valueOf(column, b)) - count.get(valueOf(column, a)));
+    return { of: (row) => colours.get(valueOf(column, row)) || NAMED[6], names: colours, order };
   }
   const known = numbersOf(column).filter((value) => value !== null).sort((a, b) => a - b);
   const at = (share) => known[Math.round(share * (known.length - 1))];
   let low = known.length ? at(0.02) : 0, high = known.length ? at(0.98) : 1; // one outlier is not all colour
   if (low === high) [low, high] = extent(known);
   return {
-    low, high, clipped: known.length > 0 && (known[0] < low || known[known.length - 1] > high),
+    low, high, order: ROWS, clipped: known.length > 0 && (known[0] < low || known[known.length - 1] > high),
     of: (row) => {
       const value = valueOf(column, row);
       return value === null ? OUTCOMES.refused : viridis((value - low) / (high - low));

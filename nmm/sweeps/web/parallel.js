@@ -1,6 +1,6 @@
 // Parallel coordinates: an axis a column, a line a rollout, brushes that filter.
 const parallel = { canvas: $("parallel"), names: [], axes: [], drag: null };
-const EDGE = { top: 34, bottom: 26, side: 46 };
+const EDGE = { top: 50, bottom: 26, side: 62 };
 
 function drawParallel() {
   const { context, width, height } = fitted(parallel.canvas);
@@ -9,16 +9,17 @@ function drawParallel() {
   parallel.axes = parallel.names.map((name, k) => {
     const column = byName.get(name), count = parallel.names.length;
     const x = EDGE.side + (count > 1 ? (k * (width - 2 * EDGE.side)) / (count - 1) : 0);
-    const values = isText(column) ? column.codes : numbersOf(column);
+    const log = logarithmic(column), known = isText(column) ? column.codes : numbersOf(column);
+    const values = log ? known.map((value) => (value === null ? null : Math.log10(value))) : known;
     const [least, most] = isText(column) ? [-0.5, column.levels.length - 0.5] : extent(values);
     const place = (value) => low + ((value - least) / (most - least)) * (high - low);
-    return { column, x, values, least, most, place };
+    return { column, x, values, least, most, place, value: (share) => (log ? 10 ** share : share), log };
   });
   context.clearRect(0, 0, width, height);
   for (const wanted of [0, 1]) {
     context.globalAlpha = wanted ? Math.max(0.12, Math.min(0.8, 250 / N)) : 1;
     context.lineWidth = 1;
-    for (let row = 0; row < N; row++) {
+    for (const row of hue.order) {
       if (kept[row] !== wanted) continue;
       context.strokeStyle = wanted ? hue.of(row) : style("--faint");
       trace(context, row);
@@ -32,14 +33,21 @@ function drawParallel() {
   }
   context.lineWidth = 1.5;
   context.textAlign = "center";
-  parallel.axes.forEach(({ column, x, least, most, place }, k) => {
-    context.strokeStyle = context.fillStyle = style("--soft");
+  const label = (text, x, y) => { // readable over the lines
+    context.strokeStyle = style("--paper");
+    context.lineWidth = 4;
+    context.strokeText(text, x, y);
+    context.fillText(text, x, y);
+    context.lineWidth = 1.5;
+  };
+  parallel.axes.forEach(({ column, x, least, most, place, value, log }, k) => {
+    context.strokeStyle = context.fillStyle = style("--ink");
     line(context, [[x, low], [x, high]]);
-    context.fillText(titled(column), x, k % 2 ? 24 : 11);
-    if (isText(column)) column.levels.forEach((name, level) => context.fillText(name, x, place(level) + 4));
+    label(titled(column) + (log ? " (log)" : ""), x, k % 2 ? 27 : 12);
+    if (isText(column)) column.levels.forEach((name, level) => label(name, x, place(level) + 4));
     else {
-      context.fillText(written(least), x, low + 16);
-      context.fillText(written(most), x, high - (k % 2 ? -14 : 4));
+      label(written(value(least)), x, low + 16);
+      label(written(value(most)), x, high - 6);
     }
     const brush = filters.get(column.name);
     if (brush && brush.place) {
@@ -49,6 +57,14 @@ function drawParallel() {
       context.globalAlpha = 1;
     }
   });
+}
+
+// What is measured and spans decades.
+function logarithmic(column) {
+  if (isText(column) || column.varied) return false;
+  const known = numbersOf(column).filter((value) => value !== null);
+  const [least, most] = extent(known);
+  return known.length > 0 && least > 0 && most > 100 * least;
 }
 
 // A line, broken where a value is not known.
@@ -72,13 +88,15 @@ function brushed(axis, from, to) {
   const clamp = (y) => Math.min(Math.max(y, EDGE.top), low);
   const [top, bottom] = [clamp(Math.min(from, to)), clamp(Math.max(from, to))];
   if (bottom - top < 4) return null;
-  const value = (y) => axis.least + ((low - y) / (low - EDGE.top)) * (axis.most - axis.least);
-  const [least, most] = [value(bottom), value(top)];
+  const share = (y) => axis.least + ((low - y) / (low - EDGE.top)) * (axis.most - axis.least);
+  const [least, most] = [share(bottom), share(top)];
   if (isText(axis.column)) {
     const names = new Set(axis.column.levels.filter((_, level) => level >= least && level <= most));
     return { text: [...names].join("|"), place: [top, bottom], test: (name) => names.has(name) };
   }
-  return { ...ranged(least, most), place: [top, bottom] };
+  // at the ends of an axis rounding must not leave out the ends
+  const slack = 1e-9 * (axis.most - axis.least);
+  return { ...ranged(axis.value(least - slack), axis.value(most + slack)), place: [top, bottom] };
 }
 
 parallel.canvas.addEventListener("pointerdown", (event) => {

@@ -73,10 +73,13 @@ function drawPoints() {
 
   const cells = across.cell && up.cell ? [Math.max(across.cell - 1, 1), Math.max(up.cell - 1, 1)] : null;
   const radius = N > 4000 ? 1.6 : N > 800 ? 2.4 : 3.6;
-  points.places = Array.from({ length: N }, (_, row) => [across.of(row), up.of(row)]);
+  // Rollouts of one point, with different listed values, stand side by side.
+  const together = !cells && DATA.combinations > 1 && DATA.combinations <= 5 && sampled(xs) && sampled(ys);
+  const aside = (row) => (together ? ((row % DATA.combinations) - (DATA.combinations - 1) / 2) * 1.7 * radius : 0);
+  points.places = Array.from({ length: N }, (_, row) => [across.of(row) + aside(row), up.of(row)]);
   points.reach = cells ? Math.max(...cells) : 14;
   for (const wanted of [0, 1]) {
-    for (let row = 0; row < N; row++) {
+    for (const row of colours.order) {
       const [x, y] = points.places[row];
       if (kept[row] !== wanted || Number.isNaN(x) || Number.isNaN(y)) continue;
       context.fillStyle = wanted ? colours.of(row) : style("--faint");
@@ -93,6 +96,8 @@ function drawPoints() {
     context.stroke();
   }
 }
+
+const sampled = (column) => column.varied && !column.listed;
 
 // The rollouts than which no other has less of both.
 function frontOf(xs, ys) {

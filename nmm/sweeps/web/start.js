@@ -85,7 +85,7 @@ function offerViews() {
   const views = [];
   const H = has("objective_integral") ? "objective_integral" : "error_rms";
   if (numbers.length > 1)
-    views.push(["Basins", { x: numbers[0].name, y: numbers[1].name, colour: outcome || H }]);
+    views.push([`Basins over ${numbers[0].name}, ${numbers[1].name}`, { x: numbers[0].name, y: numbers[1].name, colour: outcome || H }]);
   if (has("effort"))
     views.push(["Error against effort", {
       x: "effort", y: "error_rms", colour: named ? named.name : outcome || H, front: true, logX: true, logY: true,
