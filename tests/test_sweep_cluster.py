@@ -1,4 +1,4 @@
-"""Sweeps on a Dask cluster: a real scheduler and worker processes on loopback, and what goes wrong with them."""
+"""Sweeps on a Dask cluster: a real scheduler and worker processes on loopback, and what goes wrong."""
 
 from __future__ import annotations
 

@@ -16,7 +16,8 @@ from nmm.cli.output import complain, show_table
 from nmm.errors import InputError
 
 if TYPE_CHECKING:
-    from nmm.sweeps.sweep import Sweep, Swept
+    from nmm.sweeps.sweep import Sweep
+    from nmm.sweeps.swept import Swept
 
 OK, FAILED = 0, 1
 #: Times between two steps of the bar by which the time left is estimated, s.
@@ -221,22 +222,20 @@ def _show(swept: Swept) -> None:
         show_table(["", "least", "median", "largest"], numbers, numeric=["least", "median", "largest"])
     beside = compared(swept)
     if beside:
-        keys = list(beside[0].values)
-        columns = ["completed", "median error RMS", "median ∫ H dt", "median effort", "least ∫ H dt"]
+        medians = {"error_rms": "error RMS", "objective_integral": "∫ H dt", "effort": "effort"}
+        columns = ["completed", *(f"median {words}" for words in medians.values())]
+        best = ["least ∫ H dt"] if beside[0].best is not None else []
         show_table(
-            [*keys, *columns],
+            [*beside[0].values, *columns, *best],
             [
                 [
                     *one.values.values(),
                     f"{one.completed:.1%}",
-                    *(
-                        f"{one.medians[name]:.4g}" if name in one.medians else "-"
-                        for name in ("error_rms", "objective_integral", "effort")
-                    ),
-                    "-" if one.best is None else f"at {one.best:.1%} of the points",
+                    *(f"{one.medians[name]:.4g}" if name in one.medians else "-" for name in medians),
+                    *([] if one.best is None else [f"at {one.best:.1%} of the points"]),
                 ]
                 for one in beside
             ],
-            numeric=columns[:-1],
+            numeric=columns,
         )
     show_table(["", ""], [["files in", str(swept.folder)], ["open", str(swept.page)]])

@@ -19,8 +19,8 @@ MOST_COMBINATIONS = 32
 def check_varied(scenario: Scenario, vary: tuple[Varied, ...]) -> None:
     """Each value has to be one that the scenario's key takes, and each key one that the robot knows.
 
-    A value that is right only beside another one (a threshold beside the resolver that has one) is right. A start
-    outside limits is not looked at here: where some values of a key do, the others are rows that say so.
+    A value that is right only beside another one (a threshold beside the resolver that has one) is right. A
+    start outside limits is not looked at here: where some values of a key do, others are rows that say so.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def _tried(one: Varied) -> list[Any]:
 
 
 def _changed(scenario: Scenario, vary: tuple[Varied, ...], one: Varied, value: Any) -> Scenario:
-    """The scenario with one value set: alone, or else in the first combination of the others that takes it."""
+    """The scenario with one value set: alone, or in the first combination of the others that takes it."""
     try:
         return scenario.with_settings({one.key: value})
     except InputError as error:

@@ -1,4 +1,4 @@
-"""A sweep's chunks computed by the workers of a Dask cluster; what they compute is what this machine would."""
+"""A sweep's chunks computed by the workers of a Dask cluster, with the results of this machine."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def cluster(address: str) -> Iterator[Any]:
 
     Raises
     ------
-    InputError : no such address; no scheduler answers, or has a worker, within `PATIENCE`; a worker without nmm,
-        or with another version
+    InputError : no such address; no scheduler answers, or has a worker, within `PATIENCE`; a worker
+        without nmm, or with another version
     """
     distributed = needed("distributed", "a sweep on a cluster")
     logger = logging.getLogger("distributed")
@@ -51,7 +51,7 @@ def cluster(address: str) -> Iterator[Any]:
 
 
 def _check_answers(distributed: Any, address: str) -> None:
-    """A question of our own, before there is a client: one that could not connect goes on trying to the end."""
+    """A question of our own before there is a client, because one that cannot connect goes on trying."""
 
     async def kind() -> str:
         async with asyncio.timeout(PATIENCE), distributed.rpc(address, timeout=PATIENCE) as server:
@@ -80,8 +80,8 @@ def _check_workers(client: Any, address: str) -> None:
     without = sorted(worker for worker, version in versions.items() if version == "none")
     if without:
         raise InputError(
-            f"--scheduler {address}: no nmm on {'worker' if len(without) == 1 else 'workers'} {listed(without)}; "
-            f"expected nmm {__version__} on each"
+            f"--scheduler {address}: no nmm on {'worker' if len(without) == 1 else 'workers'} "
+            f"{listed(without)}; expected nmm {__version__} on each"
         )
     others = [
         f"{version} on {worker}" for worker, version in sorted(versions.items()) if version != __version__
@@ -95,7 +95,7 @@ def _check_workers(client: Any, address: str) -> None:
 def as_done_by(
     client: Any, job: Callable[[int, None], Computed], chunks: Sequence[int]
 ) -> Generator[tuple[int, Computed]]:
-    """The chunks, each with what job(chunk, None) gives, as they are done; those of a lost worker go to others.
+    """The chunks, each with what job(chunk, None) gives, as they are done; a lost worker's go to others.
 
     Raises
     ------

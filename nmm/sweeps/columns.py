@@ -75,7 +75,7 @@ def columns_of(definition: Definition) -> list[Column]:
 
 
 def measured(trajectory: Trajectory) -> dict[str, Any]:
-    """What is measured of a rollout, by column: the run's own summary, and when it arrived, at what effort."""
+    """What is measured of a rollout, by column: the run's summary, and when it arrived, at what effort."""
     summary = trajectory.summary()
     found = {column.name: summary.get(column.name) for column in MEASURED}
     found["warnings"] = len(summary["warnings"])

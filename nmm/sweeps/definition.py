@@ -1,4 +1,4 @@
-"""What a sweep is: a scenario, what varies in it, how that is sampled; and the settings of each of its rows."""
+"""What a sweep is: a scenario, what varies in it, how that is sampled; and the settings of each row."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ CHUNKS = 256
 class Definition:
     """All that its rows depend on; any process makes the same row of the same number of it.
 
-    Points of the ranges are sampled; each is run with every combination of the values that are listed. Row i is
-    combination i mod K at point i div K, of K combinations.
+    Points of the ranges are sampled; each is run with every combination of the values that are listed. Row i
+    is combination i mod K at point i div K, of K combinations.
 
     Attributes
     ----------

@@ -21,7 +21,7 @@ CELL = 8.0
 
 
 def check_size(definition: Definition, workers: int, folder: Path) -> None:
-    """`InputError`, with numbers, for a sweep that would take longer than `MOST_DAYS`, or more than the disk has.
+    """`InputError`, with numbers, for a sweep that would take more than `MOST_DAYS`, or than the disk has.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The libraries of the extra `nmm[sweep]`, imported where they are needed, or a line that says how to get them."""
+"""The libraries of the extra `nmm[sweep]`, imported where needed, or a line that says how to get them."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from nmm.sweeps.columns import Column, columns_of
 from nmm.sweeps.definition import Definition
-from nmm.sweeps.sweep import Swept
+from nmm.sweeps.swept import Swept
 from nmm.sweeps.table import whole_file
 from nmm.words import listed
 

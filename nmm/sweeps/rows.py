@@ -33,8 +33,8 @@ def rows_of(
 ) -> list[dict[str, Any]]:
     """The rows of these numbers, in their order: cells by column (`columns.columns_of`).
 
-    A rollout that fails is a row that says why: `outcome` "refused" is one whose settings are no input (a start
-    outside limits), "error" one that raised what it should not have. A cell that is not known is None.
+    A rollout that fails is a row that says why: `outcome` "refused" is one whose settings are no input (a
+    start outside limits), "error" one that raised what it should not have. A cell that is not known is None.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Points of the unit cube by their number: the same whoever asks, and however many are asked for at a time."""
+"""Points of the unit cube by their number: the same whoever asks, and for however many at a time."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MOST_OF_SOBOL = 2**30
 
 
 def sobol(seed: int, total: int, dimensions: int, first: int, count: int) -> Array:
-    """Owen-scrambled Sobol points (count, dimensions) from number `first` on; they do not depend on `total`."""
+    """Owen-scrambled Sobol points (count, dimensions) from number `first` on, whatever `total`."""
     from scipy.stats import qmc
 
     engine = qmc.Sobol(dimensions, scramble=True, rng=np.random.default_rng(seed))

@@ -5,8 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack, closing
-from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,42 +21,12 @@ from nmm.sweeps.check import check_varied
 from nmm.sweeps.cluster import as_done_by, cluster
 from nmm.sweeps.definition import KEPT, Definition
 from nmm.sweeps.estimate import check_size
-from nmm.sweeps.extra import parquet
 from nmm.sweeps.folder import SweepFolder, is_sweep
 from nmm.sweeps.sampling import GRID, SAMPLERS, check_total
+from nmm.sweeps.swept import Swept
 from nmm.sweeps.varied import Range, Varied, varied
 from nmm.sweeps.work import computed
 from nmm.words import listed
-
-
-@dataclass(frozen=True)
-class Swept:
-    """A sweep that was run.
-
-    Attributes
-    ----------
-    folder : where it is
-    definition : what it is
-    """
-
-    folder: Path
-    definition: Definition
-
-    @cached_property
-    def table(self) -> Any:
-        """A `pyarrow.Table`, one row a rollout (`.to_pandas()` where pandas is installed)."""
-        return parquet().read_table(self.folder / "rows.parquet", partitioning=None)
-
-    @property
-    def page(self) -> Path:
-        """The page that shows it."""
-        return self.folder / "index.html"
-
-    @property
-    def outcomes(self) -> dict[str, int]:
-        """How many rollouts ended how, the most frequent first."""
-        counts = self.table["outcome"].value_counts().to_pylist()
-        return {one["values"]: one["counts"] for one in sorted(counts, key=lambda one: -one["counts"])}
 
 
 class Sweep:
@@ -66,8 +35,8 @@ class Sweep:
     Parameters
     ----------
     scenario : a bundled name, a file, or a `Scenario`
-    vary : by dotted key, as for `Scenario.override`: (lower, upper) is sampled; (lower, upper, count) and a list of
-        values are combined; text ("-pi:pi", "0:1:11", "rg,pg") as on the command line
+    vary : by dotted key, as for `Scenario.override`: (lower, upper) is sampled; (lower, upper, count) and a
+        list of values are combined; text ("-pi:pi", "0:1:11", "rg,pg") as on the command line
     samples : points of the ranges; not given where there is no range
     sampler : "sobol" (scrambled), "lhs" (Latin hypercube), "random", or "grid" where there is no range
     seed : of the sampler; the parameters of a row depend on it and the row's number alone
@@ -150,15 +119,15 @@ class Sweep:
         Parameters
         ----------
         folder : a new or an empty one, or one where this sweep was begun
-        jobs : processes on this machine; as many as it has cores, when not given. With more than 1, a script needs
-            `if __name__ == "__main__":`
+        jobs : processes on this machine; as many as it has cores, when not given. With more than 1, a script
+            needs `if __name__ == "__main__":`
         scheduler : the address of a Dask scheduler (tcp://host:port) whose workers compute instead
         progress : called with the fraction done, of the rows that were done before, too
 
         Raises
         ------
-        InputError : the folder is another's, the scheduler or its workers will not do, the sweep is too large, or
-            pyarrow (of `nmm[sweep]`) is missing
+        InputError : the folder is another's, scheduler or workers will not do, the sweep is too large,
+            or pyarrow (of `nmm[sweep]`) is missing
         RunError : a process or the cluster was lost
         """
         definition, place = self.definition, SweepFolder(folder, self.definition)
@@ -220,13 +189,14 @@ def _sampling(vary: tuple[Varied, ...], sampler: str | None, samples: object) ->
     if chosen == GRID and ranges:
         one = ranges[0]
         raise InputError(
-            f"vary {one.key}: a grid needs a count: expected {one.lower:g}:{one.upper:g}:COUNT, or another sampler "
-            f"({listed(list(SAMPLERS), 'or')})"
+            f"vary {one.key}: a grid needs a count: expected {one.lower:g}:{one.upper:g}:COUNT, or another "
+            f"sampler ({listed(list(SAMPLERS), 'or')})"
         )
     if not ranges:
         if chosen != GRID:
             raise InputError(
-                f"sampler: {chosen} has nothing to sample, as every key has its values; expected a range LOWER:UPPER"
+                f"sampler: {chosen} has nothing to sample, as every key has its values; expected a range "
+                "LOWER:UPPER"
             )
         if samples is not None:
             raise InputError(

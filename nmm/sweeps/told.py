@@ -8,13 +8,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from nmm.arrays import Array
-from nmm.sweeps.sweep import Swept
+from nmm.sweeps.swept import Swept
 
 #: What is told of all rollouts.
 QUANTITIES = (
     "error_rms", "error_final", "arrival", "objective_integral", "scale_min", "sigma_min", "margin_min",
     "clearance_min", "effort",
 )  # fmt: skip
+#: Values that differ by less than this share of their size are told as one.
+ALIKE = 1e-4
 #: Combinations of listed values that are compared in a table.
 MOST_COMPARED = 24
 
@@ -34,8 +36,8 @@ class Compared(NamedTuple):
     values : what is listed, as text by key
     completed : share of its rollouts that completed
     medians : of error_rms, objective_integral and effort, where known
-    best : share of the points, of those where all combinations completed, where its ∫ H dt is the least; None
-        where there is no objective or one point only
+    best : share of the points, of those where all combinations completed, where its ∫ H dt is the least;
+        None where there is no objective or one point only
     """
 
     values: dict[str, str]
@@ -54,7 +56,7 @@ def spreads(swept: Swept) -> Iterator[Spread]:
     for name in QUANTITIES:
         values = column(swept.table, name)
         values = values[np.isfinite(values)]
-        if len(values) and np.ptp(values) > 1e-12 * np.abs(values).max():
+        if len(values) and np.ptp(values) > ALIKE * np.abs(values).max():
             yield Spread(name, float(values.min()), float(np.median(values)), float(values.max()))
 
 
@@ -73,6 +75,7 @@ def compared(swept: Swept) -> list[Compared]:
     H = by["objective_integral"][whole]
     told = len(H) > 1 and np.ptp(by["objective_integral"][np.isfinite(by["objective_integral"])]) > 0.0
     least = np.argmin(H, axis=1) if told else None
+    keys = {one.key for one in definition.listed}
     found = []
     for k, row in enumerate(definition.parameters(range(count))):
         medians = {
@@ -81,6 +84,10 @@ def compared(swept: Swept) -> list[Compared]:
             if len(known := values[:, k][np.isfinite(values[:, k])])
         }
         best = None if least is None else float(np.mean(least == k))
-        values = {one.key: f"{row[one.key]}" for one in definition.listed}
+        values = {
+            key: value if isinstance(value, str) else f"{value:.6g}"
+            for key, value in row.items()
+            if key in keys
+        }
         found.append(Compared(values, float(completed[:, k].mean()), medians, best))
     return found
