@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import re
 import sys
 import time
 from collections.abc import Callable
@@ -21,6 +22,7 @@ from nmm.bundled import bundled_sweeps
 from nmm.cli.app import status_of
 from nmm.sweeps import folder as sweep_folder
 from nmm.sweeps import rows as sweep_rows
+from nmm.sweeps.columns import columns_of
 from nmm.sweeps.files import read_sweep
 from nmm.sweeps.rows import rows_of
 from nmm.sweeps.sampling import SAMPLERS
@@ -461,3 +463,24 @@ def test_the_bundled_sweeps_run(name: str, tmp_path: Path) -> None:
     )
     swept = brief.run(tmp_path / "out", jobs=1)
     assert set(swept.outcomes) <= {"completed", "missed"}
+
+
+def test_the_examples_of_the_page_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """docs/sweeps.md: the Python, and the file."""
+    text = (Path(__file__).parent.parent / "docs" / "sweeps.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    (said,) = re.findall(r"```yaml\n(.*?)```", text, flags=re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("nmm.sweeps.sweep._cores", lambda: 1)
+    names: dict[str, Any] = {"__name__": "__main__"}
+    exec(code, names)
+    assert names["H"].shape == (4, 2, 2)
+    assert names["swept"].outcomes["completed"] > 0
+    (tmp_path / "said.yaml").write_text(said, encoding="utf-8")
+    definition = nmm.Sweep.load("said.yaml", samples=2).definition
+    assert (definition.rows, definition.keep, definition.settings) == (4, "trajectories", {"dt": "0.01"})
+    assert nmm.Sweep.load("said.yaml").definition.rows == 256
+    columns = {column.name for column in columns_of(definition)} - {"index", "q0.x", "q0.theta"}
+    told = text[text.index("| column | |") :].split("\n\n")[0]
+    known = set(re.findall(r"`(\w+)`", told)) | {f"objective{end}" for end in re.findall(r"`(_\w+)`", told)}
+    assert {name for name in columns if "." not in name} <= known
