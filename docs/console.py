@@ -17,7 +17,7 @@ from pathlib import Path
 
 FOLDER = Path(__file__).parent
 #: Pages whose blocks are written here.
-PAGES = ("singularities.md",)
+PAGES = ("singularities.md", "sweeps.md")
 COMPARED, WRITTEN = ("console",), ("console", "text")
 
 _BLOCK = re.compile(r"^```(?P<kind>\w+)\n(?P<body>\$ .*?)^```$", re.DOTALL | re.MULTILINE)

@@ -111,5 +111,7 @@ from .runs.simulation import simulate as simulate
 from .runs.trajectory import Outcome as Outcome
 from .runs.trajectory import Trajectory as Trajectory
 from .scenario import Scenario as Scenario
+from .sweeps import Sweep as Sweep
+from .sweeps import Swept as Swept
 
 __version__: str

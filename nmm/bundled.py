@@ -31,6 +31,16 @@ def bundled_scenarios() -> dict[str, Path]:
     return _files("scenarios", ".yaml")
 
 
+def bundled_sweeps() -> dict[str, Path]:
+    """The bundled sweeps of scenarios: name to YAML file, sorted by name.
+
+    Raises
+    ------
+    NmmError : the installation has no such folder
+    """
+    return _files("scenarios/sweeps", ".yaml")
+
+
 def _files(folder: str, suffix: str) -> dict[str, Path]:
     # Only the folder's own files: what lies deeper are parts that those include.
     paths = sorted(_folder(folder).glob(f"*{suffix}"))

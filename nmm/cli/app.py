@@ -28,6 +28,7 @@ from nmm.cli.output import complain
 from nmm.cli.redundancy import laps, redundancy
 from nmm.cli.robot_commands import check, info, robots, scenarios, view
 from nmm.cli.singularities import singularities
+from nmm.cli.sweeping import sweep
 from nmm.errors import InputError, NmmError
 
 #: What typer raises for wrong usage: options that do not exist, arguments that are missing.
@@ -188,6 +189,7 @@ for _name, _command in (
     ("map", map_measures),
     ("redundancy", redundancy),
     ("laps", laps),
+    ("sweep", sweep),
     ("scenarios", scenarios),
     ("robots", robots),
 ):

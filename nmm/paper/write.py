@@ -12,8 +12,8 @@ from nmm import __version__
 from nmm.errors import InputError
 from nmm.folders.whole import has_format, replaced_folder
 from nmm.paper.cases import CASES
-from nmm.paper.processes import share_out
 from nmm.paper.results import CaseResult, Claim
+from nmm.processes import share_out
 from nmm.progress import Progress
 
 #: Marks a folder as one of ours.

@@ -35,10 +35,11 @@ class Scenario:
     name, title : of the scenario
     path : the file that it was read from
     parts : its keys, checked
+    document : its text as plain data, with what was set
     """
 
     def __init__(self, document: Document) -> None:
-        self._document = document
+        self.document = document
         self.path = Path(document.name)
         own_name = re.sub(r"[^\w.-]", "_", self.path.name.split(".", 1)[0]) or "scenario"
         data = {"name": own_name, **document.data}
@@ -82,7 +83,16 @@ class Scenario:
         ------
         ScenarioError : the key leads nowhere, or the value is not what is expected there
         """
-        derived = Scenario(_with_settings(self._document, {key: value}))
+        return self.with_settings({key: value})
+
+    def with_settings(self, settings: Mapping[str, object]) -> Scenario:
+        """This scenario with other values at dotted keys, set one after the other and then checked together.
+
+        Raises
+        ------
+        ScenarioError : as `override`
+        """
+        derived = Scenario(_with_settings(self.document, settings))
         if derived._explicit_robot() == self._explicit_robot():
             derived._robot = self._robot
         return derived
@@ -96,7 +106,7 @@ class Scenario:
         if self._robot is None:
             try:
                 with at("robot"):
-                    self._robot = self.parts.robot.build(self._document.absolute, ("robot",))
+                    self._robot = self.parts.robot.build(self.document.absolute, ("robot",))
             except KeyedError as error:
                 raise self._located(error) from None
         return self._robot
@@ -163,11 +173,11 @@ class Scenario:
         return data
 
     def _explicit_robot(self) -> dict[str, Any]:
-        return self.parts.robot.explicit(self._document.absolute, ("robot",))
+        return self.parts.robot.explicit(self.document.absolute, ("robot",))
 
     def _located(self, error: KeyedError) -> ScenarioError:
-        place = as_written(error.place, self._document.data)
-        return ScenarioError(f"{self._document.where(place)}: {' '.join(error.text.split())}")
+        place = as_written(error.place, self.document.data)
+        return ScenarioError(f"{self.document.where(place)}: {' '.join(error.text.split())}")
 
 
 def _with_settings(document: Document, settings: Mapping[str, object]) -> Document:

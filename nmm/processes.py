@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -57,14 +57,26 @@ def share_out(
     RunError : a process ended without an answer
     NmmError : what a job raised; the other jobs end with it
     """
+    return dict(as_done(job, numbers, processes, progress))
+
+
+def as_done(
+    job: Job[Result], numbers: Sequence[int], processes: int, progress: Callable[[int, float], None]
+) -> Generator[tuple[int, Result]]:
+    """The numbers with job(number, report), as `share_out`, one after the other as each is done.
+
+    The children end with the generator: whoever may stop early closes it (`contextlib.closing`).
+    """
     if processes == 1 or len(numbers) == 1:
-        return {number: job(number, partial(progress, number)) for number in numbers}
-    waiting = list(numbers)
-    found: dict[int, Result] = {}
+        for number in numbers:
+            yield number, job(number, partial(progress, number))
+        return
+    waiting, left = iter(numbers), len(numbers)
     with _children(job, min(processes, len(numbers))) as children:
-        for connection in children:
-            connection.send(waiting.pop(0))
-        while len(found) < len(numbers):
+        for connection, number in zip(children, waiting, strict=False):
+            connection.send(number)
+        while left:
+            wait(list(children))
             for connection in children:
                 if not connection.poll():
                     continue
@@ -74,12 +86,11 @@ def share_out(
                 elif message.kind == "error":
                     raise message.content
                 else:
-                    found[message.number] = message.content
-                    if waiting:
-                        connection.send(waiting.pop(0))
-            if len(found) < len(numbers):
-                wait(list(children))
-    return found
+                    following = next(waiting, None)
+                    if following is not None:  # before the answer is looked at: the child goes on meanwhile
+                        connection.send(following)
+                    left -= 1
+                    yield message.number, message.content
 
 
 def _receive(connection: Connection, process: SpawnProcess) -> _Message:

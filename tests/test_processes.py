@@ -1,4 +1,4 @@
-"""The work of `nmm paper` shared out over processes: answers, errors, deaths, Ctrl-C."""
+"""Work shared out over processes: answers, errors, deaths, Ctrl-C."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from nmm.errors import InputError, RunError
-from nmm.paper.processes import share_out
+from nmm.processes import share_out
 
 Progress = Callable[[float], None]
 

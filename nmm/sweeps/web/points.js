@@ -1,0 +1,148 @@
+// Points: any column against any other, with cells where both are listed, and the Pareto front of least and least.
+const points = { canvas: $("points"), places: null };
+
+function axisOf(column, log, from, to) {
+  if (isText(column)) {
+    const levels = "same" in column ? [column.same] : column.levels;
+    const place = (k) => from + (to - from) * ((k + 0.5) / levels.length);
+    return {
+      // spread a little, by the row's number, so that points of one name do not hide one another
+      of: (row) => place(column.codes ? column.codes[row] : 0) + (((row * 0.618034) % 1) - 0.5) * 0.6 * (to - from) / levels.length,
+      marks: levels.map((name, k) => [place(k), name]),
+    };
+  }
+  const values = numbersOf(column);
+  const usable = log ? values.filter((value) => value !== null && value > 0).map(Math.log10) : values;
+  let [low, high] = extent(usable);
+  const cells = cellsOf(column, log);
+  const pad = cells ? (high - low) / (cells - 1) / 2 : 0.03 * (high - low);
+  low -= pad;
+  high += pad;
+  const place = (value) => from + ((value - low) / (high - low)) * (to - from);
+  const few = Math.max(2, Math.floor(Math.abs(to - from) / 75));
+  return {
+    cell: cells ? Math.abs(to - from) / cells : 0,
+    of: (row) => {
+      const value = values[row];
+      if (value === null || (log && value <= 0)) return NaN;
+      return place(log ? Math.log10(value) : value);
+    },
+    marks: ticks(low, high, few)
+      .filter((mark) => !log || high - low < 1.5 || Number.isInteger(Math.round(mark * 1e6) / 1e6))
+      .map((mark) => [place(mark), written(log ? 10 ** mark : Number(mark.toPrecision(12)))]),
+  };
+}
+
+// How many values a listed column has, where they are at equal distances.
+function cellsOf(column, log) {
+  if (!column.listed || log || "same" in column) return 0;
+  const values = [...new Set(numbersOf(column))].sort((a, b) => a - b);
+  const step = (values[values.length - 1] - values[0]) / (values.length - 1);
+  return values.every((value, k) => Math.abs(value - values[0] - k * step) < 1e-6 * step) ? values.length : 0;
+}
+
+function drawPoints() {
+  const { context, width, height } = fitted(points.canvas);
+  const [xs, ys, hue] = ["x", "y", "colour"].map((id) => byName.get($(id).value));
+  const margin = { left: 66, right: 14, top: 12, bottom: 44 };
+  const across = axisOf(xs, $("log-x").checked, margin.left, width - margin.right);
+  const up = axisOf(ys, $("log-y").checked, height - margin.bottom, margin.top);
+  const colours = colouring(hue);
+  showLegend(hue, colours);
+  context.clearRect(0, 0, width, height);
+  context.strokeStyle = style("--line");
+  context.fillStyle = style("--soft");
+  context.lineWidth = 1;
+  context.textAlign = "center";
+  for (const [place, text] of across.marks) {
+    line(context, [[place, margin.top], [place, height - margin.bottom]]);
+    context.fillText(text, place, height - margin.bottom + 16);
+  }
+  context.fillText(titled(xs), (margin.left + width - margin.right) / 2, height - 8);
+  context.textAlign = "right";
+  for (const [place, text] of up.marks) {
+    line(context, [[margin.left, place], [width - margin.right, place]]);
+    context.fillText(text, margin.left - 7, place + 4);
+  }
+  context.save();
+  context.translate(13, (margin.top + height - margin.bottom) / 2);
+  context.rotate(-Math.PI / 2);
+  context.textAlign = "center";
+  context.fillText(titled(ys), 0, 0);
+  context.restore();
+
+  const cells = across.cell && up.cell ? [Math.max(across.cell - 1, 1), Math.max(up.cell - 1, 1)] : null;
+  const radius = N > 4000 ? 1.6 : N > 800 ? 2.4 : 3.6;
+  // Rollouts of one point, with different listed values, stand side by side.
+  const together = !cells && DATA.combinations > 1 && DATA.combinations <= 5 && sampled(xs) && sampled(ys);
+  const aside = (row) => (together ? ((row % DATA.combinations) - (DATA.combinations - 1) / 2) * 1.7 * radius : 0);
+  points.places = Array.from({ length: N }, (_, row) => [across.of(row) + aside(row), up.of(row)]);
+  points.reach = cells ? Math.max(...cells) : 14;
+  for (const wanted of [0, 1]) {
+    for (const row of colours.order) {
+      const [x, y] = points.places[row];
+      if (kept[row] !== wanted || Number.isNaN(x) || Number.isNaN(y)) continue;
+      context.fillStyle = wanted ? colours.of(row) : style("--faint");
+      if (cells) context.fillRect(x - cells[0] / 2, y - cells[1] / 2, cells[0], cells[1]);
+      else disc(context, x, y, radius);
+    }
+  }
+  if ($("front").checked) drawFront(context, numbersOf(xs), numbersOf(ys));
+  if (chosen >= 0 && points.places[chosen].every((place) => !Number.isNaN(place))) {
+    context.strokeStyle = style("--ink");
+    context.lineWidth = 2;
+    context.beginPath();
+    context.arc(...points.places[chosen], 8, 0, 2 * Math.PI);
+    context.stroke();
+  }
+}
+
+const sampled = (column) => column.varied && !column.listed;
+
+// The rollouts than which no other has less of both.
+function frontOf(xs, ys) {
+  const rows = [...Array(N).keys()].filter((row) => kept[row] && xs[row] !== null && ys[row] !== null);
+  rows.sort((a, b) => xs[a] - xs[b] || ys[a] - ys[b]);
+  let least = Infinity;
+  return rows.filter((row) => ys[row] < least && ((least = ys[row]), true));
+}
+
+function drawFront(context, xs, ys) {
+  const places = frontOf(xs, ys).map((row) => points.places[row]).filter((place) => !place.some(Number.isNaN));
+  const stairs = places.flatMap((place, k) => (k ? [[place[0], places[k - 1][1]], place] : [place]));
+  context.strokeStyle = context.fillStyle = style("--ink");
+  context.lineWidth = 1.5;
+  line(context, stairs);
+  for (const [x, y] of places) disc(context, x, y, 3);
+}
+
+function line(context, places) {
+  context.beginPath();
+  places.forEach(([x, y], k) => (k ? context.lineTo(x, y) : context.moveTo(x, y)));
+  context.stroke();
+}
+
+function disc(context, x, y, radius) {
+  context.beginPath();
+  context.arc(x, y, radius, 0, 2 * Math.PI);
+  context.fill();
+}
+
+function nearest(event) {
+  let found = -1, least = points.reach ** 2;
+  for (let row = 0; row < N; row++) {
+    if (!kept[row]) continue;
+    const [x, y] = points.places[row];
+    const distance = (x - event.offsetX) ** 2 + (y - event.offsetY) ** 2;
+    if (distance < least) [found, least] = [row, distance];
+  }
+  return found;
+}
+
+points.canvas.addEventListener("mousemove", (event) => {
+  const row = nearest(event);
+  const columns = row < 0 ? [] : [...new Set(["x", "y", "colour"].map((id) => byName.get($(id).value)))];
+  const index = row < 0 ? "" : `rollout ${valueOf(byName.get("index"), row)}: `;
+  $("told").textContent = index + columns.map((one) => `${one.name} = ${written(valueOf(one, row), one)}`).join(", ");
+});
+points.canvas.addEventListener("click", (event) => choose(nearest(event)));

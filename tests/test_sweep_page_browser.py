@@ -1,0 +1,96 @@
+"""The page of a sweep in a real browser: filters that hold everywhere, a rollout that opens."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from playback_browser import browser as browser
+from playwright.sync_api import Browser, Page
+from short_scenario import MINIMAL
+
+import nmm
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory: pytest.TempPathFactory) -> nmm.Swept:
+    folder = tmp_path_factory.mktemp("sweep")
+    (folder / "short.yaml").write_text(MINIMAL, encoding="utf-8")
+    vary = {"q0.x": (-1, 1), "resolver.kind": ["pg", "rg"], "resolver.threshold": [0.01, 0.02]}
+    return nmm.Sweep(folder / "short.yaml", vary, samples=20).run(folder / "out", jobs=1)
+
+
+@pytest.fixture
+def page(browser: Browser, swept: nmm.Swept) -> Iterator[Page]:
+    context = browser.new_context(viewport={"width": 1100, "height": 900})
+    made = context.new_page()
+    wrong: list[str] = []
+    made.on("pageerror", lambda error: wrong.append(str(error)))
+    made.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
+    made.on(
+        "request", lambda request: wrong.append(request.url) if request.url != swept.page.as_uri() else None
+    )
+    made.goto(swept.page.as_uri())
+    yield made
+    assert wrong == []
+    context.close()
+
+
+def shown(page: Page) -> int:
+    return int(page.inner_text("#count").split()[0])
+
+
+def test_filters_of_the_table_hold_everywhere(page: Page, swept: nmm.Swept) -> None:
+    rows = swept.table.to_pylist()
+    assert shown(page) == 80
+    page.fill("thead input[data-column='q0.x']", "0..0.5")
+    assert shown(page) == sum(0.0 <= row["q0.x"] <= 0.5 for row in rows)
+    page.get_by_role("button", name="40 refused").click()
+    left = [row for row in rows if 0.0 <= row["q0.x"] <= 0.5 and row["outcome"] == "completed"]
+    assert shown(page) == len(left)
+    assert page.locator("tbody tr").count() == min(50, len(left))
+    page.get_by_role("button", name="error_rms").click()
+    columns = page.locator("thead tr:first-child th").all_inner_texts()
+    first = page.locator("tbody tr").first.locator("td").nth(columns.index("error_rms")).inner_text()
+    assert float(first) == pytest.approx(min(row["error_rms"] for row in left), rel=1e-3)
+    page.get_by_role("button", name="Clear all filters").click()
+    assert shown(page) == 80
+
+
+def test_a_brush_filters_and_a_click_lets_it_go(page: Page, swept: nmm.Swept) -> None:
+    page.locator("#parallel").scroll_into_view_if_needed()
+    box = page.locator("#parallel").bounding_box()
+    assert box is not None
+    axis = page.evaluate("parallel.axes[0].x")
+    middle = page.evaluate("parallel.axes[0].place(0)")
+    x = box["x"] + axis
+    page.mouse.move(x, box["y"] + 40)
+    page.mouse.down()
+    page.mouse.move(x, box["y"] + middle, steps=4)
+    page.mouse.up()
+    values = swept.table["q0.x"].to_pylist()
+    assert abs(shown(page) - sum(value > 0.0 for value in values)) <= 4  # a pixel may hold a point
+    page.mouse.click(x, box["y"] + 100)
+    assert shown(page) == 80
+
+
+def test_a_click_opens_the_rollout_with_the_command_that_runs_it(page: Page, swept: nmm.Swept) -> None:
+    page.select_option("#y", "error_rms")
+    x, y = page.evaluate("points.places[6]")
+    page.locator("#points").click(position={"x": x, "y": y})
+    command = page.inner_text("#one pre").split()
+    index = int(page.inner_text("#one h2").split()[1].rstrip(":"))
+    assert page.evaluate("chosen") == index
+    settings = dict(word.split("=", 1) for word in command if "=" in word)
+    row = swept.table.to_pylist()[index]
+    assert float(settings["q0.x"]) == row["q0.x"]
+    run = nmm.Scenario.load(command[2], settings).run()
+    assert run.summary()["error_rms"] == row["error_rms"]
+
+
+@pytest.mark.parametrize("width", [420, 1400])
+def test_it_fits_its_window(page: Page, width: int) -> None:
+    page.set_viewport_size({"width": width, "height": 800})
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
