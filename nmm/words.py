@@ -16,6 +16,11 @@ def listed(phrases: Sequence[str], word: str = "and") -> str:
     return f"{', '.join(phrases[:-1])} {word} {phrases[-1]}"
 
 
+def counted(count: int, thing: str) -> str:
+    """ "1 sample", "3 samples"."""
+    return f"{count} {thing}{'' if count == 1 else 's'}"
+
+
 def signed_sum(terms: Iterable[tuple[float, str]]) -> str:
     """ "a + 2 b", "-2 b - a" of terms: a number whose sign counts, and what is written after the sign."""
     text = ""

@@ -15,6 +15,7 @@ from nmm.collisions.setting import Setting
 from nmm.control.guard import Counts, Guard
 from nmm.control.integrators import Around, Velocity
 from nmm.robots.held import Held
+from nmm.words import counted
 
 #: Between samples distances are looked at after so much motion, m and rad of the coordinates together, and m
 #: of the obstacles.
@@ -122,13 +123,13 @@ def told(setting: Setting, found: Swept, t: Array, counts: Counts) -> list[str]:
         k = int(short[np.argmin(found.between[short])])
         name = setting.words(int(found.between_pairs[k]))
         sentences.append(
-            f"the distance of {asked:g} m could not be kept in {short.size} samples: "
+            f"the distance of {asked:g} m could not be kept in {counted(short.size, 'sample')}: "
             f"{name} came to {found.between[k]:.4g} m at t = {t[k]:.3g} s"
         )
     if counts.braked:
         said = f", {counts.short} of them in vain" if counts.short else ""
         sentences.append(
-            f"in {counts.braked} samples the inputs went towards braking to keep distances{said}"
+            f"in {counted(counts.braked, 'sample')} the inputs went towards braking to keep distances{said}"
         )
     return sentences
 

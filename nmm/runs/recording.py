@@ -29,12 +29,15 @@ from nmm.runs.reasons import weakest_words
 from nmm.runs.recorded import Recorded, room
 from nmm.runs.residuals import residuals
 from nmm.runs.trajectory import Outcome, Trajectory
+from nmm.words import counted
 
 #: What `Recorded` and `Step` call by one name.
 SAME_NAME = tuple(name for name in Recorded._fields if name not in ("limited", "unanswered"))
 
 #: Below this ratio of smallest to largest singular value a run is warned about.
 NEARLY_SINGULAR = 1e-3
+#: Below this one J has lost rank.
+LOST = 1e-9
 
 
 class Recorder:
@@ -201,12 +204,12 @@ class Recorder:
                 f"{np.abs(self.so_far.u).max():.3g}"
             )
 
-    def _warn_of_events(self) -> None:
+    def _warn_of_events(self, singular_values: Array) -> None:
         times = self.t
         for name in dict.fromkeys(name for beyond in self._beyond.values() for name in beyond):
             broken = {k: beyond[name] for k, beyond in self._beyond.items() if name in beyond}
             self.warnings.append(
-                f"the limit of {name} could not be kept with the others in {len(broken)} samples, from "
+                f"the limit of {name} could not be kept with the others in {counted(len(broken), 'sample')}, from "
                 f"t = {times[min(broken)]:.3g} s on: its rate was beyond what would keep it by up to "
                 f"{max(broken.values()):.3g} a second"
                 f"{f' (what contradicts each other: {against})' if (against := self._against[name]) else ''}"
@@ -220,15 +223,17 @@ class Recorder:
             missed = times[added > 0.0]
             back = ", and is done again from there on" if missed[-1] < self.reached else ""
             self.warnings.append(
-                f"the added task was not done in {len(missed)} samples, from t = {missed[0]:.4g} to "
+                f"the added task was not done in {counted(len(missed), 'sample')}, from t = {missed[0]:.4g} to "
                 f"{missed[-1]:.4g} s{back}: its rate was missed by up to {added.max():.3g} a second"
             )
         unanswered = times[self.so_far.unanswered > 0]
         if len(unanswered):
+            values = singular_values[self.so_far.unanswered > 0]
+            lost = np.any(values[:, -1] <= LOST * values[:, 0])
             self.warnings.append(
-                f"the resolver had no answer in {len(unanswered)} samples, from "
-                f"t = {unanswered[0]:.3g} s on, where J has lost rank: its inputs were those nearest "
-                "to rest within the limits"
+                f"the resolver had no answer in {counted(len(unanswered), 'sample')}, from "
+                f"t = {unanswered[0]:.3g} s on, {'where J has lost rank' if lost else 'within the limits'}: "
+                "its inputs were those nearest to rest"
             )
 
     def trajectory(self, outcome: Outcome, message: str, dt: float, method: str) -> Trajectory:
@@ -236,7 +241,7 @@ class Recorder:
         found, controller = self.so_far, self._controller
         robot, rows = controller.robot, controller.rows
         singular_values = np.linalg.svd(found.J, compute_uv=False).astype(np.float64)
-        self._warn_of_events()
+        self._warn_of_events(singular_values)
         if outcome is not Outcome.SINGULAR:  # which says so itself
             self._warn_of_singularities(singular_values)
         ended = outcome in (Outcome.COMPLETED, Outcome.MISSED)

@@ -8,6 +8,7 @@ import numpy as np
 
 from nmm.arrays import Array
 from nmm.resolvers.answer import EXACT
+from nmm.words import counted
 
 
 class Residuals(NamedTuple):
@@ -34,7 +35,7 @@ class Residuals(NamedTuple):
             return ""
         share = f"{100 * self.relative:.3g} % of it" if self.relative <= 1.0 else "more than the rate itself"
         return (
-            f"the inputs did not do all that the task asked in {self.samples} samples "
+            f"the inputs did not do all that the task asked in {counted(self.samples, 'sample')} "
             f"({100 * self.share:.3g} %): J u differed from the rate by up to {self.largest:.3g} "
             f"({share}), at t = {self.t:.4g} s"
         )
