@@ -209,8 +209,8 @@ class Recorder:
         for name in dict.fromkeys(name for beyond in self._beyond.values() for name in beyond):
             broken = {k: beyond[name] for k, beyond in self._beyond.items() if name in beyond}
             self.warnings.append(
-                f"the limit of {name} could not be kept with the others in {counted(len(broken), 'sample')}, from "
-                f"t = {times[min(broken)]:.3g} s on: its rate was beyond what would keep it by up to "
+                f"the limit of {name} could not be kept with the others in {counted(len(broken), 'sample')}, "
+                f"from t = {times[min(broken)]:.3g} s on: its rate was beyond what would keep it by up to "
                 f"{max(broken.values()):.3g} a second"
                 f"{f' (what contradicts each other: {against})' if (against := self._against[name]) else ''}"
             )
@@ -223,8 +223,9 @@ class Recorder:
             missed = times[added > 0.0]
             back = ", and is done again from there on" if missed[-1] < self.reached else ""
             self.warnings.append(
-                f"the added task was not done in {counted(len(missed), 'sample')}, from t = {missed[0]:.4g} to "
-                f"{missed[-1]:.4g} s{back}: its rate was missed by up to {added.max():.3g} a second"
+                f"the added task was not done in {counted(len(missed), 'sample')}, from "
+                f"t = {missed[0]:.4g} to {missed[-1]:.4g} s{back}: its rate was "
+                f"missed by up to {added.max():.3g} a second"
             )
         unanswered = times[self.so_far.unanswered > 0]
         if len(unanswered):
