@@ -197,3 +197,14 @@ def test_tasks_that_come_and_go_are_left_to_simulate() -> None:
     scenario = nmm.Scenario.load("unicycle_3r_sequence")
     with pytest.raises(nmm.InputError, match="simulate"):
         nmm.rollout(scenario)
+
+
+def test_controllers_that_do_not_fit_together_are_refused() -> None:
+    other = nmm.Controller(
+        nmm.load("unicycle_3r"),
+        nmm.Task(nmm.Position("ee", "xy"), [2.0, 0.0], gain=1.0),
+        nmm.ProjectedGradient(),
+    )
+    for given, words in (([], "a list of controllers"), ([controller(), other], "controller 1 has another")):
+        with pytest.raises(nmm.InputError, match=words):
+            nmm.rollout(given, START, 1.0)

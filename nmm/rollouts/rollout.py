@@ -6,7 +6,7 @@ import copy
 import math
 import os
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,19 +17,19 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array, Integers, positive
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
-from nmm.control.integrators import integrator
+from nmm.control.integrators import Integrator, integrator
 from nmm.control.sequenced import SequencedController
 from nmm.errors import InputError
-from nmm.rollouts.disturbed import Disturbed, driven_disturbed
+from nmm.rollouts.disturbed import driven_disturbed
 from nmm.rollouts.kept import Kept
 from nmm.rollouts.measures import MEASURES, measures
+from nmm.rollouts.plant import Plant
+from nmm.rollouts.starts import Start, checked_starts
 from nmm.runs.closed_loop import driven, sample_times
 from nmm.runs.recording import Recorder
 from nmm.runs.simulation import MOST_SAMPLES, guarded
 from nmm.runs.trajectory import Outcome
 from nmm.scenario import Scenario
-
-Start = ArrayLike | Mapping[str, float] | Sequence[Mapping[str, float]]
 
 
 @dataclass(frozen=True)
@@ -120,8 +120,7 @@ def rollout(
         until = parts.until.make() if until is None and parts.until is not None else until
         subject = subject.controller()
     controllers = (subject,) if isinstance(subject, Controller) else tuple(subject)
-    if not controllers or any(isinstance(one, SequencedController) for one in controllers):
-        raise InputError("rollout: expected controllers without tasks that come and go, which simulate runs")
+    _check(controllers)
     robot, method = controllers[0].robot, method or "rk4"
     if q0 is None or duration is None:
         raise InputError("rollout: expected q0 and a duration; only a scenario has its own")
@@ -131,9 +130,9 @@ def rollout(
         raise InputError(
             f"dt: {duration:g} s in steps of {dt:g} s are {steps} samples; at most {MOST_SAMPLES}"
         )
-    starts = _starts(controllers, q0)
+    starts = checked_starts(controllers, q0)
     count = len(starts)
-    plant = _Plant.of(robot.n, robot.n_u, count, noise, delay, slip, seed)
+    plant = Plant.of(robot.n, robot.n_u, count, noise, delay, slip, seed)
     if plant.disturbs and (method != "zoh" or until is not None or not controllers[0].compilable):
         raise InputError(
             "rollout: noise, delay and slip are for method zoh, without a goal, and for controllers without "
@@ -144,149 +143,105 @@ def rollout(
             "method: limits are kept from sample to sample: expected rk4, midpoint, euler or zoh"
         )
     times = sample_times(0.0, dt, steps, duration)
-    first = Recorder(controllers[0], times)
-    kept = Kept(
-        keep, times, _whole(every, "every"), count, first.found, None if folder is None else Path(folder)
-    )
-    workers = min(_whole(threads or _cores(), "threads"), count)
-    result = _Result(count)
-
-    def runs_of(controller: Controller) -> Callable[[int], tuple[Recorder, Outcome, str]]:
-        recorder = Recorder(controller, times)
-        advance = guarded(integrator(method, robot, 1e-9), controller)
-        if controller.samples:
-            controller.dt = float(times[1] - times[0])
-
-        def run(i: int) -> tuple[Recorder, Outcome, str]:
-            recorder.clear()
-            if plant.disturbs:
-                found = driven_disturbed(controller, recorder, times, starts[i], plant.at(i, len(times)))
-            else:
-                found = driven(controller, advance, recorder, times, starts[i].copy(), None, until)
-            return recorder, *found
-
-        return run
-
-    local, stop, done = threading.local(), threading.Event(), 0
-
-    def one(i: int, room: dict[str, Array], row: int) -> None:
-        nonlocal done
-        if stop.is_set():
-            return
-        if len(controllers) > 1:
-            run = runs_of(copy.copy(controllers[i]))  # one may stand there twice
-        else:
-            if not hasattr(local, "run"):
-                local.run = runs_of(copy.copy(controllers[0]))
-            run = local.run
-        recorder, outcome, message = run(i)
-        kept.put(room, row, recorder.found, len(recorder))
-        result.put(i, recorder, times, _ended(outcome, recorder, until, controllers[0]), message)
-        done += 1
-        if progress is not None:
-            progress(done / count)
-
+    where = None if folder is None else Path(folder)
+    every = _whole(every, "every")
+    kept = Kept(keep, times, every, count, Recorder(controllers[0], times).found, where)
+    runs = _Runs(controllers, starts, times, method, until, plant, kept)
+    workers = min(_whole(_cores() if threads is None else threads, "threads"), count)
     rooms: dict[str, Array] = {}
     with ThreadPoolExecutor(workers) as pool:
         for begin in range(0, count, kept.part):
-            rooms = kept.room(min(kept.part, count - begin))
+            end = min(count, begin + kept.part)
+            rooms = kept.room(end - begin)
             try:
-                for future in [
-                    pool.submit(one, i, rooms, i - begin) for i in range(begin, min(count, begin + kept.part))
-                ]:
+                waiting = [pool.submit(runs.one, i, rooms, i - begin) for i in range(begin, end)]
+                for k, future in enumerate(waiting, start=begin + 1):
                     future.result()
+                    if progress is not None:
+                        progress(k / count)
             except BaseException:
-                stop.set()
+                runs.stop.set()
                 raise
             kept.write(begin, rooms)
     return Rollouts(
         t=kept.t,
         kept={} if folder is not None else rooms,
-        measures=dict(zip(MEASURES, result.measures.T.copy(), strict=True)),
-        outcome=tuple(result.outcome),
-        message=tuple(result.message),
-        samples=result.samples,
+        measures=dict(zip(MEASURES, runs.measures.T.copy(), strict=True)),
+        outcome=tuple(runs.outcome),
+        message=tuple(runs.message),
+        samples=runs.samples,
         files=tuple(kept.files),
     )
 
 
-class _Result:
-    """What is always kept of each run."""
+class _Runs:
+    """The runs, one after the other in each thread that asks for some, and what is always kept of them.
 
-    def __init__(self, count: int) -> None:
+    Attributes
+    ----------
+    stop : set where no more are to begin
+    """
+
+    def __init__(
+        self,
+        controllers: Sequence[Controller],
+        starts: Array,
+        times: Array,
+        method: str,
+        until: Goal | None,
+        plant: Plant,
+        kept: Kept,
+    ) -> None:
+        self._controllers, self._starts, self._times = controllers, starts, times
+        self._method, self._until, self._plant, self._kept = method, until, plant, kept
+        self._local, self.stop = threading.local(), threading.Event()
+        count = len(starts)
         self.measures = np.full((count, len(MEASURES)), np.nan)
         self.samples: Integers = np.zeros(count, dtype=np.int64)
         self.outcome, self.message = [""] * count, [""] * count
 
-    def put(self, i: int, recorder: Recorder, times: Array, outcome: str, message: str) -> None:
-        self.measures[i] = measures(times, len(recorder), recorder.found)
-        self.samples[i] = len(recorder)
-        self.outcome[i], self.message[i] = outcome, message
+    def one(self, i: int, room: dict[str, Array], row: int) -> None:
+        """The i-th run, which is kept in a row of the room."""
+        if self.stop.is_set():
+            return
+        controller, recorder, advance = self._at_hand(i)
+        if self._plant.disturbs:
+            disturbed = self._plant.at(i, len(self._times))
+            outcome, message = driven_disturbed(controller, recorder, self._times, self._starts[i], disturbed)
+        else:
+            start = self._starts[i].copy()
+            outcome, message = driven(controller, advance, recorder, self._times, start, None, self._until)
+        count = len(recorder)
+        self._kept.put(room, row, recorder.found, count)
+        self.measures[i] = measures(self._times, count, recorder.found)
+        self.samples[i] = count
+        self.outcome[i], self.message[i] = _ended(outcome, recorder, self._until, controller), message
+
+    def _at_hand(self, i: int) -> tuple[Controller, Recorder, Integrator]:
+        """A controller that is this thread's alone, with room for its samples, and the integrator."""
+        if len(self._controllers) == 1 and hasattr(self._local, "ready"):
+            ready: tuple[Controller, Recorder, Integrator] = self._local.ready
+            ready[1].clear()
+            return ready
+        controller = copy.copy(self._controllers[i if len(self._controllers) > 1 else 0])
+        if controller.samples:
+            controller.dt = float(self._times[1] - self._times[0])
+        advance = guarded(integrator(self._method, controller.robot, 1e-9), controller)
+        self._local.ready = controller, Recorder(controller, self._times), advance
+        return self._local.ready
 
 
-@dataclass(frozen=True)
-class _Plant:
-    """What disturbs the runs: noise (n,), delay, slip (B, m), and the seed of the noise."""
-
-    noise: Array
-    delay: int
-    slip: Array
-    seed: int
-
-    @classmethod
-    def of(
-        cls, n: int, m: int, count: int, noise: ArrayLike, delay: int, slip: ArrayLike, seed: int
-    ) -> _Plant:
-        """From what a user gives."""
-        sizes = _broadcast(noise, (n,), "noise")
-        if np.any(sizes < 0.0):
-            raise InputError("noise: expected standard deviations, at least 0")
-        if isinstance(delay, bool) or not isinstance(delay, (int, np.integer)) or delay < 0:
-            raise InputError(f"delay: expected whole samples, at least 0, got {delay!r}")
-        return cls(sizes, int(delay), _broadcast(slip, (count, m), "slip"), int(seed))
-
-    @property
-    def disturbs(self) -> bool:
-        """Whether a run is another one than without it."""
-        return bool(np.any(self.noise > 0.0) or self.delay or np.any(self.slip != 1.0))
-
-    def at(self, i: int, samples: int) -> Disturbed:
-        """What disturbs the i-th run."""
-        noise = np.zeros((0, len(self.noise)))
-        if np.any(self.noise > 0.0):
-            drawn = np.random.default_rng([self.seed, i]).standard_normal((samples, len(self.noise)))
-            noise = drawn * self.noise
-        return Disturbed(noise, self.delay, self.slip[i].copy())
-
-
-def _starts(controllers: Sequence[Controller], q0: Start) -> Array:
-    """(B, n), checked as `simulate` does."""
-    robot = controllers[0].robot
-    if isinstance(q0, Mapping):
-        found = robot.q(q0)[np.newaxis]
-    elif isinstance(q0, Sequence) and any(isinstance(one, Mapping) for one in q0):
-        found = np.array([robot.q(one) for one in q0])
-    else:
-        found = np.array(q0, dtype=np.float64)
-        found = found[np.newaxis] if found.ndim == 1 else found
-    if found.ndim != 2 or found.shape[1] != robot.n or not len(found):
-        raise InputError(f"q0: expected at least one run, (B, {robot.n}) or ({robot.n},), got {found.shape}")
-    if len(controllers) > 1:
-        if len(found) not in (1, len(controllers)):
-            raise InputError(
-                f"q0: expected 1 or {len(controllers)} starts, one a controller, got {len(found)}"
-            )
-        found = np.broadcast_to(found, (len(controllers), robot.n)).copy()
-    for k, q in enumerate(found):
-        one = controllers[k if len(controllers) > 1 else 0]
-        come_back = one.limits is not None and one.limits.position is not False
-        try:
-            robot.check_limits(robot.q(q), come_back=come_back)
-        except InputError as error:
-            raise InputError(f"run {k}: {error}") from None
-        if one.setting is not None:
-            one.setting.check_start(0.0, q)
-    return robot.following.placed(found)
+def _check(controllers: Sequence[Controller]) -> None:
+    """`InputError` for controllers whose runs do not fit beside each other."""
+    if any(isinstance(one, SequencedController) for one in controllers):
+        raise InputError("rollout: tasks that come and go are run by simulate alone")
+    if not controllers or not all(isinstance(one, Controller) for one in controllers):
+        raise InputError("rollout: expected a controller, a scenario or a list of controllers")
+    first = controllers[0]
+    for k, one in enumerate(controllers):
+        same = one.robot.q_names == first.robot.q_names and one.robot.u_names == first.robot.u_names
+        if not same or len(one.rows) != len(first.rows):
+            raise InputError(f"rollout: controller {k} has another robot or other rows than the first")
 
 
 def _ended(outcome: Outcome, recorder: Recorder, until: Goal | None, controller: Controller) -> str:
@@ -295,16 +250,6 @@ def _ended(outcome: Outcome, recorder: Recorder, until: Goal | None, controller:
     if until is None:
         return "ended"
     return "reached" if until.reached(recorder.so_far.error[-1], controller.rows) else "missed"
-
-
-def _broadcast(value: ArrayLike, shape: tuple[int, ...], what: str) -> Array:
-    try:
-        found = np.broadcast_to(np.asarray(value, dtype=np.float64), shape).copy()
-    except (TypeError, ValueError):
-        raise InputError(f"{what}: expected a number or shape {shape}, got {value!r}") from None
-    if not np.all(np.isfinite(found)):
-        raise InputError(f"{what}: expected finite numbers")
-    return found
 
 
 def _whole(value: int, what: str) -> int:
