@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pty
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -56,10 +57,10 @@ class Terminal:
         )
         os.close(theirs)
 
-    def read_until(self, text: str | None) -> str:
-        """What is shown until a text comes, or to the end."""
+    def read_until(self, pattern: str | None) -> str:
+        """What is shown until something comes that a pattern matches, or to the end."""
         shown = b""
-        while text is None or text.encode() not in shown:
+        while pattern is None or re.search(pattern.encode(), shown) is None:
             try:
                 part = os.read(self._ours, 65536)
             except OSError:  # how Linux says that the other end is closed

@@ -114,12 +114,12 @@ def test_any_library_tracks_what_it_is_told(
 
 
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("follower", [of_nmm.Pinocchio, of_nmm.Compiled])
+@pytest.mark.parametrize("kinematics", ["pinocchio", "compiled"])
 def test_nmm_tracks_its_workloads_and_keeps_their_limits(
-    name: str, follower: Any, laid: dict[str, workloads.Workload]
+    name: str, kinematics: str, laid: dict[str, workloads.Workload]
 ) -> None:
     workload = laid[name]
-    one = follower(workload, True)
+    one = of_nmm.Nmm(workload, kinematics, True)
     one.reset()
     path = [one.q()]
     for k in range(len(workload.t)):
@@ -134,7 +134,7 @@ def test_nmm_tracks_its_workloads_and_keeps_their_limits(
 
 def test_who_does_not_track_or_breaks_a_limit_has_no_time(laid: dict[str, workloads.Workload]) -> None:
     workload = laid["planar"]
-    one = of_nmm.Compiled(workload, False)
+    one = of_nmm.Nmm(workload, "compiled", False)
     one.reset()
     path = [one.q()]
     for k in range(len(workload.t)):

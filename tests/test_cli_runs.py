@@ -171,7 +171,7 @@ def test_an_interrupted_run_leaves_its_part(tmp_path: Path, name: str) -> None:
     terminal = Terminal(
         tmp_path, 200, "run", "unicycle_2r_position", "--set", "duration=3000", "--out", "part"
     )
-    terminal.read_until(" 1%")  # of the progress bar: the run is under way
+    terminal.read_until(r" [1-9]\d?%")  # of the progress bar: the run is under way
     terminal.process.send_signal(getattr(signal, name))
     shown = terminal.read_until(None)
     assert terminal.process.wait(timeout=MOST) == 1, shown

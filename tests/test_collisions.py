@@ -290,7 +290,7 @@ def test_a_placement_is_the_same_however_it_is_given():
     box = nmm.Box([0.1, 0.2, 0.3])
     listed, packed = (nmm.Obstacle(box, motion=lambda t, made=made: made(six)) for made in (list, np.array))
     np.testing.assert_array_equal(listed.placement(1.0), packed.placement(1.0))
-    with pytest.raises(nmm.InputError, match="placement"):
+    with pytest.raises(nmm.InputError, match="motion: expected finite numbers"):
         nmm.Obstacle(box, motion=lambda t: np.array([np.nan, *six[1:]]))
 
 

