@@ -80,7 +80,7 @@ def test_wheels_turn_as_fast_as_their_rows_say(
 
 @pytest.mark.parametrize("method", ["zoh", "rk4"])
 def test_wheels_are_no_faster_than_their_limit(method: str) -> None:
-    """As far as the limits' kernel is exact: from starts 1e-12 apart (the motion is chaotic) up to 3e-10 is seen.
+    """As far as the kernel of limits is exact: starts 1e-12 apart (it is chaotic) go up to 3e-10 beyond.
 
     With bounds for the arm: without, it whips at 100 rad/s, whose rounding reaches the wheels.
     """
