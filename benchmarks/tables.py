@@ -12,7 +12,7 @@ from contest import Followed
 AIMS = {"pinocchio": 0.8, "compiled": 0.45}
 CALLED = {
     ("nmm", "pinocchio"): "nmm, Pinocchio's kinematics",
-    ("nmm", "compiled"): "nmm, compiled kinematics, `step`",
+    ("nmm", "compiled"): "nmm, compiled kinematics",
     ("floor", "floor"): "floor: by hand, no limits",
 }
 HEADS = (
