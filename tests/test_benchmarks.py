@@ -13,13 +13,14 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT / "benchmarks"), str(ROOT / "benchmarks" / "workers")]
 
-import contest  # noqa: E402
-import environments  # noqa: E402
-import growth  # noqa: E402
-import loop  # noqa: E402
-import of_nmm  # noqa: E402
-import tables  # noqa: E402
-import workloads  # noqa: E402
+# Scripts, and no package: they are found by the path above.
+import contest  # noqa: E402  # after the path
+import environments  # noqa: E402  # after the path
+import growth  # noqa: E402  # after the path
+import loop  # noqa: E402  # after the path
+import of_nmm  # noqa: E402  # after the path
+import tables  # noqa: E402  # after the path
+import workloads  # noqa: E402  # after the path
 
 NAMES = [*workloads.WORKLOADS]
 

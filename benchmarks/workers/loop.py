@@ -13,6 +13,7 @@ import os
 import sys
 import time
 import traceback
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -90,7 +91,7 @@ class Sliding:
 BASES = {"rolls": Rolling, "slides": Sliding}
 
 
-class Peer:
+class Peer(ABC):
     """A follower by a library that gives displacements of all joints; it says how in `displacement`.
 
     q, dq (m,) : the joints' positions and the last displacement, the base's in front
@@ -117,9 +118,9 @@ class Peer:
         self.base.reset()
         self.q_all[:] = [0.0, 0.0, *self._start[3:]] if self.rolls else self._start
 
+    @abstractmethod
     def displacement(self, T: np.ndarray) -> np.ndarray:
         """The displacement of all joints (m,) over dt, with the end-effector's placement to go for."""
-        raise NotImplementedError
 
     def step(self, k: int) -> None:
         """Sample k, and Euler's rule."""

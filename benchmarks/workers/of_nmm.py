@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from abc import ABC, abstractmethod
 from pathlib import Path
 
 import numpy as np
@@ -15,29 +16,20 @@ from loop import Told, serve
 from workloads import Workload
 
 
-class Ours:
-    """A follower by a control law u = law(t, q)."""
+class Ours(ABC):
+    """A robot at the beginning of its path, which steps along it."""
 
     def __init__(self, workload: Workload) -> None:
         self.workload, self.dt = workload, workload.dt
         self.t = workload.t.tolist()
         self.now = workload.q0.copy()
 
-    def law(self, t: float, q: np.ndarray) -> np.ndarray:
-        """u (m,)."""
-        raise NotImplementedError
-
     def reset(self) -> None:
         self.now = self.workload.q0.copy()
-        self._moves = np.zeros(len(self.now))
-        self._by_inputs = self._moves[1:]
 
+    @abstractmethod
     def step(self, k: int) -> None:
-        q, moves = self.now, self._moves
-        np.multiply(self.law(self.t[k], q), self.dt, self._by_inputs)
-        forward, theta = moves.item(1), q.item(2)
-        moves[0], moves[1] = forward * math.cos(theta), forward * math.sin(theta)
-        q += moves
+        """Sample k."""
 
     def q(self) -> list[float]:
         return self.now.tolist()
@@ -60,11 +52,21 @@ class Nmm(Ours):
 
 
 class Floor(Ours):
-    """The planar case by hand: Pinocchio's calls and one compiled function with every number in its text."""
+    """The planar case by hand: Pinocchio's calls, one compiled function with every number in its text, and
+    Euler's rule."""
 
     def __init__(self, workload: Workload) -> None:
         super().__init__(workload)
         self.law = floor_controller(1, "pg", workload.robot.model)
+        self._moves = np.zeros(len(self.now))
+        self._by_inputs = self._moves[1:]
+
+    def step(self, k: int) -> None:
+        q, moves = self.now, self._moves
+        np.multiply(self.law(self.t[k], q), self.dt, self._by_inputs)
+        forward, theta = moves.item(1), q.item(2)
+        moves[0], moves[1] = forward * math.cos(theta), forward * math.sin(theta)
+        q += moves
 
 
 def make(told: Told, variant: str, limits: bool) -> Ours | None:

@@ -12,6 +12,7 @@ import numpy as np
 from nmm.arrays import Array
 from nmm.errors import InputError, expect_known
 from nmm.runs.recorded import Recorded
+from nmm.words import listed
 
 #: What can be kept: quantities of a sample, by the names of a trajectory.
 QUANTITIES = ("q", "q_dot", "u", "r", "r_d", "error", "objective", "residual", "scale", "partition")
@@ -32,7 +33,7 @@ class Kept:
 
     Raises
     ------
-    InputError : a name that is none; more than there is memory for
+    InputError : a name that is none; a folder with nothing to keep in it; more than there is memory for
     """
 
     def __init__(
@@ -46,6 +47,8 @@ class Kept:
     ) -> None:
         for name in names:
             expect_known("keep", name, QUANTITIES, "rollout")
+        if folder is not None and not names:
+            raise InputError(f"folder: there is nothing to write; name what to keep, of {listed(QUANTITIES)}")
         self.names, self.every, self._folder = tuple(names), every, folder
         self.t = times[::every].copy()
         each = {name: getattr(shapes, name)[::every] for name in names}

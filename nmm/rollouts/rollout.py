@@ -135,8 +135,9 @@ def rollout(
     plant = Plant.of(robot.n, robot.n_u, count, noise, delay, slip, seed)
     if plant.disturbs and (method != "zoh" or until is not None or not controllers[0].compilable):
         raise InputError(
-            "rollout: noise, delay and slip are for method zoh, without a goal, and for controllers without "
-            f"distances, retreats, Armijo's rule and Python functions; got method {method}"
+            "rollout: noise, delay and slip are for method zoh, without a goal (of a scenario that has one, "
+            "hand over scenario.controller()), and for controllers without distances, retreats, Armijo's "
+            f"rule and Python functions; got method {method}{'' if until is None else ' and a goal'}"
         )
     if any(one.samples for one in controllers) and method == "adaptive":
         raise InputError(

@@ -21,7 +21,7 @@ from nmm.sweeps.work import Computed
 try:
     import fcntl
 except ImportError:  # Windows: nothing keeps two sweeps out of one folder there
-    fcntl = None  # type: ignore[assignment]
+    fcntl = None  # type: ignore[assignment]  # a module where there is one
 
 #: Marks a folder as one of ours.
 FORMAT = "nmm sweep 1"

@@ -6,12 +6,11 @@ import json
 import math
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-
 from nmm.sweeps.columns import Column, columns_of
 from nmm.sweeps.definition import Definition
 from nmm.sweeps.swept import Swept
 from nmm.sweeps.table import whole_file
+from nmm.templates import template
 from nmm.words import listed
 
 #: The most rollouts of a page; of more, points at equal distances are shown, each with all combinations.
@@ -24,15 +23,8 @@ SCRIPTS = ("data.js", "colours.js", "points.js", "parallel.js", "table.js", "sta
 def write_page(swept: Swept) -> None:
     """Write index.html, whole or not at all: maps, fronts, parallel coordinates and a table that filters."""
     definition = swept.definition
-    environment = Environment(
-        loader=PackageLoader("nmm.sweeps", "web"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     data = _data(swept)
-    text = environment.get_template("page.html").render(
+    text = template("nmm.sweeps", "web", "page.html").render(
         name=definition.name,
         title=definition.title,
         about=_about(definition),
