@@ -27,7 +27,7 @@ from nmm.platforms import Platform
 from nmm.resolvers import Dimensions, Problem, ProjectedGradient, ReducedGradient, Resolver, Setup, State
 from nmm.resolvers.answer import AnswerArrays, certify
 from nmm.resolvers.base import RESOLVER
-from nmm.resolvers.problem import ProblemArrays
+from nmm.resolvers.problem_arrays import ProblemArrays
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 from nmm.runs.simulation import simulate

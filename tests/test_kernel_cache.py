@@ -230,3 +230,62 @@ def test_only_folders_of_kernels_are_forgotten(tmp_path: Path) -> None:
         os.utime(tmp_path / name, (1e9 - age, 1e9 - age))
     cache._forget_old_caches(tmp_path)
     assert {path.name for path in tmp_path.iterdir()} == {*names[: cache.KEPT_CACHES - 1], "hulls"}
+
+
+PARTS = """
+import json, sys
+from nmm.kernels.cache import cache_folder
+from nmm.kernels.compiled import compiled
+
+@compiled
+def root(x):
+    if x < 0.0:
+        raise ValueError("below zero")
+    return x**0.5
+@compiled
+def twice(x):
+    return 2.0 * root(x)
+@compiled
+def fourfold(x):
+    return twice(x) + 2.0 * root(x)
+
+answers = [fourfold(4.0)]
+for function in (fourfold, root):
+    try:
+        function(-1.0)
+    except ValueError as error:
+        answers.append(error.args)
+print(json.dumps([answers, [sum(f.stats.cache_hits.values()) for f in (root, twice, fourfold)]]))
+"""
+
+
+def test_what_others_call_is_a_part_of_them(tmp_path: Path) -> None:
+    """No machine code of its own until Python calls it; errors come through, from the cache too."""
+    script = tmp_path / "script.py"
+    script.write_text(PARTS)
+    for hits in ([0, 0, 0], [1, 0, 1]):
+        done = subprocess.run(
+            [sys.executable, str(script)],
+            env=os.environ | {"XDG_CACHE_HOME": str(tmp_path / "cache")},
+            check=True,
+            capture_output=True,
+            text=True,
+        )
+        assert json.loads(done.stdout) == [[8.0, ["below zero"], ["below zero"]], hits]
+        assert not done.stderr
+    names = sorted(path.name.split("-")[0] for path in (tmp_path / "cache").rglob("*.nbc"))
+    assert names == ["script.fourfold", "script.root"]
+
+
+def test_the_first_compilation_of_all_is_told(folder: Path, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.INFO, "nmm")
+    cache._tell_of_the_first.cache_clear()
+    found_on_disk()
+    (record,) = caplog.records
+    assert record.getMessage().startswith("compiling for this machine, once")
+    cache._tell_of_the_first.cache_clear()
+    assert found_on_disk()
+    folder.rename(folder.with_name("kept"))
+    folder.mkdir()
+    assert not found_on_disk()
+    assert len(caplog.records) == 1, "a folder is there: others were compiled before"

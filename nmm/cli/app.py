@@ -24,7 +24,7 @@ from nmm.cli.options import (
     resolvers_of,
     settings_of,
 )
-from nmm.cli.output import complain
+from nmm.cli.output import complain, tell_what_takes_long
 from nmm.cli.redundancy import laps, redundancy
 from nmm.cli.robot_commands import check, info, robots, scenarios, view
 from nmm.cli.singularities import singularities
@@ -258,6 +258,7 @@ def main() -> NoReturn:
     # started it with "&" (for which the shell has set SIGINT to be ignored).
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
+    tell_what_takes_long()
     status = status_of(sys.argv[1:])
     gc.freeze()
     sys.exit(status)

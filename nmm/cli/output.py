@@ -56,6 +56,20 @@ def show_text(text: str = "") -> None:
     out.print(text, soft_wrap=not out.is_terminal)
 
 
+def tell_what_takes_long() -> None:
+    """Show on a terminal what nmm's log says of work that takes long; in a pipe, warnings alone come."""
+    if sys.stderr is None or not sys.stderr.isatty():
+        return
+    import logging
+
+    handler = logging.StreamHandler()
+    handler.setFormatter(logging.Formatter("nmm: %(message)s"))
+    logger = logging.getLogger("nmm")
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO)
+    logger.propagate = False
+
+
 def warn(text: str) -> None:
     """One line on standard error."""
     print(f"warning: {' '.join(text.split())}", file=sys.stderr)

@@ -18,7 +18,7 @@ from typing import NamedTuple
 from nmm.arrays import Array
 from nmm.kernels.compiled import compiled
 from nmm.kernels.memory import Cell, IntegerCell, IntegerVector, Matrix, Vector
-from nmm.resolvers.problem import ProblemArrays
+from nmm.resolvers.problem_arrays import ProblemArrays
 
 #: What `LimitNumbers.mode` says of a step: a sample's, an integrator's stage after it, one without limits.
 SAMPLE, STAGE, OFF = 0, 1, 2

@@ -10,7 +10,7 @@ from nmm.collisions.rows import Rows
 from nmm.control.bounds import COUNTED_ON, LimitNumbers, approach
 from nmm.kernels.compiled import compiled
 from nmm.kernels.memory import Cell, IntegerCell, Vector
-from nmm.resolvers.problem import ProblemArrays
+from nmm.resolvers.problem_arrays import ProblemArrays
 
 #: As far as an input goes in a sample, m or rad, where nothing limits its velocity.
 FARTHEST = 0.1

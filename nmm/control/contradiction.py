@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from nmm.resolvers.problem import ProblemArrays
+from nmm.resolvers.problem_arrays import ProblemArrays
 
 
 def contradicting(problem: ProblemArrays, inputs: Sequence[str], rows: Sequence[str]) -> tuple[str, ...]:

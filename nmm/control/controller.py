@@ -391,7 +391,7 @@ class Controller:
     def _solver(self) -> Callable[[float, Array], float]:
         """solve(t, q) -> status, with everything it needs at hand."""
         program, found, resolver = self._program, self._step, self.resolver
-        step = checked_by_caller(compiled_step, STEP)
+        step = checked_by_caller(compiled_step.compiled, STEP)
         dimensions, (integers, floats) = self._dimensions, program.blocks
         prepare = program.prepare if self.guard is None else self._measured(self.guard)
 

@@ -13,25 +13,18 @@ from numba import types
 
 from nmm.arrays import Array, Integers
 from nmm.collisions.rows import Rows
-from nmm.control.bounds import (
-    OFF,
-    SAMPLE,
-    LimitNumbers,
-    bound_inputs,
-    function_bounds,
-    wheel_rows,
-)
-from nmm.control.clearance_rows import Clearance, bound_unlimited, clearance_bounds
+from nmm.control.bounds import SAMPLE, LimitNumbers
+from nmm.control.clearance_rows import Clearance
 from nmm.control.steering import SteeringNumbers, steer
 from nmm.functions.program import BESIDE, Buffers, LaidOut, run
-from nmm.kernels.compiled import compiled, scratch
+from nmm.kernels.compiled import caller, compiled, kernel, scratch
 from nmm.kernels.followers import add_to_leaders, move_followers
 from nmm.kernels.linear_algebra import residual_norm
 from nmm.kernels.memory import Cell, IntegerMatrix, IntegerVector, Matrix, Vector, views
 from nmm.resolvers.answer import NOT_FINITE, RELAXED, SOLVED, AnswerArrays
 from nmm.resolvers.base import call_resolver
-from nmm.resolvers.limited import keep_limits, times
-from nmm.resolvers.problem import ProblemArrays
+from nmm.resolvers.problem_arrays import ProblemArrays
+from nmm.resolvers.within import keep_limits, times
 
 
 class TaskRows(NamedTuple):
@@ -81,6 +74,9 @@ class ControlStep(NamedTuple):
     steering : what sets the steering inputs that the task does not feel
     resolver, numbers, options, state : its kernel, what that reads, and what it remembers
     q_dot (n,) : S u
+    step : where the code of `step` begins, for loops, which hold no copy of it
+    limits_code, clearance_code : where that of `write_limits` and `write_clearance` begins; 0 where there
+        are none
     """
 
     near: Rows
@@ -100,10 +96,20 @@ class ControlStep(NamedTuple):
     state: IntegerVector
     answer: AnswerArrays
     q_dot: Vector
+    step: int
+    limits_code: int
+    clearance_code: int
 
 
 #: A step's arguments and what it returns.
 STEP = types.float64(types.float64, types.float64[::1], types.int64[::1], types.float64[::1])
+
+call_step = caller(STEP)
+
+#: What writes bounds for the resolver: q, and the blocks.
+BOUNDS = types.void(types.float64[::1], types.int64[::1], types.float64[::1])
+
+call_bounds = caller(BOUNDS)
 
 #: `resolve`'s.
 ANSWER = types.float64(types.float64[::1], types.int64[::1], types.float64[::1])
@@ -220,46 +226,6 @@ def told(task: TaskRows, problem: ProblemArrays, answer: AnswerArrays) -> None:
 
 
 @compiled
-def write_limits(limits: LimitNumbers, q: Array, b: Buffers, C: Arm, problem: ProblemArrays) -> None:
-    """Bounds of inputs, wheels and functions, with their rows; a stage keeps its sample's bounds."""
-    w = limits.spin.shape[0]
-    if limits.mode[()] == OFF:
-        for j in range(problem.u_lower.shape[0]):
-            problem.u_lower[j], problem.u_upper[j] = -math.inf, math.inf
-        for i in range(problem.lower.shape[0]):
-            problem.lower[i], problem.upper[i] = -math.inf, math.inf
-        return
-    if w > 0:
-        wheel_rows(limits, q, b.G, problem)
-    for i in range(limits.rows.shape[0]):
-        times_S(b.value_q, limits.rows[i], b.G, C, problem.limit_rows[w + i])
-    if limits.mode[()] == SAMPLE:
-        bound_inputs(limits, q, problem)
-        function_bounds(limits, b.value, b.value_t, problem)
-
-
-@compiled
-def write_clearance(e: ControlStep, b: Buffers) -> None:
-    """Rows and bounds of distances; a stage keeps its sample's bounds and gradients, S is its own."""
-    count, n = e.near.d_q.shape
-    if e.limits.mode[()] == OFF or count == 0:
-        return
-    gradient = scratch((1, n))
-    for k in range(count):
-        row = e.problem.limit_rows[e.clearance.first[()] + k]
-        if k < e.near.used[()]:
-            for j in range(n):
-                gradient[0, j] = e.near.d_q[k, j]
-            times_S(gradient, 0, b.G, e.arm, row)
-        elif e.limits.mode[()] == SAMPLE:
-            for j in range(row.shape[0]):
-                row[j] = 0.0
-    if e.limits.mode[()] == SAMPLE:
-        bound_unlimited(e.limits, e.problem)
-        clearance_bounds(e.clearance, e.near, e.limits.acceleration, e.problem)
-
-
-@compiled
 def finish(q: Array, integers: Integers, floats: Array) -> None:
     """From the resolver's inputs to the robot's: limits, the steering that the task does not feel, q_dot."""
     b = views(LaidOut, integers, floats, 0).buffers
@@ -278,8 +244,8 @@ def finish(q: Array, integers: Integers, floats: Array) -> None:
 def resolve(q: Array, integers: Integers, floats: Array) -> float:
     """The resolver's inputs for the equations that are there, within limits. Returns its status."""
     e = views(ControlStep, integers, floats, BESIDE)
-    if e.near.d.shape[0] > 0:
-        write_clearance(e, views(LaidOut, integers, floats, 0).buffers)
+    if e.clearance_code != 0:
+        call_bounds(e.clearance_code, q, integers, floats)
     answer = e.answer
     for j in range(answer.u.shape[0]):
         answer.u[j] = math.nan  # what a resolver that finds no solution leaves behind
@@ -294,7 +260,7 @@ def resolve(q: Array, integers: Integers, floats: Array) -> float:
     return float(answer.status[()])
 
 
-@compiled
+@kernel(STEP)
 def step(t: float, q: Array, integers: Integers, floats: Array) -> float:
     """One control step: functions, equations, gradient, inputs. Returns the resolver's status.
 
@@ -321,5 +287,6 @@ def step(t: float, q: Array, integers: Integers, floats: Array) -> float:
         for j in range(n):
             gradient[0, j] += e.steering.spring[()] * b.value_q[spring, j]
     times_S(gradient, 0, b.G, e.arm, problem.h)
-    write_limits(e.limits, q, b, e.arm, problem)
+    if e.limits_code != 0:
+        call_bounds(e.limits_code, q, integers, floats)
     return resolve(q, integers, floats)

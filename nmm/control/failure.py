@@ -9,7 +9,7 @@ from nmm.control.lost_directions import in_world_axes, lost_directions
 from nmm.functions.function import row_scales
 from nmm.functions.tasks.task import Stack
 from nmm.resolvers.answer import Status
-from nmm.resolvers.problem import ProblemArrays
+from nmm.resolvers.problem_arrays import ProblemArrays
 from nmm.robots.robot import Robot
 from nmm.words import listed
 

@@ -20,7 +20,7 @@ from nmm.collisions.setting import Setting
 from nmm.control.equations import ControlStep, drive
 from nmm.functions.program import BESIDE, Program
 from nmm.resolvers.answer import RELAXED, Status
-from nmm.resolvers.limited import LEFT
+from nmm.resolvers.within import LEFT
 
 #: Rows keep distances by MARGIN more than asked for, m; ways have to keep them by SLACK more: between
 #: looks they may dip.

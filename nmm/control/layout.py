@@ -7,9 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from nmm.collisions.rows import no_rows
+from nmm.control.bounded_step import write_clearance, write_limits
 from nmm.control.clearance_rows import Clearance
 from nmm.control.collisions import Collisions
 from nmm.control.equations import Arm, ControlStep
+from nmm.control.equations import step as compiled_step
 from nmm.control.guard import CUTS, MARGIN
 from nmm.control.limits import Limits, LimitsOn
 from nmm.control.steering import NOTHING, Steered
@@ -21,6 +23,7 @@ from nmm.functions.tasks.task import Stack
 from nmm.kernels.memory import views
 from nmm.resolvers.answer import unanswered
 from nmm.resolvers.base import Resolver
+from nmm.resolvers.limited import limit
 from nmm.resolvers.problem import Dimensions, Problem
 from nmm.resolvers.state import State
 from nmm.robots.robot import Robot
@@ -96,6 +99,7 @@ def lay_out(
         limit_levels=[*(task.place(priority) for priority in kept.priorities), *(0 for _ in near.d)],
     )
     dimensions = problem.dimensions
+    limited = limits is not None or collisions is not None
     setup, state = resolver.setup(dimensions), resolver.start(dimensions)
     program.lay_out(
         ControlStep(
@@ -107,7 +111,7 @@ def lay_out(
             terms=np.array(first[tasks:after], dtype=np.int64),
             weights=np.array([weight for weight, _ in weighted]),
             H=np.array(0.0),
-            problem=problem.arrays,
+            problem=problem.arrays._replace(limiter=limit.address if limited else 0),
             limits=kept.numbers(first[after : after + len(kept.functions)], robot),
             steering=NOTHING
             if steered is None
@@ -118,6 +122,9 @@ def lay_out(
             state=state.memory,
             answer=unanswered(m, len(dimensions.levels)),
             q_dot=np.zeros(robot.n),
+            step=compiled_step.address,
+            limits_code=write_limits.address if limited else 0,
+            clearance_code=write_clearance.address if len(near.d) else 0,
         )
     )
     step = views(ControlStep, *program.blocks, BESIDE)

@@ -10,7 +10,7 @@ from nmm.arrays import Array, Integers
 from nmm.control.bounds import LimitNumbers
 from nmm.control.retreat import Backing
 from nmm.control.step_size import StepSize
-from nmm.resolvers.problem import ProblemArrays
+from nmm.resolvers.problem_arrays import ProblemArrays
 
 
 class Snapshot(NamedTuple):

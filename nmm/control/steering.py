@@ -25,8 +25,8 @@ from nmm.functions.tasks.task import Task
 from nmm.kernels.compiled import compiled
 from nmm.kernels.memory import Cell, IntegerCell, IntegerVector, Vector
 from nmm.platforms.steering import SteeringPivot
-from nmm.resolvers.limited import times
-from nmm.resolvers.problem import ProblemArrays
+from nmm.resolvers.problem_arrays import ProblemArrays
+from nmm.resolvers.within import times
 from nmm.robots.loading.tips import first_tip
 from nmm.robots.reach import reach
 from nmm.robots.robot import Robot

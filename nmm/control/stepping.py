@@ -9,7 +9,7 @@ from numba import types
 
 from nmm.arrays import Array, Integers
 from nmm.control.bounds import SAMPLE, STAGE
-from nmm.control.equations import ControlStep, step
+from nmm.control.equations import ControlStep, call_step
 from nmm.control.integrators import Followed, Integrator, RungeKutta, ZeroOrderHold
 from nmm.functions.program import BESIDE, LaidOut
 from nmm.kernels.compiled import checked_by_caller, compiled, scratch
@@ -83,7 +83,7 @@ def go_on(
                 total += (method.weights[a] if k == stages else method.matrix[k, a]) * slopes[a, i]
             stage[i] = q[i] + dt * total
         if k < stages:
-            status = step(t + method.nodes[k] * dt, stage, integers, floats)
+            status = call_step(e.step, t + method.nodes[k] * dt, stage, integers, floats)
             if status >= SINGULAR_J:
                 break
     e.limits.mode[()] = mode
@@ -108,8 +108,8 @@ def advance(
 ) -> float:
     """A sample at (t, q) and the way to the next. ahead (n,): q at t + dt; u (m,): the inputs at t. Returns
     the status of the first step that failed, else that of the step at t."""
-    status = step(t, q, integers, floats)
     e = views(ControlStep, integers, floats, BESIDE)
+    status = float(call_step(e.step, t, q, integers, floats))
     for j in range(u.shape[0]):
         u[j] = e.answer.u[j]
     if status >= SINGULAR_J:

@@ -88,6 +88,7 @@ class KernelCache(caching.FunctionCache):
         key = self._key(sig, target_context.codegen())
         data = None if key is None else kept.read(self._path(key))
         if data is None:
+            _tell_of_the_first()
             return None
         try:
             found, parts = pickle.loads(data)
@@ -125,6 +126,12 @@ class KernelCache(caching.FunctionCache):
         code = self._py_func.__code__
         name = re.sub(r"[^\w.]", "", code.co_qualname)[-80:]
         return f"{self._source.stem[:80]}.{name}-{code.co_firstlineno}"
+
+
+@cache
+def _tell_of_the_first() -> None:
+    if not cache_folder().exists():
+        logging.getLogger("nmm").info("compiling for this machine, once: a minute at most, on most machines")
 
 
 @cache  # it has not changed when the next function is compiled

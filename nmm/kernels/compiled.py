@@ -27,8 +27,9 @@ from numba.core.errors import TypingError
 from numba.extending import intrinsic, lower_builtin, overload, type_callable
 
 from nmm.kernels.cache import KernelCache
+from nmm.kernels.parts import KernelDispatcher
 
-Plain = Callable[..., None]
+Plain = Callable[..., Any]
 
 
 def _without_scipy() -> None:
@@ -69,8 +70,8 @@ class Kernel:
         self.plain = plain
         self._signature = signature
 
-    def __call__(self, *arguments: Any) -> None:
-        self.compiled(*arguments)
+    def __call__(self, *arguments: Any) -> Any:
+        return self.compiled(*arguments)
 
     @cached_property
     def compiled(self) -> Any:
@@ -106,9 +107,11 @@ def compiled(function: Callable[..., Any], allocates: bool = False, nogil: bool 
     that the resolvers report, not an exception out of compiled code. Arrays are neither made (but see
     `scratch`) nor returned: counting references to them would take half of a control step.
     """
-    made = numba.njit(error_model="numpy", _nrt=allocates, nogil=nogil)(function)
-    if isinstance(made, Dispatcher):  # the function itself with NUMBA_DISABLE_JIT=1
-        made._cache = KernelCache(function)  # type: ignore[attr-defined]  # as `enable_caching` does with numba's own
+    if numba.config.DISABLE_JIT:
+        return function
+    options = {"nopython": True, "error_model": "numpy", "_nrt": allocates, "nogil": nogil}
+    made = KernelDispatcher(function, options)
+    made._cache = KernelCache(function)  # as `enable_caching` does with numba's own
     return made
 
 
@@ -231,30 +234,31 @@ def clear(array: Any) -> None:
         numbers[i] = 0.0
 
 
-def caller(signature: Any) -> Callable[..., None]:
+def caller(signature: Any) -> Callable[..., Any]:
     """A function `call(address, *arguments)` for kernels of one signature, plain and compiled."""
+    returned = signature.return_type
 
-    def call(address: int, *arguments: Any) -> None:
-        _plain_by_address[address](*arguments)
+    def call(address: int, *arguments: Any) -> Any:
+        return _plain_by_address[address](*arguments)
 
     @intrinsic
     def through_pointer(context: Any, address: Any, arguments: Any) -> Any:
         def generate(context: Any, builder: Any, signature_here: Any, values: Any) -> Any:
             convention = context.call_conv
-            pointer_type = convention.get_function_type(types.none, signature.args).as_pointer()
+            pointer_type = convention.get_function_type(returned, signature.args).as_pointer()
             function = builder.inttoptr(values[0], pointer_type)
             unpacked = cgutils.unpack_tuple(builder, values[1])
-            status, _ = convention.call_function(builder, function, types.none, signature.args, unpacked)
+            status, result = convention.call_function(builder, function, returned, signature.args, unpacked)
             with cgutils.if_unlikely(builder, status.is_error):
                 convention.return_status_propagate(builder, status)
-            return context.get_dummy_value()
+            return result
 
-        return types.void(types.int64, types.Tuple(signature.args)), generate
+        return returned(types.int64, types.Tuple(signature.args)), generate
 
     @overload(call)
     def call_compiled(address: Any, *arguments: Any) -> Any:
-        def through(address: Any, *arguments: Any) -> None:
-            through_pointer(address, arguments)
+        def through(address: Any, *arguments: Any) -> Any:
+            return through_pointer(address, arguments)
 
         return through
 

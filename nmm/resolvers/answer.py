@@ -13,7 +13,7 @@ from nmm.arrays import Array
 from nmm.kernels.compiled import compiled, inlined
 from nmm.kernels.linear_algebra import residual_norm
 from nmm.kernels.memory import Cell, Vector
-from nmm.resolvers.problem import ProblemArrays
+from nmm.resolvers.problem_arrays import ProblemArrays
 
 
 class Status(IntEnum):

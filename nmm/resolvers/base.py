@@ -13,9 +13,10 @@ from nmm.errors import InputError, expect_known
 from nmm.kernels.compiled import Kernel, caller
 from nmm.kernels.memory import record_type
 from nmm.resolvers.answer import Answer, AnswerArrays, unanswered
-from nmm.resolvers.limited import keep_limits
-from nmm.resolvers.problem import Dimensions, Problem, ProblemArrays
+from nmm.resolvers.problem import Dimensions, Problem
+from nmm.resolvers.problem_arrays import ProblemArrays
 from nmm.resolvers.state import State
+from nmm.resolvers.within import keep_limits
 
 #: A resolver's kernel: (problem, numbers, options, state, answer), of `ProblemArrays`, the numbers and
 #: options of its `Setup`, the integers of its `State`, and the `AnswerArrays` that it writes.
@@ -51,8 +52,8 @@ class Resolver(ABC):
     """u = resolve(problem). To add one, write in a file of its own a kernel and a subclass with:
 
     1. `kernel`, of signature `RESOLVER`, which solves J u = rate, writes u and measure, and ends with
-       `certify` (residual and status), or writes the status of what went wrong and leaves u; where u is not
-       `within` the limits it calls `limit` with its metric, else that is done after it, in the Euclidean one;
+       `certify` (residual and status), or writes the status of what went wrong and leaves u; it
+       may end with `bring_within` in its metric, else that is done after it, in the Euclidean one;
     2. `setup(dimensions)`, the numbers that it reads; raises `InputError` for a problem that it cannot
        resolve.
 

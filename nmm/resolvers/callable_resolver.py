@@ -15,8 +15,9 @@ from nmm.kernels.compiled import Kernel, kernel
 from nmm.kernels.linear_algebra import residual_norm
 from nmm.resolvers.answer import SOLVED, Answer, AnswerArrays, Status, certified
 from nmm.resolvers.base import NO_OPTIONS, RESOLVER, Resolver, Setup
-from nmm.resolvers.limited import limit, within
-from nmm.resolvers.problem import Dimensions, Problem, ProblemArrays
+from nmm.resolvers.problem import Dimensions, Problem
+from nmm.resolvers.problem_arrays import ProblemArrays
+from nmm.resolvers.within import bring_within
 
 
 @kernel(RESOLVER)
@@ -81,5 +82,4 @@ class CallableResolver(Resolver):
             if found.status is not Status.SOLVED and answer.status[()] < Status.SINGULAR_J:
                 answer.status[()] = found.status
                 answer.scale[:] = found.scale
-        if not within(problem, answer.u):
-            limit(problem, NO_METRIC, answer)
+        bring_within(problem, NO_METRIC, answer)

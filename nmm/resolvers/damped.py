@@ -6,7 +6,7 @@ from nmm.arrays import Array
 from nmm.kernels.compiled import compiled, scratch
 from nmm.kernels.damping import damped_solution
 from nmm.resolvers.answer import INEXACT, RELAXED, AnswerArrays, certify
-from nmm.resolvers.problem import ProblemArrays
+from nmm.resolvers.problem_arrays import ProblemArrays
 
 
 @compiled

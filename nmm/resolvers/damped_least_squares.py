@@ -13,9 +13,10 @@ from nmm.kernels.damping import BELOW, LARGEST
 from nmm.resolvers.answer import AnswerArrays
 from nmm.resolvers.base import RESOLVER, Resolver, Setup, StepRule, step_rule
 from nmm.resolvers.damped import damp
-from nmm.resolvers.limited import limit, within
-from nmm.resolvers.problem import Dimensions, ProblemArrays
+from nmm.resolvers.problem import Dimensions
+from nmm.resolvers.problem_arrays import ProblemArrays
 from nmm.resolvers.weights import Weights, metric_root
+from nmm.resolvers.within import bring_within
 
 #: Numbers: α, λ, ε and, with weights, C row after row. Options: which law, in the order of `Damping`.
 ALPHA, DAMPING, THRESHOLD, C = 0, 1, 2, 3
@@ -33,8 +34,7 @@ def damped_least_squares(
     plain = numbers.shape[0] == C
     W = view(numbers, 0 if plain else C, (0, 0) if plain else (m, m))
     damp(problem, numbers[ALPHA], options[LAW], numbers[DAMPING], numbers[THRESHOLD], W, answer)
-    if not within(problem, answer.u):
-        limit(problem, W, answer)
+    bring_within(problem, W, answer)
 
 
 class DampedLeastSquares(Resolver):

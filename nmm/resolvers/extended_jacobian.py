@@ -21,8 +21,9 @@ from nmm.resolvers.answer import (
     certify,
 )
 from nmm.resolvers.base import RESOLVER, Resolver, Setup
-from nmm.resolvers.limited import limit, within
-from nmm.resolvers.problem import Dimensions, ProblemArrays
+from nmm.resolvers.problem import Dimensions
+from nmm.resolvers.problem_arrays import ProblemArrays
+from nmm.resolvers.within import beyond, bring_within, call_limit
 
 #: Numbers: the tolerance. Options: whether the added task is damped where it asks for what the task fixes.
 TOLERANCE = 0
@@ -40,8 +41,7 @@ def extended_jacobian(
     J = problem.J
     s, m = J.shape
     if options[DAMPED] == 1 and damped_beside(problem, numbers[TOLERANCE], answer):
-        if not within(problem, answer.u):
-            limit(problem, view(numbers, 0, (0, 0)), answer)
+        bring_within(problem, view(numbers, 0, (0, 0)), answer)
         return
     M = scratch((m, m + 1))
     scales = scratch(m)
@@ -61,10 +61,10 @@ def extended_jacobian(
     for j in range(m):
         answer.u[j] = M[j, m]
     certify(problem, answer)
-    if not within(problem, answer.u):
+    if beyond(problem, answer):
         T = scratch((m, m))
         inverse(problem, T)
-        limit(problem, T, answer)
+        call_limit(problem.limiter, problem, T, answer)
 
 
 @compiled

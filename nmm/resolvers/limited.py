@@ -14,49 +14,24 @@ from __future__ import annotations
 import math
 
 from nmm.arrays import Array
-from nmm.kernels.active_set import FEASIBLE, Rows, nearest_within
-from nmm.kernels.compiled import clear, compiled, integer_scratch, scratch, view
+from nmm.kernels.active_set import Rows, nearest_within
+from nmm.kernels.compiled import clear, compiled, integer_scratch, kernel, scratch, view
 from nmm.kernels.linear_algebra import eliminate, residual_norm
 from nmm.resolvers.answer import (
     EXACT,
     FALLBACK,
     INEXACT,
-    NOT_FINITE,
     RELAXED,
     SINGULAR_J,
     SOLVED,
     AnswerArrays,
     certify,
 )
-from nmm.resolvers.problem import ProblemArrays
+from nmm.resolvers.problem_arrays import ProblemArrays
+from nmm.resolvers.within import LIMIT, times, within
 
 #: A scale below 1 by no more than this is rounding.
 WHOLE = 1e-12
-#: Rows of limits that a resolver has seen to are missed by no more than this.
-LEFT = 1e-9
-
-
-@compiled
-def within(problem: ProblemArrays, u: Array, rounding: float = FEASIBLE) -> bool:
-    """Whether the inputs are within the limits; rows of limits may be missed by rounding."""
-    for j in range(u.shape[0]):
-        if not problem.u_lower[j] <= u[j] <= problem.u_upper[j]:
-            return False
-    for i in range(problem.lower.shape[0]):
-        value = times(problem.limit_rows, i, u)
-        lower, upper = problem.lower[i], problem.upper[i]
-        if value < lower - rounding * max(1.0, abs(lower)) or value > upper + rounding * max(1.0, abs(upper)):
-            return False
-    return True
-
-
-@compiled
-def times(A: Array, row: int, x: Array) -> float:
-    """A[row] . x."""
-    total = 0.0
-    for j in range(x.shape[0]):
-        total += A[row, j] * x[j]
-    return total
 
 
 @compiled
@@ -128,13 +103,15 @@ def fall_back(problem: ProblemArrays, answer: AnswerArrays) -> None:
     answer.status[()] = FALLBACK
 
 
-@compiled
+@kernel(LIMIT)
 def limit(problem: ProblemArrays, T: Array, answer: AnswerArrays) -> None:
     """Bring the resolver's inputs within the limits: u, scale, residual, status, excess.
 
-    T (m, m) is the inverse of the metric B; (0, 0) where B is the identity.
+    T (m, m) is the inverse of the metric B; (0, 0) where B is the identity. Where there are no inputs, the
+    nearest to rest stand in for them.
     """
     if answer.status[()] >= SINGULAR_J:
+        fall_back(problem, answer)
         return
     s, m = problem.J.shape
     c = m + problem.lower.shape[0]
@@ -343,33 +320,3 @@ def judge(problem: ProblemArrays, wanted: Array, answer: AnswerArrays) -> None:
         before = INEXACT if astray > EXACT * (1.0 + math.sqrt(asked)) else RELAXED
     if before != SOLVED:
         answer.status[()] = before
-
-
-@compiled
-def undefined(problem: ProblemArrays) -> bool:
-    """Whether the task or the gradient is no number: that ends a run, as it does without limits."""
-    total = 0.0
-    for j in range(problem.h.shape[0]):
-        total += problem.h[j]
-        for i in range(problem.J.shape[0]):
-            total += problem.J[i, j]
-    for i in range(problem.rate.shape[0]):
-        total += problem.rate[i]
-    return not math.isfinite(total)
-
-
-@compiled
-def keep_limits(problem: ProblemArrays, answer: AnswerArrays) -> None:
-    """What a resolver itself did not see to: inputs it did not find, or left beyond the limits."""
-    limited = problem.lower.shape[0] > 0
-    for j in range(answer.u.shape[0]):
-        limited = limited or not (math.isinf(problem.u_lower[j]) and math.isinf(problem.u_upper[j]))
-    seen_to = not math.isnan(answer.excess[()])
-    if not seen_to:
-        answer.excess[()] = 0.0
-    if not limited or (answer.status[()] == NOT_FINITE and undefined(problem)):
-        return
-    if answer.status[()] >= SINGULAR_J:
-        fall_back(problem, answer)
-    elif not seen_to and not within(problem, answer.u, LEFT):
-        limit(problem, scratch((0, 0)), answer)

@@ -1,4 +1,4 @@
-"""What a resolver gets: the problem of one control step, as one record."""
+"""What a resolver gets: the problem of one control step."""
 
 from __future__ import annotations
 
@@ -11,46 +11,11 @@ from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, Integers, array, one_line, scalar, vector
 from nmm.errors import InputError
-from nmm.kernels.memory import Cell, IntegerVector, Matrix, Vector
-
-
-class ProblemArrays(NamedTuple):
-    """A `Problem` as kernels read it: s rows in levels, k added rows, l rows of limits, m inputs.
-
-    J (s, m), rate (s,) : J u = rate, one level of priority below the other
-    row_scales (s,) : the natural size of each row, in its unit
-    ends (levels,) : the row after the last of each level
-    added_J (k, m), added_rate (k,), added_row_scales (k,) : the added task of the extended Jacobian
-    h (m,) : the objective's gradient, seen by the inputs
-    u_lower, u_upper (m,) : u_lower <= u <= u_upper, infinite for none
-    limit_rows (l, m), lower (l,), upper (l,) : lower <= limit_rows u <= upper
-    limit_levels (l,) : 0 for rows that are always kept, k for those that are kept before the k-th level
-    active (1 + m + l,) : which of them held back the step before (see `nearest_within`); changed
-    before (m,) : the inputs of the step before
-    dt () : the time that u will stand, s; not a number where it is not known
-    """
-
-    J: Matrix
-    rate: Vector
-    row_scales: Vector
-    ends: IntegerVector
-    added_J: Matrix
-    added_rate: Vector
-    added_row_scales: Vector
-    h: Vector
-    u_lower: Vector
-    u_upper: Vector
-    limit_rows: Matrix
-    lower: Vector
-    upper: Vector
-    limit_levels: IntegerVector
-    active: IntegerVector
-    before: Vector
-    dt: Cell
-
+from nmm.resolvers.limited import limit
+from nmm.resolvers.problem_arrays import ProblemArrays
 
 #: What kernels have beside the problem's own numbers.
-MEMORY = ("ends", "active")
+MEMORY = ("ends", "active", "limiter")
 
 
 class Dimensions(NamedTuple):
@@ -179,7 +144,8 @@ class Problem:
         ends = np.cumsum(self.levels or (), dtype=np.int64)
         own = {name: np.asarray(getattr(self, name)) for name in ProblemArrays._fields if name not in MEMORY}
         active = np.zeros(1 + len(own["h"]) + len(own["lower"]), dtype=np.int64)
-        return ProblemArrays(ends=ends, active=active, **own)
+        limited = len(own["lower"]) > 0 or np.isfinite([own["u_lower"], own["u_upper"]]).any()
+        return ProblemArrays(ends=ends, active=active, limiter=limit.address if limited else 0, **own)
 
 
 def _rows(value: ArrayLike, m: int, name: str) -> Array:

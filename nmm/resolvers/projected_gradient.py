@@ -13,9 +13,10 @@ from nmm.kernels.linear_algebra import closest_solution, orthonormal_rows
 from nmm.resolvers.answer import SINGULAR_J, AnswerArrays, certify
 from nmm.resolvers.base import NO_OPTIONS, RESOLVER, Resolver, Setup, StepRule, step_rule
 from nmm.resolvers.damped import damp, unweigh, weigh
-from nmm.resolvers.limited import limit, within
-from nmm.resolvers.problem import Dimensions, ProblemArrays
+from nmm.resolvers.problem import Dimensions
+from nmm.resolvers.problem_arrays import ProblemArrays
 from nmm.resolvers.weights import Weights, metric_root
+from nmm.resolvers.within import bring_within
 
 #: Numbers: α, the tolerance and, with weights, C row after row.
 ALPHA, TOLERANCE, C = 0, 1, 2
@@ -38,8 +39,7 @@ def projected_gradient(
         plain = numbers.shape[0] == C
         metric = view(numbers, 0 if plain else C, (0, 0) if plain else (m, m))
         damp(problem, alpha, DIRECTIONS, LARGEST, BELOW, metric, answer)
-        if not within(problem, u):
-            limit(problem, metric, answer)
+        bring_within(problem, metric, answer)
         return
     order = integer_scratch(s)
     L = scratch((s, s))
@@ -65,9 +65,8 @@ def projected_gradient(
         closest_solution(problem.rate, u0, order, L, Q, solution)
         unweigh(W, solution, u)
     certify(problem, answer)
-    if not within(problem, u):
-        plain = numbers.shape[0] == C
-        limit(problem, view(numbers, 0 if plain else C, (0, 0) if plain else (m, m)), answer)
+    plain = numbers.shape[0] == C
+    bring_within(problem, view(numbers, 0 if plain else C, (0, 0) if plain else (m, m)), answer)
 
 
 class ProjectedGradient(Resolver):

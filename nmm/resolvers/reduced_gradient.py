@@ -15,7 +15,6 @@ from nmm.kernels.damping import BELOW, DIRECTIONS, LARGEST, step_threshold
 from nmm.resolvers.answer import INEXACT, RELAXED, SINGULAR_J, SINGULAR_JA, AnswerArrays, certify
 from nmm.resolvers.base import RESOLVER, Resolver, Setup, StepRule, step_rule
 from nmm.resolvers.damped import damp
-from nmm.resolvers.limited import limit, within
 from nmm.resolvers.partitions import (
     COLUMNS,
     FREE,
@@ -30,8 +29,10 @@ from nmm.resolvers.partitions import (
     solve_partition,
     volume,
 )
-from nmm.resolvers.problem import Dimensions, ProblemArrays
+from nmm.resolvers.problem import Dimensions
+from nmm.resolvers.problem_arrays import ProblemArrays
 from nmm.resolvers.weights import Weights, weight_diagonal
+from nmm.resolvers.within import beyond, bring_within, call_limit
 
 #: Numbers: α, Θ, the tolerance and, with weights, c = W^(-1/2).
 ALPHA, THRESHOLD, TOLERANCE, C = 0, 1, 2, 3
@@ -98,14 +99,14 @@ def reduced_gradient(
     certify(problem, answer)
     if share > 0.0:
         blend(problem, numbers, weighted, share, answer)
-    if not within(problem, u):
+    if beyond(problem, answer):
         T = scratch((m, m))
         reduced_metric(M, columns, 1.0 - share, T)
         if weighted:
             for i in range(m):
                 for j in range(m):
                     T[i, j] *= numbers[C + i]
-        limit(problem, T, answer)
+        call_limit(problem.limiter, problem, T, answer)
 
 
 @compiled
@@ -125,8 +126,7 @@ def damp_alone(problem: ProblemArrays, numbers: Array, weighted: bool, answer: A
     W = scratch((m, m))
     metric(numbers, weighted, W)
     damp(problem, numbers[ALPHA], DIRECTIONS, LARGEST, BELOW, W, answer)
-    if not within(problem, answer.u):
-        limit(problem, W, answer)
+    bring_within(problem, W, answer)
 
 
 @compiled

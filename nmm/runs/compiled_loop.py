@@ -15,7 +15,7 @@ from numba import types
 
 from nmm.arrays import Array, Integers
 from nmm.control.controller import Controller
-from nmm.control.equations import ControlStep, step
+from nmm.control.equations import ControlStep, call_step
 from nmm.control.goal import Goal
 from nmm.control.integrators import Integrator
 from nmm.control.stepping import Tableau, go_on, tableau
@@ -113,7 +113,7 @@ def sample(t: float, earlier: float, q: Array, integers: Integers, floats: Array
     usual = e.limits.elapsed[()]
     if t - earlier < e.problem.dt[()] * (1.0 - 1e-9):
         e.limits.elapsed[()] = t - earlier
-    status = step(t, q, integers, floats)
+    status = float(call_step(e.step, t, q, integers, floats))
     e.limits.elapsed[()] = usual
     return status
 

@@ -1,0 +1,61 @@
+"""What limits and distances add to a control step: their bounds and rows, for the resolver.
+
+A step calls this code by its address, so that it is compiled only where something is limited.
+"""
+
+from __future__ import annotations
+
+import math
+
+from nmm.arrays import Array, Integers
+from nmm.control.bounds import OFF, SAMPLE, bound_inputs, function_bounds, wheel_rows
+from nmm.control.clearance_rows import bound_unlimited, clearance_bounds
+from nmm.control.equations import BOUNDS, ControlStep, times_S
+from nmm.functions.program import BESIDE, LaidOut
+from nmm.kernels.compiled import kernel, scratch
+from nmm.kernels.memory import views
+
+
+@kernel(BOUNDS)
+def write_limits(q: Array, integers: Integers, floats: Array) -> None:
+    """Bounds of inputs, wheels and functions, with their rows; a stage keeps its sample's bounds."""
+    b = views(LaidOut, integers, floats, 0).buffers
+    e = views(ControlStep, integers, floats, BESIDE)
+    limits, problem = e.limits, e.problem
+    w = limits.spin.shape[0]
+    if limits.mode[()] == OFF:
+        for j in range(problem.u_lower.shape[0]):
+            problem.u_lower[j], problem.u_upper[j] = -math.inf, math.inf
+        for i in range(problem.lower.shape[0]):
+            problem.lower[i], problem.upper[i] = -math.inf, math.inf
+        return
+    if w > 0:
+        wheel_rows(limits, q, b.G, problem)
+    for i in range(limits.rows.shape[0]):
+        times_S(b.value_q, limits.rows[i], b.G, e.arm, problem.limit_rows[w + i])
+    if limits.mode[()] == SAMPLE:
+        bound_inputs(limits, q, problem)
+        function_bounds(limits, b.value, b.value_t, problem)
+
+
+@kernel(BOUNDS)
+def write_clearance(q: Array, integers: Integers, floats: Array) -> None:
+    """Rows and bounds of distances; a stage keeps its sample's bounds and gradients, S is its own."""
+    b = views(LaidOut, integers, floats, 0).buffers
+    e = views(ControlStep, integers, floats, BESIDE)
+    count, n = e.near.d_q.shape
+    if e.limits.mode[()] == OFF or count == 0:
+        return
+    gradient = scratch((1, n))
+    for k in range(count):
+        row = e.problem.limit_rows[e.clearance.first[()] + k]
+        if k < e.near.used[()]:
+            for j in range(n):
+                gradient[0, j] = e.near.d_q[k, j]
+            times_S(gradient, 0, b.G, e.arm, row)
+        elif e.limits.mode[()] == SAMPLE:
+            for j in range(row.shape[0]):
+                row[j] = 0.0
+    if e.limits.mode[()] == SAMPLE:
+        bound_unlimited(e.limits, e.problem)
+        clearance_bounds(e.clearance, e.near, e.limits.acceleration, e.problem)

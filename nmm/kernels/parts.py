@@ -1,0 +1,100 @@
+"""Compiled functions that other compiled functions call: parts of them, without machine code of their own.
+
+numba makes machine code of each function that a compiled one calls, with a door for Python and one for C,
+though the caller takes in the function's instructions and optimises all of them again. Of a control step's
+hundred functions Python calls three, and compiling for nobody took most of a first run.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba._dynfunc import make_function
+from numba.core import compiler, types
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler_machinery import register_pass
+from numba.core.environment import lookup_environment
+from numba.core.registry import CPUDispatcher
+from numba.core.typed_passes import NativeLowering
+
+_NO_DOORS = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+
+class _PartLibrary(JITCodeLibrary):
+    """Instructions to be linked into those of callers, which optimise them and make machine code."""
+
+    def finalize(self) -> None:
+        self._raise_if_finalized()
+        for library in dict.fromkeys(self._linking_libraries):
+            self._reload_init.update(library._reload_init)
+            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _PartLowering(NativeLowering):
+    """Lowering into a `_PartLibrary`."""
+
+    _name = "nmm_part_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        state.library = _PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.flags.no_compile = True
+        super().run_pass(state)
+        result = state["cr"]
+        name = result.fndesc.qualname
+        # What numba knows the part by; nobody calls it.
+        entry = make_function(result.fndesc.lookup_module(), name, name, 0, result.env, (state.library,))
+        state.targetctx.insert_user_function(entry, result.fndesc, [state.library])
+        state.reload_init.extend(state.library._reload_init)
+        state["cr"] = result._replace(cfunc=entry)
+        return True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _WholeLowering(NativeLowering):
+    """Lowering of a function with its parts."""
+
+    _name = "nmm_whole_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        super().run_pass(state)
+        for one in state.library._final_module.global_variables:
+            environment = lookup_environment(one.name) if one.name.startswith("_ZN08NumbaEnv") else None
+            if environment is not None:
+                state.library.codegen.set_env(one.name, environment)
+        return True
+
+
+class _Compiler(compiler.CompilerBase):
+    lowering: type[NativeLowering]
+
+    def define_pipelines(self) -> list[Any]:
+        passes = compiler.DefaultPassBuilder.define_nopython_pipeline(self.state)
+        passes.passes = [
+            (self.lowering if which is NativeLowering else which, told) for which, told in passes.passes
+        ]
+        return [passes]
+
+
+class _PartCompiler(_Compiler):
+    lowering = _PartLowering
+
+
+class _WholeCompiler(_Compiler):
+    lowering = _WholeLowering
+
+
+class KernelDispatcher(CPUDispatcher):
+    """A function's machine code for Python, and its instructions for compiled functions that call it."""
+
+    def __init__(self, function: Any, options: dict[str, Any]) -> None:
+        super().__init__(function, targetoptions=dict(options), pipeline_class=_WholeCompiler)
+        self._part = CPUDispatcher(
+            function, targetoptions={**options, **_NO_DOORS}, pipeline_class=_PartCompiler
+        )
+
+    @property
+    def _numba_type_(self) -> types.Dispatcher:
+        return types.Dispatcher(self._part)
