@@ -32,6 +32,18 @@ class _PartLibrary(JITCodeLibrary):
         self._finalized = True
 
 
+class _WholeLibrary(JITCodeLibrary):
+    """A function and its parts, optimised at once, for loops that run over three or seven numbers.
+
+    Vectorised, these take as long or, for TIAGo's seven joints, a tenth longer, and longer to compile.
+    """
+
+    def _optimize_final_module(self) -> None:
+        manager, builder = self._codegen._module_pass_manager(loop_vectorize=False, slp_vectorize=False)
+        with self._recorded_timings.record("nmm's module passes", builder):
+            manager.run(self._final_module, builder)
+
+
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _PartLowering(NativeLowering):
     """Lowering into a `_PartLibrary`."""
@@ -59,6 +71,8 @@ class _WholeLowering(NativeLowering):
     _name = "nmm_whole_lowering"
 
     def run_pass(self, state: Any) -> bool:
+        state.library = _WholeLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
         super().run_pass(state)
         for one in state.library._final_module.global_variables:
             environment = lookup_environment(one.name) if one.name.startswith("_ZN08NumbaEnv") else None
