@@ -36,6 +36,10 @@ def follow(integers: Integers, floats: Array, q: Array, points: Array, jacobians
 class FramePath:
     """The kinematics of one frame's origin, or of the centre of mass, a fraction of a microsecond each.
 
+    Attributes
+    ----------
+    blocks : where its `Kinematics` lie, at 0, for compiled code that follows it
+
     Raises
     ------
     InputError : the robot has no frame of that name
@@ -46,14 +50,14 @@ class FramePath:
         ids = [None if frame == CENTER_OF_MASS else robot.frame_id(frame)]
         memory = Memory()
         memory.add(Kinematics(joint_table(robot.model), frame_table(robot.model, ids)))
-        self._blocks = memory.blocks()
+        self.blocks = memory.blocks()
 
     def positions(self, q: Array, progress: Progress | None = None) -> Array:
         """Where the origin is (N, 3), m in the world, at q (N, n)."""
         found, none = np.empty((len(q), 3)), np.empty((0, 3, self.robot.n))
         for first in range(0, len(q), AT_ONCE):
             some = slice(first, first + AT_ONCE)
-            follow(*self._blocks, np.ascontiguousarray(q[some]), found[some], none)
+            follow(*self.blocks, np.ascontiguousarray(q[some]), found[some], none)
             if progress is not None:
                 progress(min(1.0, (first + AT_ONCE) / len(q)))
         return found
@@ -61,5 +65,5 @@ class FramePath:
     def jacobians(self, q: Array) -> tuple[Array, Array]:
         """Where the origin is (N, 3), and ∂p/∂q (N, 3, n), world axes, at q (N, n)."""
         points, found = np.empty((len(q), 3)), np.empty((len(q), 3, self.robot.n))
-        follow(*self._blocks, np.ascontiguousarray(q), points, found)
+        follow(*self.blocks, np.ascontiguousarray(q), points, found)
         return points, found

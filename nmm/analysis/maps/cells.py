@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nmm.analysis.maps.best import find_best_cells, find_better
 from nmm.arrays import Array, Flags, Integers
 
 
@@ -75,26 +76,16 @@ class Layer:
     def offer(self, cells: Integers, central: Flags, values: Array, q: Array) -> None:
         """Keep those of the postures q (N, n) that are better than what their cells have."""
         signed = self.sign * values
-        usable = np.flatnonzero((cells >= 0) & np.isfinite(signed))
-        order = usable[np.lexsort((signed[usable], central[usable], cells[usable]))]
-        last = _last_of_each(order, cells)
-        own = cells[last]
-        higher = (central[last] == self.central[own]) & (signed[last] > self.values[own])
-        better = last[higher | (central[last] & ~self.central[own])]
+        better, chosen = np.empty(len(cells), dtype=bool), np.full(len(self.values), -1, dtype=np.int64)
+        find_better(cells, central, signed, self.values, self.central, chosen, better)
         self.values[cells[better]] = signed[better]
         self.q[cells[better]] = q[better]
         self.central[cells[better]] = central[better]
 
     def best_of_blocks(self, grid: Grid, block: int) -> tuple[Integers, Integers]:
         """(blocks, cells): of each block that was reached the cell with the best value."""
-        cells = np.flatnonzero(self.reached)
-        blocks = grid.blocks(cells, block)
-        order = np.lexsort((self.values[cells], blocks))
-        last = _last_of_each(order, blocks)
-        return blocks[last], cells[last]
-
-
-def _last_of_each(order: Integers, kinds: Integers) -> Integers:
-    """Of indices in an order in which equal kinds follow one another, the last one of each kind."""
-    sorted_kinds = kinds[order]
-    return order[np.append(sorted_kinds[1:] != sorted_kinds[:-1], True)] if len(order) else order
+        columns, rows = grid.shape(block)
+        chosen = np.empty(columns * rows, dtype=np.int64)
+        find_best_cells(self.values, grid.columns, block, columns, chosen)
+        blocks = np.flatnonzero(chosen >= 0)
+        return blocks, chosen[blocks]

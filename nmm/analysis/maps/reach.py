@@ -6,7 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from nmm.analysis.cores import over_cores
 from nmm.analysis.maps.coordinates import checked_range, usual_range
+from nmm.analysis.maps.newton import Plane, lead_onto, step_towards
 from nmm.arrays import Array, Flags, Integers
 from nmm.errors import InputError, expect_known
 from nmm.progress import Progress
@@ -14,8 +16,10 @@ from nmm.robots.frame_path import FramePath
 from nmm.robots.robot import Robot
 
 AXES = "xyz"
-#: Newton steps onto a place, and the longest of them, rad or m: a stretched arm would leap.
-STEPS, LEAP = 12, 0.5
+#: Newton steps onto a place.
+STEPS = 12
+#: Postures a compiled call: what nothing interrupts.
+AT_ONCE = 1000
 
 
 class Reach:
@@ -56,8 +60,17 @@ class Reach:
         limits = [checked_range(given[name], name) if name in given else self._usual(name) for name in names]
         self.lower, self.upper = np.array(limits).reshape(-1, 2).T
         who = robot.following
-        self._carried = who.carried[:, np.searchsorted(who.independent, moving)]
         self._path = FramePath(robot, frame)
+        self._numbers = Plane(
+            axes=np.array(self.in_plane, dtype=np.int64),
+            third=np.array([self.third], dtype=np.int64),
+            slab=np.array([-np.inf, np.inf] if slab is None else slab, dtype=np.float64),
+            moving=np.ascontiguousarray(moving, dtype=np.int64),
+            lower=np.ascontiguousarray(self.lower),
+            upper=np.ascontiguousarray(self.upper),
+            carried=np.ascontiguousarray(who.carried[:, np.searchsorted(who.independent, moving)]),
+            followers=np.ascontiguousarray(who.table),
+        )
 
     def _usual(self, name: str) -> tuple[float, float]:
         index = self.robot.coordinate(name)
@@ -91,7 +104,17 @@ class Reach:
 
     def towards(self, q: Array, targets: Array) -> Array:
         """Configurations (N, n) a Newton step nearer to targets (N, 2) in the plane, in ranges and slab."""
-        return self._stepped(q, targets, *self._rates(q))
+        found = np.array(q, order="C")
+        over_cores(
+            len(q),
+            AT_ONCE,
+            lambda: (
+                lambda first, last: step_towards(
+                    *self._path.blocks, self._numbers, found[first:last], targets[first:last]
+                )
+            ),
+        )
+        return found
 
     def onto(
         self, q: Array, targets: Array, near: float, progress: Progress | None = None
@@ -107,57 +130,20 @@ class Reach:
         configurations, where they put the frame (N, 3), and how far from the targets that is (N,); infinite,
         with the configuration given, where none was in the slab
         """
-        best, points, left = q.copy(), np.zeros((len(q), 3)), np.full(len(q), np.inf)
-        going, here = np.arange(len(q)), q
-        for k in range(STEPS + 1):
-            now, rates = self._rates(here)
-            apart = np.linalg.norm(now[:, self.in_plane] - targets[going], axis=1)
-            closer = self.held(now) & (apart < left[going])
-            rows = going[closer]
-            best[rows], points[rows], left[rows] = here[closer], now[closer], apart[closer]
-            on = left[going] > near
-            if progress is not None:
-                # Most are there after three steps; the few on the rim need many.
-                progress(1.0 - 0.5 ** (k + 1))
-            if k == STEPS or not on.any():
-                break
-            going = going[on]
-            here = self._stepped(here[on], targets[going], now[on], rates[on])
+        best, points, left = np.array(q, order="C"), np.empty((len(q), 3)), np.empty(len(q))
+
+        def lead(first: int, last: int) -> None:
+            some = slice(first, last)
+            lead_onto(
+                *self._path.blocks,
+                self._numbers,
+                targets[some],
+                near,
+                STEPS,
+                best[some],
+                points[some],
+                left[some],
+            )
+
+        over_cores(len(q), AT_ONCE, lambda: lead, progress)
         return best, points, left
-
-    def _rates(self, q: Array) -> tuple[Array, Array]:
-        """Where the frame is (N, 3), and the derivatives (N, s, k) of what counts of that by the joints."""
-        points, jacobians = self._path.jacobians(q)
-        rows = [*self.in_plane, *([] if self.slab is None else [self.third])]
-        return points, jacobians[:, rows] @ self._carried
-
-    def _stepped(self, q: Array, targets: Array, points: Array, rates: Array) -> Array:
-        """Configurations a Newton step from q, where the frame is at points and moves by rates."""
-        goals = points.copy()
-        goals[:, self.in_plane] = targets
-        if self.slab is not None:
-            # Somewhat inside: a step never ends quite where it aims.
-            lower, upper = self.slab
-            inset = 0.1 * (upper - lower)
-            goals[:, self.third] = np.clip(points[:, self.third], lower + inset, upper - inset)
-        wanted = (goals - points)[:, [*self.in_plane, *([] if self.slab is None else [self.third])]]
-        joints = q[:, self.moving]
-        step = _shortest(rates, wanted)
-        beyond = (joints + step < self.lower) | (joints + step > self.upper)
-        stopped = beyond.any(axis=1)
-        if stopped.any():
-            # The other joints do what a joint at its limit cannot.
-            free = np.where(beyond[stopped, np.newaxis, :], 0.0, rates[stopped])
-            step[stopped] = _shortest(free, wanted[stopped])
-        return self.placed(np.clip(joints + step, self.lower, self.upper))
-
-
-def _shortest(rates: Array, wanted: Array) -> Array:
-    """The shortest steps (N, k) with rates (N, s, k) step = wanted (N, s); a stretched arm takes no leap."""
-    gram = np.einsum("nik,njk->nij", rates, rates)
-    damping = 1e-9 * np.trace(gram, axis1=1, axis2=2) + 1e-12
-    gram += damping[:, np.newaxis, np.newaxis] * np.eye(rates.shape[1])
-    forces = np.linalg.solve(gram, wanted[:, :, np.newaxis])[:, :, 0]
-    step = np.einsum("nik,ni->nk", rates, forces)
-    length = np.abs(step).max(axis=1, keepdims=True)
-    return np.asarray(step * np.minimum(1.0, LEAP / np.where(length == 0.0, 1.0, length)))

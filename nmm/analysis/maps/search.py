@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from nmm.analysis.maps.best import find_promising
 from nmm.analysis.maps.cells import Grid, Layer
 from nmm.analysis.maps.evaluation import Evaluator
 from nmm.analysis.maps.reach import Reach
@@ -194,32 +195,16 @@ class Search:
             values = layer.values[layer.reached]
             margin = BENT * float(np.ptp(values)) if len(values) else 0.0
             tried = np.full((len(BESIDE), len(layer.values)), np.nan)
+            seeds, cells = np.empty((2, len(layer.values)), dtype=np.int64)
             for sweep in range(SWEEPS):
                 before = layer.values.copy()
                 for side, seen in zip(BESIDE, tried, strict=True):
-                    seeds, cells = self._extrapolated(layer, side, margin)
-                    # Not the same one twice.
-                    fresh = seen[cells] != layer.values[seeds]
-                    seeds, cells = seeds[fresh], cells[fresh]
-                    seen[cells] = layer.values[seeds]
-                    self.offer(layer.q[seeds], cells=cells)
+                    count = find_promising(layer.values, self.grid.columns, *side, margin, seen, seeds, cells)
+                    self.offer(layer.q[seeds[:count]], cells=cells[:count].copy())
                 if own is not None:
                     own((sweep + 1) / SWEEPS)
                 if np.array_equal(before, layer.values):
                     break
-
-    def _extrapolated(self, layer: Layer, side: tuple[int, int], margin: float) -> tuple[Integers, Integers]:
-        """(seeds, cells): cells that have less than the two cells before them, on one side, foretell."""
-        seeds, cells = self._beside(layer.reached, side)
-        step = side[0] * self.grid.columns + side[1]
-        earlier = seeds - step
-        # Wrapped into another row, it foretells something else: an idle try at worst.
-        known = (earlier >= 0) & (earlier < len(layer.values))
-        value = layer.values[seeds]
-        before = np.where(known, layer.values[np.where(known, earlier, 0)], -np.inf)
-        change = np.where(np.isfinite(before), value - before, 0.0)
-        wanted = layer.reached[cells] & (value + change > layer.values[cells] + margin)
-        return seeds[wanted], cells[wanted]
 
     def _beside(self, chosen: Flags, side: tuple[int, int]) -> tuple[Integers, Integers]:
         """(cells, others): chosen cells and those beside them, on one side."""

@@ -17,6 +17,7 @@ import numpy as np
 
 from nmm.analysis.maps.lines import curves_and_points
 from nmm.analysis.singular.singularity import TOLERANCE
+from nmm.analysis.singular.spectra import spectra
 from nmm.arrays import Array, Integers
 from nmm.progress import Progress
 
@@ -115,7 +116,7 @@ def _finer(
     """Axes with more nodes, at least twice as many, and σ_min and w there."""
     columns, rows = (np.linspace(axis[0], axis[-1], max(FINEST, 2 * len(axis))) for axis in axes)
     J = J_of(np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2))
-    values = _singular_values(J)
+    values = spectra(J)
     shape = len(rows), len(columns)
     return (columns, rows), [values[:, -1].reshape(shape), np.prod(values, axis=1).reshape(shape)]
 
@@ -179,7 +180,7 @@ def polish(
             shorter = np.minimum(1.0, reach[going] / np.where(length == 0.0, 1.0, length))
             trial = here + step * shorter[:, np.newaxis]
             J_trial = J_of(trial)
-            volume = np.prod(_singular_values(J_trial), axis=1)
+            volume = np.prod(spectra(J_trial), axis=1)
             better = volume < best_volume  # not where there is no J
             best[better], best_J[better], best_volume[better] = trial[better], J_trial[better], volume[better]
         moved = np.linalg.norm(best - here, axis=1)
@@ -189,14 +190,6 @@ def polish(
         keep = near & (reach[going] > 1e-9)
         going, J = going[keep], J[keep]
     return x[done]
-
-
-def _singular_values(J: Array) -> Array:
-    """Those of J (N, s, m), s at most m: (N, s), falling; not a number where there is no J."""
-    found = np.full(J.shape[:2], np.nan)
-    finite = np.isfinite(J).all(axis=(1, 2))
-    found[finite] = np.linalg.svd(J[finite], compute_uv=False)
-    return found
 
 
 def _steps(J_of: Callable[[Array], Array], x: Array, U: Array, values: Array, Vt: Array) -> Iterator[Array]:

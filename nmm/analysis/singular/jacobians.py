@@ -8,6 +8,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from nmm.analysis.singular.many import matrices
 from nmm.analysis.singular.parts import rank_of
 from nmm.analysis.singular.reached import Tasks as Tasks
 from nmm.analysis.singular.reached import stacked
@@ -15,6 +16,7 @@ from nmm.arrays import Array, array, positive, scalar, vector
 from nmm.control.controller import Controller
 from nmm.errors import InputError, SingularError, expect_known
 from nmm.functions.function import Row, row_scales
+from nmm.functions.program import COMPILED
 from nmm.functions.tasks.task import Stack
 from nmm.platforms.base import Platform
 from nmm.progress import Progress
@@ -57,10 +59,8 @@ class Jacobians:
             added = Stack() if added_task is None else stacked(added_task)
         else:
             raise InputError(f"analysis: expected a Controller or (robot, task), got {subject!r}")
-        self._of_task = Controller(self.robot, self.task, ProjectedGradient(), steering=False)
-        self._of_added = (
-            Controller(self.robot, added, ProjectedGradient(), steering=False) if len(added) else None
-        )
+        self._of_task = self._controller(self.task)
+        self._of_added = self._controller(added) if len(added) else None
         self.rows: tuple[Row, ...] = self._of_task.rows
         self.scales = row_scales(self.rows, self.robot)
         self.added_rows: tuple[Row, ...] = self._of_added.rows if self._of_added else ()
@@ -70,6 +70,10 @@ class Jacobians:
                 f"added_task: expected {free} rows ({self.robot.n_u} inputs less {len(self.rows)} rows of "
                 f"the task), got {len(self.added_rows)}"
             )
+
+    def _controller(self, task: Stack) -> Controller:
+        """What evaluates a task; compiled, so that single configurations have what loops over many find."""
+        return Controller(self.robot, task, ProjectedGradient(), steering=False, kinematics=COMPILED)
 
     @property
     def row_names(self) -> tuple[str, ...]:
@@ -100,7 +104,7 @@ class Jacobians:
         return np.array(found).reshape(directions.shape[1], len(self.rows), self.robot.n_u)
 
     def batch(self, q: Array, t: float = 0.0, progress: Progress | None = None) -> Array:
-        """J (N, s, m) at N configurations (N, n) and one time, some microseconds each.
+        """J (N, s, m) at N configurations (N, n) and one time, in compiled code and over the cores.
 
         Joints that follow others are taken to be where these have them.
 
@@ -108,34 +112,34 @@ class Jacobians:
 
         Parameters
         ----------
-        progress : called with the fraction done, about a hundred times
+        progress : called with the fraction done
         """
-        solve, found = self._of_task.equation_solver()
-        platform = self.robot.platform
-        rolls = type(platform).problem is Platform.problem
-        points = np.ascontiguousarray(self.robot.following.placed(np.asarray(q, dtype=np.float64)))
-        J = np.empty((len(points), len(self.rows), self.robot.n_u))
-        every = max(1, len(points) // 100)
-        for k, point in enumerate(points):
-            solve(t, point)
-            J[k] = found
-            if not rolls and platform.problem(point[: platform.n_p]) is not None:
-                J[k] = np.nan
-            if progress is not None and k % every == 0:
-                progress(k / len(points))
-        J[~np.isfinite(J).all(axis=(1, 2))] = np.nan
-        return J
+        points = self.robot.following.placed(np.asarray(q, dtype=np.float64))
+        return self._many(self._of_task, np.full(len(points), float(t)), points, progress)
 
     def history(self, t: Array, q: Array) -> tuple[Array, Array]:
-        """J (N, s, m) and added_J (N, k, m) at N samples."""
-        m = self.robot.n_u
-        J = np.empty((len(t), len(self.rows), m))
-        added_J = np.empty((len(t), len(self.added_rows), m))
-        for k in range(len(t)):
-            J[k] = self.J(t[k], q[k])
-            if self._of_added is not None:
-                added_J[k] = self.added_J(t[k], q[k])
+        """J (N, s, m) and added_J (N, k, m) at t (N,) and q (N, n), as `J` and `added_J` find them."""
+        J = self._many(self._of_task, t, q)
+        added_J = np.zeros((len(t), 0, self.robot.n_u))
+        if self._of_added is not None:
+            added_J = self._many(self._of_added, t, q)
+        undefined = ~np.isfinite(np.concatenate([J, added_J], axis=1)).all(axis=(1, 2))
+        for k in np.flatnonzero(undefined):  # the first one raises, and says why
+            self.J(float(t[k]), q[k])
+            self.added_J(float(t[k]), q[k])
         return J, added_J
+
+    def _many(self, controller: Controller, t: Array, q: Array, progress: Progress | None = None) -> Array:
+        """J (N, rows, m) of a controller at t (N,) and q (N, n); not a number where there is none."""
+        found = matrices(controller, t, q, progress)
+        platform = self.robot.platform
+        if type(platform).problem is not Platform.problem and len(q):
+            places = q[:, : platform.n_p]
+            if np.all(places == places[0]):  # it stands, as in maps of the workspace
+                places = places[:1]
+            stuck = [platform.problem(place) is not None for place in places]
+            found[np.broadcast_to(stuck, len(q))] = np.nan
+        return found
 
     def sizes(self, length: float | None, sizes: Mapping[str, float] | None) -> tuple[Array, Array, Array]:
         """How much of each row (s,), added row (k,) and input (m,) counts as 1, in their own units.

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nmm.analysis.singular.spectra import spectra
 from nmm.arrays import Array, Integers
 from nmm.control.directions import direction_texts, readable_basis
 from nmm.errors import InputError, expect_known
@@ -81,8 +82,7 @@ def singular_values(J: Array) -> Array:
     s, m = J.shape[-2:]
     found = np.zeros((*J.shape[:-2], s))
     if m:
-        values = np.linalg.svd(J, compute_uv=False)
-        found[..., : values.shape[-1]] = values
+        found[..., : min(s, m)] = spectra(J.reshape(-1, s, m)).reshape(*J.shape[:-2], min(s, m))
     return found
 
 
