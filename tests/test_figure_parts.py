@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from nmm.figures import style
-from nmm.figures.motion import hull
+from nmm.figures.hulls import hull
 from nmm.figures.silhouette import Silhouette
 from nmm.robots.robot import Robot
 

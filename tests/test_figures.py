@@ -21,7 +21,8 @@ from nmm import figures
 from nmm.control.controller import Controller
 from nmm.errors import InputError
 from nmm.figures import style
-from nmm.figures.motion import Scene, hull
+from nmm.figures.hulls import hull
+from nmm.figures.motion import Scene
 from nmm.functions.tasks import Coordinates, Heading, Position, Task
 from nmm.resolvers import ProjectedGradient
 from nmm.robots.loading import load

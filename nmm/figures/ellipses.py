@@ -23,7 +23,6 @@ from nmm.analysis.singular.parts import WHOLE
 from nmm.arrays import Array
 from nmm.errors import InputError
 from nmm.figures import style
-from nmm.figures.motion import hull
 from nmm.figures.silhouette import Pose, Silhouette
 from nmm.figures.views import ABOVE, SIDE, View, Viewed, page
 from nmm.playback.extent import extent_of
@@ -154,11 +153,11 @@ class _Ellipses(Viewed):
 
 def _draw_faintly(axes: Axes, pose: Pose, view: View) -> None:
     """A robot in the background: its platform's outline, its wheels, its arm."""
-    bodies = [hull(points[:, view]) for points in pose.body]
+    bodies = pose.bodies(view)
     # Edges of all shapes first, faces above them: what stays visible is the edge of their union.
     edges = PolyCollection(bodies, facecolors="none", edgecolors=[_EDGE], linewidths=1.2, zorder=2.0)
     faces = PolyCollection(bodies, facecolors=[_BODY], linewidths=0, zorder=2.1)
-    wheels = [hull(points[:, view]) for points in pose.wheels]
+    wheels = pose.tyres(view)
     marks = PolyCollection(wheels, facecolors=[_EDGE], linewidths=0, zorder=2.2)
     lines = [ends[:, view] for ends in pose.links]
     links = LineCollection(lines, colors=[_EDGE], linewidths=2.2, capstyle="round", zorder=2.3)

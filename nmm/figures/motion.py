@@ -9,12 +9,12 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
-from matplotlib.path import Path
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array
 from nmm.errors import InputError
 from nmm.figures import style
+from nmm.figures.hulls import Covered, along, hull
 from nmm.figures.obstacles import FAINTEST, OBSTACLE, OBSTACLE_TEXT, outlines, with_the_nearest
 from nmm.figures.silhouette import Pose, Silhouette
 from nmm.figures.views import ABOVE, SIDE, View, Viewed, page
@@ -164,8 +164,8 @@ def _label_places(poses: Sequence[Pose], lines: Sequence[Array], solid: Sequence
     drawn = np.vstack(
         [_outline(pose) for pose in poses] + [line[:: max(1, len(line) // 300), :2] for line in lines]
     )
-    covered = [Path(hull(shape[:, :2])) for pose in poses for shape in [*pose.body, *pose.wheels]]
-    covered += [Path(edge) for edge in solid]
+    robots = [edge for pose in poses for edge in [*pose.bodies(ABOVE), *pose.tyres(ABOVE)]]
+    covered = Covered([*robots, *solid])
     angles = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
     directions = np.column_stack([np.cos(angles), np.sin(angles)])
     away = _LABEL * float(np.ptp(drawn, axis=0).max())
@@ -182,7 +182,7 @@ def _label_places(poses: Sequence[Pose], lines: Sequence[Array], solid: Sequence
         beside = np.linalg.norm((candidates[:, None] - others) * _FLAT, axis=2).min(axis=1)
         clear = np.minimum(_distances(candidates * _FLAT, flat, away), beside)
         clearance = np.minimum(clear, away) - 0.1 * farther
-        clearance[np.any([shape.contains_points(candidates) for shape in covered], axis=0)] -= edge.max()
+        clearance[covered.holds(candidates)] -= edge.max()
         places.append(candidates[int(np.argmax(clearance))])
     return np.array(places)
 
@@ -207,10 +207,9 @@ def _distances(points: Array, others: Array, most: float) -> Array:
 def _outline(pose: Pose) -> Array:
     """Points along a robot's drawing from above."""
     fractions = np.linspace(0.0, 1.0, 8)[:, None]
-    edges = [hull(shape[:, :2]) for shape in [*pose.body, *pose.wheels]]
-    lines = [side for edge in edges for side in zip(edge, np.roll(edge, -1, axis=0), strict=True)]
-    lines += [(ends[0, :2], ends[1, :2]) for ends in pose.links]
-    return np.vstack([start + fractions * (end - start) for start, end in lines])
+    edges = [along(edge, len(fractions)) for edge in [*pose.bodies(ABOVE), *pose.tyres(ABOVE)]]
+    lines = [ends[0, :2] + fractions * (ends[1, :2] - ends[0, :2]) for ends in pose.links]
+    return np.vstack(edges + lines)
 
 
 def _how_many(trajectory: Trajectory, silhouette: Silhouette) -> int:
@@ -261,14 +260,14 @@ def _draw_pose(axes: Axes, pose: Pose, view: View, strength: float, later: float
     """One drawing of the robot: above the earlier ones (`later` in [0, 1)), all arms above all platforms."""
     edge, body = _faded(_EDGE, strength), _faded(_BODY, strength)
     zorder = 3.0 + later
-    shapes = [hull(points[:, view]) for points in pose.body]
+    shapes = pose.bodies(view)
     # Edges of all shapes first, faces above them: what stays visible is the edge of their union.
     axes.add_collection(
         PolyCollection(shapes, facecolors="none", edgecolors=[edge], linewidths=1.6, zorder=zorder),
         autolim=False,
     )
     axes.add_collection(PolyCollection(shapes, facecolors=[body], linewidths=0, zorder=zorder), autolim=False)
-    marks = [hull(points[:, view]) for points in pose.wheels]
+    marks = [*pose.tyres(view)]
     if view == ABOVE and len(pose.heading):
         marks.append(pose.heading[:, view])
     axes.add_collection(PolyCollection(marks, facecolors=[edge], linewidths=0, zorder=zorder), autolim=False)
@@ -283,23 +282,3 @@ def _draw_pose(axes: Axes, pose: Pose, view: View, strength: float, later: float
         markeredgewidth=1.1, zorder=zorder, linestyle="none",
     )  # fmt: skip
     axes.plot(tips[:, 0], tips[:, 1], "o", markersize=3.0, color=edge, zorder=zorder, linestyle="none")
-
-
-def hull(points: Array) -> Array:
-    """The convex hull of points (k, 2), counter-clockwise (Andrew's monotone chain)."""
-    ordered = sorted(set(map(tuple, points.tolist())))
-    if len(ordered) < 3:
-        return points
-    chains = []
-    for sequence in (ordered, ordered[::-1]):
-        chain: list[tuple[float, ...]] = []
-        for point in sequence:
-            while len(chain) > 1 and _turn(chain[-2], chain[-1], point) <= 0.0:
-                chain.pop()
-            chain.append(point)
-        chains.append(chain[:-1])
-    return np.array(chains[0] + chains[1])
-
-
-def _turn(a: Sequence[float], b: Sequence[float], c: Sequence[float]) -> float:
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

@@ -7,14 +7,16 @@ the arm's lines from the placements of its joints. No robot is known by name.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from nmm.arrays import Array
+from nmm.figures.hulls import hull
 from nmm.figures.solids import Solid, body_wheels, neutral_outline, platform_shapes, tyre, wheel_points
+from nmm.figures.views import View
 from nmm.playback.placements import Placements
 from nmm.playback.rolling import Rolling
 from nmm.robots.configuration import Configuration
@@ -45,6 +47,21 @@ class Pose:
     links: list[Array]
     joints: Array
     tip: Array
+    _outlines: dict[View, tuple[list[Array], list[Array]]] = field(default_factory=dict, repr=False)
+
+    def bodies(self, view: View) -> list[Array]:
+        """The platform's shapes as outlines (k, 2) seen along the axis that `view` leaves out."""
+        return self._seen(view)[0]
+
+    def tyres(self, view: View) -> list[Array]:
+        """The wheels as such outlines."""
+        return self._seen(view)[1]
+
+    def _seen(self, view: View) -> tuple[list[Array], list[Array]]:
+        if view not in self._outlines:
+            bodies, wheels = ([hull(one[:, view]) for one in shapes] for shapes in (self.body, self.wheels))
+            self._outlines[view] = bodies, wheels
+        return self._outlines[view]
 
     def points(self) -> Array:
         """All points, (k, 3), for the limits of the axes."""
