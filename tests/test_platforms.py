@@ -128,6 +128,24 @@ def test_no_lateral_slip_over_a_run(name: str, rng: np.random.Generator) -> None
         assert np.abs(slip).max() <= 1e-12
 
 
+class OneByOne(Unicycle):
+    """A platform whose own `pfaffian` knows one configuration."""
+
+    def pfaffian(self, qp: Array) -> Array:
+        return np.array([[-np.sin(qp[2]), np.cos(qp[2]), 0.0]])
+
+
+@pytest.mark.parametrize("name", [*ROLLING, "one_by_one"])
+def test_sideways_speeds_of_many_samples_are_those_of_each(name: str, rng: np.random.Generator) -> None:
+    platform = EXAMPLES.get(name) or OneByOne()
+    qp = rng.uniform(-1.0, 1.0, (7, platform.n_p))
+    qp_dot = rng.uniform(-1.0, 1.0, (7, platform.n_p))
+    each = [platform.A(place) @ rate for place, rate in zip(qp, qp_dot, strict=True)]
+    found = platform.sideways(qp, qp_dot)
+    assert found.shape == (7, platform.n_p - platform.p)
+    np.testing.assert_allclose(found, np.reshape(each, found.shape), rtol=0.0, atol=1e-14)
+
+
 # Arcs: (platform, its own joints, inputs, twist in the platform's axes, radius of the circle of x, y).
 ARCS = {
     "unicycle": (Unicycle(), [], [0.7, 0.4], [0.7, 0.0, 0.4], 0.7 / 0.4),

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import copy
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import Self
+from collections.abc import Callable, Mapping
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +15,15 @@ from nmm.errors import expect_known
 from nmm.kernels.compiled import Kernel
 from nmm.platforms.layout import Layout
 from nmm.platforms.steering import SteeredAxle
+
+#: The methods `pfaffian` that `of_many` marked: an overriding one counts as of one configuration.
+_of_many: set[Callable[[Any, Array], Array]] = set()
+
+
+def of_many(pfaffian: Callable[[Any, Array], Array]) -> Callable[[Any, Array], Array]:
+    """Decorator of a `pfaffian` that takes several configurations, too: (..., n_p), A (..., n_p - p, n_p)."""
+    _of_many.add(pfaffian)
+    return pfaffian
 
 
 class Platform(ABC):
@@ -148,6 +157,14 @@ class Platform(ABC):
     def A(self, qp: ArrayLike) -> Array:
         """Pfaffian constraint rows, shape (n_p - p, n_p): A(qp) qp_dot = 0, so A(qp) G(qp) = 0."""
         return self.pfaffian(vector(qp, self.n_p, "qp"))
+
+    def sideways(self, qp: Array, qp_dot: Array) -> Array:
+        """A(qp) qp_dot at N samples (N, n_p), shape (N, n_p - p): what their constraints forbid, m/s."""
+        if self.n_p == self.p:
+            return np.zeros((len(qp), 0))
+        at_once = type(self).pfaffian in _of_many
+        A = self.pfaffian(qp) if at_once else np.array([self.pfaffian(one) for one in qp])
+        return np.einsum("kij,kj->ki", A.reshape(len(qp), -1, self.n_p), qp_dot)
 
     def _evaluate(self, qp: ArrayLike) -> tuple[Array, Array]:
         G = np.zeros((self.n_p, self.p))

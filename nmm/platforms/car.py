@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array, positive
 from nmm.errors import InputError
 from nmm.kernels.compiled import PLATFORM, Kernel, kernel
-from nmm.platforms.base import Platform
+from nmm.platforms.base import Platform, of_many
 from nmm.platforms.layout import Layout, Pivot
 from nmm.platforms.measuring import (
     NEAR,
@@ -26,6 +26,7 @@ from nmm.platforms.measuring import (
 )
 from nmm.platforms.own_joints import coordinates_with
 from nmm.platforms.steering import SteeredAxle, SteeringPivot
+from nmm.platforms.unicycle import across
 
 #: |cos δ| below which a steering angle counts as 90 degrees.
 _ACROSS = 1e-6
@@ -147,6 +148,7 @@ class _Bicycle(Platform):
         pivot = SteeringPivot(self.steering, "steering_rate", self.wheelbase, widest=self._steered_to)
         return SteeredAxle((pivot,))
 
+    @of_many
     def pfaffian(self, qp: Array) -> Array:
         """Neither the rear axle nor the steered wheel slides sideways.
 
@@ -154,14 +156,12 @@ class _Bicycle(Platform):
         wheel, at (x + L cos θ, y + L sin θ), does not move across its direction θ + δ:
         -sin(θ + δ) x_dot + cos(θ + δ) y_dot + L cos δ θ_dot = 0.
         """
-        body = complex(math.cos(qp[2]), math.sin(qp[2]))
-        steered = body * complex(math.cos(qp[3]), math.sin(qp[3]))
-        return np.array(
-            [
-                [-body.imag, body.real, 0.0, 0.0],
-                [-steered.imag, steered.real, self.wheelbase * math.cos(qp[3]), 0.0],
-            ]
-        )
+        turned = np.exp(1j * qp[..., 3])
+        steered = np.exp(1j * qp[..., 2]) * turned
+        front = np.zeros((*qp.shape[:-1], 1, 4))
+        front[..., 0, 0], front[..., 0, 1] = -steered.imag, steered.real
+        front[..., 0, 2] = self.wheelbase * turned.real
+        return np.concatenate([across(qp), front], axis=-2)
 
 
 class Car(_Bicycle):

@@ -11,9 +11,10 @@ from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, positive
 from nmm.kernels.compiled import PLATFORM, Kernel, kernel
-from nmm.platforms.base import Platform
+from nmm.platforms.base import Platform, of_many
 from nmm.platforms.layout import Layout, RollingJoint
 from nmm.platforms.measuring import NEAR, ahead, misfit, rolls_forward, same, say_wheels, wheels_on
+from nmm.platforms.unicycle import across
 
 
 @kernel(PLATFORM)
@@ -90,9 +91,10 @@ class DifferentialDrive(Platform):
     def velocity_map(self) -> Kernel:
         return differential_drive
 
+    @of_many
     def pfaffian(self, qp: Array) -> Array:
         """Neither wheel slides along the axle, on which both lie: -sin θ x_dot + cos θ y_dot = 0."""
-        return np.array([[-math.sin(qp[2]), math.cos(qp[2]), 0.0]])
+        return across(qp)
 
 
 def _misfit(wheels: tuple[RollingJoint, ...]) -> str | None:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array, positive, scalar
 from nmm.errors import InputError
 from nmm.kernels.compiled import PLATFORM, Kernel, kernel, scratch
-from nmm.platforms.base import Platform
+from nmm.platforms.base import Platform, of_many
 from nmm.platforms.layout import Layout
 from nmm.platforms.own_joints import coordinates_with
 from nmm.platforms.steering import SteeredAxle, SteeringPivot
@@ -182,6 +182,7 @@ class Tractor(Platform):
         pivot = SteeringPivot(trailer.joint, "omega", trailer.length, sign=-1.0)
         return SteeredAxle((pivot,), x=-trailer.length)
 
+    @of_many
     def pfaffian(self, qp: Array) -> Array:
         """No axle slides along itself, the tractor's first.
 
@@ -190,15 +191,17 @@ class Tractor(Platform):
         hitch, or to p_i. The row is n_i·p_i_dot = 0 with n_i across e_i.
         """
         # Directions as complex numbers: e_k = exp(j (θ + b_1 + ... + b_k)), without adding the angles.
-        e = np.cumprod(np.exp(1j * qp[2:]))
-        A = np.zeros((len(e), self.n_p))
-        for i in range(len(e)):
-            A[i, 0], A[i, 1] = -e[i].imag, e[i].real
+        e = np.cumprod(np.exp(1j * qp[..., 2:]), axis=-1)
+        axles = e.shape[-1]
+        A = np.zeros((*qp.shape[:-1], axles, self.n_p))
+        for i in range(axles):
+            A[..., i, 0], A[..., i, 1] = -e[..., i].imag, e[..., i].real
             for k in range(i + 1):
                 part = self.trailers[k - 1].length if k > 0 else 0.0
                 part += self.trailers[k].hitch if k < i else 0.0
                 # e_k_dot = n_k (θ_dot + b_1_dot + ... + b_k_dot)
-                A[i, 2 : 3 + k] -= part * (e[i] * e[k].conjugate()).real
+                turned = part * (e[..., i] * e[..., k].conjugate()).real
+                A[..., i, 2 : 3 + k] -= turned[..., np.newaxis]
         return A
 
     def problem(self, qp: ArrayLike) -> str | None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from nmm.arrays import Array
 from nmm.kernels.compiled import PLATFORM, Kernel, kernel
-from nmm.platforms.base import Platform
+from nmm.platforms.base import Platform, of_many
 
 
 @kernel(PLATFORM)
@@ -21,6 +21,14 @@ def unicycle(qp: Array, parameters: Array, G: Array, G_q: Array) -> None:
     G[2, 1] = 1.0
     G_q[0, 0, 2] = -sine
     G_q[1, 0, 2] = cosine
+
+
+def across(qp: Array) -> Array:
+    """The row (..., 1, n_p) that gives the speed of (x, y) across the heading theta, at qp (..., n_p)."""
+    ahead = np.exp(1j * qp[..., 2])
+    row = np.zeros((*qp.shape[:-1], 1, qp.shape[-1]))
+    row[..., 0, 0], row[..., 0, 1] = -ahead.imag, ahead.real
+    return row
 
 
 class Unicycle(Platform):
@@ -37,6 +45,7 @@ class Unicycle(Platform):
     def velocity_map(self) -> Kernel:
         return unicycle
 
+    @of_many
     def pfaffian(self, qp: Array) -> Array:
         """No sideways motion of the axle: -sin θ x_dot + cos θ y_dot = 0."""
-        return np.array([[-math.sin(qp[2]), math.cos(qp[2]), 0.0]])
+        return across(qp)

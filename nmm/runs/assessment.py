@@ -78,21 +78,14 @@ def _own_moves(samples: Samples, moved: Array) -> int:
 
 def _target_moves(controller: Controller, recorder: Recorder) -> Array:
     """By how much the error changed along each step with q held, otherwise than its rate says, (N - 1,)."""
-    samples, count = recorder.samples, len(recorder)
-    moved = samples.rate - samples.feedback.rates(samples.error)
-    K = samples.feedback.K
-    moves = np.empty(count - 1)
-    for k in range(count - 1):
-        try:
-            ahead = controller.evaluate(float(samples.t[k + 1]), recorder.q[k])
-        except Exception:  # a user's function may raise anything, where it was not made for
-            moves[k] = 0.0
-            continue
-        rates = moved[k] + ahead.rate - K @ ahead.error  # a step's rate is that of unbounded feedback
-        change = ahead.error - samples.error[k] - 0.5 * (samples.t[k + 1] - samples.t[k]) * rates
-        moves[k] = np.linalg.norm(change)
+    samples = recorder.samples
+    error, rate = controller.errors(samples.t[1:], recorder.so_far.q[:-1])
     controller.reset()
-    return np.nan_to_num(moves)
+    feedback = samples.feedback
+    moved = samples.rate - feedback.rates(samples.error)
+    rates = moved[:-1] + rate - error @ feedback.K.T  # a step's rate is that of unbounded feedback
+    change = error - samples.error[:-1] - 0.5 * np.diff(samples.t)[:, np.newaxis] * rates
+    return np.nan_to_num(np.linalg.norm(change, axis=1))
 
 
 def _examine(

@@ -139,8 +139,5 @@ def _rms(sizes: Array) -> float:
 def lateral_slip(trajectory: Trajectory) -> float:
     """The largest |A(qp) qp_dot| of the run, m/s: how much the motion violates the wheels' constraints."""
     platform = trajectory.robot.platform
-    rates = [
-        platform.pfaffian(q) @ q_dot
-        for q, q_dot in zip(trajectory.q[:, : platform.n_p], trajectory.q_dot[:, : platform.n_p], strict=True)
-    ]
-    return float(np.abs(rates).max(initial=0.0))
+    n_p = platform.n_p
+    return float(np.abs(platform.sideways(trajectory.q[:, :n_p], trajectory.q_dot[:, :n_p])).max(initial=0.0))
