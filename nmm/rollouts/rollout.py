@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import math
-import os
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -19,6 +18,7 @@ from nmm.control.controller import Controller
 from nmm.control.goal import Goal
 from nmm.control.integrators import Integrator, integrator
 from nmm.control.sequenced import SequencedController
+from nmm.cores import cores
 from nmm.errors import InputError
 from nmm.rollouts.disturbed import driven_disturbed
 from nmm.rollouts.kept import Kept
@@ -148,7 +148,7 @@ def rollout(
     every = _whole(every, "every")
     kept = Kept(keep, times, every, count, Recorder(controllers[0], times).found, where)
     runs = _Runs(controllers, starts, times, method, until, plant, kept)
-    workers = min(_whole(_cores() if threads is None else threads, "threads"), count)
+    workers = min(_whole(cores() if threads is None else threads, "threads"), count)
     rooms: dict[str, Array] = {}
     with ThreadPoolExecutor(workers) as pool:
         for begin in range(0, count, kept.part):
@@ -257,7 +257,3 @@ def _whole(value: int, what: str) -> int:
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
         raise InputError(f"{what}: expected a whole number, at least 1, got {value!r}")
     return int(value)
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

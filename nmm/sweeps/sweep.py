@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import ExitStack, closing
 from functools import partial
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 
 from nmm import __version__
 from nmm.bundled import bundled_scenarios
+from nmm.cores import cores
 from nmm.errors import InputError, expect_known
 from nmm.processes import as_done
 from nmm.progress import Progress
@@ -133,7 +133,7 @@ class Sweep:
         definition, place = self.definition, SweepFolder(folder, self.definition)
         if jobs is not None and scheduler is not None:
             raise InputError("jobs: a cluster has as many as it has workers: expected jobs or scheduler")
-        local = _whole(_cores() if jobs is None else jobs, "jobs", 1)
+        local = _whole(cores() if jobs is None else jobs, "jobs", 1)
         place.check()
         with ExitStack() as stack:
             client = None if scheduler is None else stack.enter_context(cluster(scheduler))
@@ -225,9 +225,3 @@ def _value(data: Any, place: tuple[str | int, ...]) -> Any:
     for step in place:
         data = data[step]
     return data
-
-
-def _cores() -> int:
-    """Of this machine, for this process."""
-    of_process: Callable[[int], set[int]] | None = getattr(os, "sched_getaffinity", None)
-    return len(of_process(0)) if of_process is not None else os.cpu_count() or 1

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from nmm.analysis.cores import over_cores
 from nmm.analysis.maps.coordinates import checked_range, usual_range
 from nmm.analysis.maps.newton import Plane, lead_onto, step_towards
 from nmm.arrays import Array, Flags, Integers
+from nmm.cores import over_cores
 from nmm.errors import InputError, expect_known
 from nmm.progress import Progress
 from nmm.robots.frame_path import FramePath

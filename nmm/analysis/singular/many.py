@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from nmm.analysis.cores import Work, over_cores
 from nmm.arrays import Array, Integers
 from nmm.control.controller import Controller
 from nmm.control.equations import ControlStep, write_equation
+from nmm.cores import Work, over_cores
 from nmm.functions.program import BESIDE, LaidOut, run
 from nmm.kernels.compiled import compiled_without_gil, view
 from nmm.kernels.memory import views

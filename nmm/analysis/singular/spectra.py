@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from nmm.analysis.cores import Work, over_cores
 from nmm.arrays import Array
+from nmm.cores import Work, over_cores
 from nmm.kernels.compiled import compiled, compiled_without_gil, integer_scratch, scratch
 from nmm.kernels.linear_algebra import EPSILON, orthonormal_rows
 from nmm.kernels.singular_values import MOST_SWEEPS
