@@ -46,6 +46,13 @@ class Leaving:
             self.q = q
         return self.q is not None
 
+    def stays(self, times: Array, q: Array, first: int, last: int) -> int:
+        """The last of the samples from `first` to `last` before one that is another leg's."""
+        for k in range(first, last + 1):
+            if self._controller.changes(float(times[k]), q[k]):
+                return k - 1
+        return last
+
 
 def sample_times(start: float, dt: float, steps: int, end: float) -> Array:
     """start, start + dt, ... of that many steps, none beyond the end, which rounding does not miss."""
@@ -100,7 +107,7 @@ def driven(
         controller.sample.restore(leg.handed)
         recorder.backed_off = 0 if controller.backing is None else controller.backing.count
     try:
-        fly = compiled_loop(controller, advance, until) if leg is None else None
+        fly = compiled_loop(controller, advance, until)
         # What is taken in Python, too: otherwise digits would depend on where compiled code stops.
         with nullcontext() if fly is None else controller.compiled_kinematics():
             _integrate(controller, advance, recorder, times, q, progress, until, leg, fly)
@@ -144,6 +151,12 @@ def _integrate(
         whole = False
         if fly is not None:
             reached, whole = fly(times, k, min(steps, (k // a_share + 1) * a_share), recorder.found)
+            if leg is not None:
+                stays = leg.stays(times, recorder.found.q, k + 1, reached)
+                if stays < reached:  # begin again, and fly to the sample before the event
+                    controller.sample.restore(earlier)
+                    _sample(controller, sample.t, sample.q, float(times[k - 1]) if k else leg.earlier)
+                    reached, whole = fly(times, k, stays, recorder.found)[0] if stays > k else k, False
             if reached > k:
                 recorder.flown(reached)
                 k, earlier = reached, controller.sample.snapshot()
