@@ -1,0 +1,57 @@
+// The table of all values at the clock's time, a column a run.
+"use strict";
+{
+  const values = (nmm.values = {});
+  const part = document.getElementById("values");
+  let rows = [];
+
+  // Six digits, without an exponent where one can read it so.
+  values.text = (value, run, key) => {
+    if (value === null) return "–";
+    if (key === "partition") return run.partitions[value] ?? "–";
+    const size = Math.abs(value);
+    const text = size !== 0 && (size < 1e-4 || size >= 1e6) ? value.toExponential(3) : value.toPrecision(6);
+    return text.replace("e-", "e−").replace(/^-/, "−");
+  };
+
+  const named = (parent, tag, text, attributes = {}) => {
+    const made = parent.appendChild(document.createElement(tag));
+    for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
+    made.append(text);
+    return made;
+  };
+
+  values.build = () => {
+    const table = part.querySelector("table");
+    const head = named(table, "thead", "").appendChild(document.createElement("tr"));
+    named(head, "th", "quantity", { scope: "col" });
+    for (const run of nmm.runs) {
+      const cell = named(head, "th", "", { scope: "col" });
+      cell.append(nmm.sign("line", run.color, run.dash), run.name || "value");
+    }
+    named(head, "th", "unit", { scope: "col" });
+    const body = named(table, "tbody", "");
+    rows = nmm.lanes.map((lane) => {
+      const row = named(body, "tr", "", { "data-channel": lane.key });
+      named(row, "th", lane.text, { scope: "row" });
+      const cells = nmm.runs.map(() => named(row, "td", ""));
+      named(row, "td", lane.unit, { class: "unit" });
+      return { lane, cells };
+    });
+    part.addEventListener("toggle", values.update);
+    nmm.runs.listeners.push(() => {
+      for (const row of table.rows) nmm.runs.forEach((run, i) => (row.cells[i + 1].hidden = run.hidden));
+    });
+  };
+
+  values.update = () => {
+    if (!part.open || !nmm.plots.shown) return;
+    for (const { lane, cells } of rows) {
+      nmm.runs.forEach((run, i) => {
+        const text = run.hidden ? "" : values.text(nmm.value(run, lane.key, nmm.player.time), run, lane.key);
+        if (cells[i].textContent !== text) cells[i].textContent = text;
+      });
+    }
+  };
+  nmm.runs.listeners.push(values.update);
+}
