@@ -124,7 +124,7 @@ def _of_task(run: Trajectory) -> Iterator[Channel]:
 
 
 def _limits_kept(run: Trajectory) -> dict[str, tuple[float, float]]:
-    """The limits of a run by what they limit: from the shares s of their range, x = lower + s (upper - lower).
+    """The limits of a run by what they limit, from the shares s of a range: x = lower + s (upper - lower).
 
     Only where the share follows x throughout: one of a limit that stands alone does not (`runs.margins`).
     """
@@ -150,10 +150,13 @@ def _limits_kept(run: Trajectory) -> dict[str, tuple[float, float]]:
 
 def _partition(run: Trajectory) -> tuple[Array, tuple[str, ...], Integers]:
     """Which set of basic columns is in use, by number (N,), what each is called, and where another begins."""
-    sets, number = np.unique(np.sort(run.partition, axis=1), axis=0, return_inverse=True)
+    columns = np.sort(run.partition, axis=1)
+    switches = np.flatnonzero(np.any(np.diff(columns, axis=0) != 0, axis=1)) + 1
+    begins = np.concatenate([[0], switches])
+    sets, number = np.unique(columns[begins], axis=0, return_inverse=True)
     texts = tuple(", ".join(_input(run, k) for k in one if k >= 0) or "none: damped" for one in sets)
-    number = number.reshape(-1)
-    return number.astype(np.float64), texts, np.flatnonzero(np.diff(number)) + 1
+    lasts = np.diff(np.append(begins, len(columns)))
+    return np.repeat(number.reshape(-1).astype(np.float64), lasts), texts, switches
 
 
 def _input(run: Trajectory | Motion, column: int) -> str:
@@ -177,8 +180,8 @@ def _replaced(channel: Channel, values: Array) -> Channel:
 
 
 def _kept(t: Array, curves: Sequence[Array], events: Sequence[Integers]) -> Integers:
-    """The samples that a page holds, ascending: about `FPS` a second, both ends, events, each curve's extremes
-    and its gaps' ends, and of what lies between the worst, where a curve would be seen to be off."""
+    """The samples that a page holds, ascending: about `FPS` a second, both ends, events, each curve's
+    extremes and its gaps' ends, and of what lies between the worst, where a curve would be seen to be off."""
     kept = samples_kept(t, FPS).astype(np.int64)
     if len(kept) == len(t):
         return kept
@@ -198,9 +201,9 @@ def _kept(t: Array, curves: Sequence[Array], events: Sequence[Integers]) -> Inte
         for k in np.flatnonzero(better & (most > SEEN)):
             where[k] = kept[k] + int(np.argmax(off[kept[k] : kept[k + 1]]))
         worst = np.where(better, most, worst)
-    off = np.flatnonzero(worst > SEEN)
-    off = off[np.argsort(-worst[off])][:MOST_FRAMES]
-    return np.unique(np.concatenate([*must, where[off]]).astype(np.int64))
+    missed = np.flatnonzero(worst > SEEN)
+    missed = missed[np.argsort(-worst[missed])][:MOST_FRAMES]
+    return np.unique(np.concatenate([*must, where[missed]]).astype(np.int64))
 
 
 def _gaps(known: Array) -> tuple[Integers, Integers]:

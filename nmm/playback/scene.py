@@ -15,7 +15,7 @@ from nmm.playback.curves import draw_curves
 from nmm.playback.drawing import Command, Drawing, DrawnRobot, Rgb
 from nmm.playback.encoding import packed
 from nmm.playback.extent import corners, robot_boxes
-from nmm.playback.keyframes import Keyframes, ghost_samples, keyframes, samples_kept
+from nmm.playback.keyframes import MOST_FRAMES, Keyframes, ghost_samples, keyframes, samples_kept
 from nmm.playback.obstacles import SceneObstacles, draw_nearest
 from nmm.playback.placements import base_position
 from nmm.playback.rolling import wheel_angles
@@ -222,11 +222,12 @@ def _desired(drawing: Drawing, motions: Sequence[Motion]) -> None:
         path = motion.desired
         if path is None or any(path.shape == other.shape and np.allclose(path, other) for other in seen):
             continue
+        kept = np.unique(np.linspace(0, len(path) - 1, MOST_FRAMES).astype(int))
         drawing.add(
             "path",
             path=f"/nmm/desired {len(seen)}",
             color=list(DESIRED),
-            points=packed(path, np.float32),
+            points=packed(path[kept], np.float32),
             times=None,
         )
         seen.append(path)

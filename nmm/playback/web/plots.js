@@ -94,7 +94,6 @@
     get("curves").setAttribute("aria-pressed", String(plots.shown));
     nmm.resize();
     plots.redraw();
-    nmm.values.update();
     changed();
   };
   plots.open = (ids) => {
@@ -163,7 +162,7 @@
     const rows = nmm.runs.filter((run) => !run.hidden && run.columns[lane.key]).map((run) => {
       const row = document.createElement("div");
       const value = document.createElement("b");
-      value.textContent = nmm.values.text(nmm.value(run, lane.key, time), run, lane.key);
+      value.textContent = nmm.values.text(nmm.value(run, lane.key, nmm.at(run, time)), run, lane.key);
       row.append(nmm.sign("line", run.color, run.dash), run.name, value);
       return row;
     });

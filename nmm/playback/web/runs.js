@@ -17,32 +17,33 @@ nmm.lanes = [];
     return low - 1;
   };
 
-  // A channel at a time since the page's first one: between two samples on the straight line, a partition as
-  // it was; null where there is none.
-  nmm.value = (run, key, time) => {
-    const column = run.columns[key];
-    if (column === undefined) return null;
-    const last = run.t.length - 1;
-    // Times of the page's clock are sums and roundings of these.
-    const near = Math.abs(time - run.t[last]) < 1e-6 ? run.t[last] : Math.abs(time - run.t[0]) < 1e-6 ? run.t[0] : time;
-    const i = nmm.before(run.t, near);
-    if (i < 0 || (i === last && near > run.t[last])) return null;
-    const here = column.values[i];
-    let value = here;
-    if (key !== "partition" && i < last && near > run.t[i]) {
-      value = here + ((near - run.t[i]) / (run.t[i + 1] - run.t[i])) * (column.values[i + 1] - here);
-    }
+  // Where a time is among a run's samples: after the one numbered i, by a share of the way to the next; null
+  // before the first and after the last. Times of the page's clock are sums and roundings of theirs.
+  nmm.at = ({ t }, time) => {
+    const last = t.length - 1;
+    if (Math.abs(time - t[last]) < 1e-6) return { i: last, share: 0 };
+    const i = nmm.before(t, time + 1e-9);
+    if (i < 0 || i === last) return null;
+    return { i, share: Math.max(time - t[i], 0) / (t[i + 1] - t[i]) };
+  };
+
+  // A channel there: between two samples on the straight line, a partition as it was; null where there is none.
+  nmm.value = (run, key, at) => {
+    if (at === null || run.columns[key] === undefined) return null;
+    const { values } = run.columns[key];
+    const here = values[at.i];
+    const value = key === "partition" || at.share === 0 ? here : here + at.share * (values[at.i + 1] - here);
     return Number.isFinite(value) ? value : null;
   };
 
   nmm.seek = (t) => nmm.player.seek(t - nmm.stage.start);
   nmm.state = () => ({
     t: nmm.stage.start + nmm.player.time,
-    runs: nmm.runs.map((run) => ({
-      name: run.name,
-      hidden: run.hidden,
-      values: Object.fromEntries(Object.keys(run.columns).map((key) => [key, nmm.value(run, key, nmm.player.time)])),
-    })),
+    runs: nmm.runs.map((run) => {
+      const at = nmm.at(run, nmm.player.time);
+      const values = Object.keys(run.columns).map((key) => [key, nmm.value(run, key, at)]);
+      return { name: run.name, hidden: run.hidden, values: Object.fromEntries(values) };
+    }),
   });
 
   // In the scene, the plots, the table and the legend together.

@@ -3,7 +3,7 @@
 {
   const values = (nmm.values = {});
   const part = document.getElementById("values");
-  let rows = [];
+  let [rows, seen] = [[], false];
 
   // Six digits, without an exponent where one can read it so.
   values.text = (value, run, key) => {
@@ -38,20 +38,26 @@
       named(row, "td", lane.unit, { class: "unit" });
       return { lane, cells };
     });
-    part.addEventListener("toggle", values.update);
+    // Far down or folded it costs nothing.
+    new IntersectionObserver(([{ isIntersecting }]) => {
+      seen = isIntersecting;
+      values.update();
+    }).observe(table);
     nmm.runs.listeners.push(() => {
       for (const row of table.rows) nmm.runs.forEach((run, i) => (row.cells[i + 1].hidden = run.hidden));
     });
   };
 
   values.update = () => {
-    if (!part.open || !nmm.plots.shown) return;
-    for (const { lane, cells } of rows) {
-      nmm.runs.forEach((run, i) => {
-        const text = run.hidden ? "" : values.text(nmm.value(run, lane.key, nmm.player.time), run, lane.key);
+    if (!seen) return;
+    nmm.runs.forEach((run, i) => {
+      if (run.hidden) return;
+      const at = nmm.at(run, nmm.player.time);
+      for (const { lane, cells } of rows) {
+        const text = values.text(nmm.value(run, lane.key, at), run, lane.key);
         if (cells[i].textContent !== text) cells[i].textContent = text;
-      });
-    }
+      }
+    });
   };
   nmm.runs.listeners.push(values.update);
 }
