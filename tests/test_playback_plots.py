@@ -362,9 +362,8 @@ def test_nothing_is_cut_off(plotted: Plotted, size: tuple[int, int]) -> None:
     try:
         draw_frames(page)
         assert page.evaluate(CUT) == []
-        assert page.evaluate(
-            "document.getElementById('plots').scrollWidth <= document.getElementById('plots').clientWidth"
-        )
+        for part in ("#plots", "#values"):
+            assert page.locator(part).evaluate("(part) => part.scrollWidth <= part.clientWidth")
         view, bar, dock = (page.locator(f"#{name}").bounding_box() for name in ("view", "bar", "plots"))
         assert view is not None
         assert bar is not None

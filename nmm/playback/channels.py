@@ -117,10 +117,12 @@ def _of_task(run: Trajectory) -> Iterator[Channel]:
             text = "λ" if levels == 1 else f"λ of level {i + 1}"
             yield Channel(f"scale_{i}", text, "", "scale", run.scale[:, i])
     if run.shares.shape[1] and len(run.shares) == len(run):
-        yield Channel("margin", "share of the range", "", "margin", margin(run.shares), (0.0, np.inf))
+        yield Channel("margin", "least margin", "", "margin", margin(run.shares), (0.0, np.inf))
     yield Channel("residual", "‖J u − rate‖", "", "residual", run.residual, log=True)
     if np.isfinite(run.clearance).any():
-        yield Channel("clearance", "d", "m", "clearance", run.clearance, (run.clearance_asked, np.inf))
+        yield Channel(
+            "clearance", "clearance", "m", "clearance", run.clearance, (run.clearance_asked, np.inf)
+        )
 
 
 def _limits_kept(run: Trajectory) -> dict[str, tuple[float, float]]:

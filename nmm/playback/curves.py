@@ -18,12 +18,12 @@ PANELS: Mapping[str, str] = {
     "H": "Objective",
     "sigma": "Smallest singular value of J",
     "scale": "Share of the task's rate that limits left",
-    "margin": "Least margin to a limit",
+    "margin": "Limits",
     "partition": "Partition: the inputs in Ja",
     "inputs": "Inputs",
     "components": "Components of the task error",
     "coordinates": "Coordinates",
-    "clearance": "Clearance",
+    "clearance": "Collisions",
     "residual": "Residual",
 }
 #: Those that are open at first, if they have something to say.

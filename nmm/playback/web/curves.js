@@ -79,8 +79,16 @@
     for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) {
       found.push({ at: k * step, text: log ? raised(k * step) : curves.number(k * step, step) });
     }
-    // Within one decade a logarithmic axis says where it ends.
-    return found.length ? found : [low, high].map((at) => ({ at, text: (10 ** at).toPrecision(2) }));
+    if (!log || found.length > 1) return found;
+    // Within one decade a logarithmic axis has its 2 and 5, too, or says where it ends.
+    for (let k = Math.floor(low); k < high; k++) {
+      for (const factor of [2, 5]) {
+        const at = k + Math.log10(factor);
+        if (at > low && at < high) found.push({ at, text: `${factor}·${raised(k)}` });
+      }
+    }
+    const few = (value) => String(Number((10 ** value).toPrecision(3)));
+    return found.length > 1 ? found : [low, high].map((at) => ({ at, text: few(at) }));
   }
 
   // The line through a run's samples; of many in one column of pixels the extremes.

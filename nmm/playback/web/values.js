@@ -10,6 +10,7 @@
     if (value === null) return "–";
     if (key === "partition") return run.partitions[value] ?? "–";
     const size = Math.abs(value);
+    if (size === 0) return "0";
     const text = size !== 0 && (size < 1e-4 || size >= 1e6) ? value.toExponential(3) : value.toPrecision(6);
     return text.replace("e-", "e−").replace(/^-/, "−");
   };
@@ -29,13 +30,12 @@
       const cell = named(head, "th", "", { scope: "col" });
       cell.append(nmm.sign("line", run.color, run.dash), run.name || "value");
     }
-    named(head, "th", "unit", { scope: "col" });
     const body = named(table, "tbody", "");
     rows = nmm.lanes.map((lane) => {
       const row = named(body, "tr", "", { "data-channel": lane.key });
-      named(row, "th", lane.text, { scope: "row" });
+      const title = named(row, "th", lane.text, { scope: "row", title: nmm.curves.named(lane) });
+      if (lane.unit) named(title, "span", ` ${lane.unit}`, { class: "unit" });
       const cells = nmm.runs.map(() => named(row, "td", ""));
-      named(row, "td", lane.unit, { class: "unit" });
       return { lane, cells };
     });
     // Far down or folded it costs nothing.
