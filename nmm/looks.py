@@ -66,6 +66,18 @@ def looks(resolvers: Sequence[str]) -> list[Look]:
     return found
 
 
+def looks_of_labels(labels: Sequence[str]) -> list[Look]:
+    """The look of each of several labelled motions: its resolver's, if the label is one in any case.
+
+    The name is the label, with a number where an earlier one has the same.
+    """
+    found = []
+    for k, (label, look) in enumerate(zip(labels, looks([label.lower() for label in labels]), strict=True)):
+        earlier = labels[:k].count(label)
+        found.append(look._replace(name=f"{label} ({earlier + 1})" if label and earlier else label))
+    return found
+
+
 def pretty(name: str) -> str:
     """A coordinate's or an input's name as the paper writes it: theta → θ, q1 → q₁."""
     if name in _GREEK:

@@ -9,7 +9,7 @@ import numpy as np
 
 from nmm.arrays import Array, interpolated
 from nmm.errors import InputError
-from nmm.looks import Look, looks
+from nmm.looks import looks, looks_of_labels
 from nmm.playback.channels import channels
 from nmm.playback.curves import draw_curves
 from nmm.playback.drawing import Command, Drawing, DrawnRobot, Rgb
@@ -70,7 +70,7 @@ def playback_scene(
     if not runs:
         raise InputError("motions: expected at least one motion, got none")
     motions = [run.motion() if isinstance(run, Trajectory) else run for run in runs]
-    worn = _worn(motions)
+    worn = looks_of_labels([motion.label for motion in motions])
     frames = [keyframes(motion, fps) for motion in motions]
     start = min(float(motion.t[0]) for motion in motions)
     end = max(float(motion.t[-1]) for motion in motions)
@@ -179,17 +179,6 @@ def live_scene(
     )
     drawing.add("ready")
     return drawing.commands, drawn
-
-
-def _worn(motions: Sequence[Motion]) -> list[Look]:
-    """The look of each motion: its label's, if that is a resolver; the name is the label, with a number where
-    an earlier one has the same."""
-    labels = [motion.label for motion in motions]
-    found = []
-    for k, (label, look) in enumerate(zip(labels, looks([label.lower() for label in labels]), strict=True)):
-        earlier = labels[:k].count(label)
-        found.append(look._replace(name=f"{label} ({earlier + 1})" if label and earlier else label))
-    return found
 
 
 def _ellipsoids(
