@@ -287,10 +287,10 @@ def test_play_shows_a_comparison(run: Command, monkeypatch: pytest.MonkeyPatch) 
 
     assert run("compare", "unicycle_2r_position", "--set", "duration=0.1", "--out", "two").status == 0
     shown = []
-    monkeypatch.setattr(nmm.playback, "play", lambda motions, **options: shown.append((motions, options)))
+    monkeypatch.setattr(nmm.playback, "play", lambda runs, **options: shown.append((runs, options)))
     assert run("play", "two", "--port", "7123", "--no-open").status == 0
-    ((motions, options),) = shown
-    assert [motion.label for motion in motions] == ["RG", "PG"]
+    ((runs, options),) = shown
+    assert [trajectory.resolver for trajectory in runs] == ["rg", "pg"]
     assert options == {"port": 7123, "open_browser": False, "ellipsoids": False}
 
 

@@ -130,12 +130,10 @@ def play_folder(folder: Path, port: int | None, *, open_browser: bool, ellipsoid
     from nmm.runs.trajectory import Trajectory
 
     folders = comparison.runs_of(folder) if comparison.is_comparison(folder) else [folder]
-    motions = [
-        trajectory.motion() for trajectory in (Trajectory.load(path) for path in folders) if len(trajectory)
-    ]
-    if not motions:
+    runs = [trajectory for trajectory in (Trajectory.load(path) for path in folders) if len(trajectory)]
+    if not runs:
         raise InputError(f"{folder}: expected a run with at least one sample")
-    play(motions, port=port, open_browser=open_browser, ellipsoids=ellipsoids)
+    play(runs, port=port, open_browser=open_browser, ellipsoids=ellipsoids)
 
 
 def _load(name: str, resolver: str | None, settings: Mapping[str, object], limits: bool | None) -> Scenario:

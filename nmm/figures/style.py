@@ -6,10 +6,8 @@ and two threads that change them change each other's. Nothing here reads or writ
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,17 +16,19 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
 from nmm.arrays import Array
-from nmm.kinds import RESOLVERS as NAMES
+from nmm.looks import BLACK as BLACK
+from nmm.looks import BLUE as BLUE
+from nmm.looks import CYCLE as CYCLE
+from nmm.looks import DASHES as DASHES
+from nmm.looks import GREEN as GREEN
+from nmm.looks import ORANGE as ORANGE
+from nmm.looks import PINK as PINK
+from nmm.looks import SKY as SKY
+from nmm.looks import VERMILLION as VERMILLION
+from nmm.looks import Look as Look
+from nmm.looks import looks as looks
+from nmm.looks import pretty as pretty
 
-#: Okabe and Ito's colours, told apart by colour-blind readers.
-BLUE, VERMILLION, GREEN, PINK = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
-ORANGE, SKY, BLACK = "#E69F00", "#56B4E9", "#222222"
-CYCLE = (BLUE, VERMILLION, GREEN, PINK, ORANGE, SKY, BLACK)
-DASHES = ("-", "--", "-.", ":")
-#: Colour and dashes of a resolver, the same in every figure.
-RESOLVERS: Mapping[str, tuple[str, str]] = {
-    name: (CYCLE[k % len(CYCLE)], DASHES[k % len(DASHES)]) for k, name in enumerate(NAMES)
-}
 GREY, LIGHT = "#6B7280", "#E5E7EB"
 DPI = 180
 TEXT, SMALL = 9.0, 8.0
@@ -38,8 +38,6 @@ PAGE, LEFT, RIGHT, BOTTOM = 5.2, 0.8, 0.2, 0.46
 #: Height above a panel for a legend of one row, and for each row more, in.
 GAP, ROW = 0.34, 0.16
 
-_GREEK = {"theta": "θ", "omega": "ω", "phi": "φ", "psi": "ψ", "alpha": "α", "beta": "β", "delta": "δ"}
-_SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -209,14 +207,6 @@ def legend(axes: Axes, width: float | None = None, *, lift: float = 0.0) -> None
     )
 
 
-def pretty(name: str) -> str:
-    """A coordinate's or an input's name as the paper writes it: theta → θ, q1 → q₁."""
-    if name in _GREEK:
-        return _GREEK[name]
-    indexed = re.fullmatch(r"([A-Za-z])_?(\d+)", name)
-    return indexed[1] + indexed[2].translate(_SUBSCRIPTS) if indexed else name
-
-
 def units(names: Iterable[str]) -> str:
     """The units of an axis that several quantities share: "[m/s, rad/s]"."""
     return f"[{', '.join(dict.fromkeys(names))}]"
@@ -227,28 +217,6 @@ def groups(kinds: Sequence[str]) -> dict[str, list[int]]:
     found: dict[str, list[int]] = {}
     for index, kind in enumerate(kinds):
         found.setdefault(kind, []).append(index)
-    return found
-
-
-class Look(NamedTuple):
-    """How a run appears in a figure of several: its name, its colour, its dashes."""
-
-    name: str
-    color: str
-    dashes: str
-
-
-def looks(resolvers: Sequence[str]) -> list[Look]:
-    """The look of each of several runs: its resolver's, unless another run has it already."""
-    found: list[Look] = []
-    spare = [color for color in CYCLE if color not in {color for color, _ in RESOLVERS.values()}]
-    for k, resolver in enumerate(resolvers):
-        earlier = resolvers[:k].count(resolver)
-        name = resolver.upper() if not earlier else f"{resolver.upper()} ({earlier + 1})"
-        color, dashes = RESOLVERS.get(resolver, (spare[k % len(spare)], DASHES[k % len(DASHES)]))
-        if earlier:
-            color, dashes = spare[k % len(spare)], DASHES[k % len(DASHES)]
-        found.append(Look(name, color, dashes))
     return found
 
 

@@ -58,6 +58,5 @@ def save(
             from nmm.playback import write_html
 
             comparison(shown).savefig(temporary / "comparison.png")
-            motions = [trajectory.motion() for trajectory in shown]
-            write_html(motions, temporary / "playback.html", title=title, ellipsoids=ellipsoids)
+            write_html(shown, temporary / "playback.html", title=title, ellipsoids=ellipsoids)
     return Path(folder)

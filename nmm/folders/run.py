@@ -86,7 +86,7 @@ def save(
 
             title = trajectory.robot.name if trajectory.scenario is None else str(trajectory.scenario["name"])
             page = temporary / "playback.html"
-            write_html([trajectory.motion()], page, title=title, ellipsoids=ellipsoids)
+            write_html([trajectory], page, title=title, ellipsoids=ellipsoids)
     return Path(folder)
 
 

@@ -78,4 +78,4 @@ def _write_playback(case: Case, runs: list[Trajectory], path: Path) -> None:
     from nmm.playback import write_html
 
     title = f"Case {case.number}: {case.title}"
-    write_html([run.motion() for run in runs], path, title=title)
+    write_html(runs, path, title=title)

@@ -9,13 +9,12 @@ from pathlib import Path
 
 from nmm.errors import InputError
 from nmm.playback.page import file_page
-from nmm.playback.scene import playback_scene
-from nmm.robots.motion import Motion
+from nmm.playback.scene import Shown, playback_scene
 from nmm.runs.ellipsoid_options import Wanted
 
 
 def write_html(
-    motions: Sequence[Motion],
+    motions: Sequence[Shown],
     path: str | Path,
     *,
     title: str | None = None,
@@ -24,13 +23,13 @@ def write_html(
     autoplay: bool = False,
     ellipsoids: Wanted = False,
 ) -> Path:
-    """Write a page that plays the motions, each in a colour of its own.
+    """Write a page that plays runs or motions, each in its resolver's colour, with its curves beside it.
 
     It opens at the first instant. `#t=3.2` after the file's address opens it at 3.2 s, `#play` plays.
 
     Parameters
     ----------
-    motions : at least one
+    motions : at least one run (`Trajectory`) or `Motion`
     path : the file to write; it appears whole or not at all, and replaces an older one
     title : heading; the first robot's name when not given
     ghosts : transparent copies of each robot along its way; 6 when not given, 3 of each of several

@@ -16,16 +16,15 @@ from nmm.arrays import vector
 from nmm.playback.encoding import encode
 from nmm.playback.page import socket_page
 from nmm.playback.rolling import Rolling
-from nmm.playback.scene import live_scene, playback_scene
+from nmm.playback.scene import Shown, live_scene, playback_scene
 from nmm.playback.server import PageServer
 from nmm.playback.sticks import appearance
-from nmm.robots.motion import Motion
 from nmm.robots.robot import Robot
 from nmm.runs.ellipsoid_options import Wanted
 
 
 def play(
-    motions: Sequence[Motion],
+    motions: Sequence[Shown],
     *,
     port: int | None = None,
     open_browser: bool = True,
@@ -41,7 +40,7 @@ def play(
 
     Parameters
     ----------
-    motions : at least one
+    motions : at least one run (`Trajectory`) or `Motion`
     port : port on 127.0.0.1; a free one when not given
     open_browser : whether to open the page in the user's browser
     title : heading; the first robot's name when not given

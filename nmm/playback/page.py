@@ -15,12 +15,20 @@ from nmm.playback.encoding import encode
 #: In the order in which they depend on one another.
 SCRIPTS = (
     "commands.js",
+    "theme.js",
+    "runs.js",
+    "legend.js",
     "scenery.js",
     "ghosts.js",
     "ellipsoids.js",
     "obstacles.js",
     "camera.js",
+    "curves.js",
+    "plots.js",
+    "values.js",
     "player.js",
+    "keys.js",
+    "address.js",
     "start.js",
 )
 
@@ -67,7 +75,7 @@ def _page(
         "version": metadata.version("nmm"),
         "title": html.escape(title),
         "source": source,
-        "style": "\n".join(_resource(name) for name in ("style.css", *styles)),
+        "style": "\n".join(_resource(name) for name in ("style.css", "plots.css", *styles)),
         "meshcat": _meshcat_viewer(),
         "scripts": before_scripts + code,
     }

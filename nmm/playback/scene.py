@@ -9,10 +9,13 @@ import numpy as np
 
 from nmm.arrays import Array, interpolated
 from nmm.errors import InputError
+from nmm.looks import looks, looks_of_labels
+from nmm.playback.channels import channels
+from nmm.playback.curves import draw_curves
 from nmm.playback.drawing import Command, Drawing, DrawnRobot, Rgb
 from nmm.playback.encoding import packed
 from nmm.playback.extent import corners, robot_boxes
-from nmm.playback.keyframes import Keyframes, ghost_samples, keyframes
+from nmm.playback.keyframes import MOST_FRAMES, Keyframes, ghost_samples, keyframes, samples_kept
 from nmm.playback.obstacles import SceneObstacles, draw_nearest
 from nmm.playback.placements import base_position
 from nmm.playback.rolling import wheel_angles
@@ -20,19 +23,11 @@ from nmm.playback.shapes import Y_TO_Z, cylinder, sphere
 from nmm.robots.motion import Motion
 from nmm.robots.robot import Robot
 from nmm.runs.ellipsoid_options import Wanted, options_of
+from nmm.runs.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from nmm.playback.ellipsoids import SceneEllipsoids
 
-#: Colours of the motions: told apart by readers with any colour vision.
-COLORS: tuple[Rgb, ...] = (
-    (0.09, 0.42, 0.83),
-    (0.87, 0.33, 0.09),
-    (0.05, 0.60, 0.45),
-    (0.70, 0.36, 0.66),
-    (0.80, 0.62, 0.05),
-    (0.35, 0.70, 0.90),
-)
 DESIRED: Rgb = (0.16, 0.18, 0.22)
 TARGET: Rgb = (0.83, 0.10, 0.22)
 
@@ -43,8 +38,12 @@ INSTANTS = 80
 POSES = 100
 
 
+#: What a page shows: a run with its curves, or a motion, whose curves are its inputs and coordinates.
+Shown = Motion | Trajectory
+
+
 def playback_scene(
-    motions: Sequence[Motion],
+    runs: Sequence[Shown],
     *,
     title: str,
     ghosts: int | None = None,
@@ -52,11 +51,11 @@ def playback_scene(
     autoplay: bool = False,
     ellipsoids: Wanted = False,
 ) -> list[Command]:
-    """Commands for motions that are played: robots, paths, ghosts, animation.
+    """Commands for runs that are played: robots, paths, ghosts, animation, and their curves.
 
     Parameters
     ----------
-    motions : at least one
+    runs : at least one
     title : heading of the page
     ghosts : transparent copies of each robot along its way; 6 when not given, 3 of each of several
     fps : frames for each second of motion
@@ -65,10 +64,13 @@ def playback_scene(
 
     Raises
     ------
-    InputError : no motion; ellipsoids of a frame or with sizes that a robot does not have
+    InputError : no motion, or one without samples; ellipsoids of a frame or with sizes that a robot does
+        not have
     """
-    if not motions:
+    if not runs:
         raise InputError("motions: expected at least one motion, got none")
+    motions = [run.motion() if isinstance(run, Trajectory) else run for run in runs]
+    worn = looks_of_labels([motion.label for motion in motions])
     frames = [keyframes(motion, fps) for motion in motions]
     start = min(float(motion.t[0]) for motion in motions)
     end = max(float(motion.t[-1]) for motion in motions)
@@ -89,6 +91,7 @@ def playback_scene(
         title=title,
         live=False,
         autoplay=autoplay,
+        plots=any(isinstance(run, Trajectory) for run in runs),
         start=start,
         duration=end - start,
         view=packed(view, np.float64),
@@ -97,8 +100,8 @@ def playback_scene(
         size=size,
     )
     animations = obstacles.draw(drawing, size, start)
-    for i, (motion, frame) in enumerate(zip(motions, frames, strict=True)):
-        color = COLORS[i % len(COLORS)]
+    for i, (motion, frame, look) in enumerate(zip(motions, frames, worn, strict=True)):
+        color = look.rgb
         path = f"/nmm/motion {i}"
         robot = DrawnRobot(drawing, motion.robot, f"{path}/robot", tint=color if several else None, rank=i)
         robot.place(frame.q[0], frame.wheels[0])
@@ -111,18 +114,19 @@ def playback_scene(
             path=path,
             root=robot.root,
             # The page calls the line that it draws the end-effector's, unless it is told otherwise.
-            label=motion.label or ("" if motion.driven is not None else motion.robot.name),
+            label=look.name or ("" if motion.driven is not None else motion.robot.name),
             color=list(color),
-            tag=motion.label if several else "",
+            tag=look.name if several else "",
             height=TAG * float(boxes[i, 0, 1, 2]),
         )
         if motion.driven is not None:
+            drawn = samples_kept(motion.t, fps)
             drawing.add(
                 "path",
                 path=f"{path}/path",
                 color=list(color),
-                points=packed(motion.driven, np.float32),
-                times=packed(motion.t - start, np.float64),
+                points=packed(motion.driven[drawn], np.float32),
+                times=packed(motion.t[drawn] - start, np.float64),
             )
         draw_nearest(drawing, motion, path, color if several else None, start, fps)
         if shown is not None:
@@ -131,7 +135,8 @@ def playback_scene(
     _desired(drawing, motions)
     _targets(drawing, motions, size)
     if shown is not None:
-        shown.tell(drawing, [f"/nmm/motion {i}" for i in range(len(motions))], COLORS[0])
+        shown.tell(drawing, [f"/nmm/motion {i}" for i in range(len(motions))], worn[0].rgb)
+    draw_curves(drawing, [channels(run) for run in runs], worn, start)
     drawing.add("set_animation", animations=animations, options={"play": False, "repetitions": 1})
     drawing.add("ready")
     return drawing.commands
@@ -168,7 +173,7 @@ def live_scene(
         path="/nmm/motion 0",
         root=drawn.root,
         label=robot.name,
-        color=list(COLORS[0]),
+        color=list(looks([""])[0].rgb),
         tag="",
         height=TAG * float(box[1, 2]),
     )
@@ -206,11 +211,12 @@ def _desired(drawing: Drawing, motions: Sequence[Motion]) -> None:
         path = motion.desired
         if path is None or any(path.shape == other.shape and np.allclose(path, other) for other in seen):
             continue
+        kept = np.unique(np.linspace(0, len(path) - 1, MOST_FRAMES).astype(int))
         drawing.add(
             "path",
             path=f"/nmm/desired {len(seen)}",
             color=list(DESIRED),
-            points=packed(path, np.float32),
+            points=packed(path[kept], np.float32),
             times=None,
         )
         seen.append(path)

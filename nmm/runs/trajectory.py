@@ -231,9 +231,7 @@ class Trajectory:
 
     def play(self, *, port: int | None = None, open_browser: bool = True, ellipsoids: Wanted = False) -> None:
         """Play the motion in a browser with MeshCat; returns when the user ends it (Ctrl-C)."""
-        door("nmm.playback:play")(
-            [self.motion()], port=port, open_browser=open_browser, ellipsoids=ellipsoids
-        )
+        door("nmm.playback:play")([self], port=port, open_browser=open_browser, ellipsoids=ellipsoids)
 
 
 def _stays(path: Array) -> bool:

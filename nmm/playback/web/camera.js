@@ -3,9 +3,14 @@
 {
   const THREE = MeshCat.THREE;
   const FIELD = 36;
-  // From the target towards the camera, in the world's axes.
-  const TOWARDS = new THREE.Vector3(0.42, -0.9, 0.82);
-  const camera = (nmm.camera = { following: false, moved: false, held: null });
+  // From the target towards the camera, in the world's axes. From right above, up would be nowhere.
+  const TOWARDS = {
+    iso: new THREE.Vector3(0.42, -0.9, 0.82),
+    top: new THREE.Vector3(0, -0.001, 1),
+    front: new THREE.Vector3(0, -1, 0.06),
+  };
+  const camera = (nmm.camera = { following: false, moved: false, held: null, from: "iso" });
+  const chooser = document.getElementById("from");
   // Not the window: a page may have something beside the view.
   const view = document.getElementById("view");
   const upright = (v) => new THREE.Vector3(v.x, v.z, -v.y);
@@ -24,7 +29,6 @@
     controls.minDistance = 0.05 * size;
     controls.maxDistance = 30 * size;
     controls.addEventListener("start", () => (camera.moved = true));
-    window.addEventListener("resize", () => camera.moved || camera.reset());
     camera.reset();
   };
 
@@ -33,9 +37,9 @@
   function covered(named) {
     const bar = document.getElementById("bar").getBoundingClientRect();
     const [head, tools] = cards();
-    const narrow = window.innerWidth < 640;
-    const under = view.clientHeight < window.innerHeight ? 56 : 24; // where a panel is below the view
-    const bottom = bar.height ? window.innerHeight - bar.top + (narrow ? 44 : 10) : under;
+    const narrow = tools.top > 0.5 * view.clientHeight; // the tools are below
+    const lowest = Math.min(bar.height ? bar.top : Infinity, narrow && tools.height ? tools.top : Infinity, view.clientHeight);
+    const bottom = view.clientHeight - lowest + (bar.height ? 10 : view.clientHeight < window.innerHeight ? 56 : 24);
     if (narrow || camera.held) return [[head.bottom + 4, bottom, 0, 0]];
     const [aside, above] = room(named.length > 0).map((pixels) => pixels + 4);
     const tops = [24, tools.bottom + above, Math.max(head.bottom, tools.bottom) + above];
@@ -137,7 +141,7 @@
 
   camera.reset = () => {
     camera.moved = false;
-    const towards = upright(TOWARDS);
+    const towards = upright(TOWARDS[camera.from]);
     if (!camera.following && !camera.held) return look(points, towards, tags);
     last = middle();
     // A page may say itself what there is to hold, as points in three.js's axes.
@@ -154,6 +158,20 @@
     }
     return look(around, towards, []);
   };
+
+  // From one of the sides above; another name is none.
+  camera.look = (from) => {
+    if (!Object.hasOwn(TOWARDS, from)) return;
+    camera.from = chooser.value = from;
+    camera.reset();
+    nmm.viewer.set_dirty();
+    nmm.address.changed();
+  };
+  camera.next = () => {
+    const sides = Object.keys(TOWARDS);
+    camera.look(sides[(sides.indexOf(camera.from) + 1) % sides.length]);
+  };
+  chooser.addEventListener("change", () => camera.look(chooser.value));
 
   camera.follow = (on) => {
     camera.following = on;

@@ -3,7 +3,27 @@
 "use strict";
 const nmm = (window.nmm = { hooks: {}, geometries: {} });
 
-nmm.viewer = window.viewer = new MeshCat.Viewer(document.getElementById("view"));
+{
+  const view = document.getElementById("view");
+  const canvas = document.createElement("canvas");
+  const drawn = ["webgl2", "webgl"].some((kind) => canvas.getContext(kind) !== null);
+  // Without WebGL all goes on as it does, and nothing is drawn.
+  const blind = { domElement: canvas, shadowMap: {}, render: () => {}, setSize: () => {}, setPixelRatio: () => {} };
+  nmm.viewer = window.viewer = drawn ? new MeshCat.Viewer(view) : new MeshCat.Viewer(view, true, blind);
+  document.body.classList.toggle("blind", !drawn);
+
+  // MeshCat takes the window's height for the view's.
+  const fit = nmm.viewer.set_3d_pane_size;
+  nmm.viewer.set_3d_pane_size = () => {
+    if (view.clientWidth && view.clientHeight) fit.call(nmm.viewer, view.clientWidth, view.clientHeight);
+  };
+  nmm.resize = () => {
+    nmm.viewer.set_3d_pane_size();
+    if (nmm.stage && !nmm.camera.moved) nmm.camera.reset();
+    nmm.viewer.set_dirty();
+  };
+  window.addEventListener("resize", () => nmm.resize());
+}
 
 {
   const THREE = MeshCat.THREE;

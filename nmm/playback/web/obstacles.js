@@ -106,7 +106,7 @@
       one.item.classList.toggle("far", pair < 0);
       if (pair < 0) continue;
       const color = d < one.asked ? one.alarm : one.color;
-      one.material.color.copy(nmm.color(color));
+      one.material.color.copy(nmm.color(nmm.theme.paint(color)));
       one.ends.forEach((end, k) => end.position.copy(ends[k]));
       const along = ends[1].clone().sub(ends[0]);
       const length = along.length();
@@ -118,7 +118,7 @@
       }
       one.text.position.copy(ends[0]).add(ends[1]).multiplyScalar(0.5);
       one.text.write(`${d.toFixed(3)} m`, css(color));
-      one.item.firstChild.style.color = css(color);
+      one.item.firstChild.style.color = nmm.theme.css(color);
       one.words.textContent = `${one.of ? `${one.of}: ` : ""}${one.names[pair]}`;
     }
   };

@@ -1,15 +1,17 @@
-// The controls: a clock that drives MeshCat's animator, the play bar, the legend, the keyboard.
+// The clock: it drives MeshCat's animator, the plots and the values, and the buttons drive it.
 "use strict";
 {
   const get = (id) => document.getElementById(id);
   const SPEEDS = [...get("speed").options].map((option) => Number(option.value));
-  const FRAME = 1 / 60;
-  const player = (nmm.player = { time: 0, playing: false, speed: 1, loop: true });
+  const PAUSE = 0.6;
+  // range: s since the first sample, what the bar reaches over.
+  const player = (nmm.player = { time: 0, playing: false, speed: 1, loop: true, range: { from: 0, to: 0 } });
   nmm.motions = [];
-  let last = null;
+  let [last, rested] = [null, 0];
 
   nmm.hooks.stage = (stage) => {
     nmm.stage = stage;
+    player.range.to = stage.duration;
     document.body.classList.toggle("live", stage.live);
     nmm.scenery.build(stage.view, stage.size, stage.follow.radius);
     nmm.camera.build(stage.view, stage.size, stage.tags);
@@ -21,7 +23,8 @@
     if (tag) nmm.scenery.tag(nmm.node(motion.root), tag, color, height, row);
     if (nmm.stage.live) return;
     const text = motion.label || "end-effector";
-    nmm.legend({ kind: "line", color: motion.color, text, path: motion.path });
+    const act = (on) => nmm.hide(nmm.runs[row], !on);
+    motion.button = nmm.legend({ kind: "line", color: motion.color, text, act }).firstChild;
   };
 
   nmm.hooks.target = ({ color }) => nmm.legend({ kind: "ball", color, text: "target" });
@@ -33,38 +36,61 @@
     document.body.classList.remove("loading");
     document.body.classList.toggle("plain", !nmm.ghosts);
     get("status").textContent = "";
-    get("slider").max = nmm.stage.duration;
     get("slider").disabled = nmm.stage.duration === 0;
     if (nmm.stage.live) return setFollow(true);
-    const wanted = new URLSearchParams(location.hash.slice(1));
-    player.seek(Number(wanted.get("t") || nmm.stage.start) - nmm.stage.start);
-    if (nmm.stage.autoplay || wanted.has("play")) player.play();
+    player.setRange(0, nmm.stage.duration);
+    nmm.plots.show(nmm.stage.plots);
+    player.seek(0);
+    nmm.address.start();
+    if (nmm.stage.autoplay) player.play();
     return nmm.camera.reset(); // the play bar is there only now
+  };
+
+  // The bar reaches over a part of the motion, at least a thousandth of it.
+  player.setRange = (from, to) => {
+    const duration = nmm.stage.duration;
+    const length = Math.min(Math.max(to - from, 1e-3 * duration), duration);
+    const first = Math.min(Math.max(from, 0), duration - length);
+    player.range = { from: first, to: length === duration ? duration : first + length };
+    Object.assign(get("slider"), { min: player.range.from, max: player.range.to });
+    get("slider").value = player.time;
   };
 
   // time: s since the first sample.
   player.seek = (time) => {
     const duration = nmm.stage.duration;
     player.time = Math.min(Math.max(Number.isFinite(time) ? time : 0, 0), duration);
+    follow();
     nmm.viewer.animator.seek(player.time);
     nmm.scenery.update(player.time);
     nmm.obstacles.update(player.time);
     nmm.camera.update();
+    nmm.plots.update();
+    nmm.values.update();
     get("slider").value = player.time;
-    get("slider").setAttribute("aria-valuetext", `${player.time.toFixed(2)} s`);
+    get("slider").setAttribute("aria-valuetext", `${(nmm.stage.start + player.time).toFixed(2)} s`);
     const end = nmm.stage.start + duration;
     get("time").textContent = `${(nmm.stage.start + player.time).toFixed(2)} / ${end.toFixed(2)} s`;
+    nmm.address.changed();
   };
+
+  // What is zoomed into comes along when somebody goes elsewhere.
+  function follow() {
+    const { from, to } = player.range;
+    if (player.time >= from && player.time <= to) return;
+    const shift = player.time < from ? player.time - from : player.time - to;
+    nmm.plots.zoom(from + shift, to + shift);
+  }
 
   function setPlaying(on) {
     player.playing = on;
-    last = null;
+    [last, rested] = [null, 0];
     document.body.classList.toggle("playing", on);
     get("play").setAttribute("aria-label", on ? "Pause" : "Play");
   }
 
   player.play = () => {
-    if (player.time >= nmm.stage.duration) player.seek(0);
+    if (player.time >= player.range.to) player.seek(player.range.from);
     setPlaying(nmm.stage.duration > 0);
   };
   player.pause = () => setPlaying(false);
@@ -73,20 +99,22 @@
     player.speed = speed;
     get("speed").value = String(speed);
   };
+  player.faster = (by) => {
+    const at = SPEEDS.indexOf(player.speed) + by;
+    if (at >= 0 && at < SPEEDS.length) player.setSpeed(SPEEDS[at]);
+  };
 
   function tick(now) {
     requestAnimationFrame(tick);
     if (!player.playing) return;
     const passed = last === null ? 0 : (now - last) / 1000;
     last = now;
-    let time = player.time + passed * player.speed;
-    if (time >= nmm.stage.duration) {
-      // Stay at the end for a moment before beginning again.
-      if (player.loop && time >= nmm.stage.duration + 0.6 * player.speed) time = 0;
-      else if (!player.loop) setPlaying(false);
-    }
-    player.seek(time);
-    if (time > nmm.stage.duration && player.playing) player.time = time;
+    const { from, to } = player.range;
+    const time = player.time + passed * player.speed;
+    // It stays at the end for a moment before it begins again.
+    rested = time >= to ? rested + passed : 0;
+    if (time >= to && !player.loop) setPlaying(false);
+    player.seek(rested >= PAUSE ? from : Math.min(time, to));
   }
   requestAnimationFrame(tick);
   // A page in the background is not drawn: after it, go on from where it was.
@@ -101,13 +129,14 @@
   function setFollow(on) {
     nmm.camera.follow(on);
     pressed("follow", on);
+    nmm.address.changed();
   }
   function setShown(id, objects, on) {
     for (const object of objects || []) object.visible = on;
     pressed(id, on);
   }
 
-  const actions = {
+  const actions = (nmm.actions = {
     play: player.toggle,
     loop: () => pressed("loop", (player.loop = !player.loop)),
     follow: () => setFollow(!nmm.camera.following),
@@ -119,72 +148,9 @@
     ellipsoids: () => setShown("ellipsoids", nmm.ellipsoids, !isPressed("ellipsoids")),
     distances: () => setShown("distances", nmm.obstacles.lines, !isPressed("distances")),
     paths: () => setShown("paths", nmm.scenery.paths, !isPressed("paths")),
-  };
+    curves: () => nmm.plots.show(!nmm.plots.shown),
+  });
   for (const [id, action] of Object.entries(actions)) get(id).addEventListener("click", action);
   get("slider").addEventListener("input", (event) => player.seek(Number(event.target.value)));
   get("speed").addEventListener("change", (event) => player.setSpeed(Number(event.target.value)));
-
-  const faster = (by) => {
-    const at = SPEEDS.indexOf(player.speed) + by;
-    if (at >= 0 && at < SPEEDS.length) player.setSpeed(SPEEDS[at]);
-  };
-  const keys = {
-    " ": actions.play,
-    ArrowLeft: (event) => player.seek(player.time - (event.shiftKey ? FRAME : 0.5)),
-    ArrowRight: (event) => player.seek(player.time + (event.shiftKey ? FRAME : 0.5)),
-    ArrowUp: () => faster(1),
-    ArrowDown: () => faster(-1),
-    Home: () => player.seek(0),
-    End: () => player.seek(nmm.stage.duration),
-    l: actions.loop,
-    f: actions.follow,
-    r: actions.reset,
-    g: actions.ghosts,
-    e: actions.ellipsoids,
-    d: actions.distances,
-    p: actions.paths,
-    m: () => document.body.classList.toggle("panel"),
-  };
-  window.addEventListener(
-    "keydown",
-    (event) => {
-      const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
-      if (event.ctrlKey || event.metaKey || event.altKey || keys[key] === undefined || !nmm.stage) return;
-      // Letters, arrows and space belong to a panel while one types or slides there.
-      if (event.target.closest && event.target.closest(".dg, #panel")) return;
-      event.preventDefault();
-      keys[key](event);
-    },
-    true,
-  );
-
-  const SIGNS = {
-    line: '<path d="M2 6h20" stroke="currentColor" stroke-width="4" stroke-linecap="round"/>',
-    dashed: '<path d="M1 6h22" stroke="currentColor" stroke-width="3" stroke-dasharray="6 4"/>',
-    box: '<path d="M5 1h14v10H5z" fill="currentColor"/>',
-    ball: '<circle cx="12" cy="6" r="5" fill="currentColor"/>',
-  };
-
-  // path: a node that the entry shows and hides, or several.
-  nmm.legend = ({ kind, color, text, path }) => {
-    if (path === undefined && text && [...get("legend").children].some((item) => item.textContent === text)) return;
-    const item = document.createElement("li");
-    const sign = document.createElement("span");
-    sign.style.color = `rgb(${color.map((c) => Math.round(255 * c)).join(",")})`;
-    sign.innerHTML = `<svg viewBox="0 0 24 12" aria-hidden="true">${SIGNS[kind]}</svg>`;
-    const holder = path === undefined ? item : item.appendChild(document.createElement("button"));
-    holder.append(sign, text);
-    if (path !== undefined) {
-      holder.setAttribute("aria-pressed", "true");
-      holder.title = `Show or hide ${text}`;
-      holder.addEventListener("click", () => {
-        const on = holder.getAttribute("aria-pressed") !== "true";
-        for (const one of [path].flat()) nmm.node(one).visible = on;
-        holder.setAttribute("aria-pressed", String(on));
-        nmm.viewer.set_dirty();
-      });
-    }
-    get("legend").append(item);
-    return item;
-  };
 }

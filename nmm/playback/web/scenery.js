@@ -105,6 +105,12 @@
     lines.setAttribute("position", new THREE.Float32BufferAttribute(positions, 3));
     lines.setAttribute("color", new THREE.Float32BufferAttribute(colors, 4));
     const grid = new THREE.LineSegments(lines, new THREE.LineBasicMaterial({ ...flat, vertexColors: true }));
+    const themed = () => {
+      grid.material.color.setRGB(...(nmm.theme.dark ? [4.4, 3.5, 2.8] : [1, 1, 1]));
+      shadow.material.opacity = nmm.theme.dark ? 0.5 : 0.28;
+    };
+    themed();
+    nmm.theme.listeners.push(themed);
     // Flat things that lie on one another are drawn in this order; nothing hides behind them.
     [grid, shadow].forEach((object, order) => (object.renderOrder = order - 2));
     group.add(grid, shadow);
@@ -239,9 +245,11 @@
     if (kept.length < 2) return;
     const group = new THREE.Group();
     if (times === null) {
-      for (const dash of dashes(kept, 9 * radius, 7 * radius)) {
-        group.add(new THREE.Mesh(tube(dash, 0.9 * radius), material(color, 1)));
-      }
+      const ink = material(color, 1);
+      for (const dash of dashes(kept, 9 * radius, 7 * radius)) group.add(new THREE.Mesh(tube(dash, 0.9 * radius), ink));
+      const themed = () => [ink.color, ink.emissive].forEach((part) => part.copy(nmm.color(nmm.theme.paint(color))));
+      themed();
+      nmm.theme.listeners.push(themed);
       nmm.legend({ kind: "dashed", color, text: "desired path" });
     } else {
       const driven = tube(kept, 1.25 * radius);

@@ -12,12 +12,6 @@
     parent.append(made);
     return made;
   };
-  // MeshCat takes the window's height for the view's.
-  const fit = nmm.viewer.set_3d_pane_size;
-  nmm.viewer.set_3d_pane_size = () => {
-    const view = document.getElementById("view");
-    fit.call(nmm.viewer, view.clientWidth, view.clientHeight);
-  };
   nmm.panel = nmm.element(document.body, "aside", { id: "panel", class: "card", "aria-label": "Robot" });
 
   // -0 is 0 to a reader.

@@ -1,0 +1,74 @@
+// The address is the state: #t=12.5&view=top&hide=pg&plots=H,error&zoom=2,7. What it says otherwise is ignored.
+"use strict";
+{
+  const address = (nmm.address = {});
+  const words = (text) => text.split(",").map((word) => word.trim().toLowerCase()).filter(Boolean);
+  const short = (time) => String(Number((nmm.stage.start + time).toFixed(4)));
+  let [ready, waiting, written] = [false, null, null];
+
+  address.text = () => {
+    const { player, plots, camera, stage } = nmm;
+    const parts = [`t=${short(Math.min(player.time, stage.duration))}`];
+    if (camera.from !== "iso") parts.push(`view=${camera.from}`);
+    if (camera.following) parts.push("follow");
+    const hidden = nmm.runs.filter((run) => run.hidden).map((run) => encodeURIComponent(run.id));
+    if (hidden.length) parts.push(`hide=${hidden.join(",")}`);
+    const open = plots.shown ? plots.opened() : ["none"];
+    if (plots.shown !== stage.plots || (plots.shown && open.join() !== plots.first.join())) {
+      parts.push(`plots=${open.join(",") || "folded"}`);
+    }
+    const { from, to } = player.range;
+    if (from > 0 || to < stage.duration) parts.push(`zoom=${short(from)},${short(to)}`);
+    return `#${parts.join("&")}`;
+  };
+
+  // Not at each frame: browsers take only so many a second.
+  address.changed = () => {
+    if (!ready || waiting !== null) return;
+    waiting = setTimeout(() => {
+      waiting = null;
+      if (nmm.player.playing) return address.changed();
+      return address.write();
+    }, 300);
+  };
+  address.write = () => {
+    written = address.text();
+    // A page in a frame of its own may not: its address is nobody's to copy.
+    try {
+      history.replaceState(null, "", written);
+    } catch {
+      ready = false;
+    }
+  };
+
+  // Says whether there was anything to read.
+  address.read = () => {
+    const wanted = new URLSearchParams(location.hash.slice(1));
+    const { stage, player, plots, camera, runs } = nmm;
+    if (wanted.has("view")) camera.look(wanted.get("view"));
+    if (wanted.has("follow") && !camera.following) nmm.actions.follow();
+    if (wanted.has("hide")) {
+      const hidden = words(wanted.get("hide"));
+      for (const run of runs) nmm.hide(run, hidden.includes(run.id));
+    }
+    if (wanted.has("plots")) {
+      const named = words(wanted.get("plots"));
+      const known = [...plots.panels.map((panel) => panel.id), "values"].filter((id) => named.includes(id.toLowerCase()));
+      if (known.length || named.includes("folded")) plots.open(known);
+      if (known.length || named.includes("folded") || named.includes("none")) plots.show(!named.includes("none"));
+    }
+    const [from, to] = (wanted.get("zoom") || "").split(",").map((text) => Number(text || NaN) - stage.start);
+    if (to > from && to > 0 && from < stage.duration) plots.zoom(from, to);
+    const time = Number(wanted.get("t") || NaN);
+    if (Number.isFinite(time)) player.seek(time - stage.start);
+    if (wanted.has("play")) player.play();
+  };
+
+  address.start = () => {
+    address.read();
+    ready = true;
+    nmm.plots.listeners.push(address.changed);
+    nmm.runs.listeners.push(address.changed);
+    window.addEventListener("hashchange", () => location.hash !== written && address.read());
+  };
+}

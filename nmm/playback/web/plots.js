@@ -1,0 +1,225 @@
+// The plots beside the scene: panels that fold, one cursor over all of them, hover, press to seek, zoom in time.
+// Curves are drawn once for a size, a zoom, a theme and what is shown; a seek moves the cursor and nothing else.
+"use strict";
+{
+  const get = (id) => document.getElementById(id);
+  const plots = (nmm.plots = { panels: [], shown: false, listeners: [] });
+  const [dock, stack, cursor, ruler, tip] = ["plots", "stack", "cursor", "ruler", "tip"].map(get);
+  const changed = () => plots.listeners.forEach((listener) => listener());
+  let width = 0;
+
+  const range = () => [nmm.player.range.from, nmm.player.range.to];
+  const span = () => nmm.player.range.to - nmm.player.range.from || 1;
+  const right = () => width - nmm.curves.RIGHT;
+  const x = (time) => nmm.curves.LEFT + ((time - nmm.player.range.from) / span()) * (right() - nmm.curves.LEFT);
+  const timeAt = (event) => {
+    const share = (event.clientX - stack.getBoundingClientRect().left - nmm.curves.LEFT) / (right() - nmm.curves.LEFT);
+    return nmm.player.range.from + Math.min(Math.max(share, 0), 1) * span();
+  };
+
+  function marks() {
+    const step = nmm.curves.step(span(), Math.max(2, width / 70));
+    const start = nmm.stage.start;
+    const [from, to] = range();
+    const found = [];
+    for (let k = Math.ceil((start + from) / step - 1e-9); k * step <= start + to + 1e-9 * step; k++) found.push(k * step - start);
+    return { at: found, step };
+  }
+
+  const colors = () => {
+    const of = (name) => nmm.theme.variable(`--${name}`);
+    const font = "11px system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif";
+    return {
+      font, ink: of("ink"), quiet: of("quiet"), line: of("grid"), zero: of("zero"), alarm: of("alarm"), plot: of("plot"),
+    };
+  };
+
+  // A canvas of so many pixels of the screen, empty, and its pen in CSS pixels.
+  function fresh(canvas, height) {
+    const dense = window.devicePixelRatio || 1;
+    Object.assign(canvas, { width: Math.round(width * dense), height: Math.round(height * dense) });
+    canvas.style.height = `${height}px`;
+    const pen = canvas.getContext("2d");
+    pen.scale(dense, dense);
+    return pen;
+  }
+
+  function drawPanel(panel, about) {
+    const heights = panel.lanes.map((lane) => nmm.curves.height(lane, panel.lanes.length));
+    const pen = fresh(panel.canvas, heights.reduce((sum, height) => sum + height + nmm.curves.GAP, 0));
+    let top = 0;
+    panel.lanes.forEach((lane, i) => {
+      Object.assign(lane, { top, bottom: top + heights[i] + nmm.curves.GAP });
+      nmm.curves.draw(pen, lane, top, heights[i], { ...about, alone: panel.lanes.length === 1 });
+      top = lane.bottom;
+    });
+    panel.stale = false;
+  }
+
+  function drawRuler({ at, step }, { quiet, font }) {
+    const pen = fresh(ruler, 18);
+    Object.assign(pen, { font, fillStyle: quiet, textBaseline: "middle", textAlign: "center" });
+    pen.fillText("t [s]", 0.5 * nmm.curves.LEFT, 9);
+    for (const time of at) {
+      const text = nmm.curves.number(nmm.stage.start + time, step);
+      const half = 0.5 * pen.measureText(text).width;
+      if (x(time) + half < width && x(time) - half > nmm.curves.LEFT - 8) pen.fillText(text, x(time), 9);
+    }
+  }
+
+  // Everything that is open and out of date.
+  plots.draw = () => {
+    width = stack.clientWidth;
+    if (!plots.shown || width === 0) return;
+    const grid = marks();
+    const about = { range: range(), x, right: right(), marks: grid.at, colors: colors() };
+    for (const panel of plots.panels) if (panel.part.open && panel.stale) drawPanel(panel, about);
+    drawRuler(grid, about.colors);
+    plots.update();
+  };
+  plots.redraw = () => {
+    for (const panel of plots.panels) panel.stale = true;
+    plots.draw();
+  };
+
+  plots.update = () => {
+    if (!plots.shown) return;
+    const at = Math.min(Math.max(x(Math.min(nmm.player.time, nmm.stage.duration)), nmm.curves.LEFT), Math.max(right(), 0));
+    cursor.style.transform = `translateX(${at.toFixed(2)}px)`;
+  };
+
+  plots.show = (on) => {
+    plots.shown = on && plots.panels.length > 0;
+    document.body.classList.toggle("plots", plots.shown);
+    get("curves").setAttribute("aria-pressed", String(plots.shown));
+    nmm.resize();
+    plots.redraw();
+    changed();
+  };
+  plots.open = (ids) => {
+    for (const panel of plots.panels) panel.part.open = ids.includes(panel.id);
+    get("values").open = ids.includes("values");
+  };
+  plots.opened = () => [...plots.panels.filter((panel) => panel.part.open).map((panel) => panel.id), ...(get("values").open ? ["values"] : [])];
+
+  function thinned() {
+    const [drawn, all] = ["t", "samples"].map((key) => nmm.runs.map((run) => (key === "t" ? run.t.length : run.samples)));
+    if (drawn.every((count, i) => count === all[i])) return;
+    const told = (counts) => [...new Set(counts)].map((count) => count.toLocaleString("en")).join(", ");
+    get("thinned").textContent = `Drawn from ${told(drawn)} of ${told(all)} samples; extremes and events are kept.`;
+  }
+
+  plots.build = (panels) => {
+    for (const { id, title, open } of panels) {
+      const part = document.createElement("details");
+      part.className = "panel";
+      part.dataset.panel = id;
+      part.open = open;
+      const lanes = nmm.lanes.filter((lane) => lane.panel === id);
+      const [only, another] = lanes;
+      const symbol = another || id === "partition" ? "" : `, ${nmm.curves.named(only)}`;
+      part.appendChild(document.createElement("summary")).textContent = `${title}${symbol}`;
+      const canvas = part.appendChild(document.createElement("canvas"));
+      canvas.setAttribute("role", "img");
+      canvas.setAttribute("aria-label", `${title} over time: ${lanes.map((lane) => lane.text).join(", ")}. The values are in the table.`);
+      get("panels").append(part);
+      const panel = { id, part, canvas, lanes, stale: true };
+      plots.panels.push(panel);
+      part.addEventListener("toggle", () => {
+        plots.draw();
+        changed();
+      });
+      listen(panel);
+    }
+    plots.first = plots.opened();
+    get("values").addEventListener("toggle", changed);
+    thinned();
+  };
+
+  // Press and drag seek; a pointer that only passes over asks for the values there.
+  function listen({ canvas, lanes }) {
+    const seek = (event) => nmm.player.seek(timeAt(event));
+    canvas.addEventListener("pointerdown", (event) => {
+      if (event.button !== 0) return;
+      canvas.setPointerCapture(event.pointerId);
+      tip.hidden = true;
+      seek(event);
+    });
+    canvas.addEventListener("pointermove", (event) => {
+      if (canvas.hasPointerCapture(event.pointerId)) return seek(event);
+      const y = event.clientY - canvas.getBoundingClientRect().top;
+      return hover(event, lanes.find((lane) => y >= lane.top && y < lane.bottom));
+    });
+    canvas.addEventListener("pointerleave", () => (tip.hidden = true));
+  }
+
+  function hover(event, lane) {
+    tip.hidden = lane === undefined;
+    if (lane === undefined) return;
+    const time = timeAt(event);
+    const title = document.createElement("strong");
+    title.textContent = `${nmm.curves.named(lane)} at ${(nmm.stage.start + time).toFixed(3)} s`;
+    const rows = nmm.runs.filter((run) => !run.hidden && run.columns[lane.key]).map((run) => {
+      const row = document.createElement("div");
+      const value = document.createElement("b");
+      value.textContent = nmm.values.text(nmm.value(run, lane.key, nmm.at(run, time)), run, lane.key);
+      row.append(nmm.sign("line", run.color, run.dash), run.name, value);
+      return row;
+    });
+    tip.replaceChildren(title, ...rows);
+    const box = tip.getBoundingClientRect();
+    const left = event.clientX + 14 + box.width > window.innerWidth - 8 ? event.clientX - 14 - box.width : event.clientX + 14;
+    const top = Math.min(event.clientY + 14, window.innerHeight - 8 - box.height);
+    Object.assign(tip.style, { left: `${Math.max(left, 4)}px`, top: `${Math.max(top, 4)}px` });
+  }
+
+  // Zoom: a drag along the ruler, a wheel with Ctrl or Shift, buttons and keys.
+  let drag = null;
+  ruler.addEventListener("pointerdown", (event) => {
+    ruler.setPointerCapture(event.pointerId);
+    drag = { from: timeAt(event), x: event.clientX };
+  });
+  ruler.addEventListener("pointermove", (event) => {
+    if (!drag) return;
+    const [from, to] = [drag.from, timeAt(event)].sort((a, b) => a - b);
+    Object.assign(get("chosen").style, { left: `${x(from)}px`, width: `${x(to) - x(from)}px` });
+    get("chosen").hidden = Math.abs(event.clientX - drag.x) < 5;
+  });
+  ruler.addEventListener("pointerup", (event) => {
+    const [from, to] = [drag.from, timeAt(event)].sort((a, b) => a - b);
+    if (get("chosen").hidden) nmm.player.seek(to);
+    else plots.zoom(from, to);
+    get("chosen").hidden = true;
+    drag = null;
+  });
+  ruler.addEventListener("dblclick", () => plots.whole());
+  stack.addEventListener("wheel", (event) => {
+    if (!event.ctrlKey && !event.shiftKey) return;
+    event.preventDefault();
+    plots.closer((event.deltaY || event.deltaX) < 0 ? 0.8 : 1.25, timeAt(event));
+  }, { passive: false });
+
+  plots.zoom = (from, to) => {
+    nmm.player.setRange(from, to);
+    const { from: first, to: last } = nmm.player.range;
+    get("whole").disabled = get("wider").disabled = first === 0 && last === nmm.stage.duration;
+    plots.redraw();
+    changed();
+  };
+  plots.whole = () => plots.zoom(0, nmm.stage.duration);
+  plots.closer = (factor, at = nmm.player.time) => {
+    const length = Math.min(span() * factor, nmm.stage.duration);
+    const share = (Math.min(at, nmm.stage.duration) - nmm.player.range.from) / span();
+    const from = Math.min(Math.max(at - share * length, 0), nmm.stage.duration - length);
+    plots.zoom(from, from + length);
+  };
+  get("whole").addEventListener("click", plots.whole);
+  get("closer").addEventListener("click", () => plots.closer(0.5));
+  get("wider").addEventListener("click", () => plots.closer(2));
+
+  nmm.runs.listeners.push(plots.redraw);
+  nmm.theme.listeners.push(plots.redraw);
+  new ResizeObserver(() => stack.clientWidth !== width && plots.redraw()).observe(stack);
+  // Another screen may have other pixels.
+  window.addEventListener("resize", plots.redraw);
+}
