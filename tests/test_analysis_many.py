@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 from numpy.typing import NDArray
 
-from nmm.analysis import cores
+from nmm import cores
 from nmm.analysis.maps.best import find_best_cells, find_better
 from nmm.analysis.maps.reach import Reach
 from nmm.analysis.maps.workspace import workspace_map

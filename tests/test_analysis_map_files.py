@@ -131,8 +131,8 @@ def test_a_figure_says_what_is_singular(robot_2r: Robot, tmp_path: Path) -> None
 
 def test_progress_rises_to_one(robot_2r: Robot) -> None:
     for make in (
-        lambda report: singularity_map((robot_2r, PLANAR), samples=30, progress=report),
-        lambda report: workspace_map((robot_2r, PLANAR), samples=20, configurations=256, progress=report),
+        lambda report: singularity_map((robot_2r, PLANAR), samples=100, progress=report),
+        lambda report: workspace_map((robot_2r, PLANAR), samples=20, configurations=8192, progress=report),
     ):
         seen: list[float] = []
         make(seen.append)

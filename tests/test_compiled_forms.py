@@ -18,6 +18,7 @@ from paper_cases import CASES, TIP
 from platform_grid import EXAMPLES, random_qp
 
 from nmm.control.controller import Controller
+from nmm.control.equations import step
 from nmm.functions.function import Stage
 from nmm.functions.objectives import Sum
 from nmm.functions.program import Program, evaluate
@@ -34,7 +35,8 @@ from nmm.resolvers import (
     ReducedGradient,
     Resolver,
 )
-from nmm.resolvers.answer import unanswered
+from nmm.resolvers.answer import SINGULAR_J, SOLVED, unanswered
+from nmm.resolvers.limited import limit
 from nmm.robots.configuration import Configuration
 from nmm.robots.loading import load
 from nmm.robots.robot import CENTER_OF_MASS, Robot
@@ -180,12 +182,40 @@ def test_resolver_kernels(resolver: Resolver, rng: np.random.Generator) -> None:
         assert_same(*both)
 
 
+def test_limit_kernel(rng: np.random.Generator) -> None:
+    """Inputs beyond limits, within them, and none at all; rows that leave no room, and a metric."""
+    moved = 0
+    for level in (0, 1, 2):
+        for _ in range(20):
+            problem = Problem(
+                *(rng.normal(size=(2, 4)), rng.normal(size=2), rng.normal(size=4)),
+                u_lower=-rng.random(4),
+                u_upper=rng.random(4),
+                limit_rows=rng.normal(size=(2, 4)),
+                lower=rng.normal(size=2) - 1.0,
+                upper=[2.0, np.inf],
+                limit_levels=[level, 0],
+            )
+            u, status = rng.normal(size=4), rng.choice([SOLVED, SINGULAR_J])
+            T = np.diag(1.0 + rng.random(4)) if level else np.zeros((0, 0))
+            both = []
+            for form in (limit.plain, limit):
+                answer = unanswered(4, 1)
+                answer.u[:], answer.status[()] = u, status
+                form(problem.arrays, T, answer)
+                both.append(np.concatenate([np.atleast_1d(field) for field in answer]))
+            assert_same(*both)
+            moved += not np.array_equal(both[0][:4], u)
+    assert moved > 40
+
+
 def test_no_kernel_is_left_out(robots: dict[str, Robot]) -> None:
     run = {resolver.kernel for resolver in RESOLVERS}
     run |= {EXAMPLES[name].velocity_map for name in EXAMPLES}
     for entry in SINGLE:
         run |= {stage.kernel for stage in entry.function.stages(robots[entry.robots[0]])}
     run |= {entry.function.comparison for entry in COMPARED}
+    run |= {limit, step}  # `step` in whole programs, below
     assert not {name for name, kernel in kernels().items() if kernel not in run}
 
 
