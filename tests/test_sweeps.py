@@ -471,7 +471,7 @@ def test_the_examples_of_the_page_run(tmp_path: Path, monkeypatch: pytest.Monkey
     (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
     (said,) = re.findall(r"```yaml\n(.*?)```", text, flags=re.DOTALL)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("nmm.sweeps.sweep._cores", lambda: 1)
+    monkeypatch.setattr("nmm.sweeps.sweep.cores", lambda: 1)
     names: dict[str, Any] = {"__name__": "__main__"}
     exec(code, names)
     assert names["H"].shape == (4, 2, 2)
