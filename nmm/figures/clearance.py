@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from nmm import looks
 from nmm.figures import style
 from nmm.runs.trajectory import Trajectory
 
@@ -36,11 +37,11 @@ def clearance(trajectory: Trajectory) -> Figure:
         nearest = pairs == pair
         shown = nearest | np.append(False, nearest[:-1])
         axes.plot(
-            t, np.where(shown, d, np.nan), color=style.CYCLE[k % 7], linewidth=style.WIDTH, label=name,
+            t, np.where(shown, d, np.nan), color=looks.CYCLE[k % 7], linewidth=style.WIDTH, label=name,
             solid_joinstyle="round",
         )  # fmt: skip
     asked = trajectory.clearance_asked
-    axes.axhline(asked, color=style.BLACK, linewidth=1.0, linestyle="--", label="distance to keep")
+    axes.axhline(asked, color=looks.BLACK, linewidth=1.0, linestyle="--", label="distance to keep")
     axes.set_ylim(min(0.0, float(d.min())), None)
     style.label(axes, y="least distance [m]")
     style.time_axis(axes, t)

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from nmm import looks
 from nmm.arrays import Array
 from nmm.errors import InputError
 from nmm.figures import curves, style
@@ -53,7 +54,7 @@ def overview(trajectory: Trajectory) -> Figure:
     if not trajectory.complete:
         panels[1].text(
             1.0, 1.04, f"run {trajectory.outcome}", transform=panels[1].transAxes, ha="right", va="bottom",
-            fontsize=style.TEXT, color=style.VERMILLION, fontweight="bold",
+            fontsize=style.TEXT, color=looks.VERMILLION, fontweight="bold",
         )  # fmt: skip
     for axes, columns in zip(panels[2:], parts, strict=False):
         curves.draw_inputs(axes, trajectory, columns)
@@ -86,21 +87,21 @@ def comparison(trajectories: Sequence[Trajectory]) -> Figure:
     runs = [run for run in trajectories if len(run)]
     if not runs:
         raise InputError("figure of a comparison: expected a run with at least one sample, got none")
-    looks = style.looks([run.resolver for run in runs])
+    worn = looks.looks([run.resolver for run in runs])
     left = style.LEFT + _VIEW + style.LEFT
-    rows = style.legend_rows([look.name for look in looks], _WIDTH - left - style.RIGHT)
+    rows = style.legend_rows([look.name for look in worn], _WIDTH - left - style.RIGHT)
     heights, legends = [1.3] * 3, [rows] * 3
     total = style.BOTTOM + style.column_height(heights, legends)
     made = style.figure(_WIDTH, total)
     entries = 1 + (2 if runs[0].path is not None else 1) * len(runs)
     above = style.room(-(-entries // 3))
     view = style.place(made, style.LEFT, style.BOTTOM, _VIEW, total - style.BOTTOM - above)
-    _draw_paths(view, runs, looks)
+    _draw_paths(view, runs, worn)
     panels = style.column(made, heights, legends, left, _WIDTH - style.RIGHT, total)
     draw_best_objective(panels[0], runs)
-    _draw_norms(panels[1], runs, looks, [run.error_norm for run in runs])
+    _draw_norms(panels[1], runs, worn, [run.error_norm for run in runs])
     style.label(panels[1], y=f"‖e‖ {style.units(runs[0].r_units)}")
-    _draw_norms(panels[2], runs, looks, [np.linalg.norm(run.u, axis=1) for run in runs])
+    _draw_norms(panels[2], runs, worn, [np.linalg.norm(run.u, axis=1) for run in runs])
     style.label(panels[2], y=f"‖u‖ {style.units(runs[0].robot.u_units)}")
     for axes in panels:
         style.legend(axes)
@@ -115,22 +116,22 @@ def _name_last(panels: Sequence[Axes]) -> None:
     style.label(panels[-1], x="time t [s]")
 
 
-def _draw_paths(axes: Axes, runs: Sequence[Trajectory], looks: Sequence[style.Look]) -> None:
+def _draw_paths(axes: Axes, runs: Sequence[Trajectory], worn: Sequence[looks.Look]) -> None:
     desired, held = runs[0].moving, runs[0].held
     if len(held):
         axes.plot(
             *held[:, :2].T,
             "*",
-            color=style.ORANGE,
+            color=looks.ORANGE,
             markersize=12,
-            markeredgecolor=style.BLACK,
+            markeredgecolor=looks.BLACK,
             label="target",
             linestyle="none",
             zorder=6,
         )
     if desired is not None:
         axes.plot(desired[:, 0], desired[:, 1], color="#C3C8D0", linewidth=5.0, label="desired path")
-    for run, (name, color, dashes) in zip(runs, looks, strict=True):
+    for run, (name, color, dashes) in zip(runs, worn, strict=True):
         if run.path is not None:
             axes.plot(*run.path[:, :2].T, dashes, color=color, linewidth=1.5, label=f"{name}: {run.frame}")
         if run.robot.platform.n_p:
@@ -143,10 +144,10 @@ def _draw_paths(axes: Axes, runs: Sequence[Trajectory], looks: Sequence[style.Lo
 
 
 def _draw_norms(
-    axes: Axes, runs: Sequence[Trajectory], looks: Sequence[style.Look], norms: Sequence[Array]
+    axes: Axes, runs: Sequence[Trajectory], worn: Sequence[looks.Look], norms: Sequence[Array]
 ) -> None:
     positive = np.concatenate([norm[np.isfinite(norm) & (norm > 0.0)] for norm in norms])
-    for run, (name, color, dashes), norm in zip(runs, looks, norms, strict=True):
+    for run, (name, color, dashes), norm in zip(runs, worn, norms, strict=True):
         style.curve(axes, run.t, np.where(norm > 0.0, norm, np.nan), name, color, dashes)
     style.time_axis(axes, max((run.t for run in runs), key=lambda t: t[-1]))
     if positive.size:

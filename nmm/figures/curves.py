@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from nmm import looks
 from nmm.arrays import Array
 from nmm.figures import style
 from nmm.runs.trajectory import Trajectory
@@ -39,7 +40,7 @@ def errors(trajectory: Trajectory, gain: float | None = None) -> Figure:
 def draw_components(axes: Axes, trajectory: Trajectory, rows: Sequence[int], unit: str) -> None:
     """Components of the task error that share a unit."""
     for k, (row, name) in enumerate(zip(rows, _error_names(trajectory, rows), strict=True)):
-        color, dashes = style.CYCLE[k % 7], style.DASHES[k % 4]
+        color, dashes = looks.CYCLE[k % 7], looks.DASHES[k % 4]
         style.curve(axes, trajectory.t, trajectory.error[:, row], name, color, dashes)
     axes.axhline(0.0, color=style.GREY, linewidth=0.7, zorder=1)
     draw_events(axes, trajectory, named=False)
@@ -84,7 +85,7 @@ def draw_error_norm(
     if not positive.size:
         style.note(axes, "the error is zero throughout")
         return
-    style.curve(axes, t, np.where(norm > 0.0, norm, np.nan), "‖e‖", style.BLUE)
+    style.curve(axes, t, np.where(norm > 0.0, norm, np.nan), "‖e‖", looks.BLUE)
     lowest, highest = max(float(positive.min()), 1e-16), float(positive.max())
     gain = _stated_gain(trajectory) if gain is None else gain
     rate = fitted_rate(t, norm) if gain is None else gain
@@ -93,7 +94,7 @@ def draw_error_norm(
         guide = norm[0] * np.exp(-rate * (t - t[0]))
         seen = guide >= lowest * 0.5
         name = f"‖e(0)‖ exp(−K t), K = {rate:.4g} 1/s{' (fitted)' if gain is None else ''}"
-        axes.plot(t[seen], guide[seen], ":", color=style.BLACK, linewidth=1.8, label=name)
+        axes.plot(t[seen], guide[seen], ":", color=looks.BLACK, linewidth=1.8, label=name)
     style.log_axis(axes, lowest, highest)
     style.legend(axes)
 
@@ -124,10 +125,10 @@ def tracking(trajectory: Trajectory) -> Figure:
     made, panels = style.stack([1.1] * count)
     for row, axes in enumerate(panels):
         name = trajectory.r_names[row]
-        color = style.CYCLE[row % 7]
+        color = looks.CYCLE[row % 7]
         style.curve(axes, trajectory.t, _unwrapped(trajectory, row), name, color)
         reference = _unwrapped(trajectory, row, reference=True)
-        style.curve(axes, trajectory.t, reference, "reference", style.BLACK, "--")
+        style.curve(axes, trajectory.t, reference, "reference", looks.BLACK, "--")
         axes.lines[-1].set_linewidth(1.0)
         _finish(axes, trajectory, f"{name} [{trajectory.r_units[row]}]", named=row == count - 1)
     return made
@@ -210,7 +211,7 @@ def draw_inputs(
     robot = trajectory.robot
     seen = (trajectory.t >= since) & (trajectory.t <= until)
     for k, (column, name) in enumerate(zip(columns, input_names(trajectory, columns), strict=True)):
-        color, dashes = style.CYCLE[k % 7], style.DASHES[k % 4]
+        color, dashes = looks.CYCLE[k % 7], looks.DASHES[k % 4]
         style.curve(axes, trajectory.t[seen], trajectory.u[seen, column], name, color, dashes)
     axes.axhline(0.0, color=style.GREY, linewidth=0.7, zorder=1)
     part = "arm" if columns[0] >= robot.platform.p else "platform"
@@ -232,7 +233,7 @@ def input_names(trajectory: Trajectory, columns: Sequence[int]) -> list[str]:
 def input_symbol(trajectory: Trajectory, column: int) -> str:
     """An input as the paper writes it: v, ω; the rate of a joint q1 with a dot above its q."""
     robot = trajectory.robot
-    name = style.pretty(robot.u_names[column])
+    name = looks.pretty(robot.u_names[column])
     is_rate = column >= robot.platform.p and len(name) == 2 and name[0] == "q"
     return f"{name[0]}\u0307{name[1]}" if is_rate else name
 
@@ -247,15 +248,15 @@ def coordinates(trajectory: Trajectory) -> Figure:
         for unit, columns in style.groups(kinds).items()
     ]
     legends = [
-        style.legend_rows([style.pretty(robot.q_names[column]) for column in columns])
+        style.legend_rows([looks.pretty(robot.q_names[column]) for column in columns])
         for _, _, columns in parts
     ]
     made, panels = style.stack([1.2] * len(parts), legends)
     for index, (axes, (part, unit, columns)) in enumerate(zip(panels, parts, strict=True)):
         for k, column in enumerate(columns):
-            name = style.pretty(robot.q_names[column])
+            name = looks.pretty(robot.q_names[column])
             style.curve(
-                axes, trajectory.t, trajectory.q[:, column], name, style.CYCLE[k % 7], style.DASHES[k % 4]
+                axes, trajectory.t, trajectory.q[:, column], name, looks.CYCLE[k % 7], looks.DASHES[k % 4]
             )
         _finish(axes, trajectory, f"{part} [{unit}]", named=index == len(parts) - 1)
     return made
@@ -273,10 +274,10 @@ def singular_values(trajectory: Trajectory) -> Figure:
 
 def draw_singular_value(axes: Axes, trajectory: Trajectory, *, named: bool = True) -> None:
     """The smallest singular value of J_bar over time, RG's switches of partition marked."""
-    style.curve(axes, trajectory.t, trajectory.sigma_min, "smallest singular value of J_bar", style.BLUE)
+    style.curve(axes, trajectory.t, trajectory.sigma_min, "smallest singular value of J_bar", looks.BLUE)
     for k, sample in enumerate(_switched(trajectory)):
         name = "switch of partition" if k == 0 else None
-        axes.axvline(trajectory.t[sample], color=style.VERMILLION, linestyle="--", linewidth=1.0, label=name)
+        axes.axvline(trajectory.t[sample], color=looks.VERMILLION, linestyle="--", linewidth=1.0, label=name)
     _finish(axes, trajectory, "σ_min", named=named)
     axes.set_ylim(bottom=0.0)
 
@@ -293,8 +294,8 @@ def _draw_partition(axes: Axes, trajectory: Trajectory) -> None:
     colors: dict[tuple[int, ...], str] = {}
     for first, last in pairwise([0, *_switched(trajectory), len(t) - 1]):
         columns = tuple(sorted(int(c) for c in trajectory.partition[first]))
-        names = ", ".join(style.pretty(trajectory.robot.u_names[c]) for c in columns if c >= 0)
-        color = colors.setdefault(columns, style.CYCLE[len(colors) % 7])
+        names = ", ".join(looks.pretty(trajectory.robot.u_names[c]) for c in columns if c >= 0)
+        color = colors.setdefault(columns, looks.CYCLE[len(colors) % 7])
         axes.axvspan(t[first], t[last], color=color, alpha=0.25, linewidth=0)
         if t[last] - t[first] > 0.15 * (t[-1] - t[0]):
             axes.text(

@@ -10,6 +10,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
+from nmm import looks
 from nmm.analysis.singular.drawn_ellipsoids import (
     NAMES,
     SHARE,
@@ -43,7 +44,7 @@ _POINTS = 1500
 _FLAT = 1e-6
 #: Room for the line above the legend, in.
 _LINE = 0.2
-_BODY, _EDGE, _FILL, _RIM, _ARM = "#EEF0F3", "#BFC5CE", style.SKY, style.BLUE, style.VERMILLION
+_BODY, _EDGE, _FILL, _RIM, _ARM = "#EEF0F3", "#BFC5CE", looks.SKY, looks.BLUE, looks.VERMILLION
 
 
 def ellipses(trajectory: Trajectory, options: Wanted = True, path: str | Path | None = None) -> Figure:
@@ -143,10 +144,10 @@ class _Ellipses(Viewed):
             )  # fmt: skip
             axes.add_collection(shapes, autolim=False)
         path = self.path[:, view]
-        axes.plot(*path.T, color=style.BLACK, linewidth=1.2, label=f"path of {self.frame}", zorder=5.0)
+        axes.plot(*path.T, color=looks.BLACK, linewidth=1.2, label=f"path of {self.frame}", zorder=5.0)
         for point, marker, text in ((path[0], "o", "start"), (path[-1], "s", "end")):
             axes.plot(
-                *point, marker, color=style.GREEN if text == "start" else style.PINK, markersize=5,
+                *point, marker, color=looks.GREEN if text == "start" else looks.PINK, markersize=5,
                 markeredgecolor="white", markeredgewidth=0.8, label=text, linestyle="none", zorder=6.0,
             )  # fmt: skip
 

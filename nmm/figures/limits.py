@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from nmm import looks
 from nmm.figures import style
 from nmm.robots.wheel_rates import wheel_rates
 from nmm.runs.margins import margin
@@ -48,7 +49,7 @@ def limits(trajectory: Trajectory) -> Figure:
 def _names(trajectory: Trajectory, columns: Sequence[int]) -> list[str]:
     wheels, _ = wheel_rates(trajectory.robot)
     names = [trajectory.limit_names[column] for column in columns]
-    return [style.pretty(name.removeprefix("u_")) + " rate" * (name in wheels) for name in names]
+    return [looks.pretty(name.removeprefix("u_")) + " rate" * (name in wheels) for name in names]
 
 
 def draw_shares(axes: Axes, trajectory: Trajectory, columns: Sequence[int], y: str) -> None:
@@ -56,11 +57,11 @@ def draw_shares(axes: Axes, trajectory: Trajectory, columns: Sequence[int], y: s
     shares = trajectory.shares[:, columns]
     low, high = min(0.0, float(shares.min())), max(1.0, float(shares.max()))
     for k, (column, name) in enumerate(zip(columns, _names(trajectory, columns), strict=True)):
-        color, dashes = style.CYCLE[k % 7], style.DASHES[k // 7 % 4]
+        color, dashes = looks.CYCLE[k % 7], looks.DASHES[k // 7 % 4]
         style.curve(axes, trajectory.t, trajectory.shares[:, column], name, color, dashes)
     for end in (0.0, 1.0):
-        axes.axhline(end, color=style.VERMILLION, linewidth=1.0, zorder=1, label=None if end else LIMIT)
-    axes.axhspan(NEAR, 1.0 - NEAR, color=style.GREEN, alpha=0.07, linewidth=0, label=FREE)
+        axes.axhline(end, color=looks.VERMILLION, linewidth=1.0, zorder=1, label=None if end else LIMIT)
+    axes.axhspan(NEAR, 1.0 - NEAR, color=looks.GREEN, alpha=0.07, linewidth=0, label=FREE)
     style.label(axes, y=y)
     axes.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))
     style.time_axis(axes, trajectory.t, named=False)
@@ -72,11 +73,11 @@ def draw_scale(axes: Axes, trajectory: Trajectory, *, named: bool = True) -> Non
     levels = trajectory.scale.shape[1]
     for level in range(levels):
         name = "λ" if levels == 1 else f"λ, level {level + 1}"
-        style.curve(axes, trajectory.t, trajectory.scale[:, level], name, style.CYCLE[level % 7])
+        style.curve(axes, trajectory.t, trajectory.scale[:, level], name, looks.CYCLE[level % 7])
     least = margin(trajectory.shares)
     lowest = 0.0
     if np.all(np.isfinite(least)):
-        style.curve(axes, trajectory.t, least, "least margin", style.VERMILLION, "--")
+        style.curve(axes, trajectory.t, least, "least margin", looks.VERMILLION, "--")
         lowest = min(0.0, float(least.min()))
     axes.set_ylim(lowest - 0.05, 1.05)
     style.label(axes, y="λ, margin")

@@ -6,10 +6,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patheffects import withStroke
 
+from nmm import looks
 from nmm.analysis.maps.result import Map
 from nmm.analysis.maps.singular_set import SingularSet
 from nmm.arrays import Array
-from nmm.figures import style
 
 #: A line may be drawn so far, of the map's side, beside its points: a tenth of a pixel.
 THIN = 1.5e-4
@@ -22,13 +22,13 @@ def draw_sets(axes: Axes, drawn: Map) -> None:
     own = "robot" if drawn.arm_singular is not None else drawn.about.part
     if drawn.arm_singular is not None:
         _draw_set(axes, drawn, drawn.arm_singular, "arm alone", "white")
-    _draw_set(axes, drawn, drawn.singular, own, style.VERMILLION)
+    _draw_set(axes, drawn, drawn.singular, own, looks.VERMILLION)
 
 
 def _draw_set(axes: Axes, drawn: Map, those: SingularSet, name: str, color: str) -> None:
     """Lines and points with an edge that shows them on any colour; one legend entry, which says if none."""
     white = color == "white"
-    edge = style.BLACK if white else "white"
+    edge = looks.BLACK if white else "white"
     width = 1.1 if white else 1.8
     halo = [withStroke(linewidth=width + 1.2, foreground=edge)]
     label = f"{name} singular" + (f": {those.text()}" if those.empty or those.everywhere else "")
@@ -54,7 +54,7 @@ def _draw_set(axes: Axes, drawn: Map, those: SingularSet, name: str, color: str)
             linestyle="none",
             color=color,
             markersize=2.3 if many else 2.5 if white else 6.5,
-            markeredgecolor=style.BLACK if white or many else "white",
+            markeredgecolor=looks.BLACK if white or many else "white",
             markeredgewidth=0.5 if many else 0.7,
             label=label,
             clip_on=False,

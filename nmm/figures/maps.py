@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
 
+from nmm import looks
 from nmm.analysis.maps.extremes import EVERYWHERE
 from nmm.analysis.maps.measures import MEASURES
 from nmm.analysis.maps.result import Map
@@ -62,7 +63,7 @@ def map_figure(drawn: Map, measure: str | None = None, path: str | Path | None =
         axes = style.place(made, style.LEFT + k * step, style.BOTTOM, width, height)
         image = _draw_values(axes, drawn, values, bounds)
         if name:
-            axes.set_title(name, fontsize=style.SMALL, color=style.BLACK, pad=3)
+            axes.set_title(name, fontsize=style.SMALL, color=looks.BLACK, pad=3)
         draw_sets(axes, drawn)
         _dress(axes, drawn, named=k == 0)
     place = (total - BAR_ROOM - BAR, style.BOTTOM, BAR, height)
@@ -131,9 +132,9 @@ def _dress(axes: Axes, drawn: Map, *, named: bool) -> None:
     for axis, name, unit, values in zip(
         (axes.xaxis, axes.yaxis), drawn.names, drawn.units, drawn.axes, strict=True
     ):
-        text = f"{drawn.frame} {name} [m]" if drawn.kind == "workspace" else f"{style.pretty(name)} [{unit}]"
+        text = f"{drawn.frame} {name} [m]" if drawn.kind == "workspace" else f"{looks.pretty(name)} [{unit}]"
         if axis is axes.xaxis or named:
-            axis.set_label_text(text, fontsize=style.TEXT, color=style.BLACK)
+            axis.set_label_text(text, fontsize=style.TEXT, color=looks.BLACK)
         span = float(values[-1] - values[0])
         if unit == "rad" and span >= np.pi / 2:
             # The coarsest of π/2, π/4, ... with at least three ticks.
@@ -155,8 +156,8 @@ def _in_pi(value: float) -> str:
 def _dress_bar(axes: Axes, drawn: Map, measure: str) -> None:
     unit = drawn.about.units[measure]
     text = subscripted(MEASURES[measure].symbol) + (f" [{unit}]" if unit else "")
-    axes.set_ylabel(text, fontsize=style.TEXT, color=style.BLACK, labelpad=4)
-    axes.tick_params(labelsize=style.SMALL, color=style.GREY, labelcolor=style.BLACK, width=0.7, length=3)
+    axes.set_ylabel(text, fontsize=style.TEXT, color=looks.BLACK, labelpad=4)
+    axes.tick_params(labelsize=style.SMALL, color=style.GREY, labelcolor=looks.BLACK, width=0.7, length=3)
     axes.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 2.5, 5, 10]))
     axes.yaxis.set_major_formatter(style.plain())
     for spine in axes.spines.values():
@@ -193,7 +194,7 @@ def _held(drawn: Map) -> str:
     moved = {name: value for name, value in held.items() if abs(value) > 1e-12}
     named = moved if len(held) > MOST_NAMED else held
     texts = [
-        f"{style.pretty(name)} = {style.number(round(value, 4))} {units[name]}"
+        f"{looks.pretty(name)} = {style.number(round(value, 4))} {units[name]}"
         for name, value in named.items()
     ]
     if len(named) < len(held):
@@ -214,6 +215,6 @@ def _write_title(made: Figure, lines: list[tuple[str, bool]]) -> None:
             text,
             fontsize=style.TEXT if headline else style.SMALL,
             fontweight="bold" if headline else "normal",
-            color=style.BLACK if headline else style.GREY,
+            color=looks.BLACK if headline else style.GREY,
             va="top",
         )

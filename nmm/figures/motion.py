@@ -11,6 +11,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
+from nmm import looks
 from nmm.arrays import Array
 from nmm.errors import InputError
 from nmm.figures import style
@@ -29,7 +30,7 @@ _FLAT = (0.35, 1.0)
 MOST, LEAST = 11, 4
 #: A run whose arm rises or falls by more than this is drawn from the side too, m.
 _RISES = 0.01
-_PATH_COLOR, _BODY, _EDGE, _ARM = style.BLUE, "#B9C0CA", "#3F4652", style.VERMILLION
+_PATH_COLOR, _BODY, _EDGE, _ARM = looks.BLUE, "#B9C0CA", "#3F4652", looks.VERMILLION
 
 
 def stroboscopic(trajectory: Trajectory, instants: ArrayLike | int | None = None) -> Figure:
@@ -128,7 +129,7 @@ class Scene(Viewed):
         desired, path = self.lines.get("desired"), self.lines.get("path")
         if desired is not None:
             axes.plot(
-                desired[:, across], desired[:, up], "--", color=style.BLACK, linewidth=1.1,
+                desired[:, across], desired[:, up], "--", color=looks.BLACK, linewidth=1.1,
                 dashes=(4, 2.5), label="desired path", zorder=5.2,
             )  # fmt: skip
         if path is not None:
@@ -138,15 +139,15 @@ class Scene(Viewed):
             )  # fmt: skip
             for point, marker, text in ((path[0], "o", "start"), (path[-1], "s", "end")):
                 axes.plot(
-                    point[across], point[up], marker, color=style.GREEN if text == "start" else style.PINK,
+                    point[across], point[up], marker, color=looks.GREEN if text == "start" else looks.PINK,
                     markersize=6, markeredgecolor="white", markeredgewidth=0.8, label=text,
                     linestyle="none", zorder=6,
                 )  # fmt: skip
         marks = trajectory.marks
         if len(marks):
             axes.plot(
-                marks[:, across], marks[:, up], "*", color=style.ORANGE, markersize=12,
-                markeredgecolor=style.BLACK, markeredgewidth=0.7, label="target", linestyle="none", zorder=6,
+                marks[:, across], marks[:, up], "*", color=looks.ORANGE, markersize=12,
+                markeredgecolor=looks.BLACK, markeredgewidth=0.7, label="target", linestyle="none", zorder=6,
             )  # fmt: skip
 
 

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from nmm import looks
 from nmm.arrays import Array
 from nmm.errors import InputError
 from nmm.figures import style
@@ -66,7 +67,7 @@ def draw_objective(
     named: bool = True,
 ) -> None:
     """H of each run over time, in its resolver's colour."""
-    for run, look in zip(runs, style.looks([run.resolver for run in runs]), strict=True):
+    for run, look in zip(runs, looks.looks([run.resolver for run in runs]), strict=True):
         H = np.where(run.objective > 0.0, run.objective, np.nan) if logarithmic else run.objective
         style.curve(axes, run.t, H, *look)
     style.label(axes, y=symbol)
@@ -129,7 +130,7 @@ def _inset_is_free(axes: Axes, runs: Sequence[Trajectory], last: float) -> bool:
 def _draw_inset(axes: Axes, runs: Sequence[Trajectory], first: float, last: float) -> None:
     """The initial transient, in the empty upper right of the axes."""
     inset = axes.inset_axes(_INSET)
-    for run, look in zip(runs, style.looks([run.resolver for run in runs]), strict=True):
+    for run, look in zip(runs, looks.looks([run.resolver for run in runs]), strict=True):
         seen = (run.t >= first - 1e-9) & (run.t <= last + 1e-9)
         style.curve(inset, run.t[seen], run.objective[seen], None, look.color, look.dashes)
     style.dress(inset, size=style.SMALL - 1.0)
@@ -137,4 +138,4 @@ def _draw_inset(axes: Axes, runs: Sequence[Trajectory], first: float, last: floa
     style.value_axis(inset)
     inset.xaxis.set_major_locator(MaxNLocator(nbins=6))
     inset.xaxis.set_major_formatter(style.plain())
-    inset.set_title("initial transient, t [s]", fontsize=style.SMALL - 1.0, pad=3, color=style.BLACK)
+    inset.set_title("initial transient, t [s]", fontsize=style.SMALL - 1.0, pad=3, color=looks.BLACK)

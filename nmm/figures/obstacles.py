@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from nmm import looks
 from nmm.arrays import Array
-from nmm.figures import style
 from nmm.figures.solids import outline_points
 from nmm.runs.trajectory import Trajectory
 
-OBSTACLE, OBSTACLE_TEXT = style.ORANGE, "#7A5200"
+OBSTACLE, OBSTACLE_TEXT = looks.ORANGE, "#7A5200"
 #: Strength of the earliest drawing, of 1 for the last.
 FAINTEST = 0.4
 #: What moves by less between two drawings rests, m.

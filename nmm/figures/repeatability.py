@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from nmm import looks
 from nmm.analysis.redundancy.laps import Laps, Repeatability
 from nmm.arrays import Array
 from nmm.errors import InputError
@@ -38,29 +39,29 @@ def laps(found: Repeatability) -> Figure:
     runs = [one for one in found.laps if len(one.distance)]
     if not runs:
         raise InputError("figure of laps: expected at least one lap, got none")
-    looks = style.looks([one.name for one in runs])
-    if len(looks) == 1:
-        looks = [looks[0]._replace(dashes="-")]
+    worn = looks.looks([one.name for one in runs])
+    if len(worn) == 1:
+        worn = [worn[0]._replace(dashes="-")]
     across = style.PAGE - style.LEFT - style.RIGHT
-    above = style.room(style.legend_rows([look.name for look in looks], across))
+    above = style.room(style.legend_rows([look.name for look in worn], across))
     if not runs[0].robot.platform.p:
         made = style.figure(style.PAGE, style.BOTTOM + DRIFT + above)
-        _draw_drift(style.place(made, style.LEFT, style.BOTTOM, across, DRIFT), runs, looks)
+        _draw_drift(style.place(made, style.LEFT, style.BOTTOM, across, DRIFT), runs, worn)
         return made
     low, high = _limits(runs)
     height = min(PATHS, across * (high[1] - low[1]) / (high[0] - low[0]))
-    between = style.BOTTOM + style.room(style.legend_rows(_path_names(runs, looks), across))
+    between = style.BOTTOM + style.room(style.legend_rows(_path_names(runs, worn), across))
     made = style.figure(style.PAGE, style.BOTTOM + height + between + DRIFT + above)
     upper = style.place(made, style.LEFT, style.BOTTOM + height + between, across, DRIFT)
-    _draw_drift(upper, runs, looks)
-    _draw_paths(style.place(made, style.LEFT, style.BOTTOM, across, height), runs, looks)
+    _draw_drift(upper, runs, worn)
+    _draw_paths(style.place(made, style.LEFT, style.BOTTOM, across, height), runs, worn)
     return made
 
 
-def _draw_drift(axes: Axes, runs: list[Laps], looks: list[style.Look]) -> None:
+def _draw_drift(axes: Axes, runs: list[Laps], worn: list[looks.Look]) -> None:
     every = np.concatenate([np.maximum(one.distance, LOWEST) for one in runs])
     longest = max(len(one.distance) for one in runs)
-    for k, (one, look) in enumerate(zip(runs, looks, strict=True)):
+    for k, (one, look) in enumerate(zip(runs, worn, strict=True)):
         numbers = np.arange(1, len(one.distance) + 1)
         axes.plot(
             numbers, np.maximum(one.distance, LOWEST), look.dashes, color=look.color, linewidth=style.WIDTH,
@@ -78,14 +79,14 @@ def _draw_drift(axes: Axes, runs: list[Laps], looks: list[style.Look]) -> None:
     style.legend(axes)
 
 
-def _draw_paths(axes: Axes, runs: list[Laps], looks: list[style.Look]) -> None:
+def _draw_paths(axes: Axes, runs: list[Laps], worn: list[looks.Look]) -> None:
     """All laps thin, the last one thick, the laps' ends as dots."""
     axes.set_aspect("equal", adjustable="box")
-    names = iter(_path_names(runs, looks))
+    names = iter(_path_names(runs, worn))
     desired = _desired(runs[0])
     if desired is not None:
-        axes.plot(desired[:, 0], desired[:, 1], ":", color=style.BLACK, linewidth=1.1, label=next(names))
-    for one, look in zip(runs, looks, strict=True):
+        axes.plot(desired[:, 0], desired[:, 1], ":", color=looks.BLACK, linewidth=1.1, label=next(names))
+    for one, look in zip(runs, worn, strict=True):
         path, samples = _path(one), _samples(one)
         every = max(1, samples // POINTS)
         axes.plot(path[::every, 0], path[::every, 1], look.dashes, color=look.color, linewidth=0.7, alpha=0.6)
@@ -103,10 +104,10 @@ def _draw_paths(axes: Axes, runs: list[Laps], looks: list[style.Look]) -> None:
     style.legend(axes, style.PAGE - style.LEFT - style.RIGHT)
 
 
-def _path_names(runs: list[Laps], looks: list[style.Look]) -> list[str]:
+def _path_names(runs: list[Laps], worn: list[looks.Look]) -> list[str]:
     """The legend of the paths."""
     desired = [f"desired path of {runs[0].trajectory.frame}"] if _desired(runs[0]) is not None else []
-    return [*desired, *(f"platform, {look.name}, last lap thick" for look in looks)]
+    return [*desired, *(f"platform, {look.name}, last lap thick" for look in worn)]
 
 
 def _samples(one: Laps) -> int:

@@ -16,18 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
 from nmm.arrays import Array
-from nmm.looks import BLACK as BLACK
-from nmm.looks import BLUE as BLUE
-from nmm.looks import CYCLE as CYCLE
-from nmm.looks import DASHES as DASHES
-from nmm.looks import GREEN as GREEN
-from nmm.looks import ORANGE as ORANGE
-from nmm.looks import PINK as PINK
-from nmm.looks import SKY as SKY
-from nmm.looks import VERMILLION as VERMILLION
-from nmm.looks import Look as Look
-from nmm.looks import looks as looks
-from nmm.looks import pretty as pretty
+from nmm.looks import BLACK
 
 GREY, LIGHT = "#6B7280", "#E5E7EB"
 DPI = 180
