@@ -131,7 +131,7 @@ class KernelCache(caching.FunctionCache):
 @cache
 def _tell_of_the_first() -> None:
     if not cache_folder().exists():
-        logging.getLogger("nmm").info("compiling for this machine, once: a minute at most, on most machines")
+        logging.getLogger("nmm").info("compiling for this machine, once: this takes about half a minute")
 
 
 @cache  # it has not changed when the next function is compiled

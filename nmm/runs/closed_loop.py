@@ -151,12 +151,13 @@ def _integrate(
         whole = False
         if fly is not None:
             reached, whole = fly(times, k, min(steps, (k // a_share + 1) * a_share), recorder.found)
-            if leg is not None:
-                stays = leg.stays(times, recorder.found.q, k + 1, reached)
-                if stays < reached:  # begin again, and fly to the sample before the event
-                    controller.sample.restore(earlier)
-                    _sample(controller, sample.t, sample.q, float(times[k - 1]) if k else leg.earlier)
-                    reached, whole = fly(times, k, stays, recorder.found)[0] if stays > k else k, False
+            stays = reached if leg is None else leg.stays(times, recorder.found.q, k + 1, reached)
+            if leg is not None and stays < reached:  # begin again, and fly to the sample before the event
+                whole, reached = False, stays
+                controller.sample.restore(earlier)
+                _sample(controller, sample.t, sample.q, float(times[k - 1]) if k else leg.earlier)
+                if stays > k:
+                    fly(times, k, stays, recorder.found)
             if reached > k:
                 recorder.flown(reached)
                 k, earlier = reached, controller.sample.snapshot()

@@ -7,7 +7,9 @@ from typing import NamedTuple
 
 from nmm.arrays import Array, Integers
 from nmm.kernels.compiled import clear, compiled, compiled_without_gil, scratch, view
+from nmm.kernels.followers import place_followers
 from nmm.kernels.kinematics import Kinematics, place_frames
+from nmm.kernels.linear_algebra import eliminate
 from nmm.kernels.memory import IntegerVector, Matrix, Vector, views
 
 #: The longest step, rad or m: a stretched arm would leap.
@@ -21,7 +23,7 @@ class Plane(NamedTuple):
     slab (2,) : the third's lowest and highest, m; -inf and inf where it is free
     moving (k,), lower (k,), upper (k,) : columns of q that are varied, and their ranges
     carried (n, k) : what a unit of each of them moves, followers included
-    followers (f, 4) : as `nmm.robots.followers.Following.table`
+    followers (4 f,) : see `nmm.kernels.followers`
     """
 
     axes: IntegerVector
@@ -31,7 +33,7 @@ class Plane(NamedTuple):
     lower: Vector
     upper: Vector
     carried: Matrix
-    followers: Matrix
+    followers: Vector
 
 
 @compiled
@@ -56,32 +58,23 @@ def rated(integers: Integers, floats: Array, plane: Plane, q: Array, point: Arra
 def shortest(rates: Array, wanted: Array, step: Array) -> None:
     """step (k,): the shortest with rates (s, k) step = wanted (s,), all but; no longer than `LEAP`."""
     s, k = rates.shape
-    gram, forces = scratch((s, s)), scratch(s)
+    system, ones = scratch((s, s + 1)), scratch(s)
     trace = 0.0
     for i in range(s):
-        forces[i] = wanted[i]
+        system[i, s], ones[i] = wanted[i], 1.0
         for j in range(s):
-            gram[i, j] = 0.0
+            system[i, j] = 0.0
             for c in range(k):
-                gram[i, j] += rates[i, c] * rates[j, c]
-        trace += gram[i, i]
+                system[i, j] += rates[i, c] * rates[j, c]
+        trace += system[i, i]
     for i in range(s):
-        gram[i, i] += 1e-9 * trace + 1e-12
-    for i in range(s):  # positive definite: no pivots are needed
-        for j in range(i + 1, s):
-            factor = gram[j, i] / gram[i, i]
-            for c in range(i, s):
-                gram[j, c] -= factor * gram[i, c]
-            forces[j] -= factor * forces[i]
-    for i in range(s - 1, -1, -1):
-        for j in range(i + 1, s):
-            forces[i] -= gram[i, j] * forces[j]
-        forces[i] /= gram[i, i]
+        system[i, i] += 1e-9 * trace + 1e-12
+    eliminate(system, ones)
     length = 0.0
     for c in range(k):
         step[c] = 0.0
         for i in range(s):
-            step[c] += rates[i, c] * forces[i]
+            step[c] += rates[i, c] * system[i, s]
         length = max(length, abs(step[c]))
     if length > LEAP:
         for c in range(k):
@@ -112,9 +105,7 @@ def advance(plane: Plane, q: Array, x: float, y: float, point: Array, rates: Arr
     for c in range(k):
         j = plane.moving[c]
         q[j] = min(max(q[j] + step[c], plane.lower[c]), plane.upper[c])
-    for i in range(plane.followers.shape[0]):
-        joint, leader = int(plane.followers[i, 0]), int(plane.followers[i, 1])
-        q[joint] = plane.followers[i, 2] * q[leader] + plane.followers[i, 3]
+    place_followers(q, plane.followers)
 
 
 @compiled_without_gil

@@ -69,7 +69,7 @@ class Reach:
             lower=np.ascontiguousarray(self.lower),
             upper=np.ascontiguousarray(self.upper),
             carried=np.ascontiguousarray(who.carried[:, np.searchsorted(who.independent, moving)]),
-            followers=np.ascontiguousarray(who.table),
+            followers=who.table.ravel(),
         )
 
     def _usual(self, name: str) -> tuple[float, float]:
@@ -105,15 +105,11 @@ class Reach:
     def towards(self, q: Array, targets: Array) -> Array:
         """Configurations (N, n) a Newton step nearer to targets (N, 2) in the plane, in ranges and slab."""
         found = np.array(q, order="C")
-        over_cores(
-            len(q),
-            AT_ONCE,
-            lambda: (
-                lambda first, last: step_towards(
-                    *self._path.blocks, self._numbers, found[first:last], targets[first:last]
-                )
-            ),
-        )
+
+        def step(first: int, last: int) -> None:
+            step_towards(*self._path.blocks, self._numbers, found[first:last], targets[first:last])
+
+        over_cores(len(q), AT_ONCE, lambda: step)
         return found
 
     def onto(
