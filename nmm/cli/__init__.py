@@ -14,6 +14,7 @@
     map_files       map
     redundancy_tables, laps              redundancy, laps
     report          the numbers of a run, as a table
+    interrupts      Ctrl-C, and when it is not taken
     output          tables, warnings and progress, on a terminal and in a pipe
 
 Commands import what they need when they run: `nmm --help` is quick.

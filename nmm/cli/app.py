@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 import os
-import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from nmm.cli.groups import Browser, Ellipsoids, command
+from nmm.cli.interrupts import raise_interrupts
 from nmm.cli.mapping import map_measures
 from nmm.cli.options import (
     LimitsOption,
@@ -254,10 +254,7 @@ def main() -> NoReturn:
     # The libraries' objects stay: looking through them for garbage, again and again and once more at the
     # end, is a fifth of a short run's time.
     gc.set_threshold(1_000_000, 50, 50)
-    # A run that is told to end writes what it has, whether by Ctrl-C, by the system, or by a script that
-    # started it with "&" (for which the shell has set SIGINT to be ignored).
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.default_int_handler)
+    raise_interrupts()
     tell_what_takes_long()
     status = status_of(sys.argv[1:])
     gc.freeze()

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from nmm.cli.output import complain, progress, shielded, show_table, show_text, warn
+from nmm.cli.interrupts import shielded
+from nmm.cli.output import complain, progress, show_table, show_text, warn
 from nmm.folders.laps import is_laps, save
 from nmm.folders.whole import check_folder
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -78,17 +77,6 @@ def warn(text: str) -> None:
 def complain(prefix: str, text: str) -> None:
     """One line on standard error: why the exit status is not 0."""
     print(f"{prefix}: {' '.join(text.split())}", file=sys.stderr)
-
-
-@contextmanager
-def shielded() -> Iterator[None]:
-    """Whoever presses Ctrl-C twice wants the run to end, not to lose what there is of it."""
-    before = {number: signal.signal(number, signal.SIG_IGN) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 @contextmanager

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nmm.cli.output import complain, progress, shielded, show_table
+from nmm.cli.interrupts import shielded
+from nmm.cli.output import complain, progress, show_table
 from nmm.cli.report import describe, show_run
 from nmm.errors import InputError
 from nmm.folders import comparison
