@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import pinocchio as pin
@@ -15,6 +16,9 @@ from nmm.robots.robot import CENTER_OF_MASS, Robot
 
 #: Velocity of the frame's origin, in world axes.
 JACOBIAN_FRAME = pin.LOCAL_WORLD_ALIGNED
+
+#: Pinocchio's data of configurations that nobody holds any more, for the next ones of the same robot.
+_spare_data: WeakKeyDictionary[Robot, list[pin.Data]] = WeakKeyDictionary()
 
 
 class Configuration:
@@ -33,9 +37,28 @@ class Configuration:
     def __init__(self, robot: Robot, q: ArrayLike) -> None:
         self.robot = robot
         self.q = unwritable(robot.q(q))
-        self._data = robot.model.createData()
+        self._spare = _spare_data.setdefault(robot, [])
+        try:
+            self._data = self._spare.pop()
+        except IndexError:
+            self._data = robot.model.createData()
         pin.computeJointJacobians(robot.model, self._data, self.q)
         self._hessians_computed = False
+
+    def __del__(self) -> None:
+        # Nobody holds it, so nobody reads Pinocchio's data any more: making them anew is three quarters of
+        # what a configuration costs.
+        if "_data" in self.__dict__:
+            self._spare.append(self._data)
+
+    def __copy__(self) -> Configuration:
+        return self  # as values are: nothing of it changes
+
+    def __deepcopy__(self, memo: dict[int, object]) -> Configuration:
+        return self
+
+    def __reduce__(self) -> tuple[type[Configuration], tuple[Robot, Array]]:
+        return Configuration, (self.robot, self.q)
 
     @cached_property
     def S(self) -> Array:
@@ -55,7 +78,7 @@ class Configuration:
 
     def center_of_mass(self) -> tuple[Array, Array]:
         """Centre of mass (3,) in the world, m, and its Jacobian in the coordinates, (3, n)."""
-        return _center_of_mass(self.robot)(self.q)
+        return _center_of_mass(self.robot, self._data)(self.q)
 
     def hessian(self, frame: str) -> Array:
         """H[i, j, k] = d jacobian[i, j] / dq[k], shape (6, n, n).
@@ -117,14 +140,14 @@ def kinematics_updater(
     return update_with_hessians if hessians.size else update
 
 
-def _center_of_mass(robot: Robot) -> Callable[[Array], tuple[Array, Array]]:
+def _center_of_mass(robot: Robot, data: pin.Data) -> Callable[[Array], tuple[Array, Array]]:
     """com(q) -> centre of mass (3,) and its Jacobian (3, n), with what stands still.
 
     Pinocchio leaves out the mass on the universe, the root link's of a fixed base.
     """
-    model, data = robot.model, robot.model.createData()
+    model = robot.model
     standing = model.inertias[0]
-    moving = sum(inertia.mass for inertia in list(model.inertias)[1:])
+    moving = pin.computeTotalMass(model, data)
     share = moving / (moving + standing.mass)
     fixed_part = (1.0 - share) * np.array(standing.lever)
 
@@ -148,7 +171,7 @@ def _with_center_of_mass(
     update_others = kinematics_updater(
         robot, tuple(frames[k] for k in others), other_placements, other_jacobians, other_hessians
     )
-    center_of_mass = _center_of_mass(robot)
+    center_of_mass = _center_of_mass(robot, robot.model.createData())
     placements[slot, :, :3] = np.eye(3)
 
     def update(t: float, q: Array) -> None:
