@@ -66,7 +66,8 @@ def test_a_page_that_never_reads_holds_up_nobody(robot: Robot) -> None:
         with socket.create_connection(tuple(address.split(":")), timeout=MOST) as page:
             page.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
             page.sendall(
-                f"GET /socket HTTP/1.1\r\nHost: {address}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+                f"GET /socket?token={viewer._server.token} HTTP/1.1\r\nHost: {address}\r\n"
+                "Upgrade: websocket\r\nConnection: Upgrade\r\n"
                 "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n\r\n".encode()
             )
             assert b"101 Switching" in page.recv(100)

@@ -9,6 +9,7 @@
     descriptions    info
     checking        check
     viewing         view
+    driving         drive
     listings        scenarios, robots
     singularity_*, symbolic_*, searching   what `singularities` prints
     map_files       map

@@ -26,7 +26,7 @@ from nmm.cli.options import (
 )
 from nmm.cli.output import complain, tell_what_takes_long
 from nmm.cli.redundancy import laps, redundancy
-from nmm.cli.robot_commands import check, info, robots, scenarios, view
+from nmm.cli.robot_commands import check, drive, info, robots, scenarios, view
 from nmm.cli.singularities import singularities
 from nmm.cli.sweeping import sweep
 from nmm.errors import InputError, NmmError
@@ -185,6 +185,7 @@ for _name, _command in (
     ("info", info),
     ("check", check),
     ("view", view),
+    ("drive", drive),
     ("singularities", singularities),
     ("map", map_measures),
     ("redundancy", redundancy),

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from nmm.cli.groups import Browser, Loading, command
+from nmm.cli.groups import Browser, Loading, Subject, command
 from nmm.cli.options import ROBOT_HELP, ArgumentOption, PackageOption, arguments_of
 
 
@@ -90,6 +90,25 @@ def view(
     from nmm.cli.viewing import view_robot
 
     view_robot(robot, **loading.keywords(), **browser.keywords(), frames=frames)
+
+
+@command
+def drive(subject: Subject, browser: Browser, loading: Loading) -> None:
+    """Drag a target in the browser; the robot follows.
+
+    In 3D, with MeshCat, and with its curves: the target of each task is dragged, typed, or moved with keys
+    or a gamepad. Resolver, gains, weights and limits are changed while it moves. A scenario's references are
+    left aside, but for where they begin; a robot holds its arm's end where it is at first. Only this machine
+    can reach it. Ctrl-C ends it.
+
+    \b
+    nmm drive unicycle_3r_position
+    nmm drive tiago_pose
+    nmm drive my_robot.urdf --platform car --task position:gripper:xyz --at shoulder=pi/4
+    """
+    from nmm.cli.driving import drive_subject
+
+    drive_subject(subject.subject, **subject.keywords(), **browser.keywords(), **loading.keywords())
 
 
 def scenarios(

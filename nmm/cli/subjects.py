@@ -62,6 +62,7 @@ def studied(
     at: Sequence[str] | None = None,
     t: float | None = None,
     settings: Sequence[str] | None = None,
+    usual_task: str = "",
     **loading: Any,
 ) -> Studied:
     """What SOURCE means: a run's folder, a scenario by name or as YAML file, or else a robot.
@@ -72,6 +73,7 @@ def studied(
     at : COORDINATE=VALUE of `--at`, m and rad
     t : s; 0, or the run's first instant. Of a run, q is where it was then
     settings : `--set`, of the robot's xacro arguments or of the scenario's keys
+    usual_task : a robot's, where there is no other; none when empty
     loading : platform, lock, axle, package_dirs of `nmm.load`; a robot's only
 
     Raises
@@ -83,6 +85,8 @@ def studied(
     run, scenario, loaded = _opened(source, settings, loading)
     own = None if scenario is None else scenario.controller()
     robot = loaded if own is None else own.robot
+    if own is None and usual_task:
+        tasks = tasks or (usual_task,)
     given = tuple(short_task(text, robot) for text in tasks or ())
     if not given and own is None:
         what = "a robot" if run is None else "a run without a scenario"

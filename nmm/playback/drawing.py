@@ -94,6 +94,14 @@ class DrawnRobot:
         for path, matrix in zip(self.paths, self.placements.relative(q, wheels), strict=True):
             self._drawing.transform(path, matrix)
 
+    def pose(self, q: Array, wheels: Array) -> Command:
+        """The command that moves it to coordinates q (n,) with wheel angles (W,) in a page that shows it."""
+        matrices = self.placements.relative(q, wheels)
+        transforms = [
+            [path, matrix.T.ravel().tolist()] for path, matrix in zip(self.paths, matrices, strict=True)
+        ]
+        return {"type": "pose", "transforms": transforms}
+
     def animations(self, frames: Keyframes, start: float) -> list[Command]:
         """MeshCat's animations: a clip for each joint that moves. Times count from `start`."""
         matrices = np.array(

@@ -57,7 +57,7 @@ def play(
     heading = title
     commands = playback_scene(motions, title=heading, ghosts=ghosts, autoplay=True, ellipsoids=ellipsoids)
     hello = [encode(command) for command in commands]
-    server = PageServer(lambda host: socket_page(heading, host), hello, port=port)
+    server = PageServer(lambda host, token: socket_page(heading, host, token), hello, port=port)
     serve(server, "Playing", [motion.robot for motion in motions], open_browser=open_browser, stop=stop)
 
 
@@ -118,7 +118,10 @@ class LiveViewer:
         self._state = robot.q(q), self._rolling.settled(robot.q(q))
         commands, self._drawn = live_scene(robot, *self._state, title=robot.name)
         self._server = PageServer(
-            lambda host: socket_page(robot.name, host), [encode(c) for c in commands], self._pose, port=port
+            lambda host, token: socket_page(robot.name, host, token),
+            [encode(command) for command in commands],
+            lambda: self._pose,
+            port=port,
         )
         if open_browser:
             _open(self.url)
@@ -153,12 +156,7 @@ class LiveViewer:
 
     def _pose(self) -> str:
         """The newest placements as a command; the server's thread asks for it."""
-        matrices = self._drawn.placements.relative(*self._state)
-        transforms = [
-            [path, matrix.T.ravel().tolist()]
-            for path, matrix in zip(self._drawn.paths, matrices, strict=True)
-        ]
-        return encode({"type": "pose", "transforms": transforms})
+        return encode(self._drawn.pose(*self._state))
 
     def close(self) -> None:
         """End the server and free its port; again is nothing."""

@@ -15,6 +15,7 @@ from nmm.playback.encoding import encode
 #: In the order in which they depend on one another.
 SCRIPTS = (
     "commands.js",
+    "elements.js",
     "theme.js",
     "runs.js",
     "legend.js",
@@ -47,15 +48,23 @@ def file_page(commands: Iterable[Command], title: str) -> str:
     return _page(title, source="page", sources="'none'", before_scripts=block)
 
 
-def socket_page(title: str, host: str, *, scripts: Sequence[str] = (), styles: Sequence[str] = ()) -> str:
-    """A page that gets its commands from the server at `host` (address:port).
+def socket_page(
+    title: str, host: str, token: str, *, scripts: Sequence[str] = (), styles: Sequence[str] = ()
+) -> str:
+    """A page that gets its commands from the server at `host` (address:port), which knows it by the token.
 
     Parameters
     ----------
     scripts, styles : files of web/ that this page has besides; the scripts run before the commands come
     """
     return _page(
-        title, source="socket", sources=f"ws://{host}", before_scripts="", scripts=scripts, styles=styles
+        title,
+        source="socket",
+        sources=f"ws://{host}",
+        before_scripts="",
+        token=token,
+        scripts=scripts,
+        styles=styles,
     )
 
 
@@ -65,6 +74,7 @@ def _page(
     source: str,
     sources: str,
     before_scripts: str,
+    token: str = "",
     scripts: Sequence[str] = (),
     styles: Sequence[str] = (),
 ) -> str:
@@ -75,6 +85,7 @@ def _page(
         "version": metadata.version("nmm"),
         "title": html.escape(title),
         "source": source,
+        "token": token,
         "style": "\n".join(_resource(name) for name in ("style.css", "plots.css", *styles)),
         "meshcat": _meshcat_viewer(),
         "scripts": before_scripts + code,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import atexit
+import secrets
 import socket
 import threading
 from collections.abc import Callable, Sequence
@@ -21,19 +22,23 @@ LOOPBACK = "127.0.0.1"
 PORTS = range(7000, 7020)
 #: Pause between two poses sent to a page, s: no screen shows more.
 PERIOD = 1.0 / 60.0
+#: What a page says is shorter than this, bytes; more ends its connection.
+LONGEST_MESSAGE = 4096
 
 
 class PageServer:
     """Serves one page and sends it commands.
 
-    A page that connects gets `hello`, then, whenever `changed()` has been called, what `latest()` says:
-    a page that is slow, or asleep in a background tab, misses what is old and delays nobody.
+    A page that connects gets `hello`, then, whenever `changed()` has been called, what its `latest()` says:
+    a page that is slow, or asleep in a background tab, misses what is old and delays nobody. Only a page that
+    this server has sent connects: it knows the token, and comes from this address.
 
     Parameters
     ----------
-    page : makes the page, given the server's address "127.0.0.1:port"
+    page : makes the page, given the server's address "127.0.0.1:port" and the token
     hello : lines of commands for a page that has just connected
-    latest : lines for what is new; called in the server's thread
+    follow : makes `latest()` for a page: lines for what is new to it; both are called in the server's thread
+    receive : called with what a page says, in the server's thread; when not given, pages have nothing to say
     port : the port, or None for a free one
 
     Raises
@@ -43,23 +48,26 @@ class PageServer:
 
     def __init__(
         self,
-        page: Callable[[str], str],
+        page: Callable[[str, str], str],
         hello: Sequence[str],
-        latest: Callable[[], str] | None = None,
+        follow: Callable[[], Callable[[], str]] | None = None,
         *,
+        receive: Callable[[str | bytes], None] | None = None,
         port: int | None = None,
     ) -> None:
         self._socket = _listen(port)
         self.port = int(self._socket.getsockname()[1])
         self.host = f"{LOOPBACK}:{self.port}"
         self.url = f"http://{self.host}/"
+        self.token = secrets.token_urlsafe(16)
         try:
-            self.page = page(self.host).encode("utf-8")
+            self.page = page(self.host, self.token).encode("utf-8")
         except BaseException:
             self._socket.close()
             raise
         self.hello = hello
-        self.latest = latest
+        self.follow = follow
+        self.receive = receive
         self.pages: set[_Socket] = set()
         self._loop = asyncio.new_event_loop()
         self._notified = False
@@ -98,6 +106,7 @@ class PageServer:
             application = tornado.web.Application(
                 [("/", _Page, {"server": self}), ("/socket", _Socket, {"server": self})],
                 log_function=lambda handler: None,
+                websocket_max_message_size=LONGEST_MESSAGE,
             )
             http = HTTPServer(application)
             http.add_sockets([self._socket])
@@ -142,6 +151,13 @@ class _Page(_Local):
 
 
 class _Socket(tornado.websocket.WebSocketHandler, _Local):
+    def prepare(self) -> None:
+        super().prepare()
+        if not secrets.compare_digest(
+            self.get_query_argument("token", "").encode(), self.server.token.encode()
+        ):
+            raise tornado.web.HTTPError(403)
+
     def open(self, *args: str, **kwargs: str) -> None:
         self.news = asyncio.Event()
         self.news.set()
@@ -151,12 +167,13 @@ class _Socket(tornado.websocket.WebSocketHandler, _Local):
 
     async def _send(self) -> None:
         server = self.server
+        latest = None if server.follow is None else server.follow()
         try:
             await self.write_message("\n".join(server.hello))
-            while server.latest is not None:
+            while latest is not None:
                 await self.news.wait()
                 self.news.clear()
-                line = server.latest()
+                line = latest()
                 if line:
                     await self.write_message(line)
                 await asyncio.sleep(PERIOD)
@@ -164,7 +181,8 @@ class _Socket(tornado.websocket.WebSocketHandler, _Local):
             server.pages.discard(self)
 
     def on_message(self, message: str | bytes) -> None:
-        """Pages have nothing to say."""
+        if self.server.receive is not None:
+            self.server.receive(message)
 
     def on_close(self) -> None:
         self.server.pages.discard(self)

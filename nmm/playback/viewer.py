@@ -46,7 +46,7 @@ def view(
     """
     commands = viewer_scene(robot, robot.rest if q is None else robot.q(q), frames=frames)
     server = PageServer(
-        lambda host: socket_page(robot.name, host, scripts=SCRIPTS, styles=STYLES),
+        lambda host, token: socket_page(robot.name, host, token, scripts=SCRIPTS, styles=STYLES),
         [encode(command) for command in commands],
         port=port,
     )

@@ -4,7 +4,7 @@
   const FRAME = 1 / 60;
   const { player, actions, plots } = nmm;
   const step = (event) => (event.shiftKey ? FRAME : 0.5);
-  const keys = {
+  const keys = (nmm.keys = {
     " ": actions.play,
     ArrowLeft: (event) => player.seek(player.time - step(event)),
     ArrowRight: (event) => player.seek(player.time + step(event)),
@@ -25,7 +25,7 @@
     "+": () => plots.closer(0.5),
     "-": () => plots.closer(2),
     0: () => plots.whole(),
-  };
+  });
 
   // What a control does with a key itself. The slider of the time is the clock: its arrows are the page's.
   function owns(target, key) {

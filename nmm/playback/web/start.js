@@ -5,7 +5,8 @@
   const embedded = document.getElementById("commands");
 
   function listen() {
-    const socket = new WebSocket(`ws://${location.host}/socket`);
+    const socket = new WebSocket(`ws://${location.host}/socket?token=${document.body.dataset.token}`);
+    nmm.send = (message) => socket.readyState === WebSocket.OPEN && socket.send(JSON.stringify(message));
     socket.onmessage = (message) => {
       for (const line of message.data.split("\n")) nmm.execute(nmm.decode(line));
       nmm.viewer.num_messages_received++;

@@ -15,27 +15,20 @@
     return text.replace("e-", "e−").replace(/^-/, "−");
   };
 
-  const named = (parent, tag, text, attributes = {}) => {
-    const made = parent.appendChild(document.createElement(tag));
-    for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
-    made.append(text);
-    return made;
-  };
-
   values.build = () => {
     const table = part.querySelector("table");
-    const head = named(table, "thead", "").appendChild(document.createElement("tr"));
-    named(head, "th", "quantity", { scope: "col" });
+    const head = nmm.element(table, "thead").appendChild(document.createElement("tr"));
+    nmm.element(head, "th", { scope: "col" }, "quantity");
     for (const run of nmm.runs) {
-      const cell = named(head, "th", "", { scope: "col" });
+      const cell = nmm.element(head, "th", { scope: "col" });
       cell.append(nmm.sign("line", run.color, run.dash), run.name || "value");
     }
-    const body = named(table, "tbody", "");
+    const body = nmm.element(table, "tbody");
     rows = nmm.lanes.map((lane) => {
-      const row = named(body, "tr", "", { "data-channel": lane.key });
-      const title = named(row, "th", lane.text, { scope: "row", title: nmm.curves.named(lane) });
-      if (lane.unit) named(title, "span", ` ${lane.unit}`, { class: "unit" });
-      const cells = nmm.runs.map(() => named(row, "td", ""));
+      const row = nmm.element(body, "tr", { "data-channel": lane.key });
+      const title = nmm.element(row, "th", { scope: "row", title: nmm.curves.named(lane) }, lane.text);
+      if (lane.unit) nmm.element(title, "span", { class: "unit" }, ` ${lane.unit}`);
+      const cells = nmm.runs.map(() => nmm.element(row, "td"));
       return { lane, cells };
     });
     // Far down or folded it costs nothing.

@@ -5,17 +5,7 @@
   const DEGREES = 180 / Math.PI;
   const joints = (nmm.joints = { coordinates: [], listeners: [] });
 
-  nmm.element = (parent, tag, attributes = {}, text = "") => {
-    const made = document.createElement(tag);
-    for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
-    made.append(text);
-    parent.append(made);
-    return made;
-  };
   nmm.panel = nmm.element(document.body, "aside", { id: "panel", class: "card", "aria-label": "Robot" });
-
-  // -0 is 0 to a reader.
-  nmm.fixed = (value, digits) => (Math.abs(value) < 0.5 * 10 ** -digits ? 0 : value).toFixed(digits);
 
   const told = ({ unit, value }) =>
     unit === "rad"

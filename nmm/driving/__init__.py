@@ -1,0 +1,9 @@
+"""A robot that follows a target which somebody moves, live: what `nmm drive` shows.
+
+targets   a task's target as a `Signal`, with what a page needs to know of it
+choices   what a driver may change: resolver, gains, weights, limits
+setups    controllers for what was chosen, of a scenario or of a robot with tasks
+driven    the robot, its controller and its time, step by step
+messages  what a page may say
+drive     the loop in real time, between the page's messages and its pictures
+"""

@@ -1,0 +1,309 @@
+"""The loop in real time, between the messages of the pages and their pictures."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+
+from nmm.driving.choices import Choice
+from nmm.driving.driven import Driven, Look
+from nmm.driving.messages import Aim, Order, Pick, parsed
+from nmm.driving.setups import Setup
+from nmm.errors import InputError, NmmError
+from nmm.looks import looks, pretty, rate
+from nmm.playback.channels import Channel, Channels
+from nmm.playback.curves import draw_curves
+from nmm.playback.drawing import Drawing
+from nmm.playback.encoding import encode
+from nmm.playback.live import serve
+from nmm.playback.page import socket_page
+from nmm.playback.scene import live_scene
+from nmm.playback.server import PageServer
+
+SCRIPTS = ("drive_gizmo.js", "drive.js")
+STYLES = ("drive.css",)
+#: Pictures a second.
+FPS = 30.0
+#: A loop that is later than this, s, lets the time go that it has lost.
+LATE = 0.25
+#: Samples that a page which comes late is told, at FPS.
+KEPT = int(30 * FPS)
+#: Messages that wait for the loop at most; more are dropped.
+WAITING = 256
+#: How long a notice is told, s.
+TOLD = 5.0
+
+
+def drive(
+    setup: Setup,
+    *,
+    port: int | None = None,
+    open_browser: bool = True,
+    stop: threading.Event | None = None,
+) -> None:
+    """Let a robot follow targets that are dragged in a browser; returns at Ctrl-C or when `stop` is set.
+
+    The address is printed. Only this machine can reach it; the program listens to pages that it sent itself,
+    and to nothing that they would not say. All pages show and move the same robot.
+
+    Parameters
+    ----------
+    setup : what is driven
+    port : port on 127.0.0.1; a free one when not given
+    open_browser : whether to open the page in the user's browser
+    stop : ends it when set (by another thread)
+
+    Raises
+    ------
+    InputError : the port is taken, not allowed or not a port; a scenario that nobody can drive
+    """
+    session = Session(Driven(setup))
+    server = PageServer(
+        lambda host, token: socket_page(setup.name, host, token, scripts=SCRIPTS, styles=STYLES),
+        [encode(command) for command in session.commands],
+        session.follow,
+        receive=session.receive,
+        port=port,
+    )
+    ended = stop or threading.Event()
+    loop = threading.Thread(target=session.run, args=(server.changed, ended), name="nmm drive", daemon=True)
+    loop.start()
+    try:
+        serve(server, "Driving", [setup.robot], open_browser=open_browser, stop=ended)
+    finally:
+        ended.set()
+        loop.join(timeout=5.0)
+
+
+class Session:
+    """A robot that is driven, what pages have said, and what they are told.
+
+    Three threads meet here: the loop (`run`), the server (`receive`, and what `follow` makes), and one that
+    makes a controller. They share what is written in one go: a deque, and references to values that nobody
+    changes.
+
+    Attributes
+    ----------
+    commands : of a page that has just come
+    """
+
+    def __init__(self, driven: Driven) -> None:
+        self._driven = driven
+        look = driven.look()
+        self._waiting: deque[Aim | Pick | Order] = deque(maxlen=WAITING)
+        self._samples: deque[tuple[int, list[float | None]]] = deque(maxlen=KEPT)
+        self._picks: dict[str, object] = {}
+        self._making: _Making | None = None
+        self._paused = False
+        self._lost = 0
+        self._notice, self._until = "", 0.0
+        self._count = 0
+        self._choices: tuple[int, list[Choice]] = (0, driven.choices)
+        robot = driven.robot
+        commands, self._drawn = live_scene(
+            robot, driven.q, driven.wheels, title=driven.setup.name, room=float(robot.reach)
+        )
+        drawing = Drawing()
+        draw_curves(
+            drawing,
+            [Channels(np.zeros(0), 0, _channels(driven))],
+            looks([""]),
+            0.0,
+        )
+        targets = Drawing()
+        targets.add(
+            "targets",
+            targets=[target.told() for target in driven.targets],
+            values=[target.signal.value.tolist() for target in driven.targets],
+            at=[_numbers(at) for at in look.at],
+            reach=float(robot.reach),
+        )
+        # The last command of a scene says that it has come.
+        self.commands = [*commands[:-1], *drawing.commands, commands[-1], *targets.commands]
+        self._publish(look)
+
+    def receive(self, text: str | bytes) -> None:
+        """A page's message; what no page of ours says is left aside."""
+        try:
+            self._waiting.append(parsed(text))
+        except InputError:
+            return
+
+    def follow(self) -> Callable[[], str]:
+        """For a page that has come: what is new to it, as lines."""
+        seen, version = -1, -1
+
+        def latest() -> str:
+            nonlocal seen, version
+            lines = []
+            number, choices = self._choices
+            if number != version:
+                version = number
+                lines.append(encode({"type": "choices", "choices": [choice.told() for choice in choices]}))
+            pose, picture = self._picture
+            fresh = [sample for count, sample in tuple(self._samples) if count > seen]
+            seen = self._samples[-1][0] if self._samples else seen
+            return "\n".join([*lines, encode(pose), encode({**picture, "samples": fresh})])
+
+        return latest
+
+    def run(self, changed: Callable[[], None], stop: threading.Event) -> None:
+        """Move in real time and tell `changed` of each picture, until `stop` is set."""
+        clock = time.monotonic()
+        while not stop.is_set():
+            self._attend()
+            now = time.monotonic()
+            if self._paused or self._driven.trouble:
+                clock = now
+            if now - clock > LATE:
+                self._lost += math.ceil((now - clock) * FPS) - 1
+                clock = now - 1.0 / FPS
+            dt = self._driven.setup.dt
+            while clock + dt <= now and self._driven.step():
+                clock += dt
+            self._publish(self._driven.look())
+            try:
+                changed()
+            except NmmError:  # the server has been closed
+                return
+            stop.wait(max(0.0, 1.0 / FPS - (time.monotonic() - now)))
+
+    def _attend(self) -> None:
+        """Do what pages have said."""
+        while self._waiting:
+            message = self._waiting.popleft()
+            try:
+                if isinstance(message, Aim):
+                    self._driven.aim(message.task, np.array(message.value))
+                elif isinstance(message, Pick):
+                    self._picks[message.key] = message.value
+                elif message.what == "restart":
+                    self._driven.restart()
+                else:
+                    self._paused = message.what == "pause"
+            except InputError:
+                continue  # no page of ours has that task
+        if self._making is not None and self._making.done:
+            self._take(self._making)
+            self._making = None
+        if self._picks and self._making is None:
+            key = next(iter(self._picks))
+            self._making = _Making(self._driven, key, self._picks.pop(key))
+
+    def _take(self, making: _Making) -> None:
+        if making.made is not None:
+            self._driven.use(making.made)
+        else:
+            self._notice, self._until = making.wrong, time.monotonic() + TOLD
+        # A page whose wish was not met shows what is.
+        self._choices = (self._choices[0] + 1, self._driven.choices)
+
+    def _publish(self, look: Look) -> None:
+        """What pages are told from now on."""
+        driven = self._driven
+        self._count += 1
+        if not self._samples or self._samples[-1][1][0] != look.t:
+            self._samples.append((self._count, [look.t, *_values(driven, look)]))
+        told, wrong = self._told(look)
+        picture: dict[str, Any] = {
+            "type": "drive",
+            "t": look.t,
+            "targets": [target.signal.value.tolist() for target in driven.targets],
+            "at": [_numbers(at) for at in look.at],
+            "paused": self._paused,
+            "told": told,
+            "wrong": wrong,
+        }
+        self._picture = self._drawn.pose(driven.q, driven.wheels), picture
+
+    def _told(self, look: Look) -> tuple[str, bool]:
+        """What a page says of the state, and whether that is bad news."""
+        if self._driven.trouble:
+            return f"Stands still: {self._driven.trouble}", True
+        if time.monotonic() < self._until:
+            return self._notice, True
+        parts = [f"t = {look.t:.1f} s"]
+        if self._making is not None:
+            parts.append("another controller is being made")
+        if self._lost:
+            parts.append(f"{self._lost} pictures late")
+        return ", ".join(parts), False
+
+
+class _Making:
+    """A controller that is made in a thread: a kind of resolver that is new to this machine is compiled."""
+
+    def __init__(self, driven: Driven, key: str, value: object) -> None:
+        self.made: Any = None
+        self.wrong = ""
+        self.done = False
+        threading.Thread(target=self._make, args=(driven, key, value), daemon=True).start()
+
+    def _make(self, driven: Driven, key: str, value: object) -> None:
+        try:
+            made = driven.with_choice(key, value)
+            self._first_step(made[1], driven)
+            self.made = made
+        except NmmError as error:
+            self.wrong = str(error)
+        except Exception as error:  # a thread's end nobody sees
+            self.wrong = f"{type(error).__name__}: {error}"
+        self.done = True
+
+    @staticmethod
+    def _first_step(controller: Any, driven: Driven) -> None:
+        """The first call compiles."""
+        try:
+            controller.step(driven.t, driven.q, driven.setup.dt)
+        except NmmError:
+            return  # the loop will see, and say so
+        finally:
+            controller.reset()
+
+
+def _channels(driven: Driven) -> tuple[Channel, ...]:
+    """What is plotted: `_values` in this order."""
+    robot, rows = driven.robot, [row for target in driven.targets for row in target.rows]
+    units = ", ".join(dict.fromkeys(unit for _, unit in rows))
+    ends = np.where(robot.limited, robot.q_limits, [-np.inf, np.inf])
+    none = np.zeros(0)
+    return (
+        Channel("error_norm", "‖e‖", units, "error", none, log=True),
+        *([Channel("objective", "H", "", "H", none)] if driven.has_objective else []),
+        Channel("sigma_min", "σ_min", "", "sigma", none),
+        Channel("scale_0", "λ", "", "scale", none),
+        *(
+            Channel(f"u_{name}", _input(driven, i), unit, "inputs", none, (-float(most), float(most)))
+            for i, (name, unit, most) in enumerate(
+                zip(robot.u_names, robot.u_units, robot.u_limits, strict=True)
+            )
+        ),
+        *(Channel(f"error_{name}", f"e of {name}", unit, "components", none) for name, unit in rows),
+        *(
+            Channel(name, pretty(name), unit, "coordinates", none, (float(lower), float(upper)))
+            for name, unit, (lower, upper) in zip(robot.q_names, robot.q_units, ends, strict=True)
+        ),
+    )
+
+
+def _input(driven: Driven, column: int) -> str:
+    name = driven.robot.u_names[column]
+    return pretty(name) if column < driven.robot.platform.p else rate(name)
+
+
+def _values(driven: Driven, look: Look) -> list[float | None]:
+    step = look.step
+    found = [float(np.linalg.norm(step.error)), *([step.objective] if driven.has_objective else [])]
+    found += [look.sigma_min, float(step.scale.min(initial=1.0)), *step.u, *step.error, *step.q]
+    return _numbers(found)
+
+
+def _numbers(values: Iterable[float]) -> list[float | None]:
+    """JSON has no other numbers than finite ones."""
+    return [float(value) if math.isfinite(value) else None for value in values]

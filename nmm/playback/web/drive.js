@@ -1,0 +1,257 @@
+// A robot that follows what one drags: targets, what one chooses, and the program's answers on one clock.
+"use strict";
+{
+  const THREE = MeshCat.THREE;
+  const [WINDOW, KEPT, REDRAW] = [20, 30, 100]; // s, s, ms
+  const drive = (nmm.drive = { targets: [], active: 0, time: 0, paused: false });
+  const panel = document.createElement("div");
+  const parts = {};
+  let [drawn, axes, polled] = [0, [], null];
+  panel.id = "drive";
+  document.getElementById("plots").prepend(panel);
+  document.body.classList.add("drive");
+
+  // The clock is the program's: nobody seeks.
+  nmm.player.seek = () => {};
+  nmm.plots.zoom = () => {};
+
+  const send = (message) => nmm.send && nmm.send(message);
+  const order = (what) => send({ type: "order", what });
+
+  // What has been aimed at since the last picture goes out with the next one.
+  const aims = new Map();
+  function aim(target, value) {
+    target.value = value;
+    aims.set(target.number, value);
+    show(target);
+  }
+  function flush() {
+    requestAnimationFrame(flush);
+    for (const [task, value] of aims) send({ type: "aim", task, value });
+    aims.clear();
+    stick();
+  }
+  requestAnimationFrame(flush);
+
+  function row(target, k, { name, unit }) {
+    const line = nmm.element(target.part, "label", { class: "aim" });
+    nmm.element(line, "span", {}, `${name} [${unit}]`);
+    const [least, most] = unit === "rad" ? [-Math.PI, Math.PI] : [target.value[k] - target.reach, target.value[k] + target.reach];
+    const words = `${target.name}: ${name} in ${unit}`;
+    const slider = nmm.element(line, "input", { type: "range", min: least, max: most, step: "any", "aria-label": words });
+    const box = nmm.element(line, "input", { type: "number", step: "0.01", "aria-label": `${words}, as a number` });
+    const chosen = (text) => {
+      const x = Number(text);
+      if (text === "" || !Number.isFinite(x)) return;
+      drive.active = target.number;
+      aim(target, target.value.map((old, i) => (i === k ? x : old)));
+    };
+    slider.addEventListener("input", () => chosen(slider.value));
+    box.addEventListener("change", () => chosen(box.value));
+    return { slider, box };
+  }
+
+  function show(target) {
+    target.inputs.forEach(({ slider, box }, k) => {
+      if (document.activeElement !== slider) slider.value = target.value[k];
+      if (document.activeElement !== box) box.value = target.value[k].toFixed(3);
+    });
+    place(target);
+  }
+  function place(target) {
+    if (!target.gizmo) return;
+    const at = Object.fromEntries(["x", "y", "z"].map((axis, i) => [axis, target.axes[axis] === undefined ? target.at[i] : target.value[target.axes[axis]]]));
+    nmm.gizmos.put(target.gizmo, at.x, at.y, at.z);
+  }
+
+  nmm.hooks.targets = ({ targets, values, at, reach, title }) => {
+    const head = nmm.element(panel, "div", { class: "head" });
+    nmm.element(head, "h2", {}, "Drive");
+    parts.pause = nmm.element(head, "button", { id: "pause", title: "Pause or go on (space)" }, "Pause");
+    parts.pause.addEventListener("click", () => order(drive.paused ? "go" : "pause"));
+    const again = nmm.element(head, "button", { id: "again", title: "Robot and targets back where they began (Home)" }, "Begin again");
+    again.addEventListener("click", () => order("restart"));
+    parts.told = nmm.element(panel, "p", { id: "told", role: "status" });
+    targets.forEach((one, number) => {
+      const target = { ...one, number, value: values[number], at: at[number], reach, inputs: [] };
+      target.part = nmm.element(panel, "fieldset");
+      nmm.element(target.part, "legend", {}, `Target of ${one.name}`);
+      target.inputs = one.rows.map((_, k) => row(target, k, one.rows[k]));
+      if (one.frame !== null && Object.keys(one.axes).length) {
+        const ways = Object.keys(one.axes);
+        target.gizmo = nmm.gizmos.add(number, ways, 0.2 * reach, (point) => {
+          drive.active = number;
+          const value = [...target.value];
+          for (const axis of ways) value[one.axes[axis]] = point[axis];
+          aim(target, value);
+        });
+        target.trail = trail(number);
+      }
+      drive.targets.push(target);
+      show(target);
+    });
+    drive.active = Math.max(0, drive.targets.findIndex((target) => target.gizmo));
+    parts.choices = nmm.element(panel, "div", { id: "choices" });
+    nmm.element(panel, "p", { class: "quiet" }, "Drag the red ball (Shift: up and down) or an arrow; or arrow keys, Page Up and Page Down, a gamepad's sticks.");
+    const run = nmm.runs[0];
+    axes = Object.keys(run.columns);
+    empty(run);
+    nmm.actions.follow();
+    nmm.plots.show(true);
+    nmm.camera.reset();
+  };
+
+  // Where a task's frame has been in the last seconds.
+  function trail(number) {
+    const geometry = new THREE.BufferGeometry();
+    const most = 30 * KEPT;
+    geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(3 * most), 3));
+    geometry.setDrawRange(0, 0);
+    const line = new THREE.Line(geometry, new THREE.LineBasicMaterial({ color: 0x0072b2 }));
+    line.frustumCulled = false;
+    nmm.viewer.set_object(nmm.split(`/nmm/trail ${number}`), line);
+    return { geometry, points: [], most };
+  }
+  function extend({ trail: line, at }) {
+    line.points.push(at);
+    if (line.points.length > line.most) line.points.shift();
+    const { position } = line.geometry.attributes;
+    line.points.forEach((point, i) => position.setXYZ(i, ...point));
+    position.needsUpdate = true;
+    line.geometry.setDrawRange(0, line.points.length);
+  }
+
+  function empty(run) {
+    run.t = [];
+    run.samples = 0;
+    for (const key of axes) run.columns[key].values = [];
+    for (const target of drive.targets) if (target.trail) target.trail.points = [];
+  }
+
+  function remember(samples) {
+    const run = nmm.runs[0];
+    for (const [t, ...values] of samples) {
+      if (run.t.length && t < run.t[run.t.length - 1]) empty(run);
+      run.t.push(t);
+      axes.forEach((key, i) => run.columns[key].values.push(values[i] ?? NaN));
+    }
+    const old = nmm.before(run.t, run.t[run.t.length - 1] - KEPT);
+    if (old > 0) {
+      run.t.splice(0, old);
+      for (const key of axes) run.columns[key].values.splice(0, old);
+    }
+    run.samples = run.t.length;
+  }
+
+  nmm.hooks.drive = ({ t, targets, at, samples, paused, told, wrong }) => {
+    remember(samples);
+    drive.time = t;
+    drive.paused = paused;
+    nmm.stage.duration = Math.max(t, 1e-3);
+    Object.assign(nmm.player, { time: t, range: { from: Math.max(0, t - WINDOW), to: Math.max(t, 1) } });
+    drive.targets.forEach((target, i) => {
+      target.at = at[i];
+      const busy = aims.has(i) || (nmm.gizmos.held && nmm.gizmos.held.gizmo === target.gizmo);
+      if (!busy) {
+        target.value = targets[i];
+        show(target);
+      }
+      if (target.trail && samples.length) extend(target);
+    });
+    parts.pause.textContent = paused ? "Go on" : "Pause";
+    if (parts.told.textContent !== told) parts.told.textContent = told;
+    parts.told.classList.toggle("bad", wrong);
+    const now = performance.now();
+    if (now - drawn > REDRAW) {
+      drawn = now;
+      nmm.plots.redraw();
+      nmm.values.update();
+    }
+  };
+
+  // What may be chosen.
+  const controls = new Map();
+  nmm.hooks.choices = ({ choices }) => {
+    const keys = choices.map(({ key, options }) => `${key} ${options}`).join();
+    if (keys !== drive.keys) {
+      drive.keys = keys;
+      controls.clear();
+      parts.choices.replaceChildren();
+      const groups = new Map();
+      for (const choice of choices) {
+        if (!groups.has(choice.group)) {
+          const part = nmm.element(parts.choices, "details", choice.group.startsWith("Weights") ? {} : { open: "" });
+          nmm.element(part, "summary", {}, choice.group);
+          groups.set(choice.group, part);
+        }
+        controls.set(choice.key, control(groups.get(choice.group), choice));
+      }
+    }
+    for (const { key, value } of choices) controls.get(key)(value);
+  };
+
+  // Makes the control of a choice, and returns what shows its value.
+  function control(part, choice) {
+    const { key, text, unit, options, least, most } = choice;
+    const line = nmm.element(part, "label", { class: "choice" });
+    nmm.element(line, "span", {}, unit ? `${text} [${unit}]` : text);
+    const pick = (value) => send({ type: "pick", key, value });
+    if (typeof choice.value === "boolean") {
+      const box = nmm.element(line, "input", { type: "checkbox", "data-key": key });
+      box.addEventListener("change", () => pick(box.checked));
+      return (value) => (box.checked = value);
+    }
+    if (options.length) {
+      const list = nmm.element(line, "select", { "data-key": key });
+      for (const option of options) nmm.element(list, "option", { value: option }, option.toUpperCase());
+      list.addEventListener("change", () => pick(list.value));
+      return (value) => (list.value = value);
+    }
+    // A slider along the logarithm.
+    const slider = nmm.element(line, "input", { type: "range", min: Math.log(least), max: Math.log(most), step: "any", "data-key": key });
+    const output = nmm.element(line, "output");
+    const told = (value) => {
+      output.textContent = value.toPrecision(3);
+      slider.setAttribute("aria-valuetext", `${output.textContent} ${unit}`);
+    };
+    const chosen = () => Math.min(Math.max(Math.exp(Number(slider.value)), least), most);
+    slider.addEventListener("input", () => told(chosen()));
+    slider.addEventListener("change", () => pick(chosen()));
+    return (value) => {
+      if (document.activeElement === slider && slider.matches(":active")) return;
+      slider.value = Math.log(value);
+      told(value);
+    };
+  }
+
+  // Keys and sticks move the target that was moved last.
+  function shift(way, by) {
+    const target = drive.targets[drive.active];
+    const k = target && target.axes[way];
+    if (k === undefined) return;
+    aim(target, target.value.map((old, i) => (i === k ? old + by : old)));
+  }
+  const step = (event, way, sign) => shift(way, sign * drive.targets[0].reach * (event.shiftKey ? 0.002 : 0.02));
+  Object.assign(nmm.keys, {
+    ArrowLeft: (event) => step(event, "x", -1),
+    ArrowRight: (event) => step(event, "x", 1),
+    ArrowUp: (event) => step(event, "y", 1),
+    ArrowDown: (event) => step(event, "y", -1),
+    PageUp: (event) => step(event, "z", 1),
+    PageDown: (event) => step(event, "z", -1),
+    " ": () => order(drive.paused ? "go" : "pause"),
+    Home: () => order("restart"),
+  });
+  for (const key of ["End", "+", "-", "0", "l"]) delete nmm.keys[key];
+
+  function stick() {
+    const now = performance.now();
+    const passed = polled === null ? 0 : Math.min((now - polled) / 1000, 0.1);
+    polled = now;
+    const pad = navigator.getGamepads ? [...navigator.getGamepads()].find(Boolean) : undefined;
+    if (!pad || !drive.targets.length) return;
+    const speed = 0.5 * drive.targets[0].reach * passed;
+    const pushed = (k) => (Math.abs(pad.axes[k] || 0) > 0.12 ? pad.axes[k] : 0);
+    for (const [way, by] of [["x", pushed(0)], ["y", -pushed(1)], ["z", -pushed(3)]]) if (by) shift(way, by * speed);
+  }
+}

@@ -1,0 +1,216 @@
+"""`nmm drive` in a real browser: the target is dragged, and the robot follows as Pinocchio says."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+from playback_browser import UPRIGHT, WALK, Window, watched
+from playback_browser import browser as browser
+from playback_browser import empty_page as empty_page
+from playback_browser import window as window
+from playwright.sync_api import Browser, Page
+from ports import MOST, free_port, listening, wait_for
+
+import nmm
+from nmm.driving.drive import drive
+from nmm.driving.setups import ScenarioSetup
+from nmm.robots.configuration import Configuration
+
+pytestmark = pytest.mark.browser
+
+#: Where a point of a gizmo is in the window, px: its ball, or the tip of the arrow along an axis.
+WHERE = """([target, way, length]) => {
+  const { group, place } = nmm.gizmos.all[target];
+  const at = place.clone();
+  if (way) at[way] += length;
+  const p = new MeshCat.THREE.Vector3(at.x, at.z, -at.y).project(viewer.camera);
+  const box = document.getElementById("view").getBoundingClientRect();
+  return [box.left + (0.5 + 0.5 * p.x) * box.width, box.top + (0.5 - 0.5 * p.y) * box.height];
+}"""
+ERROR = "nmm.state().runs[0].values.error_norm"
+
+
+@pytest.fixture(scope="module")
+def setup() -> ScenarioSetup:
+    return ScenarioSetup(nmm.Scenario.load("unicycle_3r_position"))
+
+
+@contextmanager
+def driven(setup: ScenarioSetup) -> Iterator[str]:
+    """The address of a robot that is driven."""
+    stop, port = threading.Event(), free_port()
+    options = {"port": port, "open_browser": False, "stop": stop}
+    program = threading.Thread(target=drive, args=(setup,), kwargs=options)
+    program.start()
+    try:
+        wait_for(lambda: port in listening())
+        yield f"http://127.0.0.1:{port}/"
+    finally:
+        stop.set()
+        program.join(timeout=MOST)
+    assert not program.is_alive()
+    assert port not in listening()
+
+
+def opened(window: Window, url: str) -> Page:
+    page = window.open(url)
+    page.wait_for_function("nmm.drive.targets.length > 0 && nmm.drive.time > 0 && nmm.gizmos.all.length > 0")
+    return page
+
+
+def target(page: Page) -> np.ndarray:
+    return np.array(page.evaluate("nmm.drive.targets[0].value"))
+
+
+def drag(page: Page, start: list[float], by: tuple[float, float]) -> None:
+    page.mouse.move(*start)
+    page.mouse.down()
+    page.mouse.move(start[0] + by[0], start[1] + by[1], steps=4)
+    page.mouse.up()
+
+
+def arrived(page: Page) -> None:
+    """The error falls by e each second, or faster with a larger gain."""
+    page.wait_for_function(f"{ERROR} < 2e-3", timeout=1000.0 * MOST)
+
+
+def test_the_end_effector_arrives_where_the_ball_is_dragged(window: Window, setup: ScenarioSetup) -> None:
+    with driven(setup) as url:
+        page = opened(window, url)
+        page.get_by_label("K of ee").fill("2.9")  # the logarithm: of 18 1/s
+        page.get_by_label("K of ee").dispatch_event("change")
+        arrived(page)
+        before = target(page)
+        page.evaluate("nmm.camera.look('top')")
+        drag(page, page.evaluate(WHERE, [0, "", 0.0]), (25.0, -20.0))
+        after = target(page)
+        assert np.abs(after[:2] - before[:2]).min() > 0.05  # in the ground's plane
+        assert after[2] == before[2]
+        arrived(page)
+        # What is drawn is where Pinocchio has it.
+        q = page.evaluate("Object.entries(nmm.state().runs[0].values)")
+        found = dict(q)
+        here = Configuration(setup.robot, np.array([found[name] for name in setup.robot.q_names]))
+        np.testing.assert_allclose(here.placement("ee").translation, after, atol=4e-3)
+        tree = page.evaluate(WALK)
+        path = next(name for name in tree if name.endswith("/theta"))
+        drawn = np.array(tree[path]).reshape(4, 4, order="F")
+        root = np.linalg.inv(UPRIGHT) @ drawn
+        # The picture may be one ahead of the plots.
+        np.testing.assert_allclose(root[:2, 3], [found["x"], found["y"]], atol=2e-2)
+
+
+def test_an_arrow_goes_along_its_axis_and_keys_too(window: Window, setup: ScenarioSetup) -> None:
+    with driven(setup) as url:
+        page = opened(window, url)
+        before = target(page)
+        length = 0.2 * setup.robot.reach
+        drag(page, page.evaluate(WHERE, [0, "z", 0.9 * length]), (0.0, -25.0))
+        after = target(page)
+        np.testing.assert_array_equal(after[:2], before[:2])
+        assert after[2] > before[2] + 0.02
+        for key, row, sign in (
+            ("ArrowRight", 0, 1), ("ArrowLeft", 0, -1), ("ArrowUp", 1, 1), ("ArrowDown", 1, -1),
+            ("PageUp", 2, 1), ("PageDown", 2, -1),
+        ):  # fmt: skip
+            before = target(page)
+            page.keyboard.press(key)
+            moved = target(page) - before
+            assert moved[row] * sign > 0.0
+            assert np.count_nonzero(moved) == 1
+        box = page.get_by_label("ee: x in m, as a number")
+        box.fill("0.25")
+        box.press("Enter")
+        assert target(page)[0] == 0.25
+        box.press("ArrowUp")  # the box's own key, and nobody else's
+        assert target(page)[1] == before[1]
+
+
+def test_what_is_chosen_changes_the_controller(window: Window, setup: ScenarioSetup) -> None:
+    with driven(setup) as url:
+        page = opened(window, url)
+        kinds = page.locator('select[data-key="resolver.kind"]')
+        assert kinds.input_value() == "rg"
+        kinds.select_option("pg")
+        page.locator('input[data-key="limits"]').check()
+        page.wait_for_function("document.getElementById('told').textContent.match(/^t = [\\d.]+ s/)")
+        page.evaluate("document.activeElement.blur()")  # the space bar is the check box's own
+        page.keyboard.press("Space")
+        page.wait_for_function("nmm.drive.paused")
+        t = page.evaluate("nmm.drive.time")
+        page.wait_for_timeout(200)
+        assert page.evaluate("nmm.drive.time") == t
+        page.get_by_role("button", name="Begin again").click()
+        page.wait_for_function("nmm.drive.time === 0")
+        page.get_by_role("button", name="Go on").click()
+        page.wait_for_function("nmm.drive.time > 0.1")
+        assert kinds.input_value() == "pg"
+        assert page.locator('input[data-key="limits"]').is_checked()
+
+
+def test_a_second_page_shows_and_moves_the_same_robot(
+    browser: Browser, window: Window, setup: ScenarioSetup
+) -> None:
+    with driven(setup) as url:
+        first = opened(window, url)
+        first.locator('select[data-key="resolver.kind"]').select_option("pg")
+        page = browser.new_page()
+        with watched(page) as other:
+            second = opened(other, url)
+            second.wait_for_function("document.querySelector('select[data-key]').value === 'pg'")
+            second.keyboard.press("ArrowRight")
+            place = target(second)[0]
+            first.wait_for_function(f"Math.abs(nmm.drive.targets[0].value[0] - {place}) < 1e-12")
+            # It came late, and has the curves from before.
+            assert second.evaluate("nmm.runs[0].t[0]") <= first.evaluate("nmm.runs[0].t[0]") + 1e-9
+        page.close()
+        t = first.evaluate("nmm.drive.time")
+        first.wait_for_function(f"nmm.drive.time > {t}")
+
+
+def test_nothing_seeks_and_nothing_is_cut_off_at_420_px(window: Window, setup: ScenarioSetup) -> None:
+    with driven(setup) as url:
+        page = opened(window, url)
+        page.set_viewport_size({"width": 420, "height": 800})
+        wide = page.evaluate("document.documentElement.scrollWidth")
+        assert wide <= 420
+        outside = page.evaluate(
+            """() => [...document.querySelectorAll("#drive :is(button, input, select, output, legend)")]
+              .filter((part) => part.offsetParent && part.getBoundingClientRect().right > 421)
+              .map((part) => part.outerHTML)"""
+        )
+        assert outside == []
+        page.evaluate("nmm.seek(0)")
+        t = page.evaluate("nmm.drive.time")
+        page.wait_for_function(f"nmm.drive.time > {t}")
+        unnamed = page.evaluate(
+            """() => [...document.querySelectorAll("#drive :is(input, select)")]
+              .filter((part) => !part.labels.length && !part.ariaLabel).map((part) => part.outerHTML)"""
+        )
+        assert unnamed == []
+
+
+def test_pictures_come_at_their_rate(window: Window, setup: ScenarioSetup) -> None:
+    """Thirty a second on a machine that has nothing else to do; here those that were sent are counted."""
+    with driven(setup) as url:
+        page = opened(window, url)
+        counted = page.evaluate(
+            """() => new Promise((done) => {
+              const hook = nmm.hooks.drive;
+              let [count, samples, begin] = [0, 0, performance.now()];
+              nmm.hooks.drive = (picture) => {
+                count += 1;
+                samples += picture.samples.length;
+                hook(picture);
+              };
+              setTimeout(() => done([count, samples, (performance.now() - begin) / 1000]), 2000);
+            })"""
+        )
+    count, samples, seconds = counted
+    assert count <= 62.0 * seconds
+    assert samples <= 32.0 * seconds
+    assert samples >= 5

@@ -1,0 +1,420 @@
+"""A robot that follows a target which somebody moves: robot, loop, messages, without a browser."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import subprocess
+import threading
+import time
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import process
+from ports import MOST, listening, wait_for
+from tornado.httpclient import HTTPClientError, HTTPRequest
+from tornado.ioloop import IOLoop
+from tornado.websocket import websocket_connect
+
+import nmm
+from nmm.driving.drive import Session
+from nmm.driving.driven import Driven
+from nmm.driving.messages import Aim, Order, Pick, parsed
+from nmm.driving.setups import RobotSetup, ScenarioSetup
+from nmm.errors import InputError, ScenarioError
+from nmm.playback.rolling import Rolling
+from nmm.robots.configuration import Configuration
+
+KINDS = ("rg", "pg", "ej", "dls")
+
+
+def scenario(name: str = "unicycle_3r_position") -> ScenarioSetup:
+    return ScenarioSetup(nmm.Scenario.load(name))
+
+
+def ee(driven: Driven) -> np.ndarray:
+    return np.array(Configuration(driven.robot, driven.q).placement("ee").translation)
+
+
+def moved(driven: Driven, seconds: float) -> None:
+    for _ in range(round(seconds / driven.setup.dt)):
+        assert driven.step(), driven.trouble
+
+
+# the robot
+
+
+def test_the_end_effector_goes_where_the_target_is_put() -> None:
+    driven = Driven(scenario())
+    driven.aim(0, np.array([0.4, -0.6, 0.7]))
+    moved(driven, 15.0)
+    np.testing.assert_allclose(ee(driven), [0.4, -0.6, 0.7], atol=1e-5)
+    look = driven.look()
+    np.testing.assert_allclose(look.at[0], ee(driven), atol=1e-12)
+    J = driven._controller.evaluate(driven.t, driven.q).J
+    assert look.sigma_min == pytest.approx(np.linalg.svd(J)[1].min(), rel=1e-12)
+
+
+def test_it_rolls_as_the_platform_does() -> None:
+    """The wheels' angles, picture by picture, are those of the motion as a whole."""
+    driven = Driven(scenario())
+    driven.look()
+    wheels, q = [driven.wheels], [driven.q]
+    for _ in range(60):
+        moved(driven, 0.03)
+        driven.look()
+        wheels.append(driven.wheels)
+        q.append(driven.q)
+    whole = Rolling(driven.robot).angles(np.array(q), start=wheels[0])
+    np.testing.assert_allclose(np.array(wheels), whole, atol=1e-12)
+    assert np.abs(whole[-1] - whole[0]).max() > 0.1
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_resolver_is_changed_while_it_moves(kind: str) -> None:
+    driven = Driven(scenario())
+    driven.aim(0, np.array([0.4, -0.6, 0.7]))
+    moved(driven, 1.0)
+    before, t = driven.q, driven.t
+    options = next(choice.options for choice in driven.choices if choice.key == "resolver.kind")
+    if kind not in options:
+        with pytest.raises(InputError, match=r"resolver\.kind"):
+            driven.with_choice("resolver.kind", kind)
+        return
+    driven.use(driven.with_choice("resolver.kind", kind))
+    np.testing.assert_array_equal(driven.q, before)
+    assert driven.t == t
+    assert driven._controller.resolver.name.lower() == kind
+    moved(driven, 14.0)
+    np.testing.assert_allclose(ee(driven), [0.4, -0.6, 0.7], atol=1e-4)
+
+
+def test_a_gain_sets_how_fast_the_error_falls() -> None:
+    """Without limits, ‖e‖ of a target at rest falls as exp(-K t), whatever the resolver."""
+    for gain in (1.0, 4.0):
+        driven = Driven(scenario())
+        driven.use(driven.with_choice("task.0.gain", gain))
+        first = np.linalg.norm(driven.look().step.error)
+        moved(driven, 1.0)
+        share = np.linalg.norm(driven.look().step.error) / first
+        assert share == pytest.approx(np.exp(-gain), rel=1e-6)
+
+
+def test_what_was_chosen_stays_through_other_choices_and_a_new_beginning() -> None:
+    driven = Driven(scenario())
+    chosen = {"task.0.gain": 3.0, "resolver.kind": "pg", "limits": True, "resolver.alpha": 5.0}
+    for key, value in chosen.items():
+        driven.use(driven.with_choice(key, value))
+    moved(driven, 0.5)
+    driven.aim(0, np.array([9.0, 9.0, 0.5]))
+    driven.restart()
+    assert {choice.key: choice.value for choice in driven.choices}.items() >= chosen.items()
+    assert driven.t == 0.0
+    np.testing.assert_array_equal(driven.q, driven.setup.q0)
+    assert driven.targets[0].signal.value[0] < 1.0
+
+
+def test_limits_are_kept_and_left() -> None:
+    driven = Driven(scenario("tiago_pose"))
+    first = driven.targets[0].signal.value
+    driven.use(driven.with_choice("task.0.gain", 20.0))  # upwards the platform is no help
+    driven.aim(0, first + np.array([0.0, 0.0, 0.2, 0.0, 0.0, 0.0]))
+    most = driven.robot.u_limits
+    least = 1.0
+    for _ in range(5):
+        moved(driven, 0.02)
+        step = driven.look().step
+        assert np.all(np.abs(step.u) <= most * (1.0 + 1e-9))
+        least = min(least, step.scale.min())
+    assert least < 1.0
+    driven.use(driven.with_choice("limits", False))
+    step = driven.look().step
+    assert np.any(np.abs(step.u) > most)
+    assert step.scale.min() == 1.0
+
+
+def test_a_weight_is_that_of_the_input() -> None:
+    driven = Driven(scenario("tiago_pose"))
+    driven.use(driven.with_choice("resolver.weights.omega", 7.0))
+    asked = nmm.Scenario.load("tiago_pose", {"resolver.weights": {"torso_lift_joint": 20, "omega": 7}})
+    expected = asked.controller().evaluate(0.0, driven.setup.q0)
+    driven._controller.reset()
+    for target, value in zip(driven.targets, [expected.r_d], strict=True):
+        target.signal.set(value)
+    found = driven._controller.evaluate(0.0, driven.setup.q0)
+    rate = asked.controller().task.tasks[0]
+    assert rate.gain == pytest.approx(1.0)
+    # The reference is at rest at t = 0: the same problem.
+    np.testing.assert_allclose(found.u, expected.u, atol=1e-9)
+
+
+def test_the_inputs_before_go_over_to_another_controller() -> None:
+    """From which limits of acceleration count."""
+    driven = Driven(scenario())
+    driven.use(driven.with_choice("limits", True))
+    moved(driven, 0.1)
+    before = driven._controller.before.copy()
+    assert np.abs(before).max() > 0.01
+    driven.use(driven.with_choice("task.0.gain", 2.0))
+    np.testing.assert_array_equal(driven._controller.before, before)
+
+
+def test_a_robot_without_a_scenario_holds_its_arm_where_it_is() -> None:
+    robot = nmm.load("unicycle_3r")
+    driven = Driven(RobotSetup(robot, [nmm.Position("ee", "xyz")], robot.rest))
+    here = ee(driven)
+    moved(driven, 1.0)
+    np.testing.assert_allclose(ee(driven), here, atol=1e-9)
+    there = here + np.array([0.3, 0.2, -0.2])
+    driven.aim(0, there)
+    moved(driven, 12.0)
+    np.testing.assert_allclose(ee(driven), there, atol=2e-3)
+
+
+def test_it_stands_still_and_says_why_until_it_is_told_otherwise() -> None:
+    stuck = {"robot.arguments.d": 0, "resolver.partitions": "[[v, q1]]"}
+    setup = ScenarioSetup(nmm.Scenario.load("unicycle_2r_position", stuck), {"q1": np.pi / 2})
+    driven = Driven(setup)
+    assert not driven.step()
+    assert "lost rank" in driven.trouble
+    where = driven.q
+    assert not driven.step()
+    np.testing.assert_array_equal(driven.q, where)
+    driven.use(driven.with_choice("resolver.kind", "dls"))
+    assert driven.trouble == ""
+    moved(driven, 0.1)
+
+
+def test_tasks_that_come_and_go_are_refused() -> None:
+    with pytest.raises(InputError, match="unicycle_3r_sequence: has tasks that come and go"):
+        scenario("unicycle_3r_sequence")
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("resolver.kind", "callable"), ("resolver.kind", 3), ("task.0.gain", 1e9), ("task.0.gain", "fast"),
+        ("task.0.gain", float("nan")), ("task.0.gain", True), ("limits", "yes"),
+        ("robot.source", "/etc/passwd"), ("task.1.gain", 1.0), ("", 1.0),
+    ],
+)  # fmt: skip
+def test_what_is_no_choice_is_refused(key: str, value: object) -> None:
+    driven = Driven(scenario())
+    with pytest.raises(InputError):
+        driven.with_choice(key, value)
+
+
+# messages
+
+
+def test_messages_are_read() -> None:
+    assert parsed('{"type":"aim","task":0,"value":[1,2.5,-3e0]}') == Aim(0, (1.0, 2.5, -3.0))
+    assert parsed(b'{"type":"pick","key":"limits","value":true}') == Pick("limits", True)
+    assert parsed('{"type":"order","what":"pause"}') == Order("pause")
+
+
+HOSTILE = [
+    "", "null", "[]", "{}", "{", "\x00", "1e999", '"aim"', b"\xff\xfe", "[" * 1500, '{"type":"eval"}',
+    '{"type":"aim"}', '{"type":"aim","task":0,"value":[]}', '{"type":"aim","task":0,"value":[NaN]}',
+    '{"type":"aim","task":0,"value":[Infinity]}', '{"type":"aim","task":0,"value":["1"]}',
+    '{"type":"aim","task":0,"value":[true]}', '{"type":"aim","task":0,"value":[1e5]}',
+    '{"type":"aim","task":-1,"value":[1]}', '{"type":"aim","task":0.5,"value":[1]}',
+    '{"type":"aim","task":true,"value":[1]}', '{"type":"aim","task":0,"value":[1],"more":1}',
+    '{"type":"aim","task":0,"value":[%s]}' % ("9" * 1500),
+    '{"type":"aim","task":%s,"value":[1]}' % ("9" * 1500),
+    '{"type":"aim","task":0,"value":[%s0]}' % ("0," * 900), '{"type":"aim","task":0,"value":{"0":1}}',
+    '{"type":"pick","key":1,"value":1}', '{"type":"pick","key":"limits","value":null}',
+    '{"type":"pick","key":"limits","value":[1]}', '{"type":"order","what":"stop"}',
+    '{"type":"order","what":1}', '{"type":["aim"],"task":0,"value":[1]}',
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", HOSTILE, ids=range(len(HOSTILE)))
+def test_other_messages_are_refused(text: str | bytes) -> None:
+    with pytest.raises(InputError):
+        parsed(text)
+
+
+def test_a_huge_number_is_out_of_range_and_no_overflow() -> None:
+    driven = Driven(scenario())
+    pick = parsed('{"type":"pick","key":"task.0.gain","value":%s}' % ("9" * 1500))
+    assert isinstance(pick, Pick)
+    with pytest.raises(InputError, match="from"):
+        driven.with_choice(pick.key, pick.value)
+
+
+# the loop
+
+
+class Loop:
+    """A session whose loop runs in a thread, and what a page would be told."""
+
+    def __init__(self, setup: ScenarioSetup) -> None:
+        self.session = Session(Driven(setup))
+        self.pictures: list[float] = []
+        self._stop = threading.Event()
+        self.latest = self.session.follow()
+        changed = lambda: self.pictures.append(time.monotonic())  # noqa: E731
+        self._thread = threading.Thread(target=self.session.run, args=(changed, self._stop))
+
+    def __enter__(self) -> Loop:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop.set()
+        self._thread.join(timeout=MOST)
+        assert not self._thread.is_alive()
+
+    def picture(self) -> dict[str, object]:
+        return json.loads(self.latest().splitlines()[-1])
+
+
+def test_a_hostile_message_changes_nothing() -> None:
+    with Loop(scenario()) as loop:
+        for text in HOSTILE:
+            loop.session.receive(text)
+        loop.session.receive('{"type":"aim","task":7,"value":[1,2,3]}')
+        loop.session.receive('{"type":"aim","task":0,"value":[1,2]}')
+        loop.session.receive('{"type":"pick","key":"robot.source","value":"/etc/passwd"}')
+        driven = loop.session._driven
+        target, choices = driven.targets[0].signal.value, driven.choices
+        wait_for(
+            lambda: not loop.session._waiting and not loop.session._picks and loop.session._making is None
+        )
+        count = len(loop.pictures)
+        wait_for(lambda: len(loop.pictures) > count + 3)
+        np.testing.assert_array_equal(driven.targets[0].signal.value, target)
+        assert driven.choices == choices
+        assert driven.trouble == ""
+
+
+def test_a_page_is_told_every_sample_once_and_one_that_comes_late_the_last_ones() -> None:
+    with Loop(scenario()) as loop:
+        times = []
+        late = None
+        while len(times) < 40:
+            times += [sample[0] for sample in loop.picture()["samples"]]
+            time.sleep(0.02)
+            if len(times) > 20 and late is None:
+                late = json.loads(loop.session.follow()().splitlines()[-1])
+    assert times == sorted(set(times))
+    assert late is not None
+    told = [sample[0] for sample in late["samples"]]
+    assert told[: len(times)] == times[: len(told)]
+
+
+def test_pause_restart_and_choices_are_told() -> None:
+    with Loop(scenario()) as loop:
+        wait_for(lambda: loop.picture()["t"] > 0.2)
+        loop.session.receive('{"type":"order","what":"pause"}')
+        wait_for(lambda: loop.picture()["paused"])
+        t = loop.picture()["t"]
+        time.sleep(0.2)
+        assert loop.picture()["t"] == t
+        loop.session.receive('{"type":"pick","key":"limits","value":true}')
+        found: list[dict] = []
+
+        def chosen() -> bool:
+            for line in loop.latest().splitlines():
+                found.append(json.loads(line))
+            told = [one for one in found if one["type"] == "choices"]
+            return (
+                bool(told) and next(c for c in told[-1]["choices"] if c["key"] == "limits")["value"] is True
+            )
+
+        wait_for(chosen)
+        loop.session.receive('{"type":"order","what":"restart"}')
+        wait_for(lambda: loop.picture()["t"] == 0.0)
+        loop.session.receive('{"type":"order","what":"go"}')
+        wait_for(lambda: loop.picture()["t"] > 0.1)
+
+
+def test_time_passes_as_it_does_on_the_wall() -> None:
+    """As far as the machine can: what it could not do in time is told."""
+    with Loop(scenario()) as loop:
+        wait_for(lambda: loop.picture()["t"] > 0.2)
+        (t0, w0) = loop.picture()["t"], time.monotonic()
+        time.sleep(1.0)
+        (t1, w1) = loop.picture()["t"], time.monotonic()
+        lost = loop.session._lost / 30.0
+    assert t1 - t0 <= w1 - w0 + 0.3
+    assert t1 - t0 + lost >= 0.7 * (w1 - w0) - 0.3
+
+
+# the command
+
+
+def start(folder: Path, *arguments: str) -> tuple[subprocess.Popen[str], str]:
+    running = process(folder, "drive", *arguments, "--no-open")
+    assert running.stdout is not None
+    line = running.stdout.readline()
+    found = re.search(r"http://127\.0\.0\.1:\d+/", line)
+    assert found, line + running.communicate()[1]
+    return running, found[0]
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGKILL"])
+def test_nothing_stays_behind(tmp_path: Path, name: str) -> None:
+    running, url = start(tmp_path, "unicycle_3r_position")
+    port = int(url.rsplit(":", 1)[1].strip("/"))
+    assert listening()[port] == "0100007F"
+    running.send_signal(getattr(signal, name))
+    running.communicate(timeout=MOST)
+    assert running.returncode == (0 if name == "SIGINT" else -signal.SIGKILL)
+    wait_for(lambda: port not in listening())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_only_its_own_page_is_listened_to(tmp_path: Path) -> None:
+    running, url = start(tmp_path, "unicycle_3r_position")
+    try:
+        with urllib.request.urlopen(url, timeout=MOST) as answer:
+            token = re.search(r'data-token="([^"]+)"', answer.read().decode())[1]
+        socket = url.replace("http", "ws") + "socket"
+
+        async def connects(address: str, **headers: str) -> bool:
+            try:
+                page = await websocket_connect(HTTPRequest(address, headers=headers))
+            except HTTPClientError as error:
+                return error.code != 403
+            page.close()
+            return True
+
+        run = lambda *a, **k: IOLoop().run_sync(lambda: connects(*a, **k))  # noqa: E731
+        assert run(f"{socket}?token={token}", Origin=url.strip("/"))
+        assert not run(socket, Origin=url.strip("/"))
+        assert not run(f"{socket}?token=wrong", Origin=url.strip("/"))
+        assert not run(f"{socket}?token={token}", Origin="http://example.org")
+        request = urllib.request.Request(url, headers={"Host": "example.org"})
+        with pytest.raises(urllib.error.HTTPError, match="403"):
+            urllib.request.urlopen(request, timeout=MOST)
+    finally:
+        running.kill()
+        running.communicate()
+
+
+def test_bad_input_is_a_line(tmp_path: Path) -> None:
+    for arguments, words in (
+        (["nothing_like_it"], "unknown robot or scenario"),
+        (["unicycle_3r_sequence"], "tasks that come and go"),
+        (["unicycle_2r", "--task", "pose"], "at most 4"),
+        (["unicycle_2r", "--task", "position:nowhere"], "nowhere"),
+        (["unicycle_3r_position", "--port", "99999"], "from 1 to 65535"),
+    ):
+        running = process(tmp_path, "drive", *arguments, "--no-open")
+        out, err = running.communicate(timeout=MOST)
+        assert running.returncode == 2
+        assert out == ""
+        assert err.splitlines()[-1].startswith("nmm drive: ")
+        assert words in err
+
+
+def test_a_scenario_error_names_its_key() -> None:
+    wrong = nmm.Scenario.load("unicycle_3r_position", {"limits": {"velocity": {"nothing": 1}}})
+    with pytest.raises(ScenarioError, match="limits"):
+        ScenarioSetup(wrong).controller({})
