@@ -1,4 +1,5 @@
 from . import analysis as analysis
+from . import driving as driving
 from . import figures as figures
 from . import folders as folders
 from . import playback as playback

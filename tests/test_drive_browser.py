@@ -16,8 +16,7 @@ from playwright.sync_api import Browser, Page
 from ports import MOST, free_port, listening, wait_for
 
 import nmm
-from nmm.driving.drive import drive
-from nmm.driving.setups import ScenarioSetup
+from nmm.driving import ScenarioSetup, drive
 from nmm.robots.configuration import Configuration
 
 pytestmark = pytest.mark.browser

@@ -21,9 +21,9 @@ from tornado.ioloop import IOLoop
 from tornado.websocket import websocket_connect
 
 import nmm
-from nmm.driving.drive import Session
 from nmm.driving.driven import Driven
 from nmm.driving.messages import Aim, Order, Pick, parsed
+from nmm.driving.session import Session
 from nmm.driving.setups import RobotSetup, ScenarioSetup
 from nmm.errors import InputError, ScenarioError
 from nmm.playback.rolling import Rolling

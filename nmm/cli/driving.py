@@ -12,8 +12,8 @@ def drive_subject(
     source: str, *, tasks: Sequence[str] | None, port: int | None, open_browser: bool, **asked: Any
 ) -> None:
     """Drive a scenario, or a robot with tasks, until Ctrl-C."""
-    from nmm.driving.drive import drive
-    from nmm.driving.setups import RobotSetup, ScenarioSetup, Setup
+    from nmm.driving import RobotSetup, ScenarioSetup, drive
+    from nmm.driving.setups import Setup
 
     subject = studied(source, tasks=tasks, usual_task="position", **asked)
     setup: Setup

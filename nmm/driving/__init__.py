@@ -5,5 +5,9 @@ choices   what a driver may change: resolver, gains, weights, limits
 setups    controllers for what was chosen, of a scenario or of a robot with tasks
 driven    the robot, its controller and its time, step by step
 messages  what a page may say
-drive     the loop in real time, between the page's messages and its pictures
+session   the loop in real time, between the pages' messages and their pictures
 """
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
