@@ -23,6 +23,7 @@ SCRIPTS = (
     "ghosts.js",
     "ellipsoids.js",
     "obstacles.js",
+    "apart.js",
     "camera.js",
     "curves.js",
     "plots.js",

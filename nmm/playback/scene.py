@@ -97,6 +97,7 @@ def playback_scene(
         view=packed(view, np.float64),
         tags=packed(_tags(motions, boxes, times) if several else np.zeros((0, 3)), np.float64),
         follow=_held(boxes, _middle(motions, frames, times)),
+        wall=_wall(motions),
         size=size,
     )
     animations = obstacles.draw(drawing, size, start)
@@ -106,9 +107,12 @@ def playback_scene(
         robot = DrawnRobot(drawing, motion.robot, f"{path}/robot", tint=color if several else None, rank=i)
         robot.place(frame.q[0], frame.wheels[0])
         animations += robot.animations(frame, start)
+        height = TAG * float(boxes[i, 0, 1, 2])
         samples = ghost_samples(motion, ghosts)
         if samples:
-            robot.ghosts(f"{path}/ghosts", motion.q[samples], wheel_angles(motion)[samples])
+            whose = f"{look.name} " if several else ""
+            texts = [f"{whose}{motion.t[k]:.3g} s" for k in samples]
+            robot.ghosts(f"{path}/ghosts", motion.q[samples], wheel_angles(motion)[samples], texts, height)
         drawing.add(
             "motion",
             path=path,
@@ -117,17 +121,22 @@ def playback_scene(
             label=look.name or ("" if motion.driven is not None else motion.robot.name),
             color=list(color),
             tag=look.name if several else "",
-            height=TAG * float(boxes[i, 0, 1, 2]),
+            height=height,
         )
-        if motion.driven is not None:
-            drawn = samples_kept(motion.t, fps)
-            drawing.add(
-                "path",
-                path=f"{path}/path",
-                color=list(color),
-                points=packed(motion.driven[drawn], np.float32),
-                times=packed(motion.t[drawn] - start, np.float64),
-            )
+        drawn = samples_kept(motion.t, fps)
+        for name, points, thick in (
+            ("path", motion.driven, 1.0),
+            ("platform", _on_the_floor(motion, size), 0.6),
+        ):
+            if points is not None:
+                drawing.add(
+                    "path",
+                    path=f"{path}/{name}",
+                    color=list(color),
+                    points=packed(points[drawn], np.float32),
+                    times=packed(motion.t[drawn] - start, np.float64),
+                    thick=thick,
+                )
         draw_nearest(drawing, motion, path, color if several else None, start, fps)
         if shown is not None:
             animations += shown.draw(drawing, i, path, color, start)
@@ -218,6 +227,7 @@ def _desired(drawing: Drawing, motions: Sequence[Motion]) -> None:
             color=list(DESIRED),
             points=packed(path[kept], np.float32),
             times=None,
+            thick=1.0,
         )
         seen.append(path)
 
@@ -242,6 +252,31 @@ def _targets(drawing: Drawing, motions: Sequence[Motion], size: float) -> None:
             drawing.transform(f"{path}/foot", foot)
     if targets:
         drawing.add("target", color=list(TARGET))
+
+
+def _on_the_floor(motion: Motion, size: float) -> Array | None:
+    """Where the platform has been (N, 3), just above the floor; None for one that stays."""
+    at = base_position(motion.robot, motion.q)
+    if float(np.ptp(at, axis=0).max(initial=0.0)) < 1e-6:
+        return None
+    return np.column_stack([at, np.full(len(at), 2e-3 * size)])
+
+
+def _wall(motions: Sequence[Motion]) -> list[float] | None:
+    """The normal (2,) of the upright plane that the paths lie nearest to, towards the robots; None without
+    one."""
+    paths = [line for motion in motions for line in (motion.desired, motion.driven) if line is not None]
+    if not paths:
+        return None
+    points = np.vstack(paths)[:, :2]
+    middle = points.mean(axis=0)
+    spread, axes = np.linalg.eigh(np.cov(points.T))
+    if spread[1] < 1e-12:
+        return None
+    normal = axes[:, 0]
+    bases = np.vstack([base_position(motion.robot, motion.q) for motion in motions])
+    side = float((bases.mean(axis=0) - middle) @ normal)
+    return (-normal if side < 0.0 else normal).tolist()
 
 
 def _boxes(motions: Sequence[Motion], frames: Sequence[Keyframes], times: Array) -> Array:

@@ -1,4 +1,4 @@
-// The address is the state: #t=12.5&view=top&hide=pg&plots=H,error&zoom=2,7. What it says otherwise is ignored.
+// The address is the state: #t=12.5&view=top&apart=1&grid=off&hide=pg&plots=H,error&zoom=2,7. What it says otherwise is ignored.
 "use strict";
 {
   const address = (nmm.address = {});
@@ -11,6 +11,8 @@
     const parts = [`t=${short(Math.min(player.time, stage.duration))}`];
     if (camera.from !== "iso") parts.push(`view=${camera.from}`);
     if (camera.following) parts.push("follow");
+    if (nmm.apart.share > 0) parts.push(`apart=${Number(nmm.apart.share.toFixed(3))}`);
+    if (document.getElementById("grid").getAttribute("aria-pressed") === "false") parts.push("grid=off");
     const hidden = nmm.runs.filter((run) => run.hidden).map((run) => encodeURIComponent(run.id));
     if (hidden.length) parts.push(`hide=${hidden.join(",")}`);
     const open = plots.shown ? plots.opened() : ["none"];
@@ -47,6 +49,9 @@
     const { stage, player, plots, camera, runs } = nmm;
     if (wanted.has("view")) camera.look(wanted.get("view"));
     if (wanted.has("follow") && !camera.following) nmm.actions.follow();
+    if (wanted.has("apart") && runs.length > 1) nmm.apart.set(Number(wanted.get("apart")));
+    const grid = document.getElementById("grid").getAttribute("aria-pressed") === "true" ? "on" : "off";
+    if (wanted.has("grid") && ["on", "off"].includes(wanted.get("grid")) && wanted.get("grid") !== grid) nmm.actions.grid();
     if (wanted.has("hide")) {
       const hidden = words(wanted.get("hide"));
       for (const run of runs) nmm.hide(run, hidden.includes(run.id));

@@ -18,9 +18,11 @@
   const vectors = (numbers = []) =>
     Array.from({ length: numbers.length / 3 }, (_, i) => upright(new THREE.Vector3().fromArray(numbers, 3 * i)));
 
-  camera.build = (held, size, named) => {
+  camera.build = (held, size, named, wall) => {
     tags = vectors(named);
     points = [...vectors(held), ...tags];
+    if (wall) TOWARDS.wall = new THREE.Vector3(wall[0], wall[1], 0.06);
+    else chooser.querySelector("[value=wall]").remove();
     eye = new THREE.PerspectiveCamera(FIELD, view.clientWidth / view.clientHeight, 0.01 * size, 80 * size);
     nmm.viewer.set_camera(eye);
     nmm.viewer.set_object(["Cameras", "default", "rotated"], eye);
@@ -139,10 +141,13 @@
     return sum.setY(0.5 * (nmm.stage.follow.low + nmm.stage.follow.high));
   }
 
+  // What stands there once for each of several robots that are set apart: ways in three.js's axes.
+  const apart = (held) => (nmm.apart.ways.length ? nmm.apart.ways.flatMap((way) => held.map((p) => p.clone().add(way))) : held);
+
   camera.reset = () => {
     camera.moved = false;
     const towards = upright(TOWARDS[camera.from]);
-    if (!camera.following && !camera.held) return look(points, towards, tags);
+    if (!camera.following && !camera.held) return look(apart(points), towards, apart(tags));
     last = middle();
     // A page may say itself what there is to hold, as points in three.js's axes.
     if (camera.held) return look(camera.held(), towards, []);

@@ -37,7 +37,7 @@
     return geometry;
   }
 
-  nmm.hooks.ghosts = ({ path, joints }) => {
+  nmm.hooks.ghosts = ({ path, joints, root, texts, height }) => {
     nmm.viewer.scene.updateMatrixWorld(true);
     const shapes = joints.map((joint) => merged(nmm.node(joint.path)));
     const count = joints[0].poses.length / 7;
@@ -69,6 +69,11 @@
         const node = nmm.node(`${path}/${k}/${j}`);
         node.position.fromArray(joint.poses, 7 * k);
         node.quaternion.fromArray(joint.poses, 7 * k + 3);
+        if (joint.path !== root) return;
+        const label = nmm.scenery.label(texts[k], [0.4, 0.47, 0.56], false, 0.75);
+        label.center.set(0.5, 0.5 - 1.05 * nmm.motions.length); // those of robots at one place are stacked
+        label.position.set(joint.poses[7 * k], joint.poses[7 * k + 1], joint.poses[7 * k + 2] + height);
+        nmm.viewer.set_object(nmm.split(`${path}/${k}/text`), label);
       });
     }
     nmm.ghosts = (nmm.ghosts || []).concat(nmm.node(path));

@@ -20,6 +20,7 @@
     l: actions.loop,
     m: () => document.body.classList.toggle("panel"),
     p: actions.paths,
+    x: actions.grid,
     r: actions.reset,
     v: () => nmm.camera.next(),
     "+": () => plots.closer(0.5),

@@ -14,7 +14,7 @@
     player.range.to = stage.duration;
     document.body.classList.toggle("live", stage.live);
     nmm.scenery.build(stage.view, stage.size, stage.follow.radius);
-    nmm.camera.build(stage.view, stage.size, stage.tags);
+    nmm.camera.build(stage.view, stage.size, stage.tags, stage.wall);
   };
 
   nmm.hooks.motion = (motion) => {
@@ -38,6 +38,7 @@
     get("status").textContent = "";
     get("slider").disabled = nmm.stage.duration === 0;
     if (nmm.stage.live) return setFollow(true);
+    nmm.apart.start();
     player.setRange(0, nmm.stage.duration);
     nmm.plots.show(nmm.stage.plots);
     player.seek(0);
@@ -148,6 +149,10 @@
     ellipsoids: () => setShown("ellipsoids", nmm.ellipsoids, !isPressed("ellipsoids")),
     distances: () => setShown("distances", nmm.obstacles.lines, !isPressed("distances")),
     paths: () => setShown("paths", nmm.scenery.paths, !isPressed("paths")),
+    grid: () => {
+      setShown("grid", nmm.scenery.measures, !isPressed("grid"));
+      nmm.address.changed();
+    },
     curves: () => nmm.plots.show(!nmm.plots.shown),
   });
   for (const [id, action] of Object.entries(actions)) get(id).addEventListener("click", action);

@@ -3,7 +3,7 @@
 {
   const THREE = MeshCat.THREE;
   const SIDES = 8;
-  const scenery = (nmm.scenery = { trails: [] });
+  const scenery = (nmm.scenery = { trails: [], desired: [] });
 
   function add(path, object) {
     nmm.viewer.set_object(nmm.split(path), object);
@@ -114,6 +114,7 @@
     // Flat things that lie on one another are drawn in this order; nothing hides behind them.
     [grid, shadow].forEach((object, order) => (object.renderOrder = order - 2));
     group.add(grid, shadow);
+    scenery.measures = [grid];
     add("/nmm/ground", group);
   }
 
@@ -125,7 +126,7 @@
       const painted = material(rgb, 1);
       const shaft = new THREE.Mesh(new THREE.CylinderGeometry(radius, radius, 0.86 * length, 16), painted);
       const head = new THREE.Mesh(new THREE.ConeGeometry(2.6 * radius, 0.14 * length, 20), painted);
-      const tag = label(name, rgb, false);
+      const tag = label(name, rgb, false, 0.9);
       shaft.position.y = 0.43 * length;
       head.position.y = 0.93 * length;
       tag.position.y = 1.1 * length;
@@ -135,11 +136,19 @@
       if (axis === 2) arrow.rotation.x = Math.PI / 2;
       group.add(arrow);
     });
-    add("/nmm/axes", group);
+    scenery.measures.push(add("/nmm/axes", group));
   }
 
+  // Pixels that a text is high, whatever the view's size.
+  const HIGH = 22;
+  const labels = [];
+  scenery.fit = () => {
+    const unit = (2 * Math.tan(Math.PI / 10)) / Math.max(document.getElementById("view").clientHeight, 1);
+    for (const { sprite, wide, high } of labels) sprite.scale.set(wide * high * unit, high * unit, 1);
+  };
+
   // A text that faces the viewer and keeps its size on the screen.
-  function label(text, rgb, filled) {
+  function label(text, rgb, filled, part = 1) {
     const canvas = document.createElement("canvas");
     const pen = canvas.getContext("2d");
     const font = "600 40px system-ui, sans-serif";
@@ -165,7 +174,8 @@
     const sprite = new THREE.Sprite(
       new THREE.SpriteMaterial({ map, depthTest: !filled, depthWrite: false, sizeAttenuation: false }),
     );
-    sprite.scale.set((0.028 * width) / height, 0.028, 1);
+    labels.push({ sprite, wide: width / height, high: HIGH * part });
+    scenery.fit();
     sprite.renderOrder = filled ? 1000 : 0;
     return sprite;
   }
@@ -239,8 +249,8 @@
   }
 
   // A path without times is dashed; one with times grows as the robot drives it, over a faint whole.
-  nmm.hooks.path = ({ path, color, points, times }) => {
-    const radius = 0.0032 * nmm.stage.size;
+  nmm.hooks.path = ({ path, color, points, times, thick }) => {
+    const radius = 0.0032 * nmm.stage.size * thick;
     const [kept, when] = thinned(points, times, 1.5 * radius);
     if (kept.length < 2) return;
     const group = new THREE.Group();
@@ -258,6 +268,7 @@
       scenery.trails.push({ geometry: driven, when });
     }
     scenery.paths = (scenery.paths || []).concat(group);
+    if (times === null) scenery.desired.push(group);
     add(path, group);
   };
 

@@ -1,0 +1,54 @@
+// Robots that are compared, set apart from one another: over one another at first, side by side in the end.
+"use strict";
+{
+  const THREE = MeshCat.THREE;
+  const slider = document.getElementById("apart");
+  // ways: how far each motion is moved, in three.js's axes; none while they stand over one another.
+  const apart = (nmm.apart = { share: 0, ways: [] });
+  const copies = [];
+
+  // The direction in which they need the least room, and how much that is.
+  function room() {
+    const box = new THREE.Box3().setFromArray(nmm.stage.view);
+    const { x, y } = box.getSize(new THREE.Vector3());
+    return x < y ? new THREE.Vector3(1.05 * x, 0, 0) : new THREE.Vector3(0, -1.05 * y, 0);
+  }
+
+  // Each robot that is moved takes the desired paths and targets along.
+  function copied() {
+    if (copies.length) return;
+    const fixed = nmm.viewer.scene_tree.find(["nmm"]);
+    const shared = Object.entries(fixed.children).filter(([name]) => /^(desired|target) \d+$/.test(name));
+    nmm.motions.forEach((motion, i) => {
+      if (i === 0) return;
+      const group = new THREE.Group();
+      for (const [, { object }] of shared) group.add(object.clone());
+      nmm.viewer.set_object(nmm.split(`/nmm/apart ${i}`), group);
+      copies.push(nmm.node(`/nmm/apart ${i}`));
+      nmm.scenery.paths = (nmm.scenery.paths || []).concat(group);
+    });
+  }
+
+  apart.set = (share) => {
+    apart.share = Math.min(Math.max(Number.isFinite(share) ? share : 0, 0), 1);
+    slider.value = apart.share;
+    slider.setAttribute("aria-valuetext", `${Math.round(100 * apart.share)} %`);
+    const way = room().multiplyScalar(apart.share);
+    if (apart.share > 0) copied();
+    apart.ways = [];
+    nmm.motions.forEach((motion, i) => {
+      const by = way.clone().multiplyScalar(i);
+      nmm.node(motion.path).position.copy(by);
+      if (i > 0 && copies.length) {
+        copies[i - 1].position.copy(by);
+        copies[i - 1].visible = apart.share > 0;
+      }
+      if (apart.share > 0) apart.ways.push(new THREE.Vector3(by.x, by.z, -by.y));
+    });
+    if (!nmm.camera.moved) nmm.camera.reset();
+    nmm.viewer.set_dirty();
+    nmm.address.changed();
+  };
+  apart.start = () => document.body.classList.toggle("several", nmm.motions.length > 1);
+  slider.addEventListener("input", () => apart.set(Number(slider.value)));
+}

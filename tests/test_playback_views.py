@@ -1,0 +1,130 @@
+"""Robots set apart, where to look from, what stands around: the page in a real browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playback_browser import UPRIGHT, WALK, Window, draw_frames, file_url
+from playback_browser import browser as browser
+from playback_browser import empty_page as empty_page
+from playback_browser import small_robot as small_robot
+from playback_browser import window as window
+from playback_robot import drive, hand_built_robot
+
+from nmm.playback import Motion
+from nmm.playback.extent import corners, robot_boxes
+from nmm.playback.rolling import wheel_angles
+from nmm.robots.robot import Robot
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory: pytest.TempPathFactory) -> Robot:
+    return hand_built_robot(tmp_path_factory.mktemp("robot"))
+
+
+def test_robots_are_set_apart_with_their_paths(robot: Robot, window: Window, tmp_path: Path) -> None:
+    """By a slider or the address; what is shared goes along, and nothing else of the motion changes."""
+    first = drive(robot, label="RG")
+    goal, path = np.array([1.0, 2.0, 0.5]), np.column_stack([first.q[:, :2], np.ones(len(first.q))])
+    motions = [
+        Motion(robot, first.t, first.q, first.u, frame="ee", label=name, target=goal, desired=path)
+        for name in ("RG", "PG", "EJ")
+    ]
+    page = window.open(file_url(motions, tmp_path))
+    places = "() => nmm.motions.map(({ path }) => nmm.node(path).position.toArray())"
+    assert np.all(np.array(page.evaluate(places)) == 0.0)
+    before = page.evaluate(WALK)
+    page.evaluate("nmm.apart.set(1)")
+    draw_frames(page)
+    moved = np.array(page.evaluate(places))
+    np.testing.assert_allclose(moved[2], 2.0 * moved[1], atol=1e-12)
+    assert np.count_nonzero(moved[1]) == 1
+    boxes = corners(robot_boxes(robot, first.q, wheel_angles(first))).reshape(-1, 3)
+    way = int(np.argmax(np.abs(moved[1])))
+    assert abs(moved[1, way]) >= np.ptp(boxes[:, way])  # beside one another, not into one another
+    after = page.evaluate(WALK)
+    for i in range(3):
+        for path in (p for p in before if p.startswith(f"/nmm/motion {i}/robot")):
+            old, new = (np.array(tree[path]).reshape(4, 4).T for tree in (before, after))
+            way_gone = (UPRIGHT.T @ (new - old))[:3, 3]
+            np.testing.assert_allclose(way_gone, moved[i], atol=1e-9)
+    shown = page.evaluate(
+        """() => [1, 2].map((i) => nmm.node(`/nmm/apart ${i}`))
+          .map((node) => [node.children.length, node.position.toArray()])"""
+    )
+    assert [count for count, _ in shown] == [2, 2]  # the desired path and the target
+    np.testing.assert_allclose([place for _, place in shown], moved[1:], atol=1e-12)
+    page.evaluate("nmm.address.write()")
+    assert "apart=1" in page.url
+    page.get_by_label("Apart").fill("0")
+    assert np.all(np.array(page.evaluate(places)) == 0.0)
+    assert not page.evaluate("nmm.node('/nmm/apart 1').visible")
+
+
+def test_one_robot_is_not_set_apart(small_robot: Robot, window: Window, tmp_path: Path) -> None:
+    page = window.open(file_url([drive(small_robot)], tmp_path) + "#apart=1")
+    assert not page.get_by_label("Apart").is_visible()
+    assert page.evaluate("nmm.apart.share") == 0
+
+
+def test_grid_and_axes_are_hidden_by_button_key_and_address(
+    small_robot: Robot, window: Window, tmp_path: Path
+) -> None:
+    url = file_url([drive(small_robot)], tmp_path)
+    page = window.open(url)
+    shown = "() => [...new Set(nmm.scenery.measures.map((one) => one.visible))]"
+    assert page.evaluate(shown) == [True]
+    page.locator("#grid").click()
+    assert page.evaluate(shown) == [False]
+    page.keyboard.press("x")
+    assert page.evaluate(shown) == [True]
+    page.goto(url + "#grid=off")
+    page.reload()
+    page.wait_for_function("!document.body.classList.contains('loading')")
+    assert page.evaluate(shown) == [False]
+    assert page.locator("#grid").get_attribute("aria-pressed") == "false"
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.7, 2.5])
+def test_from_the_wall_one_looks_along_the_normal_of_its_path(
+    robot: Robot, window: Window, tmp_path: Path, angle: float
+) -> None:
+    """The wall is behind the path as one sees it from the robot."""
+    motion = drive(robot)
+    turn = np.linspace(0.0, 2.0 * np.pi, 60)
+    along, normal = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+    middle = motion.q[:, :2].mean(axis=0) + 5.0 * normal
+    circle = np.column_stack([middle + np.cos(turn)[:, None] * along, 1.0 + np.sin(turn)])
+    page = window.open(
+        file_url([Motion(robot, motion.t, motion.q, motion.u, label="wall", desired=circle)], tmp_path)
+        + "#view=wall"
+    )
+    assert page.locator("#from").input_value() == "wall"
+    gaze = np.array(
+        page.evaluate("viewer.camera.getWorldDirection(new MeshCat.THREE.Vector3()).toArray()")
+    ) @ np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+    assert gaze[:2] @ normal / np.linalg.norm(gaze[:2]) > 0.999
+
+
+def test_names_and_ghosts_texts_are_smaller_than_the_robot(
+    robot: Robot, window: Window, tmp_path: Path
+) -> None:
+    page = window.open(file_url([drive(robot, label=name) for name in ("RG", "PG")], tmp_path, ghosts=3))
+    for size in ((420, 800), (1280, 800)):
+        page.set_viewport_size({"width": size[0], "height": size[1]})
+        draw_frames(page)
+        heights = page.evaluate(
+            """() => {
+              const found = [];
+              viewer.scene.traverse((part) => part.isSprite && found.push(part.scale.y));
+              const unit = document.getElementById("view").clientHeight / (2 * Math.tan(Math.PI / 10));
+              return found.map((high) => high * unit);
+            }"""
+        )
+        assert len(heights) == 3 + 2 + 6  # axes, names, ghosts
+        np.testing.assert_array_less(heights, 22.01)
+        np.testing.assert_array_less(14.0, heights)
