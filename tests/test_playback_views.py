@@ -54,7 +54,7 @@ def test_robots_are_set_apart_with_their_paths(robot: Robot, window: Window, tmp
             np.testing.assert_allclose(way_gone, moved[i], atol=1e-9)
     shown = page.evaluate(
         """() => [1, 2].map((i) => nmm.node(`/nmm/apart ${i}`))
-          .map((node) => [node.children.length, node.position.toArray()])"""
+          .map((node) => [node.children[0].children.length, node.position.toArray()])"""
     )
     assert [count for count, _ in shown] == [2, 2]  # the desired path and the target
     np.testing.assert_allclose([place for _, place in shown], moved[1:], atol=1e-12)

@@ -266,9 +266,9 @@ def _wall(motions: Sequence[Motion]) -> list[float] | None:
     """The normal (2,) of the upright plane that the paths lie nearest to, towards the robots; None without
     one."""
     paths = [line for motion in motions for line in (motion.desired, motion.driven) if line is not None]
-    if not paths:
+    points = np.vstack(paths)[:, :2] if paths else np.zeros((0, 2))
+    if len(points) < 3:
         return None
-    points = np.vstack(paths)[:, :2]
     middle = points.mean(axis=0)
     spread, axes = np.linalg.eigh(np.cov(points.T))
     if spread[1] < 1e-12:
