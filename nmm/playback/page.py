@@ -42,11 +42,13 @@ POLICY = (
 )
 
 
-def file_page(commands: Iterable[Command], title: str) -> str:
-    """A page that holds its commands and needs nothing else."""
+def file_page(
+    commands: Iterable[Command], title: str, *, scripts: Sequence[str] = (), styles: Sequence[str] = ()
+) -> str:
+    """A page that holds its commands and needs nothing else; scripts and styles as of `socket_page`."""
     lines = "\n".join(encode(command) for command in commands)
     block = f'<script type="application/json" id="commands">\n{lines}\n</script>\n'
-    return _page(title, source="page", sources="'none'", before_scripts=block)
+    return _page(title, source="page", sources="'none'", before_scripts=block, scripts=scripts, styles=styles)
 
 
 def socket_page(

@@ -13,6 +13,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array
+from nmm.doors import door
 from nmm.errors import InputError, unknown
 from nmm.platforms.base import Platform
 from nmm.robots.coordinates import Coordinates
@@ -156,6 +157,11 @@ class Robot(Coordinates):
             if frame.parentJoint > 0 and self.model.joints[frame.parentJoint].idx_q >= self.platform.n_p
         ]
         return max((end for end in ends if np.isfinite(end)), default=0.0) or 1.0
+
+    def _repr_html_(self) -> str:
+        """In a notebook: the page that shows it, with a slider for each coordinate."""
+        page: str = door("nmm.playback.inline:of_robot")(self)
+        return page
 
     def S(self, q: ArrayLike) -> Array:
         """S(q), shape (n, n_u): q_dot = S(q) u (paper, eqs. 2 and 3).

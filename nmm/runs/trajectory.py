@@ -233,6 +233,11 @@ class Trajectory:
         """Play the motion in a browser with MeshCat; returns when the user ends it (Ctrl-C)."""
         door("nmm.playback:play")([self], port=port, open_browser=open_browser, ellipsoids=ellipsoids)
 
+    def _repr_html_(self) -> str | None:
+        """In a notebook: the page that plays it."""
+        page: str | None = door("nmm.playback.inline:of_run")(self)
+        return page
+
 
 def _stays(path: Array) -> bool:
     return float(np.ptp(path, axis=0).max()) <= 1e-9
