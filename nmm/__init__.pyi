@@ -3,6 +3,7 @@ from . import driving as driving
 from . import figures as figures
 from . import folders as folders
 from . import playback as playback
+from . import rendering as rendering
 from .collisions import Box as Box
 from .collisions import Capsule as Capsule
 from .collisions import Cylinder as Cylinder

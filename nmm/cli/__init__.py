@@ -10,6 +10,7 @@
     checking        check
     viewing         view
     driving         drive
+    rendering       render
     listings        scenarios, robots
     singularity_*, symbolic_*, searching   what `singularities` prints
     map_files       map

@@ -181,6 +181,47 @@ def play(
     play_folder(folder, **browser.keywords(), ellipsoids=ellipsoids.wanted())
 
 
+@app.command()
+@command
+def render(
+    folder: Annotated[
+        Path, typer.Argument(metavar="RUN_DIR", help="A folder of `nmm run` or `nmm compare`.")
+    ],
+    video: Annotated[Path, typer.Option(metavar="FILE", help="Ends in .mp4, .webm or .gif.")],
+    *,
+    size: Annotated[str, typer.Option(metavar="WxH", help="Of a picture, px.")] = "1280x720",
+    view: Annotated[str, typer.Option(metavar="FROM", help="iso, top, front or wall.")] = "iso",
+    fps: Annotated[float, typer.Option(metavar="N", help="Pictures a second.")] = 30.0,
+    speed: Annotated[float, typer.Option(metavar="X", help="2 shows the motion twice as fast.")] = 1.0,
+    start: Annotated[
+        float | None, typer.Option("--from", metavar="S", help="First instant, s.", show_default="the first")
+    ] = None,
+    end: Annotated[
+        float | None, typer.Option("--to", metavar="S", help="Last instant, s.", show_default="the last")
+    ] = None,
+    follow: Annotated[bool, typer.Option("--follow", help="The camera goes with the robots.")] = False,
+    plots: Annotated[bool, typer.Option("--plots", help="The curves are beside the robot.")] = False,
+    apart: Annotated[
+        float, typer.Option(metavar="SHARE", help="Compared robots over one another (0) or side by side (1).")
+    ] = 0.0,
+    ellipsoids: Ellipsoids,
+) -> None:
+    """Make a video of a run.
+
+    Picture by picture through Chromium without a window, and ffmpeg (pip install 'nmm[video]').
+
+    \b
+    nmm render runs/unicycle_2r_position-rg --video motion.mp4
+    nmm render runs/unicycle_2r_position-compare --video apart.gif --size 640x400 --fps 12 --apart 1
+    """
+    from nmm.cli.rendering import render_folder
+
+    render_folder(
+        folder, video, size=size, view=view, fps=fps, speed=speed, start=start, end=end, follow=follow,
+        plots=plots, apart=apart, ellipsoids=ellipsoids.wanted(),
+    )  # fmt: skip
+
+
 for _name, _command in (
     ("info", info),
     ("check", check),

@@ -128,13 +128,19 @@ def write_the_paper(folder: Path) -> int:
 def play_folder(folder: Path, port: int | None, *, open_browser: bool, ellipsoids: Wanted = False) -> None:
     """Play a run, or the runs of a comparison in one scene."""
     from nmm.playback import play
+
+    play(runs_in(folder), port=port, open_browser=open_browser, ellipsoids=ellipsoids)
+
+
+def runs_in(folder: Path) -> list[Trajectory]:
+    """The run of a folder, or those of a comparison, that have samples; `InputError` for none."""
     from nmm.runs.trajectory import Trajectory
 
     folders = comparison.runs_of(folder) if comparison.is_comparison(folder) else [folder]
     runs = [trajectory for trajectory in (Trajectory.load(path) for path in folders) if len(trajectory)]
     if not runs:
         raise InputError(f"{folder}: expected a run with at least one sample")
-    play(runs, port=port, open_browser=open_browser, ellipsoids=ellipsoids)
+    return runs
 
 
 def _load(name: str, resolver: str | None, settings: Mapping[str, object], limits: bool | None) -> Scenario:

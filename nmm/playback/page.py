@@ -29,6 +29,7 @@ SCRIPTS = (
     "plots.js",
     "values.js",
     "player.js",
+    "film.js",
     "keys.js",
     "address.js",
     "start.js",

@@ -22,6 +22,7 @@
     p: actions.paths,
     x: actions.grid,
     r: actions.reset,
+    s: () => document.getElementById("picture").click(),
     v: () => nmm.camera.next(),
     "+": () => plots.closer(0.5),
     "-": () => plots.closer(2),

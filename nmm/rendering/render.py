@@ -1,0 +1,129 @@
+"""A video of runs: instants of their playback page, one after the other."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from nmm.arrays import counted, positive
+from nmm.errors import InputError, expect_known
+from nmm.playback.html import write_html
+from nmm.playback.scene import Shown
+from nmm.progress import Progress
+from nmm.rendering.chromium import HeadlessPage, find_browser
+from nmm.rendering.encoder import encode, expect_video, find_ffmpeg
+from nmm.runs.ellipsoid_options import Wanted
+
+VIEWS = ("iso", "top", "front", "wall")
+#: Sides of a picture, px.
+LEAST, MOST = 64, 4096
+#: Pictures of a video at most: an hour at 30 a second.
+MOST_PICTURES = 108_000
+
+
+def render(
+    motions: Sequence[Shown],
+    file: str | Path,
+    *,
+    size: tuple[int, int] = (1280, 720),
+    view: str = "iso",
+    fps: float = 30.0,
+    speed: float = 1.0,
+    follow: bool = False,
+    plots: bool = False,
+    apart: float = 0.0,
+    start: float | None = None,
+    end: float | None = None,
+    title: str | None = None,
+    ellipsoids: Wanted = False,
+    progress: Progress | None = None,
+) -> Path:
+    """Write a video of runs or motions: the page of `write_html`, picture by picture, without ghosts.
+
+    Parameters
+    ----------
+    motions : at least one run (`Trajectory`) or `Motion`
+    file : ends in .mp4, .webm or .gif; it appears whole or not at all, and replaces an older one
+    size : width and height, px, even numbers
+    view : iso, top, front, or wall
+    fps : pictures a second
+    speed : 2 shows the motion twice as fast
+    follow : whether the camera goes with the robots
+    plots : whether the curves are beside the robot
+    apart : 0 for robots over one another, 1 for side by side
+    start, end : s; the first and the last instant when not given
+    title : heading; the first robot's name when not given
+    ellipsoids : whether manipulability ellipsoids are drawn, or how (`EllipsoidOptions`)
+    progress : called with the fraction done
+
+    Raises
+    ------
+    InputError : no motion, another suffix, a size, view or time that cannot be
+    RunError : no Chromium, no ffmpeg (`pip install 'nmm[video]'`), or one that fails
+    """
+    width, height = _checked_size(size)
+    fps, speed = positive(fps, "fps"), positive(speed, "speed")
+    expect_known("view", view, VIEWS, "render")
+    if not 0.0 <= apart <= 1.0:
+        raise InputError(f"apart: expected 0 to 1, got {apart:g}")
+    target = expect_video(Path(file))
+    if not motions:
+        raise InputError("motions: expected at least one motion, got none")
+    times = _times(motions, start, end, fps, speed)
+    find_browser(), find_ffmpeg()  # before anything is drawn
+    with tempfile.TemporaryDirectory(prefix="nmm-video-", ignore_cleanup_errors=True) as folder:
+        page = write_html(motions, Path(folder) / "page.html", title=title, ghosts=0, ellipsoids=ellipsoids)
+        with HeadlessPage(page, (width, height)) as browser:
+            browser.wait_for("window.nmm && nmm.stage && !document.body.classList.contains('loading')")
+            browser.evaluate(
+                f"nmm.film({{view: '{view}', follow: {_js(follow)}, plots: {_js(plots)}, apart: {apart}}})"
+            )
+            encode(_pictures(browser, times, progress), target, fps)
+    return target
+
+
+def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
+    if len(size) != 2:
+        raise InputError(f"size: expected width and height, got {len(size)} numbers")
+    width, height = (counted(side, "size") for side in size)
+    for side in (width, height):
+        if side % 2 or not LEAST <= side <= MOST:
+            raise InputError(
+                f"size: expected even numbers from {LEAST} to {MOST} px, as in 1280x720, got {width}x{height}"
+            )
+    return width, height
+
+
+def _times(
+    motions: Sequence[Shown], start: float | None, end: float | None, fps: float, speed: float
+) -> list[float]:
+    """The instants of the pictures, s."""
+    first, last = min(float(one.t[0]) for one in motions), max(float(one.t[-1]) for one in motions)
+    begin, stop = first if start is None else start, last if end is None else end
+    if not first <= begin <= stop <= last:
+        raise InputError(
+            f"start, end: expected instants of the run, from {first:g} to {last:g} s, one after the other, "
+            f"got {begin:g} and {stop:g}"
+        )
+    count = math.floor((stop - begin) * fps / speed + 1e-9) + 1
+    if count > MOST_PICTURES:
+        raise InputError(
+            f"fps: {count} pictures; expected at most {MOST_PICTURES}: fewer a second, or a part of the run"
+        )
+    return [begin + k * speed / fps for k in range(count)]
+
+
+def _pictures(page: HeadlessPage, times: Sequence[float], progress: Progress | None) -> Iterator[bytes]:
+    for k, t in enumerate(times):
+        if progress is not None:
+            progress(k / len(times))
+        page.evaluate(f"nmm.filmed({t!r})")
+        yield page.picture()
+    if progress is not None:
+        progress(1.0)
+
+
+def _js(flag: bool) -> str:
+    return "true" if flag else "false"
