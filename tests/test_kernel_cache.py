@@ -175,6 +175,7 @@ def total(values):
     return result
 
 if __name__ == "__main__":
+    print("ready", flush=True)
     sys.stdin.readline()  # all begin at once
     assert total(np.arange(4.0)) == 24.0 and total(np.arange(4)) == 24.0 and quadruple(1) == 4.0
     misses = sum(sum(f.stats.cache_misses.values()) for f in (total, quadruple, double))
@@ -190,9 +191,12 @@ def test_processes_at_once_take_nothing_from_each_other(tmp_path: Path) -> None:
     environment = os.environ | {"XDG_CACHE_HOME": str(tmp_path / "cache")}
 
     def start() -> subprocess.Popen[str]:
-        return subprocess.Popen(
+        process = subprocess.Popen(
             command, env=environment, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
         )
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+        return process
 
     together = [start(), start()]
     for process in together:
@@ -279,11 +283,11 @@ def test_what_others_call_is_a_part_of_them(tmp_path: Path) -> None:
 
 def test_the_first_compilation_of_all_is_told(folder: Path, caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO, "nmm")
-    cache._tell_of_the_first.cache_clear()
+    cache.tell_of_the_first.cache_clear()
     found_on_disk()
     (record,) = caplog.records
     assert record.getMessage().startswith("compiling for this machine, once")
-    cache._tell_of_the_first.cache_clear()
+    cache.tell_of_the_first.cache_clear()
     assert found_on_disk()
     folder.rename(folder.with_name("kept"))
     folder.mkdir()

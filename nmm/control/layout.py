@@ -20,6 +20,7 @@ from nmm.functions.function import Function, row_scales
 from nmm.functions.objectives.base import Objective
 from nmm.functions.program import BESIDE, Program
 from nmm.functions.tasks.task import Stack
+from nmm.kernels.ahead import compile_ahead
 from nmm.kernels.memory import views
 from nmm.resolvers.answer import unanswered
 from nmm.resolvers.base import Resolver
@@ -65,6 +66,8 @@ def lay_out(
     ------
     InputError : what the robot lacks; rows that the resolver has no room for
     """
+    limited = limits is not None or collisions is not None
+    compile_ahead(*([write_limits] if limited else []), compiled_step, resolver.kernel)
     rows, added_rows = task.rows(robot), added_task.rows(robot)
     weighted = () if objective is None else objective.terms_on(robot)
     functions, added = task_functions(task), task_functions(added_task)
@@ -99,7 +102,6 @@ def lay_out(
         limit_levels=[*(task.place(priority) for priority in kept.priorities), *(0 for _ in near.d)],
     )
     dimensions = problem.dimensions
-    limited = limits is not None or collisions is not None
     setup, state = resolver.setup(dimensions), resolver.start(dimensions)
     program.lay_out(
         ControlStep(

@@ -166,6 +166,8 @@ class Program:
             self._stages += [(stage, self._rows) for stage in stages]
             self._frames += [frame for stage in stages for frame in stage.frames]
             self._rows += max((stage.rows for stage in stages), default=0)
+            for stage in stages:
+                _ = stage.kernel.address  # now, while others may be compiling the step (`kernels/ahead`)
         self._frames = list(dict.fromkeys(self._frames))
 
     def lay_out(self, beside: tuple[Any, ...] | None = None) -> None:

@@ -25,6 +25,9 @@ from nmm import kept
 #: How many folders of compiled kernels are kept.
 KEPT_CACHES = 8
 
+#: Files that other processes are about to write, each with what waits for it (`nmm.kernels.ahead`).
+under_way: dict[Path, Callable[[], None]] = {}
+
 KERNELS = Path(__file__).resolve().parent
 PACKAGE = KERNELS.parent
 
@@ -87,8 +90,11 @@ class KernelCache(caching.FunctionCache):
     def _load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
         key = self._key(sig, target_context.codegen())
         data = None if key is None else kept.read(self._path(key))
+        if data is None and key is not None and (wait := under_way.pop(self._path(key), None)) is not None:
+            wait()
+            data = kept.read(self._path(key))
         if data is None:
-            _tell_of_the_first()
+            tell_of_the_first()
             return None
         try:
             found, parts = pickle.loads(data)
@@ -117,6 +123,11 @@ class KernelCache(caching.FunctionCache):
                 return None
         return text, sys.implementation.cache_tag, *self._index_key(sig, codegen)
 
+    def path_of(self, arguments: tuple[Any, ...], codegen: Any) -> Path | None:
+        """The file of the compiled form for arguments of these types; None where no file can hold it."""
+        key = self._key(arguments, codegen)
+        return None if key is None else self._path(key)
+
     def _path(self, key: object) -> Path:
         digest = hashlib.sha256(repr(key).encode()).hexdigest()[:24]
         return Path(self.cache_path) / f"{self._stem}.{digest}.nbc"
@@ -129,9 +140,10 @@ class KernelCache(caching.FunctionCache):
 
 
 @cache
-def _tell_of_the_first() -> None:
+def tell_of_the_first() -> None:
+    """Say why this takes longer than it will."""
     if not cache_folder().exists():
-        logging.getLogger("nmm").info("compiling for this machine, once: this takes about half a minute")
+        logging.getLogger("nmm").info("compiling for this machine, once: this takes about ten seconds")
 
 
 @cache  # it has not changed when the next function is compiled

@@ -68,7 +68,7 @@ class Kernel:
 
     def __init__(self, plain: Plain, signature: Any) -> None:
         self.plain = plain
-        self._signature = signature
+        self.signature = signature
 
     def __call__(self, *arguments: Any) -> Any:
         return self.compiled(*arguments)
@@ -79,17 +79,17 @@ class Kernel:
         made = compiled(self.plain)
         if isinstance(made, Dispatcher):
             try:
-                made.compile(self._signature.args)
+                made.compile(self.signature.args)
             except TypingError:
                 made = allocating(self.plain)
-                made.compile(self._signature.args)
+                made.compile(self.signature.args)
         return made
 
     @cached_property
     def address(self) -> int:
         """Where the machine code of the compiled form begins: what compiled programs call it by."""
         if isinstance(self.compiled, Dispatcher):
-            result = self.compiled.overloads[self._signature.args]
+            result = self.compiled.overloads[self.signature.args]
             address = int(result.library.get_pointer_to_function(result.fndesc.llvm_func_name))
         else:  # NUMBA_DISABLE_JIT=1: run as it stands
             address = id(self.plain)

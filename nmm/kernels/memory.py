@@ -26,8 +26,9 @@ The contract:
    `header_length(Problem)`, the same for all shapes: what is added first has place 0, the next one the length
    of the first, and compiled code may hold such places as constants. A list of records is an IntegerVector of
    their places.
-2. `views` costs a few loads. What it returns in compiled code are pointers and extents: no bounds are checked
-   and no references counted. Whoever calls the compiled code holds the blocks while it runs.
+2. `views` costs nothing in compiled code: a record is there the blocks and its place (`LaidOutRecord`), and a
+   field read of it is a pointer and extents, without bounds checked or references counted. Whoever calls the
+   compiled code holds the blocks while it runs, and changes no header.
 3. The numbers of a record lie one behind the other in the order of its fields, records in the order in which
    they were added. Nothing but this file may rely on it.
 4. Records are also what kernels take as arguments (`record_type`), where a field may be a `float`. Fields are
@@ -42,6 +43,11 @@ from typing import Annotated, Any, NamedTuple, TypeAlias, TypeVar, get_args, get
 
 import numpy as np
 from numba import types
+from numba.core import cgutils
+from numba.core.datamodel import models
+from numba.core.typeconv import Conversion
+from numba.core.typing.templates import AttributeTemplate, infer_getattr
+from numba.extending import lower_cast, lower_getattr_generic, register_model
 
 from nmm.arrays import Array, Integers
 from nmm.kernels.compiled import array_at, generated_in_callers, view
@@ -133,12 +139,14 @@ def record_type(record: type) -> Any:
     parts = []
     for field in _fields(record):
         if isinstance(field, Kind):
-            parts.append(
-                types.Array(types.int64 if field.dtype is np.int64 else types.float64, field.ndim, "C")
-            )
+            parts.append(_array_type(field))
         else:
             parts.append({int: types.int64, float: types.float64}.get(field) or record_type(field))
     return types.BaseTuple.from_types(parts, record)
+
+
+def _array_type(field: Kind) -> Any:
+    return types.Array(types.int64 if field.dtype is np.int64 else types.float64, field.ndim, "C")
 
 
 @cache
@@ -174,34 +182,95 @@ def _flat(record: type, values: tuple[Any, ...]) -> Iterator[tuple[Any, Any]]:
         yield field, value
 
 
+class LaidOutRecord(types.Type):
+    """A record in memory, to compiled code: both blocks and its place. What is read of it is looked up there.
+
+    Handed on as a tuple of all its arrays it would be hundreds of numbers at each call, which numba writes
+    down one by one and LLVM removes again.
+    """
+
+    def __init__(self, record: type) -> None:
+        self.record = record
+        super().__init__(f"LaidOutRecord({record.__module__}.{record.__qualname__})")
+
+    def can_convert_to(self, _: Any, other: Any) -> Any:
+        return Conversion.safe if other == record_type(self.record) else None
+
+
+@register_model(LaidOutRecord)
+class _LaidOutModel(models.StructModel):
+    def __init__(self, manager: Any, kind: Any) -> None:
+        members = [
+            ("integers", types.CPointer(types.int64)),
+            ("floats", types.CPointer(types.float64)),
+            ("place", types.int64),
+        ]
+        super().__init__(manager, kind, members)
+
+
+@infer_getattr
+class _FieldTypes(AttributeTemplate):
+    key = LaidOutRecord
+
+    def generic_resolve(self, kind: Any, name: str) -> Any:
+        """The type of a field; None for what is none."""
+        if name not in kind.record._fields:
+            return None
+        field = _fields(kind.record)[kind.record._fields.index(name)]
+        if isinstance(field, Kind):
+            return _array_type(field)
+        return types.int64 if field is int else LaidOutRecord(field)
+
+
+@lower_getattr_generic(LaidOutRecord)
+def _generate_field(context: Any, builder: Any, kind: Any, value: Any, name: str) -> Any:
+    """Instructions that read a field: no others than a reader needs."""
+    blocks = cgutils.create_struct_proxy(kind)(context, builder, value)
+    fields, index = _fields(kind.record), kind.record._fields.index(name)
+    field, before = fields[index], sum(_length(one) for one in fields[:index])
+    place = builder.add(blocks.place, context.get_constant(types.int64, before))
+
+    def read(k: int) -> Any:
+        at = builder.add(place, context.get_constant(types.int64, k))
+        loaded = builder.load(builder.gep(blocks.integers, [at]))
+        # Headers stand while compiled code runs: LLVM need not read them again after each number written.
+        loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
+        return loaded
+
+    if isinstance(field, Kind):
+        block = blocks.integers if field.dtype is np.int64 else blocks.floats
+        extents = [read(k + 1) for k in range(field.ndim)]
+        return array_at(context, builder, _array_type(field), builder.gep(block, [read(0)]), extents)
+    if field is int:
+        return read(0)
+    part = cgutils.create_struct_proxy(LaidOutRecord(field))(context, builder)
+    part.integers, part.floats, part.place = blocks.integers, blocks.floats, place
+    return part._getvalue()
+
+
+@lower_cast(LaidOutRecord, types.BaseTuple)
+def _generate_tuple(context: Any, builder: Any, kind: Any, whole: Any, value: Any) -> Any:
+    """The record as kernels that are called by their addresses take it."""
+    parts = []
+    for name, part in zip(kind.record._fields, whole.types, strict=True):
+        read = _generate_field(context, builder, kind, value, name)
+        inner = _FieldTypes(None).generic_resolve(kind, name)
+        parts.append(_generate_tuple(context, builder, inner, part, read) if inner != part else read)
+    return context.make_tuple(builder, whole, parts)
+
+
 def _type_of_views(record: Any, integers: Any, floats: Any, place: Any) -> Any:
-    return record_type(record.instance_class)(record, integers, floats, types.int64)
+    return LaidOutRecord(record.instance_class)(record, integers, floats, types.int64)
 
 
 def _generate_views(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-    blocks: dict[type, Any] = {
-        dtype: context.make_array(kind)(context, builder, value).data
-        for dtype, kind, value in zip((np.int64, np.float64), signature.args[1:3], values[1:3], strict=True)
-    }
-    position = values[3]
-
-    def read() -> Any:
-        nonlocal position
-        value = builder.load(builder.gep(blocks[np.int64], [position]))
-        position = builder.add(position, context.get_constant(types.int64, 1))
-        return value
-
-    def build(kind: type, built: Any) -> Any:
-        parts = []
-        for field, part in zip(_fields(kind), built.types, strict=True):
-            if isinstance(field, Kind):
-                data = builder.gep(blocks[field.dtype], [read()])
-                parts.append(array_at(context, builder, part, data, [read() for _ in range(field.ndim)]))
-            else:
-                parts.append(read() if field is int else build(field, part))
-        return context.make_tuple(builder, built, parts)
-
-    return build(signature.args[0].instance_class, signature.return_type)
+    made = cgutils.create_struct_proxy(signature.return_type)(context, builder)
+    made.integers, made.floats = (
+        context.make_array(kind)(context, builder, value).data
+        for kind, value in zip(signature.args[1:3], values[1:3], strict=True)
+    )
+    made.place = values[3]
+    return made._getvalue()
 
 
 generated_in_callers(

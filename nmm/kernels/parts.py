@@ -16,6 +16,13 @@ from numba.core.compiler_machinery import register_pass
 from numba.core.environment import lookup_environment
 from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import NativeLowering
+from numba.core.untyped_passes import (
+    FindLiterallyCalls,
+    InlineInlinables,
+    LiteralPropagationSubPipelinePass,
+    LiteralUnroll,
+    WithLifting,
+)
 
 _NO_DOORS = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
@@ -81,13 +88,40 @@ class _WholeLowering(NativeLowering):
         return True
 
 
+#: What kernels are not written in (`with`, `literal_unroll`, functions inlined by their source); each pass
+#: goes over the whole function, and numba examines it anew after each.
+_NOT_NEEDED = {
+    WithLifting,
+    InlineInlinables,
+    FindLiterallyCalls,
+    LiteralUnroll,
+    LiteralPropagationSubPipelinePass,
+}
+
+
+class _Flags(compiler.Flags):
+    """numba's flags, compared by what was set: it compares all of them, one by one, at each operator."""
+
+    _SAME = hash(compiler.Flags())  # as numba's own, which do not hash what is set
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, compiler.Flags):
+            return NotImplemented
+        return bool(self._values == other._values or self.values() == other.values())
+
+    def __hash__(self) -> int:
+        return self._SAME
+
+
 class _Compiler(compiler.CompilerBase):
     lowering: type[NativeLowering]
 
     def define_pipelines(self) -> list[Any]:
         passes = compiler.DefaultPassBuilder.define_nopython_pipeline(self.state)
         passes.passes = [
-            (self.lowering if which is NativeLowering else which, told) for which, told in passes.passes
+            (self.lowering if which is NativeLowering else which, told)
+            for which, told in passes.passes
+            if which not in _NOT_NEEDED
         ]
         return [passes]
 
@@ -108,6 +142,8 @@ class KernelDispatcher(CPUDispatcher):
         self._part = CPUDispatcher(
             function, targetoptions={**options, **_NO_DOORS}, pipeline_class=_PartCompiler
         )
+        for dispatcher in (self, self._part):
+            dispatcher._compiler._customize_flags = _Flags
 
     @property
     def _numba_type_(self) -> types.Dispatcher:

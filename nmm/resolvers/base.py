@@ -10,8 +10,8 @@ from numba import types
 
 from nmm.arrays import Array, Integers
 from nmm.errors import InputError, expect_known
-from nmm.kernels.compiled import Kernel, caller
-from nmm.kernels.memory import record_type
+from nmm.kernels.compiled import Kernel, caller, compiled
+from nmm.kernels.memory import LaidOutRecord, Memory, header_length, views
 from nmm.resolvers.answer import Answer, AnswerArrays, unanswered
 from nmm.resolvers.problem import Dimensions, Problem
 from nmm.resolvers.problem_arrays import ProblemArrays
@@ -21,14 +21,27 @@ from nmm.resolvers.within import keep_limits
 #: A resolver's kernel: (problem, numbers, options, state, answer), of `ProblemArrays`, the numbers and
 #: options of its `Setup`, the integers of its `State`, and the `AnswerArrays` that it writes.
 RESOLVER = types.void(
-    record_type(ProblemArrays),
+    LaidOutRecord(ProblemArrays),
     types.float64[::1],
     types.int64[::1],
     types.int64[::1],
-    record_type(AnswerArrays),
+    LaidOutRecord(AnswerArrays),
 )
 
 call_resolver = caller(RESOLVER)
+
+#: Where the answer is in memory, behind the problem.
+ANSWER = header_length(ProblemArrays)
+
+
+@compiled
+def resolve_one(
+    address: int, integers: Integers, floats: Array, numbers: Array, options: Integers, state: Integers
+) -> None:
+    """Call the kernel that begins at an address, for a problem and its answer in memory."""
+    problem = views(ProblemArrays, integers, floats, 0)
+    answer = views(AnswerArrays, integers, floats, ANSWER)
+    call_resolver(address, problem, numbers, options, state, answer)
 
 
 #: How the step size of the objective's gradient is chosen: as it is given, or at most that, by Armijo's rule.
@@ -98,11 +111,14 @@ class Resolver(ABC):
 
     def resolve(self, problem: Problem, state: State | None = None) -> Answer:
         """The answer to one problem; `state` (of `start`) is what it remembers, and is changed."""
-        dimensions, arrays = problem.dimensions, problem.arrays
+        dimensions, memory = problem.dimensions, Memory()
+        memory.add(problem.arrays)
+        memory.add(unanswered(dimensions.m, len(dimensions.levels)))
+        blocks = memory.blocks()
         setup = self.setup(dimensions)
         state = self.start(dimensions) if state is None else state
-        answer = unanswered(dimensions.m, len(arrays.ends))
-        self.kernel(arrays, setup.numbers, setup.options, state.memory, answer)
+        resolve_one(self.kernel.address, *blocks, setup.numbers, setup.options, state.memory)
+        arrays, answer = views(ProblemArrays, *blocks, 0), views(AnswerArrays, *blocks, ANSWER)
         self.finish(arrays, dimensions, answer)
         keep_limits(arrays, answer)
         return Answer.of(answer)

@@ -15,11 +15,12 @@ from numba import types
 
 from nmm.arrays import Array, Integers
 from nmm.control.controller import Controller
-from nmm.control.equations import ControlStep, call_step
+from nmm.control.equations import ControlStep, call_step, step
 from nmm.control.goal import Goal
 from nmm.control.integrators import Integrator
 from nmm.control.stepping import Tableau, go_on, tableau
 from nmm.functions.program import BESIDE, LaidOut
+from nmm.kernels.ahead import compile_ahead
 from nmm.kernels.compiled import (
     checked_by_caller,
     compiled,
@@ -219,6 +220,11 @@ class CompiledLoop:
         if reached == last and time.perf_counter() - began < 0.5 * A_CALL:
             self._at_once *= 2
         return reached, reached == last
+
+
+def compile_loop_ahead() -> None:
+    """Have other processes compile the loop and the step in it where the cache lacks them."""
+    compile_ahead((fly, _FLY), step)
 
 
 def compiled_loop(controller: Controller, advance: Integrator, until: Goal | None) -> CompiledLoop | None:

@@ -118,6 +118,9 @@ class Scenario:
         ------
         ScenarioError : what the robot does not have, or what does not fit together
         """
+        from nmm.runs.compiled_loop import compile_loop_ahead
+
+        compile_loop_ahead()  # most who have a controller made run it
         robot = self.robot()
         try:
             return self.parts.build(robot, self.absolute)
