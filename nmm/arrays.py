@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from numbers import Integral
 from typing import TypeVar
 
@@ -22,7 +23,7 @@ def array(value: ArrayLike, name: str) -> Array:
         result = np.array(value, dtype=np.float64, order="C")
     except (TypeError, ValueError):
         raise InputError(f"{name}: expected numbers, got {value!r}") from None
-    if not np.all(np.isfinite(result)):
+    if not np.isfinite(result).all():
         raise InputError(f"{name}: expected finite numbers, got {one_line(result)}")
     return result
 
@@ -49,6 +50,8 @@ def vector(value: ArrayLike, length: int | None, name: str) -> Array:
 
 def scalar(value: ArrayLike, name: str) -> float:
     """A finite number."""
+    if isinstance(value, float) and math.isfinite(value):
+        return float(value)
     result = array(value, name)
     if result.ndim != 0:
         raise InputError(f"{name}: expected a number, got shape {result.shape}")

@@ -20,7 +20,11 @@ def cores() -> int:
 
 
 def over_cores(
-    count: int, at_once: int, worker: Callable[[], Work], progress: Progress | None = None
+    count: int,
+    at_once: int,
+    worker: Callable[[], Work],
+    progress: Progress | None = None,
+    threads: int | None = None,
 ) -> None:
     """Do pieces of `at_once` items, the last one shorter, in as many threads as there are cores.
 
@@ -31,9 +35,10 @@ def over_cores(
     count : how many items
     worker : called once in each thread: what does the pieces there, with memory that is this thread's alone
     progress : called with the fraction done, from this thread
+    threads : how many at most, as many as there are cores when None
     """
     pieces = [(first, min(first + at_once, count)) for first in range(0, count, at_once)]
-    threads = min(cores(), len(pieces))
+    threads = min(cores() if threads is None else threads, len(pieces))
     if threads <= 1:
         work = worker()
         for first, last in pieces:

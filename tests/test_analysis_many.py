@@ -12,8 +12,8 @@ from nmm.analysis.maps.best import find_best_cells, find_better
 from nmm.analysis.maps.reach import Reach
 from nmm.analysis.maps.workspace import workspace_map
 from nmm.analysis.singular.jacobians import Jacobians
-from nmm.analysis.singular.spectra import FEW_ROWS, spectra
 from nmm.functions.tasks import CallableFunction, Pose, Position
+from nmm.kernels.spectra import FEW_ROWS, spectra
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 

@@ -11,7 +11,7 @@ from nmm.bundled import bundled_robots, bundled_scenarios
 from nmm.collisions.pairs import sampled
 from nmm.kernels.kinematics import place_frames
 from nmm.robots.configuration import kinematics_updater
-from nmm.robots.joint_table import frame_table, joint_table
+from nmm.robots.joint_table import frame_table
 from nmm.robots.robot import CENTER_OF_MASS
 
 #: One of each family: trees, closed hands, sliding joints, unaligned axes.
@@ -32,8 +32,10 @@ def agree(robot: nmm.Robot) -> None:
     names = (*robot.frames, CENTER_OF_MASS)
     k, n = len(names), robot.n
     ours, theirs = ([np.zeros((k, 3, 4)), np.zeros((k, 6, n)), np.zeros((k, 6, n, n))] for _ in range(2))
-    joints = joint_table(robot.model)
-    frames = frame_table(robot.model, [*(robot.frame_id(name) for name in robot.frames), None])
+    joints = robot.joints
+    frames = frame_table(
+        robot.model, robot.joint_axes, [*(robot.frame_id(name) for name in robot.frames), None]
+    )
     update = kinematics_updater(robot, names, *theirs)
     for q in sampled(robot, 3, seed=4):
         place_frames(joints, frames, q, *ours)

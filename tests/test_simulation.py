@@ -9,7 +9,7 @@ from numpy import pi
 import nmm
 from nmm.control.integrators import METHODS
 from nmm.robots.robot import Robot
-from nmm.runs.stability import find_instability
+from nmm.runs.stability import instabilities
 
 START = {"x": -1, "y": -1, "theta": pi}
 CIRCLE = nmm.Circle([2, 2], 3, 0.08 * pi, 5 / 4 * pi)
@@ -92,10 +92,9 @@ def test_the_stability_limit_is_the_textbooks(robot_2r: Robot, method: str, limi
     from nmm.control.integrators import integrator
 
     stability = integrator(method, robot_2r, 1e-9).stability
-    q = np.array([0, 0, 0.1, 0.1, 0.1])
-    assert find_instability(controller, 0.0, q, 0.99 * limit / alpha, stability) is None
-    found = find_instability(controller, 0.0, q, 1.5 * limit / alpha, stability)
-    assert found is not None
+    at = np.zeros(1), np.array([[0, 0, 0.1, 0.1, 0.1]])
+    assert instabilities(controller, *at, 0.99 * limit / alpha, stability) == []
+    (found,) = instabilities(controller, *at, 1.5 * limit / alpha, stability)
     assert found.rate == pytest.approx(alpha, rel=1e-6)
     assert found.limit == pytest.approx(limit / alpha, rel=2e-3)
 

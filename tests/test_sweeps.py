@@ -149,7 +149,7 @@ def test_a_rollout_that_fails_is_a_row_that_says_why(short: Path, monkeypatch: p
     assert "unknown key 'threshold'" in rows[0]["message"]
     assert rows[0]["error_rms"] is None
 
-    def broken(self: nmm.Scenario) -> None:
+    def broken(self: nmm.Scenario, **_: object) -> None:
         raise ZeroDivisionError("of ours")
 
     monkeypatch.setattr(nmm.Scenario, "run", broken)

@@ -16,7 +16,7 @@ from nmm.collisions.way import BRAKING, LOOKS, Way
 from nmm.kernels.compiled import checked_by_caller, compiled
 from nmm.kernels.memory import Memory, views
 from nmm.robots.held import inputs_of
-from nmm.robots.joint_table import as_row, joint_table, own_axes
+from nmm.robots.joint_table import as_row
 
 _FLAT, _INTEGERS, _STRIDED = types.float64[::1], types.int64[::1], types.float64[:, :]
 _BOTH = (_INTEGERS, _FLAT, _INTEGERS, _FLAT)
@@ -173,7 +173,7 @@ class Lookout:
 def _way(queries: Queries, deceleration: Array) -> Way:
     objects, robot = queries.shapes.geometryObjects, queries.robot
     scene, L = queries.scene, LOOKS + BRAKING + 1
-    turned = own_axes(robot.model)
+    turned = robot.joint_axes
     carrier = np.array([shape.parentJoint for shape in objects], dtype=np.int64)
     path = np.full(len(objects), -2)
     moving = 0
@@ -185,7 +185,7 @@ def _way(queries: Queries, deceleration: Array) -> Way:
         if j >= scene.planes:
             planes[k, 1] = scene.boxes[j, :4]
     return Way(
-        joints=joint_table(robot.model),
+        joints=robot.joints,
         inputs=inputs_of(robot),
         deceleration=deceleration,
         carrier=carrier,

@@ -28,7 +28,7 @@ from nmm.control.sample import SampleState
 from nmm.control.steering import Steered, Steering
 from nmm.control.step import Step
 from nmm.control.step_size import StepSize
-from nmm.control.stepping import Stepper, tableau
+from nmm.control.stepping import Stepper, tableau, write_errors
 from nmm.errors import InputError, RunError, SingularError, expect_known
 from nmm.functions.function import Row
 from nmm.functions.objectives.base import Objective
@@ -44,6 +44,8 @@ from nmm.robots.robot import Robot
 
 FLOAT64 = np.dtype(np.float64)
 _FAILED = float(Status.SINGULAR_J)
+#: Looks of one compiled call, which nothing interrupts.
+AT_ONCE = 5000
 
 
 class Controller:
@@ -469,6 +471,13 @@ class Controller:
         self._expect_dt()
         task = self._step.task
         error, rate = (np.full((len(times), len(self.rows)), np.nan) for _ in range(2))
+        if self.compilable:
+            at = np.array(times, dtype=np.float64), np.array(configurations, dtype=np.float64, order="C")
+            with self.sample.aside(), self.compiled() as blocks:
+                for first in range(0, len(times), AT_ONCE):
+                    some = slice(first, first + AT_ONCE)
+                    write_errors(*blocks, *(one[some] for one in (*at, error, rate)))
+            return error, rate
         self._begin()
         try:
             with self.sample.aside():

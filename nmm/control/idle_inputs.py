@@ -77,9 +77,11 @@ def _derivatives(controller: Controller, q: Array) -> Sequence[Array]:
     """
     robot, objective = controller.robot, controller.objective
     J, added_J, h = controller.derivatives
-    here = Configuration(robot, q)
-    terms = [] if objective is None else [term for _, term in objective.terms() if isinstance(term, Product)]
-    whole = [evaluate(term.function, 0.0, here).value_q @ here.S for term in terms]
+    whole = []
+    for _, term in () if objective is None else objective.terms():
+        if isinstance(term, Product):
+            here = Configuration(robot, q)
+            whole.append(evaluate(term.function, 0.0, here).value_q @ here.S)
     return J, added_J[: len(controller.added_task.rows(robot))], h, *whole
 
 
@@ -98,6 +100,8 @@ def _zero_columns(
                 if np.isfinite(size) and size > 0.0:
                     largest = np.maximum(largest, np.linalg.norm(matrix, axis=0) / size)
                     looked = True
+            if np.all(largest > ZERO):  # they stay so
+                return ()
     except Exception:  # a user's function may raise anything, where it was not made for
         return ()
     finally:

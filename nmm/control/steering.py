@@ -24,6 +24,7 @@ from nmm.functions.pursuit import Pursuit
 from nmm.functions.tasks.task import Task
 from nmm.kernels.compiled import compiled
 from nmm.kernels.memory import Cell, IntegerCell, IntegerVector, Vector
+from nmm.platforms.base import Platform
 from nmm.platforms.steering import SteeringPivot
 from nmm.resolvers.problem_arrays import ProblemArrays
 from nmm.resolvers.within import times
@@ -103,6 +104,8 @@ class Steering:
 
     def on(self, robot: Robot, task: Iterable[Task] = ()) -> Steered | None:
         """The law on a robot with tasks, whichever inputs they move; None where nothing steers a body."""
+        if type(robot.platform).steered_axle is Platform.steered_axle:  # never: spare the look at all frames
+            return None
         hands = [one.function.shown().positions for one in task]
         for hand in [*hands, first_tip(robot)]:
             body = None if hand is None else _body(robot, hand)

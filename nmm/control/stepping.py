@@ -9,10 +9,10 @@ from numba import types
 
 from nmm.arrays import Array, Integers
 from nmm.control.bounds import SAMPLE, STAGE
-from nmm.control.equations import ControlStep, call_step
+from nmm.control.equations import ControlStep, call_step, write_equation
 from nmm.control.integrators import Followed, Integrator, RungeKutta, ZeroOrderHold
-from nmm.functions.program import BESIDE, LaidOut
-from nmm.kernels.compiled import checked_by_caller, compiled, scratch
+from nmm.functions.program import BESIDE, LaidOut, run
+from nmm.kernels.compiled import checked_by_caller, compiled, compiled_without_gil, scratch, view
 from nmm.kernels.followers import place_followers
 from nmm.kernels.memory import Blocks, Matrix, Vector, record_type, views
 from nmm.resolvers.answer import SINGULAR_J, SOLVED
@@ -93,6 +93,20 @@ def go_on(
     for i in range(n):
         ahead[i] = stage[i]
     return status if status >= SINGULAR_J else SOLVED
+
+
+@compiled_without_gil
+def write_errors(
+    integers: Integers, floats: Array, times: Array, q: Array, error: Array, rate: Array
+) -> None:
+    """The task's errors and ∂g/∂t + K e (N, s) at times (N,) and q (N, n); no step is made."""
+    e = views(ControlStep, integers, floats, BESIDE)
+    b = views(LaidOut, integers, floats, 0).buffers
+    for k in range(times.shape[0]):
+        run(times[k], view(q, k * q.shape[1], (q.shape[1],)), integers, floats)
+        write_equation(e.task, b, e.arm, e.problem.J, e.problem.rate)
+        for i in range(error.shape[1]):
+            error[k, i], rate[k, i] = e.task.error[i], e.task.full[i]
 
 
 @compiled

@@ -26,7 +26,7 @@ from nmm.kernels.memory import (
 )
 from nmm.kernels.records import At, Frames, Rows, call_function
 from nmm.robots.configuration import Configuration, kinematics_updater
-from nmm.robots.joint_table import frame_table, joint_table
+from nmm.robots.joint_table import frame_table
 from nmm.robots.robot import CENTER_OF_MASS, Robot
 
 
@@ -206,7 +206,7 @@ class Program:
             bounds = row - stage.before, row + stage.rows
             memory.add(LaidOutStage(stage.kernel.address, *bounds, slots, stage.numbers))
         ids = [None if name == CENTER_OF_MASS else robot.frame_id(name) for name in self._frames]
-        memory.add(Kinematics(joint_table(robot.model), frame_table(robot.model, ids)))
+        memory.add(Kinematics(robot.joints, frame_table(robot.model, robot.joint_axes, ids)))
         self.blocks = memory.blocks()
         laid = views(LaidOut, *self.blocks, 0)
         self._kinematics, self._table = laid.kinematics, table

@@ -129,6 +129,7 @@ def views(record: type[R], integers: Integers, floats: Array, place: int) -> R:
     return record(*parts)
 
 
+@cache
 def header_length(record: type) -> int:
     """How many integers the header of such a record takes."""
     return sum(_length(field) for field in _fields(record))

@@ -6,10 +6,10 @@ import numpy as np
 
 from nmm.arrays import Array, Integers
 from nmm.kernels.compiled import clear, compiled, scratch, view
-from nmm.kernels.kinematics import Kinematics, place_frames
+from nmm.kernels.kinematics import Kinematics, compose, place_frames, place_joints
 from nmm.kernels.memory import Memory, views
 from nmm.progress import Progress
-from nmm.robots.joint_table import frame_table, joint_table
+from nmm.robots.joint_table import frame_table
 from nmm.robots.robot import CENTER_OF_MASS, Robot
 
 #: Configurations a compiled call: what nothing interrupts.
@@ -22,6 +22,15 @@ def follow(integers: Integers, floats: Array, q: Array, points: Array, jacobians
     here = views(Kinematics, integers, floats, 0)
     n = q.shape[1]
     placement, J, none = scratch((1, 3, 4)), scratch((1, 6, n)), scratch((0, 6, n, n))
+    carrier = here.frames.carrier[0]
+    if carrier >= 0 and jacobians.shape[0] == 0:
+        places, place = scratch((here.joints.parent.shape[0], 12)), scratch((1, 12))
+        for k in range(q.shape[0]):
+            place_joints(here.joints, view(q, k * n, (n,)), places)
+            compose(places, carrier, here.frames.placement, 0, place, 0)
+            for i in range(3):
+                points[k, i] = place[0, 9 + i]
+        return
     clear(J)
     for k in range(q.shape[0]):
         place_frames(here.joints, here.frames, view(q, k * n, (n,)), placement, J, none)
@@ -49,7 +58,7 @@ class FramePath:
         self.robot, self.frame = robot, frame
         ids = [None if frame == CENTER_OF_MASS else robot.frame_id(frame)]
         memory = Memory()
-        memory.add(Kinematics(joint_table(robot.model), frame_table(robot.model, ids)))
+        memory.add(Kinematics(robot.joints, frame_table(robot.model, robot.joint_axes, ids)))
         self.blocks = memory.blocks()
 
     def positions(self, q: Array, progress: Progress | None = None) -> Array:

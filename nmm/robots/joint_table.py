@@ -11,10 +11,9 @@ from nmm.arrays import Array
 from nmm.kernels.kinematics import FrameTable, Joints
 
 
-def joint_table(model: pin.Model) -> Joints:
-    """The joints of a model whose joints have one number each (`Robot.model`)."""
+def joint_table(model: pin.Model, turned: Sequence[pin.SE3]) -> Joints:
+    """The joints of a model whose joints have one number each (`Robot.model`), in their `own_axes`."""
     count = len(model.joints)
-    turned = own_axes(model)
     placements, turns, slide = np.zeros((count, 12)), np.zeros(count), np.zeros((count, 3))
     for i in range(count):
         placements[i] = as_row(turned[model.parents[i]].inverse() * model.jointPlacements[i] * turned[i])
@@ -43,9 +42,8 @@ def own_axes(model: pin.Model) -> list[pin.SE3]:
     return found
 
 
-def frame_table(model: pin.Model, frames: Sequence[int | None]) -> FrameTable:
-    """Frames of a model by their numbers, None for the centre of mass."""
-    turned = own_axes(model)
+def frame_table(model: pin.Model, turned: Sequence[pin.SE3], frames: Sequence[int | None]) -> FrameTable:
+    """Frames of a model by their numbers, None for the centre of mass; joints in their `own_axes`."""
     carrier = [-1 if k is None else model.frames[k].parentJoint for k in frames]
     places = [pin.SE3.Identity() if k is None else model.frames[k].placement for k in frames]
     chains = [[] if i < 0 else list(model.supports[i])[1:] for i in carrier]

@@ -15,9 +15,11 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array
 from nmm.doors import door
 from nmm.errors import InputError, unknown
+from nmm.kernels.kinematics import Joints
 from nmm.platforms.base import Platform
 from nmm.robots.coordinates import Coordinates
 from nmm.robots.followers import Follower
+from nmm.robots.joint_table import joint_table, own_axes
 from nmm.robots.meshes import MeshesWhenAsked, Shapes
 from nmm.robots.wheel import Wheel
 
@@ -104,6 +106,16 @@ class Robot(Coordinates):
         # Rounded: another machine's last digit is no other robot.
         text = "\n".join([*names, *(f"{number:.6f}" for number in np.concatenate(numbers) + 0.0)])
         return hashlib.sha256(text.replace("-0.000000", "0.000000").encode()).hexdigest()[:16]
+
+    @cached_property
+    def joint_axes(self) -> list[pin.SE3]:
+        """See `nmm.robots.joint_table.own_axes`."""
+        return own_axes(self.model)
+
+    @cached_property
+    def joints(self) -> Joints:
+        """The joints of `model` as compiled kinematics read them."""
+        return joint_table(self.model, self.joint_axes)
 
     @cached_property
     def groups(self) -> Mapping[str, tuple[str, ...]]:

@@ -9,10 +9,9 @@ import numpy as np
 from nmm.arrays import Array
 from nmm.control.controller import Controller
 from nmm.control.integrators import Integrator
-from nmm.errors import RunError
 from nmm.runs.promise import ENDS, Departure, Samples, adaptive_errors, decay, departure, step_errors
 from nmm.runs.recording import Recorder
-from nmm.runs.stability import Instability, find_instability
+from nmm.runs.stability import Instability, instabilities
 
 #: At how many instants of a run the integrator's stability is examined.
 EXAMINED = 20
@@ -94,17 +93,7 @@ def _examine(
     """The instabilities at some instants of the run, and how many instants were looked at."""
     if not advance.stability:
         return [], 0
-    found = []
     chosen = np.unique(np.linspace(0, len(recorder) - 1, EXAMINED).astype(int))
-    for k in chosen:
-        controller.reset()
-        try:
-            instability = find_instability(
-                controller, float(recorder.t[k]), recorder.q[k], dt, advance.stability
-            )
-        except (RunError, np.linalg.LinAlgError):  # singular just beside this sample: not a matter of dt
-            continue
-        if instability is not None:
-            found.append(instability)
-    controller.reset()
-    return found, len(chosen)
+    return instabilities(controller, recorder.t[chosen], recorder.q[chosen], dt, advance.stability), len(
+        chosen
+    )

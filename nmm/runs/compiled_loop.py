@@ -39,6 +39,8 @@ from nmm.runs.recorded import Recorded, note
 BOUND = 1e6
 #: How long a call lasts at most, about, s: nothing interrupts it.
 A_CALL = 0.03
+#: How many times as many samples as in the longest call before may be made in one, by the time that those took.
+MOST_TIMES = 64
 
 
 class Ends(NamedTuple):
@@ -217,8 +219,9 @@ class CompiledLoop:
             reached = self._fly(
                 *blocks, self._method, times, first, last, self._partitioned, self._ends, found
             )
-        if reached == last and time.perf_counter() - began < 0.5 * A_CALL:
-            self._at_once *= 2
+        if reached == last:
+            fitting = 0.8 * A_CALL * (last - first) / max(time.perf_counter() - began, 1e-9)
+            self._at_once = max(self._at_once, min(int(fitting), MOST_TIMES * self._at_once))
         return reached, reached == last
 
 

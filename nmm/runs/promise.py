@@ -17,12 +17,13 @@ nothing: no allowance is made for it.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from nmm.arrays import Array, Integers
-from nmm.kernels.compiled import compiled
+from nmm.kernels.compiled import compiled, view
 from nmm.runs.feedback import Feedback
 from nmm.runs.residuals import differs
 
@@ -158,27 +159,67 @@ def carry_on(factors: Array, which: Integers, errors: Array) -> None:
 
 def _steps(t: Array) -> tuple[Array, Integers]:
     """The steps that there are between the times (N,), and which of them each is, (N - 1,)."""
-    return np.unique(np.round(np.diff(t), 12), return_inverse=True)
+    steps = np.round(np.diff(t), 12)
+    if np.all(steps == steps[0]):
+        return steps[:1], np.zeros(len(steps), dtype=np.int64)
+    return np.unique(steps, return_inverse=True)
 
 
 def step_errors(samples: Samples, order: int) -> Array:
     """The error that a method of that order may make along each step, (N - 1,); 0 where it cannot follow."""
     t, error, rate, J, u, _, partition, feedback = samples
-    K, fed = feedback.K, feedback.rates(error)
-    h = np.diff(t)
-    moved = rate - fed  # ∂e/∂t
-    turned = np.einsum("kij,kj->ki", np.diff(J, axis=0), u[:-1])
-    first = 0.5 * h * (_sizes(turned) + _sizes(np.diff(moved, axis=0)) + h * _sizes(fed[:-1] @ K.T))
-    change = _relative_change(u)
-    switched = np.any(
-        np.diff(partition, axis=0) != 0, axis=1
-    )  # u then jumps between two steps, not along one
-    for k in np.flatnonzero(switched):
-        change[k] = change[k - 1] if k else 0.0
-    change = np.maximum(change, _relative_change(J.reshape(len(J), -1)))
-    share = np.maximum.reduce([change, _relative_change(moved), h * np.linalg.norm(K, 2)])
-    allowed: Array = SAFETY * first * np.minimum(share, 1.0) ** (order - 1)
-    return np.where(change <= 1.0, allowed, 0.0)
+    fed, K, found = feedback.rates(error), feedback.K, np.empty(len(t) - 1)
+    again = np.ascontiguousarray(fed @ K.T)  # K² e
+    size = float(np.linalg.norm(K, 2))
+    write_step_errors(t, rate - fed, again, J, u, partition, size, order, found)
+    return found
+
+
+@compiled
+def write_step_errors(
+    t: Array,
+    moved: Array,
+    again: Array,
+    J: Array,
+    u: Array,
+    partition: Integers,
+    gain: float,
+    order: int,
+    found: Array,
+) -> None:
+    """found (N - 1,): `step_errors`, of moved (N, s): ∂e/∂t, again (N, s): K² e, and gain: ‖K‖."""
+    s, m = J.shape[1], J.shape[2]
+    jumped = 0.0
+    for k in range(t.shape[0] - 1):
+        h = t[k + 1] - t[k]
+        turned, fed, switched = 0.0, 0.0, False
+        for i in range(s):
+            along = 0.0
+            for j in range(m):
+                along += (J[k + 1, i, j] - J[k, i, j]) * u[k, j]
+            turned += along * along
+            fed += again[k, i] * again[k, i]
+            switched = switched or partition[k + 1, i] != partition[k, i]
+        drifted, share = changed(moved, k, s)
+        first = 0.5 * h * (math.sqrt(turned) + drifted + h * math.sqrt(fed))
+        if not switched:  # else u jumps between two steps, not along one
+            _, jumped = changed(u, k, m)
+        change = max(jumped, changed(J, k, s * m)[1])
+        share = max(max(change, share), h * gain)
+        found[k] = SAFETY * first * min(share, 1.0) ** (order - 1) if change <= 1.0 else 0.0
+
+
+@compiled
+def changed(values: Array, k: int, size: int) -> tuple[float, float]:
+    """‖v[k+1] - v[k]‖ of v (N, ...) with so many numbers a sample, and that beside the larger of both."""
+    flat = view(values, k * size, (2 * size,))
+    one, other, both = 0.0, 0.0, 0.0
+    for i in range(size):
+        one += flat[i] * flat[i]
+        other += flat[size + i] * flat[size + i]
+        both += (flat[size + i] - flat[i]) ** 2
+    larger, apart = math.sqrt(max(one, other)), math.sqrt(both)
+    return apart, apart / larger if larger > 0.0 else apart
 
 
 def adaptive_errors(samples: Samples, q: Array, tolerance: float) -> Array:
@@ -202,11 +243,4 @@ def add_up(added: Array, decays: Array, total: Array) -> None:
 
 
 def _sizes(rows: Array) -> Array:
-    return np.asarray(np.linalg.norm(rows, axis=1))
-
-
-def _relative_change(values: Array) -> Array:
-    """‖v[k+1] - v[k]‖ beside the larger of both, (N - 1,)."""
-    size = _sizes(values)
-    larger = np.maximum(size[1:], size[:-1])
-    return np.asarray(_sizes(np.diff(values, axis=0)) / np.where(larger > 0.0, larger, 1.0))
+    return np.sqrt(np.einsum("ki,ki->k", rows, rows))

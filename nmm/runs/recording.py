@@ -17,6 +17,7 @@ from nmm.functions.function import Function, Shown
 from nmm.functions.program import COMPILED
 from nmm.functions.tasks.position import AXES
 from nmm.functions.tasks.task import Task
+from nmm.kernels.spectra import spectra
 from nmm.resolvers.answer import Status
 from nmm.robots.frame_path import FramePath
 from nmm.robots.robot import Robot
@@ -241,7 +242,7 @@ class Recorder:
         """What was recorded."""
         found, controller = self.so_far, self._controller
         robot, rows = controller.robot, controller.rows
-        singular_values = np.linalg.svd(found.J, compute_uv=False).astype(np.float64)
+        singular_values = spectra(found.J, threads=1)
         self._warn_of_events(singular_values)
         if outcome is not Outcome.SINGULAR:  # which says so itself
             self._warn_of_singularities(singular_values)

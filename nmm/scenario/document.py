@@ -72,25 +72,30 @@ class Document:
     def _setting_of(self, path: Place) -> Place | None:
         return next((place for place in self.settings if path[: len(place)] == place), None)
 
-    def with_setting(self, key: str, value: object) -> Document:
-        """A copy in which the value at a dotted path is another.
+    def with_settings(self, settings: Mapping[str, object]) -> Document:
+        """A copy in which the values at dotted paths are others, set one after the other.
 
         Parameters
         ----------
-        key : as "resolver.alpha" or "task.0.gain"; counting begins at 0
-        value : text, read as in the file ("5/4*pi", "[v, q1]", "{x: 1}"), or plain data
+        settings : keys as "resolver.alpha" or "task.0.gain", counting begins at 0; values are text, read as
+            in the file ("5/4*pi", "[v, q1]", "{x: 1}"), or plain data
 
         Raises
         ------
-        ScenarioError : the path leads nowhere, or the text is not YAML
+        ScenarioError : a path leads nowhere, or the text is not YAML
         """
         copy = Document(self.name, _copied(self.data), self.lines, self.folder, dict(self.settings))
-        path = _parsed(key, copy)
-        place: Any = copy.data
+        for key, value in settings.items():
+            copy._set(key, value)
+        return copy
+
+    def _set(self, key: str, value: object) -> None:
+        path = _parsed(key, self)
+        place: Any = self.data
         for depth, step in enumerate(path[:-1]):
             if isinstance(place, dict):
                 inner = place.setdefault(step, {})
-                shorthand = _shorthand(path[: depth + 1], copy.data)
+                shorthand = _shorthand(path[: depth + 1], self.data)
                 if isinstance(inner, str) and shorthand is not None:
                     inner = place[step] = {shorthand: inner}
                 place = inner
@@ -99,8 +104,7 @@ class Document:
         if isinstance(value, str):
             value = read_text(value, f"{self.name}: set {key}", lines=False).data["value"]
         place[path[-1]] = _copied(value)
-        copy.settings[path] = Path.cwd()
-        return copy
+        self.settings[path] = Path.cwd()
 
 
 def dotted(path: Place) -> str:
@@ -136,9 +140,11 @@ def _parsed(key: str, document: Document) -> Place:
 
 
 def _copied(value: Any) -> Any:
+    if isinstance(value, str):
+        return value
     if hasattr(value, "tolist"):
         value = value.tolist()
-    if isinstance(value, Mapping):
+    if isinstance(value, (dict, Mapping)):  # dict first: it is the one there, and quick to tell
         return {str(key): _copied(item) for key, item in value.items()}
     return [_copied(item) for item in value] if isinstance(value, list | tuple) else value
 

@@ -6,6 +6,7 @@ import ast
 import math
 import operator
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from numbers import Real
 from typing import Annotated, Any
 
@@ -53,6 +54,7 @@ class _Arithmetic(SimpleEval):
         return float(node.value)
 
 
+@lru_cache(maxsize=10_000)
 def evaluate(text: str) -> float:
     """The value of an arithmetic expression; `ValueError` when it is none, or not finite."""
     if text.strip().lower().lstrip("+-.") in ("nan", "inf", "infinity"):

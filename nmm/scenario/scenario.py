@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from nmm.runs.trajectory import Trajectory
 
 SUFFIXES = (".yaml", ".yml")
+#: The keys that a controller does not depend on.
+KEYS_OF_A_RUN = ("q0", "duration", "method", "tolerance")
 
 
 class Scenario:
@@ -93,7 +95,8 @@ class Scenario:
         ScenarioError : as `override`
         """
         derived = Scenario(_with_settings(self.document, settings))
-        if derived._explicit_robot() == self._explicit_robot():
+        of_robot = any(key.split(".", 1)[0] == "robot" for key in settings)
+        if not of_robot or derived._explicit_robot() == self._explicit_robot():
             derived._robot = self._robot
         return derived
 
@@ -138,17 +141,23 @@ class Scenario:
         except KeyedError as error:
             raise self._located(error) from None
 
-    def run(self, progress: Progress | None = None) -> Trajectory:
+    def run(self, progress: Progress | None = None, controller: Controller | None = None) -> Trajectory:
         """Run it; a run that fails or is interrupted (Ctrl-C) returns what it has, and says so.
 
         Parameters
         ----------
         progress : called with the fraction done, about a hundred times
+        controller : one of a scenario that differs in `KEYS_OF_A_RUN` alone, to be used again; a new one when
+            not given
         """
         from nmm.runs.simulation import simulate
 
-        controller, parts = self.controller(), self.parts
+        parts = self.parts
         try:
+            if controller is None:
+                controller = self.controller()
+            else:
+                parts.check_start(self.robot())
             with at(), parts.own_keys():
                 trajectory = simulate(
                     controller,
@@ -184,14 +193,17 @@ class Scenario:
 
 
 def _with_settings(document: Document, settings: Mapping[str, object]) -> Document:
-    for key, value in settings.items():
-        document = document.with_setting(key, value)
-        if key == "resolver.kind" and isinstance(value, str) and value in RESOLVERS:
-            from nmm.scenario.resolvers import RESOLVER_PARTS
+    kind = settings.get("resolver.kind")
+    if not (isinstance(kind, str) and kind in RESOLVERS):
+        return document.with_settings(settings)
+    from nmm.scenario.resolvers import RESOLVER_PARTS
 
-            resolver, known = document.data["resolver"], RESOLVER_PARTS[value].model_fields
-            document.data["resolver"] = {name: item for name, item in resolver.items() if name in known}
-    return document
+    keys = [*settings]
+    first = keys.index("resolver.kind") + 1  # what is set after it has to be known to the new kind
+    document = document.with_settings({key: settings[key] for key in keys[:first]})
+    resolver, known = document.data["resolver"], RESOLVER_PARTS[kind].model_fields
+    document.data["resolver"] = {name: item for name, item in resolver.items() if name in known}
+    return document.with_settings({key: settings[key] for key in keys[first:]})
 
 
 def _find(name_or_path: str | Path) -> Path:

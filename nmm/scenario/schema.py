@@ -82,12 +82,7 @@ class ScenarioPart(Part):
 
     def build(self, robot: Robot, absolute: Absolute) -> Controller:
         """The controller, after a check of q0; errors know their key. `absolute` finds the files named."""
-        with at("q0"):
-            for name in self.q0 if isinstance(self.q0, dict) else ():
-                with at(name):
-                    robot.coordinate(name)
-            come_back = self.limits is not None and self.limits.position is not False
-            robot.check_limits(robot.q(self.q0), come_back=come_back)
+        self.check_start(robot)
         with at("task"):
             task = build_tasks(self.task, robot)
             sequenced = any(one.when for one in task)
@@ -138,6 +133,15 @@ class ScenarioPart(Part):
                     steering or False,
                     collisions,
                 )
+
+    def check_start(self, robot: Robot) -> None:
+        """`KeyedError` for a q0 that is none of the robot's, or outside limits that are not kept."""
+        with at("q0"):
+            for name in self.q0 if isinstance(self.q0, dict) else ():
+                with at(name):
+                    robot.coordinate(name)
+            come_back = self.limits is not None and self.limits.position is not False
+            robot.check_limits(robot.q(self.q0), come_back=come_back)
 
     def _added_task(self, resolver: WithAddedTask) -> list[TaskPart]:
         """The task that takes up the redundancy: as given, or the objective's terms at their targets."""

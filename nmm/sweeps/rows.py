@@ -1,58 +1,88 @@
-"""Rows of a sweep by their numbers: each a rollout of the scenario with its settings. Whatever computes many
-rollouts at once takes the place of `rows_of`, and of nothing else.
+"""Rows of a sweep by their numbers: each a rollout of the scenario with its settings.
+
+Rows whose settings are numbers share a robot, and those that begin elsewhere a controller; several threads
+take them one by one, as their integration is compiled code that does not hold the GIL.
 """
 
 from __future__ import annotations
 
 import json
+import threading
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
-from threading import RLock
-from typing import TYPE_CHECKING, Any
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from nmm.errors import InputError, RunError
 from nmm.progress import Progress
 from nmm.scenario import Scenario
+from nmm.scenario.scenario import KEYS_OF_A_RUN
 from nmm.sweeps.columns import failed, measured
 from nmm.sweeps.definition import Definition
 
 if TYPE_CHECKING:
+    from nmm.control.controller import Controller
     from nmm.runs.trajectory import Trajectory
 
-#: So many scenarios with their robots are kept in a process, those last used.
-MOST_ROBOTS = 16
-#: A worker of a cluster may have several threads; a robot, and Python, have time for one.
-_lock = RLock()
+#: So many scenarios with their robots are kept in a process, and controllers in a thread, those last used.
+MOST_KEPT = 16
+#: What is not compiled as a whole has time for one thread: Python has, and shapes are read when asked for.
+_lock = threading.RLock()
 _robots: OrderedDict[tuple[str, str], Scenario] = OrderedDict()
+_own = threading.local()
 
 Keep = Callable[[int, "Trajectory"], None]
+Key = TypeVar("Key")
+Value = TypeVar("Value")
 
 
 def rows_of(
-    definition: Definition, indices: Sequence[int], keep: Keep | None = None, progress: Progress | None = None
+    definition: Definition,
+    indices: Sequence[int],
+    keep: Keep | None = None,
+    progress: Progress | None = None,
+    threads: int = 1,
 ) -> list[dict[str, Any]]:
     """The rows of these numbers, in their order: cells by column (`columns.columns_of`).
 
     A rollout that fails is a row that says why: `outcome` "refused" is one whose settings are no input (a
     start outside limits), "error" one that raised what it should not have. A cell that is not known is None.
+    Cells do not depend on the threads.
 
     Parameters
     ----------
     keep : called with each row's number and trajectory, where there is one
     progress : called with the fraction done after each row
+    threads : how many, at least 1. With more of them Ctrl-C ends it when the rows under way are done
 
     Raises
     ------
     KeyboardInterrupt : a rollout was interrupted; rows are whole or not there
     """
-    told = definition.parameters(indices)
-    rows = []
-    for k, (index, changes) in enumerate(zip(indices, definition.changes(indices), strict=True)):
-        with _lock:
-            found = _rollout(definition, index, changes, keep)
-        rows.append({"index": index, **told[k], **found})
+    told, changes = definition.parameters(indices), definition.changes(indices)
+    rows: list[dict[str, Any]] = []
+
+    def found(k: int) -> dict[str, Any]:
+        return _rollout(definition, indices[k], changes[k], keep)
+
+    def add(cells: dict[str, Any]) -> None:
+        k = len(rows)
+        rows.append({"index": indices[k], **told[k], **cells})
         if progress is not None:
-            progress((k + 1) / len(indices))
+            progress(len(rows) / len(indices))
+
+    first = len(indices) if threads == 1 else min(1, len(indices))  # of several the first one compiles alone
+    for k in range(first):
+        add(found(k))
+    if first < len(indices):
+        with ThreadPoolExecutor(min(threads, len(indices) - first)) as pool:
+            try:
+                for cells in pool.map(found, range(first, len(indices))):
+                    add(cells)
+            except BaseException:
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
     return rows
 
 
@@ -60,7 +90,11 @@ def _rollout(
     definition: Definition, index: int, changes: dict[str, Any], keep: Keep | None
 ) -> dict[str, Any]:
     try:
-        trajectory = scenario_of(definition, changes).run()
+        with _lock:
+            scenario = scenario_of(definition, changes)
+        controller, compilable = _controller_of(scenario, definition, changes)
+        with nullcontext() if compilable else _lock:
+            trajectory = scenario.run(controller=controller)
     except InputError as error:
         return failed("refused", str(error))
     except RunError as error:
@@ -70,8 +104,31 @@ def _rollout(
     if trajectory.outcome == "interrupted":
         raise KeyboardInterrupt
     if keep is not None:
-        keep(index, trajectory)
+        with _lock:
+            keep(index, trajectory)
     return measured(trajectory)
+
+
+def _controller_of(
+    scenario: Scenario, definition: Definition, changes: dict[str, Any]
+) -> tuple[Controller, bool]:
+    """A controller for a row's scenario, and whether its steps are compiled as a whole.
+
+    Such a one is this thread's, and it is used again: what a run leaves in it, the next one resets.
+    """
+    others = {key: value for key, value in changes.items() if key.split(".")[0] not in KEYS_OF_A_RUN}
+    key = definition.digest, json.dumps(others, default=str)
+    if not hasattr(_own, "controllers"):
+        _own.controllers = OrderedDict()
+    if key in _own.controllers:
+        return _kept(_own.controllers, key), True
+    from nmm.control.sequenced import SequencedController
+
+    with _lock:
+        controller = scenario.controller()
+    if isinstance(controller, SequencedController) or not controller.compilable:
+        return controller, False
+    return _kept(_own.controllers, key, controller), True
 
 
 def scenario_of(definition: Definition, changes: dict[str, Any]) -> Scenario:
@@ -83,12 +140,20 @@ def scenario_of(definition: Definition, changes: dict[str, Any]) -> Scenario:
     """
     of_robot = {key: value for key, value in changes.items() if key.split(".")[0] == "robot"}
     rest = {key: value for key, value in changes.items() if key not in of_robot}
+
     key = definition.digest, json.dumps(of_robot, default=str)
-    if key not in _robots:
-        scenario = Scenario(definition.document).with_settings(of_robot)
-        scenario.robot()
-        _robots[key] = scenario
-        if len(_robots) > MOST_ROBOTS:
-            _robots.popitem(last=False)
-    _robots.move_to_end(key)
-    return _robots[key].with_settings(rest)
+    if key in _robots:
+        return _kept(_robots, key).with_settings(rest)
+    scenario = Scenario(definition.document).with_settings(of_robot)
+    scenario.robot()
+    return _kept(_robots, key, scenario).with_settings(rest)
+
+
+def _kept(kept: OrderedDict[Key, Value], key: Key, new: Value | None = None) -> Value:
+    """What is kept under a key, or is new there; what was used the longest ago is forgotten."""
+    if new is not None:
+        kept[key] = new
+        if len(kept) > MOST_KEPT:
+            kept.popitem(last=False)
+    kept.move_to_end(key)
+    return kept[key]

@@ -17,8 +17,8 @@ import numpy as np
 
 from nmm.analysis.maps.lines import curves_and_points
 from nmm.analysis.singular.singularity import TOLERANCE
-from nmm.analysis.singular.spectra import spectra
 from nmm.arrays import Array, Integers
+from nmm.kernels.spectra import spectra
 from nmm.progress import Progress
 
 #: Central differences, in cells of the grid.

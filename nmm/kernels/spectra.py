@@ -91,10 +91,11 @@ def write_spectra(J: Array, found: Array) -> None:
             found[p, place] = value
 
 
-def spectra(J: Array) -> Array:
+def spectra(J: Array, threads: int | None = None) -> Array:
     """Singular values (N, min(s, m)) of J (N, s, m), falling; not numbers where J is not finite.
 
-    Small ones are as accurate as large ones where J's rows are (Demmel and Veselić 1992).
+    In so many threads, as many as there are cores when None. Small ones are as accurate as large ones where
+    J's rows are (Demmel and Veselić 1992).
     """
     J = np.ascontiguousarray(J, dtype=np.float64)
     found = np.empty((len(J), min(J.shape[1:])))
@@ -102,5 +103,5 @@ def spectra(J: Array) -> Array:
     def worker() -> Work:
         return lambda first, last: write_spectra(J[first:last], found[first:last])
 
-    over_cores(len(J), AT_ONCE, worker)
+    over_cores(len(J), AT_ONCE, worker, threads=threads)
     return found
