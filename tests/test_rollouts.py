@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 import nmm
 from nmm.robots.held import Held
 from nmm.rollouts import kept
+from nmm.rollouts.measures import least_singular_value
 
 START = np.array([0.0, 0.0, 0.0, 0.5, 0.5])
 
@@ -43,6 +44,19 @@ def test_each_run_is_simulates_to_the_bit(name: str, method: str) -> None:
             assert found[measure][k] == pytest.approx(summary[measure], rel=1e-9, abs=1e-12), measure
         for measure in ("partition_switches", "input_rms", "input_peak"):
             assert found[measure][k] == pytest.approx(summary[measure], rel=1e-9, abs=1e-12), measure
+
+
+@pytest.mark.parametrize("shape", [(2, 4), (6, 10), (3, 2), (1, 3)])
+def test_the_least_singular_value_is_that_of_all_samples(shape: tuple[int, int]) -> None:
+    """Of matrices that wander, stand still, and jump; LAPACK decomposes each."""
+    rng = np.random.default_rng(5)
+    walk = np.cumsum(0.02 * rng.standard_normal((700, *shape)), axis=0) + rng.standard_normal(shape)
+    jumps = np.where(np.arange(700)[:, None, None] % 101 == 50, 0.3 * walk, walk)
+    for J in (walk, np.repeat(walk[:1], 300, axis=0), jumps):
+        expected = np.linalg.svd(J, compute_uv=False)[:, -1]
+        for count in (1, 2, 65, len(J)):
+            found = least_singular_value(np.ascontiguousarray(J), count)
+            assert found == pytest.approx(expected[:count].min(), rel=1e-12, abs=1e-14)
 
 
 def test_threads_change_no_bit() -> None:

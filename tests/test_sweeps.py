@@ -175,6 +175,43 @@ def test_a_robot_is_loaded_once_for_each_way_it_changes(short: Path, monkeypatch
     assert rows[0]["error_initial"] != rows[1]["error_initial"]
 
 
+def test_threads_and_controllers_used_again_change_no_cell(short: Path) -> None:
+    """Other starts, of which some are refused, and other gains, some too large for dt, by several threads."""
+    vary = {"q0.q1": (-4, 4), "task.gain": [1, 4, 1e6], "resolver.kind": ["rg", "pg"]}
+    settings = {"duration": 0.2}
+    definition = nmm.Sweep(short, vary, samples=6, settings=settings).definition
+    told: list[float] = []
+    rows = rows_of(definition, range(36), progress=told.append, threads=3)
+    assert rows == rows_of(definition, range(36)) == rows_of(definition, range(36))
+    assert told == [(k + 1) / 36 for k in range(36)]
+    assert len({row["outcome"] for row in rows}) > 1
+    for row, changes in zip(rows, definition.changes(range(36)), strict=True):
+        if row["outcome"] == "refused":
+            with pytest.raises(nmm.InputError, match=re.escape(row["message"])):
+                nmm.Scenario.load(short, {**settings, **changes}).run()
+            continue
+        summary = nmm.Scenario.load(short, {**settings, **changes}).run().summary()
+        for name in ("outcome", "message", "error_rms", "input_peak"):
+            assert row[name] == summary.get(name), name
+
+
+def test_an_interrupt_in_a_thread_ends_all(short: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    definition = nmm.Sweep(short, {"q0.x": (-1, 1)}, samples=40).definition
+    begun: list[int] = []
+    rollout = sweep_rows._rollout
+
+    def interrupted(definition: Any, index: int, *rest: Any) -> dict[str, Any]:
+        begun.append(index)
+        if index == 3:
+            raise KeyboardInterrupt
+        return rollout(definition, index, *rest)
+
+    monkeypatch.setattr(sweep_rows, "_rollout", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        rows_of(definition, range(40), threads=2)
+    assert len(begun) < 40
+
+
 # The folder
 
 
@@ -232,9 +269,10 @@ def test_interrupted_anywhere_it_goes_on_to_the_same_bytes(
     assert bytes_of[0] == bytes_of[1]
 
 
-def test_killed_and_started_again_nothing_is_lost_or_doubled(short: Path, tmp_path: Path) -> None:
-    """Two processes, the parent killed as by the system; then on to the end."""
-    vary = ["--vary", "q0.x=-1:1", "--vary", "resolver.kind=rg,pg", "--samples", "40", "--set", "duration=1"]
+@pytest.mark.parametrize("other", ["resolver.kind=rg,pg", "robot.arguments.d=0.2,0.4"])
+def test_killed_and_started_again_nothing_is_lost_or_doubled(short: Path, tmp_path: Path, other: str) -> None:
+    """Two threads, or processes where robots change; killed as by the system; then on to the end."""
+    vary = ["--vary", "q0.x=-1:1", "--vary", other, "--samples", "40", "--set", "duration=1"]
     began = process(tmp_path, "sweep", str(short), *vary, "--out", "out", "--jobs", "2")
     while len(list((tmp_path / "out").glob("parts/*.parquet"))) < 2:
         assert began.poll() is None, began.communicate()
@@ -242,9 +280,8 @@ def test_killed_and_started_again_nothing_is_lost_or_doubled(short: Path, tmp_pa
     began.kill()
     began.communicate()
     assert 2 <= len(list((tmp_path / "out").glob("parts/*.parquet"))) < 10
-    sweep = nmm.Sweep(
-        short, {"q0.x": (-1, 1), "resolver.kind": "rg,pg"}, samples=40, settings={"duration": 1}
-    )
+    key, values = other.split("=")
+    sweep = nmm.Sweep(short, {"q0.x": (-1, 1), key: values}, samples=40, settings={"duration": 1})
     shares: list[float] = []
     table = sweep.run(tmp_path / "out", jobs=1, progress=shares.append).table
     assert shares[0] >= 0.2

@@ -76,7 +76,7 @@ def sweep(
     ] = None,
     jobs: Annotated[
         int | None,
-        typer.Option(metavar="N", help="Processes on this machine.", show_default="one a core"),
+        typer.Option(metavar="N", help="Rollouts at a time on this machine.", show_default="one a core"),
     ] = None,
     scheduler: Annotated[
         str | None,

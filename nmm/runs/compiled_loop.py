@@ -39,7 +39,7 @@ from nmm.runs.recorded import Recorded, note
 BOUND = 1e6
 #: How long a call lasts at most, about, s: nothing interrupts it.
 A_CALL = 0.03
-#: How many times as many samples as in the longest call before may be made in one, by the time that those took.
+#: So many times the samples of the longest call before a call has at most, by the time that those took.
 MOST_TIMES = 64
 
 

@@ -22,11 +22,17 @@ from nmm.sweeps.cluster import as_done_by, cluster
 from nmm.sweeps.definition import KEPT, Definition
 from nmm.sweeps.estimate import check_size
 from nmm.sweeps.folder import SweepFolder, is_sweep
+from nmm.sweeps.rows import wholly_compiled
 from nmm.sweeps.sampling import GRID, SAMPLERS, check_total
 from nmm.sweeps.swept import Swept
 from nmm.sweeps.varied import Range, Varied, varied
 from nmm.sweeps.work import computed
 from nmm.words import listed
+
+#: So many rows a core are computed by threads; more are worth processes of their own.
+FEW_ROWS = 128
+#: So many threads a process has at most, however many cores there are.
+MOST_THREADS = 3
 
 
 class Sweep:
@@ -119,8 +125,9 @@ class Sweep:
         Parameters
         ----------
         folder : a new or an empty one, or one where this sweep was begun
-        jobs : processes on this machine; as many as it has cores, when not given. With more than 1, a script
-            needs `if __name__ == "__main__":`
+        jobs : rows that are computed at the same time on this machine; as many as it has cores, when not
+            given. They are threads where rows are few and share a robot, and processes otherwise, for which a
+            script needs `if __name__ == "__main__":`
         scheduler : the address of a Dask scheduler (tcp://host:port) whose workers compute instead
         progress : called with the fraction done, of the rows that were done before, too
 
@@ -144,10 +151,11 @@ class Sweep:
             stack.enter_context(place.opened())
             missing = place.missing()
             done = _Done(definition, missing, progress)
+            threads = self._threads(local, sum(map(len, map(definition.indices, missing))))
             job = partial(computed, definition=definition)
             if missing:
                 found = (
-                    as_done(job, missing, local, done.report)
+                    as_done(partial(job, threads=threads), missing, -(-local // threads), done.report)
                     if client is None
                     else as_done_by(client, job, missing)
                 )
@@ -160,6 +168,19 @@ class Sweep:
 
             write_page(swept)
         return swept
+
+    def _threads(self, jobs: int, rows: int) -> int:
+        """How many rows a process computes at the same time, of `jobs` in all, where so many rows are left.
+
+        Several where a process of their own would hardly have begun before they are done, robots stay the
+        same, and steps are compiled as a whole, which holds no GIL; what Python does in between bounds how
+        many.
+        """
+        controller, varying = self.scenario.controller(), self.definition.vary
+        shared = not any(one.key.split(".")[0] == "robot" for one in varying)
+        if rows > FEW_ROWS * jobs or not shared or self.definition.keep or not wholly_compiled(controller):
+            return 1
+        return -(-jobs // -(-jobs // MOST_THREADS))
 
 
 class _Done:

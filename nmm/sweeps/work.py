@@ -23,8 +23,8 @@ class Computed(NamedTuple):
     runs: dict[int, dict[str, bytes]]
 
 
-def computed(chunk: int, progress: Progress | None, definition: Definition) -> Computed:
-    """Chunk number `chunk` of a sweep.
+def computed(chunk: int, progress: Progress | None, definition: Definition, threads: int = 1) -> Computed:
+    """Chunk number `chunk` of a sweep, its rows by so many threads.
 
     Raises
     ------
@@ -42,5 +42,7 @@ def computed(chunk: int, progress: Progress | None, definition: Definition) -> C
             saved = trajectory.save(Path(folder) / "run", figures=False, html=html)
             runs[index] = {path.name: path.read_bytes() for path in saved.iterdir()}
 
-    rows = rows_of(definition, definition.indices(chunk), keep if definition.keep else None, progress)
+    rows = rows_of(
+        definition, definition.indices(chunk), keep if definition.keep else None, progress, threads
+    )
     return Computed(rows, runs)
