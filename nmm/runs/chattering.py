@@ -48,12 +48,17 @@ def chattering(t: Array, u: Array, names: Sequence[str]) -> Chattering | None:
     if len(u) < IN_A_ROW + 2:
         return None
     jump = np.diff(u, axis=0)
-    size = np.abs(jump)
-    about = np.maximum.reduce([np.abs(u[:-2]), np.abs(u[1:-1]), np.abs(u[2:])])
-    least = np.maximum(SMALL * about, NEGLIGIBLE * np.abs(u).max())
-    back = (jump[1:] * jump[:-1] < 0.0) & (np.minimum(size[1:], size[:-1]) > least)
+    turned = jump[1:] * jump[:-1] < 0.0
+    if np.count_nonzero(turned) < IN_A_ROW:
+        return None
+    size, large = np.abs(jump), np.abs(u)
+    about = np.maximum(np.maximum(large[:-2], large[1:-1]), large[2:])
+    least = np.maximum(SMALL * about, NEGLIGIBLE * large.max())
+    back = turned & (np.minimum(size[1:], size[:-1]) > least)
     found = None
     for i, name in enumerate(names):
+        if np.count_nonzero(back[:, i]) < IN_A_ROW:
+            continue
         (steps,) = np.nonzero(_in_rows(back[:, i]))
         if steps.size:
             largest = float(size[steps, i].max())
