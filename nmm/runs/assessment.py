@@ -40,16 +40,20 @@ class Assessment(NamedTuple):
         return self.departure is not None and self.departure.missed
 
 
-def assess(controller: Controller, recorder: Recorder, advance: Integrator, dt: float) -> Assessment:
-    """What is wrong with a run whose samples were recorded."""
+def assess(
+    controller: Controller, recorder: Recorder, advance: Integrator, dt: float, held: bool = True
+) -> Assessment:
+    """What is wrong with a run whose samples were recorded; held: to what its gain promised."""
     with controller.without_limits():
-        return _assess(controller, recorder, advance, dt)
+        return _assess(controller, recorder, advance, dt, held)
 
 
-def _assess(controller: Controller, recorder: Recorder, advance: Integrator, dt: float) -> Assessment:
+def _assess(
+    controller: Controller, recorder: Recorder, advance: Integrator, dt: float, held: bool
+) -> Assessment:
     unstable, examined = _examine(controller, recorder, advance, dt)
     samples = recorder.samples
-    if len(recorder) < 3:
+    if len(recorder) < 3 or not held:
         return Assessment(unstable, examined, None, 0)
     if advance.tolerance:
         steps = adaptive_errors(samples, recorder.q[: len(recorder)], advance.tolerance)

@@ -78,9 +78,8 @@ def judge(
     samples = recorder.samples
     if not len(recorder):
         return Verdict(outcome, _joined(message, *_lost(controller, recorder, ended)), [])
-    found = assess(controller, recorder, advance, dt)
-    if goal is not None and goal.reached(samples.error[-1], controller.rows):
-        found = found._replace(departure=None, target=0)
+    there = goal is not None and goal.reached(samples.error[-1], controller.rows)
+    found = assess(controller, recorder, advance, dt, held=not there)
     residual = samples.residual.copy()
     if controller.limits is not None:  # of a start from rest λ says it
         residual[: run_up(samples.t, samples.u, controller.kept.accelerations, dt)] = 0.0
