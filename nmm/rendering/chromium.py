@@ -9,6 +9,7 @@ import select
 import shutil
 import signal
 import subprocess
+import sys
 import tempfile
 import time
 from contextlib import suppress
@@ -24,6 +25,14 @@ OPTIONS = (
     "--hide-scrollbars", "--disable-gpu", "--use-gl=angle", "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader", "--disable-extensions", "--disable-background-networking",
 )  # fmt: skip
+#: A browser has its pipes as numbers 3 and 4. (Some shells know no number above 9.)
+PIPED = """
+import fcntl, os, sys
+read, write = (fcntl.fcntl(int(number), fcntl.F_DUPFD, 10) for number in sys.argv[1:3])
+os.dup2(read, 3)
+os.dup2(write, 4)
+os.execv(sys.argv[3], sys.argv[3:])
+"""
 #: How long a browser may take to start, and to answer, s.
 PATIENCE = 60.0
 
@@ -68,11 +77,10 @@ class HeadlessPage:
         # Root has no sandbox to be put into.
         unboxed = ["--no-sandbox"] if os.geteuid() == 0 else []
         command = [self._browser, *OPTIONS, *unboxed, f"--user-data-dir={self._folder.name}", "about:blank"]
-        # A browser has its pipes as numbers 3 and 4.
-        shell = ["/bin/sh", "-c", f'exec "$@" 3<&{theirs_in} 4>&{theirs_out}', "sh"]
+        begin = [sys.executable, "-I", "-S", "-c", PIPED, str(theirs_in), str(theirs_out)]
         with self._log.open("wb") as log:
             self._process = subprocess.Popen(
-                [*shell, *command],
+                [*begin, *command],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=log,

@@ -1,0 +1,183 @@
+"""Videos of runs: what is asked, what is missing, and pictures that show what the page shows."""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import io
+import itertools
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import process
+from matplotlib.image import imread
+from PIL import Image
+from playback_browser import Window, file_url
+from playback_browser import browser as browser
+from playback_browser import empty_page as empty_page
+from playback_browser import small_robot as small_robot
+from playback_browser import window as window
+from playback_robot import drive
+from ports import MOST
+
+from nmm.errors import InputError, RunError
+from nmm.rendering import encoder, render
+from nmm.rendering.chromium import HeadlessPage
+from nmm.robots.robot import Robot
+
+SMALL = (160, 96)
+
+
+def seen(file: Path, fps: float) -> list[np.ndarray]:
+    """The pictures of a video."""
+    folder = file.parent / f"{file.name} seen"
+    folder.mkdir()
+    command = [encoder.find_ffmpeg(), "-loglevel", "error", "-i", str(file), "-r", f"{fps:g}"]
+    subprocess.run([*command, str(folder / "%04d.png")], check=True)
+    return [imread(path)[..., :3] for path in sorted(folder.iterdir())]
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("suffix", [".mp4", ".webm", ".gif"])
+def test_a_video_has_its_pictures_in_their_order(small_robot: Robot, tmp_path: Path, suffix: str) -> None:
+    motion = drive(small_robot, duration=2.0)
+    shares: list[float] = []
+    file = render(
+        [motion], tmp_path / f"motion{suffix}", size=SMALL, view="top", fps=5, progress=shares.append
+    )
+    assert [path.name for path in tmp_path.iterdir()] == [file.name]
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    pictures = seen(file, 5)
+    assert len(pictures) == 11
+    assert {picture.shape for picture in pictures} == {(96, 160, 3)}
+    # It moves, and each picture is nearer to the next one than to one a second later.
+    near = [np.abs(a - b).mean() for a, b in itertools.pairwise(pictures)]
+    far = [np.abs(a - b).mean() for a, b in zip(pictures, pictures[5:], strict=False)]
+    assert min(far) > 0.0
+    assert np.mean(near) < np.mean(far)
+
+
+@pytest.mark.browser
+def test_a_picture_of_a_video_is_what_the_page_shows(small_robot: Robot, tmp_path: Path) -> None:
+    motion = drive(small_robot, duration=2.0)
+    whole = render([motion], tmp_path / "whole.gif", size=SMALL, fps=2, title="")
+    part = render([motion], tmp_path / "part.gif", size=SMALL, fps=2, start=1.0, end=1.5, title="")
+    fast = render([motion], tmp_path / "fast.gif", size=SMALL, fps=2, speed=2.0, title="")
+    pictures, some, few = (seen(file, 2) for file in (whole, part, fast))
+    assert [len(pictures), len(some), len(few)] == [5, 2, 3]
+    for shown, same, other in ((some[0], pictures[2], pictures[0]), (few[1], pictures[2], pictures[4])):
+        assert np.abs(shown - same).mean() < 0.5 * np.abs(shown - other).mean()
+
+
+@pytest.mark.browser
+def test_a_page_saves_its_scene_twice_as_large(small_robot: Robot, window: Window, tmp_path: Path) -> None:
+    page = window.open(file_url([drive(small_robot, duration=1.0)], tmp_path) + "#plots=none")
+    view = page.evaluate("(({ width, height }) => [width, height])(nmm.viewer.renderer.domElement)")
+    data = page.evaluate("nmm.picture()")
+    picture = Image.open(io.BytesIO(base64.b64decode(data.partition(",")[2])))
+    assert list(picture.size) == [2 * side for side in view]
+    assert len(np.unique(np.asarray(picture).reshape(-1, 4), axis=0)) > 100
+    assert page.evaluate("(({ width, height }) => [width, height])(nmm.viewer.renderer.domElement)") == view
+    with page.expect_download() as download:
+        page.locator("#picture").click()
+    assert re.fullmatch(r"[\w-]+-0\.00s\.png", download.value.suggested_filename)
+
+
+@pytest.mark.browser
+def test_a_page_that_throws_says_so(tmp_path: Path) -> None:
+    file = tmp_path / "page.html"
+    file.write_text("<!DOCTYPE html><title>page</title>", encoding="utf-8")
+    with HeadlessPage(file, (200, 100)) as page:
+        assert page.evaluate("1 + 1") == 2
+        assert page.evaluate("Promise.resolve('later')") == "later"
+        with pytest.raises(RunError, match="no such thing"):
+            page.evaluate("throw new Error('no such thing')")
+        pid = page._process.pid
+        assert Image.open(io.BytesIO(page.picture())).size == (200, 100)
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            state, _, _, session = stat.read_text().rpartition(")")[2].split()[:4]
+            assert int(session) != pid or state == "Z"  # nobody of its session is alive
+
+
+@pytest.mark.browser
+def test_an_interrupted_video_leaves_nothing(tmp_path: Path) -> None:
+    made = process(tmp_path, "run", "unicycle_2r_position", "--set", "duration=5", "--out", "run")
+    assert made.wait(timeout=MOST) == 0, made.communicate()
+    running = process(tmp_path, "render", "run", "--video", "motion.mp4", "--size", "320x200")
+    end = time.monotonic() + MOST
+    while not [path for path in tmp_path.iterdir() if path.name.startswith(".motion.mp4-")]:
+        assert time.monotonic() < end
+        assert running.poll() is None
+        time.sleep(0.02)
+    time.sleep(0.5)
+    running.send_signal(signal.SIGINT)
+    out, err = running.communicate(timeout=MOST)
+    assert (running.returncode, out, err) == (130, "", "")
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"size": (161, 96)}, "even numbers"), ({"size": (10, 10)}, "from 64 to 4096"),
+        ({"size": (9000, 10)}, "from 64"), ({"view": "below"}, "iso"), ({"fps": 0.0}, "fps"),
+        ({"speed": -1.0}, "speed"), ({"apart": 2.0}, "0 to 1"), ({"start": 5.0}, "instants of the run"),
+        ({"start": 1.0, "end": 0.5}, "instants of the run"), ({"fps": 1e6}, "at most 108000"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_filmed_is_refused(
+    small_robot: Robot, tmp_path: Path, options: dict, words: str
+) -> None:
+    with pytest.raises(InputError, match=words):
+        render([drive(small_robot, duration=2.0)], tmp_path / "motion.mp4", **options)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_where_it_cannot_be_written_is_refused(small_robot: Robot, tmp_path: Path) -> None:
+    motion = drive(small_robot, duration=1.0)
+    for name, words in (
+        ("motion.avi", r"\.mp4, \.webm, \.gif"), ("motion", "ends in"),
+        ("nowhere/motion.mp4", "is not there"),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=words):
+            render([motion], tmp_path / name)
+    with pytest.raises(InputError, match="at least one"):
+        render([], tmp_path / "motion.mp4")
+
+
+def test_what_is_missing_is_named(
+    small_robot: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    motion = drive(small_robot, duration=1.0)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(RunError, match=r"Chromium or Chrome.*apt-get install chromium"):
+        render([motion], tmp_path / "motion.mp4")
+    fake = tmp_path / "chromium"
+    fake.write_text("#!/bin/sh\necho cannot open display >&2\nexit 1\n")
+    fake.chmod(0o755)
+    with pytest.raises(RunError, match=r"has ended: .*cannot open display"):
+        render([motion], tmp_path / "motion.mp4")
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(RunError, match=r"ffmpeg.*nmm\[video\]"):
+        render([motion], tmp_path / "motion.mp4")
+    assert [path.name for path in tmp_path.iterdir()] == ["chromium"]
+
+
+def test_the_command_says_what_is_wrong(tmp_path: Path) -> None:
+    for arguments, words in (
+        (["nothing", "--video", "a.mp4"], "nothing"),
+        (["nothing", "--video", "a.mp4", "--size", "big"], "WIDTHxHEIGHT"),
+    ):
+        running = process(tmp_path, "render", *arguments)
+        out, err = running.communicate(timeout=MOST)
+        assert (running.returncode, out) == (2, "")
+        assert err.startswith("nmm render: ")
+        assert words in err
