@@ -142,5 +142,6 @@ class Driven:
             if target.frame is not None:
                 on_robot = target.frame != CENTER_OF_MASS
                 at[i] = here.placement(target.frame).translation if on_robot else here.center_of_mass()[0]
-        sigma = np.linalg.svd(step.J, compute_uv=False).min(initial=math.inf)
+        known = bool(np.all(np.isfinite(step.J)))
+        sigma = np.linalg.svd(step.J, compute_uv=False).min(initial=math.inf) if known else math.nan
         return Look(self.t, step, float(sigma), at)

@@ -95,7 +95,7 @@ class Session:
 
     def __init__(self, driven: Driven) -> None:
         self._driven = driven
-        look = driven.look()
+        self._look = look = driven.look()
         self._waiting: deque[Aim | Pick | Order] = deque(maxlen=WAITING)
         self._samples: deque[tuple[int, list[float | None]]] = deque(maxlen=KEPT)
         self._picks: dict[str, object] = {}
@@ -167,7 +167,11 @@ class Session:
             dt = self._driven.setup.dt
             while clock + dt <= now and self._driven.step():
                 clock += dt
-            self._publish(self._driven.look())
+            try:
+                self._look = self._driven.look()
+            except NmmError as error:  # a user's function may raise
+                self._driven.trouble = str(error)
+            self._publish(self._look)
             try:
                 changed()
             except NmmError:  # the server has been closed
