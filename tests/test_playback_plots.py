@@ -319,7 +319,7 @@ def test_every_key_acts_and_none_is_stolen(plotted: Plotted) -> None:
     page.evaluate("nmm.camera.moved = true")
     page.keyboard.press("r")
     assert page.evaluate("nmm.camera.moved") is False
-    for side in ("top", "front", "iso"):
+    for side in ("top", "front", "wall", "iso"):
         page.keyboard.press("v")
         assert page.locator("#from").input_value() == side
     # A button, a list and a fold that have the focus keep their own keys.
