@@ -24,7 +24,7 @@ import nmm
 from nmm.driving.driven import Driven
 from nmm.driving.messages import Aim, Order, Pick, parsed
 from nmm.driving.session import Session
-from nmm.driving.setups import RobotSetup, ScenarioSetup, Setup
+from nmm.driving.setups import RobotSetup, ScenarioSetup, Settings, Setup
 from nmm.errors import InputError, ScenarioError
 from nmm.playback.rolling import Rolling
 from nmm.robots.configuration import Configuration
@@ -343,6 +343,36 @@ def test_time_passes_as_it_does_on_the_wall() -> None:
         t1, w1 = loop.picture()["t"], time.monotonic()
         assert t1 - t0 <= w1 - w0 + 0.3
         wait_for(lambda: loop.picture()["t"] - t0 + loop.session._lost / 30.0 >= 0.9 * (w1 - w0))
+
+
+def test_obstacles_are_shown_where_they_are_and_kept_off() -> None:
+    """One that moves, too: the robot gives way to it, as `Collisions` promises."""
+    robot = nmm.load("unicycle_2r")
+    wall = nmm.Obstacle(nmm.Box([0.1, 4.0, 1.0]), [2.0, 0.0, 0.5], name="wall")
+    ball = nmm.Obstacle(nmm.Sphere(0.1), motion=lambda t: [-3.0 + 0.1 * t, 0.0, 0.3], name="ball")
+
+    class Walled(RobotSetup):
+        def controller(self, settings: Settings) -> nmm.Controller:
+            plain = super().controller(settings)
+            return nmm.Controller(
+                robot, plain.task, plain.resolver, limits=plain.limits, dt=self.dt,
+                collisions=nmm.Collisions(0.05, obstacles=[wall, ball]),
+            )  # fmt: skip
+
+    with Loop(Walled(robot, [nmm.Position("ee", "xy")], robot.rest)) as loop:
+        told = [command for command in loop.session.commands if command["type"] == "obstacle"]
+        assert [(one["path"], one["name"]) for one in told] == [
+            ("/nmm/obstacle 0", "wall"), ("/nmm/obstacle 1", "ball"),
+        ]  # fmt: skip
+        loop.session.receive('{"type":"aim","task":0,"value":[3.0,0.0]}')
+        wait_for(lambda: loop.session._look.t > 4.0)
+        lines = [json.loads(line) for line in loop.latest().splitlines()]
+        ((path, matrix),) = next(line for line in lines if line["type"] == "places")["transforms"]
+        picture = next(line for line in lines if line["type"] == "drive")
+        assert path == "/nmm/obstacle 1"
+        assert matrix[12] == pytest.approx(-3.0 + 0.1 * picture["t"], abs=1e-9)
+        # The arm's end would be through the wall by now.
+        assert 1.2 < picture["at"][0][0] < 1.95
 
 
 def test_a_function_that_raises_stops_the_robot_and_not_the_loop() -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nmm.arrays import Array
+from nmm.collisions.obstacle import Obstacle
 from nmm.control.controller import Controller
 from nmm.control.step import Step
 from nmm.driving.choices import Choice, named
@@ -72,6 +73,12 @@ class Driven:
     def has_objective(self) -> bool:
         """Whether there is an H."""
         return self._controller.objective is not None
+
+    @property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """What it keeps off, besides itself."""
+        collisions = self._controller.collisions
+        return () if collisions is None else tuple(collisions.obstacles)
 
     def _stand(self) -> None:
         self.t, self.q = 0.0, self.setup.q0.copy()

@@ -15,6 +15,7 @@ from nmm.driving.choices import Choice
 from nmm.driving.driven import Driven, Look
 from nmm.driving.messages import Aim, Order, Pick, parsed
 from nmm.driving.setups import Setup
+from nmm.driving.surroundings import Surroundings
 from nmm.errors import InputError, NmmError
 from nmm.looks import looks, pretty, rate
 from nmm.playback.channels import Channel, Channels
@@ -109,13 +110,10 @@ class Session:
         commands, self._drawn = live_scene(
             robot, driven.q, driven.wheels, title=driven.setup.name, room=float(robot.reach)
         )
+        self._surroundings = Surroundings(driven.obstacles, robot, driven.q, driven.wheels)
         drawing = Drawing()
-        draw_curves(
-            drawing,
-            [Channels(np.zeros(0), 0, _channels(driven))],
-            looks([""]),
-            0.0,
-        )
+        self._surroundings.draw(drawing, 2.0 * float(robot.reach))
+        draw_curves(drawing, [Channels(np.zeros(0), 0, _channels(driven))], looks([""]), 0.0)
         targets = Drawing()
         targets.add(
             "targets",
@@ -146,10 +144,11 @@ class Session:
             if number != version:
                 version = number
                 lines.append(encode({"type": "choices", "choices": [choice.told() for choice in choices]}))
-            pose, picture = self._picture
+            *placed, picture = self._picture
             fresh = [sample for count, sample in tuple(self._samples) if count > seen]
             seen = self._samples[-1][0] if self._samples else seen
-            return "\n".join([*lines, encode(pose), encode({**picture, "samples": fresh})])
+            lines += [encode(command) for command in placed]
+            return "\n".join([*lines, encode({**picture, "samples": fresh})])
 
         return latest
 
@@ -224,7 +223,7 @@ class Session:
             "told": told,
             "wrong": wrong,
         }
-        self._picture = self._drawn.pose(driven.q, driven.wheels), picture
+        self._picture = self._surroundings.moved(look.t), self._drawn.pose(driven.q, driven.wheels), picture
 
     def _told(self, look: Look) -> tuple[str, bool]:
         """What a page says of the state, and whether that is bad news."""

@@ -81,8 +81,12 @@ const nmm = (window.nmm = { hooks: {}, geometries: {} });
     nmm.viewer.set_object(nmm.split(path), mesh);
   };
 
-  nmm.hooks.pose = ({ transforms }) => {
+  nmm.hooks.places = ({ transforms }) => {
     for (const [path, matrix] of transforms) nmm.viewer.set_transform(nmm.split(path), matrix);
+  };
+
+  nmm.hooks.pose = ({ transforms }) => {
+    nmm.hooks.places({ transforms });
     nmm.viewer.scene.updateMatrixWorld();
     nmm.camera.update();
     const root = new THREE.Vector3().setFromMatrixPosition(nmm.node(nmm.motions[0].root).matrixWorld);
