@@ -2,7 +2,7 @@
 
 Raised while a module is being imported, a `KeyboardInterrupt` is now and then swallowed (a library that tries
 whether another is there catches everything) or leaves a half-made C++ module behind that ends the process
-with "double free": of 450 interrupts in the first 1.4 s of `nmm run`, 9 were lost and one crashed.
+with "double free": of 450 interrupts in the first 1.4 s of `nmm run`, four to nine were lost and one crashed.
 """
 
 from __future__ import annotations
