@@ -90,20 +90,23 @@ class _Child:
     """A process that compiles some functions, one after the other."""
 
     def __init__(self, functions: dict[Path, tuple[str, str, Any]]) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", _BEGIN],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,  # Ctrl-C is for us
-        )
+        (theirs_in, asked), (told, theirs_out) = os.pipe(), os.pipe()
+        self._asked, self._told = os.fdopen(asked, "wb"), os.fdopen(told, "rb", buffering=0)
+        try:
+            self._process = subprocess.Popen(
+                [sys.executable, "-c", _BEGIN],
+                stdin=theirs_in,
+                stdout=theirs_out,
+                stderr=subprocess.DEVNULL,
+                start_new_session=True,  # Ctrl-C is for us
+            )
+        finally:
+            os.close(theirs_in)
+            os.close(theirs_out)
         _children.append(self._process)
         self._begun = b""
         atexit.register(self._end)
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._asked, self._told = self._process.stdin, self._process.stdout
-        os.set_blocking(self._told.fileno(), False)
+        os.set_blocking(told, False)
         for what in (sys.path, [*functions.values()]):
             self._asked.write(pickle.dumps(what))
         self._asked.flush()

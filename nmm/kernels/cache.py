@@ -143,7 +143,7 @@ class KernelCache(caching.FunctionCache):
 def tell_of_the_first() -> None:
     """Say why this takes longer than it will."""
     if not cache_folder().exists():
-        logging.getLogger("nmm").info("compiling for this machine, once: this takes about ten seconds")
+        logging.getLogger("nmm").info("compiling for this machine, once: this takes about half a minute")
 
 
 @cache  # it has not changed when the next function is compiled

@@ -74,9 +74,8 @@ def rows_of(
             progress(len(rows) / len(indices))
 
     with _garbage_of_its_own():
-        first = (
-            len(indices) if threads == 1 else min(1, len(indices))
-        )  # of several the first one compiles alone
+        # Of several the first one compiles alone.
+        first = len(indices) if threads == 1 else min(1, len(indices))
         for k in range(first):
             add(found(k))
         if first < len(indices):
@@ -159,7 +158,6 @@ def scenario_of(definition: Definition, changes: dict[str, Any]) -> Scenario:
     """
     of_robot = {key: value for key, value in changes.items() if key.split(".")[0] == "robot"}
     rest = {key: value for key, value in changes.items() if key not in of_robot}
-
     key = definition.digest, json.dumps(of_robot, default=str)
     if key in _robots:
         return _kept(_robots, key).with_settings(rest)
