@@ -6,19 +6,21 @@ import math
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from nmm.driving.choices import Choice
 from nmm.driving.driven import Driven, Look
+from nmm.driving.making import Making
 from nmm.driving.messages import Aim, Order, Pick, parsed
+from nmm.driving.plotted import channels, numbers, values
 from nmm.driving.setups import Setup
 from nmm.driving.surroundings import Surroundings
 from nmm.errors import InputError, NmmError
-from nmm.looks import looks, pretty, rate
-from nmm.playback.channels import Channel, Channels
+from nmm.looks import looks
+from nmm.playback.channels import Channels
 from nmm.playback.curves import draw_curves
 from nmm.playback.drawing import Drawing
 from nmm.playback.encoding import encode
@@ -100,7 +102,7 @@ class Session:
         self._waiting: deque[Aim | Pick | Order] = deque(maxlen=WAITING)
         self._samples: deque[tuple[int, list[float | None]]] = deque(maxlen=KEPT)
         self._picks: dict[str, object] = {}
-        self._making: _Making | None = None
+        self._making: Making | None = None
         self._paused = False
         self._lost = 0
         self._notice, self._until = "", 0.0
@@ -113,13 +115,13 @@ class Session:
         self._surroundings = Surroundings(driven.obstacles, robot, driven.q, driven.wheels)
         drawing = Drawing()
         self._surroundings.draw(drawing, 2.0 * float(robot.reach))
-        draw_curves(drawing, [Channels(np.zeros(0), 0, _channels(driven))], looks([""]), 0.0)
+        draw_curves(drawing, [Channels(np.zeros(0), 0, channels(driven))], looks([""]), 0.0)
         targets = Drawing()
         targets.add(
             "targets",
             targets=[target.told() for target in driven.targets],
             values=[target.signal.value.tolist() for target in driven.targets],
-            at=[_numbers(at) for at in look.at],
+            at=[numbers(at) for at in look.at],
             reach=float(robot.reach),
         )
         # The last command of a scene says that it has come.
@@ -197,9 +199,9 @@ class Session:
             self._making = None
         if self._picks and self._making is None:
             key = next(iter(self._picks))
-            self._making = _Making(self._driven, key, self._picks.pop(key))
+            self._making = Making(self._driven, key, self._picks.pop(key))
 
-    def _take(self, making: _Making) -> None:
+    def _take(self, making: Making) -> None:
         if making.made is not None:
             self._driven.use(making.made)
         else:
@@ -212,13 +214,13 @@ class Session:
         driven = self._driven
         self._count += 1
         if not self._samples or self._samples[-1][1][0] != look.t:
-            self._samples.append((self._count, [look.t, *_values(driven, look)]))
+            self._samples.append((self._count, [look.t, *values(driven, look)]))
         told, wrong = self._told(look)
         picture: dict[str, Any] = {
             "type": "drive",
             "t": look.t,
             "targets": [target.signal.value.tolist() for target in driven.targets],
-            "at": [_numbers(at) for at in look.at],
+            "at": [numbers(at) for at in look.at],
             "paused": self._paused,
             "told": told,
             "wrong": wrong,
@@ -237,76 +239,3 @@ class Session:
         if self._lost:
             parts.append(f"{self._lost} pictures late")
         return ", ".join(parts), False
-
-
-class _Making:
-    """A controller that is made in a thread: a kind of resolver that is new to this machine is compiled."""
-
-    def __init__(self, driven: Driven, key: str, value: object) -> None:
-        self.made: Any = None
-        self.wrong = ""
-        self.done = False
-        threading.Thread(target=self._make, args=(driven, key, value), daemon=True).start()
-
-    def _make(self, driven: Driven, key: str, value: object) -> None:
-        try:
-            made = driven.with_choice(key, value)
-            self._first_step(made[1], driven)
-            self.made = made
-        except NmmError as error:
-            self.wrong = str(error)
-        except Exception as error:  # a thread's end nobody sees
-            self.wrong = f"{type(error).__name__}: {error}"
-        self.done = True
-
-    @staticmethod
-    def _first_step(controller: Any, driven: Driven) -> None:
-        """The first call compiles."""
-        try:
-            controller.step(driven.t, driven.q, driven.setup.dt)
-        except NmmError:
-            return  # the loop will see, and say so
-        finally:
-            controller.reset()
-
-
-def _channels(driven: Driven) -> tuple[Channel, ...]:
-    """What is plotted: `_values` in this order."""
-    robot, rows = driven.robot, [row for target in driven.targets for row in target.rows]
-    units = ", ".join(dict.fromkeys(unit for _, unit in rows))
-    ends = np.where(robot.limited, robot.q_limits, [-np.inf, np.inf])
-    none = np.zeros(0)
-    return (
-        Channel("error_norm", "‖e‖", units, "error", none, log=True),
-        *([Channel("objective", "H", "", "H", none)] if driven.has_objective else []),
-        Channel("sigma_min", "σ_min", "", "sigma", none),
-        Channel("scale_0", "λ", "", "scale", none),
-        *(
-            Channel(f"u_{name}", _input(driven, i), unit, "inputs", none, (-float(most), float(most)))
-            for i, (name, unit, most) in enumerate(
-                zip(robot.u_names, robot.u_units, robot.u_limits, strict=True)
-            )
-        ),
-        *(Channel(f"error_{name}", f"e of {name}", unit, "components", none) for name, unit in rows),
-        *(
-            Channel(name, pretty(name), unit, "coordinates", none, (float(lower), float(upper)))
-            for name, unit, (lower, upper) in zip(robot.q_names, robot.q_units, ends, strict=True)
-        ),
-    )
-
-
-def _input(driven: Driven, column: int) -> str:
-    name = driven.robot.u_names[column]
-    return pretty(name) if column < driven.robot.platform.p else rate(name)
-
-
-def _values(driven: Driven, look: Look) -> list[float | None]:
-    step = look.step
-    found = [float(np.linalg.norm(step.error)), *([step.objective] if driven.has_objective else [])]
-    found += [look.sigma_min, float(step.scale.min(initial=1.0)), *step.u, *step.error, *step.q]
-    return _numbers(found)
-
-
-def _numbers(values: Iterable[float]) -> list[float | None]:
-    """JSON has no other numbers than finite ones."""
-    return [float(value) if math.isfinite(value) else None for value in values]

@@ -6,6 +6,7 @@ import os
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from nmm.errors import InputError
 from nmm.playback.page import file_page
@@ -41,12 +42,18 @@ def write_html(
     ------
     InputError : no motion, or the file cannot be written; ellipsoids as in `playback_scene`
     """
+    options = {"ghosts": ghosts, "fps": fps, "autoplay": autoplay}
+    return _write_atomically(Path(path), page_of(motions, title, ellipsoids, **options)[1])
+
+
+def page_of(
+    motions: Sequence[Shown], title: str | None, ellipsoids: Wanted, **options: Any
+) -> tuple[str, str]:
+    """The page's heading, and the page; options as of `playback_scene`."""
     if title is None:
         title = motions[0].robot.name if motions else ""
-    commands = playback_scene(
-        motions, title=title, ghosts=ghosts, fps=fps, autoplay=autoplay, ellipsoids=ellipsoids
-    )
-    return _write_atomically(Path(path), file_page(commands, title))
+    commands = playback_scene(motions, title=title, ellipsoids=ellipsoids, **options)
+    return title, file_page(commands, title)
 
 
 def _write_atomically(path: Path, text: str) -> Path:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import html
 from collections.abc import Sequence
 
+from nmm.playback.html import page_of
 from nmm.playback.page import file_page
-from nmm.playback.scene import Shown, playback_scene
+from nmm.playback.scene import Shown
 from nmm.playback.viewer import SCRIPTS, STYLES
 from nmm.playback.viewer_scene import viewer_scene
 from nmm.robots.robot import Robot
@@ -42,11 +43,8 @@ class Page:
         ellipsoids: Wanted = False,
         height: int = HEIGHT,
     ) -> None:
-        if title is None:
-            title = motions[0].robot.name if motions else ""
-        commands = playback_scene(motions, title=title, ghosts=ghosts, fps=fps, ellipsoids=ellipsoids)
-        self.title, self.height = title, height
-        self.html = file_page(commands, title)
+        self.title, self.html = page_of(motions, title, ellipsoids, ghosts=ghosts, fps=fps)
+        self.height = height
 
     def __repr__(self) -> str:
         return f"Page({self.title!r}, {len(self.html) / 1e6:.1f} MB)"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nmm.arrays import Array, interpolated
+from nmm.arrays import Array
 from nmm.errors import InputError
 from nmm.looks import looks, looks_of_labels
 from nmm.playback.channels import channels
@@ -15,6 +15,7 @@ from nmm.playback.curves import draw_curves
 from nmm.playback.drawing import Command, Drawing, DrawnRobot, Rgb
 from nmm.playback.encoding import packed
 from nmm.playback.extent import corners, robot_boxes
+from nmm.playback.framing import TAG, boxes_around, held, middle, reached, tag_places, view_points, wall
 from nmm.playback.keyframes import MOST_FRAMES, Keyframes, ghost_samples, keyframes, samples_kept
 from nmm.playback.obstacles import SceneObstacles, draw_nearest
 from nmm.playback.placements import base_position
@@ -31,11 +32,8 @@ if TYPE_CHECKING:
 DESIRED: Rgb = (0.16, 0.18, 0.22)
 TARGET: Rgb = (0.83, 0.10, 0.22)
 
-#: A robot's name tag is so much higher than the robot.
-TAG = 1.1
-#: Instants at which the room that the robots take is measured, and poses for the room that one can take.
+#: Instants at which the room that the robots take is measured.
 INSTANTS = 80
-POSES = 100
 
 
 #: What a page shows: a run with its curves, or a motion, whose curves are its inputs and coordinates.
@@ -75,12 +73,12 @@ def playback_scene(
     start = min(float(motion.t[0]) for motion in motions)
     end = max(float(motion.t[-1]) for motion in motions)
     times = np.linspace(start, end, INSTANTS)
-    boxes = _boxes(motions, frames, times)
+    boxes = boxes_around(motions, frames, times)
     shown = _ellipsoids(motions, frames, ellipsoids)
     if shown is not None:
         boxes = shown.around(boxes, times)
     obstacles = SceneObstacles(motions, boxes, fps)
-    view = np.vstack([_view(boxes, motions), obstacles.points()])
+    view = np.vstack([view_points(boxes, motions), obstacles.points()])
     size = max(0.5 * float(np.linalg.norm(np.ptp(view, axis=0))), 1e-3)
     several = len(motions) > 1
     if ghosts is None:
@@ -95,9 +93,9 @@ def playback_scene(
         start=start,
         duration=end - start,
         view=packed(view, np.float64),
-        tags=packed(_tags(motions, boxes, times) if several else np.zeros((0, 3)), np.float64),
-        follow=_held(boxes, _middle(motions, frames, times)),
-        wall=_wall(motions),
+        tags=packed(tag_places(motions, boxes, times) if several else np.zeros((0, 3)), np.float64),
+        follow=held(boxes, middle(motions, frames, times)),
+        wall=wall(motions),
         size=size,
     )
     animations = obstacles.draw(drawing, size, start)
@@ -172,7 +170,7 @@ def live_scene(
         start=0.0,
         duration=0.0,
         view=packed(corners(around), np.float64),
-        follow=_held(_reached(robot, q, wheels)[np.newaxis], base_position(robot, q)[np.newaxis]),
+        follow=held(reached(robot, q, wheels)[np.newaxis], base_position(robot, q)[np.newaxis]),
         size=0.5 * float(np.linalg.norm(np.ptp(around, axis=0))),
     )
     drawn = DrawnRobot(drawing, robot, "/nmm/motion 0/robot")
@@ -201,16 +199,6 @@ def _ellipsoids(
 
     options = options_of(wanted)
     return None if options is None else SceneEllipsoids(motions, frames, options)
-
-
-def _reached(robot: Robot, q: Array, wheels: Array) -> Array:
-    """Boxes around the robot at q (n,) and with its joints anywhere in their limits, (POSES + 1, 2, 3)."""
-    lower, upper = np.clip(robot.q_limits, -np.pi, np.pi).T
-    poses = np.random.default_rng(0).uniform(lower, upper, (POSES, robot.n))
-    moving = np.arange(robot.n) >= min(3, robot.platform.n_p)
-    poses[:, ~moving] = q[~moving]
-    poses = np.vstack([q, robot.following.placed(poses)])
-    return robot_boxes(robot, poses, np.tile(wheels, (len(poses), 1)))
 
 
 def _desired(drawing: Drawing, motions: Sequence[Motion]) -> None:
@@ -260,80 +248,3 @@ def _on_the_floor(motion: Motion, size: float) -> Array | None:
     if float(np.ptp(at, axis=0).max(initial=0.0)) < 1e-6:
         return None
     return np.column_stack([at, np.full(len(at), 2e-3 * size)])
-
-
-def _wall(motions: Sequence[Motion]) -> list[float] | None:
-    """The normal (2,) of the upright plane that the paths lie nearest to, towards the robots; None without
-    one."""
-    paths = [line for motion in motions for line in (motion.desired, motion.driven) if line is not None]
-    points = np.vstack(paths)[:, :2] if paths else np.zeros((0, 2))
-    if len(points) < 3:
-        return None
-    middle = points.mean(axis=0)
-    spread, axes = np.linalg.eigh(np.cov(points.T))
-    if spread[1] < 1e-12:
-        return None
-    normal = axes[:, 0]
-    bases = np.vstack([base_position(motion.robot, motion.q) for motion in motions])
-    side = float((bases.mean(axis=0) - middle) @ normal)
-    return (-normal if side < 0.0 else normal).tolist()
-
-
-def _boxes(motions: Sequence[Motion], frames: Sequence[Keyframes], times: Array) -> Array:
-    """Boxes around the robots at the times, (motions, times, 2, 3)."""
-    return np.array(
-        [
-            robot_boxes(
-                motion.robot,
-                interpolated(times, frame.t, frame.q),
-                interpolated(times, frame.t, frame.wheels),
-            )
-            for motion, frame in zip(motions, frames, strict=True)
-        ]
-    )
-
-
-def _middle(motions: Sequence[Motion], frames: Sequence[Keyframes], times: Array) -> Array:
-    """Midpoint of the platforms at the times, (times, 2)."""
-    places = [
-        interpolated(times, frame.t, base_position(motion.robot, frame.q))
-        for motion, frame in zip(motions, frames, strict=True)
-    ]
-    return np.asarray(np.mean(places, axis=0))
-
-
-def _view(boxes: Array, motions: Sequence[Motion]) -> Array:
-    """Points that the camera has to hold, (P, 3)."""
-    points = [corners(boxes).reshape(-1, 3)]
-    for motion in motions:
-        points += [
-            line[:: max(1, len(line) // 200)] for line in (motion.driven, motion.desired) if line is not None
-        ]
-        if motion.target is not None:
-            points.append(np.atleast_2d(motion.target))
-    return np.vstack(points)
-
-
-def _tags(motions: Sequence[Motion], boxes: Array, times: Array) -> Array:
-    """Where the motions' name tags are at the times, (P, 3); the page writes them so high above the roots."""
-    found = []
-    for i, motion in enumerate(motions):
-        at = interpolated(times, motion.t, base_position(motion.robot, motion.q))
-        found.append(np.column_stack([at, np.full(len(at), TAG * boxes[i, 0, 1, 2])]))
-    return np.vstack(found)
-
-
-def _held(boxes: Array, middle: Array) -> dict[str, float]:
-    """What a camera holds that follows the robots' middle: an upright cylinder, m.
-
-    Parameters
-    ----------
-    boxes : (motions, K, 2, 3) around the robots at K instants
-    middle : (K, 2) the robots' middle then
-    """
-    offsets = corners(boxes)[..., :2] - middle[:, np.newaxis]
-    return {
-        "radius": float(np.linalg.norm(offsets, axis=-1).max()),
-        "low": float(boxes[..., 2].min()),
-        "high": float(boxes[..., 2].max()),
-    }
