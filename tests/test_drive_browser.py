@@ -73,7 +73,11 @@ def drag(page: Page, start: list[float], by: tuple[float, float]) -> None:
 
 
 def arrived(page: Page) -> None:
-    """The error falls by e each second, or faster with a larger gain."""
+    """The error falls by e each second, or faster with a larger gain.
+
+    First the program must know what has been aimed at: until then the error is that of the target before.
+    """
+    page.wait_for_function("nmm.drive.targets[0].awaited === undefined", timeout=1000.0 * MOST)
     page.wait_for_function(f"{ERROR} < 2e-3", timeout=1000.0 * MOST)
 
 

@@ -2,7 +2,7 @@
 "use strict";
 {
   const THREE = MeshCat.THREE;
-  const [WINDOW, KEPT, REDRAW] = [20, 30, 100]; // s, s, ms
+  const [WINDOW, KEPT, REDRAW, PATIENCE] = [20, 30, 100, 5000]; // s, s, ms, ms
   const drive = (nmm.drive = { targets: [], active: 0, time: 0, paused: false });
   const panel = document.createElement("div");
   const parts = {};
@@ -22,6 +22,7 @@
   const aims = new Map();
   function aim(target, value) {
     target.value = value;
+    target.awaited = performance.now();
     aims.set(target.number, value);
     show(target);
   }
@@ -151,7 +152,10 @@
     Object.assign(nmm.player, { time: t, range: { from: Math.max(0, t - WINDOW), to: Math.max(t, 1) } });
     drive.targets.forEach((target, i) => {
       target.at = at[i];
-      const busy = aims.has(i) || (nmm.gizmos.held && nmm.gizmos.held.gizmo === target.gizmo);
+      // Pictures on their way know nothing of what has just been aimed at.
+      const echoed = targets[i].every((x, k) => x === target.value[k]);
+      if (echoed || performance.now() - target.awaited > PATIENCE) target.awaited = undefined;
+      const busy = target.awaited !== undefined || (nmm.gizmos.held && nmm.gizmos.held.gizmo === target.gizmo);
       if (!busy) {
         target.value = targets[i];
         show(target);
