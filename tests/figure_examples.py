@@ -36,6 +36,9 @@ def check_legible(made: Figure) -> None:
         numbered = [label for label in axes.get_yticklabels() if label.get_visible() and label.get_text()]
         shares = [other for other in made.axes if other.get_ylabel() and same_row(axes, other)]
         assert not numbered or shares
+        if axes.get_ylabel():
+            name = axes.yaxis.label.get_window_extent(renderer)
+            assert all(name.x1 <= one.get_window_extent(renderer).x0 for one in numbered)
         shown = axes.get_legend()
         if shown is not None:
             assert shown.get_window_extent(renderer).y0 >= axes.get_window_extent(renderer).y1 - 1.0

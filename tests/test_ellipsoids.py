@@ -70,16 +70,17 @@ def test_projections_reach_as_far_as_velocities_seen_from_there(name: str) -> No
     robot = load(name)
     q, d = random_q(robot, 5), directions(40, 2)
     found = ellipsoids_along(robot, None, q)
-    for view in ((0, 1), (0, 2), (1, 2)):
+    turned = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 2)))[0].T
+    for view in (np.eye(3)[[0, 1]], np.eye(3)[[0, 2]], turned):
         shadow = found.projected(view)
         outlines = shadow.outline(0.3, 2000) - shadow.center[:, None]
         for k in range(len(q)):
             # The largest of d J u with ‖u‖ <= 1 is the length of the row d J.
-            expected = np.linalg.norm(d @ jacobian(robot, found.frame, q[k])[list(view)], axis=1)
+            expected = np.linalg.norm(d @ view @ jacobian(robot, found.frame, q[k]), axis=1)
             reach = np.linalg.norm((d @ shadow.axes[k]) * shadow.radii[k], axis=1)
             np.testing.assert_allclose(reach, expected, atol=1e-13)
             np.testing.assert_allclose((outlines[k] @ d.T).max(axis=0), 0.3 * expected, atol=1e-5)
-            np.testing.assert_allclose(shadow.center[k], found.center[k][list(view)])
+            np.testing.assert_allclose(shadow.center[k], view @ found.center[k])
 
 
 def test_a_planar_robot_has_no_third_radius() -> None:

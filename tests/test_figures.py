@@ -15,14 +15,11 @@ import numpy as np
 import pytest
 from figure_examples import PAPER, check_legible, cut, drawn_points, run
 from matplotlib.figure import Figure
-from matplotlib.path import Path as Hull
 
 from nmm import figures
 from nmm.control.controller import Controller
 from nmm.errors import InputError
 from nmm.figures import style
-from nmm.figures.hulls import hull
-from nmm.figures.motion import Scene
 from nmm.functions.tasks import Coordinates, Heading, Position, Task
 from nmm.resolvers import ProjectedGradient
 from nmm.robots.loading import load
@@ -179,25 +176,6 @@ def test_long_run_is_drawn_with_few_points() -> None:
     for make in (figures.errors, figures.inputs, figures.stroboscopic):
         lines = [line for axes in make(long).axes for line in axes.lines]
         assert max(len(line.get_xdata()) for line in lines) < 3500
-
-
-@pytest.mark.parametrize("name", ["unicycle_2r_position", "panda_mecanum_pose", "small_arm_second_trailer"])
-def test_times_stand_beside_their_robot(name: str) -> None:
-    """Each label's middle lies on no platform, it covers no other, and it is near its own robot."""
-    made = figures.stroboscopic(run(name, "pg", dt=0.05))
-    made.canvas.draw()
-    axes = made.axes[0]
-    boxes = [text.get_window_extent() for text in axes.texts]
-    scene = Scene(run(name, "pg", dt=0.05))
-    assert len(boxes) == len(scene.poses)
-    shapes = [Hull(hull(shape[:, :2])) for pose in scene.poses for shape in [*pose.body, *pose.wheels]]
-    size = np.ptp(np.vstack([pose.points() for pose in scene.poses])[:, :2], axis=0).max()
-    for k, (box, text, pose) in enumerate(zip(boxes, axes.texts, scene.poses, strict=True)):
-        assert not any(shape.contains_point(text.get_position()) for shape in shapes)
-        assert not any(box.overlaps(other) for other in boxes[:k])
-        corners = hull(pose.main[:, :2])
-        edge = Hull(np.vstack([corners, corners[:1]])).interpolated(50).vertices
-        assert np.linalg.norm(edge - text.get_position(), axis=1).min() < 0.1 * size
 
 
 def test_instants() -> None:

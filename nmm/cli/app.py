@@ -11,7 +11,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from nmm.cli.groups import Browser, Ellipsoids, command
+from nmm.cli.groups import Browser, Ellipsoids, Figures, command
 from nmm.cli.interrupts import raise_interrupts
 from nmm.cli.mapping import map_measures
 from nmm.cli.options import (
@@ -96,6 +96,7 @@ def run(
         bool, typer.Option("--play", help="Play the motion in the browser afterwards; Ctrl-C ends it.")
     ] = False,
     ellipsoids: Ellipsoids,
+    figures: Figures,
 ) -> int:
     """Run a scenario and write what happened.
 
@@ -105,6 +106,7 @@ def run(
     nmm run unicycle_2r_position --set task.0.reference.radius=2 --set robot.arguments.d=0.5
     nmm run unicycle_3r_spline --set 'q0={x: 0.2, q2: pi/3}' --html --out here
     nmm run unicycle_3r_position --ellipsoids --html
+    nmm run unicycle_2r_position --format png,pdf --width column
 
     The folder holds trajectory.npz and trajectory.csv (times, coordinates, inputs, errors, objective),
     summary.json (the numbers of the table), scenario.yaml (every key, to be run again) and figures as PNG,
@@ -113,9 +115,16 @@ def run(
     """
     from nmm.cli.runs import run_scenario
 
-    drawn = ellipsoids.wanted()
     return run_scenario(
-        scenario, resolver, settings_of(settings), limits, out, html=html, play=play, ellipsoids=drawn
+        scenario,
+        resolver,
+        settings_of(settings),
+        limits,
+        out,
+        html=html,
+        play=play,
+        ellipsoids=ellipsoids.wanted(),
+        figures=figures.options(),
     )
 
 
@@ -129,6 +138,7 @@ def compare(
     limits: LimitsOption = None,
     out: Annotated[Path | None, out_option("runs/<scenario>-compare")] = None,
     ellipsoids: Ellipsoids,
+    figures: Figures,
 ) -> int:
     """Run a scenario with several resolvers.
 
@@ -143,15 +153,25 @@ def compare(
     """
     from nmm.cli.runs import compare_resolvers
 
-    kinds, drawn = resolvers_of(resolvers), ellipsoids.wanted()
-    return compare_resolvers(scenario, kinds, settings_of(settings), limits, out, ellipsoids=drawn)
+    return compare_resolvers(
+        scenario,
+        resolvers_of(resolvers),
+        settings_of(settings),
+        limits,
+        out,
+        ellipsoids=ellipsoids.wanted(),
+        figures=figures.options(),
+    )
 
 
 @app.command()
+@command
 def paper(
+    *,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Where to write, as for `nmm run`.")] = Path(
         "paper"
     ),
+    figures: Figures,
 ) -> int:
     """Redo the paper's cases and figures.
 
@@ -160,7 +180,7 @@ def paper(
     """
     from nmm.cli.runs import write_the_paper
 
-    return write_the_paper(out)
+    return write_the_paper(out, figures.options())
 
 
 @app.command()

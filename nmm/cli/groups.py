@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass
 from functools import wraps
 from typing import TYPE_CHECKING, Any, get_type_hints
@@ -13,6 +14,7 @@ from nmm.cli.options import (
     AxleOption,
     EllipsoidScaleOption,
     EllipsoidsOption,
+    FormatOption,
     LockOption,
     NoOpenOption,
     PackageOption,
@@ -21,12 +23,15 @@ from nmm.cli.options import (
     SubjectArgument,
     SubjectSetOption,
     TaskOption,
+    WidthOption,
     axle_of,
     lock_of,
+    names_of,
 )
 
 if TYPE_CHECKING:
     from nmm.runs.ellipsoid_options import Wanted
+    from nmm.runs.figure_options import FigureOptions
 
 
 def command(function: Callable[..., int | None]) -> Callable[..., int | None]:
@@ -135,3 +140,20 @@ class Ellipsoids:
         from nmm.runs.ellipsoid_options import EllipsoidOptions
 
         return EllipsoidOptions(scale=self.ellipsoid_scale)
+
+
+@dataclass(frozen=True)
+class Figures:
+    """As what figures are written, and how wide."""
+
+    format: FormatOption = "png"
+    width: WidthOption = None
+
+    def options(self) -> FigureOptions:
+        """What they ask for; `InputError` for an unknown format or width."""
+        from nmm.runs.figure_options import FigureOptions
+
+        width: float | str | None = self.width
+        with suppress(ValueError, TypeError):
+            width = float(self.width or "")
+        return FigureOptions(tuple(dict.fromkeys(names_of(self.format, "--format"))), width)

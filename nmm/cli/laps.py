@@ -10,6 +10,7 @@ from nmm.cli.interrupts import shielded
 from nmm.cli.output import complain, progress, show_table, show_text, warn
 from nmm.folders.laps import is_laps, save
 from nmm.folders.whole import check_folder
+from nmm.runs.figure_options import PLAIN, FigureOptions
 
 if TYPE_CHECKING:
     from nmm.analysis.redundancy.laps import Laps
@@ -25,6 +26,7 @@ def run_laps(
     laps: int,
     period: float | None,
     out: Path | None,
+    figures: FigureOptions = PLAIN,
 ) -> int:
     """Run the laps, write the folder, print the tables; 1 when a run ended before its last lap."""
     from nmm.analysis.redundancy.laps import repeatability
@@ -36,7 +38,7 @@ def run_laps(
     with progress(f"{scenario.name}, {laps} laps") as report:
         found = repeatability(scenario, laps=laps, resolvers=kinds, period=period, progress=report)
     with shielded():
-        save(found, folder)
+        save(found, folder, figures=figures)
     show_text(f"{scenario.name}: {found.transient}; period {found.period:.6g} s")
     for one in found.laps:
         for warning in one.trajectory.warnings:

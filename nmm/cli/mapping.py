@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from nmm.cli.groups import Loading, Subject, command
+from nmm.cli.groups import Figures, Loading, Subject, command
 from nmm.cli.options import LengthOption, names_of, out_option, values_of
 from nmm.cli.output import progress
 from nmm.errors import InputError
@@ -91,6 +91,7 @@ def map_measures(
     length: LengthOption = None,
     out: Annotated[Path | None, out_option("runs/<subject>-map")] = None,
     loading: Loading,
+    figures: Figures,
 ) -> None:
     """Map singularity and manipulability over two coordinates or a plane of the workspace.
 
@@ -104,7 +105,7 @@ def map_measures(
     nmm map unicycle_3r --task position --workspace xz --measure weighted,inverse_condition --alpha 0.3
 
     The folder holds map.npz (axes, values, rank, singular lines and points), map.json (what was computed)
-    and a PNG a measure.
+    and a figure a measure.
     """
     from nmm.analysis.maps.coordinates import check_held, singularity_map
     from nmm.analysis.maps.workspace import check_given, workspace_map
@@ -112,6 +113,7 @@ def map_measures(
     from nmm.cli.subjects import studied
     from nmm.folders.map import is_map
 
+    drawn = figures.options()
     counts, bounds = counts_of(samples), ranges_of(ranges)
     if workspace is None:
         refuse({"--frame": frame, "--height": height}, "--workspace PLANE")
@@ -144,5 +146,5 @@ def map_measures(
             made = workspace_map(
                 what.subject, frame, plane=workspace, height=slab, samples=counts[0], **common
             )
-    made.save(folder)
+    made.save(folder, figures=drawn)
     show_map(made, folder)

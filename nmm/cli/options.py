@@ -142,8 +142,18 @@ EllipsoidScaleOption = Annotated[
         show_default="a readable one",
     ),
 ]
-
-
+FormatOption = Annotated[
+    str,
+    typer.Option("--format", metavar="KIND,KIND,...", help="Formats of the figures: some of png, pdf, svg."),
+]
+WidthOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="IN",
+        help="Width of the figures, in; or column (3.5 in) or page (7.16 in), as journals have them.",
+        show_default="as reads well on a screen",
+    ),
+]
 LimitsOption = Annotated[
     bool | None,
     typer.Option(

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from nmm.cli.groups import Browser, Loading, Subject, command
+from nmm.cli.groups import Browser, Figures, Loading, Subject, command
 from nmm.cli.options import (
     ResolversOption,
     ScenarioArgument,
@@ -116,6 +116,8 @@ def laps(
     ] = None,
     settings: SetOption = None,
     out: Annotated[Path | None, out_option("runs/<scenario>-laps")] = None,
+    *,
+    figures: Figures,
 ) -> int:
     """Go round a closed path several times: does the posture come back?
 
@@ -130,4 +132,7 @@ def laps(
     from nmm.cli.laps import run_laps
 
     kinds = resolvers_of(resolvers)
-    return run_laps(scenario, kinds, settings_of(settings), laps=number, period=period, out=out)
+    asked = figures.options()
+    return run_laps(
+        scenario, kinds, settings_of(settings), laps=number, period=period, out=out, figures=asked
+    )

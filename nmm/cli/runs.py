@@ -14,6 +14,7 @@ from nmm.folders import comparison
 from nmm.folders.run import is_run
 from nmm.folders.run import save as save_run
 from nmm.folders.whole import check_folder
+from nmm.runs.figure_options import PLAIN, FigureOptions
 from nmm.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ def run_scenario(
     html: bool,
     play: bool,
     ellipsoids: Wanted = False,
+    figures: FigureOptions = PLAIN,
 ) -> int:
     """Run a scenario, write its folder, print its table."""
     scenario = _load(name, resolver, settings, limits)
@@ -40,14 +42,14 @@ def run_scenario(
     check_folder(folder, is_run)
     trajectory = _run(scenario)
     with shielded():
-        _tell_and_save(trajectory, folder, html=html, ellipsoids=ellipsoids)
+        _tell_and_save(trajectory, folder, html=html, ellipsoids=ellipsoids, figures=figures)
     status = _status("nmm run", [trajectory], folder)
     if play and len(trajectory):
         trajectory.play(ellipsoids=ellipsoids)
     return status
 
 
-def _tell_and_save(trajectory: Trajectory, folder: Path, *, html: bool, ellipsoids: Wanted) -> None:
+def _tell_and_save(trajectory: Trajectory, folder: Path, **asked: Any) -> None:
     """The numbers first: nobody has to wait for figures to see them."""
     width = 0
     gone: OSError | None = None
@@ -59,7 +61,7 @@ def _tell_and_save(trajectory: Trajectory, folder: Path, *, html: bool, ellipsoi
         except OSError as error:  # their reader has gone (`nmm run … | head -3`): the folder is written still
             gone = error
 
-    save_run(trajectory, folder, html=html, ellipsoids=ellipsoids, tell=tell)
+    save_run(trajectory, folder, tell=tell, **asked)
     if gone is not None:
         raise gone
     show_table(["", ""], [["files in".ljust(width), str(folder)]])
@@ -73,6 +75,7 @@ def compare_resolvers(
     out: Path | None,
     *,
     ellipsoids: Wanted = False,
+    figures: FigureOptions = PLAIN,
 ) -> int:
     """Run a scenario with several resolvers; write and print how they compare."""
     from nmm.runs.timing import step_time
@@ -88,7 +91,7 @@ def compare_resolvers(
         if trajectories[-1].outcome == "interrupted":
             break
     with shielded():
-        comparison.save(trajectories, folder, scenarios[0].name, ellipsoids=ellipsoids)
+        comparison.save(trajectories, folder, scenarios[0].name, ellipsoids=ellipsoids, figures=figures)
     table = [dict(describe(trajectory, trajectory.summary())) for trajectory in trajectories]
     for column, scenario, trajectory in zip(table, scenarios, trajectories, strict=False):
         if len(trajectory):
@@ -105,12 +108,12 @@ def compare_resolvers(
     return _status("nmm compare", trajectories, folder)
 
 
-def write_the_paper(folder: Path) -> int:
+def write_the_paper(folder: Path, figures: FigureOptions = PLAIN) -> int:
     """The paper's cases and figures; 0 when every claim holds."""
     from nmm.paper import write_paper
 
     with progress("the paper's four cases") as report:
-        paper = write_paper(folder, progress=report)
+        paper = write_paper(folder, progress=report, figures=figures)
     show_table(
         ["case", "what the paper claims", "holds"],
         [

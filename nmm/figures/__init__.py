@@ -3,11 +3,14 @@
 from nmm.figures.clearance import clearance
 from nmm.figures.composed import comparison, overview, write_run_figures
 from nmm.figures.curves import coordinates, errors, inputs, singular_values, tracking
+from nmm.figures.files import save
 from nmm.figures.limits import limits
 from nmm.figures.motion import stroboscopic
 from nmm.figures.objective import objective_comparison
+from nmm.runs.figure_options import FigureOptions
 
 __all__ = [
+    "FigureOptions",
     "clearance",
     "comparison",
     "coordinates",
@@ -16,6 +19,7 @@ __all__ = [
     "limits",
     "objective_comparison",
     "overview",
+    "save",
     "singular_values",
     "stroboscopic",
     "tracking",

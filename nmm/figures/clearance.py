@@ -22,15 +22,15 @@ def has_clearance(trajectory: Trajectory) -> bool:
     )
 
 
-def clearance(trajectory: Trajectory) -> Figure:
+def clearance(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
     """The least distance over time, on the way to the next sample included, coloured by the nearest pair;
-    the distance asked for as a line."""
+    the distance asked for as a line; `width` in wide."""
     t, d, pairs = trajectory.t, trajectory.clearance_between, trajectory.clearance_pairs
     kinds, counts = np.unique(pairs[(pairs >= 0) & np.isfinite(d)], return_counts=True)
     named = [int(pair) for pair in kinds[np.argsort(-counts, kind="stable")][:NAMED]]
     names = [trajectory.clearance_names[pair] for pair in named]
     entries = [*names, *["other pairs"] * (len(kinds) > NAMED), "distance to keep"]
-    made, (axes,) = style.stack([2.2], [style.legend_rows(entries)])
+    made, (axes,) = style.stack([2.2], [entries], width)
     style.curve(axes, t, d, "other pairs" if len(kinds) > NAMED else None, style.LIGHT)
     for k, (pair, name) in enumerate(zip(named, names, strict=True)):
         # Each stretch goes on to the sample at which another pair takes over.

@@ -15,40 +15,75 @@ from nmm.arrays import Array
 from nmm.errors import InputError
 from nmm.figures import curves, style
 from nmm.figures.clearance import clearance, has_clearance
+from nmm.figures.files import save_as
 from nmm.figures.limits import draw_scale, has_limits, limits
 from nmm.figures.motion import Scene, stroboscopic
 from nmm.figures.objective import draw_best_objective, has_objective, objective_comparison
 from nmm.runs.ellipsoid_options import Wanted
+from nmm.runs.figure_options import PLAIN, FigureOptions
 from nmm.runs.trajectory import Trajectory
 
-#: Width of a figure of two columns and of its left column, in.
-_WIDTH, _VIEW = 10.4, 4.8
+#: Width of a figure of two columns, in.
+_WIDTH = 10.4
+#: A narrower one has one column, in.
+_NARROW = 6.0
+#: The tallest drawing of a motion, in.
+_TALLEST = 6.2
 
 
-def overview(trajectory: Trajectory) -> Figure:
-    """One run at a glance: the motion, the error's norm, the objective, the inputs; under limits λ, too."""
-    scene = Scene(trajectory)
+class _Columns:
+    """Drawings at the left, panels over time at the right; in a narrow figure the panels below.
+
+    Attributes
+    ----------
+    view, left, right : width of the drawings, and where the panels begin and end, in
+    """
+
+    def __init__(self, width: float) -> None:
+        self.width, self.beside = width, width >= _NARROW
+        across = width - style.LEFT - style.RIGHT
+        self.view = 0.5 * (across - style.LEFT) if self.beside else across
+        self.left = style.LEFT + (self.view + style.LEFT if self.beside else 0.0)
+        self.right = width - style.RIGHT
+
+    def rows(self, names: Sequence[str]) -> int:
+        """Rows of a legend above a panel."""
+        return style.legend_rows(names, self.right - self.left)
+
+    def made(self, panels: float, drawing: float) -> tuple[Figure, float, float]:
+        """A figure for panels and a drawing so high, and where both begin, from the top, in."""
+        if self.beside:
+            total = style.BOTTOM + panels
+            return style.figure(self.width, total), total, total
+        total = 2.0 * style.BOTTOM + panels + drawing
+        return style.figure(self.width, total), total - style.BOTTOM - drawing, total
+
+
+def overview(trajectory: Trajectory, *, width: float = _WIDTH) -> Figure:
+    """One run at a glance: the motion, the error's norm, the objective, the inputs; under limits λ, too.
+
+    Parameters
+    ----------
+    width : of the figure, in; one narrower than 6 in has one column
+    """
+    scene, columns = Scene(trajectory), _Columns(width)
     parts = list(curves.input_parts(trajectory).values())
-    left = style.LEFT + _VIEW + style.LEFT
-    names = [curves.input_names(trajectory, columns) for columns in parts]
+    names = [curves.input_names(trajectory, part) for part in parts]
     limited = has_limits(trajectory)
-    legends = [
-        1,
-        1,
-        *(style.legend_rows(part, _WIDTH - left - style.RIGHT) for part in names),
-        *([1] * limited),
-    ]
-    drawn = min(scene.height(scene.views[0], _VIEW), 6.2)
-    each = max(1.0, (style.GAP + drawn - style.column_height([], legends)) / len(legends))
+    legends = [1, 1, *(columns.rows(part) for part in names), *([1] * limited)]
+    drawn = min(scene.height(scene.views[0], columns.view), _TALLEST)
+    above = style.room(style.legend_rows(scene.names, columns.view))
+    each = 1.0
+    if columns.beside:
+        each = max(each, (above + drawn - style.column_height([], legends)) / len(legends))
     heights = [each] * len(legends)
-    total = style.BOTTOM + style.column_height(heights, legends)
-    made = style.figure(_WIDTH, total)
-    below = _draw_views(made, scene, total)
-    if below > style.BOTTOM + style.GAP + 0.8:
+    made, begins, top = columns.made(style.column_height(heights, legends), above + drawn)
+    below = _draw_views(made, scene, columns, top)
+    if columns.beside and below > style.BOTTOM + style.GAP + 0.8:
         height = min(below - style.BOTTOM - style.GAP, 1.4)
-        axes = style.place(made, style.LEFT, below - style.GAP - height, _VIEW, height)
+        axes = style.place(made, style.LEFT, below - style.GAP - height, columns.view, height)
         curves.draw_singular_value(axes, trajectory)
-    panels = style.column(made, heights, legends, left, _WIDTH - style.RIGHT, total)
+    panels = style.column(made, heights, legends, columns.left, columns.right, begins)
     curves.draw_error_norm(panels[0], trajectory)
     draw_best_objective(panels[1], [trajectory])
     if not trajectory.complete:
@@ -56,8 +91,8 @@ def overview(trajectory: Trajectory) -> Figure:
             1.0, 1.04, f"run {trajectory.outcome}", transform=panels[1].transAxes, ha="right", va="bottom",
             fontsize=style.TEXT, color=looks.VERMILLION, fontweight="bold",
         )  # fmt: skip
-    for axes, columns in zip(panels[2:], parts, strict=False):
-        curves.draw_inputs(axes, trajectory, columns)
+    for axes, part in zip(panels[2:], parts, strict=False):
+        curves.draw_inputs(axes, trajectory, part)
         style.legend(axes)
     if limited:
         draw_scale(panels[-1], trajectory, named=False)
@@ -65,39 +100,47 @@ def overview(trajectory: Trajectory) -> Figure:
     return made
 
 
-def _draw_views(made: Figure, scene: Scene, top: float) -> float:
+def _draw_views(made: Figure, scene: Scene, columns: _Columns, top: float) -> float:
     """Draw the views of the motion that fit, from the top down; returns where the room left begins, in."""
-    for index, view in enumerate(scene.views):
-        tall = scene.height(view, _VIEW)
-        height = min(tall, 6.2)
+    for index, view in enumerate(scene.views if columns.beside else scene.views[:1]):
+        tall = scene.height(view, columns.view)
+        height = min(tall, _TALLEST)
         if index and top - style.GAP - height < style.BOTTOM:
             break
-        rows = 1 if index else style.legend_rows(scene.names, _VIEW)
+        rows = 1 if index else style.legend_rows(scene.names, columns.view)
         top -= style.room(rows) + height
-        axes = style.place(made, style.LEFT, top, _VIEW * height / tall, height)
+        axes = style.place(made, style.LEFT, top, columns.view * height / tall, height)
         scene.draw(axes, view)
         if index == 0:
-            style.legend(axes, _VIEW)
+            style.legend(axes, columns.view)
         top -= style.BOTTOM
     return top
 
 
-def comparison(trajectories: Sequence[Trajectory]) -> Figure:
-    """Several runs side by side: their paths from above, objective, error and size of the inputs."""
+def comparison(trajectories: Sequence[Trajectory], *, width: float = _WIDTH) -> Figure:
+    """Several runs side by side: their paths from above, objective, error and size of the inputs.
+
+    Parameters
+    ----------
+    width : of the figure, in; one narrower than 6 in has one column
+
+    Raises
+    ------
+    InputError : no run with a sample
+    """
     runs = [run for run in trajectories if len(run)]
     if not runs:
         raise InputError("figure of a comparison: expected a run with at least one sample, got none")
-    worn = looks.looks([run.resolver for run in runs])
-    left = style.LEFT + _VIEW + style.LEFT
-    rows = style.legend_rows([look.name for look in worn], _WIDTH - left - style.RIGHT)
+    worn, columns = looks.looks([run.resolver for run in runs]), _Columns(width)
+    rows = columns.rows([look.name for look in worn])
     heights, legends = [1.3] * 3, [rows] * 3
-    total = style.BOTTOM + style.column_height(heights, legends)
-    made = style.figure(_WIDTH, total)
-    entries = 1 + (2 if runs[0].path is not None else 1) * len(runs)
-    above = style.room(-(-entries // 3))
-    view = style.place(made, style.LEFT, style.BOTTOM, _VIEW, total - style.BOTTOM - above)
+    high = style.column_height(heights, legends)
+    above = style.room(style.legend_rows(_path_names(runs, worn), columns.view))
+    drawing = high if columns.beside else above + 0.8 * columns.view
+    made, begins, top = columns.made(high, drawing)
+    view = style.place(made, style.LEFT, top - drawing, columns.view, drawing - above)
     _draw_paths(view, runs, worn)
-    panels = style.column(made, heights, legends, left, _WIDTH - style.RIGHT, total)
+    panels = style.column(made, heights, legends, columns.left, columns.right, begins)
     draw_best_objective(panels[0], runs)
     _draw_norms(panels[1], runs, worn, [run.error_norm for run in runs])
     style.label(panels[1], y=f"‖e‖ {style.units(runs[0].r_units)}")
@@ -116,6 +159,15 @@ def _name_last(panels: Sequence[Axes]) -> None:
     style.label(panels[-1], x="time t [s]")
 
 
+def _path_names(runs: Sequence[Trajectory], worn: Sequence[looks.Look]) -> list[str]:
+    """The entries of the paths' legend."""
+    names = ["target"] * bool(len(runs[0].held)) + ["desired path"] * (runs[0].moving is not None)
+    for run, (name, *_) in zip(runs, worn, strict=True):
+        names += [f"{name}: {run.frame}"] * (run.path is not None)
+        names += [f"{name}: platform"] * bool(run.robot.platform.n_p)
+    return names
+
+
 def _draw_paths(axes: Axes, runs: Sequence[Trajectory], worn: Sequence[looks.Look]) -> None:
     desired, held = runs[0].moving, runs[0].held
     if len(held):
@@ -131,11 +183,15 @@ def _draw_paths(axes: Axes, runs: Sequence[Trajectory], worn: Sequence[looks.Loo
         )
     if desired is not None:
         axes.plot(desired[:, 0], desired[:, 1], color="#C3C8D0", linewidth=5.0, label="desired path")
-    for run, (name, color, dashes) in zip(runs, worn, strict=True):
+    for k, (run, (name, color, dashes)) in enumerate(zip(runs, worn, strict=True)):
+        # The later ones are thinner: those below are seen where they run the same way.
+        below = len(runs) - 1 - k
         if run.path is not None:
-            axes.plot(*run.path[:, :2].T, dashes, color=color, linewidth=1.5, label=f"{name}: {run.frame}")
+            width = 1.5 + style.WIDER * below
+            axes.plot(*run.path[:, :2].T, dashes, color=color, linewidth=width, label=f"{name}: {run.frame}")
         if run.robot.platform.n_p:
-            axes.plot(*run.q[:, :2].T, dashes, color=color, linewidth=0.8, label=f"{name}: platform")
+            width = 0.8 + 0.5 * below
+            axes.plot(*run.q[:, :2].T, dashes, color=color, linewidth=width, label=f"{name}: platform")
     axes.set_aspect("equal", adjustable="datalim")
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(nbins=9, steps=[1, 2, 5, 10]))
@@ -147,8 +203,8 @@ def _draw_norms(
     axes: Axes, runs: Sequence[Trajectory], worn: Sequence[looks.Look], norms: Sequence[Array]
 ) -> None:
     positive = np.concatenate([norm[np.isfinite(norm) & (norm > 0.0)] for norm in norms])
-    for run, (name, color, dashes), norm in zip(runs, worn, norms, strict=True):
-        style.curve(axes, run.t, np.where(norm > 0.0, norm, np.nan), name, color, dashes)
+    for k, (run, look, norm) in enumerate(zip(runs, worn, norms, strict=True)):
+        style.curve(axes, run.t, np.where(norm > 0.0, norm, np.nan), *look, below=len(runs) - 1 - k)
     style.time_axis(axes, max((run.t for run in runs), key=lambda t: t[-1]))
     if positive.size:
         style.log_axis(axes, max(float(positive.min()), 1e-16), float(positive.max()))
@@ -157,35 +213,40 @@ def _draw_norms(
 
 
 def write_run_figures(
-    trajectory: Trajectory, folder: str | Path, *, ellipsoids: Wanted = False
+    trajectory: Trajectory,
+    folder: str | Path,
+    *,
+    ellipsoids: Wanted = False,
+    options: FigureOptions = PLAIN,
 ) -> list[Path]:
-    """Write motion.png, errors.png, inputs.png; where there are such objective, limits and clearance, too.
+    """Write motion, errors and inputs; where there are such objective, limits and clearance, too.
 
     Parameters
     ----------
     trajectory : a run of at least one sample
     folder : an existing folder
-    ellipsoids : whether ellipses.png is written too, or how (`nmm.playback.EllipsoidOptions`)
+    ellipsoids : whether ellipses are drawn too, or how (`nmm.playback.EllipsoidOptions`)
+    options : formats and width
 
     Returns
     -------
-    The files written.
+    The files written: motion.png and so on, or of the formats asked for.
     """
-    folder = Path(folder)
+    across = options.across()
     figures = {
-        "motion": stroboscopic(trajectory),
-        "errors": curves.errors(trajectory),
-        "inputs": curves.inputs(trajectory),
+        "motion": stroboscopic(trajectory, **across),
+        "errors": curves.errors(trajectory, **across),
+        "inputs": curves.inputs(trajectory, **across),
     }
     if has_objective([trajectory]):
-        figures["objective"] = objective_comparison([trajectory])
+        figures["objective"] = objective_comparison([trajectory], **across)
     if has_limits(trajectory):
-        figures["limits"] = limits(trajectory)
+        figures["limits"] = limits(trajectory, **across)
     if has_clearance(trajectory):
-        figures["clearance"] = clearance(trajectory)
+        figures["clearance"] = clearance(trajectory, **across)
     if ellipsoids is not False:
         # Not before: with it comes the whole of the analysis.
         from nmm.figures.ellipses import ellipses
 
-        figures["ellipses"] = ellipses(trajectory, ellipsoids)
-    return [style.save(made, folder / f"{name}.png") for name, made in figures.items()]
+        figures["ellipses"] = ellipses(trajectory, ellipsoids, **across)
+    return [path for name, made in figures.items() for path in save_as(made, Path(folder), name, options)]

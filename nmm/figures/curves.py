@@ -17,9 +17,14 @@ from nmm.runs.trajectory import Trajectory
 
 #: Errors below this fraction of the largest are rounding, and say nothing of the rate of decay.
 _FLOOR = 1e-9
+#: Two panels stand beside each other in a figure that is at least so wide, in.
+_ROOM_FOR_TWO = 4.5
+_SIGMA = "smallest singular value of J_bar"
+#: As wide as the legend of the error's norm is, with its guide.
+_NORM_AND_GUIDE = ("‖e‖", "‖e(0)‖ exp(−K t), K = 0.0000 1/s (fitted)")
 
 
-def errors(trajectory: Trajectory, gain: float | None = None) -> Figure:
+def errors(trajectory: Trajectory, gain: float | None = None, *, width: float = style.PAGE) -> Figure:
     """The task error's components over time, a panel a unit, and ‖e‖ on a logarithmic scale.
 
     Parameters
@@ -27,10 +32,11 @@ def errors(trajectory: Trajectory, gain: float | None = None) -> Figure:
     trajectory : the run
     gain : K of the guide ‖e(0)‖ exp(-K t), 1/s; when not given, the one that all tasks of the run's
         scenario share, or else the rate fitted to the run
+    width : of the figure, in
     """
     kinds = style.groups(trajectory.r_units)
-    legends = [style.legend_rows(_error_names(trajectory, rows)) for rows in kinds.values()]
-    made, panels = style.stack([1.15] * len(kinds) + [1.5], [*legends, 1])
+    legends = [_error_names(trajectory, rows) for rows in kinds.values()]
+    made, panels = style.stack([1.15] * len(kinds) + [1.5], [*legends, _NORM_AND_GUIDE], width)
     for axes, (unit, rows) in zip(panels, kinds.items(), strict=False):
         draw_components(axes, trajectory, rows, unit)
     draw_error_norm(panels[-1], trajectory, gain)
@@ -119,10 +125,11 @@ def fitted_rate(t: Array, values: Array) -> float | None:
     return float(-np.polyfit(t[:end], np.log(values[:end]), 1)[0])
 
 
-def tracking(trajectory: Trajectory) -> Figure:
-    """Each component of the task over time, its reference dashed (the paper's Fig. 9)."""
+def tracking(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
+    """Each component of the task over time, its reference dashed (the paper's Fig. 9); `width` in wide."""
     count = len(trajectory.r_names)
-    made, panels = style.stack([1.1] * count)
+    legends = [[name, "reference"] for name in trajectory.r_names]
+    made, panels = style.stack([1.1] * count, legends, width)
     for row, axes in enumerate(panels):
         name = trajectory.r_names[row]
         color = looks.CYCLE[row % 7]
@@ -144,20 +151,25 @@ def _unwrapped(trajectory: Trajectory, row: int, *, reference: bool = False) -> 
     return target if reference else target - trajectory.error[:, row]
 
 
-def inputs(trajectory: Trajectory) -> Figure:
+def inputs(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
     """The inputs over time: the platform's in one panel, the arm's in another.
 
     Where the initial transient dwarfs the rest, it has panels of its own at the left, and those at
-    the right are scaled to what comes after it.
+    the right are scaled to what comes after it; not in figures that have no room for both.
+
+    Parameters
+    ----------
+    width : of the figure, in
     """
     parts = list(input_parts(trajectory).values())
-    legends = [style.legend_rows(input_names(trajectory, columns)) for columns in parts]
+    across = width - style.LEFT - style.RIGHT
+    legends = [style.legend_rows(input_names(trajectory, columns), across) for columns in parts]
     heights = [1.45] * len(parts)
     total = style.BOTTOM + style.column_height(heights, legends)
-    made = style.figure(style.PAGE, total)
-    transient = _transient(trajectory)
-    edge = style.PAGE - style.RIGHT
-    split = style.LEFT if transient is None else 2.6
+    made = style.figure(width, total)
+    transient = _transient(trajectory) if width >= _ROOM_FOR_TWO else None
+    edge = width - style.RIGHT
+    split = style.LEFT if transient is None else 0.5 * width
     panels = style.column(made, heights, legends, split, edge, total)
     start, end = float(trajectory.t[0]), float(trajectory.t[-1])
     for k, (axes, columns) in enumerate(zip(panels, parts, strict=True)):
@@ -172,7 +184,7 @@ def inputs(trajectory: Trajectory) -> Figure:
         draw_inputs(left, trajectory, columns, named=k == len(parts) - 1, until=transient)
         left.set_xlim(start, transient)
         left.xaxis.set_major_locator(MaxNLocator(nbins=4))
-        style.legend(left, style.PAGE - style.LEFT - style.RIGHT)
+        style.legend(left, across)
         right.set_xlim(transient, end)
         right.set_ylabel("")
     return made
@@ -238,8 +250,8 @@ def input_symbol(trajectory: Trajectory, column: int) -> str:
     return f"{name[0]}\u0307{name[1]}" if is_rate else name
 
 
-def coordinates(trajectory: Trajectory) -> Figure:
-    """The coordinates over time: the platform's position, its angles, the arm."""
+def coordinates(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
+    """The coordinates over time: the platform's position, its angles, the arm; `width` in wide."""
     robot = trajectory.robot
     n_p = robot.platform.n_p
     parts = [
@@ -247,11 +259,8 @@ def coordinates(trajectory: Trajectory) -> Figure:
         for part, first, kinds in (("platform", 0, robot.q_units[:n_p]), ("arm", n_p, robot.q_units[n_p:]))
         for unit, columns in style.groups(kinds).items()
     ]
-    legends = [
-        style.legend_rows([looks.pretty(robot.q_names[column]) for column in columns])
-        for _, _, columns in parts
-    ]
-    made, panels = style.stack([1.2] * len(parts), legends)
+    legends = [[looks.pretty(robot.q_names[column]) for column in columns] for _, _, columns in parts]
+    made, panels = style.stack([1.2] * len(parts), legends, width)
     for index, (axes, (part, unit, columns)) in enumerate(zip(panels, parts, strict=True)):
         for k, column in enumerate(columns):
             name = looks.pretty(robot.q_names[column])
@@ -262,10 +271,13 @@ def coordinates(trajectory: Trajectory) -> Figure:
     return made
 
 
-def singular_values(trajectory: Trajectory) -> Figure:
-    """The smallest singular value of J_bar over time; below it RG's partition, its switches marked."""
+def singular_values(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
+    """The smallest singular value of J_bar over time; below it RG's partition, its switches marked; `width`
+    in wide."""
     partitioned = bool(np.any(trajectory.partition >= 0))
-    made, panels = style.stack([1.7, 0.28] if partitioned else [1.7])
+    names = [_SIGMA, *["switch of partition"] * bool(_switched(trajectory))]
+    heights, legends = ([1.7, 0.28], [names, []]) if partitioned else ([1.7], [names])
+    made, panels = style.stack(heights, legends, width)
     draw_singular_value(panels[0], trajectory, named=not partitioned)
     if partitioned:
         _draw_partition(panels[1], trajectory)
@@ -274,7 +286,7 @@ def singular_values(trajectory: Trajectory) -> Figure:
 
 def draw_singular_value(axes: Axes, trajectory: Trajectory, *, named: bool = True) -> None:
     """The smallest singular value of J_bar over time, RG's switches of partition marked."""
-    style.curve(axes, trajectory.t, trajectory.sigma_min, "smallest singular value of J_bar", looks.BLUE)
+    style.curve(axes, trajectory.t, trajectory.sigma_min, _SIGMA, looks.BLUE)
     for k, sample in enumerate(_switched(trajectory)):
         name = "switch of partition" if k == 0 else None
         axes.axvline(trajectory.t[sample], color=looks.VERMILLION, linestyle="--", linewidth=1.0, label=name)

@@ -24,8 +24,9 @@ from nmm.analysis.singular.parts import WHOLE
 from nmm.arrays import Array
 from nmm.errors import InputError
 from nmm.figures import style
+from nmm.figures.files import save
 from nmm.figures.silhouette import Pose, Silhouette
-from nmm.figures.views import ABOVE, SIDE, View, Viewed, page
+from nmm.figures.views import ABOVE, View, Viewed, page, upright
 from nmm.playback.extent import extent_of
 from nmm.playback.keyframes import ghost_samples
 from nmm.robots.motion import Motion
@@ -47,7 +48,13 @@ _LINE = 0.2
 _BODY, _EDGE, _FILL, _RIM, _ARM = "#EEF0F3", "#BFC5CE", looks.SKY, looks.BLUE, looks.VERMILLION
 
 
-def ellipses(trajectory: Trajectory, options: Wanted = True, path: str | Path | None = None) -> Figure:
+def ellipses(
+    trajectory: Trajectory,
+    options: Wanted = True,
+    path: str | Path | None = None,
+    *,
+    width: float = style.PAGE,
+) -> Figure:
     """The end-effector's path with the ellipses of its velocities at instants spread evenly along the way.
 
     An ellipse holds the velocities, seen in that view, that inputs of size 1 give the frame: the shadow of
@@ -58,20 +65,21 @@ def ellipses(trajectory: Trajectory, options: Wanted = True, path: str | Path | 
     ----------
     trajectory : the run, of at least one sample
     options : frame, sizes of the inputs, and scale; True for the task's frame, 1, and a readable one
-    path : of a PNG to write, too
+    path : of a file to write, too (`nmm.figures.save`)
+    width : of the figure, in
 
     Raises
     ------
     InputError : no sample; a frame or an input that the robot does not have
     """
     scene = _Ellipses(trajectory, options_of(options) or EllipsoidOptions())
-    made = page(scene, above=_LINE)
+    made = page(scene, width, above=_LINE)
     made.text(
-        style.LEFT / style.PAGE, 1.0 - 0.5 * _LINE / float(made.get_size_inches()[1]), scene.text,
+        style.LEFT / width, 1.0 - 0.5 * _LINE / float(made.get_size_inches()[1]), scene.text,
         fontsize=style.SMALL, color=style.GREY, va="top",
     )  # fmt: skip
     if path is not None:
-        style.save(made, path)
+        save(made, path)
     return made
 
 
@@ -102,15 +110,18 @@ class _Ellipses(Viewed):
         samples = ghost_samples(motion, count) or [0]
         drawn = np.unique(np.linspace(0, len(samples) - 1, ROBOTS).round().astype(int))
         self.poses = [silhouette.at(q[samples[k]]) for k in drawn]
+        side = upright(self.path)
         self.outlines = {
-            view: {part: found.projected(view).outline(self.scale)[samples] for part, found in along.items()}
-            for view in (ABOVE, SIDE)
+            view: {
+                part: found.projected(view.rows).outline(self.scale)[samples] for part, found in along.items()
+            }
+            for view in (ABOVE, side)
         }
         sizes = zip(along[WHOLE].input_sizes, robot.u_units, strict=True)
         self.sizes = list(dict.fromkeys(f"{size:.3g} {unit}" for size, unit in sizes))
         upwards = float(np.nan_to_num(along[WHOLE].half_extents()[:, 2]).max())
         rises = float(np.ptp(self.path[:, 2])) > _FLAT
-        self.views = (ABOVE, SIDE) if rises or upwards > _FLAT * largest else (ABOVE,)
+        self.views = (ABOVE, side) if rises or upwards > _FLAT * largest else (ABOVE,)
 
     @property
     def names(self) -> list[str]:
@@ -124,13 +135,13 @@ class _Ellipses(Viewed):
         sizes = ", ".join(self.sizes) if len(self.sizes) <= 2 else "the sizes given"
         return f"velocities for ‖u‖ ≤ 1 ({sizes}); {scale_text(self.scale)}"
 
-    def points(self, view: View) -> list[Array]:
+    def points(self, view: View, width: float) -> list[Array]:
         """Path, robots and ellipses."""
-        points = [self.path[:, view], *(pose.points()[:, view] for pose in self.poses)]
+        points = [view.of(self.path), *(view.of(pose.points()) for pose in self.poses)]
         return points + [outlines.reshape(-1, 2) for outlines in self.outlines[view].values()]
 
     def draw(self, axes: Axes, view: View) -> None:
-        """Draw the scene seen along the world axis that `view` leaves out."""
+        """Draw the scene as it is seen in a view."""
         self.dress(axes, view)
         for pose in self.poses:
             _draw_faintly(axes, pose, view)
@@ -143,7 +154,7 @@ class _Ellipses(Viewed):
                 zorder=4.0 if part == WHOLE else 4.5,
             )  # fmt: skip
             axes.add_collection(shapes, autolim=False)
-        path = self.path[:, view]
+        path = view.of(self.path)
         axes.plot(*path.T, color=looks.BLACK, linewidth=1.2, label=f"path of {self.frame}", zorder=5.0)
         for point, marker, text in ((path[0], "o", "start"), (path[-1], "s", "end")):
             axes.plot(
@@ -160,11 +171,11 @@ def _draw_faintly(axes: Axes, pose: Pose, view: View) -> None:
     faces = PolyCollection(bodies, facecolors=[_BODY], linewidths=0, zorder=2.1)
     wheels = pose.tyres(view)
     marks = PolyCollection(wheels, facecolors=[_EDGE], linewidths=0, zorder=2.2)
-    lines = [ends[:, view] for ends in pose.links]
+    lines = [view.of(ends) for ends in pose.links]
     links = LineCollection(lines, colors=[_EDGE], linewidths=2.2, capstyle="round", zorder=2.3)
     for drawn in (edges, faces, marks, links):
         axes.add_collection(drawn, autolim=False)
-    joints: Array = pose.joints[:, view]
+    joints: Array = view.of(pose.joints)
     axes.plot(
         *joints.T, "o", markersize=2.6, color="white", markeredgecolor=_EDGE, zorder=2.4, linestyle="none"
     )

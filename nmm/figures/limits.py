@@ -17,6 +17,7 @@ from nmm.runs.trajectory import Trajectory
 #: A limit counts as near within this share of its range.
 NEAR = 0.05
 #: What the lines and the shading are called.
+_LEAST = "least margin"
 LIMIT, FREE = "limit", f"farther than {100 * NEAR:g} % of the range from both"
 
 
@@ -25,7 +26,7 @@ def has_limits(trajectory: Trajectory) -> bool:
     return trajectory.limited and bool(trajectory.limit_names) and len(trajectory.shares) == len(trajectory)
 
 
-def limits(trajectory: Trajectory) -> Figure:
+def limits(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
     """Each limited quantity in the band of its range over time, 0 at its lower and 1 at its upper limit.
 
     Inputs in one panel, coordinates and what else is limited in another; below them λ and the least margin.
@@ -38,12 +39,18 @@ def limits(trajectory: Trajectory) -> Figure:
         "others": [i for i in columns if trajectory.limit_names[i] not in inputs],
     }
     shown = {name: part for name, part in parts.items() if part}
-    legends = [style.legend_rows([*_names(trajectory, part), LIMIT, FREE]) for part in shown.values()]
-    made, panels = style.stack([1.5] * len(shown) + [1.1], [*legends, 1])
+    legends = [[*_names(trajectory, part), LIMIT, FREE] for part in shown.values()]
+    legends.append([*_levels(trajectory), _LEAST])
+    made, panels = style.stack([1.5] * len(shown) + [1.1], legends, width)
     for axes, (name, part) in zip(panels, shown.items(), strict=False):
         draw_shares(axes, trajectory, part, f"{name}, share of range")
     draw_scale(panels[-1], trajectory)
     return made
+
+
+def _levels(trajectory: Trajectory) -> list[str]:
+    count = trajectory.scale.shape[1]
+    return ["λ"] if count == 1 else [f"λ, level {level + 1}" for level in range(count)]
 
 
 def _names(trajectory: Trajectory, columns: Sequence[int]) -> list[str]:
@@ -70,14 +77,12 @@ def draw_shares(axes: Axes, trajectory: Trajectory, columns: Sequence[int], y: s
 
 def draw_scale(axes: Axes, trajectory: Trajectory, *, named: bool = True) -> None:
     """λ of each level, and the least margin of all limits: 0.5 in the middle of its range, 0 at a limit."""
-    levels = trajectory.scale.shape[1]
-    for level in range(levels):
-        name = "λ" if levels == 1 else f"λ, level {level + 1}"
+    for level, name in enumerate(_levels(trajectory)):
         style.curve(axes, trajectory.t, trajectory.scale[:, level], name, looks.CYCLE[level % 7])
     least = margin(trajectory.shares)
     lowest = 0.0
     if np.all(np.isfinite(least)):
-        style.curve(axes, trajectory.t, least, "least margin", looks.VERMILLION, "--")
+        style.curve(axes, trajectory.t, least, _LEAST, looks.VERMILLION, "--")
         lowest = min(0.0, float(least.min()))
     axes.set_ylim(lowest - 0.05, 1.05)
     style.label(axes, y="λ, margin")

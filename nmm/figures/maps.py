@@ -20,6 +20,7 @@ from nmm.analysis.maps.result import Map
 from nmm.arrays import Array
 from nmm.errors import expect_known
 from nmm.figures import style
+from nmm.figures.files import save
 from nmm.figures.map_sets import draw_sets
 from nmm.words import fraction_of_pi
 
@@ -33,13 +34,16 @@ MOST_NAMED = 6
 WORST = "worst posture"
 
 
-def map_figure(drawn: Map, measure: str | None = None, path: str | Path | None = None) -> Figure:
+def map_figure(
+    drawn: Map, measure: str | None = None, path: str | Path | None = None, *, width: float | None = None
+) -> Figure:
     """The figure of a measure: over two coordinates one map; of a workspace the best and the worst beside it.
 
     Parameters
     ----------
     measure : the map's first one when not given
-    path : of a PNG to write, too
+    path : of a file to write, too (`nmm.figures.save`)
+    width : of the figure, in; when not given, so that a map's longest side is 3.5 in
 
     Raises
     ------
@@ -51,16 +55,20 @@ def map_figure(drawn: Map, measure: str | None = None, path: str | Path | None =
     if drawn.kind == "workspace":
         layers = {"best posture": drawn.values[measure], WORST: drawn.worst[measure]}
     layers = {name: _even(drawn, measure, name, values) for name, values in layers.items()}
-    width, height = _size(drawn)
-    step = width + BETWEEN + (0.3 if len(layers) > 1 else 0.0)
-    total = style.LEFT + step * (len(layers) - 1) + width + BAR_GAP + BAR + BAR_ROOM
+    across, height = _size(drawn)
+    between, beside = BETWEEN + 0.3, style.LEFT + BAR_GAP + BAR + BAR_ROOM
+    if width is not None:
+        asked = (width - beside - between * (len(layers) - 1)) / len(layers)
+        across, height = asked, height * asked / across
+    step = across + between
+    total = beside + step * (len(layers) - 1) + across
     lines = _title(drawn, measure, total)
     legend = 0 if drawn.kind == "workspace" and drawn.singular.empty and drawn.arm_singular is None else 1
     above = 0.12 + LINE * len(lines) + (style.GAP if legend else 0.1) + (0.2 if len(layers) > 1 else 0.0)
     made = style.figure(total, style.BOTTOM + height + above)
     bounds = _bounds(layers.values())
     for k, (name, values) in enumerate(layers.items()):
-        axes = style.place(made, style.LEFT + k * step, style.BOTTOM, width, height)
+        axes = style.place(made, style.LEFT + k * step, style.BOTTOM, across, height)
         image = _draw_values(axes, drawn, values, bounds)
         if name:
             axes.set_title(name, fontsize=style.SMALL, color=looks.BLACK, pad=3)
@@ -74,7 +82,7 @@ def map_figure(drawn: Map, measure: str | None = None, path: str | Path | None =
     if legend:
         style.legend(made.axes[0], np.inf, lift=0.2 if len(layers) > 1 else 0.0)
     if path is not None:
-        style.save(made, path)
+        save(made, path)
     return made
 
 

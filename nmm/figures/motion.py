@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
@@ -15,17 +13,16 @@ from nmm import looks
 from nmm.arrays import Array
 from nmm.errors import InputError
 from nmm.figures import style
-from nmm.figures.hulls import Covered, along, hull
+from nmm.figures.hulls import hull
 from nmm.figures.obstacles import FAINTEST, OBSTACLE, OBSTACLE_TEXT, outlines, with_the_nearest
 from nmm.figures.silhouette import Pose, Silhouette
-from nmm.figures.views import ABOVE, SIDE, View, Viewed, page
+from nmm.figures.time_labels import SIZE, Ground, Place, Subject, places
+from nmm.figures.views import ABOVE, View, Viewed, page, upright
 from nmm.playback.placements import base_position
 from nmm.runs.trajectory import Trajectory
 
-#: Distance of a time's label from what it belongs to, as a share of the figure's larger side.
-_LABEL = 0.03
-#: Such a label is wider than high: distances across count less.
-_FLAT = (0.35, 1.0)
+#: Sizes of the marks at the path's ends and of a target, pt.
+_END, _TARGET = 6.0, 12.0
 #: When no instants are given: at most so many, at least so many, a platform's length apart.
 MOST, LEAST = 11, 4
 #: A run whose arm rises or falls by more than this is drawn from the side too, m.
@@ -33,24 +30,27 @@ _RISES = 0.01
 _PATH_COLOR, _BODY, _EDGE, _ARM = looks.BLUE, "#B9C0CA", "#3F4652", looks.VERMILLION
 
 
-def stroboscopic(trajectory: Trajectory, instants: ArrayLike | int | None = None) -> Figure:
+def stroboscopic(
+    trajectory: Trajectory, instants: ArrayLike | int | None = None, *, width: float = style.PAGE
+) -> Figure:
     """The robot seen from above at instants of the run (the paper's Figs. 3, 5 and 7).
 
     Platform with wheels and heading, arm, end-effector's path, desired path, start, end and the
-    target, looked at or held; drawings fade towards the start. A second view from the side, with the
-    same x axis, where the arm leaves the plane.
+    target, looked at or held; drawings fade towards the start. A second view from the side, of the upright
+    plane in which the motion mostly lies, where the arm leaves the ground's.
 
     Parameters
     ----------
     trajectory : the run, of at least one sample
     instants : times to draw at, s, or how many, evenly spaced; when not given 11, or fewer where
         they would cover each other
+    width : of the figure, in
 
     Raises
     ------
     InputError : no sample; an instant outside the run
     """
-    return page(Scene(trajectory, instants))
+    return page(Scene(trajectory, instants), width)
 
 
 class Scene(Viewed):
@@ -71,11 +71,11 @@ class Scene(Viewed):
         self.poses: list[Pose] = [silhouette.at(trajectory.q[k]) for k in samples]
         self.lines = _lines(trajectory)
         self.outlines = outlines(trajectory, self.times)
-        solid = [hull(outline.points[:, :2]) for outline in self.outlines]
-        self.labels = _label_places(self.poses, list(self.lines.values()), solid)
+        self._labels: dict[float, list[Place]] = {}
         heights = np.array([[*pose.joints[:, 2], *pose.tip[:, 2]] for pose in self.poses])
         rises = heights.size > 0 and float(np.ptp(heights, axis=0).max()) > _RISES
-        self.views = (ABOVE, SIDE) if rises else (ABOVE,)
+        self.side = upright(self.lines["path"])
+        self.views = (ABOVE, self.side) if rises else (ABOVE,)
 
     @property
     def names(self) -> list[str]:
@@ -88,67 +88,114 @@ class Scene(Viewed):
     def _path_name(self) -> str:
         return f"path of {self.trajectory.frame}" if self.trajectory.frame else "path of the platform"
 
-    def points(self, view: View) -> list[Array]:
-        """Robots, paths, labels and target."""
+    def points(self, view: View, width: float) -> list[Array]:
+        """Robots, paths, targets, and the times beside them."""
+        return [*self._drawn(view), *(place.corners for place in self.times_at(view, width))]
+
+    def _drawn(self, view: View) -> list[Array]:
         points = [*(pose.points() for pose in self.poses), *self.lines.values()]
-        if view == ABOVE:
-            points.append(np.column_stack([self.labels, np.zeros(len(self.labels))]))
         points += [outline.points for outline in self.outlines]
-        points.append(self.trajectory.marks)
-        return [part[:, view] for part in points]
+        return [view.of(part) for part in [*points, self.trajectory.marks]]
+
+    def times_at(self, view: View, width: float) -> list[Place]:
+        """Where the times stand in a drawing `width` in wide: the robots', then the obstacles'."""
+        if view != ABOVE:
+            return []
+        if width not in self._labels:
+            drawn = np.vstack(self._drawn(view))
+            drawn = drawn[np.isfinite(drawn).all(axis=1)]
+            extent = float(np.ptp(drawn[:, 0]))
+            # The farther out they stand, the smaller is all else drawn, and the larger are they beside it.
+            scale = 1.1 * extent / width
+            subjects, ground = self._shown(view, scale)
+            for _ in range(4):
+                scale = 1.1 * extent / width
+                found = places(subjects, ground, scale)
+                every = np.vstack([drawn[:, :1], *[place.corners[:, :1] for place in found]])
+                extent = float(np.ptp(every))
+                if 1.08 * extent / width <= scale:  # what stands around is a margin of 8 %
+                    break
+            self._labels[width] = found
+        return self._labels[width]
+
+    def _shown(self, view: View, scale: float) -> tuple[list[Subject], Ground]:
+        """What times belong to, and all that is drawn, at about so many m for each inch."""
+        robots = [edge for pose in self.poses for edge in [*pose.bodies(view), *pose.tyres(view)]]
+        links = [view.of(ends) for pose in self.poses for ends in pose.links]
+        solid = [hull(view.of(outline.points)) for outline in self.outlines]
+        paths = [view.of(line) for line in self.lines.values()]
+        mains = [hull(view.of(pose.main)) for pose in self.poses]
+        subjects = [Subject(_seconds(float(t)), edge) for t, edge in zip(self.times, mains, strict=True)]
+        subjects += [
+            Subject(_span(*outline.times), edge)
+            for outline, edge in zip(self.outlines, solid, strict=True)
+            if outline.times is not None
+        ]
+        ends, targets = view.of(self.lines["path"][[0, -1]]), view.of(self.trajectory.marks)
+        marks = [*_around(ends, _END, scale), *_around(targets, _TARGET, scale)]
+        return subjects, Ground([*paths, *links, *marks], [*robots, *solid], scale)
 
     def draw(self, axes: Axes, view: View) -> None:
-        """Draw the scene seen along the world axis that `view` leaves out."""
-        across, up = view
+        """Draw the scene as it is seen in a view."""
         trajectory = self.trajectory
         self.dress(axes, view)
         strengths = np.linspace(FAINTEST, 1.0, len(self.poses)) if len(self.poses) > 1 else [1.0]
         for k, (pose, strength) in enumerate(zip(self.poses, strengths, strict=True)):
             # From the side the robots of a round path stand behind each other: every second one is enough.
-            if view == SIDE and len(self.poses) > 6 and (len(self.poses) - 1 - k) % 2:
+            if view != ABOVE and len(self.poses) > 6 and (len(self.poses) - 1 - k) % 2:
                 continue
             _draw_pose(axes, pose, view, float(strength), k / len(self.poses))
-            if view == ABOVE:
-                axes.text(
-                    float(self.labels[k, 0]), float(self.labels[k, 1]),
-                    _seconds(float(self.times[k])), color=style.GREY,
-                    fontsize=style.SMALL - 1.0, ha="center", va="center", zorder=7,
-                )  # fmt: skip
         for k, outline in enumerate(self.outlines):
-            shade, edge = _faded(OBSTACLE, outline.strength), hull(outline.points[:, view])
+            shade, edge = _faded(OBSTACLE, outline.strength), hull(view.of(outline.points))
             axes.fill(
                 *edge.T, facecolor=(*shade, 0.25), edgecolor=shade, linewidth=1.0,
                 zorder=2.5, label=None if k else "obstacle",
             )  # fmt: skip
-            if view == ABOVE and outline.times is not None:
-                x, y = 0.5 * (edge.min(axis=0) + edge.max(axis=0))
-                axes.text(
-                    float(x), float(y), _span(*outline.times), color=OBSTACLE_TEXT,
-                    fontsize=style.SMALL - 1.0, ha="center", va="center", zorder=7,
-                )  # fmt: skip
-        desired, path = self.lines.get("desired"), self.lines.get("path")
-        if desired is not None:
+        self._draw_times(axes, view)
+        if "desired" in self.lines:
             axes.plot(
-                desired[:, across], desired[:, up], "--", color=looks.BLACK, linewidth=1.1,
+                *view.of(self.lines["desired"]).T, "--", color=looks.BLACK, linewidth=1.1,
                 dashes=(4, 2.5), label="desired path", zorder=5.2,
             )  # fmt: skip
-        if path is not None:
+        path = view.of(self.lines["path"])
+        axes.plot(*path.T, color=_PATH_COLOR, linewidth=1.5, label=self._path_name, zorder=5.1)
+        for point, marker, text in ((path[0], "o", "start"), (path[-1], "s", "end")):
             axes.plot(
-                path[:, across], path[:, up], color=_PATH_COLOR, linewidth=1.5, label=self._path_name,
-                zorder=5.1,
+                *point, marker, color=looks.GREEN if text == "start" else looks.PINK,
+                markersize=_END, markeredgecolor="white", markeredgewidth=0.8, label=text,
+                linestyle="none", zorder=6,
             )  # fmt: skip
-            for point, marker, text in ((path[0], "o", "start"), (path[-1], "s", "end")):
-                axes.plot(
-                    point[across], point[up], marker, color=looks.GREEN if text == "start" else looks.PINK,
-                    markersize=6, markeredgecolor="white", markeredgewidth=0.8, label=text,
-                    linestyle="none", zorder=6,
-                )  # fmt: skip
-        marks = trajectory.marks
-        if len(marks):
+        if len(trajectory.marks):
             axes.plot(
-                marks[:, across], marks[:, up], "*", color=looks.ORANGE, markersize=12,
+                *view.of(trajectory.marks).T, "*", color=looks.ORANGE, markersize=_TARGET,
                 markeredgecolor=looks.BLACK, markeredgewidth=0.7, label="target", linestyle="none", zorder=6,
             )  # fmt: skip
+
+    def _draw_times(self, axes: Axes, view: View) -> None:
+        width, _ = style.inches(axes)
+        of_obstacles = [_span(*outline.times) for outline in self.outlines if outline.times is not None]
+        texts = [*map(_seconds, self.times.tolist()), *of_obstacles]
+        for k, (place, text) in enumerate(zip(self.times_at(view, width), texts, strict=False)):
+            color = style.GREY if k < len(self.times) else OBSTACLE_TEXT
+            axes.text(
+                float(place.middle[0]),
+                float(place.middle[1]),
+                text,
+                color=color,
+                fontsize=SIZE,
+                ha="center",
+                va="center",
+                zorder=7,
+            )
+            if place.foot is not None:
+                axes.plot(*np.array([place.foot, place.end]).T, color=color, linewidth=0.5, zorder=6.5)
+
+
+def _around(points: Array, size: float, scale: float) -> list[Array]:
+    """The edges of marks of that size, pt, at points (k, 2) of a drawing of `scale` m for each inch."""
+    angles = np.linspace(0.0, 2.0 * np.pi, 13)
+    circle = np.column_stack([np.cos(angles), np.sin(angles)]) * 0.5 * size / 72.0 * scale
+    return [point + circle for point in points]
 
 
 def _seconds(t: float) -> str:
@@ -157,60 +204,6 @@ def _seconds(t: float) -> str:
 
 def _span(first: float, last: float) -> str:
     return _seconds(last) if first == last else f"{style.number(round(first, 2))} to {_seconds(last)}"
-
-
-def _label_places(poses: Sequence[Pose], lines: Sequence[Array], solid: Sequence[Array]) -> Array:
-    """Where the times are written, (k, 2): near each platform, clear of drawings if there is room; not within
-    the outlines `solid`, (k, 2) each."""
-    drawn = np.vstack(
-        [_outline(pose) for pose in poses] + [line[:: max(1, len(line) // 300), :2] for line in lines]
-    )
-    robots = [edge for pose in poses for edge in [*pose.bodies(ABOVE), *pose.tyres(ABOVE)]]
-    covered = Covered([*robots, *solid])
-    angles = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
-    directions = np.column_stack([np.cos(angles), np.sin(angles)])
-    away = _LABEL * float(np.ptp(drawn, axis=0).max())
-    flat = _thinned(drawn * _FLAT, away / 20.0)
-    width = 2.0 * away * np.array([[-1.0, 0.0], [0.0, 0.0], [1.0, 0.0]])
-    places: list[Array] = []
-    for pose in poses:
-        body = pose.main[:, :2]
-        centre = 0.5 * (body.min(axis=0) + body.max(axis=0))
-        edge = np.max(directions @ (body - centre).T, axis=1)
-        farther = np.repeat(np.linspace(0.0, edge.max(), 9), len(angles))
-        candidates = centre + (np.tile(edge + away, 9) + farther)[:, None] * np.tile(directions, (9, 1))
-        others = np.vstack([np.full((1, 2), np.inf), *[place + width for place in places]])
-        beside = np.linalg.norm((candidates[:, None] - others) * _FLAT, axis=2).min(axis=1)
-        clear = np.minimum(_distances(candidates * _FLAT, flat, away), beside)
-        clearance = np.minimum(clear, away) - 0.1 * farther
-        clearance[covered.holds(candidates)] -= edge.max()
-        places.append(candidates[int(np.argmax(clearance))])
-    return np.array(places)
-
-
-def _thinned(points: Array, width: float) -> Array:
-    """One of points (N, 2) for each square of that width with some in it."""
-    squares = np.floor((points - points.min(axis=0)) / width)
-    _, kept = np.unique(squares @ [squares[:, 1].max() + 1.0, 1.0], return_index=True)
-    return points[kept]
-
-
-def _distances(points: Array, others: Array, most: float) -> Array:
-    """How far each of points (P, 2) is from the nearest of others (O, 2), of those no farther than `most`."""
-    lower, upper = points.min(axis=0) - most, points.max(axis=0) + most
-    near = others[np.all((others > lower) & (others < upper), axis=1)]
-    if not len(near):
-        return np.full(len(points), most)
-    x, y = (np.subtract.outer(points[:, k], near[:, k]) for k in range(2))
-    return np.sqrt((x * x + y * y).min(axis=1))
-
-
-def _outline(pose: Pose) -> Array:
-    """Points along a robot's drawing from above."""
-    fractions = np.linspace(0.0, 1.0, 8)[:, None]
-    edges = [along(edge, len(fractions)) for edge in [*pose.bodies(ABOVE), *pose.tyres(ABOVE)]]
-    lines = [ends[0, :2] + fractions * (ends[1, :2] - ends[0, :2]) for ends in pose.links]
-    return np.vstack(edges + lines)
 
 
 def _how_many(trajectory: Trajectory, silhouette: Silhouette) -> int:
@@ -270,14 +263,14 @@ def _draw_pose(axes: Axes, pose: Pose, view: View, strength: float, later: float
     axes.add_collection(PolyCollection(shapes, facecolors=[body], linewidths=0, zorder=zorder), autolim=False)
     marks = [*pose.tyres(view)]
     if view == ABOVE and len(pose.heading):
-        marks.append(pose.heading[:, view])
+        marks.append(view.of(pose.heading))
     axes.add_collection(PolyCollection(marks, facecolors=[edge], linewidths=0, zorder=zorder), autolim=False)
     zorder = 4.0 + later
-    lines = [ends[:, view] for ends in pose.links]
+    lines = [view.of(ends) for ends in pose.links]
     for color, width in ((edge, 4.0), (_faded(_ARM, strength), 2.6)):
         drawn = LineCollection(lines, colors=[color], linewidths=width, capstyle="round", zorder=zorder)
         axes.add_collection(drawn, autolim=False)
-    joints, tips = pose.joints[:, view], pose.tip[:, view]
+    joints, tips = view.of(pose.joints), view.of(pose.tip)
     axes.plot(
         joints[:, 0], joints[:, 1], "o", markersize=4.2, color="white", markeredgecolor=edge,
         markeredgewidth=1.1, zorder=zorder, linestyle="none",

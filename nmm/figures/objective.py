@@ -22,7 +22,11 @@ _INSET = (0.42, 0.28, 0.56, 0.66)
 
 
 def objective_comparison(
-    trajectories: Sequence[Trajectory], zoom: tuple[float, float] | None = None, symbol: str = "H(q)"
+    trajectories: Sequence[Trajectory],
+    zoom: tuple[float, float] | None = None,
+    symbol: str = "H(q)",
+    *,
+    width: float = style.PAGE,
 ) -> Figure:
     """H of several runs over time: above, with an inset on the initial transient; below, logarithmic.
 
@@ -33,6 +37,7 @@ def objective_comparison(
     trajectories : runs of the same scenario
     zoom : the inset's limits in time, s; when not given, until the slowest run has come close
     symbol : what the axes call H
+    width : of the figure, in
 
     Raises
     ------
@@ -42,7 +47,8 @@ def objective_comparison(
     if not runs:
         raise InputError("figure of the objective: expected a run with at least one sample, got none")
     logarithmic = _can_be_logarithmic(runs)
-    made, panels = style.stack([1.9, 1.4] if logarithmic else [2.1])
+    heights = [1.9, 1.4] if logarithmic else [2.1]
+    made, panels = style.stack(heights, [[run.resolver for run in runs], []][: len(heights)], width)
     draw_objective(panels[0], runs, symbol, named=not logarithmic)
     style.legend(panels[0])
     first, last = _transient(runs) if zoom is None else zoom
@@ -67,9 +73,9 @@ def draw_objective(
     named: bool = True,
 ) -> None:
     """H of each run over time, in its resolver's colour."""
-    for run, look in zip(runs, looks.looks([run.resolver for run in runs]), strict=True):
+    for k, (run, look) in enumerate(zip(runs, looks.looks([run.resolver for run in runs]), strict=True)):
         H = np.where(run.objective > 0.0, run.objective, np.nan) if logarithmic else run.objective
-        style.curve(axes, run.t, H, *look)
+        style.curve(axes, run.t, H, *look, below=len(runs) - 1 - k)
     style.label(axes, y=symbol)
     style.time_axis(axes, _longest(runs), named=named)
     if not logarithmic:
@@ -130,9 +136,11 @@ def _inset_is_free(axes: Axes, runs: Sequence[Trajectory], last: float) -> bool:
 def _draw_inset(axes: Axes, runs: Sequence[Trajectory], first: float, last: float) -> None:
     """The initial transient, in the empty upper right of the axes."""
     inset = axes.inset_axes(_INSET)
-    for run, look in zip(runs, looks.looks([run.resolver for run in runs]), strict=True):
+    for k, (run, look) in enumerate(zip(runs, looks.looks([run.resolver for run in runs]), strict=True)):
         seen = (run.t >= first - 1e-9) & (run.t <= last + 1e-9)
-        style.curve(inset, run.t[seen], run.objective[seen], None, look.color, look.dashes)
+        style.curve(
+            inset, run.t[seen], run.objective[seen], None, look.color, look.dashes, below=len(runs) - 1 - k
+        )
     style.dress(inset, size=style.SMALL - 1.0)
     inset.set_xlim(first, last)
     style.value_axis(inset)

@@ -23,7 +23,7 @@ MUCH = 30.0
 POINTS = 1500
 
 
-def laps(found: Repeatability) -> Figure:
+def laps(found: Repeatability, *, width: float = style.PAGE) -> Figure:
     """Drift of the posture in each lap, logarithmic; below it the platforms' paths from above.
 
     Full turns of joints without limits are no drift. Without a platform that moves there is one panel.
@@ -31,6 +31,7 @@ def laps(found: Repeatability) -> Figure:
     Parameters
     ----------
     found : laps of one resolver or several
+    width : of the figure, in
 
     Raises
     ------
@@ -42,19 +43,19 @@ def laps(found: Repeatability) -> Figure:
     worn = looks.looks([one.name for one in runs])
     if len(worn) == 1:
         worn = [worn[0]._replace(dashes="-")]
-    across = style.PAGE - style.LEFT - style.RIGHT
+    across = width - style.LEFT - style.RIGHT
     above = style.room(style.legend_rows([look.name for look in worn], across))
     if not runs[0].robot.platform.p:
-        made = style.figure(style.PAGE, style.BOTTOM + DRIFT + above)
+        made = style.figure(width, style.BOTTOM + DRIFT + above)
         _draw_drift(style.place(made, style.LEFT, style.BOTTOM, across, DRIFT), runs, worn)
         return made
     low, high = _limits(runs)
     height = min(PATHS, across * (high[1] - low[1]) / (high[0] - low[0]))
     between = style.BOTTOM + style.room(style.legend_rows(_path_names(runs, worn), across))
-    made = style.figure(style.PAGE, style.BOTTOM + height + between + DRIFT + above)
+    made = style.figure(width, style.BOTTOM + height + between + DRIFT + above)
     upper = style.place(made, style.LEFT, style.BOTTOM + height + between, across, DRIFT)
     _draw_drift(upper, runs, worn)
-    _draw_paths(style.place(made, style.LEFT, style.BOTTOM, across, height), runs, worn)
+    _draw_paths(style.place(made, style.LEFT, style.BOTTOM, across, height), runs, worn, across)
     return made
 
 
@@ -79,8 +80,8 @@ def _draw_drift(axes: Axes, runs: list[Laps], worn: list[looks.Look]) -> None:
     style.legend(axes)
 
 
-def _draw_paths(axes: Axes, runs: list[Laps], worn: list[looks.Look]) -> None:
-    """All laps thin, the last one thick, the laps' ends as dots."""
+def _draw_paths(axes: Axes, runs: list[Laps], worn: list[looks.Look], width: float) -> None:
+    """All laps thin, the last one thick, the laps' ends as dots; a legend `width` in wide."""
     axes.set_aspect("equal", adjustable="box")
     names = iter(_path_names(runs, worn))
     desired = _desired(runs[0])
@@ -101,7 +102,7 @@ def _draw_paths(axes: Axes, runs: list[Laps], worn: list[looks.Look]) -> None:
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(nbins=8, steps=[1, 2, 5, 10]))
     style.label(axes, x="x [m]", y="y [m]")
-    style.legend(axes, style.PAGE - style.LEFT - style.RIGHT)
+    style.legend(axes, width)
 
 
 def _path_names(runs: list[Laps], worn: list[looks.Look]) -> list[str]:

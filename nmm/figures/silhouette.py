@@ -50,7 +50,7 @@ class Pose:
     _outlines: dict[View, tuple[list[Array], list[Array]]] = field(default_factory=dict, repr=False)
 
     def bodies(self, view: View) -> list[Array]:
-        """The platform's shapes as outlines (k, 2) seen along the axis that `view` leaves out."""
+        """The platform's shapes as outlines (k, 2) as they are seen in a view."""
         return self._seen(view)[0]
 
     def tyres(self, view: View) -> list[Array]:
@@ -59,7 +59,7 @@ class Pose:
 
     def _seen(self, view: View) -> tuple[list[Array], list[Array]]:
         if view not in self._outlines:
-            bodies, wheels = ([hull(one[:, view]) for one in shapes] for shapes in (self.body, self.wheels))
+            bodies, wheels = ([hull(view.of(one)) for one in shapes] for shapes in (self.body, self.wheels))
             self._outlines[view] = bodies, wheels
         return self._outlines[view]
 

@@ -7,7 +7,6 @@ and two threads that change them change each other's. Nothing here reads or writ
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -21,9 +20,11 @@ from nmm.looks import BLACK
 GREY, LIGHT = "#6B7280", "#E5E7EB"
 DPI = 180
 TEXT, SMALL = 9.0, 8.0
-WIDTH = 1.4
+WIDTH, WIDER = 1.4, 0.7
 #: Figure width, and the strip that axes need for their labels at the left and below, in.
 PAGE, LEFT, RIGHT, BOTTOM = 5.2, 0.8, 0.2, 0.46
+#: Distance of a y axis' label from it, in.
+LABEL = 0.6
 #: Height above a panel for a legend of one row, and for each row more, in.
 GAP, ROW = 0.34, 0.16
 
@@ -60,6 +61,12 @@ def dress(axes: Axes, size: float = SMALL) -> None:
         spine.set_linewidth(0.7)
 
 
+def inches(axes: Axes) -> tuple[float, float]:
+    """Width and height of axes, in."""
+    room = axes.get_window_extent()
+    return float(room.width) / DPI, float(room.height) / DPI
+
+
 def column(
     made: Figure, heights: Sequence[float], legends: Sequence[int], left: float, right: float, top: float
 ) -> list[Axes]:
@@ -85,12 +92,14 @@ def column_height(heights: Sequence[float], legends: Sequence[int]) -> float:
     return sum(heights) + sum(room(rows) for rows in legends)
 
 
-def stack(heights: Sequence[float], legends: Sequence[int] | None = None) -> tuple[Figure, list[Axes]]:
-    """A figure of one column of panels, as wide as a page."""
-    legends = [1] * len(heights) if legends is None else legends
-    total = BOTTOM + column_height(heights, legends)
-    made = figure(PAGE, total)
-    return made, column(made, heights, legends, LEFT, PAGE - RIGHT, total)
+def stack(
+    heights: Sequence[float], legends: Sequence[Sequence[str]], width: float
+) -> tuple[Figure, list[Axes]]:
+    """A figure of one column of panels, `width` in wide; `legends` are the names above each."""
+    rows = [legend_rows(names, width - LEFT - RIGHT) for names in legends]
+    total = BOTTOM + column_height(heights, rows)
+    made = figure(width, total)
+    return made, column(made, heights, rows, LEFT, width - RIGHT, total)
 
 
 def room(rows: int) -> float:
@@ -98,7 +107,7 @@ def room(rows: int) -> float:
     return GAP + ROW * max(rows - 1, 0)
 
 
-def legend_columns(names: Sequence[str], width: float = PAGE - LEFT - RIGHT) -> int:
+def legend_columns(names: Sequence[str], width: float) -> int:
     """How many legend entries fit side by side into a width, in."""
     lengths = [0.42 + 0.058 * len(name) for name in names]
     for columns in range(len(names), 1, -1):
@@ -109,7 +118,7 @@ def legend_columns(names: Sequence[str], width: float = PAGE - LEFT - RIGHT) -> 
     return 1
 
 
-def legend_rows(names: Sequence[str], width: float = PAGE - LEFT - RIGHT) -> int:
+def legend_rows(names: Sequence[str], width: float) -> int:
     """How many rows a legend takes that fits into a width, in."""
     return -(-len(names) // legend_columns(names, width)) if names else 1
 
@@ -119,7 +128,9 @@ def label(axes: Axes, *, x: str = "", y: str = "") -> None:
     if x:
         axes.set_xlabel(x, fontsize=TEXT, color=BLACK, labelpad=3)
     if y:
-        axes.set_ylabel(y, fontsize=TEXT, color=BLACK, labelpad=4)
+        axes.set_ylabel(y, fontsize=TEXT, color=BLACK)
+        # At one distance from the axes: labels of panels above each other are aligned.
+        axes.yaxis.set_label_coords(-LABEL / inches(axes)[0], 0.5)
 
 
 def time_axis(axes: Axes, t: Array, *, named: bool = True) -> None:
@@ -175,9 +186,8 @@ def legend(axes: Axes, width: float | None = None, *, lift: float = 0.0) -> None
     handles, names = axes.get_legend_handles_labels()
     if not handles:
         return
-    height = float(axes.get_window_extent().height) / DPI
-    if width is None:
-        width = float(axes.get_window_extent().width) / DPI
+    across, height = inches(axes)
+    width = across if width is None else width
     axes.legend(
         handles,
         names,
@@ -225,21 +235,19 @@ def thin(t: Array, y: Array, most: int = 1200) -> tuple[Array, Array]:
     return t[kept], y[kept]
 
 
-def curve(axes: Axes, t: Array, y: Array, name: str | None, color: str, dashes: str = "-") -> None:
-    """One curve over time, drawn with no more points than can be seen."""
+def curve(
+    axes: Axes, t: Array, y: Array, name: str | None, color: str, dashes: str = "-", below: int = 0
+) -> None:
+    """One curve over time, drawn with no more points than can be seen.
+
+    `below` counts those that are drawn over it: it is wider, and seen where it runs as they do.
+    """
     x, values = thin(t, y)
-    axes.plot(x, values, dashes, color=color, linewidth=WIDTH, label=name, solid_joinstyle="round")
+    width = WIDTH + WIDER * below
+    axes.plot(x, values, dashes, color=color, linewidth=width, label=name, solid_joinstyle="round")
 
 
 def note(axes: Axes, text: str) -> None:
     """A sentence in the middle of axes that have nothing to show."""
     axes.yaxis.set_major_locator(NullLocator())
     axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", fontsize=TEXT, color=GREY)
-
-
-def save(made: Figure, path: str | Path) -> Path:
-    """Write a PNG file."""
-    path = Path(path)
-    # Level 3 costs half the time of zlib's default and a few per cent of size.
-    made.savefig(path, dpi=DPI, pil_kwargs={"compress_level": 3})
-    return path

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nmm.folders.whole import has_format, replaced_folder
+from nmm.runs.figure_options import PLAIN, FigureOptions
 
 if TYPE_CHECKING:
     from nmm.runs.ellipsoid_options import Wanted
@@ -28,7 +29,12 @@ def runs_of(folder: Path) -> list[Path]:
 
 
 def save(
-    trajectories: Sequence[Trajectory], folder: str | Path, title: str, *, ellipsoids: Wanted = False
+    trajectories: Sequence[Trajectory],
+    folder: str | Path,
+    title: str,
+    *,
+    ellipsoids: Wanted = False,
+    figures: FigureOptions = PLAIN,
 ) -> Path:
     """Write each run's folder, summary.json, comparison.png and playback.html.
 
@@ -38,6 +44,7 @@ def save(
     folder : a new folder, or one of a comparison, which is replaced
     title : of the playback
     ellipsoids : whether the playback shows manipulability ellipsoids, or how
+    figures : formats and width of the figure
 
     Raises
     ------
@@ -55,8 +62,9 @@ def save(
         shown = [trajectory for trajectory in trajectories if len(trajectory) > 1]
         if shown:
             from nmm.figures import comparison
+            from nmm.figures.files import save_as
             from nmm.playback import write_html
 
-            comparison(shown).savefig(temporary / "comparison.png")
+            save_as(comparison(shown, **figures.across()), temporary, "comparison", figures)
             write_html(shown, temporary / "playback.html", title=title, ellipsoids=ellipsoids)
     return Path(folder)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nmm.folders.whole import has_format, replaced_folder
+from nmm.runs.figure_options import PLAIN, FigureOptions
 
 if TYPE_CHECKING:
     from nmm.analysis.redundancy.laps import Repeatability
@@ -24,12 +25,13 @@ def is_laps(folder: Path) -> bool:
     return has_format(folder / "summary.json", FORMAT)
 
 
-def save(found: Repeatability, folder: str | Path) -> Path:
+def save(found: Repeatability, folder: str | Path, *, figures: FigureOptions = PLAIN) -> Path:
     """Write each run's folder, summary.json, laps.csv and laps.png.
 
     Parameters
     ----------
     folder : a new folder, or one of laps, which is replaced
+    figures : formats and width of the figure
 
     Raises
     ------
@@ -44,10 +46,10 @@ def save(found: Repeatability, folder: str | Path) -> Path:
         with (temporary / "laps.csv").open("w", newline="", encoding="utf-8") as file:
             csv.writer(file, lineterminator="\n").writerows(_lines(found))
         if any(len(one.distance) for one in found.laps):
-            from nmm.figures import style
+            from nmm.figures.files import save_as
             from nmm.figures.repeatability import laps
 
-            style.save(laps(found), temporary / "laps.png")
+            save_as(laps(found, **figures.across()), temporary, "laps", figures)
     return Path(folder)
 
 

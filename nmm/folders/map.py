@@ -13,6 +13,7 @@ from nmm.analysis.maps.extremes import EVERYWHERE, Extreme
 from nmm.analysis.maps.measures import MEASURES
 from nmm.arrays import Array, Integers
 from nmm.folders.whole import has_format, replaced_folder
+from nmm.runs.figure_options import PLAIN, FigureOptions
 
 if TYPE_CHECKING:
     from nmm.analysis.maps.result import Map
@@ -27,12 +28,13 @@ def is_map(folder: Path) -> bool:
     return has_format(folder / "map.json", FORMAT)
 
 
-def save(made: Map, folder: str | Path) -> Path:
-    """Write map.npz, map.json and a PNG a measure.
+def save(made: Map, folder: str | Path, *, figures: FigureOptions = PLAIN) -> Path:
+    """Write map.npz, map.json and a figure a measure.
 
     Parameters
     ----------
     folder : a new folder, or one of a map, which is replaced
+    figures : their formats and width
 
     Raises
     ------
@@ -42,8 +44,11 @@ def save(made: Map, folder: str | Path) -> Path:
         np.savez_compressed(temporary / "map.npz", **_arrays(made))  # type: ignore[arg-type]  # arrays by name
         text = json.dumps(summary(made), indent=2, ensure_ascii=False)
         (temporary / "map.json").write_text(text + "\n", encoding="utf-8")
+        from nmm.figures.files import save_as
+        from nmm.figures.maps import map_figure
+
         for measure in made.values:
-            made.plot(measure, temporary / f"{measure}.png")
+            save_as(map_figure(made, measure, **figures.across()), temporary, measure, figures)
     return Path(folder)
 
 

@@ -14,6 +14,7 @@ import yaml
 from nmm.collisions.recorded import described, made, places, shape_of
 from nmm.errors import InputError, RobotError
 from nmm.folders.whole import has_format, replaced_folder
+from nmm.runs.figure_options import Drawn, drawn_as
 from nmm.runs.summary import FORMAT, unmet
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ def save(
     trajectory: Trajectory,
     folder: str | Path,
     *,
-    figures: bool = True,
+    figures: Drawn = True,
     html: bool = False,
     ellipsoids: Wanted = False,
     tell: Callable[[dict[str, Any]], None] | None = None,
@@ -56,7 +57,7 @@ def save(
     Parameters
     ----------
     folder : a new folder, or one of nmm's, which is replaced
-    figures : whether to draw the figures (PNG)
+    figures : whether to draw the figures, or in which formats and how wide (`nmm.figures.FigureOptions`)
     html : whether to write playback.html
     ellipsoids : whether manipulability ellipsoids are drawn, in ellipses.png and playback.html, or how
         (`nmm.playback.EllipsoidOptions`)
@@ -67,6 +68,7 @@ def save(
     InputError : the folder exists and is not ours, or cannot be written; ellipsoids of a frame or with
         sizes that the robot does not have
     """
+    drawn = drawn_as(figures)
     with replaced_folder(folder, is_run) as temporary:
         np.savez(temporary / "trajectory.npz", **_arrays(trajectory))  # compressing gains little on doubles
         summary = trajectory.summary()
@@ -77,10 +79,10 @@ def save(
         if trajectory.scenario is not None:
             text = yaml.safe_dump(trajectory.scenario, sort_keys=False, allow_unicode=True)
             (temporary / "scenario.yaml").write_text(text, encoding="utf-8")
-        if figures and len(trajectory) > 1:
+        if drawn is not None and len(trajectory) > 1:
             from nmm.figures import write_run_figures
 
-            write_run_figures(trajectory, temporary, ellipsoids=ellipsoids)
+            write_run_figures(trajectory, temporary, ellipsoids=ellipsoids, options=drawn)
         if html and len(trajectory):
             from nmm.playback import write_html
 

@@ -12,13 +12,14 @@ from nmm.paper.claims import claims
 from nmm.paper.numbers import smallest_determinant, table
 from nmm.paper.results import CaseResult
 from nmm.progress import Progress, between
+from nmm.runs.figure_options import PLAIN, FigureOptions
 from nmm.runs.trajectory import Outcome, Trajectory
 
 if TYPE_CHECKING:
     from nmm.scenario import Scenario
 
 
-def run_case(number: int, folder: Path, progress: Progress) -> CaseResult:
+def run_case(number: int, folder: Path, progress: Progress, figures: FigureOptions = PLAIN) -> CaseResult:
     """Run a case with RG and PG, and write its files into `folder`, which exists.
 
     Raises
@@ -34,9 +35,9 @@ def run_case(number: int, folder: Path, progress: Progress) -> CaseResult:
     own = folder / case.folder
     own.mkdir()
     for k, trajectory in enumerate((rg, pg)):
-        trajectory.save(own / trajectory.resolver, html=False)
+        trajectory.save(own / trajectory.resolver, figures=figures)
         progress(0.4 + 0.15 * k)
-    _write_figures(case, rg, pg, folder)
+    _write_figures(case, rg, pg, folder, figures)
     progress(0.7)
     _write_playback(case, [rg, pg], own / "playback.html")
     progress(1.0)
@@ -62,16 +63,17 @@ def _runs(case: Case, progress: Progress | None) -> list[Trajectory]:
     return found
 
 
-def _write_figures(case: Case, rg: Trajectory, pg: Trajectory, folder: Path) -> None:
+def _write_figures(case: Case, rg: Trajectory, pg: Trajectory, folder: Path, figures: FigureOptions) -> None:
     """The paper's two figures of the case, fig03.png to fig10.png."""
     from nmm.figures import objective_comparison, stroboscopic, tracking
-    from nmm.figures.style import save
+    from nmm.figures.files import save_as
 
     (motion, _), (objective, _) = case.figures
-    shown = tracking(rg) if case.number == 4 else stroboscopic(rg)
-    save(shown, folder / f"fig{motion:02d}.png")
-    compared = objective_comparison([rg, pg], zoom=(0.0, case.zoom), symbol=case.symbol)
-    save(compared, folder / f"fig{objective:02d}.png")
+    across = figures.across()
+    shown = (tracking if case.number == 4 else stroboscopic)(rg, **across)
+    save_as(shown, folder, f"fig{motion:02d}", figures)
+    compared = objective_comparison([rg, pg], zoom=(0.0, case.zoom), symbol=case.symbol, **across)
+    save_as(compared, folder, f"fig{objective:02d}", figures)
 
 
 def _write_playback(case: Case, runs: list[Trajectory], path: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -15,6 +15,7 @@ from nmm.paper.cases import CASES
 from nmm.paper.results import CaseResult, Claim
 from nmm.processes import share_out
 from nmm.progress import Progress
+from nmm.runs.figure_options import PLAIN, FigureOptions
 
 #: Marks a folder as one of ours.
 FORMAT = "nmm paper 1"
@@ -48,7 +49,13 @@ class PaperReport:
         return all(claim.holds for claim in self.claims)
 
 
-def write_paper(folder: str | Path, progress: Progress | None = None, jobs: int = 2) -> PaperReport:
+def write_paper(
+    folder: str | Path,
+    progress: Progress | None = None,
+    jobs: int = 2,
+    *,
+    figures: FigureOptions = PLAIN,
+) -> PaperReport:
     """Run the paper's four cases with RG and PG, and write figures, numbers, playback and index.html.
 
     Parameters
@@ -57,6 +64,7 @@ def write_paper(folder: str | Path, progress: Progress | None = None, jobs: int 
     progress : called with the fraction done
     jobs : over how many processes the cases are shared out; with more than 1, a script needs
         `if __name__ == "__main__":`
+    figures : formats and width; PNG, which the page shows, is written always
 
     Raises
     ------
@@ -66,6 +74,7 @@ def write_paper(folder: str | Path, progress: Progress | None = None, jobs: int 
     if jobs < 1:
         raise InputError(f"jobs: expected at least 1, got {jobs}")
     began = time.perf_counter()
+    shown = replace(figures, formats=tuple(dict.fromkeys(["png", *figures.formats])))
     done = dict.fromkeys((case.number for case in CASES), 0.0)
 
     def advance(number: int, fraction: float) -> None:
@@ -74,7 +83,7 @@ def write_paper(folder: str | Path, progress: Progress | None = None, jobs: int 
             progress(sum(done.values()) / len(done))
 
     with replaced_folder(folder, is_paper) as temporary:
-        found = share_out(partial(_case, folder=temporary), list(done), jobs, advance)
+        found = share_out(partial(_case, folder=temporary, figures=shown), list(done), jobs, advance)
         results = tuple(found[number] for number in sorted(found))
         from nmm.paper.page import render
 
@@ -96,8 +105,8 @@ def is_paper(folder: Path) -> bool:
     return has_format(folder / _MARKER, FORMAT)
 
 
-def _case(number: int, progress: Progress, folder: Path) -> CaseResult:
+def _case(number: int, progress: Progress, folder: Path, figures: FigureOptions) -> CaseResult:
     # Imported where it is done: a process that only shares the cases out needs none of it.
     from nmm.paper.case_run import run_case
 
-    return run_case(number, folder, progress)
+    return run_case(number, folder, progress, figures)

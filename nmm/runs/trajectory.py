@@ -18,6 +18,7 @@ from nmm.robots.bodies import Body, Nearest
 from nmm.robots.motion import Motion
 from nmm.robots.robot import Robot
 from nmm.runs.ellipsoid_options import Wanted
+from nmm.runs.figure_options import Drawn
 from nmm.runs.residuals import NONE, Residuals
 
 if TYPE_CHECKING:
@@ -179,7 +180,7 @@ class Trajectory:
         return door("nmm.runs.summary:summarise")(self)
 
     def save(
-        self, folder: str | Path, *, figures: bool = True, html: bool = False, ellipsoids: Wanted = False
+        self, folder: str | Path, *, figures: Drawn = True, html: bool = False, ellipsoids: Wanted = False
     ) -> Path:
         """Write the run's folder (see `nmm.folders.run.save`): arrays, tables, summary, figures, playback."""
         return door("nmm.folders.run:save")(self, folder, figures=figures, html=html, ellipsoids=ellipsoids)
@@ -199,7 +200,7 @@ class Trajectory:
         return door("nmm.figures:overview")(self)
 
     def plot_ellipses(self, path: str | Path | None = None, options: Wanted = True) -> Figure:
-        """The end-effector's path with manipulability ellipses (see `nmm.figures.ellipses`); also as PNG."""
+        """The end-effector's path with manipulability ellipses; also as a file (`nmm.figures.ellipses`)."""
         return door("nmm.figures.ellipses:ellipses")(self, options, path)
 
     def motion(self, label: str | None = None) -> Motion:

@@ -15,6 +15,7 @@ from nmm.analysis.maps.measures import unit_of
 from nmm.analysis.maps.singular_set import SingularSet
 from nmm.arrays import Array, Integers
 from nmm.doors import door
+from nmm.runs.figure_options import PLAIN, FigureOptions
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -158,18 +159,19 @@ class Map:
         return door("nmm.folders.map:summary")(self)
 
     def plot(self, measure: str | None = None, path: str | Path | None = None) -> Figure:
-        """The figure of a measure (the first one by default), written as PNG where a path is given."""
+        """The figure of a measure (the first one by default); written, too, where a path is given."""
         return door("nmm.figures.maps:map_figure")(self, measure, path)
 
-    def save(self, folder: str | Path) -> Path:
-        """Write map.npz, map.json and a PNG a measure.
+    def save(self, folder: str | Path, *, figures: FigureOptions = PLAIN) -> Path:
+        """Write map.npz, map.json and a figure a measure.
 
         Parameters
         ----------
         folder : a new folder, or one of a map, which is replaced
+        figures : their formats and width
 
         Raises
         ------
         InputError : the folder exists and is not a map's, or cannot be written
         """
-        return door("nmm.folders.map:save")(self, folder)
+        return door("nmm.folders.map:save")(self, folder, figures=figures)

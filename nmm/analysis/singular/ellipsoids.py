@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.analysis.singular.parts import WHOLE, columns_of
-from nmm.arrays import Array, array, positive
+from nmm.arrays import Array, array, matrix, positive
 from nmm.errors import InputError
 from nmm.robots.frame_path import FramePath
 from nmm.robots.loading.tips import first_tip
@@ -93,13 +93,19 @@ class Ellipsoids:
         """Half the sides of the boxes around them along the world's axes, (N, 3) m/s."""
         return self.support(np.eye(3))
 
-    def projected(self, view: tuple[int, int] = (0, 1)) -> Ellipses:
-        """Their shadows on the plane of two world axes: what can be seen from there, not a section."""
-        halves = (self.axes * self.radii[:, None])[:, view]
+    def projected(self, directions: ArrayLike = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))) -> Ellipses:
+        """Their shadows on a plane: what can be seen from there, not a section.
+
+        Parameters
+        ----------
+        directions : two of the plane, (2, 3), of length 1 and at right angles, in world axes
+        """
+        plane = matrix(directions, (2, 3), "directions of a plane")
+        halves = plane @ (self.axes * self.radii[:, None])
         known = np.isfinite(halves).all(axis=(1, 2))
         axes, radii = np.tile(np.eye(2), (len(self), 1, 1)), np.full((len(self), 2), np.nan)
         axes[known], radii[known], _ = np.linalg.svd(halves[known])
-        return Ellipses(self.center[:, view], axes, radii)
+        return Ellipses(self.center @ plane.T, axes, radii)
 
 
 def ellipsoids_along(
