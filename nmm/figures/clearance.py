@@ -46,4 +46,4 @@ def clearance(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
     style.label(axes, y="least distance [m]")
     style.time_axis(axes, t)
     style.legend(axes)
-    return made
+    return style.aligned(made)

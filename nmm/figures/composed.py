@@ -42,7 +42,7 @@ class _Columns:
     def __init__(self, width: float) -> None:
         self.width, self.beside = width, width >= _NARROW
         across = width - style.LEFT - style.RIGHT
-        self.view = 0.5 * (across - style.LEFT) if self.beside else across
+        self.view = 0.56 * (across - style.LEFT) if self.beside else across
         self.left = style.LEFT + (self.view + style.LEFT if self.beside else 0.0)
         self.right = width - style.RIGHT
 
@@ -97,7 +97,7 @@ def overview(trajectory: Trajectory, *, width: float = _WIDTH) -> Figure:
     if limited:
         draw_scale(panels[-1], trajectory, named=False)
     _name_last(panels)
-    return made
+    return style.aligned(made)
 
 
 def _draw_views(made: Figure, scene: Scene, columns: _Columns, top: float) -> float:
@@ -149,7 +149,7 @@ def comparison(trajectories: Sequence[Trajectory], *, width: float = _WIDTH) -> 
     for axes in panels:
         style.legend(axes)
     _name_last(panels)
-    return made
+    return style.aligned(made)
 
 
 def _name_last(panels: Sequence[Axes]) -> None:

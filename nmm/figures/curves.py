@@ -40,7 +40,7 @@ def errors(trajectory: Trajectory, gain: float | None = None, *, width: float = 
     for axes, (unit, rows) in zip(panels, kinds.items(), strict=False):
         draw_components(axes, trajectory, rows, unit)
     draw_error_norm(panels[-1], trajectory, gain)
-    return made
+    return style.aligned(made)
 
 
 def draw_components(axes: Axes, trajectory: Trajectory, rows: Sequence[int], unit: str) -> None:
@@ -138,7 +138,7 @@ def tracking(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
         style.curve(axes, trajectory.t, reference, "reference", looks.BLACK, "--")
         axes.lines[-1].set_linewidth(1.0)
         _finish(axes, trajectory, f"{name} [{trajectory.r_units[row]}]", named=row == count - 1)
-    return made
+    return style.aligned(made)
 
 
 def _unwrapped(trajectory: Trajectory, row: int, *, reference: bool = False) -> Array:
@@ -178,7 +178,7 @@ def inputs(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
         if transient is None:
             style.legend(axes)
     if transient is None:
-        return made
+        return style.aligned(made)
     lefts = style.column(made, heights, legends, style.LEFT, split - 0.55, total)
     for k, (left, right, columns) in enumerate(zip(lefts, panels, parts, strict=True)):
         draw_inputs(left, trajectory, columns, named=k == len(parts) - 1, until=transient)
@@ -187,7 +187,7 @@ def inputs(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
         style.legend(left, across)
         right.set_xlim(transient, end)
         right.set_ylabel("")
-    return made
+    return style.aligned(made)
 
 
 def _transient(trajectory: Trajectory) -> float | None:
@@ -268,7 +268,7 @@ def coordinates(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
                 axes, trajectory.t, trajectory.q[:, column], name, looks.CYCLE[k % 7], looks.DASHES[k % 4]
             )
         _finish(axes, trajectory, f"{part} [{unit}]", named=index == len(parts) - 1)
-    return made
+    return style.aligned(made)
 
 
 def singular_values(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
@@ -281,7 +281,7 @@ def singular_values(trajectory: Trajectory, *, width: float = style.PAGE) -> Fig
     draw_singular_value(panels[0], trajectory, named=not partitioned)
     if partitioned:
         _draw_partition(panels[1], trajectory)
-    return made
+    return style.aligned(made)
 
 
 def draw_singular_value(axes: Axes, trajectory: Trajectory, *, named: bool = True) -> None:

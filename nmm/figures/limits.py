@@ -45,7 +45,7 @@ def limits(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
     for axes, (name, part) in zip(panels, shown.items(), strict=False):
         draw_shares(axes, trajectory, part, f"{name}, share of range")
     draw_scale(panels[-1], trajectory)
-    return made
+    return style.aligned(made)
 
 
 def _levels(trajectory: Trajectory) -> list[str]:

@@ -56,7 +56,7 @@ def objective_comparison(
         _draw_inset(panels[0], runs, first, last)
     if logarithmic:
         draw_objective(panels[1], runs, symbol, logarithmic=True)
-    return made
+    return style.aligned(made)
 
 
 def has_objective(trajectories: Sequence[Trajectory]) -> bool:

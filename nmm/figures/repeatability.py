@@ -48,7 +48,7 @@ def laps(found: Repeatability, *, width: float = style.PAGE) -> Figure:
     if not runs[0].robot.platform.p:
         made = style.figure(width, style.BOTTOM + DRIFT + above)
         _draw_drift(style.place(made, style.LEFT, style.BOTTOM, across, DRIFT), runs, worn)
-        return made
+        return style.aligned(made)
     low, high = _limits(runs)
     height = min(PATHS, across * (high[1] - low[1]) / (high[0] - low[0]))
     between = style.BOTTOM + style.room(style.legend_rows(_path_names(runs, worn), across))
@@ -56,7 +56,7 @@ def laps(found: Repeatability, *, width: float = style.PAGE) -> Figure:
     upper = style.place(made, style.LEFT, style.BOTTOM + height + between, across, DRIFT)
     _draw_drift(upper, runs, worn)
     _draw_paths(style.place(made, style.LEFT, style.BOTTOM, across, height), runs, worn, across)
-    return made
+    return style.aligned(made)
 
 
 def _draw_drift(axes: Axes, runs: list[Laps], worn: list[looks.Look]) -> None:

@@ -23,8 +23,8 @@ TEXT, SMALL = 9.0, 8.0
 WIDTH, WIDER = 1.4, 0.7
 #: Figure width, and the strip that axes need for their labels at the left and below, in.
 PAGE, LEFT, RIGHT, BOTTOM = 5.2, 0.8, 0.2, 0.46
-#: Distance of a y axis' label from it, in.
-LABEL = 0.6
+#: Room beside the ticks' numbers, of a character of them at most, and of them where there are many, in.
+TICK, CHARACTER, NUMBERS = 0.16, 0.64 * SMALL / 72.0, 0.46
 #: Height above a panel for a legend of one row, and for each row more, in.
 GAP, ROW = 0.34, 0.16
 
@@ -128,9 +128,25 @@ def label(axes: Axes, *, x: str = "", y: str = "") -> None:
     if x:
         axes.set_xlabel(x, fontsize=TEXT, color=BLACK, labelpad=3)
     if y:
-        axes.set_ylabel(y, fontsize=TEXT, color=BLACK)
-        # At one distance from the axes: labels of panels above each other are aligned.
-        axes.yaxis.set_label_coords(-LABEL / inches(axes)[0], 0.5)
+        axes.set_ylabel(y, fontsize=TEXT, color=BLACK, labelpad=4)
+
+
+def aligned(made: Figure) -> Figure:
+    """The figure, once all is drawn, with labels of y axes above each other at one distance from them."""
+    columns: dict[float, list[Axes]] = {}
+    for axes in made.axes:
+        if axes.get_ylabel():
+            columns.setdefault(round(axes.get_position().x0, 3), []).append(axes)
+    for panels in columns.values():
+        texts: list[str] = []
+        for axes in panels:
+            low, high = sorted(axes.get_ylim())
+            shown = [value for value in axes.yaxis.get_majorticklocs() if low <= value <= high]
+            texts += axes.yaxis.get_major_formatter().format_ticks(shown)
+        numbers = CHARACTER * max(map(len, texts), default=0)
+        for axes in panels:
+            axes.yaxis.set_label_coords(-(TICK + min(numbers, NUMBERS)) / inches(axes)[0], 0.5)
+    return made
 
 
 def time_axis(axes: Axes, t: Array, *, named: bool = True) -> None:

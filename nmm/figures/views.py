@@ -145,4 +145,4 @@ def page(scene: Viewed, width: float, above: float = 0.0) -> Figure:
         if index == 0:
             style.legend(axes)
         top -= _BETWEEN
-    return made
+    return style.aligned(made)
