@@ -101,8 +101,7 @@ def view(
     """
     from nmm.cli.viewing import view_robot
 
-    shown = {"tasks": task, "at": at, "frames": frames}
-    view_robot(robot, **loading.keywords(), **browser.keywords(), **shown)
+    view_robot(robot, **loading.keywords(), **browser.keywords(), frames=frames, tasks=task, at=at)
 
 
 @command
