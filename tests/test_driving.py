@@ -26,6 +26,7 @@ from nmm.driving.messages import Aim, Order, Pick, parsed
 from nmm.driving.session import Session
 from nmm.driving.setups import RobotSetup, ScenarioSetup, Settings, Setup
 from nmm.errors import InputError, ScenarioError
+from nmm.kinds import RESOLVERS
 from nmm.playback.rolling import Rolling
 from nmm.robots.configuration import Configuration
 
@@ -80,17 +81,24 @@ def test_a_resolver_is_changed_while_it_moves(kind: str) -> None:
     driven.aim(0, np.array([0.4, -0.6, 0.7]))
     moved(driven, 1.0)
     before, t = driven.q, driven.t
-    options = next(choice.options for choice in driven.choices if choice.key == "resolver.kind")
-    if kind not in options:
-        with pytest.raises(InputError, match=r"resolver\.kind"):
-            driven.with_choice("resolver.kind", kind)
-        return
     driven.use(driven.with_choice("resolver.kind", kind))
     np.testing.assert_array_equal(driven.q, before)
     assert driven.t == t
     assert driven._controller.resolver.name.lower() == kind
     moved(driven, 14.0)
     np.testing.assert_allclose(ee(driven), [0.4, -0.6, 0.7], atol=1e-4)
+
+
+def test_a_resolver_that_a_scenario_cannot_do_with_says_why_and_changes_nothing() -> None:
+    """It is tried when somebody chooses it: the page of a large robot comes without waiting for others."""
+    with Loop(scenario("unicycle_3r_spline")) as loop:
+        driven = loop.session._driven
+        before, choices = driven._controller, driven.choices
+        assert next(one.options for one in choices if one.key == "resolver.kind") == tuple(RESOLVERS)
+        loop.session.receive('{"type":"pick","key":"resolver.kind","value":"ej"}')
+        wait_for(lambda: "added_task: expected 2 rows" in str(loop.picture()["told"]))
+        assert driven._controller is before
+        assert driven.choices == choices
 
 
 def test_a_gain_sets_how_fast_the_error_falls() -> None:

@@ -246,6 +246,54 @@ def test_the_robot_is_in_the_picture_also_after_it_moved(
             assert np.abs(page.evaluate(PROJECT, points)).max() < 1.0
 
 
+def test_numbers_and_ellipsoid_follow_the_sliders(robot_3r: Robot, window: Window) -> None:
+    def answered() -> None:
+        page.wait_for_function("nmm.task.asked > 0 && nmm.task.answered === nmm.task.asked")
+
+    def node(path: str) -> np.ndarray:
+        return np.asarray(UPRIGHT.T @ np.reshape(page.evaluate(WALK)[path], (4, 4)).T)
+
+    with shown(robot_3r, task=nmm.Position("ee")) as url:
+        page = window.open(url)
+        cell = page.locator('[data-value="robot sigma_min"]')
+        assert cell.inner_text() == "0"
+        assert page.locator("#lost").inner_text() == "Lost: no input gives motion of ee along z."
+        rng = np.random.default_rng(2)
+        for _ in range(3):
+            q = robot_3r.q({name: slide(page, name, rng.uniform(0.2, 0.8)) for name in robot_3r.q_names})
+            page.evaluate("nmm.joints.set({})")  # one more question, after the last slider's
+            draw_frames(page)
+            answered()
+            data = robot_3r.model.createData()
+            frame = robot_3r.frame_id("ee")
+            J = pin.computeFrameJacobian(robot_3r.model, data, q, frame, pin.LOCAL_WORLD_ALIGNED)[:3]
+            J = J @ robot_3r.S(q)
+            values = np.linalg.svd(J, compute_uv=False)
+            assert float(cell.inner_text()) == pytest.approx(values[-1], rel=1e-3)
+            volume = page.locator('[data-value="robot manipulability"]').inner_text()
+            assert float(volume) == pytest.approx(np.sqrt(np.linalg.det(J @ J.T)), rel=1e-3)
+            drawn = node("/nmm/task 0/robot")
+            np.testing.assert_allclose(drawn[:3, 3], expected_frames(robot_3r, q)["ee"][:3, 3], atol=1e-6)
+            radii = np.linalg.svd(drawn[:3, :3], compute_uv=False)
+            # A flat one keeps 1.2 % of its largest radius.
+            np.testing.assert_allclose(radii / radii[0], np.maximum(values / values[0], 0.012), atol=1e-5)
+        page.locator("#rest").click()
+        page.wait_for_function("nmm.task.answer.state === 'lost'")
+        # The arrow is upright, at the end of the arm, and in the picture.
+        arrow = "nmm.node('/nmm/lost/0').children[0].matrixWorld.elements"
+        draw_frames(page)
+        placed = UPRIGHT.T @ np.reshape(page.evaluate(arrow), (4, 4)).T
+        np.testing.assert_allclose(np.abs(placed[:3, 2]), [0.0, 0.0, 1.0], atol=1e-6)
+        np.testing.assert_allclose(
+            placed[:3, 3], expected_frames(robot_3r, robot_3r.q())["ee"][:3, 3], atol=1e-6
+        )
+        page.locator("#reset").click()
+        ends = [placed[:3, 3] + sign * 0.2 * placed[:3, 2] for sign in (1.0, -1.0)]
+        assert np.abs(page.evaluate(PROJECT, np.array(ends).tolist())).max() < 1.0
+        page.locator("#ellipsoids").click()
+        assert not page.evaluate("nmm.ellipsoids.some((group) => group.visible)")
+
+
 def test_the_command_shows_a_robot_until_it_is_interrupted(window: Window, tmp_path: Path) -> None:
     port = free_port()
     viewer = process(tmp_path, "view", "unicycle_2r", "--no-open", "--port", str(port), "--lock", "q1=pi/2")

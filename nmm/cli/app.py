@@ -93,8 +93,13 @@ def run(
         typer.Option("--html", help="Write playback.html too: the motion in 3D, one file, works offline."),
     ] = False,
     play: Annotated[
-        bool, typer.Option("--play", help="Play the motion in the browser afterwards; Ctrl-C ends it.")
+        bool,
+        typer.Option(
+            "--play",
+            help="Show the motion in the browser as it is computed, then play it; Ctrl-C ends it.",
+        ),
     ] = False,
+    browser: Browser,
     ellipsoids: Ellipsoids,
     figures: Figures,
 ) -> int:
@@ -123,6 +128,7 @@ def run(
         out,
         html=html,
         play=play,
+        **browser.keywords(),
         ellipsoids=ellipsoids.wanted(),
         figures=figures.options(),
     )

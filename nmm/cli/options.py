@@ -64,16 +64,18 @@ AxleOption = Annotated[
         show_default="the root link's origin",
     ),
 ]
+_TASK_HELP = (
+    f"The task, of KIND {listed(list(TASKS), 'or')}: position:ee:xy, pose, coordinates:q1,q2; or "
+    "a mapping as in a scenario, '{kind: pointing, frame: ee, at: [2, 0, 1]}'. Without FRAME the end of "
+    "the arm. May be repeated: tasks stand above each other."
+)
 TaskOption = Annotated[
     list[str] | None,
-    typer.Option(
-        "--task",
-        metavar="KIND[:FRAME[:AXES]]",
-        help=f"The task, of KIND {listed(list(TASKS), 'or')}: position:ee:xy, pose, coordinates:q1,q2; or "
-        "a mapping as in a scenario, '{kind: pointing, frame: ee, at: [2, 0, 1]}'. Without FRAME the end of "
-        "the arm. May be repeated: tasks stand above each other.",
-        show_default="the scenario's",
-    ),
+    typer.Option("--task", metavar="KIND[:FRAME[:AXES]]", help=_TASK_HELP, show_default="the scenario's"),
+]
+ViewedTaskOption = Annotated[
+    list[str] | None,
+    typer.Option("--task", metavar="KIND[:FRAME[:AXES]]", help=_TASK_HELP, show_default="none"),
 ]
 AtOption = Annotated[
     list[str] | None,

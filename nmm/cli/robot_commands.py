@@ -7,7 +7,14 @@ from typing import Annotated
 import typer
 
 from nmm.cli.groups import Browser, Loading, Subject, command
-from nmm.cli.options import ROBOT_HELP, ArgumentOption, PackageOption, arguments_of
+from nmm.cli.options import (
+    ROBOT_HELP,
+    ArgumentOption,
+    AtOption,
+    PackageOption,
+    ViewedTaskOption,
+    arguments_of,
+)
 
 
 @command
@@ -77,19 +84,24 @@ def view(
     frames: Annotated[
         bool, typer.Option("--frames/--no-frames", help="Show frames at first; the page can change it.")
     ] = True,
+    task: ViewedTaskOption = None,
+    at: AtOption = None,
 ) -> None:
     """Look at a robot in the browser.
 
     In 3D, with MeshCat: a slider for each coordinate, frames with their names, and the pose of one of them
-    in numbers. Only this machine can reach it. Ctrl-C ends it.
+    in numbers. With --task what the robot can do for it where the sliders are: singular values of J, wheels
+    and all, manipulability, ellipsoids, and the directions that are lost. Only this machine can reach it.
+    Ctrl-C ends it.
 
     \b
     nmm view unicycle_3r
+    nmm view unicycle_3r --task position --at q2=pi/3
     nmm view my_robot.urdf --platform car --lock head=0.3 --no-frames
     """
     from nmm.cli.viewing import view_robot
 
-    view_robot(robot, **loading.keywords(), **browser.keywords(), frames=frames)
+    view_robot(robot, **loading.keywords(), **browser.keywords(), frames=frames, tasks=task, at=at)
 
 
 @command

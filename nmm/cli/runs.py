@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,10 @@ from nmm.runs.figure_options import PLAIN, FigureOptions
 from nmm.scenario import Scenario
 
 if TYPE_CHECKING:
+    from nmm.control.controller import Controller
+    from nmm.playback import LiveRun
     from nmm.runs.ellipsoid_options import Wanted
+    from nmm.runs.recording import Recorder
     from nmm.runs.trajectory import Trajectory
 
 OK, FAILED = 0, 1
@@ -33,20 +37,35 @@ def run_scenario(
     *,
     html: bool,
     play: bool,
+    port: int | None = None,
+    open_browser: bool = True,
     ellipsoids: Wanted = False,
     figures: FigureOptions = PLAIN,
 ) -> int:
-    """Run a scenario, write its folder, print its table."""
+    """Run a scenario, in a page that shows it meanwhile if wanted; write its folder, print its table."""
     scenario = _load(name, resolver, settings, limits)
     folder = out or Path("runs") / f"{scenario.name}-{scenario.parts.resolver.kind}"
     check_folder(folder, is_run)
-    trajectory = _run(scenario)
-    with shielded():
-        _tell_and_save(trajectory, folder, html=html, ellipsoids=ellipsoids, figures=figures)
-    status = _status("nmm run", [trajectory], folder)
-    if play and len(trajectory):
-        trajectory.play(ellipsoids=ellipsoids)
+    controller = scenario.controller()  # complains before there is a progress bar
+    with _shown(scenario, controller, port, open_browser=open_browser) if play else nullcontext() as page:
+        trajectory = _run(scenario, controller, None if page is None else page.watch)
+        with shielded():
+            _tell_and_save(trajectory, folder, html=html, ellipsoids=ellipsoids, figures=figures)
+        status = _status("nmm run", [trajectory], folder)
+        if page is not None and len(trajectory) and trajectory.outcome != "interrupted":
+            page.stay(trajectory, ellipsoids=ellipsoids)
     return status
+
+
+def _shown(
+    scenario: Scenario, controller: Controller, port: int | None, *, open_browser: bool
+) -> AbstractContextManager[LiveRun]:
+    """A page for a run that is about to begin."""
+    from nmm.playback import LiveRun
+
+    parts = scenario.parts
+    title = f"{scenario.title or scenario.name}, {parts.resolver.kind.upper()}"
+    return LiveRun(controller, parts.q0, parts.duration, title=title, port=port, open_browser=open_browser)
 
 
 def _tell_and_save(trajectory: Trajectory, folder: Path, **asked: Any) -> None:
@@ -83,11 +102,11 @@ def compare_resolvers(
     scenarios = [_load(name, kind, settings, limits) for kind in kinds]
     folder = out or Path("runs") / f"{scenarios[0].name}-compare"
     check_folder(folder, comparison.is_comparison)
-    for scenario in scenarios:
-        scenario.controller()  # what is wrong with the last one shows before the first one runs
+    # What is wrong with the last one shows before the first one runs.
+    controllers = [scenario.controller() for scenario in scenarios]
     trajectories: list[Trajectory] = []
-    for scenario in scenarios:
-        trajectories.append(_run(scenario))
+    for scenario, controller in zip(scenarios, controllers, strict=True):
+        trajectories.append(_run(scenario, controller))
         if trajectories[-1].outcome == "interrupted":
             break
     with shielded():
@@ -154,10 +173,11 @@ def _load(name: str, resolver: str | None, settings: Mapping[str, object], limit
     return scenario.override("limits", limits)
 
 
-def _run(scenario: Scenario) -> Trajectory:
-    scenario.controller()  # complains before there is a progress bar
+def _run(
+    scenario: Scenario, controller: Controller, watch: Callable[[Recorder], None] | None = None
+) -> Trajectory:
     with progress(f"{scenario.name}, {scenario.parts.resolver.kind.upper()}") as report:
-        return scenario.run(report)
+        return scenario.run(report, controller, watch)
 
 
 def _status(command: str, trajectories: Sequence[Trajectory], folder: Path) -> int:

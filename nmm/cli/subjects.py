@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -95,10 +95,7 @@ def studied(
             "--task pose:FRAME (may be repeated)"
         )
     q = _start(robot, run, scenario) if t is None or run is None else _then(run, t)
-    for name, value in values_of(at, "--at", "COORDINATE=VALUE, as in q1=pi/2").items():
-        if name in (loading.get("lock") or {}):
-            raise InputError(f"--at: {name} is locked, and no coordinate then")
-        q[robot.coordinate(name)] = scalar(value, f"--at: {name}")
+    q = configuration_at(robot, q, at, loading.get("lock") or {})
     first = 0.0 if run is None or not len(run) else float(run.t[0])
     if not given and own is not None:
         _decide(own, first if t is None else t, q)
@@ -112,6 +109,16 @@ def studied(
         trajectory=run,
         scenario=scenario,
     )
+
+
+def configuration_at(robot: Robot, q: Array, at: Sequence[str] | None, locked: Mapping[str, float]) -> Array:
+    """q (n,) with what `--at` says, COORDINATE=VALUE, m and rad; `InputError` for what is no coordinate."""
+    q = q.copy()
+    for name, value in values_of(at, "--at", "COORDINATE=VALUE, as in q1=pi/2").items():
+        if name in locked:
+            raise InputError(f"--at: {name} is locked, and no coordinate then")
+        q[robot.coordinate(name)] = scalar(value, f"--at: {name}")
+    return q
 
 
 def _decide(controller: Controller, t: float, q: Array) -> None:

@@ -7,6 +7,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,6 @@ from nmm.driving.making import Making
 from nmm.driving.messages import Aim, Order, Pick, parsed
 from nmm.driving.plotted import channels, numbers, values
 from nmm.driving.setups import Setup
-from nmm.driving.surroundings import Surroundings
 from nmm.errors import InputError, NmmError
 from nmm.looks import looks
 from nmm.playback.channels import Channels
@@ -27,7 +27,8 @@ from nmm.playback.encoding import encode
 from nmm.playback.live import serve
 from nmm.playback.page import socket_page
 from nmm.playback.scene import live_scene
-from nmm.playback.server import PageServer
+from nmm.playback.server import PageServer, Visitor
+from nmm.playback.surroundings import Surroundings
 
 SCRIPTS = ("drive_gizmo.js", "drive.js")
 STYLES = ("drive.css",)
@@ -70,8 +71,7 @@ def drive(
     server = PageServer(
         lambda host, token: socket_page(setup.name, host, token, scripts=SCRIPTS, styles=STYLES),
         [encode(command) for command in session.commands],
-        session.follow,
-        receive=session.receive,
+        lambda: Visitor(session.follow(), session.receive),
         port=port,
     )
     ended = stop or threading.Event()
@@ -128,12 +128,11 @@ class Session:
         self.commands = [*commands[:-1], *drawing.commands, commands[-1], *targets.commands]
         self._publish(look)
 
-    def receive(self, text: str | bytes) -> None:
-        """A page's message; what no page of ours says is left aside."""
-        try:
+    def receive(self, text: str | bytes) -> bool:
+        """A page's message; what no page of ours says is left aside. The loop answers: never at once."""
+        with suppress(InputError):
             self._waiting.append(parsed(text))
-        except InputError:
-            return
+        return False
 
     def follow(self) -> Callable[[], str]:
         """For a page that has come: what is new to it, as lines."""

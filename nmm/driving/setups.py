@@ -91,7 +91,8 @@ class ScenarioSetup(Setup):
     def choices(self, settings: Settings) -> list[Choice]:
         parts = self._with(settings).parts
         kind = parts.resolver.kind
-        found = [Choice("resolver.kind", "method", RESOLVER, kind, self._kinds)]
+        # Which of them the scenario can do with shows when one is chosen: to try takes as long as to load.
+        found = [Choice("resolver.kind", "method", RESOLVER, kind, tuple(RESOLVERS))]
         resolver = parts.resolver.model_dump()
         alpha = resolver.get("alpha")
         if isinstance(alpha, float | int) and not isinstance(alpha, bool) and alpha > 0.0:
@@ -131,18 +132,6 @@ class ScenarioSetup(Setup):
     @cached_property
     def _task_names(self) -> list[str]:
         return [title_of(task, self.robot) for task in self.scenario.controller().task]
-
-    @cached_property
-    def _kinds(self) -> tuple[str, ...]:
-        """The resolvers that this scenario can do with."""
-        return tuple(kind for kind in RESOLVERS if self._does(kind))
-
-    def _does(self, kind: str) -> bool:
-        try:
-            self.scenario.with_resolver(kind).controller()
-        except NmmError:
-            return False
-        return True
 
     def _with(self, settings: Settings) -> Scenario:
         kind = str(settings.get("resolver.kind", self.scenario.parts.resolver.kind))

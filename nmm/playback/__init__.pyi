@@ -6,4 +6,5 @@ from .live import play as play
 from .rolling import Motion as Motion
 from .rolling import wheel_angles as wheel_angles
 from .rolling import wheel_rates as wheel_rates
+from .running import LiveRun as LiveRun
 from .viewer import view as view

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,6 +11,7 @@ from nmm.arrays import Array, Integers
 from nmm.looks import pretty, rate
 from nmm.playback.keyframes import MOST_FRAMES, samples_kept
 from nmm.robots.motion import Motion
+from nmm.robots.robot import Robot
 from nmm.runs.margins import margin
 from nmm.runs.trajectory import Trajectory
 
@@ -90,13 +91,19 @@ def channels(run: Trajectory | Motion) -> Channels:
     return Channels(run.t[kept], len(run.t), thinned, partitions)
 
 
+def still_channels(robot: Robot) -> list[Channel]:
+    """Those of a robot's inputs and coordinates, without values yet."""
+    still = Motion(robot, np.zeros(1), robot.rest[np.newaxis], np.zeros((1, robot.n_u)))
+    return [_replaced(channel, np.zeros(0)) for channel in _of_motion(still)]
+
+
 def _of_motion(run: Trajectory | Motion) -> Iterator[Channel]:
     robot = run.robot
     named = _limits_kept(run) if isinstance(run, Trajectory) else {}
     for i, (name, unit, most) in enumerate(zip(robot.u_names, robot.u_units, robot.u_limits, strict=True)):
         key = f"u_{name}"
         ends = named.get(key, (-float(most), float(most)))
-        yield Channel(key, _input(run, i), unit, "inputs", run.u[:, i], ends)
+        yield Channel(key, input_text(robot, i), unit, "inputs", run.u[:, i], ends)
     for i, (name, unit) in enumerate(zip(robot.q_names, robot.q_units, strict=True)):
         own = np.where(robot.limited[i], robot.q_limits[i], [-np.inf, np.inf])
         ends = named.get(name, (float(own[0]), float(own[1])))
@@ -156,14 +163,20 @@ def _partition(run: Trajectory) -> tuple[Array, tuple[str, ...], Integers]:
     switches = np.flatnonzero(np.any(np.diff(columns, axis=0) != 0, axis=1)) + 1
     begins = np.concatenate([[0], switches])
     sets, number = np.unique(columns[begins], axis=0, return_inverse=True)
-    texts = tuple(", ".join(_input(run, k) for k in one if k >= 0) or "none: damped" for one in sets)
+    texts = tuple(partition_text(run.robot, one) for one in sets)
     lasts = np.diff(np.append(begins, len(columns)))
     return np.repeat(number.reshape(-1).astype(np.float64), lasts), texts, switches
 
 
-def _input(run: Trajectory | Motion, column: int) -> str:
-    name = run.robot.u_names[column]
-    return pretty(name) if column < run.robot.platform.p else rate(name)
+def partition_text(robot: Robot, columns: Iterable[int]) -> str:
+    """What a partition is called, by the numbers of its columns; negative ones are none."""
+    return ", ".join(input_text(robot, k) for k in columns if k >= 0) or "none: damped"
+
+
+def input_text(robot: Robot, column: int) -> str:
+    """What people call an input: v, or a joint's rate by the joint's name."""
+    name = robot.u_names[column]
+    return pretty(name) if column < robot.platform.p else rate(name)
 
 
 def _finite(channel: Channel) -> Channel:

@@ -17,7 +17,7 @@ from nmm.playback.encoding import encode
 from nmm.playback.page import socket_page
 from nmm.playback.rolling import Rolling
 from nmm.playback.scene import Shown, live_scene, playback_scene
-from nmm.playback.server import PageServer
+from nmm.playback.server import PageServer, Visitor
 from nmm.playback.sticks import appearance
 from nmm.robots.robot import Robot
 from nmm.runs.ellipsoid_options import Wanted
@@ -72,11 +72,7 @@ def serve(
     """Print where a server's page is and which links of the robots are drawn without visuals, and return at
     Ctrl-C or when `stop` is set, with the server closed."""
     try:
-        print(f"{what} at {server.url} (Ctrl-C ends it)", flush=True)
-        for note in dict.fromkeys(note for robot in robots for note in appearance(robot).notes()):
-            print(note, flush=True)
-        if open_browser:
-            _open(server.url)
+        announce(server, what, robots, open_browser=open_browser)
         stop = stop or threading.Event()
         # Not for ever at once: on some systems Ctrl-C cannot end that.
         while not stop.wait(timeout=0.5):
@@ -85,6 +81,15 @@ def serve(
         print(flush=True)
     finally:
         server.close()
+
+
+def announce(server: PageServer, what: str, robots: Sequence[Robot], *, open_browser: bool) -> None:
+    """Print where a server's page is, and open it; the rest as `serve`."""
+    print(f"{what} at {server.url} (Ctrl-C ends it)", flush=True)
+    for note in dict.fromkeys(note for robot in robots for note in appearance(robot).notes()):
+        print(note, flush=True)
+    if open_browser:
+        _open(server.url)
 
 
 class LiveViewer:
@@ -120,7 +125,7 @@ class LiveViewer:
         self._server = PageServer(
             lambda host, token: socket_page(robot.name, host, token),
             [encode(command) for command in commands],
-            lambda: self._pose,
+            lambda: Visitor(self._pose),
             port=port,
         )
         if open_browser:

@@ -9,6 +9,7 @@ import socket
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
+from dataclasses import dataclass
 
 import tornado.web
 import tornado.websocket
@@ -26,6 +27,22 @@ PERIOD = 1.0 / 60.0
 LONGEST_MESSAGE = 4096
 
 
+@dataclass(frozen=True)
+class Visitor:
+    """A page that has come. All is called in the server's thread.
+
+    Attributes
+    ----------
+    latest : lines for what is new to it; "" for nothing
+    heard : called with what it says; whether `latest` then has something new
+    gone : called when it has gone
+    """
+
+    latest: Callable[[], str]
+    heard: Callable[[str | bytes], bool] = lambda message: False
+    gone: Callable[[], None] = lambda: None
+
+
 class PageServer:
     """Serves one page and sends it commands.
 
@@ -37,9 +54,13 @@ class PageServer:
     ----------
     page : makes the page, given the server's address "127.0.0.1:port" and the token
     hello : lines of commands for a page that has just connected
-    follow : makes `latest()` for a page: lines for what is new to it; both are called in the server's thread
-    receive : called with what a page says, in the server's thread; when not given, pages have nothing to say
+    visit : makes the `Visitor` for a page that has connected; when not given, pages are told no more
     port : the port, or None for a free one
+
+    Attributes
+    ----------
+    port, host, url, token : where it is, "127.0.0.1:port", "http://127.0.0.1:port/"; what its pages know
+    hello : as given; another list is what pages get that come from now on
 
     Raises
     ------
@@ -50,9 +71,8 @@ class PageServer:
         self,
         page: Callable[[str, str], str],
         hello: Sequence[str],
-        follow: Callable[[], Callable[[], str]] | None = None,
+        visit: Callable[[], Visitor] | None = None,
         *,
-        receive: Callable[[str | bytes], None] | None = None,
         port: int | None = None,
     ) -> None:
         self._socket = _listen(port)
@@ -66,8 +86,7 @@ class PageServer:
             self._socket.close()
             raise
         self.hello = hello
-        self.follow = follow
-        self.receive = receive
+        self.visit = visit
         self.pages: set[_Socket] = set()
         self._loop = asyncio.new_event_loop()
         self._notified = False
@@ -159,6 +178,8 @@ class _Socket(tornado.websocket.WebSocketHandler, _Local):
             raise tornado.web.HTTPError(403)
 
     def open(self, *args: str, **kwargs: str) -> None:
+        visit = self.server.visit
+        self.visitor = None if visit is None else visit()
         self.news = asyncio.Event()
         self.news.set()
         self.server.pages.add(self)
@@ -166,14 +187,13 @@ class _Socket(tornado.websocket.WebSocketHandler, _Local):
         self._sending = asyncio.ensure_future(self._send())
 
     async def _send(self) -> None:
-        server = self.server
-        latest = None if server.follow is None else server.follow()
+        server, visitor = self.server, self.visitor
         try:
             await self.write_message("\n".join(server.hello))
-            while latest is not None:
+            while visitor is not None:
                 await self.news.wait()
                 self.news.clear()
-                line = latest()
+                line = visitor.latest()
                 if line:
                     await self.write_message(line)
                 await asyncio.sleep(PERIOD)
@@ -181,11 +201,13 @@ class _Socket(tornado.websocket.WebSocketHandler, _Local):
             server.pages.discard(self)
 
     def on_message(self, message: str | bytes) -> None:
-        if self.server.receive is not None:
-            self.server.receive(message)
+        if self.visitor is not None and self.visitor.heard(message):
+            self.news.set()
 
     def on_close(self) -> None:
         self.server.pages.discard(self)
+        if self.visitor is not None:
+            self.visitor.gone()
         self._sending.cancel()
 
 

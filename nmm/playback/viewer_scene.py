@@ -15,6 +15,7 @@ from nmm.playback.extent import robot_boxes
 from nmm.playback.placements import position_and_quaternion
 from nmm.playback.rolling import Rolling
 from nmm.playback.scene import live_scene
+from nmm.playback.viewed_task import ViewedTask
 from nmm.robots.loading.tips import first_tip, tips
 from nmm.robots.robot import Robot
 
@@ -24,22 +25,29 @@ UNBOUNDED = 1e3
 ANGLE, WAY, REACH = float(np.pi), 3.0, 1.0
 
 
-def viewer_scene(robot: Robot, q: Array, *, frames: bool = True) -> list[Command]:
+def viewer_scene(
+    robot: Robot, q: Array, *, frames: bool = True, task: ViewedTask | None = None
+) -> list[Command]:
     """Commands for a robot at q (n,) that the page's sliders move.
 
     Parameters
     ----------
     frames : whether frames are shown at first
+    task : what the page tells of a task
     """
     wheels = Rolling(robot).settled(q)
     commands, drawn = live_scene(robot, q, wheels, title=robot.name, room=1.0)
     box = robot_boxes(robot, q[np.newaxis], wheels[np.newaxis])[0]
     length = float(np.clip(0.08 * np.linalg.norm(np.ptp(box, axis=0)), 0.02, 0.25))
     drawing = Drawing()
+    if task is not None:
+        task.draw(drawing)
     listed = list(_frames(robot, drawn, drawing))
     drawing.add("joints", coordinates=list(_coordinates(robot, drawn, q)))
     shown_pose = first_tip(robot) or _first_shown(listed)
     drawing.add("frames", frames=listed, shown=frames, length=length, pose=shown_pose)
+    if task is not None:
+        drawing.commands.append(task.told(q))
     drawing.add("hold")
     # The last command says that everything has come.
     return [*commands[:-1], *drawing.commands, commands[-1]]

@@ -70,9 +70,12 @@ def record(
     progress: Callable[[float], None] | None,
     until: Goal | None = None,
     leg: Leaving | None = None,
+    watch: Callable[[Recorder], None] | None = None,
 ) -> tuple[Recorder, Ended]:
-    """Integrate over the times (N,) from q, and say how that ended."""
+    """Integrate over the times (N,) from q, and say how that ended; `watch` gets the recorder before."""
     recorder = Recorder(controller, times)
+    if watch is not None:
+        watch(recorder)
     if len(times) > 1 and not advance.tolerance:  # adaptive steps are shorter than the samples
         controller.dt = float(times[1] - times[0])
     recorder.warnings += slip_warnings(controller.robot)

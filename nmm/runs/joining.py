@@ -126,7 +126,7 @@ def join(
         partition=partition,
         scale=scale,
         unmet=_unmet([part.unmet for part in parts], count),
-        r_names=_names(controller),
+        r_names=row_names(controller),
         r_units=tuple(row.unit for row in rows),
         resolver=controller.resolver_name,
         outcome=verdict.outcome,
@@ -141,7 +141,7 @@ def join(
     )
 
 
-def _names(controller: SequencedController) -> tuple[str, ...]:
+def row_names(controller: SequencedController) -> tuple[str, ...]:
     """Names of all rows; with their task's where two tasks have rows of one name."""
     robot, stack = controller.robot, controller.all_tasks
     names = [row.name for row in stack.rows(robot)]

@@ -35,6 +35,7 @@ def simulate(
     tolerance: float = 1e-9,
     progress: Callable[[float], None] | None = None,
     until: Goal | None = None,
+    watch: Callable[[Recorder], None] | None = None,
 ) -> Trajectory:
     """Integrate q_dot = S(q) u(t, q) from q0 over `duration`, sampled every dt.
 
@@ -52,6 +53,8 @@ def simulate(
     tolerance : of the adaptive method, local error in m and rad
     progress : called with the fraction done, about a hundred times
     until : a target to reach: the run ends where the error is within its tolerances
+    watch : called with what records the samples, before the first one; of tasks that come and go, at each
+        event. Another thread may read the samples in it, all but the last, which may be taken again
 
     Returns
     -------
@@ -87,14 +90,14 @@ def simulate(
         controller.setting.check_start(0.0, q)
     times = sample_times(0.0, dt, steps, duration)
     if isinstance(controller, SequencedController):
-        legs = _legs(controller, advance, times, q, progress, until)
+        legs = _legs(controller, advance, times, q, progress, until, watch)
         for leg in legs:
             kept = guarded(advance, leg.controller)
             goal = until if leg is legs[-1] else None
             leg.verdict = _judged(leg.controller, leg.recorder, leg.ended, kept, method, dt, leg.end, goal)
         return join(controller, legs, until, dt, method)
     advance = guarded(advance, controller)
-    recorder, ended = record(controller, advance, times, q, progress, until)
+    recorder, ended = record(controller, advance, times, q, progress, until, watch=watch)
     verdict = _judged(controller, recorder, ended, advance, method, dt, duration, until)
     if until is not None:
         verdict = reached_or_not(verdict, recorder, until, controller.rows)
@@ -147,6 +150,7 @@ def _legs(
     q: Array,
     progress: Callable[[float], None] | None,
     until: Goal | None,
+    watch: Callable[[Recorder], None] | None,
 ) -> list[Leg]:
     """The run from event to event, each leg with the controller of the tasks then active.
 
@@ -174,6 +178,7 @@ def _legs(
             None if progress is None else _from(first / steps, progress),
             until if any(active) and not waiting else None,
             leaving,
+            watch,
         )
         end = float(times[-1]) if leaving.q is None else float(times[first + len(recorder)])
         recorder.goes_on = leaving.q is not None

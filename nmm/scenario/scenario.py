@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from nmm.collisions.obstacle import Obstacle
     from nmm.control.controller import Controller
     from nmm.robots.robot import Robot
+    from nmm.runs.recording import Recorder
     from nmm.runs.trajectory import Trajectory
 
 SUFFIXES = (".yaml", ".yml")
@@ -141,7 +142,12 @@ class Scenario:
         except KeyedError as error:
             raise self._located(error) from None
 
-    def run(self, progress: Progress | None = None, controller: Controller | None = None) -> Trajectory:
+    def run(
+        self,
+        progress: Progress | None = None,
+        controller: Controller | None = None,
+        watch: Callable[[Recorder], None] | None = None,
+    ) -> Trajectory:
         """Run it; a run that fails or is interrupted (Ctrl-C) returns what it has, and says so.
 
         Parameters
@@ -149,6 +155,7 @@ class Scenario:
         progress : called with the fraction done, about a hundred times
         controller : one of a scenario that differs in `KEYS_OF_A_RUN` alone, to be used again; a new one when
             not given
+        watch : as `simulate` takes it
         """
         from nmm.runs.simulation import simulate
 
@@ -168,6 +175,7 @@ class Scenario:
                     tolerance=parts.tolerance,
                     until=None if parts.until is None else parts.until.make(),
                     progress=progress,
+                    watch=watch,
                 )
         except KeyedError as error:
             raise self._located(error) from None

@@ -6,7 +6,12 @@
 
   function listen() {
     const socket = new WebSocket(`ws://${location.host}/socket?token=${document.body.dataset.token}`);
-    nmm.send = (message) => socket.readyState === WebSocket.OPEN && socket.send(JSON.stringify(message));
+    // Says whether there is somebody who hears it.
+    nmm.send = (message) => {
+      const open = socket.readyState === WebSocket.OPEN;
+      if (open) socket.send(JSON.stringify(message));
+      return open;
+    };
     socket.onmessage = (message) => {
       for (const line of message.data.split("\n")) nmm.execute(nmm.decode(line));
       nmm.viewer.num_messages_received++;

@@ -3,7 +3,8 @@
 {
   const THREE = MeshCat.THREE;
   const DEGREES = 180 / Math.PI;
-  const joints = (nmm.joints = { coordinates: [], listeners: [] });
+  // beside: what else the camera holds, as functions that return points.
+  const joints = (nmm.joints = { coordinates: [], listeners: [], beside: [] });
 
   nmm.panel = nmm.element(document.body, "aside", { id: "panel", class: "card", "aria-label": "Robot" });
 
@@ -106,7 +107,7 @@
     if (found.length === 0) {
       for (const path of paths) found.push(new THREE.Vector3().setFromMatrixPosition(nmm.node(path).matrixWorld));
     }
-    return found;
+    return [...found, ...joints.beside.flatMap((points) => points())];
   }
 
   // The camera holds the robot as it stands now, with some room for names, not all that it could reach.

@@ -1,4 +1,4 @@
-"""What a driven robot keeps off, in the page: obstacles that stand, and where those are that move."""
+"""What a robot keeps off that moves in a page: obstacles that stand, and where those are that move."""
 
 from __future__ import annotations
 

@@ -1,0 +1,147 @@
+"""A run that is shown while it is computed, in a real browser: what it draws, counts, and is in the end."""
+
+from __future__ import annotations
+
+import re
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+from live_pages import LivePage
+from playback_browser import UPRIGHT, WALK, Window
+from playback_browser import browser as browser
+from playback_browser import empty_page as empty_page
+from playback_browser import window as window
+from playwright.sync_api import Browser, Page
+from ports import MOST, wait_for
+
+import nmm
+from nmm.playback import LiveRun
+from nmm.playback.running import FPS
+from nmm.runs.trajectory import Trajectory
+
+pytestmark = pytest.mark.browser
+
+DURATION = 6.0
+
+
+@contextmanager
+def live(duration: float = DURATION) -> Iterator[tuple[LiveRun, Callable[[], Trajectory]]]:
+    """A page for a run, and what computes the run and shows it to its end in a thread."""
+    one = nmm.Scenario.load("unicycle_2r_position", {"duration": duration})
+    controller, stop, threads = one.controller(), threading.Event(), []
+    with LiveRun(controller, one.parts.q0, duration, open_browser=False) as page:
+
+        def run() -> Trajectory:
+            made = one.run(None, controller, page.watch)
+            threads.append(threading.Thread(target=page.stay, args=(made,), kwargs={"stop": stop}))
+            threads[-1].start()
+            return made
+
+        try:
+            yield page, run
+        finally:
+            stop.set()
+            for thread in threads:
+                thread.join(timeout=MOST)
+
+
+def without_drawing(page: Page) -> None:
+    """The processor that draws here is slow, and no part of what is counted."""
+    page.evaluate("nmm.viewer.scene.visible = false; nmm.plots.show(false)")
+
+
+def of_report(report: str, page: int) -> tuple[int, int, int, int]:
+    """Pictures made, made too late; drawn and dropped by that page."""
+    made = re.search(r"(\d+) pictures of", report)
+    late = re.search(r"(\d+) could not be made", report)
+    pages = re.findall(r"drew (\d+) and dropped (\d+)", report)
+    assert made is not None
+    return int(made[1]), int(late[1]) if late else 0, *(int(text) for text in pages[page])  # type: ignore[return-value]
+
+
+def test_it_grows_and_becomes_the_page_that_plays_it(window: Window) -> None:
+    with live() as (shown, run):
+        page = window.open(shown.url)
+        assert page.locator("#status").inner_text() in ("", "0.00 of 6 s, the run begins")
+        made = run()
+        page.wait_for_function("nmm.runs[0].t.length > 20")
+        # What is drawn is where the run was then, and the curves end there.
+        t, tree, state = page.evaluate(f"[nmm.player.time, ({WALK})(), nmm.state()]")
+        k = int(np.searchsorted(made.t, t))
+        assert made.t[k] == t
+        assert t < DURATION
+        values = state["runs"][0]["values"]
+        for i, name in enumerate(made.robot.q_names):
+            assert values[name] == pytest.approx(made.q[k, i], rel=1e-6, abs=1e-7)
+        assert values["error_norm"] == pytest.approx(made.error_norm[k], rel=1e-6)
+        root = UPRIGHT.T @ np.reshape(tree[next(one for one in tree if one.endswith("/theta"))], (4, 4)).T
+        np.testing.assert_allclose(root[:2, 3], made.q[k, :2], atol=1e-6)
+        page.evaluate("nmm.seek(0)")  # the clock is the program's
+        assert page.evaluate("nmm.player.time") >= t
+        page.get_by_role("button", name="Whole run").click()
+        page.wait_for_function("nmm.stage && !nmm.stage.live && nmm.player.time === nmm.stage.duration")
+        assert "shown as it ran" in shown.report()
+        page.evaluate("nmm.seek(2.5)")
+        k = int(np.searchsorted(made.t, 2.5))
+        values = page.evaluate("nmm.state()")["runs"][0]["values"]
+        for i, name in enumerate(made.robot.q_names):
+            assert values[name] == pytest.approx(made.q[k, i], abs=1e-6)
+        assert page.locator("#status").inner_text() == ""
+        assert page.evaluate("document.body.classList.contains('running')") is False
+
+
+def test_thirty_pictures_a_second_are_drawn_or_counted(window: Window, browser: Browser) -> None:
+    """By a page, by by a second one that comes late, and by one whose browser is killed."""
+    with live(60.0) as (shown, run):
+        page = window.open(shown.url)
+        without_drawing(page)
+        other, late = browser.new_context(), browser.new_context()
+        dying = other.new_page()
+        dying.goto(shown.url)
+        dying.wait_for_function("nmm.running && nmm.running.drawn > 0")
+        run()
+        page.wait_for_function("nmm.player.time > 1", timeout=1000.0 * MOST)
+        other.close()
+        second = late.new_page()
+        second.goto(shown.url)
+        second.wait_for_function("nmm.running && nmm.running.drawn > 2", timeout=1000.0 * MOST)
+        assert second.evaluate("nmm.runs[0].t[0]") == 0.0
+        without_drawing(second)
+        reached = page.evaluate("nmm.player.time")
+        page.get_by_role("button", name="Whole run").click()
+        for one in (page, second):
+            one.wait_for_function("nmm.stage && !nmm.stage.live", timeout=1000.0 * MOST)
+        wait_for(lambda: shown._over)
+        report = shown.report()
+        late.close()
+    made, too_late, drew, dropped = of_report(report, 0)
+    assert made + too_late >= 0.9 * FPS * reached
+    assert drew > 0
+    assert drew + dropped == made
+    for i in (1, 2):
+        _, _, drew, dropped = of_report(report, i)
+        assert drew > 0
+        assert drew + dropped < made
+
+
+def test_a_page_that_hangs_keeps_nobody_waiting(window: Window, browser: Browser) -> None:
+    with live(2.0) as (shown, run):
+        hung = browser.new_context()
+        stuck = hung.new_page()
+        stuck.goto(shown.url)
+        stuck.wait_for_function("nmm.running && nmm.running.drawn > 0")
+        stuck.evaluate(
+            "setTimeout(() => { const t = performance.now(); while (performance.now() - t < 8000); }, 0); 0"
+        )
+        with LivePage(shown.url) as page:
+            run()
+            wait_for(lambda: bool(page.of("whole")))
+        report = shown.report()
+        made, too_late, drew, dropped = of_report(report, 1)
+        assert drew + dropped == made or drew + dropped == made - 1
+        assert made + too_late >= 0.9 * FPS * 2.0
+        assert of_report(report, 0)[3] > 0.5 * made
+        hung.close()
