@@ -198,22 +198,20 @@ def test_nothing_seeks_and_nothing_is_cut_off_at_420_px(window: Window, setup: S
 
 
 def test_pictures_come_at_their_rate(window: Window, setup: ScenarioSetup) -> None:
-    """Thirty a second on a machine that has nothing else to do; here those that were sent are counted."""
+    """Thirty a second of the robot's time: a machine that has else to do may send those late, and in crowds."""
     with driven(setup) as url:
         page = opened(window, url)
-        counted = page.evaluate(
+        times = page.evaluate(
             """() => new Promise((done) => {
               const hook = nmm.hooks.drive;
-              let [count, samples, begin] = [0, 0, performance.now()];
+              const times = [];
               nmm.hooks.drive = (picture) => {
-                count += 1;
-                samples += picture.samples.length;
+                times.push(...picture.samples.map(([t]) => t));
                 hook(picture);
               };
-              setTimeout(() => done([count, samples, (performance.now() - begin) / 1000]), 2000);
+              setTimeout(() => done(times), 2000);
             })"""
         )
-    count, samples, seconds = counted
-    assert count <= 62.0 * seconds
-    assert samples <= 32.0 * seconds
-    assert samples >= 5
+    assert len(times) >= 5
+    assert np.all(np.diff(times) > 0.0)
+    assert len(times) - 1 <= 32.0 * (times[-1] - times[0]) + 1.0
