@@ -149,8 +149,11 @@ CORNERS = """([at, within]) => {
 }"""
 
 
+CALLS = "viewer.renderer.render(viewer.scene, viewer.camera), viewer.renderer.info.render.calls"
+
+
 def test_ghosts_stand_where_the_robot_passes(small_robot: Robot, window: Window, tmp_path: Path) -> None:
-    """Every corner of every part, in the order of the joints; a copy is drawn twice, however many joints it has."""
+    """With every corner of every part; a copy is drawn in two passes, however many joints it has."""
     motion = drive(small_robot)
     page = window.open(file_url([motion], tmp_path, ghosts=4))
     samples = ghost_samples(motion, 4)

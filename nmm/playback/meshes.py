@@ -1,4 +1,4 @@
-"""Mesh files as the browser needs them: one piece a material, no more triangles than are seen, sharp edges kept,
+"""Mesh files as the browser needs them: one piece a material, as many triangles as are seen, sharp edges kept,
 scales worked in."""
 
 from __future__ import annotations

@@ -71,7 +71,7 @@
       // copies the older one.
       const back = 4 + copies;
       const offset = {
-        side: THREE.DoubleSide, polygonOffset: true, polygonOffsetFactor: back, polygonOffsetUnits: 8 * back,
+        side: THREE.DoubleSide, blending: THREE.CustomBlending, polygonOffset: true, polygonOffsetFactor: back, polygonOffsetUnits: 8 * back,
       };
       // First depth alone, then colour where it is nearest: a copy hides its own inside.
       const depth = new THREE.MeshBasicMaterial({ ...offset, transparent: true, colorWrite: false });
@@ -86,6 +86,9 @@
       [depth, paint].forEach((material, pass) => {
         const mesh = new THREE.Mesh(geometry, material);
         mesh.renderOrder = 2 * k + pass + 1;
+        // What is transparent comes last, but three.js would draw its back and its front by themselves.
+        mesh.onBeforeRender = () => (material.transparent = false);
+        mesh.onAfterRender = () => (material.transparent = true);
         group.add(mesh);
       });
       nmm.viewer.set_object(nmm.split(`${path}/${k}/robot`), group);
