@@ -1,5 +1,4 @@
-"""Mesh files as the browser needs them: one piece a material, as many triangles as are seen, sharp edges kept,
-scales worked in."""
+"""Mesh files for the browser: a piece a material, no more triangles than one sees, sharp edges kept."""
 
 from __future__ import annotations
 
@@ -21,8 +20,8 @@ Color = tuple[float, float, float, float]
 
 #: Faces that meet at less than this angle are shaded as one smooth surface, rad.
 SMOOTH = np.radians(35.0)
-#: A file's surface may be off by this share of its size (the diagonal of the box around it): less than a pixel,
-#: even when it fills the window.
+#: A file's surface may be off by this share of its size (the diagonal of the box around it): a pixel when it
+#: fills the window.
 OFF = 1e-3
 
 
@@ -51,7 +50,9 @@ def mesh_pieces(geometry: pin.GeometryObject) -> list[MeshPiece]:
         MeshPiece(piece.vertices * scale, piece.faces[:, ::-1] if flip else piece.faces, piece.color)
         for piece in pieces
     ]
-    if not loaded or np.allclose(_box(scaled), _box(loaded), atol=1e-3 * np.ptp(_box(loaded), axis=0).max()):
+    if not loaded or np.allclose(
+        _box(scaled), _box(loaded), atol=3.0 * OFF * np.ptp(_box(loaded), axis=0).max()
+    ):
         return scaled
     return loaded
 
