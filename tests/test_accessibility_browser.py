@@ -1,4 +1,4 @@
-"""axe-core finds no serious fault in the pages. It comes from npm, for this test alone (NMM_AXE is its file)."""
+"""axe-core finds no serious fault in the pages. It is from npm, for this test alone: NMM_AXE is its file."""
 
 from __future__ import annotations
 
