@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -99,13 +100,18 @@ def test_what_is_thinned_misses_nothing_that_one_could_see() -> None:
     assert len(shown.t) <= 2 * FPS * 20.0 + 200
 
 
-def test_a_million_samples_fit_into_a_page() -> None:
+def test_a_million_samples_fit_into_a_page(tmp_path: Path) -> None:
     trajectory = noisy(1_000_000, 1000.0)
     shown = channels(trajectory)
     assert shown.samples == 1_000_000
     assert len(shown.t) <= 2 * MOST_FRAMES + 200
     assert shown.t[0] == trajectory.t[0]
     assert shown.t[-1] == trajectory.t[-1]
+    begun = time.process_time()
+    page = write_html([trajectory], tmp_path / "page.html")
+    assert time.process_time() - begun < 10.0  # 3 s on one core; sample by sample it was 20 s
+    assert page.stat().st_size < 4e6
+    assert '"samples":1000000' in page.read_text("utf-8")
 
 
 def test_one_sample_and_ten_runs_and_other_robots_make_a_page(tmp_path: Path) -> None:

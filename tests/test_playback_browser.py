@@ -131,22 +131,54 @@ def test_every_visual_fills_the_room_that_its_shape_fills(robot: Robot, opened: 
         np.testing.assert_allclose(box, expected, atol=close, err_msg=geometry.name)
 
 
+CORNERS = """([at, within]) => {
+  viewer.scene.updateMatrixWorld(true);
+  const inverse = nmm.node(within).matrixWorld.clone().invert();
+  const found = [];
+  const parts = nmm.split(at).length > nmm.split(within).length ? [nmm.node(at)]
+    : nmm.node(at).children.filter((child) => child.name.startsWith("visual "));
+  for (const one of parts) one.traverse((part) => {
+    if (!part.isMesh) return;
+    const points = part.geometry.attributes.position;
+    for (let i = 0; i < points.count; i++) {
+      const point = new MeshCat.THREE.Vector3().fromBufferAttribute(points, i);
+      found.push(point.applyMatrix4(part.matrixWorld).applyMatrix4(inverse).toArray());
+    }
+  });
+  return found;
+}"""
+
+
+CALLS = "viewer.renderer.render(viewer.scene, viewer.camera), viewer.renderer.info.render.calls"
+
+
 def test_ghosts_stand_where_the_robot_passes(small_robot: Robot, window: Window, tmp_path: Path) -> None:
+    """With every corner of every part; a copy is drawn in two passes, however many joints it has."""
     motion = drive(small_robot)
     page = window.open(file_url([motion], tmp_path, ghosts=4))
-    matrices = page.evaluate(WALK)
     samples = ghost_samples(motion, 4)
     assert len(samples) == 4
+    paths = [f"/nmm/motion 0/robot/{'/'.join(names)}" for names in _joints_above(small_robot)]
+    parts = [np.reshape(page.evaluate(CORNERS, [path, path]), (-1, 3)) for path in paths]
     for k, sample in enumerate(samples):
         world = Placements(small_robot).world(motion.q[sample], wheel_angles(motion)[sample])
-        for j, expected in enumerate(world):
-            drawn = matrices.get(f"/nmm/motion 0/ghosts/{k}/{j}")
-            if drawn is not None:  # joints that carry nothing have no ghost
-                np.testing.assert_allclose(UPRIGHT.T @ np.reshape(drawn, (4, 4)).T, expected, atol=1e-12)
-    ghosts = [path for path in matrices if path.startswith("/nmm/motion 0/ghosts/") and path.count("/") == 5]
-    texts = [path for path in ghosts if path.endswith("/text")]
-    joints = {geometry.parentJoint for geometry in small_robot.visual_model.geometryObjects}
-    assert (len(texts), len(ghosts)) == (4, 4 * (len(joints) + 1))
+        expected = [part @ place[:3, :3].T + place[:3, 3] for part, place in zip(parts, world, strict=True)]
+        drawn = np.array(page.evaluate(CORNERS, [f"/nmm/motion 0/ghosts/{k}/robot", "/nmm"]))
+        np.testing.assert_allclose(drawn, np.vstack([*expected, *expected]), atol=1e-6)
+    calls = page.evaluate(CALLS)
+    page.evaluate("nmm.actions.ghosts()")
+    assert calls - page.evaluate(CALLS) == 3 * 4  # with its text
+    shown = page.evaluate("nmm.ghosts[0].children.map((copy) => copy.children.map((part) => part.name))")
+    assert [sorted(names) for names in shown] == [["robot", "text"]] * 4
+
+
+def _joints_above(robot: Robot) -> list[list[str]]:
+    """The names of each joint of the display model and of those above it, the first one first."""
+    model = robot.display_model
+    found: list[list[str]] = [[]]
+    for joint in range(1, model.njoints):
+        found.append([*found[model.parents[joint]], model.names[joint]])
+    return found[1:]
 
 
 @pytest.mark.parametrize("size", [(1280, 720), (420, 700), (640, 300)])

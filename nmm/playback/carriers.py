@@ -102,10 +102,8 @@ class Carriers:
         the step otherwise.
         """
         places = np.zeros((len(q), len(self._ids), 2))
-        for i, at in enumerate(q):
-            pin.forwardKinematics(self.robot.model, self._data, at)
-            for k, joint in enumerate(self._ids):
-                places[i, k] = self._ground.actInv(self._data.oMi[joint].translation)[:2]
+        for k, joint in enumerate(self._ids):
+            places[:, k] = self._places(joint, q)
         headings = self._heading + q @ self._turning.T
         turns = np.diff(headings, axis=0)
         # The chord of an arc is shorter than the arc by this factor. A turn of more than half a
@@ -117,6 +115,26 @@ class Carriers:
         along = cosine * moved[..., 0] + sine * moved[..., 1]
         across = cosine * moved[..., 1] - sine * moved[..., 0]
         return np.stack([along, across, turns], axis=-1)
+
+    def _places(self, joint: int, q: Array) -> Array:
+        """Where a joint's origin is on the ground, (N, 2), for q (N, n), all samples at once."""
+        model, data = self.robot.model, self._data
+        pin.computeJointJacobians(model, data, np.zeros(model.nq))
+        place, turned = np.zeros((len(q), 2)), np.zeros(len(q))
+        before = np.zeros(2)
+        for above in list(model.supports[joint])[1:]:
+            at = self._ground.actInv(data.oMi[above].translation)[:2]
+            columns = pin.getJointJacobian(model, data, above, pin.LOCAL_WORLD_ALIGNED)
+            column = model.joints[above].idx_v
+            slide = self._ground.rotation.T @ columns[:3, column]
+            turn = self._ground.rotation[:, 2] @ columns[3:, column]
+            offset = (at - before) + slide[:2] * q[:, [column]]
+            cosine, sine = np.cos(turned), np.sin(turned)
+            place[:, 0] += cosine * offset[:, 0] - sine * offset[:, 1]
+            place[:, 1] += sine * offset[:, 0] + cosine * offset[:, 1]
+            turned = turned + np.round(turn) * q[:, column]
+            before = at
+        return place
 
     def moving_inputs(self, carrier: int, point: Array) -> list[int]:
         """The inputs that move a point (2,) of a body, along its level axes, at some configuration."""

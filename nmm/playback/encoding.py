@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-_KEYS: Mapping[type, str] = {np.float32: "f32", np.float64: "f64", np.uint32: "u32"}
+_KEYS: Mapping[type, str] = {np.float32: "f32", np.float64: "f64", np.uint32: "u32", np.uint16: "u16"}
 
 
 def packed(values: ArrayLike, dtype: type) -> dict[str, str]:
-    """An array for the page: {"f32": base64 of its little-endian bytes}, likewise f64 and u32."""
+    """An array for the page: {"f32": base64 of its little-endian bytes}, likewise f64, u32 and u16."""
     flat = np.ascontiguousarray(values, dtype=np.dtype(dtype).newbyteorder("<"))
     return {_KEYS[dtype]: base64.b64encode(flat.tobytes()).decode("ascii")}
 

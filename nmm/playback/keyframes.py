@@ -31,13 +31,13 @@ class Keyframes:
         return len(self.t)
 
 
-def keyframes(motion: Motion, fps: float = 60.0) -> Keyframes:
-    """Thin a motion to about `fps` frames a second of its time.
+def keyframes(motion: Motion, fps: float = 60.0, wheels: Array | None = None) -> Keyframes:
+    """Thin a motion to about `fps` frames a second of its time; its wheels' angles (N, D), if they are known.
 
     Frames are samples of the motion, the first and the last among them; only where parts turn by more
     than `LARGEST_TURN` between two samples are frames put in between, linear in the coordinates.
     """
-    t, wheels = motion.t, wheel_angles(motion)
+    t, wheels = motion.t, wheel_angles(motion) if wheels is None else wheels
     kept = samples_kept(t, fps)
     everything = np.column_stack([motion.q, wheels])[kept]
     times = t[kept]

@@ -1,4 +1,4 @@
-"""Mesh files as the browser needs them: one piece a material, sharp edges kept, scales worked in."""
+"""Mesh files for the browser: a piece a material, no more triangles than one sees, sharp edges kept."""
 
 from __future__ import annotations
 
@@ -9,19 +9,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from nmm.arrays import Array
+from nmm.playback.decimation import Indices, decimated
 
 if TYPE_CHECKING:
     import trimesh
-
-Indices = NDArray[np.uint32]
 
 Color = tuple[float, float, float, float]
 
 #: Faces that meet at less than this angle are shaded as one smooth surface, rad.
 SMOOTH = np.radians(35.0)
+#: A file's surface may be off by this share of its size (the diagonal of the box around it): a pixel when it
+#: fills the window.
+OFF = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +50,9 @@ def mesh_pieces(geometry: pin.GeometryObject) -> list[MeshPiece]:
         MeshPiece(piece.vertices * scale, piece.faces[:, ::-1] if flip else piece.faces, piece.color)
         for piece in pieces
     ]
-    if not loaded or np.allclose(_box(scaled), _box(loaded), atol=1e-3 * np.ptp(_box(loaded), axis=0).max()):
+    if not loaded or np.allclose(
+        _box(scaled), _box(loaded), atol=3.0 * OFF * np.ptp(_box(loaded), axis=0).max()
+    ):
         return scaled
     return loaded
 
@@ -66,16 +69,23 @@ def _file_pieces(path: str) -> tuple[MeshPiece, ...]:
         meshes = [mesh for mesh in scene.dump() if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces)]
     except Exception:  # trimesh's readers raise whatever they meet; Pinocchio's copy of the mesh is at hand
         return ()
-    return tuple(MeshPiece(*_smoothed(mesh), _color(mesh)) for mesh in meshes)
+    if not meshes:
+        return ()
+    ends = np.array([mesh.bounds for mesh in meshes])
+    off = OFF * float(np.linalg.norm(ends[:, 1].max(axis=0) - ends[:, 0].min(axis=0)))
+    return tuple(MeshPiece(*_light(mesh, off), _color(mesh)) for mesh in meshes)
 
 
-def _smoothed(mesh: trimesh.Trimesh) -> tuple[Array, Indices]:
-    """Vertices shared between the faces of a smooth surface, and only there."""
-    from trimesh.graph import smooth_shade
+def _light(mesh: trimesh.Trimesh, off: float) -> tuple[Array, Indices]:
+    """A decimated mesh, whose vertices are shared between the faces of a smooth surface, and only there."""
+    import trimesh
 
     mesh = mesh.copy()
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    mesh = smooth_shade(mesh, angle=SMOOTH)
+    vertices, faces = decimated(
+        np.array(mesh.vertices, dtype=float), np.array(mesh.faces, dtype=np.uint32), off
+    )
+    mesh = trimesh.graph.smooth_shade(trimesh.Trimesh(vertices, faces, process=False), angle=SMOOTH)
     return np.array(mesh.vertices, dtype=float), np.array(mesh.faces, dtype=np.uint32)
 
 

@@ -30,6 +30,8 @@ SCRIPTS = (
     "values.js",
     "player.js",
     "film.js",
+    "webm.js",
+    "record.js",
     "keys.js",
     "address.js",
     "start.js",

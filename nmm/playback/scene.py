@@ -69,7 +69,8 @@ def playback_scene(
         raise InputError("motions: expected at least one motion, got none")
     motions = [run.motion() if isinstance(run, Trajectory) else run for run in runs]
     worn = looks_of_labels([motion.label for motion in motions])
-    frames = [keyframes(motion, fps) for motion in motions]
+    wheels = [wheel_angles(motion) for motion in motions]
+    frames = [keyframes(motion, fps, angles) for motion, angles in zip(motions, wheels, strict=True)]
     start = min(float(motion.t[0]) for motion in motions)
     end = max(float(motion.t[-1]) for motion in motions)
     times = np.linspace(start, end, INSTANTS)
@@ -110,7 +111,7 @@ def playback_scene(
         if samples:
             whose = f"{look.name} " if several else ""
             texts = [f"{whose}{motion.t[k]:.3g} s" for k in samples]
-            robot.ghosts(f"{path}/ghosts", motion.q[samples], wheel_angles(motion)[samples], texts, height)
+            robot.ghosts(f"{path}/ghosts", motion.q[samples], wheels[i][samples], texts, height)
         drawing.add(
             "motion",
             path=path,

@@ -47,13 +47,15 @@ def shapes(geometry: pin.GeometryObject) -> list[Shape]:
 
 def triangles(vertices: Array, faces: Indices) -> dict[str, Any]:
     """Triangles; the browser computes the normals."""
+    short = len(vertices) <= 2**16
+    kind, dtype = ("Uint16Array", np.uint16) if short else ("Uint32Array", np.uint32)
     return {
         "type": "BufferGeometry",
         "data": {
             "attributes": {
                 "position": {"itemSize": 3, "type": "Float32Array", "array": packed(vertices, np.float32)}
             },
-            "index": {"type": "Uint32Array", "array": packed(faces, np.uint32)},
+            "index": {"type": kind, "array": packed(faces, dtype)},
         },
     }
 

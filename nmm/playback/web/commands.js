@@ -28,7 +28,7 @@ const nmm = (window.nmm = { hooks: {}, geometries: {} });
 
 {
   const THREE = MeshCat.THREE;
-  const ARRAYS = { f32: Float32Array, f64: Float64Array, u32: Uint32Array };
+  const ARRAYS = { f32: Float32Array, f64: Float64Array, u32: Uint32Array, u16: Uint16Array };
 
   nmm.split = (path) => path.split("/").filter((name) => name.length > 0);
   nmm.node = (path) => nmm.viewer.scene_tree.find(nmm.split(path)).object;

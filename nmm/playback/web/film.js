@@ -29,11 +29,13 @@
     nmm.viewer.set_dirty();
     return picture;
   };
-  document.getElementById("picture").addEventListener("click", () => {
+  // A file of what is here at this time.
+  nmm.save = (address, kind) => {
     const name = document.title.toLowerCase().replace(/[^\p{L}\p{N}]+/gu, "-").replace(/^-|-$/g, "") || "scene";
     const link = document.createElement("a");
-    link.download = `${name}-${(nmm.stage.start + nmm.player.time).toFixed(2)}s.png`;
-    link.href = nmm.picture();
+    link.download = `${name}-${(nmm.stage.start + nmm.player.time).toFixed(2)}s.${kind}`;
+    link.href = address;
     link.click();
-  });
+  };
+  document.getElementById("picture").addEventListener("click", () => nmm.save(nmm.picture(), "png"));
 }

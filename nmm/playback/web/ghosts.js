@@ -1,45 +1,69 @@
-// Transparent copies of a robot at instants along its way: one geometry a joint, shared by all the copies.
+// Transparent copies of a robot at instants along its way: each one geometry, drawn in two passes.
 "use strict";
 {
   const THREE = MeshCat.THREE;
   const SLATE = nmm.color([0.36, 0.44, 0.54]);
   let copies = 0;
 
-  // Everything fixed to a joint's node as one geometry in that node's frame, with the parts' colours.
-  function merged(joint) {
-    const inverse = joint.matrixWorld.clone().invert();
+  // Everything fixed to the joints' nodes as one geometry: which triangles, in which colours, and each part
+  // with its joint's number and its place in that joint's frame.
+  function merged(joints) {
     const parts = [];
-    for (const child of joint.children) {
-      if (!child.name.startsWith("visual ")) continue;
-      child.traverse((part) => part.isMesh && parts.push(part));
-    }
-    const pieces = parts.map((part) => {
-      const piece = part.geometry.index === null ? part.geometry.clone() : part.geometry.toNonIndexed();
-      return piece.applyMatrix4(inverse.clone().multiply(part.matrixWorld));
+    joints.forEach((joint, number) => {
+      const node = nmm.node(joint.path);
+      const inverse = node.matrixWorld.clone().invert();
+      for (const child of node.children) {
+        if (!child.name.startsWith("visual ")) continue;
+        child.traverse(({ isMesh, geometry, material, matrixWorld }) => {
+          if (isMesh) parts.push({ number, geometry, material, matrix: inverse.clone().multiply(matrixWorld) });
+        });
+      }
     });
-    const count = pieces.reduce((sum, piece) => sum + piece.attributes.position.count, 0);
-    if (count === 0) return null;
-    const [position, normal, color] = [0, 1, 2].map(() => new Float32Array(3 * count));
+    const count = parts.reduce((sum, { geometry }) => sum + geometry.attributes.position.count, 0);
+    const color = new Float32Array(3 * count);
+    const index = [];
     let start = 0;
-    pieces.forEach((piece, i) => {
-      position.set(piece.attributes.position.array, start);
-      normal.set(piece.attributes.normal.array, start);
-      const end = start + 3 * piece.attributes.position.count;
+    for (const { geometry, material } of parts) {
+      const many = geometry.attributes.position.count;
+      if (geometry.index === null) for (let i = 0; i < many; i++) index.push(start + i);
+      else for (const i of geometry.index.array) index.push(start + i);
       // A little slate, so that white copies can be told from the floor.
-      const shade = parts[i].material.color.clone().lerp(SLATE, 0.3);
-      for (; start < end; start += 3) shade.toArray(color, start);
-      piece.dispose();
-    });
+      const shade = material.color.clone().lerp(SLATE, 0.3);
+      for (let i = start; i < start + many; i++) shade.toArray(color, 3 * i);
+      start += many;
+    }
+    return { parts, count, index: new THREE.BufferAttribute(new Uint32Array(index), 1), color: new THREE.BufferAttribute(color, 3) };
+  }
+
+  // The robot with its joints in the k-th of their poses.
+  function posed({ parts, count, index, color }, joints, k) {
+    const [position, normal] = [0, 1].map(() => new Float32Array(3 * count));
+    const places = joints.map(({ poses }) =>
+      new THREE.Matrix4().compose(
+        new THREE.Vector3().fromArray(poses, 7 * k), new THREE.Quaternion().fromArray(poses, 7 * k + 3), new THREE.Vector3(1, 1, 1),
+      ));
+    const v = new THREE.Vector3();
+    let at = 0;
+    for (const { number, geometry, matrix } of parts) {
+      const placed = places[number].clone().multiply(matrix);
+      const turned = new THREE.Matrix3().getNormalMatrix(placed);
+      for (let i = 0; i < geometry.attributes.position.count; i++, at += 3) {
+        v.fromBufferAttribute(geometry.attributes.position, i).applyMatrix4(placed).toArray(position, at);
+        v.fromBufferAttribute(geometry.attributes.normal, i).applyMatrix3(turned).normalize().toArray(normal, at);
+      }
+    }
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(position, 3));
     geometry.setAttribute("normal", new THREE.BufferAttribute(normal, 3));
-    geometry.setAttribute("color", new THREE.BufferAttribute(color, 3));
+    geometry.setAttribute("color", color);
+    geometry.setIndex(index);
     return geometry;
   }
 
   nmm.hooks.ghosts = ({ path, joints, root, texts, height }) => {
     nmm.viewer.scene.updateMatrixWorld(true);
-    const shapes = joints.map((joint) => merged(nmm.node(joint.path)));
+    const shape = merged(joints);
+    const platform = joints.find((joint) => joint.path === root);
     const count = joints[0].poses.length / 7;
     for (let k = 0; k < count; k++) {
       copies += 1;
@@ -47,7 +71,7 @@
       // copies the older one.
       const back = 4 + copies;
       const offset = {
-        side: THREE.DoubleSide, polygonOffset: true, polygonOffsetFactor: back, polygonOffsetUnits: 8 * back,
+        side: THREE.DoubleSide, blending: THREE.CustomBlending, polygonOffset: true, polygonOffsetFactor: back, polygonOffsetUnits: 8 * back,
       };
       // First depth alone, then colour where it is nearest: a copy hides its own inside.
       const depth = new THREE.MeshBasicMaterial({ ...offset, transparent: true, colorWrite: false });
@@ -57,24 +81,23 @@
         stencilWrite: true, stencilRef: 1 + (copies % 255),
         stencilFunc: THREE.NotEqualStencilFunc, stencilZPass: THREE.ReplaceStencilOp,
       });
-      joints.forEach((joint, j) => {
-        if (shapes[j] === null) return;
-        const group = new THREE.Group();
-        [depth, paint].forEach((material, pass) => {
-          const mesh = new THREE.Mesh(shapes[j], material);
-          mesh.renderOrder = 2 * k + pass + 1;
-          group.add(mesh);
-        });
-        nmm.viewer.set_object(nmm.split(`${path}/${k}/${j}`), group);
-        const node = nmm.node(`${path}/${k}/${j}`);
-        node.position.fromArray(joint.poses, 7 * k);
-        node.quaternion.fromArray(joint.poses, 7 * k + 3);
-        if (joint.path !== root) return;
-        const label = nmm.scenery.label(texts[k], [0.4, 0.47, 0.56], false, 0.75);
-        label.center.set(0.5, 0.5 - 1.05 * nmm.motions.length); // those of robots at one place are stacked
-        label.position.set(joint.poses[7 * k], joint.poses[7 * k + 1], joint.poses[7 * k + 2] + height);
-        nmm.viewer.set_object(nmm.split(`${path}/${k}/text`), label);
+      const group = new THREE.Group();
+      const geometry = posed(shape, joints, k);
+      [depth, paint].forEach((material, pass) => {
+        const mesh = new THREE.Mesh(geometry, material);
+        mesh.renderOrder = 2 * k + pass + 1;
+        // What is transparent comes last, but three.js would draw its back and its front by themselves.
+        mesh.onBeforeRender = () => (material.transparent = false);
+        mesh.onAfterRender = () => (material.transparent = true);
+        group.add(mesh);
       });
+      nmm.viewer.set_object(nmm.split(`${path}/${k}/robot`), group);
+      if (platform === undefined) continue;
+      const label = nmm.scenery.label(texts[k], [0.4, 0.47, 0.56], false, 0.75);
+      label.center.set(0.5, 0.5 - 1.05 * nmm.motions.length); // those of robots at one place are stacked
+      label.position.fromArray(platform.poses, 7 * k);
+      label.position.z += height;
+      nmm.viewer.set_object(nmm.split(`${path}/${k}/text`), label);
     }
     nmm.ghosts = (nmm.ghosts || []).concat(nmm.node(path));
   };

@@ -24,6 +24,7 @@
     r: actions.reset,
     s: () => document.getElementById("picture").click(),
     v: () => nmm.camera.next(),
+    w: () => document.getElementById("film").click(),
     "+": () => plots.closer(0.5),
     "-": () => plots.closer(2),
     0: () => plots.whole(),

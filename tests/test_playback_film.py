@@ -1,0 +1,96 @@
+"""The page makes a film of itself: each picture is the scene at its time, whatever the machine's speed."""
+
+from __future__ import annotations
+
+import base64
+import re
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playback_browser import Window, browser, empty_page, file_url, small_robot, window  # noqa: F401  # fixtures
+from playback_robot import drive
+
+from nmm.rendering.encoder import find_ffmpeg
+from nmm.robots.robot import Robot
+
+pytestmark = pytest.mark.browser
+
+FILM = """async (told) => {
+  const shares = [];
+  const film = await nmm.record((share) => shares.push(share));
+  const bytes = new Uint8Array(await film.arrayBuffer());
+  let text = "";
+  for (const byte of bytes) text += String.fromCharCode(byte);
+  return [btoa(text), shares, film.type];
+}"""
+PICTURE = """(time) => {
+  const pen = nmm.filmPen();
+  nmm.filmPicture(pen, time);
+  const { width, height } = pen.canvas;
+  return [width, height, Array.from(pen.getImageData(0, 0, width, height).data)];
+}"""
+
+
+def decoded(film: Path, width: int, height: int) -> np.ndarray:
+    """The pictures of a film, (N, height, width, 3), as another program reads them."""
+    command = [find_ffmpeg(), "-v", "error", "-i", str(film), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+    raw = subprocess.run(command, capture_output=True, check=True).stdout
+    return np.frombuffer(raw, np.uint8).reshape(-1, height, width, 3).astype(float)
+
+
+def test_a_film_shows_each_time(small_robot: Robot, window: Window, tmp_path: Path) -> None:  # noqa: F811
+    page = window.open(file_url([drive(small_robot)], tmp_path) + "#plots=none&zoom=1,2.5&t=1.7")
+    assert page.evaluate("[isSecureContext, typeof VideoEncoder]") == [True, "function"]
+    times = page.evaluate("nmm.filmTimes()")
+    np.testing.assert_allclose(times, 1.0 + np.arange(46) / 30.0, atol=1e-9)
+    text, shares, kind = page.evaluate(FILM)
+    assert kind == "video/webm"
+    assert shares == [k / 46 for k in range(46)]
+    assert page.evaluate("[nmm.player.time, nmm.player.playing]") == [1.7, False]
+    film = tmp_path / "film.webm"
+    film.write_bytes(base64.b64decode(text))
+
+    told = subprocess.run([find_ffmpeg(), "-i", str(film)], capture_output=True, text=True).stderr
+    assert re.search(r"Video: vp[89]", told), told
+    assert "30 fps" in told
+    hours, minutes, seconds = re.search(r"Duration: (\d+):(\d+):([\d.]+)", told).groups()  # type: ignore[union-attr]  # printed
+    assert 3600 * int(hours) + 60 * int(minutes) + float(seconds) == pytest.approx(46 / 30, abs=0.011)
+
+    width, height, _ = page.evaluate(PICTURE, 1.0)
+    pictures = decoded(film, width, height)
+    assert len(pictures) == 46
+    shown = [0, 13, 29, 45]
+    own = [np.reshape(page.evaluate(PICTURE, times[k])[2], (height, width, 4))[..., :3] for k in shown]
+    for i, k in enumerate(shown):
+        off = [float(np.abs(pictures[k] - picture).mean()) for picture in own]
+        assert int(np.argmin(off)) == i
+        assert off[i] < 4.0, off  # of 255: what the codec loses
+
+
+def test_a_film_can_be_stopped_and_plays_on(small_robot: Robot, window: Window, tmp_path: Path) -> None:  # noqa: F811
+    page = window.open(file_url([drive(small_robot)], tmp_path) + "#plots=none&t=0.5")
+    page.evaluate("nmm.player.play()")
+    page.locator("#film").click()
+    page.wait_for_function("/Film [1-9]/.test(document.getElementById('film').textContent)")
+    page.keyboard.press("w")
+    page.wait_for_function("document.getElementById('film').textContent === 'Film'")
+    assert page.evaluate("nmm.player.playing")
+    assert page.locator("#status").text_content() == ""
+
+
+def test_a_film_is_saved_under_the_pages_name(small_robot: Robot, window: Window, tmp_path: Path) -> None:  # noqa: F811
+    url = file_url([drive(small_robot, duration=0.2)], tmp_path, title="Two laps") + "#plots=none"
+    page = window.open(url)
+    with page.expect_download() as waiting:
+        page.keyboard.press("w")
+    assert waiting.value.suggested_filename == "two-laps-0.00s.webm"
+    assert Path(waiting.value.path()).read_bytes()[:4] == b"\x1a\x45\xdf\xa3"
+
+
+def test_a_browser_that_encodes_nothing_says_so(small_robot: Robot, window: Window, tmp_path: Path) -> None:  # noqa: F811
+    page = window.open(file_url([drive(small_robot, duration=0.2)], tmp_path))
+    page.evaluate("delete window.VideoEncoder")
+    page.locator("#film").click()
+    assert "nmm render RUN --video" in (page.locator("#status").text_content() or "")
