@@ -290,6 +290,11 @@ class Controller:
         return compiled
 
     @property
+    def blocks(self) -> Blocks:
+        """Its memory, where compiled code reads what the last call left."""
+        return self._program.blocks
+
+    @property
     def compilable(self) -> bool:
         """Whether nothing but its kinematics needs Python, so that `compiled` makes it one compiled call."""
         whole = type(self.resolver).finish is Resolver.finish and not self._program.calls_python
