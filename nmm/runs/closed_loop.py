@@ -48,10 +48,7 @@ class Leaving:
 
     def stays(self, times: Array, q: Array, first: int, last: int) -> int:
         """The last of the samples from `first` to `last` before one that is another leg's."""
-        for k in range(first, last + 1):
-            if self._controller.changes(float(times[k]), q[k]):
-                return k - 1
-        return last
+        return first - 1 + self._controller.stays(times[first : last + 1], q[first : last + 1])
 
 
 def sample_times(start: float, dt: float, steps: int, end: float) -> Array:
