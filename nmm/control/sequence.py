@@ -20,6 +20,7 @@ from nmm.functions.tasks.task import Stack, Task
 from nmm.kernels.compiled import checked_by_caller
 from nmm.robots.robot import Robot
 
+
 class Event(NamedTuple):
     """A task began or ended: t, s; the task's name; "begins" or "ends"; why, in words."""
 

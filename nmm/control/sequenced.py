@@ -146,8 +146,8 @@ class SequencedController(Controller):
         return self._pending.active != self.moment.active
 
     def stays(self, times: Array, q: Array) -> int:
-        """How many samples at times (N,), s, and q (N, n) have the same tasks as the one before: as `changes`,
-        asked at one after the other, up to the first that has others."""
+        """How many samples at times (N,), s, and q (N, n) have the same tasks as the one before them: what
+        `changes` says of one after the other, up to the first that has others."""
         if len(times) and times[0] > self._pending.t:
             self._commit()
         count, known = self.sequence.pass_over(self.moment, times, q)

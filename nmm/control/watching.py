@@ -27,7 +27,8 @@ BETWEEN, WHILE, AFTER = range(3)
 class Conditions(NamedTuple):
     """Conditions and the rows that they look at.
 
-    kinds, tasks, watched (c,) : of each BETWEEN, WHILE or AFTER; whose it is; the task that an AFTER waits for
+    kinds, tasks (c,) : of each BETWEEN, WHILE or AFTER, and whose it is
+    watched (c,) : the task that an AFTER waits for
     first (c + 1,) : where the rows of each begin
     numbers (c, 2) : start and end, s; margin, 0; how long it holds, s, 0
     rows (r, 4) : in the program the row of f, of g and of e or PLAIN or WRAPPED, as in `TaskRows`, and the
@@ -48,7 +49,13 @@ class Conditions(NamedTuple):
 #: remembered, and room for what was remembered before that.
 WATCH = types.int64(
     *(types.float64[::1], types.Array(types.float64, 2, "C"), types.int64[::1], types.float64[::1]),
-    *(record_type(Conditions), types.boolean[::1], types.boolean[::1], types.float64[::1], types.float64[::1]),
+    *(
+        record_type(Conditions),
+        types.boolean[::1],
+        types.boolean[::1],
+        types.float64[::1],
+        types.float64[::1],
+    ),
 )
 
 
@@ -64,8 +71,10 @@ def watch(
     memory: Array,
     before: Array,
 ) -> int:
-    """How many samples have the active tasks; memory (c,) is then that after the last of these (see `Moment`),
-    `before` (c,) that after the one before it.
+    """How many samples have the active tasks.
+
+    memory, before (c,) : what is remembered (see `Moment`); become that after the last of them, and after the
+        one before it
     """
     b = views(LaidOut, integers, floats, 0).buffers
     n, count = q.shape[1], those.kinds.shape[0]
@@ -154,7 +163,9 @@ def conditions(
             table.numbers[c, 0] = one.hold
             units = [row.unit for row in own]
             for j, row in enumerate(own):
-                compared = e + j if task.function.comparison is not None else WRAPPED if row.angular else PLAIN
+                compared = (
+                    e + j if task.function.comparison is not None else WRAPPED if row.angular else PLAIN
+                )
                 rows.append((f + j, g + j, compared, first + units.index(row.unit)))
                 bounds.append((0.0, one.within.get(row.unit, one.within.get("", math.inf))))
         else:
