@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import nmm
+from nmm.control.step_size import StepSize
 from nmm.runs import closed_loop
 from nmm.runs.compiled_loop import CompiledLoop
 
@@ -219,3 +220,90 @@ def test_the_summary_and_the_folder_say_who_computed_the_kinematics(tmp_path) ->
     run.save(tmp_path / "run", figures=False, html=False)
     read = nmm.Trajectory.load(tmp_path / "run")
     assert read.kinematics_off == run.kinematics_off < 1e-13
+
+
+@pytest.mark.parametrize("method", ["rk4", "zoh"])
+@pytest.mark.parametrize("resolver", ["pg", "rg", "dls"])
+def test_armijos_rule_is_the_same(resolver: str, method: str, flights: list[tuple[int, int, bool]]) -> None:
+    """With an α that has to be shortened, and one that has not; by limits, too."""
+    for more in ({"resolver.alpha": 300.0}, {"limits": {"acceleration": 4.0}}):
+        scenario = nmm.Scenario.load(
+            "unicycle_2r_position",
+            {"method": method, "duration": 2.0, "dt": 0.01, "resolver.step": "armijo", **more},
+        )
+        flown, stepped = both(scenario.with_resolver(resolver).run)
+        assert sum(reached - first for first, reached, _ in flights) > 100
+        flights.clear()
+        same(flown, stepped)
+        np.testing.assert_allclose(flown.step_size, stepped.step_size, atol=1e-12)
+        assert flown.summary()["kinematics"] == "compiled"
+        assert ("limits" in more) or flown.step_size.min() < 0.9
+
+
+@pytest.mark.parametrize("resolver", ["pg", "rg", "dls"])
+def test_alpha_is_the_one_that_python_finds(resolver: str) -> None:
+    """The rule, once compiled and once written for users' objectives, which Python evaluates."""
+    scenario = nmm.Scenario.load("unicycle_2r_position", {"resolver.alpha": 300.0, "resolver.step": "armijo"})
+    controller = scenario.with_resolver(resolver).controller()
+    controller.dt = 0.01
+    rng = np.random.default_rng(2)
+    for q in controller.robot.q({"q1": 0.5, "q2": 0.5}) + 0.6 * rng.standard_normal((40, 5)):
+        controller.reset()
+        one = controller.evaluate(0.0, q)
+        controller.reset()
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(StepSize, "compiled", property(lambda self: False))
+            other = controller.evaluate(0.0, q)
+        assert one.step_size == pytest.approx(other.step_size, rel=1e-12)
+        np.testing.assert_allclose(one.u, other.u, rtol=1e-12, atol=1e-12)
+        np.testing.assert_array_equal(one.partition, other.partition)
+
+
+def test_a_users_objective_keeps_armijos_rule_in_python(flights: list[tuple[int, int, bool]]) -> None:
+    objective = nmm.CallableObjective(lambda c: float(c.q[3] ** 2 + c.q[4] ** 2))
+    task = nmm.Task(nmm.Position("ee", "xy"), [2.0, 0.5], gain=1.0)
+    resolver = nmm.ProjectedGradient(alpha=300.0, step="armijo")
+    controller = nmm.Controller(nmm.load("unicycle_2r"), task, resolver, objective, dt=0.01)
+    run = nmm.simulate(controller, {"q1": 0.5, "q2": 0.5}, 0.5, 0.01)
+    assert not flights
+    assert run.summary()["kinematics"] == "pinocchio"
+    assert run.step_size.min() < 0.9
+
+
+@pytest.mark.parametrize("method", ["rk4", "zoh"])
+def test_retreats_are_python_s_and_what_is_between_them_is_compiled(
+    method: str, flights: list[tuple[int, int, bool]]
+) -> None:
+    """A target that joints at their stops cannot reach: the robot backs off again and again."""
+    robot = nmm.load("unicycle_2r")
+    limits = nmm.Limits(position={"q1": [-0.1, 0.1], "q2": [-0.1, 0.1]}, velocity={"v": 1.0, "omega": 1e-3})
+    task = nmm.Task(nmm.Position("ee", "xy"), [0.5, 0.6], gain=1.0)
+    retreat = nmm.Retreat(stalled=0.4, durations=(0.2, 0.3))
+    controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), limits=limits, retreat=retreat)
+    flown, stepped = both(lambda: nmm.simulate(controller, robot.rest, 8.0, 0.01, method))
+    assert any("backed off" in warning for warning in flown.warnings)
+    assert len({first for first, reached, _ in flights if reached > first}) > 3
+    assert sum(reached - first for first, reached, _ in flights) > 200
+    same(flown, stepped)
+
+
+@pytest.mark.parametrize("given", ["nothing", "armijo", "retreat", "distances"])
+def test_errors_looked_at_are_those_of_a_step(given: str) -> None:
+    """What decides about inputs has no part in them, so that they are found in compiled code."""
+    robot = nmm.load("unicycle_2r")
+    task = nmm.Task(nmm.Position("ee", "xy"), nmm.Circle([2, 0], 1.0, rate=0.5), gain=2.0)
+    resolver = nmm.ProjectedGradient(step="armijo" if given == "armijo" else "constant")
+    objective = nmm.Quadratic(nmm.Square("q1"), nmm.Square("q2"))
+    more: dict[str, object] = {"dt": 0.01}
+    if given == "retreat":
+        more["retreat"] = nmm.Retreat()
+    if given == "distances":
+        more["collisions"] = nmm.Collisions(0.05, obstacles=[nmm.Obstacle(nmm.Sphere(0.3), [9.0, 0.0, 0.0])])
+    controller = nmm.Controller(robot, task, resolver, objective, **more)
+    times = np.linspace(0.0, 1.0, 7)
+    q = robot.q({"q1": 0.5, "q2": 0.5}) + 0.3 * np.random.default_rng(3).standard_normal((7, robot.n))
+    error, rate = controller.errors(times, q)
+    for k, t in enumerate(times.tolist()):
+        step = controller.evaluate(t, q[k])
+        np.testing.assert_allclose(error[k], step.error, atol=1e-12)
+        np.testing.assert_allclose(rate[k], step.rate, atol=1e-12)

@@ -107,6 +107,65 @@ def test_a_wish_is_followed_as_far_as_the_task_allows(robot_2r: Robot) -> None:
         )
 
 
+def by_singular_values(found: SelfMotion, task: Task, direction: Any, columns: list[int]) -> Array:
+    """q (N, n) of the way there once more: LAPACK's singular vectors, one step of RK4 a sample."""
+    robot, times = found.trajectory.robot, found.trajectory.t[: found.turning + 1]
+    controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), steering=False)
+    e0 = controller.evaluate(0.0, found.trajectory.q[0]).error
+    last = np.zeros(robot.n_u)
+
+    def n(J: Array) -> Array:
+        """The null vector of some columns, near the last one; or what is left of a wish."""
+        if not columns:
+            left = direction - np.linalg.pinv(J) @ J @ direction
+            return np.asarray(left / np.linalg.norm(left))
+        vector = np.zeros(robot.n_u)
+        vector[columns] = np.linalg.svd(J[:, columns])[2][-1]
+        return np.asarray(vector * np.sign(vector @ (last if last.any() else direction)))
+
+    def velocity(t: float, q: Array) -> tuple[Array, Array]:
+        step = controller.evaluate(0.0, q)
+        rate = found.length * pi / (2.0 * times[-1]) * np.sin(pi * t / times[-1])
+        u = rate * n(step.J) + np.linalg.pinv(step.J) @ (10.0 * (step.error - e0))
+        return robot.S(q) @ u, n(step.J)
+
+    every = [found.trajectory.q[0]]
+    for t, h in zip(times, np.diff(times), strict=False):
+        q = every[-1]
+        k1, along = velocity(t, q)
+        last = along
+        k2, _ = velocity(t + h / 2, q + h / 2 * k1)
+        k3, _ = velocity(t + h / 2, q + h / 2 * k2)
+        k4, _ = velocity(t + h, q + h * k3)
+        every.append(q + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4))
+    return np.array(every)
+
+
+def test_it_is_what_singular_vectors_make_of_it(robot_2r: Robot) -> None:
+    """The same motions, the same to rounding: of a few inputs, of a wish, of a user's function in Python."""
+    q0 = robot_2r.q(BENT)
+    report = redundancy((robot_2r, TIP), q0)
+    held = Task(TIP, Configuration(robot_2r, q0).placement("ee").translation[:2], 10.0)
+    for k, vector in enumerate(report.readable):
+        found = self_motion((robot_2r, TIP), q0, direction=k, duration=1.0)
+        again = by_singular_values(found, held, vector, [*np.flatnonzero(vector)])
+        np.testing.assert_allclose(found.trajectory.q[: found.turning + 1], again, atol=1e-12)
+    wish = np.array([0.3, 1.0, 0.0, 1.0])
+    found = self_motion((robot_2r, TIP), q0, direction=wish, duration=1.0)
+    again = by_singular_values(found, held, wish, [])
+    np.testing.assert_allclose(found.trajectory.q[: found.turning + 1], again, atol=1e-12)
+    assert found.trajectory.kinematics_off < 1e-13
+
+    point = nmm.CallableFunction(
+        lambda c: c.placement("ee").translation[:2],
+        ["x", "y"],
+        units=["m", "m"],
+        jacobian=lambda c: c.jacobian("ee")[:2],
+    )
+    same = self_motion((robot_2r, point), q0, direction=wish, duration=1.0)
+    np.testing.assert_allclose(same.trajectory.q, found.trajectory.q, atol=1e-12)
+
+
 @pytest.mark.parametrize(
     "base", ["car", "second trailer", "mecanum", "differential", "described by its wheels"]
 )

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import nmm
+from nmm.control.sequence import Sequence
 
 ROBOT = nmm.load("unicycle_3r")
 START = ROBOT.q({"q1": 0.4, "q2": 0.6, "q3": 0.9})
@@ -355,3 +356,40 @@ def test_a_distance_is_kept_across_events() -> None:
     assert len(run.clearance) == len(run.clearance_between) == len(run)
     assert run.clearance_between.min() >= 0.03 - 1e-6
     assert run.clearance.min() < 0.5
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_samples_passed_over_are_judged_as_one_by_one(seed: int) -> None:
+    """Every kind of condition, on a walk that goes in and out of them, with errors of two units."""
+    robot = nmm.load("unicycle_2r")
+    inside = nmm.While(nmm.Coordinates("x", "q1"), [-0.5, -0.4], [0.6, 0.5], 0.1)
+    at_rest = {"fold": [inside], "turn": [nmm.Between(0.2, 1.5)]}
+    at_rest |= {"then": [nmm.After("reach", 0.9, 0.05), nmm.Between(0.1)]}
+    at_rest |= {"last": [nmm.After("posed", {"m": 1.2, "rad": 1.0}, 0.1, instead=True)]}
+    tasks = nmm.Stack(
+        (
+            nmm.Task(nmm.Position("ee", "xy"), [1.0, 0.0], name="reach"),
+            nmm.Task(nmm.Coordinates("x", "theta"), [0.5, 3.0], name="posed"),
+            *(nmm.Task(nmm.Coordinates("q1"), [0.0], name=name, when=when) for name, when in at_rest.items()),
+        )
+    )
+    sequence = Sequence(tasks, robot)
+    rng = np.random.default_rng(seed)
+    times = np.arange(400) * 0.01
+    q = 0.05 * np.cumsum(rng.standard_normal((400, robot.n)), axis=0)
+    alone, known = [], sequence.start
+    for t, here in zip(times, q, strict=True):
+        known = sequence.next(known, float(t), here)
+        alone.append(known)
+    k, known, changed = 0, sequence.start, 0
+    while k < len(times):
+        count, (*_, known) = sequence.pass_over(known, times[k:], q[k:])
+        k += count
+        if count:
+            assert repr(known) == repr(alone[k - 1])
+        if k < len(times):
+            known = sequence.next(known, float(times[k]), q[k])
+            assert repr(known) == repr(alone[k])
+            assert known.active != (alone[k - 1].active if k else sequence.start.active)
+            k, changed = k + 1, changed + 1
+    assert 3 < changed < 100

@@ -167,9 +167,7 @@ class Controller:
             if descended and self.steered is not None:
                 spring = float(self._step.steering.spring)
                 descended.append((spring, self.steered.pursuit, len(self.steered.inputs)))
-            self.step_size = StepSize(
-                robot, resolver, descended, self._step, self._program.blocks, kinematics
-            )
+            self.step_size = StepSize(robot, resolver, descended, self._step, self._program.blocks)
         self._steppers: dict[str, Callable[[float, Array, float], tuple[Array, Array]]] = {}
         self.sample = SampleState(
             self._step.problem,
@@ -290,10 +288,21 @@ class Controller:
         return compiled
 
     @property
+    def blocks(self) -> Blocks:
+        """Its memory, where compiled code reads what the last call left."""
+        return self._program.blocks
+
+    @property
     def compilable(self) -> bool:
         """Whether nothing but its kinematics needs Python, so that `compiled` makes it one compiled call."""
+        return self.flies and not (self.backing or self.step_size)
+
+    @property
+    def flies(self) -> bool:
+        """Whether samples of a run can be compiled: as `compilable`, or with an α that compiled code chooses
+        between, or a retreat, whose own samples are not."""
         whole = type(self.resolver).finish is Resolver.finish and not self._program.calls_python
-        return whole and not (self.guard or self.backing or self.step_size)
+        return whole and not self.guard and (self.step_size is None or self.step_size.compiled)
 
     def compiled_kinematics(self) -> AbstractContextManager[None]:
         """`with controller.compiled_kinematics():` steps compute them, whatever `kinematics` says."""
@@ -471,7 +480,7 @@ class Controller:
         self._expect_dt()
         task = self._step.task
         error, rate = (np.full((len(times), len(self.rows)), np.nan) for _ in range(2))
-        if self.compilable:
+        if not self._program.calls_python:
             at = np.array(times, dtype=np.float64), np.array(configurations, dtype=np.float64, order="C")
             with self.sample.aside(), self.compiled() as blocks:
                 for first in range(0, len(times), AT_ONCE):

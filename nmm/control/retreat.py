@@ -121,6 +121,25 @@ class Backing:
         """See whether the next dt is a retreat's, given the error (s,) now."""
         self.now = self._stalls(error, dt)
 
+    def pass_over(self, errors: Array, dt: float) -> int:
+        """`watch` samples with errors (N, s) one after the other, up to the first that is a retreat's.
+
+        Returns how many there are before it.
+        """
+        for k, error in enumerate(errors):
+            self.watch(error, dt)
+            if self.now:
+                return k
+        return len(errors)
+
+    def quiet(self, errors: Array, dt: float) -> int:
+        """What `pass_over` finds, while nothing is remembered of it."""
+        before = self.snapshot()
+        try:
+            return self.pass_over(errors, dt)
+        finally:
+            self.restore(before)
+
     def _stalls(self, error: Array, dt: float) -> bool:
         retreat = self._retreat
         if self.left > 1e-9:

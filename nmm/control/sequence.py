@@ -11,15 +11,14 @@ import numpy as np
 
 from nmm.arrays import Array
 from nmm.control.task_rows import task_functions
+from nmm.control.watching import SAME, WATCH, conditions, watch
 from nmm.errors import InputError, expect_known
-from nmm.functions.function import Evaluation
-from nmm.functions.program import Program
+from nmm.functions.function import Evaluation, Row
+from nmm.functions.program import COMPILED, Program
 from nmm.functions.tasks.conditions import After, Between, Condition, While
 from nmm.functions.tasks.task import Stack, Task
+from nmm.kernels.compiled import checked_by_caller
 from nmm.robots.robot import Robot
-
-#: Times that differ by less are one, s.
-SAME = 1e-9
 
 
 class Event(NamedTuple):
@@ -88,9 +87,25 @@ class Sequence:
         self._robot = robot
         watched = [self.tasks[i] for i in self._after.values()]
         functions = [one.function for _, one in self._conditions if isinstance(one, While)]
-        self._program = Program(robot, [*task_functions(Stack(tuple(watched))), *functions])
+        # Compiled, so that samples passed over and those looked at one by one are judged by the same digits.
+        self._program = Program(robot, [*task_functions(Stack(tuple(watched))), *functions], COMPILED)
         self._program.lay_out()
         self._evaluates = bool(watched or functions)
+        first = self._program.first_rows
+        begins = {name: first[3 * k : 3 * k + 3] for k, name in enumerate(self._after)}
+        self._rows = {name: self.tasks[i].rows(robot) for name, i in self._after.items()}
+        self._table = conditions(
+            self._conditions,
+            [
+                (i := self._after[one.task], self.tasks[i], self._rows[one.task], begins[one.task])
+                for _, one in self._conditions
+                if isinstance(one, After)
+            ],
+            [
+                (begin, len(function.rows(robot)))
+                for begin, function in zip(first[3 * len(watched) :], functions, strict=True)
+            ],
+        )
         none = (False,) * len(self.tasks)
         memory = tuple(math.nan if isinstance(one, After) else 0.0 for _, one in self._conditions)
         self.start = Moment(-math.inf, none, memory, none, none)
@@ -111,11 +126,33 @@ class Sequence:
         for name in waits:
             follow(name, [])
 
+    def pass_over(self, before: Moment, times: Array, q: Array) -> tuple[int, list[Moment]]:
+        """How many samples at times (N,), s, and q (N, n) have the same tasks active as the one before.
+
+        Returns
+        -------
+        that number; what is known after each of the last two of them, and before them. Where users' Python
+        functions are among the conditions, 0
+        """
+        if self._program.calls_python:
+            return 0, [before]
+        active, over = np.array(before.active), np.array(before.over)
+        memory = np.array(before.memory, dtype=np.float64)
+        earlier = memory.copy()
+        at = np.ascontiguousarray(times, dtype=np.float64), np.ascontiguousarray(q, dtype=np.float64)
+        watching = checked_by_caller(watch, WATCH)
+        count = watching(*at, *self._program.blocks, self._table, active, over, memory, earlier)
+        known = [before]
+        for k, remembered in ((count - 2, earlier), (count - 1, memory)):
+            if k >= 0:
+                known.append(before._replace(t=float(times[k]), memory=(*remembered.tolist(),), events=()))
+        return count, known[-2:]
+
     def next(self, before: Moment, t: float, q: Array) -> Moment:
         """What is known after a sample at t, s, and q (n,), given what was known before it."""
         found = self._program.evaluate(t, q) if self._evaluates else []
         errors = {
-            name: _error(self.tasks[i], found[3 * k : 3 * k + 3], self._robot)
+            name: _error(self.tasks[i], found[3 * k : 3 * k + 3], self._rows[name])
             for k, (name, i) in enumerate(self._after.items())
         }
         values = iter(found[3 * len(self._after) :])
@@ -195,15 +232,15 @@ class Sequence:
             if was == -math.inf:
                 return was
             i = self._after[one.task]
-            if not before.active[i] or not self._within(one, self.tasks[i], errors[one.task]):
+            if not before.active[i] or not self._within(one, errors[one.task]):
                 return math.nan
             since = t if math.isnan(was) else was
             return -math.inf if t - since >= one.hold - SAME else since
         return 0.0
 
-    def _within(self, one: After, task: Task, error: Array) -> bool:
+    def _within(self, one: After, error: Array) -> bool:
         squares: dict[str, float] = {}
-        for row, value in zip(task.rows(self._robot), error.tolist(), strict=True):
+        for row, value in zip(self._rows[one.task], error.tolist(), strict=True):
             squares[row.unit] = squares.get(row.unit, 0.0) + value * value
         tolerances = {unit: one.within.get(unit, one.within.get("", math.inf)) for unit in squares}
         return all(math.sqrt(squares[unit]) <= tolerances[unit] for unit in squares)
@@ -239,11 +276,11 @@ def _check_rows(one: While, robot: Robot, where: str) -> None:
             raise InputError(f"{where}: {name}: expected a number, or {rows}, one a row, got {len(bound)}")
 
 
-def _error(task: Task, found: Several[Evaluation], robot: Robot) -> Array:
+def _error(task: Task, found: Several[Evaluation], rows: Several[Row]) -> Array:
     """The error (s,) of a task: computed, or the difference, wrapped where a row is an angle."""
     value, target, compared = (one.value for one in found)
     if task.function.comparison is not None:
         return compared
     error = target - value
-    angular = np.array([row.angular for row in task.rows(robot)], dtype=bool)
+    angular = np.array([row.angular for row in rows], dtype=bool)
     return np.where(angular, np.pi - (np.pi - error) % (2.0 * np.pi), error)

@@ -145,6 +145,18 @@ class SequencedController(Controller):
         self._pending = self.sequence.next(self.moment, t, q)
         return self._pending.active != self.moment.active
 
+    def stays(self, times: Array, q: Array) -> int:
+        """How many samples at times (N,), s, and q (N, n) have the same tasks as the one before them: what
+        `changes` says of one after the other, up to the first that has others."""
+        if len(times) and times[0] > self._pending.t:
+            self._commit()
+        count, known = self.sequence.pass_over(self.moment, times, q)
+        if count:
+            self.moment, self._pending = known
+        while count < len(times) and not self.changes(float(times[count]), q[count]):
+            count += 1
+        return count
+
     def _commit(self) -> None:
         self.moment = self._pending
         self.events += self.moment.events

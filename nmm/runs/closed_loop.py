@@ -48,10 +48,7 @@ class Leaving:
 
     def stays(self, times: Array, q: Array, first: int, last: int) -> int:
         """The last of the samples from `first` to `last` before one that is another leg's."""
-        for k in range(first, last + 1):
-            if self._controller.changes(float(times[k]), q[k]):
-                return k - 1
-        return last
+        return first - 1 + self._controller.stays(times[first : last + 1], q[first : last + 1])
 
 
 def sample_times(start: float, dt: float, steps: int, end: float) -> Array:
@@ -151,18 +148,27 @@ def _integrate(
     while k < steps and not there:
         if progress is not None and k % a_share == 0:
             progress(k / steps)
-        whole = False
-        if fly is not None:
+        whole, backing = False, controller.backing
+        if fly is not None and not (backing is not None and backing.now):
+            decided = controller.state.snapshot()
             reached, whole = fly(times, k, min(steps, (k // a_share + 1) * a_share), recorder.found)
-            stays = reached if leg is None else leg.stays(times, recorder.found.q, k + 1, reached)
-            if leg is not None and stays < reached:  # begin again, and fly to the sample before the event
+            stays = reached
+            if backing is not None:
+                stays = k + backing.quiet(recorder.found.error[k + 1 : reached + 1], controller.dt or 0.0)
+            if leg is not None:
+                stays = leg.stays(times, recorder.found.q, k + 1, stays)
+            if stays < reached:  # begin again, and fly to the sample before the event
                 whole, reached = False, stays
+                before = float(times[k - 1]) if k else -math.inf if leg is None else leg.earlier
                 controller.sample.restore(earlier)
-                _sample(controller, sample.t, sample.q, float(times[k - 1]) if k else leg.earlier)
+                _sample(controller, sample.t, sample.q, before)
+                controller.state.restore(decided)
                 if stays > k:
                     fly(times, k, stays, recorder.found)
             if reached > k:
                 recorder.flown(reached)
+                if backing is not None:
+                    backing.pass_over(recorder.found.error[k + 1 : reached], controller.dt or 0.0)
                 k, earlier = reached, controller.sample.snapshot()
                 sample = _sample(controller, float(times[k]), recorder.q[k].copy(), float(times[k - 1]))
                 recorder.replace_last(sample)

@@ -18,6 +18,7 @@ from nmm.control.controller import Controller
 from nmm.control.equations import ControlStep, call_step, step
 from nmm.control.goal import Goal
 from nmm.control.integrators import Integrator
+from nmm.control.step_size import Descent, call_shorten, shorten
 from nmm.control.stepping import Tableau, go_on, tableau
 from nmm.functions.program import BESIDE, LaidOut
 from nmm.kernels.ahead import compile_ahead
@@ -55,9 +56,18 @@ class Ends(NamedTuple):
     tolerances: Vector
 
 
+class Choice(NamedTuple):
+    """How α is chosen at each sample: where the code of `shorten` begins, 0 where it is constant, and the
+    blocks of what is descended."""
+
+    code: int
+    integers: IntegerVector
+    floats: Vector
+
+
 _FLY = types.int64(
     *(types.int64[::1], types.float64[::1], record_type(Tableau), types.float64[::1], types.int64),
-    *(types.int64, types.int64, record_type(Ends), record_type(Recorded)),
+    *(types.int64, types.int64, record_type(Ends), record_type(Choice), record_type(Recorded)),
 )
 
 
@@ -133,6 +143,23 @@ def arrived(error: Array, ends: Ends) -> bool:
     return math.sqrt(square_m) <= ends.tolerances[0] and math.sqrt(square_rad) <= ends.tolerances[1]
 
 
+@compiled
+def alpha(e: ControlStep, choice: Choice) -> tuple[float, float]:
+    """The α in use and the resolver's own; 1 and 1 where it is constant."""
+    if choice.code == 0:
+        return 1.0, 1.0
+    own = views(Descent, choice.integers, choice.floats, BESIDE)
+    return float(e.numbers[own.alpha_at]), float(own.whole[()])
+
+
+@compiled
+def set_alpha(e: ControlStep, choice: Choice, value: float) -> None:
+    """Use that α, where it is not constant."""
+    if choice.code != 0:
+        own = views(Descent, choice.integers, choice.floats, BESIDE)
+        e.numbers[own.alpha_at] = value
+
+
 @compiled_without_gil
 def fly(
     integers: Integers,
@@ -143,6 +170,7 @@ def fly(
     last: int,
     partitioned: int,
     ends: Ends,
+    choice: Choice,
     found: Recorded,
 ) -> int:
     """From the sample `first`, which was just made, to the sample `last`. Returns the last one recorded.
@@ -160,6 +188,7 @@ def fly(
     was_integers, now_integers = integer_scratch(count + 1), integer_scratch(count + 1)
     ahead = scratch(n)
     remember(e, was, was_integers)
+    earlier, whole = alpha(e, choice)
     reached = first
     for k in range(first + 1, last + 1):
         for i in range(e.state.shape[0]):
@@ -175,12 +204,17 @@ def fly(
         if not fine:
             break
         remember(e, now, now_integers)
+        set_alpha(e, choice, whole)
         status = sample(times[k], times[k - 1], ahead, integers, floats)
+        if choice.code != 0:
+            call_shorten(choice.code, times[k], ahead, integers, floats, choice.integers, choice.floats)
+            status = e.answer.status[()]
         if status >= SINGULAR_J or not small(e.answer.u):
             break
         if partitioned == 1 and passed_zero(e, decided):
             break
         note(e, b, ahead, partitioned, k, found)
+        found.step_size[k] = alpha(e, choice)[0] / whole
         reached = k
         for i in range(size):
             was[i] = now[i]
@@ -189,6 +223,8 @@ def fly(
         if e.answer.excess[()] > 0.0 or arrived(e.task.error, ends):
             break
     recall(e, was, was_integers)
+    if reached == first:
+        set_alpha(e, choice, earlier)
     return reached
 
 
@@ -208,6 +244,12 @@ class CompiledLoop:
             np.array([codes.get(row.unit, -1) for row in controller.rows], dtype=np.int64),
             np.array([-1.0, -1.0] if until is None else [until.m, until.rad]),
         )
+        chosen = controller.step_size
+        self._choice = (
+            Choice(0, np.zeros(0, dtype=np.int64), np.zeros(0))
+            if chosen is None
+            else Choice(shorten.address, *chosen.blocks)
+        )
         self._fly = checked_by_caller(fly, _FLY)
         self._at_once = 16
 
@@ -217,7 +259,15 @@ class CompiledLoop:
         began = time.perf_counter()
         with self._controller.compiled() as blocks:
             reached = self._fly(
-                *blocks, self._method, times, first, last, self._partitioned, self._ends, found
+                *blocks,
+                self._method,
+                times,
+                first,
+                last,
+                self._partitioned,
+                self._ends,
+                self._choice,
+                found,
             )
         if reached == last:
             fitting = 0.8 * A_CALL * (last - first) / max(time.perf_counter() - began, 1e-9)
@@ -234,6 +284,6 @@ def compiled_loop(controller: Controller, advance: Integrator, until: Goal | Non
     """The loop of a controller that is compiled as a whole; None for another one."""
     method = tableau(advance)
     plain = type(controller.state) in (State, PartitionState) and (until is None or type(until) is Goal)
-    if method is None or not (plain and controller.compilable):
+    if method is None or not (plain and controller.flies):
         return None
     return CompiledLoop(controller, method, until)

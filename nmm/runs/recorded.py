@@ -23,6 +23,7 @@ class Recorded(NamedTuple):
     limited (N, k) : what limits name (`LimitReport.row_values`)
     unanswered (N,) : 1 where the resolver had no answer
     excess (N,) : by how much limits were widened
+    step_size (N,) : the share of α that was taken
     """
 
     q: Matrix
@@ -41,6 +42,7 @@ class Recorded(NamedTuple):
     limited: Matrix
     unanswered: IntegerVector
     excess: Vector
+    step_size: Vector
 
 
 def room(count: int, n: int, m: int, s: int, levels: int, limited: int) -> Recorded:
@@ -62,6 +64,7 @@ def room(count: int, n: int, m: int, s: int, levels: int, limited: int) -> Recor
         limited=np.empty((count, limited)),
         unanswered=np.zeros(count, dtype=np.int64),
         excess=np.zeros(count),
+        step_size=np.ones(count),
     )
 
 

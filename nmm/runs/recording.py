@@ -63,7 +63,6 @@ class Recorder:
         self._beyond: dict[int, dict[str, float]] = {}
         self._against: dict[str, str] = {}
         self._retreats = np.zeros(count, dtype=np.int64)
-        self._step_size = np.ones(count)
         self._count = 0
         self.warnings: list[str] = []
         self.blocking: tuple[str, ...] = ()
@@ -155,7 +154,6 @@ class Recorder:
         found.unanswered[k] = sample.status is Status.FALLBACK
         if (setting := self._controller.setting) is not None:
             self._places[k:] = [setting.places(sample.t)]
-        self._step_size[k] = sample.step_size
         self._retreats[k] = sample.retreats
         self._beyond.pop(k, None)
         if sample.excess > 0.0:
@@ -292,7 +290,7 @@ class Recorder:
             partition=found.partition.copy(),
             residual=found.residual.copy(),
             scale=found.scale.copy(),
-            step_size=self._step_size[: len(self)].copy(),
+            step_size=found.step_size.copy(),
             limited=controller.limits is not None,
             margin=margin(within),
             shares=within,

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from nmm.analysis.redundancy.following import ALONE, FOLLOW, FOLLOWED, UNDEFINED, Field, follow
 from nmm.analysis.redundancy.motion_words import input_words, motion_text
 from nmm.analysis.redundancy.null_fields import (
-    NEARLY_SINGULAR,
+    WORDS,
     Direction,
     Ended,
-    Field,
+    direction_at,
     expect_direction,
     null_field,
 )
@@ -22,12 +24,15 @@ from nmm.analysis.singular.reached import Reached
 from nmm.analysis.singular.singularity import TOLERANCE
 from nmm.arrays import Array, positive
 from nmm.control.controller import Controller
+from nmm.control.equations import ControlStep
 from nmm.control.integrators import RK4
 from nmm.control.step import Step
 from nmm.errors import InputError, SingularError
-from nmm.functions.program import evaluate
+from nmm.functions.program import BESIDE, COMPILED, evaluate
 from nmm.functions.references.polynomial import Constant
 from nmm.functions.tasks.task import Stack, Task
+from nmm.kernels.compiled import checked_by_caller
+from nmm.kernels.memory import views
 from nmm.resolvers.answer import Status
 from nmm.resolvers.projected_gradient import ProjectedGradient
 from nmm.robots.configuration import Configuration
@@ -116,7 +121,7 @@ def self_motion(
     rank = jacobians.rank(J, TOLERANCE)
     expect_direction(robot, J, rank, direction)
     nearby = _nearby(jacobians, t, q, rank)
-    motion = _Motion(robot, held(jacobians, t, q), t, q, null_field(robot, J, nearby, rank, direction), rank)
+    motion = _Motion(robot, held(jacobians, t, q), t, q, null_field(robot, J, nearby, rank, direction))
     length = 2.0 * speed * duration / np.pi
     steps = max(4, round(duration / dt))
     times = np.linspace(0.0, duration, steps + 1)
@@ -169,68 +174,63 @@ def _nearby(jacobians: Jacobians, t: float, q: Array, rank: int) -> Array:
 class _Motion:
     """The way there: a field followed with the task held."""
 
-    def __init__(self, robot: Robot, task: Stack, t: float, q: Array, field: Field, rank: int) -> None:
-        self.robot, self.t, self.q, self.field, self.rank = robot, t, q, field, rank
-        self.controller = Controller(robot, task, ProjectedGradient(), steering=False)
+    def __init__(self, robot: Robot, task: Stack, t: float, q: Array, field: Field) -> None:
+        self.robot, self.t, self.q, self.field = robot, t, q, field
+        self.controller = Controller(robot, task, ProjectedGradient(), steering=False, kinematics=COMPILED)
         self.e0 = self.controller.evaluate(t, q).error
-        self.angular = np.array([row.angular for row in task.rows(robot)])
-        self.last = np.zeros(robot.n_u)
+        self.angular = np.array([row.angular for row in task.rows(robot)], dtype=bool)
+        self.last, self.along = np.zeros(robot.n_u), np.zeros(robot.n_u)
+        self._solve, _ = self.controller.equation_solver()
+        self._follow = checked_by_caller(follow, FOLLOW)
+        self._q_dot = views(ControlStep, *self.controller.blocks, BESIDE).q_dot
 
     def run(self, times: Array, length: float) -> tuple[list[Step], str]:
         """Samples at the times, or as far as the motion goes, and why it ended."""
         duration, dt = float(times[-1]), float(times[1])
         substeps = int(np.ceil(max(dt / STEP, dt * length * np.pi / (2.0 * duration) / STRIDE) - 1e-9))
-        self.last = np.zeros(self.robot.n_u)
+        self.last[:] = 0.0
 
-        def rate(time: float) -> float:
-            return float(length * np.pi / (2.0 * duration) * np.sin(np.pi * time / duration))
+        def velocity(time: float, q: Array) -> Array:
+            rate = length * np.pi / (2.0 * duration) * math.sin(np.pi * time / duration)
+            return self._velocity(q, rate)
 
         samples: list[Step] = []
         q = self.q
         try:
-            for k, time in enumerate(times):
-                sample, along = self._step(float(time), q, rate(float(time)))
-                self._check(sample)
-                samples.append(sample)
+            q_dot = velocity(0.0, q)
+            for k, time in enumerate(times.tolist()):
+                samples.append(self._sample(time, q))
                 if k + 1 == len(times):
                     break
                 for h in range(substeps):
-                    self.last = along
-                    q = RK4.advance(
-                        lambda s, at: self._step(s, at, rate(s))[0].q_dot,
-                        sample.t, q, sample.q_dot, sample.u, dt / substeps,
-                    )  # fmt: skip
-                    later = float(time) + (h + 1) * dt / substeps
-                    sample, along = self._step(later, q, rate(later))
+                    self.last[:] = self.along
+                    at = time + h * dt / substeps
+                    q = RK4.advance(velocity, at, q, q_dot, samples[-1].u, dt / substeps)
+                    q_dot = velocity(time + (h + 1) * dt / substeps, q)
         except Ended as ended:
             return samples, str(ended)
         return samples, ""
 
-    def _step(self, time: float, q: Array, rate: float) -> tuple[Step, Array]:
-        found = self.controller.evaluate(self.t, q)
-        J, error = found.J, found.error - self.e0
-        turned = error[self.angular]
-        error[self.angular] = turned - 2.0 * np.pi * np.round(turned / (2.0 * np.pi))
-        if not np.all(np.isfinite(J)):
+    def _velocity(self, q: Array, rate: float) -> Array:
+        """q_dot at q (n,), ‖u‖ being `rate` but for what holds the task."""
+        self._solve(self.t, q)
+        given = self.field, self.e0, self.angular, self.last, rate, GAIN, self.along
+        found = self._follow(*self.controller.blocks, *given)
+        if found == UNDEFINED:
             raise Ended(self.robot.platform.problem(q[: self.robot.platform.n_p]) or "the task is undefined")
-        U, values, Vt = np.linalg.svd(J)
-        rank = self.rank
-        if rank and values[rank - 1] < NEARLY_SINGULAR * values[0]:
-            raise Ended("J comes close to a singular configuration")
-        along = self.field(J, self.last)
-        back = Vt[:rank].T @ ((U[:, :rank].T @ (GAIN * error)) / values[:rank])
-        u = rate * along + back
-        return replace(
-            found,
-            t=time,
-            r_d=found.r + error,
-            error=error,
-            rate=GAIN * error,
-            u=u,
-            q_dot=self.robot.S(q) @ u,
-            residual=float(np.linalg.norm(J @ u - GAIN * error)),
-            status=Status.SOLVED,
-        ), along
+        if found == ALONE:
+            names = listed([self.robot.u_names[column] for column in self.field.columns])
+            raise Ended(f"{names} alone come close to a singular configuration")
+        if found != FOLLOWED:
+            raise Ended(WORDS[found])
+        return self._q_dot.copy()
+
+    def _sample(self, time: float, q: Array) -> Step:
+        """What `_velocity` just found at q."""
+        found = self.controller.last(time, q)
+        sample = replace(found, r_d=found.r + found.error, status=Status.SOLVED)
+        self._check(sample)
+        return sample
 
     def _check(self, sample: Step) -> None:
         lower, upper = self.robot.q_limits.T
@@ -255,7 +255,7 @@ class _Motion:
         if ended:
             recorder.warnings.append(f"the self-motion turns back early: {ended}")
         robot = self.robot
-        first = self.field(samples[0].J, np.zeros(robot.n_u))
+        first = direction_at(samples[0].J, self.field)
         words = input_words(robot, self.q)
         text = motion_text(first / np.abs(first).max(), robot.u_names, robot.u_units, words, robot.platform.p)
         trajectory = recorder.trajectory(Outcome.COMPLETED, "", float(times[1]), "rk4")

@@ -2,33 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from nmm.analysis.redundancy.following import DIRECTION, FOLLOWED, LITTLE, NEARLY, Field, write_direction
 from nmm.analysis.redundancy.null_space import readable_null_space
-from nmm.arrays import Array, Integers, scalar, vector
+from nmm.arrays import Array, scalar, vector
 from nmm.errors import InputError, expect_known
+from nmm.kernels.compiled import checked_by_caller
 from nmm.robots.robot import Robot
-from nmm.words import listed
 
 #: What moves: a vector of `RedundancyReport.readable` by its number, an input by name, inputs by name or all.
 Direction = int | str | Mapping[str, float] | ArrayLike
-#: The motion ends where a singular value that it needs is below this part of the largest.
-NEARLY_SINGULAR = 1e-3
-#: It ends where less than this part of the wished inputs leaves the task at rest.
-LITTLE_LEFT = 0.05
 #: Null vectors move the task by less than this.
 DEPENDENT = 1e-9
+#: Why a field ends.
+WORDS = {
+    NEARLY: "J comes close to a singular configuration",
+    LITTLE: "the wished inputs move the task: next to nothing of them leaves it at rest",
+}
 
 
 class Ended(Exception):
     """The motion cannot go on, and why."""
-
-
-#: n(J, last): the unit null vector to follow, near the last one.
-Field = Callable[[Array, Array], Array]
 
 
 def expect_direction(
@@ -54,7 +52,7 @@ def expect_direction(
         return int(direction)
     wish = _wish(robot, direction, name)
     try:
-        _of_wish(wish, rank)(J, np.zeros(robot.n_u))
+        direction_at(J, _of_wish(wish, rank))
     except Ended as ended:
         raise InputError(f"{name}: {ended}") from None
     return wish
@@ -71,36 +69,27 @@ def null_field(robot: Robot, J: Array, nearby: Array, rank: int, direction: Dire
     smallest = [np.linalg.svd(one[:, columns])[2][-1] @ one[:, columns].T for one in nearby]
     if np.abs(smallest).max(initial=0.0) > DEPENDENT:
         return _of_wish(start, rank)  # these inputs depend on each other at q and not beside it
-    return _of_circuit(columns, start, listed([robot.u_names[column] for column in columns]))
-
-
-def _of_circuit(columns: Integers, start: Array, names: str) -> Field:
-    """The null vector of the few inputs of a readable one, near the last, first near `start`."""
-
-    def field(J: Array, last: Array) -> Array:
-        _, values, Vt = np.linalg.svd(J[:, columns])
-        needed = len(columns) - 1
-        if needed and values[needed - 1] < NEARLY_SINGULAR * np.linalg.norm(J, 2):
-            raise Ended(f"{names} alone come close to a singular configuration")
-        vector = np.zeros(J.shape[1])
-        vector[columns] = Vt[-1]
-        return np.asarray(vector * np.sign(vector @ (last if last.any() else start)))
-
-    return field
+    return Field(columns, start[columns], rank, 1)
 
 
 def _of_wish(wish: Array, rank: int) -> Field:
     """The wished inputs as far as they leave the task at rest."""
+    return Field(np.arange(wish.size), wish, rank, 0)
 
-    def field(J: Array, last: Array) -> Array:
-        rows = np.linalg.svd(J)[2][:rank]
-        left = wish - rows.T @ (rows @ wish)
-        size = float(np.linalg.norm(left))
-        if size < LITTLE_LEFT * float(np.linalg.norm(wish)):
-            raise Ended("the wished inputs move the task: next to nothing of them leaves it at rest")
-        return np.asarray(left / size)
 
-    return field
+def direction_at(J: Array, field: Field) -> Array:
+    """The unit null vector (m,) of J (s, m) with which a field begins.
+
+    Raises
+    ------
+    Ended : too little is left of the wish, or the inputs that move are nearly singular
+    """
+    along = np.zeros(J.shape[1])
+    given = np.ascontiguousarray(J, dtype=np.float64), field, np.zeros_like(along), along
+    found = checked_by_caller(write_direction, DIRECTION)(*given)
+    if found != FOLLOWED:
+        raise Ended(WORDS[found])
+    return along
 
 
 def _wish(robot: Robot, direction: Direction, what: str) -> Array:
