@@ -198,7 +198,7 @@ def test_nothing_seeks_and_nothing_is_cut_off_at_420_px(window: Window, setup: S
 
 
 def test_pictures_come_at_their_rate(window: Window, setup: ScenarioSetup) -> None:
-    """Thirty a second of the robot's time: a machine that has else to do may send those late, and in crowds."""
+    """Thirty a second of the robot's time; a busy machine may send them late, and in crowds."""
     with driven(setup) as url:
         page = opened(window, url)
         times = page.evaluate(
