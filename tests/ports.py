@@ -1,4 +1,4 @@
-"""Ports that a process listens on, and a process that plays."""
+"""Ports that a process listens on, programs that show a page there, and a process that plays."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ import socket
 import subprocess
 import sys
 import textwrap
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 #: Waited at most for what comes at once on an idle machine, s: a busy one may take its time.
@@ -61,3 +63,20 @@ def start_player(folder: Path) -> tuple[subprocess.Popen[str], int]:
     assert f"http://127.0.0.1:{port}/" in said
     assert listening().get(port) == "0100007F"
     return process, port
+
+
+@contextmanager
+def served(program: Callable[..., object], *arguments: object, **options: object) -> Iterator[str]:
+    """The address at which a program shows a page, which ends when it is told to and frees its port."""
+    stop, port = threading.Event(), free_port()
+    settings = {"port": port, "open_browser": False, "stop": stop, **options}
+    thread = threading.Thread(target=program, args=arguments, kwargs=settings)
+    thread.start()
+    try:
+        wait_for(lambda: port in listening())
+        yield f"http://127.0.0.1:{port}/"
+    finally:
+        stop.set()
+        thread.join(timeout=MOST)
+    assert not thread.is_alive()
+    assert port not in listening()

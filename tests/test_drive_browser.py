@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 
 import numpy as np
 import pytest
@@ -13,7 +11,7 @@ from playback_browser import browser as browser
 from playback_browser import empty_page as empty_page
 from playback_browser import window as window
 from playwright.sync_api import Browser, Page
-from ports import MOST, free_port, listening, wait_for
+from ports import MOST, served
 
 import nmm
 from nmm.driving import ScenarioSetup, drive
@@ -38,21 +36,9 @@ def setup() -> ScenarioSetup:
     return ScenarioSetup(nmm.Scenario.load("unicycle_3r_position"))
 
 
-@contextmanager
-def driven(setup: ScenarioSetup) -> Iterator[str]:
+def driven(setup: ScenarioSetup) -> AbstractContextManager[str]:
     """The address of a robot that is driven."""
-    stop, port = threading.Event(), free_port()
-    options = {"port": port, "open_browser": False, "stop": stop}
-    program = threading.Thread(target=drive, args=(setup,), kwargs=options)
-    program.start()
-    try:
-        wait_for(lambda: port in listening())
-        yield f"http://127.0.0.1:{port}/"
-    finally:
-        stop.set()
-        program.join(timeout=MOST)
-    assert not program.is_alive()
-    assert port not in listening()
+    return served(drive, setup)
 
 
 def opened(window: Window, url: str) -> Page:

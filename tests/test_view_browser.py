@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import signal
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +26,7 @@ from playback_browser import empty_page as empty_page
 from playback_browser import window as window
 from playback_robot import hand_built_robot
 from playwright.sync_api import Page
-from ports import MOST, free_port, listening, wait_for
+from ports import MOST, free_port, listening, served
 
 import nmm
 from nmm.playback import view
@@ -53,20 +51,9 @@ def robot_3r() -> Robot:
     return nmm.load("unicycle_3r")
 
 
-@contextmanager
-def shown(robot: Robot, **options: object) -> Iterator[str]:
+def shown(robot: Robot, **options: object) -> AbstractContextManager[str]:
     """The address of a robot that is shown."""
-    stop, port = threading.Event(), free_port()
-    settings = {"port": port, "open_browser": False, "stop": stop, **options}
-    viewer = threading.Thread(target=view, args=(robot,), kwargs=settings)
-    viewer.start()
-    wait_for(lambda: port in listening())
-    try:
-        yield f"http://127.0.0.1:{port}/"
-    finally:
-        stop.set()
-        viewer.join(timeout=MOST)
-        assert port not in listening()
+    return served(view, robot, **options)
 
 
 def slide(page: Page, name: str, fraction: float) -> float:

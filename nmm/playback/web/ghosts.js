@@ -4,6 +4,7 @@
   const THREE = MeshCat.THREE;
   const SLATE = nmm.color([0.36, 0.44, 0.54]);
   let copies = 0;
+  const labelled = []; // where copies with texts stand
 
   // Everything fixed to the joints' nodes as one geometry: which triangles, in which colours, and each part
   // with its joint's number and its place in that joint's frame.
@@ -94,8 +95,12 @@
       nmm.viewer.set_object(nmm.split(`${path}/${k}/robot`), group);
       if (platform === undefined) continue;
       const label = nmm.scenery.label(texts[k], [0.4, 0.47, 0.56], false, 0.75);
-      label.center.set(0.5, 0.5 - 1.05 * nmm.motions.length); // those of robots at one place are stacked
-      label.position.fromArray(platform.poses, 7 * k);
+      // Those of robots at one place are stacked.
+      const place = new THREE.Vector3().fromArray(platform.poses, 7 * k);
+      const below = labelled.filter((other) => other.distanceTo(place) < 0.4 * height).length;
+      label.center.set(0.5, 0.5 - 1.05 * below);
+      labelled.push(place);
+      label.position.copy(place);
       label.position.z += height;
       nmm.viewer.set_object(nmm.split(`${path}/${k}/text`), label);
     }
