@@ -23,6 +23,7 @@ import nmm
 import nmm.cli.runs
 from nmm.cli.app import status_of
 from nmm.cli.runs import run_scenario
+from nmm.runs.figure_options import FigureOptions
 
 SHORT = ("--set", "duration=0.5")
 Command = Callable[..., Result]
@@ -275,19 +276,20 @@ def test_paper_hands_over_the_folder_and_prints_the_claims(
         def write_paper(
             folder: Path,
             progress: object = None,
+            figures: FigureOptions | None = None,
             report: SimpleNamespace = report,
             asked: list[object] = asked,
         ) -> SimpleNamespace:
-            asked += [folder, progress]
+            asked += [folder, progress, figures]
             return report
 
         monkeypatch.setattr(nmm.paper, "write_paper", write_paper)
-        result = run("paper", "--out", "here")
+        result = run("paper", "--out", "here", "--format", "pdf", "--width", "column")
         assert result.status == status
         assert result.value("1").split() == ["RG", "is", "faster", "yes" if holds else "NO"]
         assert result.value("open") == "here/index.html"
         assert len(result.err.splitlines()) == status
-        assert asked == [Path("here"), None]
+        assert asked == [Path("here"), None, FigureOptions(("pdf",), "column")]
 
 
 # play

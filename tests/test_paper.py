@@ -21,6 +21,7 @@ from nmm.paper.claims import claims
 from nmm.paper.numbers import decay_rate, ripple, settling_time, smallest_determinant, text
 from nmm.paper.page import render
 from nmm.paper.results import CaseResult, Claim, Row
+from nmm.runs.figure_options import FigureOptions
 from nmm.runs.trajectory import Trajectory
 from nmm.scenario import Scenario
 
@@ -152,7 +153,8 @@ def result(number: int, found: str = "so") -> CaseResult:
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Replaces the computation by nothing much."""
 
-    def case(number: int, progress: Progress, folder: Path) -> CaseResult:
+    def case(number: int, progress: Progress, folder: Path, figures: FigureOptions) -> CaseResult:
+        assert figures == FigureOptions()
         (folder / f"case{number}").mkdir()
         progress(1.0)
         return result(number)
