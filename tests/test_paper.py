@@ -198,7 +198,7 @@ def test_a_failure_leaves_the_earlier_paper(tmp_path: Path, monkeypatch: pytest.
     write_paper(folder, jobs=1)
     before = (folder / "index.html").read_bytes()
 
-    def fails(number: int, progress: Progress, folder: Path) -> CaseResult:
+    def fails(number: int, progress: Progress, folder: Path, figures: FigureOptions) -> CaseResult:
         raise RunError(f"case {number} did not work")
 
     monkeypatch.setattr(write, "_case", fails)
