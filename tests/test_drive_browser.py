@@ -162,7 +162,11 @@ def test_a_second_page_shows_and_moves_the_same_robot(
 
 
 def test_nothing_seeks_and_nothing_is_cut_off_at_420_px(window: Window, setup: ScenarioSetup) -> None:
-    with driven(setup) as url:
+    """The target, several reaches away from the robot, among it."""
+    q = np.array(setup.q0)
+    q[setup.robot.coordinate("x")] -= 3.0
+    away = ScenarioSetup(setup.scenario, q)
+    with driven(away) as url:
         page = opened(window, url)
         page.set_viewport_size({"width": 420, "height": 800})
         wide = page.evaluate("document.documentElement.scrollWidth")
@@ -173,6 +177,12 @@ def test_nothing_seeks_and_nothing_is_cut_off_at_420_px(window: Window, setup: S
               .map((part) => part.outerHTML)"""
         )
         assert outside == []
+        for side in ("iso", "top"):
+            page.evaluate(f"nmm.camera.look('{side}')")
+            x, y = page.evaluate(WHERE, [0, "", 0.0])  # the ball
+            view = page.evaluate("document.getElementById('view').getBoundingClientRect().toJSON()")
+            assert view["left"] < x < view["right"]
+            assert view["top"] < y < view["bottom"]
         page.evaluate("nmm.seek(0)")
         t = page.evaluate("nmm.drive.time")
         page.wait_for_function(f"nmm.drive.time > {t}")

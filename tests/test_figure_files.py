@@ -157,6 +157,12 @@ def test_files_that_cannot_be(tmp_path: Path) -> None:
         run(ONE).save(tmp_path / "run", figures="pdf")  # type: ignore[arg-type]  # that is what is tried
 
 
+def test_views_above_each_other_have_the_same_x() -> None:
+    above, side = figures.stroboscopic(run("unicycle_3r_position")).axes
+    assert (above.get_xlabel(), side.get_xlabel()) == ("x [m]", "x [m]")
+    assert above.get_xlim() == side.get_xlim()
+
+
 def test_the_side_view_shows_the_plane_of_the_motion() -> None:
     """A path in an upright plane keeps its length there, whichever way the plane is turned."""
     s = np.linspace(0.0, 2.0, 50)

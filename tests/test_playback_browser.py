@@ -152,6 +152,17 @@ CORNERS = """([at, within]) => {
 CALLS = "viewer.renderer.render(viewer.scene, viewer.camera), viewer.renderer.info.render.calls"
 
 
+#: How opaque each pixel of the picture is, 0 to 255.
+OPACITIES = """() => {
+  viewer.renderer.render(viewer.scene, viewer.camera);
+  const gl = viewer.renderer.getContext();
+  const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
+  const pixels = new Uint8Array(4 * width * height);
+  gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+  return [...pixels.filter((_, i) => i % 4 === 3)];
+}"""
+
+
 def test_ghosts_stand_where_the_robot_passes(small_robot: Robot, window: Window, tmp_path: Path) -> None:
     """With every corner of every part; a copy is drawn in two passes, however many joints it has."""
     motion = drive(small_robot)
@@ -165,8 +176,10 @@ def test_ghosts_stand_where_the_robot_passes(small_robot: Robot, window: Window,
         expected = [part @ place[:3, :3].T + place[:3, 3] for part, place in zip(parts, world, strict=True)]
         drawn = np.array(page.evaluate(CORNERS, [f"/nmm/motion 0/ghosts/{k}/robot", "/nmm"]))
         np.testing.assert_allclose(drawn, np.vstack([*expected, *expected]), atol=1e-6)
-    calls = page.evaluate(CALLS)
+    calls, opaque = page.evaluate(CALLS), np.array(page.evaluate(OPACITIES))
     page.evaluate("nmm.actions.ghosts()")
+    # What is opaque stays so: else the page's ground would shine through.
+    assert np.all(opaque >= page.evaluate(OPACITIES))
     assert calls - page.evaluate(CALLS) == 3 * 4  # with its text
     shown = page.evaluate("nmm.ghosts[0].children.map((copy) => copy.children.map((part) => part.name))")
     assert [sorted(names) for names in shown] == [["robot", "text"]] * 4

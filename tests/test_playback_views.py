@@ -87,6 +87,14 @@ def test_grid_and_axes_are_hidden_by_button_key_and_address(
     page.wait_for_function("!document.body.classList.contains('loading')")
     assert page.evaluate(shown) == [False]
     assert page.locator("#grid").get_attribute("aria-pressed") == "false"
+    page.goto(url + "#ghosts=off&paths=off")
+    page.reload()
+    page.wait_for_function("!document.body.classList.contains('loading')")
+    assert page.evaluate("nmm.address.text()").count("=off") == 2
+    # A slider that has the focus has its own keys, and no more.
+    page.locator("#slider").evaluate("slider => slider.focus()")
+    page.keyboard.press("p")
+    assert "paths" not in page.evaluate("nmm.address.text()")
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.7, 2.5])

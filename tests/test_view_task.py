@@ -294,6 +294,7 @@ def test_bad_input_is_a_line(tmp_path: Path) -> None:
         (["unicycle_2r", "--task", "nothing"], "nothing"),
         (["unicycle_2r", "--at", "q9=1"], "q9"),
         (["unicycle_2r", "--lock", "q1=1", "--at", "q1=1"], "locked"),
+        (["small_arm", "--at", "q2=9"], "outside its limits"),
     ):
         running = process(tmp_path, "view", *arguments, "--no-open")
         out, err = running.communicate(timeout=MOST)

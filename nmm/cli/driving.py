@@ -18,6 +18,7 @@ def drive_subject(
     subject = studied(source, tasks=tasks, usual_task="position", **asked)
     setup: Setup
     if subject.controller is None or subject.scenario is None:
+        subject.robot.check_limits(subject.q)
         setup = RobotSetup(subject.robot, tuple(subject.task), subject.q)
     else:
         setup = ScenarioSetup(subject.scenario, subject.q)

@@ -28,6 +28,7 @@ from nmm.cli.options import (
     lock_of,
     names_of,
 )
+from nmm.errors import expect_known
 
 if TYPE_CHECKING:
     from nmm.runs.ellipsoid_options import Wanted
@@ -151,9 +152,12 @@ class Figures:
 
     def options(self) -> FigureOptions:
         """What they ask for; `InputError` for an unknown format or width."""
-        from nmm.runs.figure_options import FigureOptions
+        from nmm.runs.figure_options import FORMATS, FigureOptions
 
+        formats = tuple(dict.fromkeys(names_of(self.format, "--format")))
+        for name in formats:
+            expect_known("format", name, FORMATS, "--format")
         width: float | str | None = self.width
         with suppress(ValueError, TypeError):
             width = float(self.width or "")
-        return FigureOptions(tuple(dict.fromkeys(names_of(self.format, "--format"))), width)
+        return FigureOptions(formats, width)

@@ -30,4 +30,5 @@ def view_robot(
             warn(note)
     task = [short_task(text, robot) for text in tasks or ()] or None
     q = configuration_at(robot, robot.rest, at, loading.get("lock") or {})
+    robot.check_limits(q)
     view(robot, q, frames=frames, task=task, port=port, open_browser=open_browser)

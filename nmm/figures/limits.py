@@ -38,6 +38,8 @@ def limits(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
         "inputs": [i for i in columns if trajectory.limit_names[i] in inputs],
         "others": [i for i in columns if trajectory.limit_names[i] not in inputs],
     }
+    if all(trajectory.limit_names[i] in trajectory.robot.q_names for i in parts["others"]):
+        parts["coordinates"] = parts.pop("others")
     shown = {name: part for name, part in parts.items() if part}
     legends = [[*_names(trajectory, part), LIMIT, FREE] for part in shown.values()]
     legends.append([*_levels(trajectory), _LEAST])
@@ -64,10 +66,10 @@ def draw_shares(axes: Axes, trajectory: Trajectory, columns: Sequence[int], y: s
     shares = trajectory.shares[:, columns]
     low, high = min(0.0, float(shares.min())), max(1.0, float(shares.max()))
     for k, (column, name) in enumerate(zip(columns, _names(trajectory, columns), strict=True)):
-        color, dashes = looks.CYCLE[k % 7], looks.DASHES[k // 7 % 4]
+        color, dashes = looks.CYCLE[k % 7], looks.DASHES[k % 4]
         style.curve(axes, trajectory.t, trajectory.shares[:, column], name, color, dashes)
     for end in (0.0, 1.0):
-        axes.axhline(end, color=looks.VERMILLION, linewidth=1.0, zorder=1, label=None if end else LIMIT)
+        axes.axhline(end, color=looks.BLACK, linewidth=1.0, zorder=1, label=None if end else LIMIT)
     axes.axhspan(NEAR, 1.0 - NEAR, color=looks.GREEN, alpha=0.07, linewidth=0, label=FREE)
     style.label(axes, y=y)
     axes.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))

@@ -74,7 +74,7 @@ class Scene(Viewed):
         self._labels: dict[float, list[Place]] = {}
         heights = np.array([[*pose.joints[:, 2], *pose.tip[:, 2]] for pose in self.poses])
         rises = heights.size > 0 and float(np.ptp(heights, axis=0).max()) > _RISES
-        self.side = upright(self.lines["path"])
+        self.side = upright(self.lines.get("desired", self.lines["path"]))
         self.views = (ABOVE, self.side) if rises else (ABOVE,)
 
     @property

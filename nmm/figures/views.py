@@ -102,6 +102,10 @@ class Viewed(ABC):
         """Limits of both axes that hold everything, with a margin that is the same on all sides, m."""
         found = np.vstack([part[np.all(np.isfinite(part), axis=1)] for part in self.points(view, width)])
         low, high = found.min(axis=0), found.max(axis=0)
+        if view != ABOVE and view.across == ABOVE.across and ABOVE in self.views:
+            # One above the other: x is where it is.
+            above = np.vstack(self.points(ABOVE, width))[:, 0]
+            low[0], high[0] = np.nanmin(above), np.nanmax(above)
         if view.up == SIDE.up:
             low[1] = min(low[1], 0.0)
         margin = _MARGIN * float(np.max(high - low))

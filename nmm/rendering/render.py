@@ -104,8 +104,8 @@ def _times(
     begin, stop = first if start is None else start, last if end is None else end
     if not first <= begin <= stop <= last:
         raise InputError(
-            f"start, end: expected instants of the run, from {first:g} to {last:g} s, one after the other, "
-            f"got {begin:g} and {stop:g}"
+            f"start and end (--from, --to): expected instants of the run, from {first:g} to {last:g} s, one "
+            f"after the other, got {begin:g} and {stop:g}"
         )
     count = math.floor((stop - begin) * fps / speed + 1e-9) + 1
     if count > MOST_PICTURES:

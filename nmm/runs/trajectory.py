@@ -195,9 +195,9 @@ class Trajectory:
         """
         return door("nmm.folders.run:load")(folder, robot)
 
-    def plot(self) -> Figure:
-        """One figure that shows the run: the motion from above, errors, objective, inputs."""
-        return door("nmm.figures:overview")(self)
+    def plot(self, **options: float) -> Figure:
+        """One figure that shows the run: the motion from above, errors, objective, inputs; `width`, in."""
+        return door("nmm.figures:overview")(self, **options)
 
     def plot_ellipses(self, path: str | Path | None = None, options: Wanted = True) -> Figure:
         """The end-effector's path with manipulability ellipses; also as a file (`nmm.figures.ellipses`)."""

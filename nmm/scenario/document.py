@@ -135,7 +135,10 @@ def _parsed(key: str, document: Document) -> Place:
             path = (*path, step)
             place = place if step == shorthand else {}
         else:
-            raise ScenarioError(f"{where}: {dotted(path)} is {shown(place)}, which has no keys")
+            raise ScenarioError(
+                f"{where}: {dotted(path)} is {shown(place)}, which has no keys: "
+                f"give it some, as in --set '{dotted(path)}={{{step}: …}}'"
+            )
     return path
 
 

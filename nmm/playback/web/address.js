@@ -2,6 +2,8 @@
 "use strict";
 {
   const address = (nmm.address = {});
+  const SHOWN = ["grid", "ghosts", "paths"];
+  const pressed = (part) => document.getElementById(part).getAttribute("aria-pressed") === "true";
   const words = (text) => text.split(",").map((word) => word.trim().toLowerCase()).filter(Boolean);
   const short = (time) => String(Number((nmm.stage.start + time).toFixed(4)));
   let [ready, waiting, written] = [false, null, null];
@@ -12,7 +14,7 @@
     if (camera.from !== "iso") parts.push(`view=${camera.from}`);
     if (camera.following) parts.push("follow");
     if (nmm.apart.share > 0) parts.push(`apart=${Number(nmm.apart.share.toFixed(3))}`);
-    if (document.getElementById("grid").getAttribute("aria-pressed") === "false") parts.push("grid=off");
+    for (const part of SHOWN) if (!pressed(part)) parts.push(`${part}=off`);
     const hidden = nmm.runs.filter((run) => run.hidden).map((run) => encodeURIComponent(run.id));
     if (hidden.length) parts.push(`hide=${hidden.join(",")}`);
     const open = plots.shown ? plots.opened() : ["none"];
@@ -50,8 +52,10 @@
     if (wanted.has("view")) camera.look(wanted.get("view"));
     if (wanted.has("follow") && !camera.following) nmm.actions.follow();
     if (wanted.has("apart") && runs.length > 1) nmm.apart.set(Number(wanted.get("apart")));
-    const grid = document.getElementById("grid").getAttribute("aria-pressed") === "true" ? "on" : "off";
-    if (wanted.has("grid") && ["on", "off"].includes(wanted.get("grid")) && wanted.get("grid") !== grid) nmm.actions.grid();
+    for (const part of SHOWN) {
+      const asked = wanted.get(part);
+      if (["on", "off"].includes(asked) && (asked === "on") !== pressed(part)) nmm.actions[part]();
+    }
     if (wanted.has("hide")) {
       const hidden = words(wanted.get("hide"));
       for (const run of runs) nmm.hide(run, hidden.includes(run.id));

@@ -9,7 +9,7 @@
     top: new THREE.Vector3(0, -0.001, 1),
     front: new THREE.Vector3(0, -1, 0.06),
   };
-  const camera = (nmm.camera = { following: false, moved: false, held: null, from: "iso" });
+  const camera = (nmm.camera = { following: false, moved: false, held: null, also: () => [], from: "iso" });
   const chooser = document.getElementById("from");
   // Not the window: a page may have something beside the view.
   const view = document.getElementById("view");
@@ -147,7 +147,8 @@
   camera.reset = () => {
     camera.moved = false;
     const towards = upright(TOWARDS[camera.from]);
-    if (!camera.following && !camera.held) return look(apart(points), towards, apart(tags));
+    const also = camera.also(); // what a page holds besides
+    if (!camera.following && !camera.held) return look([...apart(points), ...also], towards, apart(tags));
     last = middle();
     // A page may say itself what there is to hold, as points in three.js's axes.
     if (camera.held) return look(camera.held(), towards, []);
@@ -161,7 +162,7 @@
         around.push(last.clone().add(new THREE.Vector3(x, y, z)));
       }
     }
-    return look(around, towards, []);
+    return look([...around, ...also], towards, []);
   };
 
   // From one of the sides above; another name is none.

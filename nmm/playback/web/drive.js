@@ -97,6 +97,8 @@
     const run = nmm.runs[0];
     axes = Object.keys(run.columns);
     empty(run);
+    const upright = ([x, y, z]) => new THREE.Vector3(x, z, -y);
+    nmm.camera.also = () => drive.targets.filter((target) => target.gizmo).map((target) => upright(target.gizmo.place.toArray()));
     nmm.actions.follow();
     nmm.plots.show(true);
     nmm.camera.reset();

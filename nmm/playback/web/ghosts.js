@@ -72,7 +72,9 @@
       // copies the older one.
       const back = 4 + copies;
       const offset = {
-        side: THREE.DoubleSide, blending: THREE.CustomBlending, polygonOffset: true, polygonOffsetFactor: back, polygonOffsetUnits: 8 * back,
+        // As three.js blends what is transparent: the picture itself stays opaque.
+        side: THREE.DoubleSide, blending: THREE.CustomBlending, blendSrcAlpha: THREE.OneFactor,
+        blendDstAlpha: THREE.OneMinusSrcAlphaFactor, polygonOffset: true, polygonOffsetFactor: back, polygonOffsetUnits: 8 * back,
       };
       // First depth alone, then colour where it is nearest: a copy hides its own inside.
       const depth = new THREE.MeshBasicMaterial({ ...offset, transparent: true, colorWrite: false });

@@ -2,6 +2,7 @@
 "use strict";
 {
   const FRAME = 1 / 60;
+  const SLIDES = new Set(["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown"]);
   const { player, actions, plots } = nmm;
   const step = (event) => (event.shiftKey ? FRAME : 0.5);
   const keys = (nmm.keys = {
@@ -33,6 +34,7 @@
   // What a control does with a key itself. The slider of the time is the clock: its arrows are the page's.
   function owns(target, key) {
     if (!target.closest || target.id === "slider") return false;
+    if (target.type === "range" && !target.closest(".dg, #panel")) return SLIDES.has(key);
     if (target.closest(".dg, #panel, input, select, textarea, [contenteditable]")) return true;
     return target.closest("button, summary, a") !== null && (key === " " || key === "Enter");
   }
