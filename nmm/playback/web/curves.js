@@ -63,8 +63,8 @@
       const wide = Math.max(high, end) - Math.min(low, end);
       if (wide <= Math.max(2.5 * span, 1e-12)) [low, high] = [Math.min(low, end), Math.max(high, end)];
     }
-    // A value that hardly moves is not shown as noise.
-    const least = 1e-6 * Math.max(Math.abs(low), Math.abs(high), 1e-6);
+    // A value that hardly moves is not shown as noise, nor with numbers that have no room.
+    const least = Math.max(5e-4 * Math.max(Math.abs(low), Math.abs(high)), 1e-12);
     if (high - low < least) [low, high] = [low - 0.5 * least || -1, high + 0.5 * least || 1];
     const room = 0.08 * (high - low);
     return { log: false, low: low - room, high: high + room, limits: [...limits] };
