@@ -9,13 +9,14 @@ import re
 import socket
 import threading
 import urllib.request
+from contextlib import suppress
 from types import TracebackType
 from typing import Any
 
 import numpy as np
 from ports import MOST, wait_for
 from tornado.httpclient import HTTPRequest
-from tornado.websocket import WebSocketClientConnection, websocket_connect
+from tornado.websocket import WebSocketClientConnection, WebSocketClosedError, websocket_connect
 
 #: The arrays of a page's commands.
 KINDS = {"f32": "<f4", "f64": "<f8", "u32": "<u4"}
@@ -74,7 +75,8 @@ class LivePage:
                 if self._answers and "picture" in command:
                     self._drawn += 1
                     answer = {"type": "drawn", "picture": command["picture"], "drawn": self._drawn}
-                    await self._socket.write_message(json.dumps(answer))
+                    with suppress(WebSocketClosedError):  # hung up meanwhile: so says the next message
+                        await self._socket.write_message(json.dumps(answer))
         self.closed = True
 
     def says(self, text: str) -> None:
