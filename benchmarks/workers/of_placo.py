@@ -41,16 +41,18 @@ class Placo(Peer):
                 self._robot.set_joint(name, value)
             self._robot.update_kinematics()
 
-    def step(self, k: int) -> None:
-        """Its robot keeps the joints' positions itself, and integrates them."""
-        T = self.base.target(k)
+    def displacement(self, T: np.ndarray) -> np.ndarray:
         if self.pose:
             self._task.T_world_frame = T
         else:
             self._task.target_world = T[:3, 3]
-        dq = self._solver.solve(True)
+        return self._solver.solve(True)[6:]
+
+    def step(self, k: int) -> None:
+        """Its robot keeps the joints' positions itself, and integrates them."""
+        dq = self.displacement(self.base.target(k))
         if self.rolls:
-            self.base.move(dq.item(6), dq.item(7))
+            self.base.move(dq.item(0), dq.item(1))
             self._robot.set_joint("forward", 0.0)
             self._robot.set_joint("turn", 0.0)
         self._robot.update_kinematics()
