@@ -38,6 +38,18 @@ def process(folder: Path, *arguments: str, **environment: str) -> subprocess.Pop
     )
 
 
+def page_of(folder: Path, *arguments: str) -> tuple[subprocess.Popen[str], str]:
+    """Start a command line that shows a page, without a browser, and wait for the page's address."""
+    running = process(folder, *arguments, "--no-open")
+    assert running.stdout is not None
+    line = running.stdout.readline()
+    found = re.search(r" at (http://127\.0\.0\.1:\d+/) \(Ctrl-C ends it\)", line)
+    if found is None:
+        running.kill()
+    assert found, line + running.communicate()[1]
+    return running, found[1]
+
+
 class Terminal:
     """A command line on a terminal of that width."""
 

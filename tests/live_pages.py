@@ -9,14 +9,19 @@ import re
 import socket
 import threading
 import urllib.request
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from types import TracebackType
 from typing import Any
 
 import numpy as np
-from ports import MOST, wait_for
+from ports import MOST, listening, wait_for
 from tornado.httpclient import HTTPRequest
 from tornado.websocket import WebSocketClientConnection, WebSocketClosedError, websocket_connect
+
+import nmm
+from nmm.playback import LiveRun
+from nmm.runs.trajectory import Trajectory
 
 #: The arrays of a page's commands.
 KINDS = {"f32": "<f4", "f64": "<f8", "u32": "<u4"}
@@ -117,3 +122,30 @@ def dead_page(url: str) -> socket.socket:
     )
     assert b"101 Switching" in page.recv(100)
     return page
+
+
+@contextmanager
+def live(
+    one: nmm.Scenario, controller: nmm.Controller | None = None
+) -> Iterator[tuple[LiveRun, Callable[[], Trajectory]]]:
+    """A page for a run, and what computes the run and shows it to its end in a thread."""
+    controller = one.controller() if controller is None else controller
+    parts, stop, threads = one.parts, threading.Event(), []
+    with LiveRun(controller, parts.q0, parts.duration, open_browser=False) as page:
+
+        def run() -> Trajectory:
+            made = one.run(None, controller, page.watch)
+            staying = threading.Thread(target=page.stay, args=(made,), kwargs={"stop": stop})
+            threads.append(staying)
+            staying.start()
+            return made
+
+        try:
+            yield page, run
+        finally:
+            stop.set()
+            for thread in threads:
+                thread.join(timeout=MOST)
+                assert not thread.is_alive()
+    port = int(page.url.rsplit(":", 1)[1].strip("/"))
+    assert port not in listening()

@@ -16,7 +16,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import yaml
-from command_line import Result, Terminal, process
+from command_line import Result, Terminal, page_of, process
 from ports import MOST
 
 import nmm
@@ -298,10 +298,7 @@ def test_paper_hands_over_the_folder_and_prints_the_claims(
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
 def test_play_ends_cleanly(run: Command, tmp_path: Path, name: str) -> None:
     assert run("run", "unicycle_2r_position", "--set", "duration=0.1", "--out", "short").status == 0
-    playing = process(tmp_path, "play", "short", "--no-open")
-    assert playing.stdout is not None
-    line = playing.stdout.readline()
-    assert re.search(r"http://127\.0\.0\.1:\d+", line), line
+    playing, _ = page_of(tmp_path, "play", "short")
     playing.send_signal(getattr(signal, name))
     _, err = playing.communicate(timeout=MOST)
     assert (playing.returncode, err) == (0, "")

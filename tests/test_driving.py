@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import signal
-import subprocess
 import threading
 import time
 import urllib.error
@@ -14,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import process
+from command_line import page_of, process
 from ports import MOST, listening, wait_for
 from tornado.httpclient import HTTPClientError, HTTPRequest
 from tornado.ioloop import IOLoop
@@ -409,18 +408,9 @@ def test_a_function_that_raises_stops_the_robot_and_not_the_loop() -> None:
 # the command
 
 
-def start(folder: Path, *arguments: str) -> tuple[subprocess.Popen[str], str]:
-    running = process(folder, "drive", *arguments, "--no-open")
-    assert running.stdout is not None
-    line = running.stdout.readline()
-    found = re.search(r"http://127\.0\.0\.1:\d+/", line)
-    assert found, line + running.communicate()[1]
-    return running, found[0]
-
-
 @pytest.mark.parametrize("name", ["SIGINT", "SIGKILL"])
 def test_nothing_stays_behind(tmp_path: Path, name: str) -> None:
-    running, url = start(tmp_path, "unicycle_3r_position")
+    running, url = page_of(tmp_path, "drive", "unicycle_3r_position")
     port = int(url.rsplit(":", 1)[1].strip("/"))
     assert listening()[port] == "0100007F"
     running.send_signal(getattr(signal, name))
@@ -431,7 +421,7 @@ def test_nothing_stays_behind(tmp_path: Path, name: str) -> None:
 
 
 def test_only_its_own_page_is_listened_to(tmp_path: Path) -> None:
-    running, url = start(tmp_path, "unicycle_3r_position")
+    running, url = page_of(tmp_path, "drive", "unicycle_3r_position")
     try:
         with urllib.request.urlopen(url, timeout=MOST) as answer:
             token = re.search(r'data-token="([^"]+)"', answer.read().decode())[1]

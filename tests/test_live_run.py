@@ -6,18 +6,15 @@ from __future__ import annotations
 import json
 import re
 import signal
-import subprocess
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import process
-from live_pages import LivePage, dead_page, unpacked
+from command_line import page_of, process
+from live_pages import LivePage, dead_page, live, unpacked
 from ports import MOST, listening, wait_for
 
 import nmm
@@ -28,37 +25,12 @@ from nmm.robots.configuration import Configuration
 from nmm.runs.trajectory import Trajectory
 
 DT = 0.005
+SHORT = ("--set", "duration=0.5")
+LONG = ("--set", "duration=20000")
 
 
 def scenario(name: str = "unicycle_3r_position", **settings: object) -> nmm.Scenario:
     return nmm.Scenario.load(name, {"duration": 1.0, **settings})
-
-
-@contextmanager
-def live(
-    one: nmm.Scenario, controller: nmm.Controller | None = None
-) -> Iterator[tuple[LiveRun, Callable[[], Trajectory]]]:
-    """A page for a run, and what computes the run and shows it to its end in a thread."""
-    controller = one.controller() if controller is None else controller
-    parts, stop, threads = one.parts, threading.Event(), []
-    with LiveRun(controller, parts.q0, parts.duration, open_browser=False) as page:
-
-        def run() -> Trajectory:
-            made = one.run(None, controller, page.watch)
-            staying = threading.Thread(target=page.stay, args=(made,), kwargs={"stop": stop})
-            threads.append(staying)
-            staying.start()
-            return made
-
-        try:
-            yield page, run
-        finally:
-            stop.set()
-            for thread in threads:
-                thread.join(timeout=MOST)
-                assert not thread.is_alive()
-    port = int(page.url.rsplit(":", 1)[1].strip("/"))
-    assert port not in listening()
 
 
 def told(page: LivePage) -> tuple[list[str], np.ndarray, np.ndarray]:
@@ -261,19 +233,10 @@ def test_an_answer_counts_once_and_others_count_nothing() -> None:
 # the command
 
 
-def start(folder: Path, *arguments: str) -> tuple[subprocess.Popen[str], str]:
-    running = process(folder, "run", *arguments, "--play", "--no-open")
-    assert running.stdout is not None
-    line = running.stdout.readline()
-    found = re.search(r"Playing at (http://127\.0\.0\.1:\d+/) \(Ctrl-C ends it\)", line)
-    assert found, line + running.communicate()[1]
-    return running, found[1]
-
-
 def test_the_command_shows_computes_and_plays(tmp_path: Path) -> None:
-    short = ("unicycle_2r_position", "--set", "duration=0.5")
+    short = ("unicycle_2r_position", *SHORT)
     assert process(tmp_path, "run", *short, "--out", "plain").wait(MOST) == 0
-    running, url = start(tmp_path, *short, "--out", "shown")
+    running, url = page_of(tmp_path, "run", "--play", *short, "--out", "shown")
     with LivePage(url) as page:
         wait_for(lambda: bool(page.of("whole")))
     running.send_signal(signal.SIGINT)
@@ -289,10 +252,23 @@ def test_the_command_shows_computes_and_plays(tmp_path: Path) -> None:
             np.testing.assert_array_equal(plain[name], shown[name], err_msg=name)
 
 
+def test_ended_while_the_folder_is_written_it_does_not_stay(tmp_path: Path) -> None:
+    """Numbers come before figures: Ctrl-C in between neither spoils the folder nor is lost."""
+    running, _ = page_of(tmp_path, "run", "--play", "unicycle_2r_position", *SHORT, "--out", "here")
+    assert running.stdout is not None
+    while not (line := running.stdout.readline()).startswith("outcome"):
+        assert line
+    running.send_signal(signal.SIGINT)
+    out, err = running.communicate(timeout=MOST)
+    assert (running.returncode, err) == (0, "")
+    assert "files in" in out
+    assert (tmp_path / "here/motion.png").exists()
+
+
 @pytest.mark.parametrize("name", ["SIGINT", "SIGKILL"])
 def test_nothing_stays_behind(tmp_path: Path, name: str) -> None:
     """Ended in the middle of a long run."""
-    running, url = start(tmp_path, "unicycle_2r_position", "--set", "duration=20000", "--out", "here")
+    running, url = page_of(tmp_path, "run", "--play", "unicycle_2r_position", *LONG, "--out", "here")
     port = int(url.rsplit(":", 1)[1].strip("/"))
     assert listening()[port] == "0100007F"
     with LivePage(url) as page:

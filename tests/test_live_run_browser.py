@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import re
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from live_pages import LivePage
+from live_pages import LivePage, live
 from playback_browser import UPRIGHT, WALK, Window
 from playback_browser import browser as browser
 from playback_browser import empty_page as empty_page
@@ -18,34 +15,15 @@ from playwright.sync_api import Browser, Page
 from ports import MOST, wait_for
 
 import nmm
-from nmm.playback import LiveRun
 from nmm.playback.running import FPS
-from nmm.runs.trajectory import Trajectory
 
 pytestmark = pytest.mark.browser
 
 DURATION = 6.0
 
 
-@contextmanager
-def live(duration: float = DURATION) -> Iterator[tuple[LiveRun, Callable[[], Trajectory]]]:
-    """A page for a run, and what computes the run and shows it to its end in a thread."""
-    one = nmm.Scenario.load("unicycle_2r_position", {"duration": duration})
-    controller, stop, threads = one.controller(), threading.Event(), []
-    with LiveRun(controller, one.parts.q0, duration, open_browser=False) as page:
-
-        def run() -> Trajectory:
-            made = one.run(None, controller, page.watch)
-            threads.append(threading.Thread(target=page.stay, args=(made,), kwargs={"stop": stop}))
-            threads[-1].start()
-            return made
-
-        try:
-            yield page, run
-        finally:
-            stop.set()
-            for thread in threads:
-                thread.join(timeout=MOST)
+def scenario(duration: float = DURATION) -> nmm.Scenario:
+    return nmm.Scenario.load("unicycle_2r_position", {"duration": duration})
 
 
 def without_drawing(page: Page) -> None:
@@ -63,7 +41,7 @@ def of_report(report: str, page: int) -> tuple[int, int, int, int]:
 
 
 def test_it_grows_and_becomes_the_page_that_plays_it(window: Window) -> None:
-    with live() as (shown, run):
+    with live(scenario()) as (shown, run):
         page = window.open(shown.url)
         assert page.locator("#status").inner_text() in ("", "0.00 of 6 s, the run begins")
         made = run()
@@ -95,7 +73,7 @@ def test_it_grows_and_becomes_the_page_that_plays_it(window: Window) -> None:
 
 def test_thirty_pictures_a_second_are_drawn_or_counted(window: Window, browser: Browser) -> None:
     """By a page, by by a second one that comes late, and by one whose browser is killed."""
-    with live(60.0) as (shown, run):
+    with live(scenario(60.0)) as (shown, run):
         page = window.open(shown.url)
         without_drawing(page)
         other, late = browser.new_context(), browser.new_context()
@@ -128,7 +106,7 @@ def test_thirty_pictures_a_second_are_drawn_or_counted(window: Window, browser: 
 
 
 def test_a_page_that_hangs_keeps_nobody_waiting(window: Window, browser: Browser) -> None:
-    with live(2.0) as (shown, run):
+    with live(scenario(2.0)) as (shown, run):
         hung = browser.new_context()
         stuck = hung.new_page()
         stuck.goto(shown.url)

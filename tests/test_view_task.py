@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-import re
 import signal
-import subprocess
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -16,7 +14,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from command_line import process
+from command_line import page_of, process
 from gripping import folding
 from live_pages import LivePage
 from ports import MOST, free_port, listening, wait_for
@@ -262,19 +260,10 @@ def test_pages_are_answered_each_for_itself() -> None:
 # the command
 
 
-def start(folder: Path, *arguments: str) -> tuple[subprocess.Popen[str], str]:
-    running = process(folder, "view", *arguments, "--no-open")
-    assert running.stdout is not None
-    line = running.stdout.readline()
-    found = re.search(r"http://127\.0\.0\.1:\d+/", line)
-    assert found, line + running.communicate()[1]
-    return running, found[0]
-
-
 def test_the_command_takes_a_strangers_robot_and_where_it_is(tmp_path: Path) -> None:
     planar_arm(tmp_path)
     options = ("--platform", "unicycle", "--task", "position:hand:xy", "--at", "theta=pi/2")
-    running, url = start(tmp_path, "planar.urdf", *options)
+    running, url = page_of(tmp_path, "view", "planar.urdf", *options)
     with LivePage(url) as page:
         lines = [json.loads(line) for line in page.hello]
         joints = next(line for line in lines if line["type"] == "joints")

@@ -8,6 +8,7 @@ with "double free": of 450 interrupts in the first 1.4 s of `nmm run`, four to n
 from __future__ import annotations
 
 import signal
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -33,11 +34,15 @@ def raise_interrupts() -> None:
 
 
 @contextmanager
-def shielded() -> Iterator[None]:
-    """Whoever presses Ctrl-C twice wants the run to end, not to lose what there is of it."""
-    before = {number: signal.signal(number, signal.SIG_IGN) for number in SIGNALS}
+def shielded() -> Iterator[threading.Event]:
+    """Whoever presses Ctrl-C twice wants the run to end, not to lose what there is of it.
+
+    What is yielded is set when the command was asked to end meanwhile.
+    """
+    asked = threading.Event()
+    before = {number: signal.signal(number, lambda *of: asked.set()) for number in SIGNALS}
     try:
-        yield
+        yield asked
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

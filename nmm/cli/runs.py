@@ -49,10 +49,11 @@ def run_scenario(
     controller = scenario.controller()  # complains before there is a progress bar
     with _shown(scenario, controller, port, open_browser=open_browser) if play else nullcontext() as page:
         trajectory = _run(scenario, controller, None if page is None else page.watch)
-        with shielded():
+        with shielded() as asked_to_end:
             _tell_and_save(trajectory, folder, html=html, ellipsoids=ellipsoids, figures=figures)
         status = _status("nmm run", [trajectory], folder)
-        if page is not None and len(trajectory) and trajectory.outcome != "interrupted":
+        ends = asked_to_end.is_set() or trajectory.outcome == "interrupted"
+        if page is not None and len(trajectory) and not ends:
             page.stay(trajectory, ellipsoids=ellipsoids)
     return status
 
