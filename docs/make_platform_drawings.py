@@ -42,6 +42,29 @@ def differential() -> Drawing:
     return drawing
 
 
+def skid_steer() -> Drawing:
+    drawing = Drawing(5.0, 3.6)
+    drawing.world()
+    body, half, out, ahead = Body(drawing, 2.6 + 1.75j, math.radians(18.0)), complex(0.6, 0.55), 1.0, -0.2
+    body.hull(-0.85, 0.95, 0.42, 0.12)
+    for x in (half.real, -half.real):
+        drawing.line([body.at(complex(x, -half.imag)), body.at(complex(x, half.imag))], INK, 2)
+        for y in (half.imag, -half.imag):
+            body.wheel(complex(x, y), 0.0)
+    drawing.dashes(body.at(complex(ahead, -out - 0.2)), body.at(complex(ahead, out + 0.2)))
+    for y, name, label in ((out, "left", -0.36 + 0.1j), (-out, "right", -0.42 - 0.12j)):
+        drawing.dot(body.at(complex(ahead, y)), 3.5)
+        drawing.text(body.at(complex(ahead, y)) + label, name, AXIS, 14)
+    body.heading(1.45, 1.05, 0.9)
+    for y, name, label in ((half.imag, "ω_left", 0.1 + 0.2j), (-half.imag, "ω_right", 0.32 - 0.1j)):
+        body.input(complex(half.real + 0.2, y), complex(half.real + 0.7, y), name, label)
+    rear = -half
+    drawing.dimension(body.at(rear), body.at(half.conjugate()), -0.75j * body.e, "length", 0.1 - 0.2j)
+    drawing.dimension(body.at(rear), body.at(-half.conjugate()), -0.7 * body.e, "width", -0.38 * body.e)
+    body.point(0.22 - 0.14j)
+    return drawing
+
+
 def bicycle(front_drive: bool) -> Drawing:
     drawing = Drawing(4.1, 2.95)
     drawing.world()
@@ -169,6 +192,7 @@ DRAWINGS: dict[str, Callable[[], Drawing]] = {
     "front_drive_car": lambda: bicycle(front_drive=True),
     "tractor": tractor,
     "omnidirectional": omnidirectional,
+    "skid_steer": skid_steer,
     "mecanum": mecanum,
     "fixed": fixed,
 }

@@ -86,6 +86,7 @@ from .platforms import Mecanum as Mecanum
 from .platforms import Omnidirectional as Omnidirectional
 from .platforms import OmniWheel as OmniWheel
 from .platforms import Platform as Platform
+from .platforms import SkidSteer as SkidSteer
 from .platforms import Speed as Speed
 from .platforms import Spin as Spin
 from .platforms import Spins as Spins

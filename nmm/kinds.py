@@ -66,6 +66,7 @@ PLATFORMS = Kinds(
     "platform",
     unicycle="nmm.platforms.unicycle:Unicycle",
     differential="nmm.platforms.differential_drive:DifferentialDrive",
+    skid_steer="nmm.platforms.skid_steer:SkidSteer",
     car="nmm.platforms.car:Car",
     front_drive_car="nmm.platforms.car:FrontDriveCar",
     tractor="nmm.platforms.tractor:Tractor",

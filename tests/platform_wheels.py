@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from nmm.platforms import Mecanum, Platform, Tractor
+from nmm.platforms import Mecanum, Platform, SkidSteer, Tractor
 from nmm.platforms.car import Car, FrontDriveCar
 from nmm.platforms.differential_drive import DifferentialDrive
 
@@ -88,6 +88,10 @@ def contacts(platform: Platform, qp: Array, up: Array | None) -> list[Contact]:
             y = platform.width / 2 if "left" in name else -platform.width / 2
             found.append(Contact(0, complex(x, y), 0.0, platform.radius, spin, platform.roller(x, y)))
         return found
+    if isinstance(platform, SkidSteer):
+        spins = (None, None) if up is None else (up[0], up[1])
+        ends = (platform.length / 2, -platform.length / 2)
+        return [wheel for x in ends for wheel in axle(0, x, platform.width, platform.radius, spins)]
     if isinstance(platform, Tractor):
         behind = [wheel for i, t in enumerate(platform.trailers, 1) for wheel in pair(i, -t.length)]
         return [*pair(0, 0.0), *behind]

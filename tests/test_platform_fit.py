@@ -21,6 +21,7 @@ from nmm.platforms import (
     Pivot,
     Platform,
     RollingJoint,
+    SkidSteer,
     Tractor,
     Unicycle,
 )
@@ -222,3 +223,35 @@ def test_misfit_of_mecanum(case: str) -> None:
     expected = "robot: platform mecanum expects four wheels of one radius .*"
     with pytest.raises(InputError, match=expected + re.escape(message)):
         Mecanum.fit(Layout("robot", (), wheels))
+
+
+def test_fit_skid_steer() -> None:
+    middle = tuple(wheel(f"middle_{side}", 0.01, y, r=0.05) for side, y in (("left", 0.1), ("right", -0.1)))
+    for wheels in (CORNERS, CORNERS[::-1], (*CORNERS, *middle)):
+        found = SkidSteer.fit(Layout("rover", (), wheels))
+        assert (found.radius, found.length, found.width) == (0.05, 0.3, 0.2)
+        assert (found.left, found.right, found.ahead) == (0.1, -0.1, 0.0)
+
+
+SKID_STEER_MISFITS = {
+    "two": (CORNERS[:2], "the root's body carries 2 (found: front_left at (0.15, 0.1) m, radius 0.05 m; fro"),
+    "across": ((*CORNERS[:3], replace(CORNERS[3], heading=1.0)), "rear_right does not roll forward"),
+    "ahead": (
+        tuple(replace(w, x=w.x + 0.02) for w in CORNERS),
+        "the reference point is not midway between the first and the last axle: give axle=",
+    ),
+    "aside": (tuple(replace(w, y=w.y + 0.02) for w in CORNERS), "they are not equally far to the left and"),
+    "one line": (tuple(replace(w, y=0.0) for w in CORNERS), "they are not equally far to the left and"),
+    "one axle": (tuple(replace(w, x=0.0) for w in CORNERS), "they are on one axle"),
+    "not in pairs": ((*CORNERS, wheel("odd", 0.0, 0.1, r=0.05)), "they do not stand in pairs"),
+    "radii": ((*CORNERS[:3], replace(CORNERS[3], radius=0.06)), "their radii differ"),
+}
+
+
+@pytest.mark.parametrize("case", SKID_STEER_MISFITS)
+def test_misfit_of_skid_steer(case: str) -> None:
+    wheels, message = SKID_STEER_MISFITS[case]
+    with pytest.raises(
+        InputError, match="robot: platform skid_steer expects wheels of one radius .*" + re.escape(message)
+    ):
+        SkidSteer.fit(Layout("robot", (), wheels))

@@ -19,6 +19,7 @@ from nmm.platforms import (
     Mecanum,
     Omnidirectional,
     Platform,
+    SkidSteer,
     Tractor,
     Trailer,
     Unicycle,
@@ -55,6 +56,12 @@ BAD: dict[str, tuple[Callable[[], object], str]] = {
     "lengths": (lambda: Tractor([1.0]), "trailers: expected a list of Trailer, got 1.0 in it"),
     "twice": (lambda: Tractor([Trailer(1.0), Trailer(1.0)]), "tractor: two joints are named 'hitch1'"),
     "x": (lambda: Tractor([Trailer(1.0, joint="x")]), f"tractor: {NOT_A_JOINT} 'x'"),
+    "skid_steer": (lambda: SkidSteer(0.1, 0.0, 0.4), f"skid_steer: length: {NOT_POSITIVE} 0"),
+    "skid_steer turned about": (
+        lambda: SkidSteer(0.1, 0.5, 0.4, left=-0.3),
+        "skid_steer: left, right: expected the left wheels' centre of rotation to the left of the right "
+        "wheels', got y = -0.3 and -0.2 m",
+    ),
     "mecanum": (lambda: Mecanum(0.1, 0.5, 0.0), f"mecanum: width: {NOT_POSITIVE} 0"),
 }
 
@@ -74,6 +81,7 @@ KINDS: dict[str, Callable[..., Platform]] = {
     "tractor": lambda **options: Tractor([Trailer(1.0)], **options),
     "omnidirectional": Omnidirectional,
     "mecanum": lambda **options: Mecanum(0.1, 0.5, 0.4, **options),
+    "skid_steer": lambda **options: SkidSteer(0.1, 0.5, 0.4, **options),
     "fixed": Fixed,
 }
 

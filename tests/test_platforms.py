@@ -25,6 +25,7 @@ from nmm.platforms import (
     Mecanum,
     Omnidirectional,
     Platform,
+    SkidSteer,
     Tractor,
     Trailer,
     Unicycle,
@@ -82,8 +83,9 @@ def test_copies_are_the_same_platform(name: str, rng: np.random.Generator) -> No
 ROLLING = [
     name
     for name, platform in EXAMPLES.items()
-    if not isinstance(platform, Omnidirectional | Fixed | WheeledPlatform)
+    if not isinstance(platform, Omnidirectional | Fixed | WheeledPlatform | SkidSteer)
 ]
+SKIDDING = [name for name, platform in EXAMPLES.items() if isinstance(platform, SkidSteer)]
 
 
 @pytest.mark.parametrize("name", ROLLING)
@@ -155,6 +157,13 @@ ARCS = {
         [3.0, 7.0],
         [0.5, 0.0, 0.8],
         0.25 * (7.0 + 3.0) / (7.0 - 3.0),
+    ),
+    "skid_steer": (
+        SkidSteer(0.1, 0.5, 0.6, left=0.5, right=-0.3, ahead=-0.2),
+        [],
+        [3.0, 7.0],
+        [0.55, 0.1, 0.5],
+        np.hypot(0.55, 0.1) / 0.5,
     ),
     "car": (Car(0.4), [0.5], [0.7, 0.0], [0.7, 0.0, 0.7 * np.tan(0.5) / 0.4], 0.4 / np.tan(0.5)),
     "front_drive_car": (
@@ -295,6 +304,47 @@ def test_mecanum_wheel_speeds(name: str, rng: np.random.Generator) -> None:
             assert abs(gamma) == pi / 4
             grip = (center * np.exp(-1j * gamma)).real
             assert grip / (platform.radius * np.cos(gamma)) == pytest.approx(speed, abs=1e-13)
+
+
+@pytest.mark.parametrize("name", SKIDDING)
+def test_skidding_wheels_slide_as_fast_as_is_said(name: str, rng: np.random.Generator) -> None:
+    """Not where a side's centre of rotation is: there the ground sees the side's wheels at rest."""
+    platform = EXAMPLES[name]
+    qp, up = rng.normal(size=(20, 3)), rng.normal(size=(20, 2))
+    for place, inputs, told in zip(qp, up, platform.sliding(up), strict=True):
+        qp_dot = platform.G(place) @ inputs
+        found = slips(platform, place, qp_dot, inputs).reshape(-1, 2)
+        assert told == pytest.approx(np.linalg.norm(found, axis=1).max(), rel=1e-12)
+        (body,) = bodies(platform, place, qp_dot)
+        for y, speed in ((platform.left, inputs[0]), (platform.right, inputs[1])):
+            center = body.point_velocity(complex(platform.ahead, y)) / body.direction
+            assert abs(center - platform.radius * speed) <= 1e-14
+    np.testing.assert_array_equal(platform.sliding(np.array([2.0, 2.0])), 0.0)
+
+
+def test_viscous_ground_puts_the_centres_where_the_wheels_slide_least(rng: np.random.Generator) -> None:
+    """Four equal wheels whose friction is as their slip: they take the motion with the least Σ slip², and
+    that is skid steering about centres at ±(width/2) (1 + (length/width)²)."""
+    length, width = 0.5, 0.6
+    out = 0.5 * width * (1.0 + (length / width) ** 2)
+    platform = SkidSteer(0.1, length, width, left=out, right=-out)
+    for _ in range(20):
+        qp, up = rng.normal(size=3), rng.normal(size=2)
+        rates = np.column_stack(
+            [slips(platform, qp, qp_dot, np.zeros(2)) for qp_dot in np.eye(3)]
+        )  # of all bodies' motions, with the wheels locked
+        driven = slips(platform, qp, np.zeros(3), up)
+        expected = np.linalg.lstsq(rates, -driven, rcond=None)[0]
+        np.testing.assert_allclose(platform.G(qp) @ up, expected, rtol=0, atol=1e-14)
+
+
+def test_skid_steering_without_numbers_is_a_differential_drive(rng: np.random.Generator) -> None:
+    qp = rng.normal(size=3)
+    found, expected = SkidSteer(0.1, 0.7, 0.6), DifferentialDrive(0.1, 0.6)
+    np.testing.assert_allclose(found.G(qp), expected.G(qp), rtol=0, atol=1e-16)
+    np.testing.assert_allclose(found.A(qp), expected.A(qp), rtol=0, atol=0)
+    assert np.all(expected.sliding(rng.normal(size=(5, 2))) == 0.0)
+    assert found.sliding(np.array([0.0, 1.0])) == pytest.approx(0.1 / 0.6 * 0.35)
 
 
 def test_only_mecanum_wheels_have_rollers() -> None:

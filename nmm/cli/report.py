@@ -87,3 +87,5 @@ def _rows(trajectory: Trajectory, numbers: dict[str, Any]) -> Iterator[tuple[str
     if trajectory.resolver == "rg":
         yield "switches of partition", str(numbers["partition_switches"])
     yield "lateral slip", f"{numbers['lateral_slip_max']:.1g} m/s at most"
+    if numbers.get("sliding_max"):
+        yield "wheels slide by design", f"{numbers['sliding_max']:.3g} m/s at most"

@@ -10,6 +10,7 @@ from nmm.platforms.fixed import Fixed
 from nmm.platforms.layout import Layout, Pivot, RollingJoint
 from nmm.platforms.mecanum import Mecanum
 from nmm.platforms.omnidirectional import Omnidirectional
+from nmm.platforms.skid_steer import SkidSteer
 from nmm.platforms.tractor import Tractor, Trailer
 from nmm.platforms.unicycle import Unicycle
 from nmm.platforms.wheeled import (
@@ -49,6 +50,7 @@ __all__ = [
     "Pivot",
     "Platform",
     "RollingJoint",
+    "SkidSteer",
     "Speed",
     "Spin",
     "Spins",

@@ -37,7 +37,8 @@ class Platform(ABC):
 
     It may say more: `parameters` (the numbers that the kernel reads) and their `parameter_names`, `fit` (how
     to measure them in a robot's file), `coordinate_limits`, `problem` (where its wheels cannot roll, and
-    why), `roller`, `steered_axle` (what turns it where no task feels that).
+    why), `roller`, `rolls_at` and `sliding` (of wheels that do more than roll), `steered_axle` (what turns
+    it where no task feels that).
 
     Parameters
     ----------
@@ -122,6 +123,16 @@ class Platform(ABC):
         direction in which it rolls, turned by γ (rad) about z. 0 for a wheel without rollers and for one
         whose rollers turn about its rolling direction; ±π/4 for a mecanum wheel."""
         return 0.0
+
+    def rolls_at(self, x: float, y: float) -> tuple[float, float]:
+        """The point (m) of the root's body whose motion turns the wheel at (x, y) m: its own centre, unless
+        the wheel slides along the direction in which it rolls."""
+        return x, y
+
+    def sliding(self, up: Array) -> Array:
+        """How fast its wheels slide over the ground by design at the inputs (..., p): (...,) m/s, of the one
+        that slides fastest. 0 where all roll."""
+        return np.zeros(up.shape[:-1])
 
     def steered_axle(self, body: str) -> SteeredAxle | None:
         """What steers a body where, at first order, only the speed moves it; None where nothing needs to.

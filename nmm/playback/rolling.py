@@ -18,7 +18,8 @@ class Rolling:
 
     A wheel of centre c, axis a and radius r, which grips along the direction d in which it rolls turned by
     γ (its rollers' angle), turns at v_c·d(γ) / (r cos γ), with v_c the velocity of its centre: the point
-    that touches the ground then has no velocity along d(γ). d = a × z.
+    that touches the ground then has no velocity along d(γ). d = a × z. Of a wheel that slides along d by
+    design, c is where it would not (`Platform.rolls_at`).
 
     Attributes
     ----------
@@ -35,7 +36,7 @@ class Rolling:
         carriers = [self._carriers.names.index(wheel.carrier) for wheel in wheels]
         self._carrier = np.array(carriers, dtype=int)
         planar = [
-            [self._carriers.planar(k, part) for part in (wheel.center, wheel.axis)]
+            [self._carriers.planar(k, part) for part in (wheel.rolls_at, wheel.axis)]
             for k, wheel in zip(carriers, wheels, strict=True)
         ]
         centers, axes = np.array(planar).reshape(-1, 2, 2).transpose(1, 0, 2)

@@ -18,7 +18,8 @@ def slipping_wheels(robot: Robot) -> dict[str, float]:
     """
     platform = robot.platform
     plain = [wheel for wheel in robot.wheels if wheel.is_fixed]
-    if not plain or platform.n_p < 3 or platform.p > 2:  # with three inputs the wheels must have rollers
+    by_design = np.any(platform.sliding(np.eye(platform.p)))
+    if not plain or platform.n_p < 3 or platform.p > 2 or by_design:  # three inputs: the wheels have rollers
         return {}
     own = platform.coordinate_limits[3:]
     found: dict[str, float] = {}

@@ -22,6 +22,7 @@ class Wheel:
     center : (3,) wheel centre in the carrier's frame with the swivel at zero, m
     axis : (3,) unit spin axis in the carrier's frame with the swivel at zero, level
     radius : m
+    rolls_at : (3,) the point of the carrier whose motion turns it (see `Platform.rolls_at`), m
     carrier : name of the movable joint of `model` that carries it; "theta" for the root link's body
     swivel : name of the swivel's joint in the display model, or "" without
     pivot : (3,) a point of the swivel's axis in the carrier's frame, m
@@ -32,6 +33,7 @@ class Wheel:
     center: Array
     axis: Array
     radius: float
+    rolls_at: Array
     carrier: str = "theta"
     swivel: str = ""
     pivot: Array = field(default_factory=lambda: np.zeros(3))

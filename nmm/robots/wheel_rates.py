@@ -17,9 +17,9 @@ _LEVEL = 1e-3
 def wheel_rates(robot: Robot) -> tuple[tuple[str, ...], Array]:
     """Names of the driven wheels, and rows [x, y, angle, r, steer, pivot x, pivot y], (w, 7), m and rad.
 
-    A wheel at (x, y) that grips along `angle`, turned and moved by coordinate `steer` about its pivot (-1: it
-    hangs on the main body), turns at (grip . velocity of its centre) / r; of a wheel with rollers r is the
-    radius times cos γ. Wheels on swivels and on trailers are left out: their rates follow.
+    A wheel that rolls as (x, y) moves and grips along `angle`, turned and moved by coordinate `steer` about
+    its pivot (-1: it hangs on the main body), turns at (grip . velocity there) / r; of a wheel with rollers
+    r is the radius times cos γ. Wheels on swivels and on trailers are left out: their rates follow.
     """
     rows = {wheel.joint: row for wheel in robot.wheels if (row := _row(robot, wheel)) is not None}
     return tuple(rows), np.array(list(rows.values())).reshape(-1, 7)
@@ -30,7 +30,7 @@ def _row(robot: Robot, wheel: Wheel) -> list[float] | None:
         return None
     angle = math.atan2(-wheel.axis[0], wheel.axis[1]) + wheel.roller
     radius = wheel.radius * math.cos(wheel.roller)
-    x, y = (float(value) for value in wheel.center[:2])
+    x, y = (float(value) for value in wheel.rolls_at[:2])
     if wheel.carrier == "theta":
         return [x, y, angle, radius, -1.0, 0.0, 0.0]
     if wheel.carrier not in robot.q_names[3 : robot.platform.n_p]:

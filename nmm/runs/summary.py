@@ -84,6 +84,7 @@ def summarise(trajectory: Trajectory) -> dict[str, Any]:
             "step_size_mean": float(trajectory.step_size.mean()),
             "margin_min": float(trajectory.margin.min()) if np.all(np.isfinite(trajectory.margin)) else None,
             "lateral_slip_max": lateral_slip(trajectory),
+            "sliding_max": sliding(trajectory),
             "partition_switches": trajectory.switches,
             "input_rms": _rms(sizes),
             "input_peak": float(sizes.max()),
@@ -141,3 +142,9 @@ def lateral_slip(trajectory: Trajectory) -> float:
     platform = trajectory.robot.platform
     n_p = platform.n_p
     return float(np.abs(platform.sideways(trajectory.q[:, :n_p], trajectory.q_dot[:, :n_p])).max(initial=0.0))
+
+
+def sliding(trajectory: Trajectory) -> float:
+    """The most that a wheel slides over the ground by design during the run, m/s: see `Platform.sliding`."""
+    platform = trajectory.robot.platform
+    return float(platform.sliding(trajectory.u[:, : platform.p]).max(initial=0.0))

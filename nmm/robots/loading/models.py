@@ -185,5 +185,5 @@ def _wheels(
     if not platform.coordinates:
         return (), []
     shown, solid = display.geometries
-    wheels, notes = find_wheels(display.model, (solid, shown), asked, where, own, platform.roller)
+    wheels, notes = find_wheels(display.model, (solid, shown), asked, where, own, platform)
     return wheels, list(notes)

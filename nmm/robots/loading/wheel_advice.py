@@ -49,7 +49,7 @@ def _nameless(robot: Robot) -> Iterator[str]:
 def _about_axle(robot: Robot, root: str) -> Iterator[str]:
     """Where the axle of the wheels is that neither steer nor swivel nor have rollers."""
     fixed = [wheel for wheel in robot.wheels if wheel.is_fixed]
-    if not fixed or robot.platform.p > 2:
+    if not fixed or robot.platform.p > 2 or np.any(robot.platform.sliding(np.eye(robot.platform.p))):
         return
     names = ", ".join(wheel.joint for wheel in fixed)
     axis = fixed[0].axis[:2] / np.linalg.norm(fixed[0].axis[:2])
@@ -60,7 +60,8 @@ def _about_axle(robot: Robot, root: str) -> Iterator[str]:
     ahead = np.array([along @ wheel.center[:2] for wheel in fixed])
     if np.ptp(ahead) > NEAR:
         yield (
-            f"wheels that neither steer nor swivel are not on one axle ({names}): the robot slips in turns"
+            f"wheels that neither steer nor swivel are not on one axle ({names}): the robot slips in turns; "
+            'platform="skid_steer" takes that as its way of turning, and says how fast they slide'
         )
         return
     if abs(along[1]) > PARALLEL:

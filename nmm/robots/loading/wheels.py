@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 import pinocchio as pin
 
+from nmm.platforms import Platform
 from nmm.robots.loading.layout import Measured
 from nmm.robots.wheel import Wheel
 
@@ -16,8 +17,8 @@ def find_wheels(
     geometries: Sequence[pin.GeometryModel],
     asked: Sequence[str] | Mapping[str, float] | None,
     where: str,
-    own: Sequence[str] = (),
-    roller: Callable[[float, float], float] | None = None,
+    own: Sequence[str],
+    platform: Platform,
 ) -> tuple[tuple[Wheel, ...], tuple[str, ...]]:
     """The robot's wheels, and notes on joints that are named wheels and are none.
 
@@ -33,7 +34,7 @@ def find_wheels(
     asked : joint names, or a radius (m) for each; None finds them
     where : what messages call the model
     own : the platform's own joints, which are coordinates, not wheels
-    roller : angle (rad) of the rollers of the wheel at (x, y) m on the root's body: `Platform.roller`
+    platform : says how wheels on the root's body roll
 
     Raises
     ------
@@ -41,7 +42,7 @@ def find_wheels(
     """
     measured = Measured(model, geometries, where)
     radii, notes = _wheels(measured, asked, own)
-    return tuple(_wheel(measured, name, radii[name], own, roller) for name in radii), notes
+    return tuple(_wheel(measured, name, radii[name], own, platform) for name in radii), notes
 
 
 def held_joints(
@@ -100,7 +101,7 @@ def _wheel(
     name: str,
     radius: float | None,
     own: Sequence[str],
-    roller: Callable[[float, float], float] | None,
+    platform: Platform,
 ) -> Wheel:
     model, joint = measured.model, measured.joints[name]
     carrier, swivel = int(model.parents[joint]), _swivel(measured, name, own)
@@ -111,16 +112,18 @@ def _wheel(
     pivot = np.zeros(3)
     if swivel:
         pivot = carried.act(measured.placements[measured.joints[swivel]].translation)
-    gripping = 0.0
-    if roller is not None and carrier == measured.root and not swivel:
-        gripping = roller(float(center[0]), float(center[1]))
+    roller, rolls_at = 0.0, center.copy()
+    if carrier == measured.root and not swivel:
+        x, y = (float(value) for value in center[:2])
+        roller, rolls_at[:2] = platform.roller(x, y), platform.rolls_at(x, y)
     return Wheel(
         name,
         center,
         carried.rotation @ measured.axis(joint),
         measured.radius(joint, radius),
+        rolls_at,
         carrier=str(model.names[carrier]),
         swivel=swivel,
         pivot=pivot,
-        roller=gripping,
+        roller=roller,
     )
