@@ -33,9 +33,12 @@ def hand_built_robot(folder: Path) -> Robot:
     def pose(roll: float, pitch: float, yaw: float, *xyz: float) -> pin.SE3:
         return pin.SE3(pin.rpy.rpyToMatrix(roll, pitch, yaw), np.array(xyz))
 
-    wheels = (
-        Wheel("left", np.array([0.0, 0.25, 0.1]), np.array([0.0, 1.0, 0.0]), 0.1),
-        Wheel("right", np.array([0.0, -0.2, 0.15]), np.array([0.0, -1.0, 0.0]), 0.15),
+    wheels = tuple(
+        Wheel(name, center, np.array([0.0, axis, 0.0]), radius, center)
+        for name, center, axis, radius in (
+            ("left", np.array([0.0, 0.25, 0.1]), 1.0, 0.1),
+            ("right", np.array([0.0, -0.2, 0.15]), -1.0, 0.15),
+        )
     )
     arm = [
         ("q1", pin.JointModelRZ(), pose(0, 0, 0.3, 0.1, 0.0, 0.3)),
