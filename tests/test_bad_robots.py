@@ -171,7 +171,7 @@ BAD = {
             arm(f'<limit lower="{value}" upper="1" effort="1" velocity="1"/>'),
             ["joint 'elbow': <limit> lower: expected a finite number", repr(value)],
         )
-        for value in ("abc", "nan", "-inf", "-1e999", "", "1 2", "0x1", "1_0", " 1", "${pi}")
+        for value in ("abc", "nan", "-inf", "-1e999", "", "1 2", "0x1", "1_0", " 1", "٣", "1e-308", "${pi}")
     },
     "zero axis": (arm('<axis xyz="0 0 0"/>' + LIMIT), ["joint 'elbow': <axis> xyz is zero"]),
     "axis without xyz": (arm("<axis/>" + LIMIT), ["joint 'elbow': <axis> has no xyz"]),

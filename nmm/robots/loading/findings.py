@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -11,8 +12,8 @@ from nmm.errors import unknown
 from nmm.robots.loading.xml_tree import Element
 from nmm.words import one_line
 
-# What the C++ reader takes: Python's float would also take nan, inf and 1_0.
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+# What the C++ reader takes: Python's float would also take nan, inf, 1_0 and digits of other scripts.
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ class Findings:
         # A scalar may not have blanks around it (the C++ reader refuses them), a vector may.
         words = value.split() if size > 1 else [value]
         numbers = [float(word) for word in words if _NUMBER.fullmatch(word)]
-        if len(words) != size or len(numbers) != size or not all(map(math.isfinite, numbers)):
+        if len(words) != size or len(numbers) != size or not all(map(_readable, numbers)):
             expected = f"{size} finite numbers" if size > 1 else "a finite number"
             self.add(
                 element,
@@ -99,6 +100,11 @@ class Findings:
         if origin is not None:
             self.vector(origin, "xyz", 3, owner)
             self.vector(origin, "rpy", 3, owner)
+
+
+def _readable(number: float) -> bool:
+    """Whether the C++ reader takes it: it refuses numbers so small that they have lost digits."""
+    return math.isfinite(number) and (number == 0.0 or abs(number) >= sys.float_info.min)
 
 
 def child(parent: Element, tag: str) -> Element | None:

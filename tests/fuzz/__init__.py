@@ -1,0 +1,12 @@
+"""The hunt: hostile and random input of every kind, with Hypothesis. `python -m tests.fuzz --minutes 30`.
+
+hunting   what a hunt is, how long it goes, what is kept of a failure
+mutants   plain data, text and bytes with something changed in them
+the hunts themselves: scenarios, robots, folders, caches, commands, problems
+
+A case is plain data, so that it can be kept as a file and tried again: `kept/HUNT-….json`.
+"""
+
+from . import caches, commands, folders, problems, robots, scenarios
+
+HUNTS = {module.HUNT.name: module.HUNT for module in (scenarios, robots, folders, caches, commands, problems)}

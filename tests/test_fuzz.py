@@ -1,0 +1,24 @@
+"""A short hunt, the same each time, and what longer ones have found (`python -m tests.fuzz`)."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from fuzz import HUNTS
+from fuzz.hunting import KEPT, some, tried
+
+#: Cases of each hunt: about ten seconds of it.
+EXAMPLES = {"scenarios": 60, "robots": 80, "folders": 60, "caches": 15, "commands": 40, "problems": 60}
+
+
+@pytest.mark.parametrize("name", HUNTS)
+def test_a_short_hunt(name: str) -> None:
+    found = some(HUNTS[name], EXAMPLES[name])
+    assert sum(found.counts.values()) >= EXAMPLES[name] // 2
+
+
+@pytest.mark.parametrize("path", sorted(KEPT.glob("*.json")), ids=lambda path: path.stem)
+def test_what_was_found_once(path: object) -> None:
+    name = path.stem.split("-")[0]  # type: ignore[attr-defined]
+    tried(HUNTS[name], json.loads(path.read_text(encoding="utf-8")))  # type: ignore[attr-defined]
