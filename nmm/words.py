@@ -59,6 +59,12 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
+def quoted(value: object, limit: int = 60) -> str:
+    """A value as an error shows it: on one line, not too long."""
+    # Of a long text repr would make a longer one first.
+    return one_line(repr(value[:limit] if isinstance(value, str | bytes) else value), limit)
+
+
 def one_line(text: str, limit: int = 300) -> str:
     """The text with all white space as single spaces, cut after `limit` characters."""
     joined = " ".join(text.split())

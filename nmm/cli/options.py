@@ -10,7 +10,7 @@ import typer
 
 from nmm.errors import InputError
 from nmm.kinds import PLATFORMS, RESOLVERS, TASKS
-from nmm.words import listed
+from nmm.words import listed, quoted
 
 ROBOT_HELP = "A bundled name (see `nmm robots`), a .urdf or .xacro file, or package://PACKAGE/PATH."
 
@@ -241,6 +241,6 @@ def _pairs(given: Sequence[str] | None, option: str, expected: str) -> list[tupl
     for text in given or ():
         key, equals, value = text.partition("=")
         if not equals or not key.strip():
-            raise InputError(f"{option}: expected {expected}, got {text!r}")
+            raise InputError(f"{option}: expected {expected}, got {quoted(text)}")
         pairs.append((key.strip(), value))
     return pairs

@@ -14,7 +14,7 @@ from nmm.errors import InputError
 from nmm.folders import comparison
 from nmm.folders.run import is_run
 from nmm.folders.run import save as save_run
-from nmm.folders.whole import check_folder
+from nmm.folders.whole import check_folder, steady
 from nmm.runs.figure_options import PLAIN, FigureOptions
 from nmm.scenario import Scenario
 
@@ -159,8 +159,11 @@ def runs_in(folder: Path) -> list[Trajectory]:
     """The run of a folder, or those of a comparison, that have samples; `InputError` for none."""
     from nmm.runs.trajectory import Trajectory
 
-    folders = comparison.runs_of(folder) if comparison.is_comparison(folder) else [folder]
-    runs = [trajectory for trajectory in (Trajectory.load(path) for path in folders) if len(trajectory)]
+    def read() -> list[Trajectory]:
+        folders = comparison.runs_of(folder) if comparison.is_comparison(folder) else [folder]
+        return [trajectory for trajectory in (Trajectory.load(path) for path in folders) if len(trajectory)]
+
+    runs = steady(folder, read)
     if not runs:
         raise InputError(f"{folder}: expected a run with at least one sample")
     return runs

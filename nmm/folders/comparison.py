@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from nmm.errors import InputError
 from nmm.folders.whole import has_format, replaced_folder
 from nmm.runs.figure_options import PLAIN, FigureOptions
+from nmm.scenario.numbers import shown
 
 if TYPE_CHECKING:
     from nmm.runs.ellipsoid_options import Wanted
@@ -24,8 +26,15 @@ def is_comparison(folder: Path) -> bool:
 
 
 def runs_of(folder: Path) -> list[Path]:
-    """The folders of a comparison's runs."""
-    return [folder / kind for kind in json.loads((folder / "summary.json").read_text("utf-8"))["runs"]]
+    """The folders of a comparison's runs; `InputError` names what is wrong with its summary.json."""
+    from nmm.folders.told import ToldComparison, read_told
+
+    file = folder / "summary.json"
+    names = list(read_told(file, ToldComparison, FORMAT).runs)
+    for name in names:
+        if not name or name in (".", "..") or Path(name).name != name:
+            raise InputError(f"{file}: runs: expected names of folders, got {shown(name)}")
+    return [folder / name for name in names]
 
 
 def save(

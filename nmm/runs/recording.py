@@ -18,6 +18,7 @@ from nmm.functions.program import COMPILED
 from nmm.functions.tasks.position import AXES
 from nmm.functions.tasks.task import Task
 from nmm.kernels.spectra import spectra
+from nmm.memory import expect_memory
 from nmm.resolvers.answer import Status
 from nmm.robots.frame_path import FramePath
 from nmm.robots.robot import Robot
@@ -35,6 +36,8 @@ from nmm.words import counted
 #: What `Recorded` and `Step` call by one name.
 SAME_NAME = tuple(name for name in Recorded._fields if name not in ("limited", "unanswered"))
 
+#: A run fills its record's memory so many times: with copies, and what is worked out of it.
+COPIES = 2.5
 #: Below this ratio of smallest to largest singular value a run is warned about.
 NEARLY_SINGULAR = 1e-3
 #: Below this one J has lost rank.
@@ -58,7 +61,13 @@ class Recorder:
         robot, s = controller.robot, len(controller.rows)
         count = len(times)
         kept = controller.kept.row_limits if controller.limits is not None else ()
-        self.found = room(count, robot.n, robot.n_u, s, len(controller.task.levels(robot)), len(kept))
+        sizes = robot.n, robot.n_u, s, len(controller.task.levels(robot)), len(kept)
+        expect_memory(
+            COPIES * count * sum(one.nbytes for one in room(1, *sizes)),
+            f"{count} samples need",
+            "expected a larger dt or a shorter duration; nmm.rollout keeps every so many samples (every=)",
+        )
+        self.found = room(count, *sizes)
         # By sample: one that is taken again counts once.
         self._beyond: dict[int, dict[str, float]] = {}
         self._against: dict[str, str] = {}

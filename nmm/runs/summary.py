@@ -8,7 +8,6 @@ import numpy as np
 
 from nmm.arrays import Array
 from nmm.collisions.recorded import described
-from nmm.runs.residuals import NONE, Residuals
 
 if TYPE_CHECKING:
     from nmm.runs.trajectory import Trajectory
@@ -110,12 +109,6 @@ def without_velocity_limit(trajectory: Trajectory) -> list[str]:
     named, moved = {*trajectory.limit_names}, np.ptp(trajectory.u, axis=0) > 0.0
     names = trajectory.robot.u_names
     return [name for name, moves in zip(names, moved, strict=True) if moves and f"u_{name}" not in named]
-
-
-def unmet(summary: dict[str, Any]) -> Residuals:
-    """Where J u differed from the rate, read back from a summary; older ones do not say."""
-    found = {name: summary[f"unmet_{name}"] for name in NONE._fields if f"unmet_{name}" in summary}
-    return NONE._replace(**found)
 
 
 def _clearance(trajectory: Trajectory) -> dict[str, Any]:

@@ -10,12 +10,14 @@ from typing import Any
 import yaml
 
 from nmm.errors import ScenarioError
+from nmm.files import read_bytes
 from nmm.scenario.numbers import shown
 
 #: Where a value stands: mapping keys and list indices, from the top.
 Place = tuple[str | int, ...]
 
-MOST_NODES = 200_000
+#: How long a file may be, bytes, how many values it may have, and how deep lists and mappings may nest.
+LONGEST, MOST_NODES, DEEPEST = 20_000_000, 200_000, 100
 _NULL = ("", "~", "null", "Null", "NULL")
 _TRUE = ("true", "True", "TRUE")
 _FALSE = ("false", "False", "FALSE")
@@ -155,7 +157,7 @@ def _copied(value: Any) -> Any:
 def read_file(path: Path) -> Document:
     """Read a scenario file; `ScenarioError` names file and line of what is wrong with it."""
     try:
-        text = path.read_bytes().decode("utf-8-sig")
+        text = read_bytes(path, LONGEST).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise ScenarioError(f"{path}: expected UTF-8 text") from None
     except OSError as error:
@@ -186,10 +188,19 @@ def read_text(text: str, name: str, *, lines: bool = True) -> Document:
 
 
 def _check_events(text: str, name: str) -> None:
-    """Refuse tags and a second document, which a node graph no longer shows."""
-    documents = 0
+    """Refuse tags and a second document, which a node graph no longer shows, and what takes long to read."""
+    documents = depth = nodes = 0
     for event in yaml.parse(text, yaml.SafeLoader):
         line = 1 if event.start_mark is None else event.start_mark.line + 1
+        nodes += isinstance(event, yaml.NodeEvent)
+        if nodes > MOST_NODES:
+            raise ScenarioError(f"{name}:{line}: expected at most {MOST_NODES} values")
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > DEEPEST:
+            raise ScenarioError(
+                f"{name}:{line}: not valid YAML: nested too deeply; expected at most {DEEPEST} lists and "
+                "mappings in one another"
+            )
         if isinstance(event, yaml.DocumentStartEvent):
             documents += 1
             if documents > 1:
