@@ -229,7 +229,7 @@ def test_ctrl_c_waits_for_an_import_that_would_swallow_it(tmp_path: Path, name: 
 
 
 def test_compare_makes_one_table_one_figure_one_playback(run: Command) -> None:
-    result = run("compare", "unicycle_2r_pointing", "--resolvers", "rg, pg,ej,rg", *SHORT)
+    result = run("compare", "unicycle_2r_pointing", "--resolvers", "rg, pg,ej", *SHORT)
     assert (result.status, result.err) == (0, "")
     assert result.out.splitlines()[1].split() == ["RG", "PG", "EJ"]
     folder = Path(result.value("files in"))

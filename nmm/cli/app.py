@@ -56,6 +56,13 @@ def _version(wanted: bool) -> None:
         raise typer.Exit
 
 
+def _always_written(wanted: bool) -> None:
+    if wanted:
+        raise InputError(
+            "--html: there is no need: `nmm compare` always writes playback.html, with all runs in it"
+        )
+
+
 @app.callback(invoke_without_command=True)
 def nmm(
     context: typer.Context,
@@ -123,6 +130,8 @@ def run(
     """
     from nmm.cli.runs import run_scenario
 
+    if not play:
+        browser.refuse("--play")
     return run_scenario(
         scenario,
         resolver,
@@ -146,6 +155,7 @@ def compare(
     settings: SetOption = None,
     limits: LimitsOption = None,
     out: Annotated[Path | None, out_option("runs/<scenario>-compare")] = None,
+    html: Annotated[bool, typer.Option("--html", hidden=True, callback=_always_written)] = False,
     ellipsoids: Ellipsoids,
     figures: Figures,
 ) -> int:

@@ -28,7 +28,7 @@ from nmm.cli.options import (
     lock_of,
     names_of,
 )
-from nmm.errors import expect_known
+from nmm.errors import InputError, expect_known
 
 if TYPE_CHECKING:
     from nmm.runs.ellipsoid_options import Wanted
@@ -125,6 +125,12 @@ class Browser:
     def keywords(self) -> dict[str, Any]:
         """As `nmm.playback` takes them."""
         return {"port": self.port, "open_browser": not self.no_open}
+
+    def refuse(self, needed: str) -> None:
+        """`InputError` where something is asked of a page that only the option `needed` shows."""
+        asked = ["--port"] * (self.port is not None) + ["--no-open"] * self.no_open
+        if asked:
+            raise InputError(f"{asked[0]}: there is a page only with {needed}, which is not given")
 
 
 @dataclass(frozen=True)
