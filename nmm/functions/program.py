@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import types
 
 from nmm.arrays import Array, Integers
 from nmm.functions.function import Callback, Evaluation, Function, Stage
@@ -115,8 +116,14 @@ def run(t: float, q: Array, integers: Integers, floats: Array) -> None:
         call_function(stage.kernel, at, frames, stage.numbers, rows)
 
 
+PLACE = types.void(
+    *(types.int64[::1], types.float64[::1], types.int64, types.float64[::1]),
+    *(types.float64[:, :, ::1], types.float64[:, :, ::1], types.float64[:, :, :, ::1]),
+)
+
+
 @compiled
-def _place(
+def place(
     integers: Integers,
     floats: Array,
     table: int,
@@ -250,7 +257,7 @@ class Program:
         off = 0.0
         for q in configurations:
             update(0.0, q)
-            _place(*self.blocks, self._table, q, *ours)
+            place(*self.blocks, self._table, q, *ours)
             off = max(
                 off, *(float(np.abs(a - z).max(initial=0.0)) for a, z in zip(theirs, ours, strict=True))
             )

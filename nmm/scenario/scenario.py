@@ -122,9 +122,9 @@ class Scenario:
         ------
         ScenarioError : what the robot does not have, or what does not fit together
         """
-        from nmm.runs.compiled_loop import compile_loop_ahead
+        from nmm.runs.simulation import compile_ahead_of_a_run
 
-        compile_loop_ahead()  # most who have a controller made run it
+        compile_ahead_of_a_run()  # most who have a controller made run it
         robot = self.robot()
         try:
             return self.parts.build(robot, self.absolute)
