@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 import numpy as np
 import pinocchio as pin
 
-from nmm.robots.loading.layout import Measured
+from nmm.robots.loading.layout import Measured, speed_limit
 from nmm.robots.wheel import Wheel
 
 
@@ -123,4 +123,5 @@ def _wheel(
         swivel=swivel,
         pivot=pivot,
         roller=gripping,
+        velocity=speed_limit(model, joint),
     )
