@@ -143,8 +143,14 @@ BAD = {
     "unknown type": (arm("", "hinge"), ["joint 'elbow': unknown joint type 'hinge'", "available: revolute"]),
     "capital type": (arm("", "Revolute"), ["unknown joint type 'Revolute'", "did you mean 'revolute'"]),
     "spherical": (arm("", "spherical"), ["unknown joint type 'spherical'"]),
-    "planar": (arm(AXIS, "planar"), ["joint 'elbow': a planar joint is refused"]),
-    "floating": (arm("", "floating"), ["joint 'elbow': a floating joint is refused"]),
+    "planar": (
+        robot(LINKS, joint("elbow"), link("c"), joint("wrist", "b", "c", "planar")),
+        ["joint 'wrist': a planar joint is refused inside the tree"],
+    ),
+    "floating": (
+        robot(LINKS, joint("elbow"), link("c"), joint("wrist", "b", "c", "floating", "")),
+        ["joint 'wrist': a floating joint is refused inside the tree"],
+    ),
     "mimic": (
         robot(LINKS, link("c"), joint(), joint("k", "b", "c", body=AXIS + LIMIT + '<mimic joint="i"/>')),
         ["'k'", "unknown joint to follow 'i'"],

@@ -12,7 +12,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from nmm.cli.groups import Browser, Ellipsoids, Figures, command
+from nmm.cli.groups import Browser, Ellipsoids, Figures, OfRobot, command
 from nmm.cli.interrupts import raise_interrupts
 from nmm.cli.mapping import map_measures
 from nmm.cli.options import (
@@ -97,6 +97,7 @@ def run(
     resolver: ResolverOption = None,
     settings: SetOption = None,
     limits: LimitsOption = None,
+    of_robot: OfRobot,
     out: Annotated[Path | None, out_option("runs/<scenario>-<resolver>")] = None,
     html: Annotated[
         bool,
@@ -143,6 +144,7 @@ def run(
         **browser.keywords(),
         ellipsoids=ellipsoids.wanted(),
         figures=figures.options(),
+        of_robot=of_robot.keywords(),
     )
 
 
@@ -154,6 +156,7 @@ def compare(
     resolvers: ResolversOption = "rg,pg",
     settings: SetOption = None,
     limits: LimitsOption = None,
+    of_robot: OfRobot,
     out: Annotated[Path | None, out_option("runs/<scenario>-compare")] = None,
     html: Annotated[bool, typer.Option("--html", hidden=True, callback=_always_written)] = False,
     ellipsoids: Ellipsoids,
@@ -180,6 +183,7 @@ def compare(
         out,
         ellipsoids=ellipsoids.wanted(),
         figures=figures.options(),
+        of_robot=of_robot.keywords(),
     )
 
 

@@ -16,6 +16,7 @@ from nmm.cli.options import (
     EllipsoidsOption,
     FormatOption,
     LockOption,
+    MissingMeshesOption,
     NoOpenOption,
     PackageOption,
     PlatformOption,
@@ -23,10 +24,12 @@ from nmm.cli.options import (
     SubjectArgument,
     SubjectSetOption,
     TaskOption,
+    WheelsOption,
     WidthOption,
     axle_of,
     lock_of,
     names_of,
+    wheels_of,
 )
 from nmm.errors import InputError, expect_known
 
@@ -83,19 +86,35 @@ def _option(parameter: inspect.Parameter, hint: Any) -> inspect.Parameter:
 
 
 @dataclass(frozen=True)
-class Loading:
+class OfRobot:
+    """What is made of a robot's joints and meshes, of a scenario's robot too."""
+
+    lock: LockOption = None
+    wheels: WheelsOption = None
+    missing_meshes: MissingMeshesOption = None
+
+    def keywords(self) -> dict[str, Any]:
+        """As `nmm.load` takes them, without those not given."""
+        given = {
+            "lock": lock_of(self.lock) or None,
+            "wheels": wheels_of(self.wheels),
+            "missing_meshes": self.missing_meshes,
+        }
+        return {name: value for name, value in given.items() if value is not None}
+
+
+@dataclass(frozen=True)
+class Loading(OfRobot):
     """How a robot's file is loaded."""
 
     platform: PlatformOption = None
-    lock: LockOption = None
     axle: AxleOption = None
     package_dir: PackageOption = None
 
     def keywords(self) -> dict[str, Any]:
         """As `nmm.load` takes them."""
-        return {
+        return super().keywords() | {
             "platform": self.platform,
-            "lock": lock_of(self.lock),
             "axle": axle_of(self.axle),
             "package_dirs": list(self.package_dir or ()),
         }

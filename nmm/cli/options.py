@@ -53,7 +53,24 @@ LockOption = Annotated[
     list[str] | None,
     typer.Option(
         metavar="JOINT=VALUE",
-        help="Fix a joint at a value, rad or m; arithmetic with pi will do. May be repeated.",
+        help="Fix a joint at a value, rad or m; arithmetic with pi will do. '*finger*=0' fixes all that "
+        "match. May be repeated.",
+    ),
+]
+WheelsOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="JOINT[=RADIUS],...",
+        help="The joints that only roll, each with its radius in m or all without; none for no wheels.",
+        show_default="those named so",
+    ),
+]
+MissingMeshesOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="error|skip",
+        help="What to do about meshes that are not there: refuse the robot, or leave their shapes out.",
+        show_default="the scenario's; skip to look at a robot, else error",
     ),
 ]
 AxleOption = Annotated[
@@ -228,6 +245,18 @@ def values_of(given: Sequence[str] | None, option: str, expected: str) -> dict[s
         except ValueError as error:
             raise InputError(f"{option}: {name}: {error}") from None
     return values
+
+
+def wheels_of(given: str | None) -> list[str] | dict[str, float] | None:
+    """The `--wheels` option: joints, or the radius (m) of each; none of them for "none"."""
+    if given is None:
+        return None
+    names = names_of(given, "--wheels", "JOINT,JOINT,... or JOINT=RADIUS,...")
+    if names == ["none"]:
+        return []
+    if not any("=" in name for name in names):
+        return names
+    return values_of(names, "--wheels", "a radius for each, as in left=0.1,right=0.1, or for none")
 
 
 def axle_of(given: str | None) -> str | list[float] | None:

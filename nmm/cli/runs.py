@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from nmm.cli.interrupts import shielded
 from nmm.cli.output import complain, progress, show_table
 from nmm.cli.report import describe, show_run
+from nmm.cli.subjects import scenario_with
 from nmm.errors import InputError
 from nmm.folders import comparison
 from nmm.folders.run import is_run
@@ -41,9 +43,10 @@ def run_scenario(
     open_browser: bool = True,
     ellipsoids: Wanted = False,
     figures: FigureOptions = PLAIN,
+    of_robot: Mapping[str, Any] = MappingProxyType({}),
 ) -> int:
     """Run a scenario, in a page that shows it meanwhile if wanted; write its folder, print its table."""
-    scenario = _load(name, resolver, settings, limits)
+    scenario = _load(name, resolver, settings, limits, of_robot)
     folder = out or Path("runs") / f"{scenario.name}-{scenario.parts.resolver.kind}"
     check_folder(folder, is_run)
     controller = scenario.controller()  # complains before there is a progress bar
@@ -96,11 +99,12 @@ def compare_resolvers(
     *,
     ellipsoids: Wanted = False,
     figures: FigureOptions = PLAIN,
+    of_robot: Mapping[str, Any] = MappingProxyType({}),
 ) -> int:
     """Run a scenario with several resolvers; write and print how they compare."""
     from nmm.runs.timing import step_time
 
-    scenarios = [_load(name, kind, settings, limits) for kind in kinds]
+    scenarios = [_load(name, kind, settings, limits, of_robot) for kind in kinds]
     folder = out or Path("runs") / f"{scenarios[0].name}-compare"
     check_folder(folder, comparison.is_comparison)
     # What is wrong with the last one shows before the first one runs.
@@ -169,9 +173,15 @@ def runs_in(folder: Path) -> list[Trajectory]:
     return runs
 
 
-def _load(name: str, resolver: str | None, settings: Mapping[str, object], limits: bool | None) -> Scenario:
+def _load(
+    name: str,
+    resolver: str | None,
+    settings: Mapping[str, object],
+    limits: bool | None,
+    of_robot: Mapping[str, Any],
+) -> Scenario:
     kind = {} if resolver is None else {"resolver.kind": resolver}
-    scenario = Scenario.load(name, kind | dict(settings))
+    scenario = scenario_with(Scenario.load(name, kind | dict(settings)), of_robot)
     if limits is None or limits is (scenario.parts.limits is not None):
         return scenario
     return scenario.override("limits", limits)

@@ -21,7 +21,16 @@ if TYPE_CHECKING:
     from nmm.scenario import Scenario
 
 #: Options by the arguments of `nmm.load`.
-_OPTIONS = {"platform": "--platform", "lock": "--lock", "axle": "--axle", "package_dirs": "--package-dir"}
+_OPTIONS = {
+    "platform": "--platform",
+    "lock": "--lock",
+    "wheels": "--wheels",
+    "missing_meshes": "--missing-meshes",
+    "axle": "--axle",
+    "package_dirs": "--package-dir",
+}
+#: Those that a scenario's robot takes, too.
+_OF_SCENARIO = ("lock", "wheels", "missing_meshes")
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +120,28 @@ def studied(
     )
 
 
+def scenario_with(scenario: Scenario, loading: Mapping[str, Any]) -> Scenario:
+    """The scenario with `lock`, `wheels` and `missing_meshes` of `nmm.load` for its robot, where given.
+
+    Raises
+    ------
+    InputError : its robot is mounted from several
+    """
+    from nmm.scenario.robot import RobotPart
+
+    robot, given = scenario.parts.robot, {key: loading[key] for key in _OF_SCENARIO if key in loading}
+    if not given:
+        return scenario
+    if not isinstance(robot, RobotPart):
+        raise InputError(
+            f"{', '.join(_OPTIONS[key] for key in given)}: the robot of {scenario.name} is mounted from "
+            "several: say of which, as in --set robot.arm.lock.JOINT=VALUE"
+        )
+    if "lock" in given:
+        given["lock"] = {**robot.lock, **given["lock"]}
+    return scenario.with_settings({f"robot.{key}": value for key, value in given.items()})
+
+
 def configuration_at(robot: Robot, q: Array, at: Sequence[str] | None, locked: Mapping[str, float]) -> Array:
     """q (n,) with what `--at` says, COORDINATE=VALUE, m and rad; `InputError` for what is no coordinate."""
     q = q.copy()
@@ -161,11 +192,12 @@ def _opened(
             names = [*bundled_robots(), *bundled_scenarios()]
             raise InputError(unknown("robot or scenario", source, names) + "; or give a path")
         return None, None, load(source, arguments=arguments_of(settings), **loading)
-    wrong = [_OPTIONS[key] for key, value in loading.items() if value]
+    allowed = _OF_SCENARIO if of_scenario else ()
+    wrong = [_OPTIONS[key] for key, value in loading.items() if value and key not in allowed]
     if wrong:
         raise InputError(f"{', '.join(wrong)}: of a robot's file; {source} has a robot of its own")
     if of_scenario:
-        scenario = Scenario.load(source, settings_of(settings))
+        scenario = scenario_with(Scenario.load(source, settings_of(settings)), loading)
         return None, scenario, scenario.robot()
     if settings:
         raise InputError(f"--set: expected a robot or a scenario; {source} is a run, which is as it was")

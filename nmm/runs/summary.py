@@ -8,6 +8,7 @@ import numpy as np
 
 from nmm.arrays import Array
 from nmm.collisions.recorded import described
+from nmm.robots.wheel_rates import inputs_held_by
 
 if TYPE_CHECKING:
     from nmm.runs.trajectory import Trajectory
@@ -107,6 +108,7 @@ def without_velocity_limit(trajectory: Trajectory) -> list[str]:
     if not trajectory.limited or not len(trajectory):
         return []
     named, moved = {*trajectory.limit_names}, np.ptp(trajectory.u, axis=0) > 0.0
+    named |= {f"u_{name}" for name in inputs_held_by(trajectory.robot, trajectory.limit_names)}
     names = trajectory.robot.u_names
     return [name for name, moves in zip(names, moved, strict=True) if moves and f"u_{name}" not in named]
 

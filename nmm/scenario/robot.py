@@ -106,7 +106,8 @@ class RobotPart(Part):
     platform: Annotated[str | dict[str, Any] | None, BeforeValidator(_kind_of_platform)] = Field(
         None,
         description="how the base moves: a kind (car), measured in the file, or with its parameters, as "
-        "{kind: car, wheelbase: 0.5}; when not given, what the file declares, or a unicycle",
+        "{kind: car, wheelbase: 0.5}; when not given, what the file declares, or a car or a unicycle, as "
+        "its wheels steer",
     )
     package_dirs: list[FileName] = Field(
         default_factory=list,
@@ -118,7 +119,9 @@ class RobotPart(Part):
         "when not given, the loader finds them",
     )
     lock: dict[str, Number] = Field(
-        default_factory=dict, description="joints to fix, and their values, rad or m, as {torso: 0.2}"
+        default_factory=dict,
+        description="joints to fix, and their values, rad or m, as {torso: 0.2}, or {'*finger*': 0} for all "
+        "that match",
     )
     axle: Annotated[str | list[float] | None, BeforeValidator(_axle)] = Field(
         None,
