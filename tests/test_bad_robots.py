@@ -454,10 +454,10 @@ def test_other_suffix(name: str, tmp_path: Path) -> None:
 def test_unreadable(suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write(tmp_path / f"r{suffix}", robot(link("a")))
 
-    def read_bytes(self: Path) -> bytes:
-        raise PermissionError(13, "Permission denied", str(self))
+    def read_bytes(file: Path, most: int) -> bytes:
+        raise PermissionError(13, "Permission denied", str(file))
 
-    monkeypatch.setattr(Path, "read_bytes", read_bytes)
+    monkeypatch.setattr("nmm.robots.loading.text.read_bytes", read_bytes)
     assert refused(path) == f"{path}: cannot be read (Permission denied)"
 
 

@@ -24,7 +24,7 @@ from nmm.robots.loading.description import describe
 from tests.damaging import copied, damage
 
 #: NMM_MUTANTS=5000 damages more folders.
-MUTANTS = int(os.environ.get("NMM_MUTANTS", "60"))
+MUTANTS = int(os.environ.get("NMM_MUTANTS", "40"))
 
 
 @pytest.fixture(scope="module")
