@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from nmm.arrays import Array, interpolated, scalar
 from nmm.cli.options import arguments_of, settings_of, values_of
+from nmm.cli.output import warn
 from nmm.errors import InputError, unknown
 
 if TYPE_CHECKING:
@@ -123,7 +124,6 @@ def configuration_at(robot: Robot, q: Array, at: Sequence[str] | None, locked: M
 
 def _decide(controller: Controller, t: float, q: Array) -> None:
     """Of tasks that come and go, those active at t (s) and q (n,) are looked at; the others are told."""
-    from nmm.cli.output import warn
     from nmm.control.sequenced import SequencedController
     from nmm.words import listed
 
@@ -168,6 +168,8 @@ def _opened(
         scenario = Scenario.load(source, settings_of(settings))
         return None, scenario, scenario.robot()
     if settings:
+        for warning in scenario.warnings:
+            warn(warning)
         raise InputError(f"--set: expected a robot or a scenario; {source} is a run, which is as it was")
     run = Trajectory.load(path)
     if not len(run):

@@ -171,9 +171,9 @@ class Trajectory:
         events = np.searchsorted(self.t, sorted({event.t for event in self.events}))
         return [part for part in np.split(self.desired, events) if len(part)]
 
-    def with_scenario(self, scenario: dict[str, Any]) -> Trajectory:
-        """The same trajectory with the scenario that it came from."""
-        return replace(self, scenario=scenario)
+    def with_scenario(self, scenario: dict[str, Any], warnings: tuple[str, ...] = ()) -> Trajectory:
+        """The same trajectory with the scenario that it came from, and with what that warns of."""
+        return replace(self, scenario=scenario, warnings=(*warnings, *self.warnings))
 
     def summary(self) -> dict[str, Any]:
         """The run in numbers, ready for JSON."""

@@ -47,12 +47,15 @@ class Scenario:
         own_name = re.sub(r"[^\w.-]", "_", self.path.name.split(".", 1)[0]) or "scenario"
         data = {"name": own_name, **document.data}
         from nmm.scenario.schema import ScenarioPart
+        from nmm.scenario.named_reference import NamedReferences
 
         try:
-            self.parts = ScenarioPart.model_validate(data)
+            self.parts = ScenarioPart.model_validate(data, context=NamedReferences(data))
         except ValidationError as error:
             raise self._located(first_error(error, data)) from None
         self.name = self.parts.name
+        #: What is worth a warning of what was set, a sentence each.
+        self.warnings = tuple(document.parted())
         self.title = self.parts.title
         #: The absolute path of a file that is named at a place of it.
         self.absolute = document.absolute
@@ -179,7 +182,7 @@ class Scenario:
                 )
         except KeyedError as error:
             raise self._located(error) from None
-        return trajectory.with_scenario(self.resolved())
+        return trajectory.with_scenario(self.resolved(), self.warnings)
 
     def resolved(self) -> dict[str, Any]:
         """Every key as plain data, defaults included, numbers evaluated, files with absolute paths.
