@@ -64,6 +64,7 @@ def studied(
     t: float | None = None,
     settings: Sequence[str] | None = None,
     usual_task: str = "",
+    decide: bool = True,
     **loading: Any,
 ) -> Studied:
     """What SOURCE means: a run's folder, a scenario by name or as YAML file, or else a robot.
@@ -75,6 +76,7 @@ def studied(
     t : s; 0, or the run's first instant. Of a run, q is where it was then
     settings : `--set`, of the robot's xacro arguments or of the scenario's keys
     usual_task : a robot's, where there is no other; none when empty
+    decide : where tasks come and go, whether to look at those active there and tell the others
     loading : platform, lock, axle, package_dirs of `nmm.load`; a robot's only
 
     Raises
@@ -98,7 +100,7 @@ def studied(
     q = _start(robot, run, scenario) if t is None or run is None else _then(run, t)
     q = configuration_at(robot, q, at, loading.get("lock") or {})
     first = 0.0 if run is None or not len(run) else float(run.t[0])
-    if not given and own is not None:
+    if not given and own is not None and decide:
         _decide(own, first if t is None else t, q)
     return Studied(
         name=robot.name if scenario is None else scenario.name,
@@ -166,10 +168,10 @@ def _opened(
         raise InputError(f"{', '.join(wrong)}: of a robot's file; {source} has a robot of its own")
     if of_scenario:
         scenario = Scenario.load(source, settings_of(settings))
-        return None, scenario, scenario.robot()
-    if settings:
         for warning in scenario.warnings:
             warn(warning)
+        return None, scenario, scenario.robot()
+    if settings:
         raise InputError(f"--set: expected a robot or a scenario; {source} is a run, which is as it was")
     run = Trajectory.load(path)
     if not len(run):
