@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nmm.cli.chosen_resolvers import Chosen, check_different
 from nmm.cli.interrupts import shielded
 from nmm.cli.output import complain, progress, show_table
 from nmm.cli.report import describe, show_run
@@ -30,7 +32,7 @@ OK, FAILED = 0, 1
 
 def run_scenario(
     name: str,
-    resolver: str | None,
+    resolver: Chosen | None,
     settings: Mapping[str, object],
     limits: bool | None,
     out: Path | None,
@@ -44,11 +46,16 @@ def run_scenario(
 ) -> int:
     """Run a scenario, in a page that shows it meanwhile if wanted; write its folder, print its table."""
     scenario = _load(name, resolver, settings, limits)
-    folder = out or Path("runs") / f"{scenario.name}-{scenario.parts.resolver.kind}"
+    label = "" if resolver is None else resolver.label
+    called = label or scenario.parts.resolver.kind.upper()
+    folder = out or Path("runs") / f"{scenario.name}-{comparison.folder_name(called)}"
     check_folder(folder, is_run)
-    controller = scenario.controller()  # complains before there is a progress bar
-    with _shown(scenario, controller, port, open_browser=open_browser) if play else nullcontext() as page:
-        trajectory = _run(scenario, controller, None if page is None else page.watch)
+    controller = scenario.controller(
+        None if resolver is None else resolver.own
+    )  # complains before there is a progress bar
+    title = f"{scenario.title or scenario.name}, {called}"
+    with _shown(scenario, controller, title, port, open_browser) if play else nullcontext() as page:
+        trajectory = _run(scenario, controller, None if page is None else page.watch, label)
         with shielded() as asked_to_end:
             _tell_and_save(trajectory, folder, html=html, ellipsoids=ellipsoids, figures=figures)
         status = _status("nmm run", [trajectory], folder)
@@ -59,13 +66,12 @@ def run_scenario(
 
 
 def _shown(
-    scenario: Scenario, controller: Controller, port: int | None, *, open_browser: bool
+    scenario: Scenario, controller: Controller, title: str, port: int | None, open_browser: bool
 ) -> AbstractContextManager[LiveRun]:
     """A page for a run that is about to begin."""
     from nmm.playback import LiveRun
 
     parts = scenario.parts
-    title = f"{scenario.title or scenario.name}, {parts.resolver.kind.upper()}"
     return LiveRun(controller, parts.q0, parts.duration, title=title, port=port, open_browser=open_browser)
 
 
@@ -89,7 +95,7 @@ def _tell_and_save(trajectory: Trajectory, folder: Path, **asked: Any) -> None:
 
 def compare_resolvers(
     name: str,
-    kinds: Sequence[str],
+    resolvers: Sequence[Chosen],
     settings: Mapping[str, object],
     limits: bool | None,
     out: Path | None,
@@ -97,30 +103,31 @@ def compare_resolvers(
     ellipsoids: Wanted = False,
     figures: FigureOptions = PLAIN,
 ) -> int:
-    """Run a scenario with several resolvers; write and print how they compare."""
+    """Run a scenario with several resolvers, or settings of one; write and print how they compare."""
     from nmm.runs.timing import step_time
 
-    scenarios = [_load(name, kind, settings, limits) for kind in kinds]
+    scenarios = [_load(name, one, settings, limits) for one in resolvers]
+    check_different(resolvers, scenarios, "--resolvers")
     folder = out or Path("runs") / f"{scenarios[0].name}-compare"
     check_folder(folder, comparison.is_comparison)
     # What is wrong with the last one shows before the first one runs.
-    controllers = [scenario.controller() for scenario in scenarios]
+    controllers = [scenario.controller(one.own) for scenario, one in zip(scenarios, resolvers, strict=True)]
     trajectories: list[Trajectory] = []
-    for scenario, controller in zip(scenarios, controllers, strict=True):
-        trajectories.append(_run(scenario, controller))
+    for scenario, controller, one in zip(scenarios, controllers, resolvers, strict=True):
+        trajectories.append(_run(scenario, controller, label=one.label))
         if trajectories[-1].outcome == "interrupted":
             break
     with shielded():
         comparison.save(trajectories, folder, scenarios[0].name, ellipsoids=ellipsoids, figures=figures)
     table = [dict(describe(trajectory, trajectory.summary())) for trajectory in trajectories]
-    for column, scenario, trajectory in zip(table, scenarios, trajectories, strict=False):
+    for column, scenario, one, trajectory in zip(table, scenarios, resolvers, trajectories, strict=False):
         if len(trajectory):
-            controller = scenario.controller()
+            controller = scenario.controller(one.own)
             controller.dt = trajectory.dt
             column["a control step"] = f"{1e6 * step_time(controller, trajectory):.3g} µs here"
     labels = list(dict.fromkeys(label for column in table for label in column))
     show_table(
-        ["", *(trajectory.resolver.upper() for trajectory in trajectories)],
+        ["", *(trajectory.called for trajectory in trajectories)],
         [[label, *(column.get(label, "") for column in table)] for label in labels],
         title=f"{scenarios[0].name}: {scenarios[0].title}",
     )
@@ -166,19 +173,26 @@ def runs_in(folder: Path) -> list[Trajectory]:
     return runs
 
 
-def _load(name: str, resolver: str | None, settings: Mapping[str, object], limits: bool | None) -> Scenario:
-    kind = {} if resolver is None else {"resolver.kind": resolver}
+def _load(
+    name: str, resolver: Chosen | None, settings: Mapping[str, object], limits: bool | None
+) -> Scenario:
+    kind = {} if resolver is None or resolver.own is not None else {"resolver.kind": resolver.kind}
     scenario = Scenario.load(name, kind | dict(settings))
+    if resolver is not None:
+        scenario = resolver.scenario(scenario)
     if limits is None or limits is (scenario.parts.limits is not None):
         return scenario
     return scenario.override("limits", limits)
 
 
 def _run(
-    scenario: Scenario, controller: Controller, watch: Callable[[Recorder], None] | None = None
+    scenario: Scenario,
+    controller: Controller,
+    watch: Callable[[Recorder], None] | None = None,
+    label: str = "",
 ) -> Trajectory:
-    with progress(f"{scenario.name}, {scenario.parts.resolver.kind.upper()}") as report:
-        return scenario.run(report, controller, watch)
+    with progress(f"{scenario.name}, {label or scenario.parts.resolver.kind.upper()}") as report:
+        return replace(scenario.run(report, controller, watch), label=label)
 
 
 def _status(command: str, trajectories: Sequence[Trajectory], folder: Path) -> int:
@@ -187,7 +201,7 @@ def _status(command: str, trajectories: Sequence[Trajectory], folder: Path) -> i
     for trajectory in failed:
         complain(
             command,
-            f"{trajectory.resolver.upper()} {trajectory.outcome}: {trajectory.message}; "
+            f"{trajectory.called} {trajectory.outcome}: {trajectory.message}; "
             f"{'the run' if trajectory.outcome == 'missed' else 'the part that was computed'} is in {folder}",
         )
     return FAILED if failed else OK

@@ -21,12 +21,15 @@ from nmm.figures.motion import Scene, stroboscopic
 from nmm.figures.objective import draw_best_objective, has_objective, objective_comparison
 from nmm.runs.ellipsoid_options import Wanted
 from nmm.runs.figure_options import PLAIN, FigureOptions
+from nmm.runs.settling import BAND, settling_time
 from nmm.runs.trajectory import Trajectory
 
 #: Width of a figure of two columns, in.
 _WIDTH = 10.4
 #: A narrower one has one column, in.
 _NARROW = 6.0
+#: What a comparison calls the marks on its errors.
+_SETTLED = f"down to {100 * BAND:g} %"
 #: The tallest drawing of a motion, in.
 _TALLEST = 6.2
 
@@ -131,9 +134,10 @@ def comparison(trajectories: Sequence[Trajectory], *, width: float = _WIDTH) -> 
     runs = [run for run in trajectories if len(run)]
     if not runs:
         raise InputError("figure of a comparison: expected a run with at least one sample, got none")
-    worn, columns = looks.looks([run.resolver for run in runs]), _Columns(width)
-    rows = columns.rows([look.name for look in worn])
-    heights, legends = [1.3] * 3, [rows] * 3
+    worn, columns = looks.looks_of_labels([run.called for run in runs]), _Columns(width)
+    names = [look.name for look in worn]
+    settle = [_SETTLED] * any(settling_time(run) is not None for run in runs)
+    heights, legends = [1.3] * 3, [columns.rows(names), columns.rows(names + settle), columns.rows(names)]
     high = style.column_height(heights, legends)
     above = style.room(style.legend_rows(_path_names(runs, worn), columns.view))
     drawing = high if columns.beside else above + 0.8 * columns.view
@@ -143,6 +147,7 @@ def comparison(trajectories: Sequence[Trajectory], *, width: float = _WIDTH) -> 
     panels = style.column(made, heights, legends, columns.left, columns.right, begins)
     draw_best_objective(panels[0], runs)
     _draw_norms(panels[1], runs, worn, [run.error_norm for run in runs])
+    _mark_settled(panels[1], runs, worn)
     style.label(panels[1], y=f"‖e‖ {style.units(runs[0].r_units)}")
     _draw_norms(panels[2], runs, worn, [np.linalg.norm(run.u, axis=1) for run in runs])
     style.label(panels[2], y=f"‖u‖ {style.units(runs[0].robot.u_units)}")
@@ -210,6 +215,18 @@ def _draw_norms(
         style.log_axis(axes, max(float(positive.min()), 1e-16), float(positive.max()))
     else:
         style.note(axes, "zero throughout")
+
+
+def _mark_settled(axes: Axes, runs: Sequence[Trajectory], worn: Sequence[looks.Look]) -> None:
+    """Where each run's error has come down for good; all runs begin alike, so the legend has one mark."""
+    label = _SETTLED
+    for run, look in zip(runs, worn, strict=True):
+        if (after := settling_time(run)) is not None:
+            band = BAND * run.error_norm[0]
+            axes.plot(
+                run.t[0] + after, band, "o", color=look.color, markersize=5.0, label=label, linestyle="none"
+            )
+            label = "_"
 
 
 def write_run_figures(

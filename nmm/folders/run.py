@@ -157,6 +157,7 @@ def load(folder: str | Path, robot: Robot | None = None) -> Trajectory:
         obstacles=obstacles,
         scenario=scenario,
         events=tuple(Event(**event) for event in summary.get("events", ())),
+        label=summary.get("label", ""),
         **arrays,
     )
 

@@ -18,6 +18,7 @@ from nmm.scenario.keys import KeyedError, as_written, at, first_error
 if TYPE_CHECKING:
     from nmm.collisions.obstacle import Obstacle
     from nmm.control.controller import Controller
+    from nmm.resolvers.base import Resolver
     from nmm.robots.robot import Robot
     from nmm.runs.recording import Recorder
     from nmm.runs.trajectory import Trajectory
@@ -46,16 +47,16 @@ class Scenario:
         self.path = Path(document.name)
         own_name = re.sub(r"[^\w.-]", "_", self.path.name.split(".", 1)[0]) or "scenario"
         data = {"name": own_name, **document.data}
-        from nmm.scenario.schema import ScenarioPart
         from nmm.scenario.named_reference import NamedReferences
+        from nmm.scenario.schema import ScenarioPart
 
         try:
             self.parts = ScenarioPart.model_validate(data, context=NamedReferences(data))
         except ValidationError as error:
             raise self._located(first_error(error, data)) from None
-        self.name = self.parts.name
         #: What is worth a warning of what was set, a sentence each.
         self.warnings = tuple(document.parted())
+        self.name = self.parts.name
         self.title = self.parts.title
         #: The absolute path of a file that is named at a place of it.
         self.absolute = document.absolute
@@ -118,8 +119,12 @@ class Scenario:
                 raise self._located(error) from None
         return self._robot
 
-    def controller(self) -> Controller:
+    def controller(self, resolver: Resolver | None = None) -> Controller:
         """A new controller; with it, every key has been checked.
+
+        Parameters
+        ----------
+        resolver : one in the place of the scenario's, such as one of your own
 
         Raises
         ------
@@ -130,7 +135,7 @@ class Scenario:
         compile_loop_ahead()  # most who have a controller made run it
         robot = self.robot()
         try:
-            return self.parts.build(robot, self.absolute)
+            return self.parts.build(robot, self.absolute, resolver)
         except KeyedError as error:
             raise self._located(error) from None
 
