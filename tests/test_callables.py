@@ -54,11 +54,12 @@ def test_the_pages_example_runs_and_its_derivatives_are_right() -> None:
         check_function(function, robot, 0.7, np.array(Q))
     exec(law, names)
     resolver = nmm.CallableResolver(names["least_norm"])
-    assert (
-        nmm.Scenario.load("unicycle_2r_position", {"duration": "1"})
-        .run(controller=nmm.Scenario.load("unicycle_2r_position").controller(resolver))
-        .complete
-    )
+    scenario = nmm.Scenario.load("unicycle_2r_position", {"duration": "0.5"}).with_resolver(resolver)
+    with_own = scenario.override("duration", 1).run()
+    assert (with_own.outcome, with_own.resolver, with_own.t[-1]) == ("completed", "callable", 1.0)
+    assert with_own.scenario is not None
+    assert with_own.scenario["resolver"] == {"kind": "own", "source": "callable"}
+    assert scenario.with_resolver("pg").run().resolver == "pg"
 
 
 def test_every_row_of_the_pages_tables_is_what_a_configuration_has(robot_2r: Robot) -> None:

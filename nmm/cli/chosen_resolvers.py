@@ -52,7 +52,7 @@ class Chosen:
         """The scenario with this resolver, which keeps those keys that the kind knows."""
         if self.own is not None:
             file, _, name = self.text.rpartition(":")
-            return scenario.override("resolver", {"kind": "own", "source": f"{Path(file).resolve()}:{name}"})
+            return scenario.with_resolver(self.own, f"{Path(file).resolve()}:{name}")
         settings = {f"resolver.{key}": value for key, value in self.settings}
         return scenario.with_resolver(self.kind).with_settings(settings)
 

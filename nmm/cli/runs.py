@@ -50,9 +50,7 @@ def run_scenario(
     called = label or scenario.parts.resolver.kind.upper()
     folder = out or Path("runs") / f"{scenario.name}-{comparison.folder_name(called)}"
     check_folder(folder, is_run)
-    controller = scenario.controller(
-        None if resolver is None else resolver.own
-    )  # complains before there is a progress bar
+    controller = scenario.controller()  # complains before there is a progress bar
     title = f"{scenario.title or scenario.name}, {called}"
     with _shown(scenario, controller, title, port, open_browser) if play else nullcontext() as page:
         trajectory = _run(scenario, controller, None if page is None else page.watch, label)
@@ -111,7 +109,7 @@ def compare_resolvers(
     folder = out or Path("runs") / f"{scenarios[0].name}-compare"
     check_folder(folder, comparison.is_comparison)
     # What is wrong with the last one shows before the first one runs.
-    controllers = [scenario.controller(one.own) for scenario, one in zip(scenarios, resolvers, strict=True)]
+    controllers = [scenario.controller() for scenario in scenarios]
     trajectories: list[Trajectory] = []
     for scenario, controller, one in zip(scenarios, controllers, resolvers, strict=True):
         trajectories.append(_run(scenario, controller, label=one.label))
@@ -120,9 +118,9 @@ def compare_resolvers(
     with shielded():
         comparison.save(trajectories, folder, scenarios[0].name, ellipsoids=ellipsoids, figures=figures)
     table = [dict(describe(trajectory, trajectory.summary())) for trajectory in trajectories]
-    for column, scenario, one, trajectory in zip(table, scenarios, resolvers, trajectories, strict=False):
+    for column, scenario, trajectory in zip(table, scenarios, trajectories, strict=False):
         if len(trajectory):
-            controller = scenario.controller(one.own)
+            controller = scenario.controller()
             controller.dt = trajectory.dt
             column["a control step"] = f"{1e6 * step_time(controller, trajectory):.3g} µs here"
     labels = list(dict.fromkeys(label for column in table for label in column))

@@ -79,7 +79,9 @@ class OwnPart(ResolverPart):
 
     def make(self, unit: str = "m") -> Any:
         raise KeyedError(
-            ("source",), f"a scenario runs no Python file; expected it as --resolver {self.source}"
+            ("source",),
+            f"a scenario runs no Python; expected {self.source} as --resolver FILE.py:NAME, or in Python as "
+            "scenario.with_resolver(resolver)",
         )
 
     @model_validator(mode="after")

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from nmm.runs.trajectory import Trajectory
 
 SUFFIXES = (".yaml", ".yml")
+#: The kind of a resolver that is no kind of ours.
+OWN = "own"
 #: The keys that a controller does not depend on.
 KEYS_OF_A_RUN = ("q0", "duration", "method", "tolerance")
 
@@ -61,6 +63,7 @@ class Scenario:
         #: The absolute path of a file that is named at a place of it.
         self.absolute = document.absolute
         self._robot: Robot | None = None
+        self._own: Resolver | None = None
 
     @classmethod
     def load(cls, name_or_path: str | Path, overrides: Mapping[str, object] | None = None) -> Scenario:
@@ -100,14 +103,25 @@ class Scenario:
         ScenarioError : as `override`
         """
         derived = Scenario(_with_settings(self.document, settings))
+        derived._own = self._own
         of_robot = any(key.split(".", 1)[0] == "robot" for key in settings)
         if not of_robot or derived._explicit_robot() == self._explicit_robot():
             derived._robot = self._robot
         return derived
 
-    def with_resolver(self, kind: str) -> Scenario:
-        """This scenario with another kind of resolver, which keeps those keys that the kind knows."""
-        return self if kind == self.parts.resolver.kind else self.override("resolver.kind", kind)
+    def with_resolver(self, resolver: str | Resolver, source: str = "") -> Scenario:
+        """This scenario with another resolver: a kind, which keeps the keys that it knows, or your own.
+
+        Parameters
+        ----------
+        resolver : "rg", "pg", ..., or a `Resolver`
+        source : where one of your own is from, as a run's folder records it
+        """
+        if isinstance(resolver, str):
+            return self if resolver == self.parts.resolver.kind else self.override("resolver.kind", resolver)
+        derived = self.override("resolver", {"kind": OWN, "source": source or resolver.name})
+        derived._own = resolver
+        return derived
 
     def robot(self) -> Robot:
         """The robot, loaded once."""
@@ -119,12 +133,8 @@ class Scenario:
                 raise self._located(error) from None
         return self._robot
 
-    def controller(self, resolver: Resolver | None = None) -> Controller:
+    def controller(self) -> Controller:
         """A new controller; with it, every key has been checked.
-
-        Parameters
-        ----------
-        resolver : one in the place of the scenario's, such as one of your own
 
         Raises
         ------
@@ -135,7 +145,8 @@ class Scenario:
         compile_loop_ahead()  # most who have a controller made run it
         robot = self.robot()
         try:
-            return self.parts.build(robot, self.absolute, resolver)
+            own = self._own if self.parts.resolver.kind == OWN else None
+            return self.parts.build(robot, self.absolute, own)
         except KeyedError as error:
             raise self._located(error) from None
 
