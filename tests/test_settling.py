@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 import nmm
 from nmm.control.sequence import Event
+from nmm.figures import comparison
 from nmm.runs.settling import settling_time
 
 
@@ -59,3 +60,19 @@ def test_what_has_none(run: nmm.Trajectory) -> None:
     decaying = with_error(run, t, np.exp(-5.0 * t))
     assert settling_time(decaying) is not None
     assert settling_time(dataclasses.replace(decaying, events=(Event(1.0, "reach", "ends", ""),))) is None
+
+
+def test_a_comparison_marks_it() -> None:
+    """On each error's curve, where ln 50 / K and 2 % of the start meet; once in the legend."""
+    gains = (1.0, 2.5)
+    runs = [
+        nmm.Scenario.load("unicycle_2r_position", {"duration": "5", "task.0.gain": gain}).run()
+        for gain in gains
+    ]
+    (panel,) = [axes for axes in comparison(runs).axes if axes.get_ylabel().startswith("‖e‖")]
+    marks = [line for line in panel.lines if line.get_marker() == "o"]
+    for mark, run, gain in zip(marks, runs, gains, strict=True):
+        assert mark.get_xdata() == pytest.approx([math.log(50.0) / gain], rel=1e-6)
+        assert mark.get_ydata() == pytest.approx([0.02 * run.error_norm[0]])
+    texts = [text.get_text() for text in panel.get_legend().get_texts()]
+    assert texts == ["RG", "RG (2)", "down to 2 %"]
