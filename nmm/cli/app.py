@@ -22,7 +22,6 @@ from nmm.cli.options import (
     ScenarioArgument,
     SetOption,
     out_option,
-    resolvers_of,
     settings_of,
 )
 from nmm.cli.output import complain, tell_what_takes_long
@@ -129,13 +128,14 @@ def run(
     with --ellipsoids ellipses.png among them.
     Ctrl-C ends the run and writes the part that was computed, marked incomplete.
     """
+    from nmm.cli.chosen_resolvers import chosen
     from nmm.cli.runs import run_scenario
 
     if not play:
         browser.refuse("--play")
     return run_scenario(
         scenario,
-        resolver,
+        None if resolver is None else chosen(resolver, "--resolver"),
         settings_of(settings),
         limits,
         out,
@@ -162,22 +162,25 @@ def compare(
     ellipsoids: Ellipsoids,
     figures: Figures,
 ) -> int:
-    """Run a scenario with several resolvers.
+    """Run a scenario with several resolvers, or with one at several settings.
 
     One table, one figure, one playback.
 
     \b
     nmm compare unicycle_2r_position
     nmm compare unicycle_2r_pointing --resolvers rg,pg,ej --set resolver.alpha=5
+    nmm compare unicycle_2r_position --resolvers rg,rg:alpha=5,pg:alpha=50
+    nmm compare unicycle_2r_position --resolvers rg,my_laws.py:law
 
     The folder holds comparison.png, playback.html (all robots in one scene), summary.json and, for each
     resolver, a folder with its run.
     """
+    from nmm.cli.chosen_resolvers import several
     from nmm.cli.runs import compare_resolvers
 
     return compare_resolvers(
         scenario,
-        resolvers_of(resolvers),
+        several(resolvers, "--resolvers"),
         settings_of(settings),
         limits,
         out,

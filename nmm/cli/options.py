@@ -130,7 +130,7 @@ ResolverOption = Annotated[
         metavar="|".join(RESOLVERS),
         help=f"Resolve the redundancy with the "
         f"{listed([f'{RESOLVERS.words(name)} ({name})' for name in RESOLVERS], 'or')}, "
-        "with those of the scenario's settings that it knows.",
+        "with those of the scenario's settings that it knows; or as in --resolvers of `nmm compare`.",
     ),
 ]
 ResolversOption = Annotated[

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from nmm.arrays import Array, interpolated, scalar
 from nmm.cli.options import arguments_of, settings_of, values_of
+from nmm.cli.output import warn
 from nmm.errors import InputError, unknown
 
 if TYPE_CHECKING:
@@ -72,6 +73,7 @@ def studied(
     t: float | None = None,
     settings: Sequence[str] | None = None,
     usual_task: str = "",
+    decide: bool = True,
     **loading: Any,
 ) -> Studied:
     """What SOURCE means: a run's folder, a scenario by name or as YAML file, or else a robot.
@@ -83,6 +85,7 @@ def studied(
     t : s; 0, or the run's first instant. Of a run, q is where it was then
     settings : `--set`, of the robot's xacro arguments or of the scenario's keys
     usual_task : a robot's, where there is no other; none when empty
+    decide : where tasks come and go, whether to look at those active there and tell the others
     loading : platform, lock, axle, package_dirs of `nmm.load`; a robot's only
 
     Raises
@@ -106,7 +109,7 @@ def studied(
     q = _start(robot, run, scenario) if t is None or run is None else _then(run, t)
     q = configuration_at(robot, q, at, loading.get("lock") or {})
     first = 0.0 if run is None or not len(run) else float(run.t[0])
-    if not given and own is not None:
+    if not given and own is not None and decide:
         _decide(own, first if t is None else t, q)
     return Studied(
         name=robot.name if scenario is None else scenario.name,
@@ -154,7 +157,6 @@ def configuration_at(robot: Robot, q: Array, at: Sequence[str] | None, locked: M
 
 def _decide(controller: Controller, t: float, q: Array) -> None:
     """Of tasks that come and go, those active at t (s) and q (n,) are looked at; the others are told."""
-    from nmm.cli.output import warn
     from nmm.control.sequenced import SequencedController
     from nmm.words import listed
 
@@ -198,6 +200,8 @@ def _opened(
         raise InputError(f"{', '.join(wrong)}: of a robot's file; {source} has a robot of its own")
     if of_scenario:
         scenario = scenario_with(Scenario.load(source, settings_of(settings)), loading)
+        for warning in scenario.warnings:
+            warn(warning)
         return None, scenario, scenario.robot()
     if settings:
         raise InputError(f"--set: expected a robot or a scenario; {source} is a run, which is as it was")

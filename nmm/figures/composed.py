@@ -22,12 +22,15 @@ from nmm.figures.paths import Paths
 from nmm.figures.views import Viewed
 from nmm.runs.ellipsoid_options import Wanted
 from nmm.runs.figure_options import PLAIN, FigureOptions
+from nmm.runs.settling import BAND, settling_time
 from nmm.runs.trajectory import Trajectory
 
 #: Width of a figure of two columns, in.
 _WIDTH = 10.4
 #: A narrower one has one column, in.
 _NARROW = 6.0
+#: What a comparison calls the marks on its errors.
+_SETTLED = f"down to {100 * BAND:g} %"
 #: The tallest drawing of a motion, and of compared paths in one of two views, in.
 _TALLEST, _TALL = 6.2, 3.6
 #: The panel below the drawings, where it has room, in.
@@ -139,14 +142,16 @@ def comparison(trajectories: Sequence[Trajectory], *, width: float = _WIDTH) -> 
     runs = [run for run in trajectories if len(run)]
     if not runs:
         raise InputError("figure of a comparison: expected a run with at least one sample, got none")
-    worn, columns = looks.looks([run.resolver for run in runs]), _Columns(width)
+    worn, columns = looks.looks_of_labels([run.called for run in runs]), _Columns(width)
     scene = Paths(runs, worn)
     tallest = _TALL if len(scene.views) > 1 else _TALLEST
     drawn = [min(scene.height(view, columns.view), tallest) for view in scene.views]
     rooms = [style.legend_rows(scene.names, columns.view), *[1] * (len(drawn) - 1)]
     drawing = style.column_height(drawn, rooms) + style.BOTTOM * (len(drawn) - 1)
-    rows = columns.rows([look.name for look in worn])
-    legends = [rows] * 3
+    names = [look.name for look in worn]
+    settle = [_SETTLED] * any(settling_time(run) is not None for run in runs)
+    rows = columns.rows(names)
+    legends = [rows, columns.rows(names + settle), rows]
     each = 1.3
     if columns.beside:
         each = max(each, (drawing - style.column_height([], legends)) / 3)
@@ -165,6 +170,7 @@ def comparison(trajectories: Sequence[Trajectory], *, width: float = _WIDTH) -> 
     else:
         _draw_singular_values(panels[0], runs, worn)
     _draw_norms(panels[1], runs, worn, [run.error_norm for run in runs])
+    _mark_settled(panels[1], runs, worn)
     style.label(panels[1], y=f"‖e‖ {style.units(runs[0].r_units)}")
     _draw_norms(panels[2], runs, worn, [np.linalg.norm(run.u, axis=1) for run in runs])
     style.label(panels[2], y=f"‖u‖ {style.units(runs[0].robot.u_units)}")
@@ -197,6 +203,18 @@ def _draw_norms(
         style.log_axis(axes, max(float(positive.min()), 1e-16), float(positive.max()))
     else:
         style.note(axes, "zero throughout")
+
+
+def _mark_settled(axes: Axes, runs: Sequence[Trajectory], worn: Sequence[looks.Look]) -> None:
+    """Where each run's error has come down for good; all runs begin alike, so the legend has one mark."""
+    label = _SETTLED
+    for run, look in zip(runs, worn, strict=True):
+        if (after := settling_time(run)) is not None:
+            band = BAND * run.error_norm[0]
+            axes.plot(
+                run.t[0] + after, band, "o", color=look.color, markersize=5.0, label=label, linestyle="none"
+            )
+            label = "_"
 
 
 def write_run_figures(

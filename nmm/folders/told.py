@@ -62,6 +62,7 @@ class ToldRun(Told):
     warnings: tuple[str, ...]
     frame: str | None
     samples: int | None = None
+    label: str = ""
     limited: bool = False
     kinematics_off: float | None = None
     limit_names: tuple[str, ...] = ()

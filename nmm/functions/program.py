@@ -150,6 +150,7 @@ class Program:
     blocks : what `run` takes, made by `lay_out`
     buffers : what it reads and writes, as views
     calls_python : whether users' Python functions are among them
+    costs : what makes such functions dear, a sentence each
     prepare : prepare(t, q) does Pinocchio's part at q and the users' Python functions at (t, q); `nothing`
         where there is neither
     """
@@ -157,6 +158,7 @@ class Program:
     blocks: Blocks
     buffers: Buffers
     calls_python: bool
+    costs: tuple[str, ...]
     prepare: Callable[[float, Array], None]
 
     def __init__(self, robot: Robot, functions: Sequence[Function], kinematics: str = PINOCCHIO) -> None:
@@ -236,6 +238,8 @@ class Program:
             if stage.callback is not None
         ]
         self.calls_python = bool(callbacks)
+        said = (getattr(callback, "costs", "") for callback, _ in callbacks)
+        self.costs = tuple(dict.fromkeys(sentence for sentence in said if sentence))
         if callbacks:
             self.prepare = _with_callbacks(robot, update, callbacks)
 
@@ -302,5 +306,6 @@ def _with_callbacks(
         for callback, block in callbacks:
             value, value_t, value_q = callback(t, configuration)
             block[:] = np.concatenate([value, value_t, value_q.ravel()])
+        configuration.forget_neighbours()
 
     return prepare

@@ -75,7 +75,7 @@ def record(
         watch(recorder)
     if len(times) > 1 and not advance.tolerance:  # adaptive steps are shorter than the samples
         controller.dt = float(times[1] - times[0])
-    recorder.warnings += platform_warnings(controller.robot)
+    recorder.warnings += [*platform_warnings(controller.robot), *controller.costs]
     if controller.limits is not None:
         recorder.warnings += outside_at_start(controller.robot, controller.kept, q)
     idle = idle_inputs(controller, q)

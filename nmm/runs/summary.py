@@ -9,6 +9,7 @@ import numpy as np
 from nmm.arrays import Array
 from nmm.collisions.recorded import described
 from nmm.robots.wheel_rates import inputs_held_by
+from nmm.runs.settling import settling_time
 
 if TYPE_CHECKING:
     from nmm.runs.trajectory import Trajectory
@@ -41,6 +42,7 @@ def summarise(trajectory: Trajectory) -> dict[str, Any]:
         },
         "platform": robot.platform.name,
         "resolver": trajectory.resolver,
+        "label": trajectory.label,
         "method": trajectory.method,
         "dt": trajectory.dt,
         "limited": trajectory.limited,
@@ -70,6 +72,7 @@ def summarise(trajectory: Trajectory) -> dict[str, Any]:
             "error_max_second_half": float(norm[half].max()),
             "error_rms": _rms(norm),
             "error_max": float(norm.max()),
+            "settling_time": settling_time(trajectory),
             "objective_initial": float(trajectory.objective[0]),
             "objective_final": float(trajectory.objective[-1]),
             "objective_mean_second_half": float(trajectory.objective[half].mean()),
