@@ -24,6 +24,19 @@ key and what was expected.
 ```yaml
 %s```
 
+A reference that another one is made from stands once, and is named by its path wherever a reference may
+stand: a bearing's or velocity's `of`, a point, a direction, an objective's target, another task's
+`reference`.
+
+```yaml
+task:
+  - {kind: position, frame: ee, axes: xy, reference: {kind: circle, center: [2, 2], radius: 3, rate: 0.25}}
+  - {kind: heading, frame: link2, reference: {kind: bearing, of: task.0.reference, towards: [6, 2]}}
+```
+
+`--set task.0.reference.radius=2` then changes both. Below an anchor (`&`) of YAML it changes that place
+alone, with a warning that names those that the anchor ties to it.
+
 Below, every key. (`docs/make_scenario_keys.py` writes this page from the schema that checks the files.)
 """
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nmm.errors import InputError
+from nmm.words import quoted
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -22,7 +23,7 @@ def array(value: ArrayLike, name: str) -> Array:
     try:
         result = np.array(value, dtype=np.float64, order="C")
     except (TypeError, ValueError):
-        raise InputError(f"{name}: expected numbers, got {value!r}") from None
+        raise InputError(f"{name}: expected numbers, got {quoted(value)}") from None
     if not np.isfinite(result).all():
         raise InputError(f"{name}: expected finite numbers, got {one_line(result)}")
     return result
@@ -52,6 +53,8 @@ def scalar(value: ArrayLike, name: str) -> float:
     """A finite number."""
     if isinstance(value, float) and math.isfinite(value):
         return float(value)
+    if isinstance(value, bool | np.bool_):
+        raise InputError(f"{name}: expected a number, got {value}")
     result = array(value, name)
     if result.ndim != 0:
         raise InputError(f"{name}: expected a number, got shape {result.shape}")
@@ -67,11 +70,12 @@ def positive(value: ArrayLike, name: str) -> float:
 
 
 def counted(value: object, name: str, least: int = 1) -> int:
-    """A whole number, at least `least`."""
-    if not isinstance(value, Integral) or isinstance(value, bool) or value < least:
+    """A whole number, at least `least`; one that is written 2.0 is 2, as in a scenario."""
+    whole = isinstance(value, Integral) or (isinstance(value, float) and value.is_integer())
+    if not whole or isinstance(value, bool) or int(value) < least:  # type: ignore[call-overload]  # a number
         expected = "above 0" if least == 1 else f"from {least}"
-        raise InputError(f"{name}: expected a whole number {expected}, got {value!r}")
-    return int(value)
+        raise InputError(f"{name}: expected a whole number {expected}, got {quoted(value)}")
+    return int(value)  # type: ignore[call-overload]  # likewise
 
 
 def matrix(value: ArrayLike, shape: tuple[int, int], name: str) -> Array:

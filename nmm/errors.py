@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from typing import Any
 
+from nmm.words import quoted
+
 
 class NmmError(Exception):
     """Root of every error that nmm raises on purpose."""
@@ -37,6 +39,10 @@ class DivergedError(RunError):
     """The motion grew without bound; `alpha * dt` is usually too large."""
 
 
+#: A longer name is no misspelling.
+LONGEST = 200
+
+
 def unknown(kind: str, name: object, available: Iterable[str], where: str = "") -> str:
     """One line for a name that does not exist: what came, the nearest match, what there is.
 
@@ -45,12 +51,12 @@ def unknown(kind: str, name: object, available: Iterable[str], where: str = "") 
     """
     import difflib  # here: every start would pay
 
-    names = list(available)
-    near = difflib.get_close_matches(str(name), names, n=1)
+    names, asked = list(available), str(name)
+    near = difflib.get_close_matches(asked, names, n=1) if len(asked) < LONGEST else []
     hint = f" (did you mean {near[0]!r}?)" if near else ""
     listing = ", ".join(names) if names else "none"
     prefix = f"{where}: " if where else ""
-    return f"{prefix}unknown {kind} {name!r}{hint}; available: {listing}"
+    return f"{prefix}unknown {kind} {quoted(name)}{hint}; available: {listing}"
 
 
 def expect_known(

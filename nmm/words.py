@@ -54,9 +54,27 @@ def value_text(value: float, unit: str) -> str:
     return fraction_of_pi(value) or measured(value, unit)
 
 
+def split_outside_brackets(text: str, mark: str) -> list[str]:
+    """The parts of a text between marks that stand in no bracket: "a,[b,c]" at "," is "a" and "[b,c]"."""
+    parts, depth = [""], 0
+    for character in text:
+        depth += (character in "[{(") - (character in "]})")
+        if character == mark and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += character
+    return [part.strip() for part in parts]
+
+
 def printable(text: str) -> str:
     """The text with control characters, line breaks among them, as escapes: names in files may hold any."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def quoted(value: object, limit: int = 60) -> str:
+    """A value as an error shows it: on one line, not too long."""
+    # Of a long text repr would make a longer one first.
+    return one_line(repr(value[:limit] if isinstance(value, str | bytes) else value), limit)
 
 
 def one_line(text: str, limit: int = 300) -> str:

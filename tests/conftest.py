@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+
 import numpy as np
 import pytest
 from gripping import folding
@@ -9,6 +11,12 @@ from spatial_arms import load_tiago, load_ur5
 
 from nmm.robots.loading import load
 from nmm.robots.robot import Robot
+
+
+def pytest_configure() -> None:
+    """A shell's "&" has SIGINT ignored, by the commands, too, that the tests interrupt."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")

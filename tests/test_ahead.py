@@ -42,9 +42,11 @@ SCRIPT = """
 import os, sys, time
 from pathlib import Path
 import functions
+from nmm.cores import cores
 from nmm.kernels import ahead
 from nmm.kernels.cache import cache_folder, under_way
 ahead.OURS = "functions"
+ahead.cores = {cores}
 print("script", flush=True)
 ahead.compile_ahead(functions.clear_first, functions.count, (functions.sine, functions.NUMBER))
 print(len(ahead._children), len(under_way), flush=True)
@@ -74,8 +76,8 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def run(folder: Path, then: str, **more: str) -> subprocess.CompletedProcess[str]:
-    (folder / "script.py").write_text(SCRIPT.format(then=then))
+def run(folder: Path, then: str, cores: str = "cores", **more: str) -> subprocess.CompletedProcess[str]:
+    (folder / "script.py").write_text(SCRIPT.format(then=then, cores=cores))
     return subprocess.run(
         [sys.executable, "script.py"],
         cwd=folder,
@@ -111,6 +113,32 @@ print(sum(functions.count.compiled.stats.cache_misses.values()))
     assert done.stdout.splitlines()[-1] == "1"
 
 
+def test_who_waits_takes_what_has_not_been_begun(folder: Path) -> None:
+    """The other process ends its first function only when all others have been compiled here."""
+    held = """
+from pathlib import Path
+for _ in range(400 if __import__("sys").argv[0] == "-c" else 0):
+    time.sleep(0.0 if Path("go").exists() else 0.05)
+"""
+    (folder / "functions.py").write_text(FUNCTIONS + held)
+    then = """
+child, compile_one = under_way[min(under_way)].func.__self__, ahead._compile
+def told(*one):
+    compile_one(*one)
+    print(one[1], flush=True)
+    if one[1] == "count":
+        Path("go").touch()
+ahead._compile = told
+while not child._begun:
+    child._begun += child._told.read() or b""
+assert functions.clear_first.address
+print(sum(functions.clear_first.compiled.stats.cache_hits.values()))
+"""
+    done = run(folder, then, cores="lambda: 2")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[2:] == ["sine", "count", "1"]
+
+
 def test_a_cache_that_cannot_be_written_starts_nobody(folder: Path) -> None:
     (folder / "file").write_text("")
     used = "assert functions.count.address and functions.clear_first.address"
@@ -120,7 +148,7 @@ def test_a_cache_that_cannot_be_written_starts_nobody(folder: Path) -> None:
 
 
 def test_users_modules_are_not_imported_elsewhere(folder: Path) -> None:
-    (folder / "script.py").write_text(SCRIPT.format(then="").replace("ahead.OURS = ", "_ = "))
+    (folder / "script.py").write_text(SCRIPT.format(then="", cores="cores").replace("ahead.OURS = ", "_ = "))
     done = subprocess.run(
         [sys.executable, "script.py"],
         cwd=folder,
@@ -150,7 +178,9 @@ def test_nobody_outlives_who_asked(folder: Path, how: signal.Signals | None) -> 
     """Killed, interrupted, or through: no process and no half-written file stays."""
     (folder / "functions.py").write_text(FUNCTIONS + "if __import__('sys').argv[0] == '-c': time.sleep(60)\n")
     then = "print(*(child.pid for child in ahead._children), flush=True)\n"
-    (folder / "script.py").write_text(SCRIPT.format(then=then + ("" if how is None else "time.sleep(60)")))
+    (folder / "script.py").write_text(
+        SCRIPT.format(then=then + ("" if how is None else "time.sleep(60)"), cores="cores")
+    )
     process = subprocess.Popen(
         [sys.executable, "script.py"],
         cwd=folder,

@@ -143,8 +143,14 @@ BAD = {
     "unknown type": (arm("", "hinge"), ["joint 'elbow': unknown joint type 'hinge'", "available: revolute"]),
     "capital type": (arm("", "Revolute"), ["unknown joint type 'Revolute'", "did you mean 'revolute'"]),
     "spherical": (arm("", "spherical"), ["unknown joint type 'spherical'"]),
-    "planar": (arm(AXIS, "planar"), ["joint 'elbow': a planar joint is refused"]),
-    "floating": (arm("", "floating"), ["joint 'elbow': a floating joint is refused"]),
+    "planar": (
+        robot(LINKS, joint("elbow"), link("c"), joint("wrist", "b", "c", "planar")),
+        ["joint 'wrist': a planar joint is refused inside the tree"],
+    ),
+    "floating": (
+        robot(LINKS, joint("elbow"), link("c"), joint("wrist", "b", "c", "floating", "")),
+        ["joint 'wrist': a floating joint is refused inside the tree"],
+    ),
     "mimic": (
         robot(LINKS, link("c"), joint(), joint("k", "b", "c", body=AXIS + LIMIT + '<mimic joint="i"/>')),
         ["'k'", "unknown joint to follow 'i'"],
@@ -448,10 +454,10 @@ def test_other_suffix(name: str, tmp_path: Path) -> None:
 def test_unreadable(suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write(tmp_path / f"r{suffix}", robot(link("a")))
 
-    def read_bytes(self: Path) -> bytes:
-        raise PermissionError(13, "Permission denied", str(self))
+    def read_bytes(file: Path, most: int) -> bytes:
+        raise PermissionError(13, "Permission denied", str(file))
 
-    monkeypatch.setattr(Path, "read_bytes", read_bytes)
+    monkeypatch.setattr("nmm.robots.loading.text.read_bytes", read_bytes)
     assert refused(path) == f"{path}: cannot be read (Permission denied)"
 
 

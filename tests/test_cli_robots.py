@@ -141,7 +141,7 @@ def test_info_of_a_scenario_shows_its_robot_and_what_does_not_move_its_task(
     ("arguments", "words"),
     [
         ([], "expected ROBOT"),
-        (["--scenario", "unicycle_2r_position", "--lock", "q1=0"], "are for ROBOT"),
+        (["--scenario", "unicycle_2r_position", "--axle", "1,2"], "are for ROBOT"),
         (["unicycle_2r", "--scenario", "unicycle_3r_position"], "does not fit robot unicycle_2r"),
         (["unicycle_2r", "--lock", "q1"], "--lock: expected JOINT=VALUE, as in torso=0.2, got 'q1'"),
         (["unicycle_2r", "--lock", "q1=left"], "--lock: q1: expected a number"),

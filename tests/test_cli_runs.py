@@ -204,7 +204,7 @@ def test_ctrl_c_where_there_is_nothing_to_write(tmp_path: Path, later: float) ->
     out, err = running.communicate(timeout=MOST)
     # The latter where it was raised in an `eval`, whatever is made of it: Python's own rule.
     assert running.returncode in {130, -signal.SIGINT}
-    assert (out, err) == ("", "")
+    assert (out, err) == ("", "nmm run: interrupted\n" if running.returncode == 130 else "")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -229,7 +229,7 @@ def test_ctrl_c_waits_for_an_import_that_would_swallow_it(tmp_path: Path, name: 
 
 
 def test_compare_makes_one_table_one_figure_one_playback(run: Command) -> None:
-    result = run("compare", "unicycle_2r_pointing", "--resolvers", "rg, pg,ej,rg", *SHORT)
+    result = run("compare", "unicycle_2r_pointing", "--resolvers", "rg, pg,ej", *SHORT)
     assert (result.status, result.err) == (0, "")
     assert result.out.splitlines()[1].split() == ["RG", "PG", "EJ"]
     folder = Path(result.value("files in"))
@@ -246,6 +246,118 @@ def test_compare_makes_one_table_one_figure_one_playback(run: Command) -> None:
     assert (folder / "comparison.png").read_bytes()[:4] == b"\x89PNG"
     # A comparison is ours too: it may be replaced.
     assert run("compare", "unicycle_2r_pointing", "--resolvers", "rg", *SHORT).status == 0
+
+
+LAWS = """\
+import numpy as np
+from nmm import ProjectedGradient
+
+
+def least_norm(problem):
+    return np.linalg.pinv(problem.J) @ problem.rate
+
+
+class Law(ProjectedGradient):
+    def __init__(self):
+        super().__init__(alpha=3.0)
+
+
+five = ProjectedGradient(5.0)
+number = 3
+"""
+
+
+def test_compare_takes_settings_and_resolvers_of_ones_own(run: Command) -> None:
+    """Each run has a name, a colour and a folder of its own, and is what its entry says."""
+    for folder in ("", "more"):
+        Path(folder).mkdir(exist_ok=True)
+        (Path(folder) / "laws.py").write_text(LAWS, encoding="utf-8")
+    entries = "rg,pg:alpha=50,rg:alpha=5,laws.py:least_norm,more/laws.py:least_norm,laws.py:Law,laws.py:five"
+    result = run("compare", "unicycle_2r_position", "--resolvers", entries, *SHORT)
+    assert result.status == 0
+    called = ["RG", "PG α=50", "RG α=5", *["laws.py:least_norm"] * 2, "laws.py:Law", "laws.py:five"]
+    assert re.split(r"  +", result.out.splitlines()[1].strip()) == called
+    folder = Path("runs/unicycle_2r_position-compare")
+    names = ["rg", "pg-alpha-50", "rg-alpha-5", "laws.py-least_norm", "laws.py-least_norm-2"]
+    names += ["laws.py-law", "laws.py-five"]
+    runs = {name: nmm.Trajectory.load(folder / name) for name in names}
+    assert list(json.loads((folder / "summary.json").read_text())["runs"]) == names
+    assert [one.called for one in runs.values()] == called
+    assert [one.called for one in nmm.cli.runs.runs_in(folder)] == called
+    for name, alpha in (("pg-alpha-50", 50.0), ("rg-alpha-5", 5.0)):
+        assert runs[name].scenario is not None
+        assert runs[name].scenario["resolver"]["alpha"] == alpha
+    alone = nmm.Scenario.load("unicycle_2r_position", {"duration": "0.5", "resolver.kind": "pg"})
+    np.testing.assert_array_equal(runs["pg-alpha-50"].q, alone.override("resolver.alpha", 50).run().q)
+    np.testing.assert_array_equal(runs["laws.py-law"].q, alone.override("resolver.alpha", 3).run().q)
+    np.testing.assert_array_equal(runs["laws.py-five"].q, alone.override("resolver.alpha", 5).run().q)
+    idle = alone.override("objective", None).run()
+    np.testing.assert_allclose(runs["laws.py-least_norm"].q, idle.q, atol=1e-9)
+    page = (folder / "playback.html").read_text(encoding="utf-8")
+    assert all(f'"{label}"' in page or label.encode("unicode_escape").decode() in page for label in called)
+
+
+def test_a_run_with_a_resolver_of_ones_own_is_recorded_and_not_run_from_a_file(run: Command) -> None:
+    Path("laws.py").write_text(LAWS, encoding="utf-8")
+    result = run("run", "unicycle_2r_position", "--resolver", "laws.py:least_norm", *SHORT)
+    assert result.status == 0
+    folder = Path(result.value("files in"))
+    assert folder == Path("runs/unicycle_2r_position-laws.py-least_norm")
+    file = str(folder / "scenario.yaml")
+    source = yaml.safe_load((folder / "scenario.yaml").read_text())["resolver"]["source"]
+    assert source == f"{Path('laws.py').resolve()}:least_norm"
+    again = run("run", file, "--out", "again")
+    assert again.status == 2
+    assert f"resolver.source: a scenario runs no Python; expected {source} as --resolver" in again.err
+    assert run("run", file, "--resolver", source, "--out", "again").status == 0
+    first, second = (nmm.Trajectory.load(one) for one in (folder, "again"))
+    np.testing.assert_array_equal(first.q, second.q)
+    assert run("run", file, "--resolver", "pg", "--out", "other").status == 0
+
+
+@pytest.mark.parametrize(
+    ("entries", "messages"),
+    [
+        ("rg,rg", ["--resolvers: rg is given twice", "rg,rg:alpha=5"]),
+        ("rg,pg,rg:alpha=10", ["rg and rg:alpha=10 are the same here"]),
+        ("pg:alpha=50,pg:alpha=5e1", ["pg:alpha=50 and pg:alpha=5e1 are the same here"]),
+        ("laws.py:five,./laws.py:five", ["are the same here"]),
+        ("rg,pg:beta=3", ["set resolver.beta", "available: kind, alpha"]),
+        ("rg,pg:alpha", ["expected KIND:KEY=VALUE, as in pg:alpha=50, got 'pg:alpha'"]),
+        ("laws.py", ["expected FILE.py:NAME, got 'laws.py'"]),
+        ("laws.py:five:alpha=3", ["expected FILE.py:NAME"]),
+        ("nowhere.py:law", ["nowhere.py: expected a Python file"]),
+        ("laws.py:least", ["unknown name 'least' (did you mean 'least_norm'?)", "Law"]),
+        ("laws.py:number", ["number: expected a function problem -> u or a Resolver, got 3"]),
+        ("broken.py:law", ["broken.py: ZeroDivisionError: division by zero"]),
+        ("unread.py:law", ["unread.py: SyntaxError"]),
+    ],
+)
+def test_entries_that_are_none(entries: str, messages: list[str], run: Command) -> None:
+    for name, text in (("laws", LAWS), ("broken", "1 / 0\n"), ("unread", "def law(:\n")):
+        Path(f"{name}.py").write_text(text, encoding="utf-8")
+    result = run("compare", "unicycle_2r_position", "--resolvers", entries, *SHORT)
+    assert (result.status, result.out, len(result.err.splitlines())) == (2, "", 1)
+    assert not Path("runs").exists()
+    for message in messages:
+        assert message in result.err
+
+
+def test_a_comparison_shows_what_is_asked_of_the_inputs_and_when_the_error_settles(run: Command) -> None:
+    result = run("compare", "unicycle_2r_pointing", "--set", "duration=5", "--out", "both")
+    assert result.status == 0
+    runs = [nmm.Trajectory.load(f"both/{kind}") for kind in ("rg", "pg")]
+    numbers = json.loads(Path("both/summary.json").read_text())["runs"]
+    for kind, one in zip(("rg", "pg"), runs, strict=True):
+        assert numbers[kind]["u_max"] == dict(zip(one.robot.u_names, np.abs(one.u).max(axis=0), strict=True))
+        assert numbers[kind]["settling_time"] == pytest.approx(np.log(50.0), rel=1e-4)
+    joints = [one.robot.u_names.index(name) for one in runs[:1] for name in ("omega", "q1", "q2")]
+    peaks = re.split(r"  +", result.value("peak inputs"))
+    for text, one in zip(peaks, runs, strict=True):
+        drive, turn = re.fullmatch(r"v (\S+) m/s, \w+ (\S+) rad/s", text).groups()  # type: ignore[union-attr]
+        assert float(drive) == pytest.approx(np.abs(one.u[:, 0]).max(), rel=5e-3)
+        assert float(turn) == pytest.approx(np.abs(one.u[:, joints]).max(), rel=5e-3)
+    assert re.split(r"  +", result.value("‖e‖ down to 2 % of its start")) == ["after 3.91 s"] * 2
 
 
 def test_a_comparison_with_a_failed_run_says_so(run: Command) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from typing import Any
 
 import numpy as np
@@ -136,6 +137,7 @@ def test_ej_drives_through_an_algorithmic_singularity() -> None:
         assert said == run.summary()["warnings"][0]
         assert "the added task was not done in" in said
         assert "and is done again from there on" in said
+        assert re.search(r"its rate was missed by up to [\d.e-]+ rad/s$", said)
         assert run.residual.max() < 1e-12
         assert run.scale.min() == 1.0
         expected = run.error_norm[0] * math.exp(-run.t[-1]) + 1e-11 * (dt / 0.005) ** 4

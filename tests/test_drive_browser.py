@@ -6,7 +6,7 @@ from contextlib import AbstractContextManager
 
 import numpy as np
 import pytest
-from playback_browser import UPRIGHT, WALK, Window, watched
+from playback_browser import UPRIGHT, WALK, Window, draw_frames, watched
 from playback_browser import browser as browser
 from playback_browser import empty_page as empty_page
 from playback_browser import window as window
@@ -191,6 +191,80 @@ def test_nothing_seeks_and_nothing_is_cut_off_at_420_px(window: Window, setup: S
               .filter((part) => !part.labels.length && !part.ariaLabel).map((part) => part.outerHTML)"""
         )
         assert unnamed == []
+
+
+def test_a_target_out_of_reach_is_said_in_words_and_taken_back(window: Window, setup: ScenarioSetup) -> None:
+    with driven(setup) as url:
+        page = opened(window, url)
+        told = page.locator("#told")
+        height = page.get_by_label("ee: z in m, as a number")
+        height.fill("2.5")
+        height.press("Enter")
+        page.wait_for_function(
+            "document.getElementById('told').classList.contains('bad')", timeout=1000.0 * MOST
+        )
+        assert "The target of ee is out of reach: it is" in told.inner_text()
+        assert "links add up to" in told.inner_text()
+        height.fill("0.6")
+        height.press("Enter")
+        page.wait_for_function(
+            "!document.getElementById('told').classList.contains('bad')", timeout=1000.0 * MOST
+        )
+        assert told.inner_text().startswith("t = ")
+
+
+#: A gamepad as a browser gives it: axes 0 and 1 of the left stick, 2 and 3 of the right one.
+GAMEPAD = """(axes) => {
+  navigator.getGamepads = () => [null, { index: 1, connected: true, axes, buttons: [] }, null, null];
+}"""
+
+
+def test_a_gamepad_moves_the_target(window: Window, setup: ScenarioSetup) -> None:
+    with driven(setup) as url:
+        page = opened(window, url)
+        for axes, row, sign in (
+            ([0.9, 0.0, 0.0, 0.0], 0, 1), ([-0.9, 0.0, 0.0, 0.0], 0, -1),
+            ([0.0, -0.9, 0.0, 0.0], 1, 1), ([0.0, 0.9, 0.0, 0.0], 1, -1),
+            ([0.0, 0.0, 0.0, -0.9], 2, 1), ([0.0, 0.0, 0.0, 0.9], 2, -1),
+        ):  # fmt: skip
+            before = target(page)
+            page.evaluate(GAMEPAD, axes)
+            page.wait_for_function(f"Math.abs(nmm.drive.targets[0].value[{row}] - {before[row]}) > 0.01")
+            page.evaluate(GAMEPAD, [0.0, 0.0, 0.0, 0.0])
+            change = target(page) - before
+            assert change[row] * sign > 0.0
+            assert np.count_nonzero(change) == 1
+        # A stick that is let go of is never quite at 0; without sticks, or pads, nothing goes wrong.
+        page.wait_for_function("nmm.drive.targets[0].awaited === undefined", timeout=1000.0 * MOST)
+        rest = target(page)
+        for pad in (
+            f"({GAMEPAD})([0.05, -0.1, 0.11, 0.1])",
+            f"({GAMEPAD})([])",
+            "navigator.getGamepads = () => []",
+        ):
+            page.evaluate(f"() => {{ {pad} }}")
+            draw_frames(page)
+            np.testing.assert_array_equal(target(page), rest)
+        # Half pushed it is half as fast: speed is that of the stick, whatever the rate of pictures.
+        gone = []
+        for push in (0.4, 0.8):
+            page.evaluate(GAMEPAD, [push, 0.0, 0.0, 0.0])
+            gone.append(
+                page.evaluate(
+                    """() => new Promise((done) => {
+                      const begin = (t0) => {
+                        const x0 = nmm.drive.targets[0].value[0];
+                        const next = (t) => {
+                          if (t - t0 < 900) return requestAnimationFrame(next);
+                          return done((nmm.drive.targets[0].value[0] - x0) / (t - t0));
+                        };
+                        requestAnimationFrame(next);
+                      };
+                      requestAnimationFrame(begin);
+                    })"""
+                )
+            )
+        assert gone[1] / gone[0] == pytest.approx(2.0, rel=0.35)
 
 
 def test_pictures_come_at_their_rate(window: Window, setup: ScenarioSetup) -> None:

@@ -9,6 +9,8 @@ import threading
 import time
 import urllib.error
 import urllib.request
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +22,10 @@ from tornado.ioloop import IOLoop
 from tornado.websocket import websocket_connect
 
 import nmm
+from nmm.arrays import Array
 from nmm.driving.driven import Driven
 from nmm.driving.messages import Aim, Order, Pick, parsed
+from nmm.driving.reaching import Reaching
 from nmm.driving.session import Session
 from nmm.driving.setups import RobotSetup, ScenarioSetup, Settings, Setup
 from nmm.errors import InputError, ScenarioError
@@ -180,6 +184,55 @@ def test_a_robot_without_a_scenario_holds_its_arm_where_it_is() -> None:
     driven.aim(0, there)
     moved(driven, 12.0)
     np.testing.assert_allclose(ee(driven), there, atol=2e-3)
+
+
+def test_a_target_out_of_reach_is_told_until_it_is_in_reach_again() -> None:
+    """The arm's first joint stays at its height; a platform that drives reaches any place below the arm's."""
+    driven = Driven(scenario())
+    assert driven.look().against == ""
+    first = Configuration(driven.robot, driven.q).placement("link1").translation
+    stretched = Configuration(driven.robot, driven.robot.q({})).placement("ee").translation  # arm upright
+    for height, far in ((stretched[2] + 0.05, True), (stretched[2] - 0.05, False), (3.0, True)):
+        driven.aim(0, np.array([4.0, -3.0, height]))
+        moved(driven, 0.1)
+        against = driven.look().against
+        assert bool(against) is far
+        if far:
+            assert "the target of ee is out of reach" in against
+            assert f"it is {height - first[2]:.3g} m above q1" in against
+    driven.aim(0, np.array([0.4, -0.6, 0.7]))
+    for _ in range(30):
+        moved(driven, 0.1)
+        assert driven.look().against == ""
+    driven.restart()
+    assert driven.look().against == ""
+
+
+def test_an_error_that_stands_is_told_and_one_that_falls_is_not() -> None:
+    driven = Driven(scenario())
+    controller, target = driven._controller, driven.targets[0].signal.value
+    step = controller.evaluate(0.0, driven.q)
+
+    def told(norms: Callable[[float], float], *, until: float = 3.0, goal: Array = target) -> list[str]:
+        reaching, found = Reaching(), []
+        for t in np.arange(0.0, until, 1.0 / 30.0):
+            error = np.array([0.0, 0.6, 0.8]) * norms(t)
+            found.append(reaching.words(controller, t, replace(step, error=error), goal))
+        return found
+
+    stands = told(lambda t: 0.5)
+    assert not any(stands[:30])  # at first nobody knows
+    assert all("does not fall: ‖e‖ stays at 0.5" in words for words in stands[31:])
+    assert not any(told(lambda t: 0.5 * np.exp(-0.05 * t)))  # a small gain
+    assert not any(told(lambda t: 40.0 - 0.5 * t))  # a long way under limits
+    assert not any(told(lambda t: 0.004))  # it is there
+    # What limits leave of the rate is told; a target that moves begins anew; a pause is no time.
+    limited = Reaching()
+    for t in (0.0, 1.1):
+        words = limited.words(controller, t, replace(step, error=np.ones(3), scale=np.array([0.25])), target)
+    assert words.endswith("limits leave 0.25 of the task's rate")
+    for _ in range(100):
+        assert limited.words(controller, 1.1, replace(step, error=np.ones(3)), target + 0.01) == ""
 
 
 def test_it_stands_still_and_says_why_until_it_is_told_otherwise() -> None:
@@ -460,7 +513,8 @@ def test_bad_input_is_a_line(tmp_path: Path) -> None:
         out, err = running.communicate(timeout=MOST)
         assert running.returncode == 2
         assert out == ""
-        assert err.splitlines()[-1].startswith("nmm drive: ")
+        (line,) = err.splitlines()  # nothing is warned of that is refused
+        assert line.startswith("nmm drive: ")
         assert words in err
 
 

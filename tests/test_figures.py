@@ -152,6 +152,45 @@ def test_a_held_target_is_marked_and_no_path() -> None:
     np.testing.assert_array_equal(moved.motion().desired, moved.desired)
 
 
+@pytest.mark.parametrize(
+    ("name", "across"),
+    [(PAPER[0], []), ("panda_mecanum_pose", ["y [m]"]), ("unicycle_3r_vertical_line", ["x [m]"])],
+)
+@pytest.mark.parametrize("width", [10.4, 3.5])
+def test_compared_paths_are_drawn_in_the_planes_in_which_they_lie(
+    name: str, across: list[str], width: float
+) -> None:
+    """Those that rise from the side, too; all of them inside the axes, a metre as long up as across."""
+    runs = two(run(name))
+    made = figures.comparison(runs, width=width)
+    check_legible(made)
+    sides = [axes for axes in made.axes if axes.get_ylabel() == "z [m]"]
+    assert [axes.get_xlabel() for axes in sides] == across
+    path = runs[0].path
+    assert path is not None
+    rows = {"x [m]": 0, "y [m]": 1, "z [m]": 2}
+    views = [axes for axes in made.axes if axes.get_ylabel() in ("y [m]", "z [m]")]
+    for axes in views:
+        seen = path[:, [rows[axes.get_xlabel()], rows[axes.get_ylabel()]]]
+        drawn = [line.get_xydata() for line in axes.lines if line.get_label() == f"RG: {runs[0].frame}"]
+        np.testing.assert_allclose(drawn[0], seen, atol=1e-12)
+        (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+        points = np.vstack([line.get_xydata() for line in axes.lines])
+        assert np.all((points > [left, low]) & (points < [right, high]))
+        box = axes.get_position().transformed(made.transSubfigure)
+        assert box.width / (right - left) == pytest.approx(box.height / (high - low), rel=1e-6)
+    assert len(views) == 1 + len(across)
+    if width > 6.0:  # no empty corner: panels reach as far down at the left as at the right, or nearly
+        lowest = [
+            min(box.y0 for box in boxes)
+            for boxes in (
+                [axes.get_position() for axes in made.axes if axes.get_position().x0 < 0.5],
+                [axes.get_position() for axes in made.axes if axes.get_position().x0 > 0.5],
+            )
+        ]
+        assert abs(lowest[0] - lowest[1]) * made.get_figheight() < 2.0
+
+
 def test_runs_without_a_sample_are_refused() -> None:
     empty = cut(run(PAPER[0]), 0)
     for make in (KINDS["stroboscopic"], KINDS["objective"], KINDS["overview"], KINDS["comparison"]):

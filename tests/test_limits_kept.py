@@ -297,11 +297,21 @@ def test_a_start_from_rest_is_not_warned_about() -> None:
 
 @pytest.mark.parametrize("velocity", [True, {"v": 1.0}, {"v": [0.2, 0.2], "omega": [-1.0, np.inf]}])
 def test_inputs_without_a_velocity_limit_are_named(velocity: bool | dict[str, object]) -> None:
-    """The file of this robot states none for its platform: limits of velocity leave it alone, and say so."""
-    robot = nmm.load("unicycle_3r")
+    """An arm on a platform without wheels: limits of velocity leave the platform alone, and say so."""
+    robot = nmm.load("small_arm", platform="unicycle")
     task = nmm.Task(nmm.Position("ee", "xy"), nmm.Circle([2, 0], 1.0, rate=0.3))
     controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), limits=nmm.Limits(velocity), dt=0.01)
     run = nmm.simulate(controller, {"q1": 0.3, "q2": 0.6}, 0.1, 0.01)
     stated = {*(velocity if isinstance(velocity, dict) else {})}
     platform = [name for name in robot.groups["platform"] if name not in stated]
     assert [name for name in run.summary()["without_velocity_limit"] if name in {"v", "omega"}] == platform
+
+
+def test_inputs_that_wheels_bound_are_not_named() -> None:
+    """Two wheels of 30 rad/s bound v and omega; a car's bound v, and its steering joint the rest."""
+    for name, arm in (("unicycle_3r", None), ("car_base", "small_arm")):
+        robot = nmm.load(name) if arm is None else nmm.mount(name, arm, at="arm_mount")
+        task = nmm.Task(nmm.Position("ee", "xy"), nmm.Circle([2, 0], 1.0, rate=0.3))
+        controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), limits=nmm.Limits(), dt=0.01)
+        run = nmm.simulate(controller, {"q1": 0.3, "q2": 0.6}, 0.1, 0.01)
+        assert run.summary()["without_velocity_limit"] == []

@@ -19,7 +19,7 @@ from ports import MOST, listening, wait_for
 
 import nmm
 from nmm.playback import LiveRun
-from nmm.playback.running import FPS, KEPT
+from nmm.playback.running import ALL, FPS, KEPT
 from nmm.playback.watching import AHEAD, Watching, counted
 from nmm.robots.configuration import Configuration
 from nmm.runs.trajectory import Trajectory
@@ -129,23 +129,24 @@ def test_time_passes_as_it_does_on_the_wall_and_pictures_are_counted() -> None:
 
 
 def test_a_page_that_comes_late_is_told_everything_so_far() -> None:
-    one = scenario(duration=1.5)
+    one = scenario(duration=60.0)  # however late: it is not over by itself
     with live(one) as (shown, run), LivePage(shown.url) as first:
         run()
-        wait_for(lambda: len(first.of("run")) > 12)
+        wait_for(lambda: any(unpacked(each["t"]).max(initial=0.0) > 0.2 for each in first.of("run")))
         with LivePage(shown.url) as late:
             wait_for(lambda: bool(late.of("run")))
             run_told = late.of("run")[0]
             t = unpacked(run_told["t"])
             assert t[0] == 0.0
             assert t[-1] > 0.2
+            first.says(ALL)
             wait_for(lambda: bool(late.of("whole")) and bool(first.of("whole")))
         np.testing.assert_array_equal(told(late)[1], told(first)[1])
         # One that comes after the end gets what `nmm play` shows.
         with LivePage(shown.url) as after:
             stage = next(json.loads(line) for line in after.hello if '"type":"stage"' in line)
             assert stage["live"] is False
-            assert stage["duration"] == pytest.approx(1.5)
+            assert stage["duration"] == pytest.approx(60.0)
             time.sleep(0.2)
             assert after.told == []
 
@@ -157,7 +158,7 @@ def test_the_clock_stands_until_somebody_looks() -> None:
         with LivePage(shown.url) as page:
             wait_for(lambda: bool(page.of("run")))
             assert unpacked(page.of("run")[0]["t"]).size <= 3
-            page.says('{"type":"all"}')
+            page.says(ALL)
             wait_for(lambda: bool(page.of("whole")))
 
 
@@ -190,7 +191,7 @@ def test_tasks_that_come_and_go_have_curves_where_they_are_active() -> None:
     with live(one) as (shown, run), LivePage(shown.url) as page:
         made = run()
         wait_for(lambda: len(page.of("run")) > 4 and page.of("run")[-1]["whole"])
-        page.says('{"type":"all"}')
+        page.says(ALL)
         wait_for(lambda: bool(page.of("whole")))
         names, t, values = told(page)
     at = np.searchsorted(made.t, t)

@@ -68,7 +68,41 @@ def test_it_grows_and_becomes_the_page_that_plays_it(window: Window) -> None:
         for i, name in enumerate(made.robot.q_names):
             assert values[name] == pytest.approx(made.q[k, i], abs=1e-6)
         assert page.locator("#status").inner_text() == ""
+        assert not page.evaluate("nmm.camera.following")  # the whole of it is in the picture
         assert page.evaluate("document.body.classList.contains('running')") is False
+
+
+def test_a_camera_that_somebody_has_moved_stays_where_it_is(window: Window) -> None:
+    """When the run has been shown, and its page becomes the one that plays it."""
+    place = "nmm.camera.place()"
+    window.page.set_viewport_size({"width": 1280, "height": 800})
+    with live(60.0) as (shown, run):
+        page = window.open(shown.url)
+        run()
+        page.wait_for_function("nmm.runs[0].t.length > 20")
+        page.keyboard.press("x")  # without a grid
+        page.mouse.move(300, 500)
+        page.mouse.down()
+        page.mouse.move(250, 520, steps=3)
+        page.mouse.up()
+        assert page.evaluate("nmm.camera.moved")
+        # It goes along with the robot: what stays is where it is beside it.
+        beside = """() => {
+          const [x, y, z] = nmm.camera.place();
+          viewer.scene.updateMatrixWorld(true);
+          const { matrixWorld } = nmm.node(nmm.motions[0].root);
+          const at = new MeshCat.THREE.Vector3().setFromMatrixPosition(matrixWorld);
+          return [x - at.x, y + at.z, z];
+        }"""
+        before = page.evaluate(beside)
+        page.get_by_role("button", name="Whole run").click()
+        page.wait_for_function("nmm.stage && !nmm.stage.live && nmm.player.time === nmm.stage.duration")
+        np.testing.assert_allclose(page.evaluate(beside), before, atol=1e-3)
+        assert page.evaluate("nmm.camera.following")
+        assert page.locator("#grid").get_attribute("aria-pressed") == "false"
+        page.keyboard.press("r")
+        page.wait_for_function("!location.hash.includes('camera')")
+        assert page.evaluate(place) != before
 
 
 def test_thirty_pictures_a_second_are_drawn_or_counted(window: Window, browser: Browser) -> None:

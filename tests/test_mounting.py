@@ -589,3 +589,52 @@ def test_axle_and_lock_of_a_scenario(tmp_path: Path) -> None:
     assert given.robot().q_names == ("x", "y", "theta")
     deck = Configuration(given.robot(), np.zeros(3)).placement("deck")
     np.testing.assert_allclose(deck.translation, [-0.2, -0.1, 0.0])
+
+
+MOUNTED = """\
+robot: {platform: car_base, arm: small_arm, limits: {v: 0.2}}
+q0: {q1: 0.3, q2: 0.4, q3: 0.8}
+duration: 0.4
+task: {kind: position, frame: ee, axes: x, reference: 4}
+resolver: {kind: pg}
+"""
+
+
+def test_limits_beside_a_mount_are_the_platforms(tmp_path: Path) -> None:
+    """As docs/robots.md has them: a run that exceeds them says so; one that keeps limits keeps them."""
+    path = tmp_path / "given.yaml"
+    path.write_text(MOUNTED, encoding="utf-8")
+    scenario = Scenario.load(path)
+    robot = scenario.robot()
+    assert dict(zip(robot.u_names, robot.u_limits, strict=True))["v"] == 0.2
+    free = scenario.run()
+    assert np.abs(free.u[:, 0]).max() > 0.3
+    assert any("inputs exceed their limits: v" in warning for warning in free.warnings)
+    kept = scenario.override("limits", True).run()
+    assert np.abs(kept.u[:, 0]).max() <= 0.2 * (1 + 1e-9)
+    # As resolved they are the platform's own, and it can be set by either path.
+    assert scenario.resolved()["robot"]["platform"]["limits"] == {"v": 0.2}
+    faster = scenario.override("robot.limits.v", 0.5).robot()
+    assert faster.u_limits[faster.input("v")] == 0.5
+    listed = scenario.override(
+        "robot", {"platform": "car_base", "arms": [{"arm": "small_arm"}], "limits": {"v": 1}}
+    )
+    assert listed.robot().u_limits[0] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("platform", "limits", "message"),
+    [
+        ("car_base", {"w": 1}, "unknown input 'w'; available: v, steering_rate"),
+        ("car_base", {"v": "fast"}, "robot.limits.v"),
+        ({"source": "car_base", "limits": {"v": 1}}, {"v": 2}, "robot.limits.v: expected once"),
+    ],
+)
+def test_limits_beside_a_mount_that_are_none(
+    platform: object, limits: dict[str, object], message: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "given.yaml"
+    path.write_text(MOUNTED, encoding="utf-8")
+    robot = {"platform": platform, "arm": "small_arm", "limits": limits}
+    with pytest.raises(ScenarioError, match=re.escape(message)):
+        Scenario.load(path, {"robot": robot}).robot()

@@ -70,6 +70,13 @@ def test_the_frame_runs_scripts_and_nothing_else(small_robot: Robot) -> None:
     assert page.rstrip().endswith("</html>")
 
 
+def test_what_is_not_trusted_says_so(small_robot: Robot) -> None:
+    """JupyterLab leaves out a frame of a notebook that is not trusted, and keeps the words in it."""
+    text = Page([drive(small_robot, duration=0.5)], title="a <b>")._repr_html_()
+    words = re.sub(r"<[^>]*>", "", text)
+    assert words == "a &lt;b&gt;: this page is drawn once the notebook is trusted."
+
+
 def test_what_has_no_samples_has_no_page(runs: list[nmm.Trajectory]) -> None:
     with pytest.raises(InputError, match="at least one"):
         Page([])

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -264,6 +266,83 @@ def test_zoom_takes_the_bar_along(plotted: Plotted) -> None:
     assert page.evaluate("nmm.player.range") == {"from": 0, "to": 6}
 
 
+#: What is written while all is drawn again: each text with its middle, px, and its canvas.
+WRITTEN = """() => {
+  const found = [];
+  const pen = CanvasRenderingContext2D.prototype;
+  const write = pen.fillText;
+  pen.fillText = function (text, x, y) {
+    const wide = this.measureText(text).width;
+    const left = { left: x, start: x, center: x - 0.5 * wide, right: x - wide }[this.textAlign];
+    found.push([this.canvas.id || this.canvas.parentElement.dataset.panel, text, left, left + wide, y]);
+    write.call(this, text, x, y);
+  };
+  nmm.plots.redraw();
+  pen.fillText = write;
+  return found;
+}"""
+#: A quantity that two decimals or a power of ten tell.
+NUMBER = re.compile(r"−?[\d.]+(e−?\d+)?")
+
+
+def test_every_axis_has_numbers_that_tell_two_values(plotted: Plotted) -> None:
+    """Also where limits stretch it, a curve does not move, or moves about a large value."""
+    page = plotted.page
+    page.evaluate("nmm.plots.open(nmm.plots.panels.map(({ id }) => id))")
+    lanes = page.evaluate("nmm.lanes.filter(({ panel }) => panel === 'inputs').length")
+    for name, values in {
+        "limits": "(i, n) => 0.3 * Math.sin(i / 20)",
+        "still": "() => 0.1",
+        "nothing": "() => 0",
+        "rounding": "(i) => (i % 2) * 3e-16",
+        "high": "(i) => 5000 + 0.02 * i",
+        "small": "(i) => 3e-7 * Math.cos(i / 9)",
+    }.items():
+        page.evaluate(
+            f"""() => nmm.runs.forEach((run) => nmm.lanes.forEach((lane) => {{
+              if (lane.panel !== "inputs") return;
+              const column = run.columns[lane.key];
+              column.values = Float32Array.from(run.t, {values});
+              column.limits = "{name}" === "limits" ? [-0.68, 0.68] : [null, null];
+            }}))"""
+        )
+        written = [one for one in page.evaluate(WRITTEN) if one[0] == "inputs"]
+        ticks = [one for one in written if NUMBER.fullmatch(one[1]) and one[3] < 56]
+        assert len({text for _, text, *_ in ticks}) >= 2, name
+        assert len(ticks) >= 2 * lanes
+        by_lane: dict[int, list[str]] = {}
+        for _, text, left, _, y in ticks:
+            assert left >= -1.0, (name, text)  # not cut off
+            by_lane.setdefault(int(y // 67), []).append(text)
+        for texts in by_lane.values():
+            assert 2 <= len(texts) <= 3
+            assert len(set(texts)) == len(texts), name
+
+
+@pytest.mark.parametrize(("first", "last"), [(0.0, 6.0), (1.37, 4.93), (2.3411, 2.3622), (5.02, 6.0)])
+def test_both_ends_of_the_time_axis_are_told(plotted: Plotted, first: float, last: float) -> None:
+    page = plotted.page
+    page.evaluate(f"nmm.plots.zoom({first}, {last})")
+    written = sorted([*one[2:4], one[1]] for one in page.evaluate(WRITTEN) if one[0] == "ruler")
+    assert written[0][2] == "t [s]"
+    times = [float(text) for _, _, text in written[1:]]
+    assert len(times) >= 3
+    assert times == sorted(set(times))
+    for told, wanted in ((times[0], first), (times[-1], last)):
+        assert told == pytest.approx(wanted, abs=0.003 * (last - first))
+    width = page.evaluate("document.getElementById('stack').clientWidth")
+    assert written[-1][1] <= width
+    for one, following in pairwise(written):
+        assert one[1] < following[0]
+    # Each stands where its time is, but at the ends, where it is moved into the picture.
+    low, high = page.evaluate(
+        "[nmm.curves.LEFT, document.getElementById('stack').clientWidth - nmm.curves.RIGHT]"
+    )
+    for left, right, text in written[2:-1]:
+        share = (float(text) - first) / (last - first)
+        assert 0.5 * (left + right) == pytest.approx(low + share * (high - low), abs=1.0)
+
+
 def test_the_address_is_the_state(plotted: Plotted) -> None:
     page = plotted.page
     page.evaluate("nmm.seek(2.5)")
@@ -293,6 +372,20 @@ def test_the_address_is_the_state(plotted: Plotted) -> None:
     assert page.evaluate("[nmm.state().t, nmm.camera.from, nmm.plots.opened()]") == [4, "front", ["sigma"]]
     page.evaluate("location.hash = '#plots=none'")
     page.wait_for_function("!document.body.classList.contains('plots')")
+    # The camera, once somebody has put it somewhere: until he asks for the whole scene again.
+    assert "camera" not in page.url
+    page.mouse.move(400, 300)
+    page.mouse.down()
+    page.mouse.move(340, 330, steps=3)
+    page.mouse.up()
+    page.wait_for_function("location.hash.includes('camera=') && location.hash === nmm.address.text()")
+    address, placed = page.url, page.evaluate("nmm.camera.place()")
+    page.goto("about:blank")
+    page.goto(address)
+    page.wait_for_function("!document.body.classList.contains('loading')")
+    np.testing.assert_allclose(page.evaluate("nmm.camera.place()"), placed, rtol=1e-5, atol=1e-5)
+    page.keyboard.press("r")
+    page.wait_for_function("!location.hash.includes('camera=')")
 
 
 def test_every_key_acts_and_none_is_stolen(plotted: Plotted) -> None:

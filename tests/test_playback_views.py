@@ -65,6 +65,45 @@ def test_robots_are_set_apart_with_their_paths(robot: Robot, window: Window, tmp
     assert not page.evaluate("nmm.node('/nmm/apart 1').visible")
 
 
+def test_a_run_that_is_hidden_takes_its_own_copies_along(
+    robot: Robot, window: Window, tmp_path: Path
+) -> None:
+    """Set apart, each has a desired path and a target of its own; over one another they share them."""
+    first = drive(robot, label="RG")
+    goal, path = np.array([1.0, 2.0, 0.5]), np.column_stack([first.q[:, :2], np.ones(len(first.q))])
+    motions = [
+        Motion(robot, first.t, first.q, first.u, frame="ee", label=name, target=goal, desired=path)
+        for name in ("RG", "PG", "EJ")
+    ]
+    page = window.open(file_url(motions, tmp_path))
+    # Drawn, node by node: the shared ones, then each copy's; then all dashes, by their own button.
+    drawn = """() => {
+      const seen = (object) => !object || (object.visible && seen(object.parent));
+      const dashes = (path) => {
+        const found = [];
+        nmm.node(path).traverse((part) => part.isMesh && found.push(seen(part)));
+        return found;
+      };
+      return ["/nmm/desired 0", "/nmm/apart 1", "/nmm/apart 2"].map((path) => {
+        const all = dashes(path);
+        return [all.some(Boolean), all.every(Boolean)];
+      });
+    }"""
+    both, none, target = [True, True], [False, False], [True, False]
+    page.evaluate("nmm.apart.set(1)")
+    assert page.evaluate(drawn) == [both, both, both]
+    for i in range(3):
+        page.locator("#legend button").nth(i).click()
+        assert page.evaluate(drawn) == [none if k == i else both for k in range(3)]
+        page.locator("#legend button").nth(i).click()
+    page.locator("#paths").click()
+    assert page.evaluate(drawn) == [none, target, target]  # the targets are no paths
+    page.locator("#paths").click()
+    page.locator("#legend button").first.click()
+    page.evaluate("nmm.apart.set(0)")
+    assert page.evaluate(drawn) == [both, none, none]  # those of the others, too
+
+
 def test_one_robot_is_not_set_apart(small_robot: Robot, window: Window, tmp_path: Path) -> None:
     page = window.open(file_url([drive(small_robot)], tmp_path) + "#apart=1")
     assert not page.get_by_label("Apart").is_visible()
@@ -136,3 +175,67 @@ def test_names_and_ghosts_texts_are_smaller_than_the_robot(
         assert len(heights) == 3 + 2 + 6  # axes, names, ghosts
         np.testing.assert_array_less(heights, 22.01)
         np.testing.assert_array_less(14.0, heights)
+
+
+#: For each text of a ghost: how far above the highest point of its own, and aside of it, and its box, px.
+TEXTS = """() => {
+  const view = document.getElementById("view");
+  const [width, height] = [view.clientWidth, view.clientHeight];
+  const seen = (p) => {
+    const { x, y } = p.clone().project(viewer.camera);
+    return [0.5 * (1 + x) * width, 0.5 * (1 - y) * height];
+  };
+  viewer.render();
+  return nmm.motions.flatMap(({ path }) => [0, 1, 2, 3, 4, 5].map((k) => {
+    const node = nmm.viewer.scene_tree.find(nmm.split(`${path}/ghosts/${k}`));
+    let top = null;
+    node.find(["robot"]).object.traverse((part) => {
+      if (!part.isMesh) return;
+      const { position } = part.geometry.attributes;
+      for (let i = 0; i < position.count; i++) {
+        const p = new MeshCat.THREE.Vector3().fromBufferAttribute(position, i).applyMatrix4(part.matrixWorld);
+        if (top === null || p.y > top.y) top = p;
+      }
+    });
+    let sprite = null;
+    node.find(["text"]).object.traverse((part) => part.isSprite && (sprite = part));
+    const unit = height / (2 * Math.tan(Math.PI / 10));
+    const [wide, high] = [sprite.scale.x * unit, sprite.scale.y * unit];
+    const [x, y] = seen(new MeshCat.THREE.Vector3().setFromMatrixPosition(sprite.matrixWorld));
+    const [left, bottom] = [x - sprite.center.x * wide, y + sprite.center.y * high];
+    const [tx, ty] = seen(top);
+    const box = [left, bottom - high, left + wide, bottom];
+    return { above: ty - bottom, aside: Math.abs(left + 0.5 * wide - tx), box };
+  }));
+}"""
+
+
+@pytest.mark.parametrize("size", [(420, 800), (1280, 800)])
+@pytest.mark.parametrize("way", [0.3, 6.0])
+def test_texts_of_ghosts_stand_at_their_own_and_not_on_one_another(
+    robot: Robot, window: Window, tmp_path: Path, size: tuple[int, int], way: float
+) -> None:
+    """Copies that are far apart, and copies that are nearly at one place."""
+    q = np.zeros((60, robot.n))
+    q[:, 0] = np.linspace(0.0, way, 60)
+    motion = Motion(robot, np.linspace(0.0, 6.0, 60), q, np.zeros((60, robot.n_u)))
+    window.page.set_viewport_size({"width": size[0], "height": size[1]})
+    page = window.open(file_url([motion], tmp_path, ghosts=6))
+    for side in ("iso", "front", "top"):
+        page.evaluate(f"nmm.camera.look('{side}')")
+        found = page.evaluate(TEXTS)
+        assert len(found) == 6
+        cards = page.evaluate(
+            """["heading", "tools", "bar"].map((id) => document.getElementById(id).getBoundingClientRect())
+               .map(({ left, top, right, bottom }) => [left, top, right, bottom])"""
+        )
+        boxes = [*cards, *(one["box"] for one in found)]
+        for i, one in enumerate(found):
+            if way > 1.0 and side == "iso":  # there is room
+                assert one["above"] == pytest.approx(3.0, abs=1.5)
+                assert one["aside"] < 2.0
+            left, top, right, bottom = one["box"]
+            assert left >= 0.0
+            assert right <= page.evaluate("document.getElementById('view').clientWidth")
+            for other in boxes[: len(cards) + i]:
+                assert right <= other[0] or other[2] <= left or bottom <= other[1] or other[3] <= top

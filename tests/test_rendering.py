@@ -120,7 +120,7 @@ def test_an_interrupted_video_leaves_nothing(tmp_path: Path) -> None:
     time.sleep(0.5)
     running.send_signal(signal.SIGINT)
     out, err = running.communicate(timeout=MOST)
-    assert (running.returncode, out, err) == (130, "", "")
+    assert (running.returncode, out, err) == (130, "", "nmm render: interrupted\n")
     assert [path.name for path in tmp_path.iterdir()] == ["run"]
 
 

@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import nmm
+from nmm import memory
 from nmm.robots.held import Held
 from nmm.rollouts import kept
 from nmm.rollouts.measures import least_singular_value
@@ -203,7 +204,7 @@ def test_bad_input_is_named(given: dict[str, object], words: str) -> None:
 
 
 def test_what_does_not_fit_in_memory_is_asked_before(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kept, "free_memory", lambda: 1e5)
+    monkeypatch.setattr(memory, "free_memory", lambda: 1.8e6)
     with pytest.raises(nmm.InputError, match=r"GB are free; keep less, every so many samples"):
         nmm.rollout(controller(), starts(40), 1.0, 0.001, keep=("q",))
     assert len(nmm.rollout(controller(), starts(2), 0.1, 0.01)) == 2  # measures alone need none

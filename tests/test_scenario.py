@@ -85,7 +85,7 @@ def test_numbers_of_numpy_are_numbers() -> None:
         ("dt: *nobody", r"given\.yaml:1: not valid YAML: found undefined alias"),
         ("dt: &a [*a]", r"given\.yaml:1: an alias"),
         ("? [a, b]\n: 1", r"given\.yaml:1: expected a name as key"),
-        ("dt: " + "[" * 1200 + "]" * 1200, r"given\.yaml: not valid YAML: nested too deeply"),
+        ("dt: " + "[" * 1200 + "]" * 1200, r"given\.yaml:1: not valid YAML: nested too deeply"),
         ("dt: \x00", r"given\.yaml: not valid YAML"),
         (
             "a: &a [x,x,x,x,x,x,x,x,x]\n"

@@ -46,3 +46,25 @@ assert np.array_equal(allocating(product)(A, A), A @ A)
 assert "scipy.linalg" in sys.modules
 """
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_kept_kernels_do_not_load_what_compiles() -> None:
+    """Nor do those that make arrays; what is compiled after them finds all that it needs."""
+    code = """
+import sys
+import numpy as np
+import nmm
+from nmm.kernels.compiled import allocating
+from nmm.robots.ahead import Ahead
+q, _ = Ahead(nmm.load("unicycle_2r"))(np.zeros(5), 0.5)
+assert abs(q[0] - 0.5) < 1e-12
+print("numba.np.linalg" in sys.modules)
+def largest(values):
+    return np.sort(values)[-1]
+assert allocating(largest)(np.array([1.0, 3.0, 2.0])) == 3.0
+"""
+    _, second = (
+        subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
+        for _ in range(2)
+    )
+    assert second == "False\n"

@@ -233,6 +233,38 @@ def test_the_robot_is_in_the_picture_also_after_it_moved(
             assert np.abs(page.evaluate(PROJECT, points)).max() < 1.0
 
 
+def test_the_camera_comes_along_where_the_arm_bends_out_of_the_picture(
+    robot_3r: Robot, window: Window
+) -> None:
+    """Unless somebody has moved it."""
+    window.page.set_viewport_size({"width": 1280, "height": 800})
+    outside = """() => {
+      viewer.camera.updateMatrixWorld();
+      return nmm.camera.held().some((p) => {
+        const { x, y } = p.project(viewer.camera);
+        return Math.abs(x) > 1 || Math.abs(y) > 1;
+      });
+    }"""
+    with shown(robot_3r) as url:
+        page = window.open(url)
+        page.evaluate("nmm.joints.set({ q2: -1.4, q3: 0 })")  # folded, and so fitted
+        page.locator("#reset").click()
+        distance = "viewer.camera.position.distanceTo(nmm.viewer.controls.target)"
+        near = page.evaluate(distance)
+        slider = page.locator('input[data-name="q2"]')
+        for angle in (-0.7, 0.0, 0.8, 1.5):
+            slider.fill(str(angle))
+            assert not page.evaluate(outside)
+        assert page.evaluate(distance) > near
+        page.evaluate("nmm.joints.set({ q2: -1.4 })")
+        page.locator("#reset").click()
+        page.evaluate("nmm.camera.moved = true")
+        placed = page.evaluate("nmm.camera.place()")
+        slider.fill("1.5")
+        np.testing.assert_allclose(page.evaluate("nmm.camera.place()"), placed, atol=1e-9)
+        assert page.evaluate(outside)
+
+
 def test_numbers_and_ellipsoid_follow_the_sliders(robot_3r: Robot, window: Window) -> None:
     def answered() -> None:
         page.wait_for_function("nmm.task.asked > 0 && nmm.task.answered === nmm.task.asked")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import gc
 import os
 import sys
@@ -11,7 +12,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from nmm.cli.groups import Browser, Ellipsoids, Figures, command
+from nmm.cli.groups import Browser, Ellipsoids, Figures, OfRobot, command
 from nmm.cli.interrupts import raise_interrupts
 from nmm.cli.mapping import map_measures
 from nmm.cli.options import (
@@ -21,7 +22,6 @@ from nmm.cli.options import (
     ScenarioArgument,
     SetOption,
     out_option,
-    resolvers_of,
     settings_of,
 )
 from nmm.cli.output import complain, tell_what_takes_long
@@ -29,12 +29,14 @@ from nmm.cli.redundancy import laps, redundancy
 from nmm.cli.robot_commands import check, drive, info, robots, scenarios, view
 from nmm.cli.singularities import singularities
 from nmm.cli.sweeping import sweep
-from nmm.errors import InputError, NmmError
+from nmm.errors import InputError, NmmError, RunError
 
 #: What typer raises for wrong usage: options that do not exist, arguments that are missing.
 _USAGE_ERROR: type[Exception] = typer.BadParameter.mro()[2]
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+#: Their exit status tells how a run ended.
+TELLING = ("run", "compare", "laps", "paper", "sweep")
 
 app = typer.Typer(
     name="nmm",
@@ -51,6 +53,13 @@ def _version(wanted: bool) -> None:
 
         print(f"nmm {__version__}")
         raise typer.Exit
+
+
+def _always_written(wanted: bool) -> None:
+    if wanted:
+        raise InputError(
+            "--html: there is no need: `nmm compare` always writes playback.html, with all runs in it"
+        )
 
 
 @app.callback(invoke_without_command=True)
@@ -87,6 +96,7 @@ def run(
     resolver: ResolverOption = None,
     settings: SetOption = None,
     limits: LimitsOption = None,
+    of_robot: OfRobot,
     out: Annotated[Path | None, out_option("runs/<scenario>-<resolver>")] = None,
     html: Annotated[
         bool,
@@ -118,11 +128,14 @@ def run(
     with --ellipsoids ellipses.png among them.
     Ctrl-C ends the run and writes the part that was computed, marked incomplete.
     """
+    from nmm.cli.chosen_resolvers import chosen
     from nmm.cli.runs import run_scenario
 
+    if not play:
+        browser.refuse("--play")
     return run_scenario(
         scenario,
-        resolver,
+        None if resolver is None else chosen(resolver, "--resolver"),
         settings_of(settings),
         limits,
         out,
@@ -131,6 +144,7 @@ def run(
         **browser.keywords(),
         ellipsoids=ellipsoids.wanted(),
         figures=figures.options(),
+        of_robot=of_robot.keywords(),
     )
 
 
@@ -142,31 +156,37 @@ def compare(
     resolvers: ResolversOption = "rg,pg",
     settings: SetOption = None,
     limits: LimitsOption = None,
+    of_robot: OfRobot,
     out: Annotated[Path | None, out_option("runs/<scenario>-compare")] = None,
+    html: Annotated[bool, typer.Option("--html", hidden=True, callback=_always_written)] = False,
     ellipsoids: Ellipsoids,
     figures: Figures,
 ) -> int:
-    """Run a scenario with several resolvers.
+    """Run a scenario with several resolvers, or with one at several settings.
 
     One table, one figure, one playback.
 
     \b
     nmm compare unicycle_2r_position
     nmm compare unicycle_2r_pointing --resolvers rg,pg,ej --set resolver.alpha=5
+    nmm compare unicycle_2r_position --resolvers rg,rg:alpha=5,pg:alpha=50
+    nmm compare unicycle_2r_position --resolvers rg,my_laws.py:law
 
     The folder holds comparison.png, playback.html (all robots in one scene), summary.json and, for each
     resolver, a folder with its run.
     """
+    from nmm.cli.chosen_resolvers import several
     from nmm.cli.runs import compare_resolvers
 
     return compare_resolvers(
         scenario,
-        resolvers_of(resolvers),
+        several(resolvers, "--resolvers"),
         settings_of(settings),
         limits,
         out,
         ellipsoids=ellipsoids.wanted(),
         figures=figures.options(),
+        of_robot=of_robot.keywords(),
     )
 
 
@@ -276,24 +296,37 @@ def status_of(arguments: Sequence[str]) -> int:
         prefix = f"nmm {arguments[0]}"
     try:
         result = app(args=list(arguments), prog_name="nmm", standalone_mode=False)
-        sys.stdout.flush()
+        _flush()
+        if result == INTERRUPTED:
+            return _complain(prefix, "interrupted", INTERRUPTED)
         return result if isinstance(result, int) else OK
     except KeyboardInterrupt:
-        return INTERRUPTED
-    except BrokenPipeError:
+        return _complain(prefix, "interrupted", INTERRUPTED)
+    except (BrokenPipeError, SystemExit):  # typer makes the latter of the former
         _discard_output()
-        return FAILED
+        if prefix.rpartition(" ")[2] not in TELLING:  # who reads no further has what he wanted
+            return OK
+        return _complain(prefix, "nobody reads the output any more; what is written is whole", FAILED)
     except InputError as error:
         return _complain(prefix, str(error), BAD_INPUT)
     except NmmError as error:
         return _complain(prefix, str(error), FAILED)
-    except typer.Abort:
-        return INTERRUPTED
+    except typer.Abort as error:
+        if isinstance(error.__cause__, EOFError):
+            return _complain(prefix, "what was read ended too early", FAILED)
+        return _complain(prefix, "interrupted", INTERRUPTED)
+    except MemoryError:
+        return _complain(prefix, "there is not enough memory for this", FAILED)
     except _USAGE_ERROR as error:
         message = error.format_message() if hasattr(error, "format_message") else str(error)
         return _complain(prefix, f"{message} (see {prefix} --help)", BAD_INPUT)
     except OSError as error:
-        return _complain(prefix, str(error), FAILED)
+        if error.errno == errno.ENAMETOOLONG:
+            return _complain(prefix, f"{error.filename}: {error.strerror}", BAD_INPUT)
+        if error.filename is None:
+            _discard_output()  # it may have been that: nothing of it is tried again at the end
+        what = "cannot write or read" if error.filename is None else error.filename
+        return _complain(prefix, f"{what}: {error.strerror or error}", FAILED)
 
 
 def _commands() -> list[str]:
@@ -309,13 +342,34 @@ def _complain(prefix: str, text: str, status: int) -> int:
     return status
 
 
+def _flush() -> None:
+    """What is printed goes out; `RunError` where it cannot (a full disk)."""
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        _discard_output()
+        raise RunError(f"the output cannot be written: {error.strerror}") from None
+
+
 def _discard_output() -> None:
     """The reader of our output has gone (`nmm info | head -1`): write the rest to nowhere."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+
+
+def _open_streams() -> None:
+    """Streams that were closed (`nmm info >&-`) go nowhere: the next file opened would be taken for them."""
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            while (handle := os.open(os.devnull, os.O_RDWR)) < number:
+                pass
+            setattr(sys, name, os.fdopen(handle, "w" if number else "r", encoding="utf-8"))
 
 
 def main() -> NoReturn:
     """Entry point of `nmm` and `python -m nmm`."""
+    _open_streams()
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # a terminal that knows no Greek gets "?"

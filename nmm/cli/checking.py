@@ -19,7 +19,14 @@ if TYPE_CHECKING:
 OK, BAD_INPUT = 0, 2
 
 
-def check_file(file: str, arguments: Mapping[str, object], package_dirs: Sequence[Path]) -> int:
+def check_file(
+    file: str,
+    arguments: Mapping[str, object],
+    package_dirs: Sequence[Path],
+    platform: str | None = None,
+    lock: Mapping[str, float] | None = None,
+    wheels: Sequence[str] | Mapping[str, float] | None = None,
+) -> int:
     """Print every problem and warning, a line each; 2 when there are problems, else 0 and what it holds."""
     from nmm.robots.loading.packages import package_file
     from nmm.robots.loading.report import report
@@ -28,7 +35,7 @@ def check_file(file: str, arguments: Mapping[str, object], package_dirs: Sequenc
         path = package_file(file, package_dirs)
     else:
         path = bundled_robots().get(file, Path(file))
-    made = report(path, arguments, package_dirs)
+    made = report(path, arguments, package_dirs, platform=platform, lock=lock, wheels=wheels)
     shown = os.path.relpath(path) if file in bundled_robots() else file
     for problem in made.problems:
         print(_line(shown, problem, made))

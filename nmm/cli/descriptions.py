@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import degrees, isfinite
 from typing import TYPE_CHECKING, Any, cast
 
 from nmm.cli.output import show_table, show_text
+from nmm.cli.subjects import scenario_with
 from nmm.errors import InputError
+from nmm.robots.coordinates import UNLIMITED
+from nmm.robots.wheel_rates import wheel_rates
 
 if TYPE_CHECKING:
     from nmm.arrays import Array
@@ -17,10 +20,13 @@ if TYPE_CHECKING:
     from nmm.robots.robot import Robot
     from nmm.robots.wheel import Wheel
 
-#: An angle beyond this many turns is a joint without limits.
-UNBOUNDED = 1e6
 #: Where the kind of platform comes from, for `Provenance.platform`.
-_CHOSEN = {"file": "declared in the file", "default": "by default"}
+_CHOSEN = {
+    "file": "declared in the file",
+    "wheels": "by its wheels",
+    "base": "by its base of joints",
+    "default": "by default",
+}
 
 
 def describe_robot(source: str | None, scenario: str | None, **loading: Any) -> None:
@@ -29,18 +35,16 @@ def describe_robot(source: str | None, scenario: str | None, **loading: Any) -> 
 
     if source is None and scenario is None:
         raise InputError("expected ROBOT, a bundled name or a file, or --scenario SCENARIO, which has one")
-    if source is None and any(loading.values()):
-        raise InputError(
-            "--platform, --lock, --axle and --package-dir are for ROBOT, a scenario says its own"
-        )
+    if source is None and any(loading[key] for key in ("platform", "axle", "package_dirs")):
+        raise InputError("--platform, --axle and --package-dir are for ROBOT, a scenario says its own")
     given: Robot | None = None
     if source is not None:
-        given = load(source, **loading, missing_meshes="skip")
+        given = load(source, **{"missing_meshes": "skip", **loading})
     task = [("position in the plane", 2), ("position in space", 3), ("pose in space", 6)]
     without: Sequence[str] | None = None
     steered: Steered | None
     if scenario is not None:
-        name, controller, q0 = _of_scenario(scenario, given)
+        name, controller, q0 = _of_scenario(scenario, given, loading)
         from nmm.control.idle_inputs import inputs_without_effect
 
         given = controller.robot
@@ -62,13 +66,14 @@ def describe_robot(source: str | None, scenario: str | None, **loading: Any) -> 
     _show_loading(robot)
 
 
-def _of_scenario(name: str, robot: Robot | None) -> tuple[str, Controller, Array]:
+def _of_scenario(name: str, robot: Robot | None, loading: Mapping[str, Any]) -> tuple[str, Controller, Array]:
     """A scenario's name, its controller (on another robot, if one is given), and its start."""
     from nmm.scenario import Scenario
     from nmm.scenario.keys import KeyedError
 
     scenario = Scenario.load(name)
     if robot is None:
+        scenario = scenario_with(scenario, loading)
         controller = scenario.controller()
     else:
         try:
@@ -101,9 +106,10 @@ def _show(robot: Robot, tasks: Sequence[tuple[str, int]]) -> None:
         show_text(f"platform {name}: {value}")
     show_text()
     if robot.wheels:
+        known, _ = wheel_rates(robot)
         show_table(
-            ["wheel", "radius", "on", "swivels on", "rollers", "centre there"],
-            [_wheel(wheel) for wheel in robot.wheels],
+            ["wheel", "radius", "limit", "on", "swivels on", "rollers", "centre there"],
+            [_wheel(wheel, kept=wheel.joint in known) for wheel in robot.wheels],
             numeric=["radius"],
         )
         show_text()
@@ -132,13 +138,15 @@ def _arm(robot: Robot, joint: str) -> str:
 
 
 def _limit(value: float) -> str:
-    return f"{value + 0.0:.4g}" if isfinite(value) and abs(value) < UNBOUNDED else "-"  # no -0
+    return f"{value + 0.0:.4g}" if isfinite(value) and abs(value) < UNLIMITED else "-"  # no -0
 
 
-def _wheel(wheel: Wheel) -> list[str]:
+def _wheel(wheel: Wheel, *, kept: bool) -> list[str]:
+    limit = f"{wheel.velocity:.4g} rad/s" if isfinite(wheel.velocity) else "-"
     return [
         wheel.joint,
         f"{wheel.radius:g} m",
+        limit if kept or limit == "-" else f"{limit}, not kept",
         "the root's body" if wheel.carrier == "theta" else wheel.carrier,
         wheel.swivel or "-",
         f"{degrees(wheel.roller):g}°" if wheel.roller else "-",

@@ -15,7 +15,7 @@ def drive_subject(
     from nmm.driving import RobotSetup, ScenarioSetup, drive
     from nmm.driving.setups import Setup
 
-    subject = studied(source, tasks=tasks, usual_task="position", **asked)
+    subject = studied(source, tasks=tasks, usual_task="position", decide=False, **asked)
     setup: Setup
     if subject.controller is None or subject.scenario is None:
         subject.robot.check_limits(subject.q)

@@ -16,6 +16,7 @@ from nmm.cli.options import (
     EllipsoidsOption,
     FormatOption,
     LockOption,
+    MissingMeshesOption,
     NoOpenOption,
     PackageOption,
     PlatformOption,
@@ -23,12 +24,14 @@ from nmm.cli.options import (
     SubjectArgument,
     SubjectSetOption,
     TaskOption,
+    WheelsOption,
     WidthOption,
     axle_of,
     lock_of,
     names_of,
+    wheels_of,
 )
-from nmm.errors import expect_known
+from nmm.errors import InputError, expect_known
 
 if TYPE_CHECKING:
     from nmm.runs.ellipsoid_options import Wanted
@@ -83,19 +86,35 @@ def _option(parameter: inspect.Parameter, hint: Any) -> inspect.Parameter:
 
 
 @dataclass(frozen=True)
-class Loading:
+class OfRobot:
+    """What is made of a robot's joints and meshes, of a scenario's robot too."""
+
+    lock: LockOption = None
+    wheels: WheelsOption = None
+    missing_meshes: MissingMeshesOption = None
+
+    def keywords(self) -> dict[str, Any]:
+        """As `nmm.load` takes them, without those not given."""
+        given = {
+            "lock": lock_of(self.lock) or None,
+            "wheels": wheels_of(self.wheels),
+            "missing_meshes": self.missing_meshes,
+        }
+        return {name: value for name, value in given.items() if value is not None}
+
+
+@dataclass(frozen=True)
+class Loading(OfRobot):
     """How a robot's file is loaded."""
 
     platform: PlatformOption = None
-    lock: LockOption = None
     axle: AxleOption = None
     package_dir: PackageOption = None
 
     def keywords(self) -> dict[str, Any]:
         """As `nmm.load` takes them."""
-        return {
+        return super().keywords() | {
             "platform": self.platform,
-            "lock": lock_of(self.lock),
             "axle": axle_of(self.axle),
             "package_dirs": list(self.package_dir or ()),
         }
@@ -125,6 +144,12 @@ class Browser:
     def keywords(self) -> dict[str, Any]:
         """As `nmm.playback` takes them."""
         return {"port": self.port, "open_browser": not self.no_open}
+
+    def refuse(self, needed: str) -> None:
+        """`InputError` where something is asked of a page that only the option `needed` shows."""
+        asked = ["--port"] * (self.port is not None) + ["--no-open"] * self.no_open
+        if asked:
+            raise InputError(f"{asked[0]}: there is a page only with {needed}, which is not given")
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,9 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGALRM)
 #: Between two looks whether the import is through, s.
 AGAIN = 0.02
 
-#: Their code catches, or cannot stand, an interrupt.
-DEAF = ("importlib", "pydantic")
+#: Their code catches, or cannot stand, an interrupt: LLVM calls llvmlite back, and goes on without what an
+#: interrupted call was to keep.
+DEAF = ("importlib", "pydantic", "llvmlite")
 
 
 def raise_interrupts() -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from nmm.cli.output import show_table
 from nmm.errors import InputError
+from nmm.words import quoted
 
 if TYPE_CHECKING:
     from nmm.analysis.maps.result import Map
@@ -69,7 +70,7 @@ def counts_of(text: str) -> tuple[int, int]:
     """ "500" or "300x200"."""
     words = text.lower().split("x")
     if len(words) > 2 or not all(word.strip().isdecimal() for word in words):
-        raise InputError(f"--samples: expected a whole number, or two as in 300x200, got {text!r}")
+        raise InputError(f"--samples: expected a whole number, or two as in 300x200, got {quoted(text)}")
     return int(words[0]), int(words[-1])
 
 
@@ -80,7 +81,7 @@ def ranges_of(given: Sequence[str] | None) -> dict[str, tuple[float, float]]:
         name, equals, values = text.partition("=")
         name = name.strip()
         if not equals or not name:
-            raise InputError(f"--range: expected NAME=LOWER:UPPER, as in q1=-pi:pi, got {text!r}")
+            raise InputError(f"--range: expected NAME=LOWER:UPPER, as in q1=-pi:pi, got {quoted(text)}")
         if name in found:
             raise InputError(f"--range: {name} is given twice")
         found[name] = range_of(values, f"--range: {name}")
@@ -93,7 +94,7 @@ def range_of(text: str, option: str) -> tuple[float, float]:
 
     words = text.split(":")
     if len(words) != 2:
-        raise InputError(f"{option}: expected LOWER:UPPER, as in -pi:pi, got {text!r}")
+        raise InputError(f"{option}: expected LOWER:UPPER, as in -pi:pi, got {quoted(text)}")
     try:
         lower, upper = (evaluate(word) for word in words)
     except ValueError as error:

@@ -10,7 +10,7 @@ import typer
 
 from nmm.errors import InputError
 from nmm.kinds import PLATFORMS, RESOLVERS, TASKS
-from nmm.words import listed
+from nmm.words import listed, quoted
 
 ROBOT_HELP = "A bundled name (see `nmm robots`), a .urdf or .xacro file, or package://PACKAGE/PATH."
 
@@ -53,7 +53,24 @@ LockOption = Annotated[
     list[str] | None,
     typer.Option(
         metavar="JOINT=VALUE",
-        help="Fix a joint at a value, rad or m; arithmetic with pi will do. May be repeated.",
+        help="Fix a joint at a value, rad or m; arithmetic with pi will do. '*finger*=0' fixes all that "
+        "match. May be repeated.",
+    ),
+]
+WheelsOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="JOINT[=RADIUS],...",
+        help="The joints that only roll, each with its radius in m or all without; none for no wheels.",
+        show_default="those named so",
+    ),
+]
+MissingMeshesOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="error|skip",
+        help="What to do about meshes that are not there: refuse the robot, or leave their shapes out.",
+        show_default="the scenario's; skip to look at a robot, else error",
     ),
 ]
 AxleOption = Annotated[
@@ -113,7 +130,7 @@ ResolverOption = Annotated[
         metavar="|".join(RESOLVERS),
         help=f"Resolve the redundancy with the "
         f"{listed([f'{RESOLVERS.words(name)} ({name})' for name in RESOLVERS], 'or')}, "
-        "with those of the scenario's settings that it knows.",
+        "with those of the scenario's settings that it knows; or as in --resolvers of `nmm compare`.",
     ),
 ]
 ResolversOption = Annotated[
@@ -177,8 +194,14 @@ def out_option(default: str) -> Any:
 
 
 def resolvers_of(given: str) -> list[str]:
-    """The kinds in `--resolvers`, each once."""
-    return list(dict.fromkeys(names_of(given, "--resolvers", "kinds with commas between them, as in rg,pg")))
+    """The kinds in `--resolvers`; `InputError` for one that is given twice: both runs would be the same."""
+    kinds = names_of(given, "--resolvers", "kinds with commas between them, as in rg,pg")
+    twice = next((kind for kind in kinds if kinds.count(kind) > 1), None)
+    if twice is not None:
+        raise InputError(
+            f"--resolvers: expected each kind once, got {twice} {kinds.count(twice)} times in {given!r}"
+        )
+    return kinds
 
 
 def names_of(given: str, option: str, expected: str = "names with commas between them") -> list[str]:
@@ -224,6 +247,18 @@ def values_of(given: Sequence[str] | None, option: str, expected: str) -> dict[s
     return values
 
 
+def wheels_of(given: str | None) -> list[str] | dict[str, float] | None:
+    """The `--wheels` option: joints, or the radius (m) of each; none of them for "none"."""
+    if given is None:
+        return None
+    names = names_of(given, "--wheels", "JOINT,JOINT,... or JOINT=RADIUS,...")
+    if names == ["none"]:
+        return []
+    if not any("=" in name for name in names):
+        return names
+    return values_of(names, "--wheels", "a radius for each, as in left=0.1,right=0.1, or for none")
+
+
 def axle_of(given: str | None) -> str | list[float] | None:
     """The `--axle` option: a frame, or x, y (and z), m."""
     if given is None or "," not in given:
@@ -241,6 +276,6 @@ def _pairs(given: Sequence[str] | None, option: str, expected: str) -> list[tupl
     for text in given or ():
         key, equals, value = text.partition("=")
         if not equals or not key.strip():
-            raise InputError(f"{option}: expected {expected}, got {text!r}")
+            raise InputError(f"{option}: expected {expected}, got {quoted(text)}")
         pairs.append((key.strip(), value))
     return pairs

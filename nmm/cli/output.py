@@ -5,14 +5,18 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
+
+from nmm.words import one_line, printable
 
 if TYPE_CHECKING:
     from rich.console import Console, JustifyMethod
 
 #: A pipe has no width of its own: lines end where the text does.
 WIDTH_OF_A_PIPE = 500
+#: Of a message, and of a word in it (a path, or a value that somebody gave), characters.
+LONGEST, LONGEST_WORD = 4000, 500
 
 
 def console() -> Console:
@@ -29,15 +33,15 @@ def show_table(
     """Print a table; columns named in `numeric` are aligned to the right. All but the first column fold."""
     from rich.table import Table
 
-    out = console()
+    out, title = console(), _shown(title)
     table = Table(
         box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold", show_header=any(columns)
     )
-    for i, name in enumerate(columns):
+    for i, name in enumerate(map(_shown, columns)):
         side: JustifyMethod = "right" if name in numeric else "left"
         table.add_column(name, justify=side, overflow="fold", no_wrap=i == 0)
     for row in rows:
-        table.add_row(*row)
+        table.add_row(*map(_shown, row))
     if title:
         out.print(title, style="bold")
     if out.is_terminal:
@@ -52,7 +56,12 @@ def show_table(
 def show_text(text: str = "") -> None:
     """Print text that wraps on a terminal."""
     out = console()
-    out.print(text, soft_wrap=not out.is_terminal)
+    out.print(_shown(text), soft_wrap=not out.is_terminal)
+
+
+def _shown(text: str) -> str:
+    """Names and titles hold anything: what a terminal would take for commands is shown as escapes."""
+    return "\n".join(map(printable, text.split("\n")))
 
 
 def tell_what_takes_long() -> None:
@@ -69,14 +78,21 @@ def tell_what_takes_long() -> None:
     logger.propagate = False
 
 
+def readable(text: str) -> str:
+    """A message on one line, without what a terminal would take for commands, and not endless."""
+    words = printable(one_line(text, LONGEST)).split(" ")
+    return " ".join(one_line(word, LONGEST_WORD) for word in words)
+
+
 def warn(text: str) -> None:
     """One line on standard error."""
-    print(f"warning: {' '.join(text.split())}", file=sys.stderr)
+    print(f"warning: {readable(text)}", file=sys.stderr)
 
 
 def complain(prefix: str, text: str) -> None:
     """One line on standard error: why the exit status is not 0."""
-    print(f"{prefix}: {' '.join(text.split())}", file=sys.stderr)
+    with suppress(OSError):  # of a full disk: the exit status says it still
+        print(f"{prefix}: {readable(text)}", file=sys.stderr, flush=True)
 
 
 @contextmanager

@@ -11,6 +11,7 @@ import numpy as np
 from nmm.cli.output import show_table, show_text, warn
 from nmm.cli.singularity_words import ZERO, number, say
 from nmm.errors import InputError
+from nmm.files import replaceable
 
 if TYPE_CHECKING:
     from nmm.analysis.redundancy.moving import SelfMotion
@@ -19,9 +20,10 @@ if TYPE_CHECKING:
 
 def check_file(file: Path, option: str) -> None:
     """`InputError` where a file cannot be written, its folder missing: before anything is computed."""
-    folder = file.absolute().parent
-    if file.is_dir():
-        raise InputError(f"{option}: expected a file, {file} is a folder")
+    try:
+        folder = replaceable(file).parent
+    except InputError as error:
+        raise InputError(f"{option}: {error}") from None
     if not folder.is_dir() or not os.access(folder, os.W_OK | os.X_OK):
         raise InputError(f"{option}: {file} cannot be written: {folder} is not a folder where you may write")
 

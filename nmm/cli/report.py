@@ -30,12 +30,12 @@ def show_run(trajectory: Trajectory, numbers: dict[str, Any]) -> int:
 def describe(trajectory: Trajectory, numbers: dict[str, Any]) -> list[tuple[str, str]]:
     """Labels and values of the numbers of a run, by its summary; warnings go to standard error."""
     for warning in numbers["warnings"]:
-        warn(f"{trajectory.resolver.upper()}: {warning}")
+        warn(f"{trajectory.called}: {warning}")
     return list(_rows(trajectory, numbers))
 
 
 def _rows(trajectory: Trajectory, numbers: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    method = f"{trajectory.resolver.upper()}, {trajectory.method}, dt {trajectory.dt:g} s"
+    method = f"{trajectory.called}, {trajectory.method}, dt {trajectory.dt:g} s"
     yield "resolver", method
     outcome = str(trajectory.outcome)
     if len(trajectory):
@@ -53,11 +53,14 @@ def _rows(trajectory: Trajectory, numbers: dict[str, Any]) -> Iterator[tuple[str
     for event in trajectory.events:
         yield f"t = {event.t:.4g} s", f"{event.task} {event.what}{f': {event.why}' if event.why else ''}"
     yield "tracking ‖e‖", f"RMS {numbers['error_rms']:.3g}, {numbers['error_max']:.3g} at most"
+    if (settles := numbers["settling_time"]) is not None:
+        yield "‖e‖ down to 2 % of its start", f"after {settles:.3g} s"
     if (trajectory.scenario or {}).get("objective"):
         yield "objective H", f"{trajectory.objective[0]:.4g} → {trajectory.objective[-1]:.4g}"
         yield "mean H, second half", f"{numbers['objective_mean_second_half']:.4g}"
         yield "∫ H dt", f"{numbers['objective_integral']:.4g}"
     yield "inputs ‖u‖", f"RMS {numbers['input_rms']:.3g}, {numbers['input_peak']:.3g} at most"
+    yield "peak inputs", _peaks(trajectory, numbers["u_max"])
     yield "smallest σ_min", f"{numbers['sigma_min']:.3g}"
     if trajectory.unmet.samples:
         unmet = trajectory.unmet
@@ -89,3 +92,13 @@ def _rows(trajectory: Trajectory, numbers: dict[str, Any]) -> Iterator[tuple[str
     yield "lateral slip", f"{numbers['lateral_slip_max']:.1g} m/s at most"
     if numbers.get("sliding_max"):
         yield "wheels slide by design", f"{numbers['sliding_max']:.3g} m/s at most"
+
+
+def _peaks(trajectory: Trajectory, largest: dict[str, float]) -> str:
+    """The largest input of each unit."""
+    units = dict(zip(trajectory.robot.u_names, trajectory.robot.u_units, strict=True))
+    names = [
+        max((name for name in units if units[name] == unit), key=largest.__getitem__)
+        for unit in dict.fromkeys(units.values())
+    ]
+    return ", ".join(f"{name} {largest[name]:.3g} {units[name]}" for name in names)

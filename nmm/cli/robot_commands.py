@@ -11,9 +11,14 @@ from nmm.cli.options import (
     ROBOT_HELP,
     ArgumentOption,
     AtOption,
+    LockOption,
     PackageOption,
+    PlatformOption,
     ViewedTaskOption,
+    WheelsOption,
     arguments_of,
+    lock_of,
+    wheels_of,
 )
 
 
@@ -58,6 +63,9 @@ def check(
     file: Annotated[str, typer.Argument(metavar="FILE", help=ROBOT_HELP)],
     arguments: ArgumentOption = None,
     package_dir: PackageOption = None,
+    platform: PlatformOption = None,
+    lock: LockOption = None,
+    wheels: WheelsOption = None,
 ) -> int:
     """Say everything that is wrong with a robot's file.
 
@@ -67,13 +75,16 @@ def check(
     \b
     nmm check my_robot.urdf
     nmm check my_robot.urdf.xacro -a arm=true --package-dir ~/ros/src
+    nmm check my_robot.urdf --lock '*finger*=0' --wheels left_drive=0.1,right_drive=0.1
 
     The lines of a xacro file's problems are those of the text that xacro makes of it. Exit status 2 when
     there are problems.
     """
     from nmm.cli.checking import check_file
 
-    return check_file(file, arguments_of(arguments), package_dir or [])
+    return check_file(
+        file, arguments_of(arguments), package_dir or [], platform, lock_of(lock), wheels_of(wheels)
+    )
 
 
 @command

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from nmm.cli.chosen_resolvers import Chosen, check_different
 from nmm.cli.interrupts import shielded
 from nmm.cli.output import complain, progress, show_table
 from nmm.cli.report import describe, show_run
+from nmm.cli.subjects import scenario_with
 from nmm.errors import InputError
 from nmm.folders import comparison
 from nmm.folders.run import is_run
 from nmm.folders.run import save as save_run
-from nmm.folders.whole import check_folder
+from nmm.folders.whole import check_folder, steady
 from nmm.runs.figure_options import PLAIN, FigureOptions
 from nmm.scenario import Scenario
 
@@ -30,7 +34,7 @@ OK, FAILED = 0, 1
 
 def run_scenario(
     name: str,
-    resolver: str | None,
+    resolver: Chosen | None,
     settings: Mapping[str, object],
     limits: bool | None,
     out: Path | None,
@@ -41,14 +45,18 @@ def run_scenario(
     open_browser: bool = True,
     ellipsoids: Wanted = False,
     figures: FigureOptions = PLAIN,
+    of_robot: Mapping[str, Any] = MappingProxyType({}),
 ) -> int:
     """Run a scenario, in a page that shows it meanwhile if wanted; write its folder, print its table."""
-    scenario = _load(name, resolver, settings, limits)
-    folder = out or Path("runs") / f"{scenario.name}-{scenario.parts.resolver.kind}"
+    scenario = _load(name, resolver, settings, limits, of_robot)
+    label = "" if resolver is None else resolver.label
+    called = label or scenario.parts.resolver.kind.upper()
+    folder = out or Path("runs") / f"{scenario.name}-{comparison.folder_name(called)}"
     check_folder(folder, is_run)
     controller = scenario.controller()  # complains before there is a progress bar
-    with _shown(scenario, controller, port, open_browser=open_browser) if play else nullcontext() as page:
-        trajectory = _run(scenario, controller, None if page is None else page.watch)
+    title = f"{scenario.title or scenario.name}, {called}"
+    with _shown(scenario, controller, title, port, open_browser) if play else nullcontext() as page:
+        trajectory = _run(scenario, controller, None if page is None else page.watch, label)
         with shielded() as asked_to_end:
             _tell_and_save(trajectory, folder, html=html, ellipsoids=ellipsoids, figures=figures)
         status = _status("nmm run", [trajectory], folder)
@@ -59,13 +67,12 @@ def run_scenario(
 
 
 def _shown(
-    scenario: Scenario, controller: Controller, port: int | None, *, open_browser: bool
+    scenario: Scenario, controller: Controller, title: str, port: int | None, open_browser: bool
 ) -> AbstractContextManager[LiveRun]:
     """A page for a run that is about to begin."""
     from nmm.playback import LiveRun
 
     parts = scenario.parts
-    title = f"{scenario.title or scenario.name}, {parts.resolver.kind.upper()}"
     return LiveRun(controller, parts.q0, parts.duration, title=title, port=port, open_browser=open_browser)
 
 
@@ -89,25 +96,27 @@ def _tell_and_save(trajectory: Trajectory, folder: Path, **asked: Any) -> None:
 
 def compare_resolvers(
     name: str,
-    kinds: Sequence[str],
+    resolvers: Sequence[Chosen],
     settings: Mapping[str, object],
     limits: bool | None,
     out: Path | None,
     *,
     ellipsoids: Wanted = False,
     figures: FigureOptions = PLAIN,
+    of_robot: Mapping[str, Any] = MappingProxyType({}),
 ) -> int:
-    """Run a scenario with several resolvers; write and print how they compare."""
+    """Run a scenario with several resolvers, or settings of one; write and print how they compare."""
     from nmm.runs.timing import step_time
 
-    scenarios = [_load(name, kind, settings, limits) for kind in kinds]
+    scenarios = [_load(name, one, settings, limits, of_robot) for one in resolvers]
+    check_different(resolvers, scenarios, "--resolvers")
     folder = out or Path("runs") / f"{scenarios[0].name}-compare"
     check_folder(folder, comparison.is_comparison)
     # What is wrong with the last one shows before the first one runs.
     controllers = [scenario.controller() for scenario in scenarios]
     trajectories: list[Trajectory] = []
-    for scenario, controller in zip(scenarios, controllers, strict=True):
-        trajectories.append(_run(scenario, controller))
+    for scenario, controller, one in zip(scenarios, controllers, resolvers, strict=True):
+        trajectories.append(_run(scenario, controller, label=one.label))
         if trajectories[-1].outcome == "interrupted":
             break
     with shielded():
@@ -120,7 +129,7 @@ def compare_resolvers(
             column["a control step"] = f"{1e6 * step_time(controller, trajectory):.3g} µs here"
     labels = list(dict.fromkeys(label for column in table for label in column))
     show_table(
-        ["", *(trajectory.resolver.upper() for trajectory in trajectories)],
+        ["", *(trajectory.called for trajectory in trajectories)],
         [[label, *(column.get(label, "") for column in table)] for label in labels],
         title=f"{scenarios[0].name}: {scenarios[0].title}",
     )
@@ -159,26 +168,40 @@ def runs_in(folder: Path) -> list[Trajectory]:
     """The run of a folder, or those of a comparison, that have samples; `InputError` for none."""
     from nmm.runs.trajectory import Trajectory
 
-    folders = comparison.runs_of(folder) if comparison.is_comparison(folder) else [folder]
-    runs = [trajectory for trajectory in (Trajectory.load(path) for path in folders) if len(trajectory)]
+    def read() -> list[Trajectory]:
+        folders = comparison.runs_of(folder) if comparison.is_comparison(folder) else [folder]
+        return [trajectory for trajectory in (Trajectory.load(path) for path in folders) if len(trajectory)]
+
+    runs = steady(folder, read)
     if not runs:
         raise InputError(f"{folder}: expected a run with at least one sample")
     return runs
 
 
-def _load(name: str, resolver: str | None, settings: Mapping[str, object], limits: bool | None) -> Scenario:
-    kind = {} if resolver is None else {"resolver.kind": resolver}
-    scenario = Scenario.load(name, kind | dict(settings))
+def _load(
+    name: str,
+    resolver: Chosen | None,
+    settings: Mapping[str, object],
+    limits: bool | None,
+    of_robot: Mapping[str, Any],
+) -> Scenario:
+    kind = {} if resolver is None or resolver.own is not None else {"resolver.kind": resolver.kind}
+    scenario = scenario_with(Scenario.load(name, kind | dict(settings)), of_robot)
+    if resolver is not None:
+        scenario = resolver.scenario(scenario)
     if limits is None or limits is (scenario.parts.limits is not None):
         return scenario
     return scenario.override("limits", limits)
 
 
 def _run(
-    scenario: Scenario, controller: Controller, watch: Callable[[Recorder], None] | None = None
+    scenario: Scenario,
+    controller: Controller,
+    watch: Callable[[Recorder], None] | None = None,
+    label: str = "",
 ) -> Trajectory:
-    with progress(f"{scenario.name}, {scenario.parts.resolver.kind.upper()}") as report:
-        return scenario.run(report, controller, watch)
+    with progress(f"{scenario.name}, {label or scenario.parts.resolver.kind.upper()}") as report:
+        return replace(scenario.run(report, controller, watch), label=label)
 
 
 def _status(command: str, trajectories: Sequence[Trajectory], folder: Path) -> int:
@@ -187,7 +210,7 @@ def _status(command: str, trajectories: Sequence[Trajectory], folder: Path) -> i
     for trajectory in failed:
         complain(
             command,
-            f"{trajectory.resolver.upper()} {trajectory.outcome}: {trajectory.message}; "
+            f"{trajectory.called} {trajectory.outcome}: {trajectory.message}; "
             f"{'the run' if trajectory.outcome == 'missed' else 'the part that was computed'} is in {folder}",
         )
     return FAILED if failed else OK

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from nmm.arrays import Array, interpolated, scalar
 from nmm.cli.options import arguments_of, settings_of, values_of
+from nmm.cli.output import warn
 from nmm.errors import InputError, unknown
 
 if TYPE_CHECKING:
@@ -21,7 +22,16 @@ if TYPE_CHECKING:
     from nmm.scenario import Scenario
 
 #: Options by the arguments of `nmm.load`.
-_OPTIONS = {"platform": "--platform", "lock": "--lock", "axle": "--axle", "package_dirs": "--package-dir"}
+_OPTIONS = {
+    "platform": "--platform",
+    "lock": "--lock",
+    "wheels": "--wheels",
+    "missing_meshes": "--missing-meshes",
+    "axle": "--axle",
+    "package_dirs": "--package-dir",
+}
+#: Those that a scenario's robot takes, too.
+_OF_SCENARIO = ("lock", "wheels", "missing_meshes")
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +73,7 @@ def studied(
     t: float | None = None,
     settings: Sequence[str] | None = None,
     usual_task: str = "",
+    decide: bool = True,
     **loading: Any,
 ) -> Studied:
     """What SOURCE means: a run's folder, a scenario by name or as YAML file, or else a robot.
@@ -74,6 +85,7 @@ def studied(
     t : s; 0, or the run's first instant. Of a run, q is where it was then
     settings : `--set`, of the robot's xacro arguments or of the scenario's keys
     usual_task : a robot's, where there is no other; none when empty
+    decide : where tasks come and go, whether to look at those active there and tell the others
     loading : platform, lock, axle, package_dirs of `nmm.load`; a robot's only
 
     Raises
@@ -97,7 +109,7 @@ def studied(
     q = _start(robot, run, scenario) if t is None or run is None else _then(run, t)
     q = configuration_at(robot, q, at, loading.get("lock") or {})
     first = 0.0 if run is None or not len(run) else float(run.t[0])
-    if not given and own is not None:
+    if not given and own is not None and decide:
         _decide(own, first if t is None else t, q)
     return Studied(
         name=robot.name if scenario is None else scenario.name,
@@ -109,6 +121,28 @@ def studied(
         trajectory=run,
         scenario=scenario,
     )
+
+
+def scenario_with(scenario: Scenario, loading: Mapping[str, Any]) -> Scenario:
+    """The scenario with `lock`, `wheels` and `missing_meshes` of `nmm.load` for its robot, where given.
+
+    Raises
+    ------
+    InputError : its robot is mounted from several
+    """
+    from nmm.scenario.robot import RobotPart
+
+    robot, given = scenario.parts.robot, {key: loading[key] for key in _OF_SCENARIO if key in loading}
+    if not given:
+        return scenario
+    if not isinstance(robot, RobotPart):
+        raise InputError(
+            f"{', '.join(_OPTIONS[key] for key in given)}: the robot of {scenario.name} is mounted from "
+            "several: say of which, as in --set robot.arm.lock.JOINT=VALUE"
+        )
+    if "lock" in given:
+        given["lock"] = {**robot.lock, **given["lock"]}
+    return scenario.with_settings({f"robot.{key}": value for key, value in given.items()})
 
 
 def configuration_at(robot: Robot, q: Array, at: Sequence[str] | None, locked: Mapping[str, float]) -> Array:
@@ -123,7 +157,6 @@ def configuration_at(robot: Robot, q: Array, at: Sequence[str] | None, locked: M
 
 def _decide(controller: Controller, t: float, q: Array) -> None:
     """Of tasks that come and go, those active at t (s) and q (n,) are looked at; the others are told."""
-    from nmm.cli.output import warn
     from nmm.control.sequenced import SequencedController
     from nmm.words import listed
 
@@ -161,11 +194,14 @@ def _opened(
             names = [*bundled_robots(), *bundled_scenarios()]
             raise InputError(unknown("robot or scenario", source, names) + "; or give a path")
         return None, None, load(source, arguments=arguments_of(settings), **loading)
-    wrong = [_OPTIONS[key] for key, value in loading.items() if value]
+    allowed = _OF_SCENARIO if of_scenario else ()
+    wrong = [_OPTIONS[key] for key, value in loading.items() if value and key not in allowed]
     if wrong:
         raise InputError(f"{', '.join(wrong)}: of a robot's file; {source} has a robot of its own")
     if of_scenario:
-        scenario = Scenario.load(source, settings_of(settings))
+        scenario = scenario_with(Scenario.load(source, settings_of(settings)), loading)
+        for warning in scenario.warnings:
+            warn(warning)
         return None, scenario, scenario.robot()
     if settings:
         raise InputError(f"--set: expected a robot or a scenario; {source} is a run, which is as it was")

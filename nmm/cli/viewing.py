@@ -24,7 +24,7 @@ def view_robot(
     from nmm.robots.loading import load
     from nmm.scenario.short_task import short_task
 
-    robot = load(source, **loading, missing_meshes="skip")
+    robot = load(source, **{"missing_meshes": "skip", **loading})
     for note in robot.notes:
         if note.startswith("shapes left out"):
             warn(note)

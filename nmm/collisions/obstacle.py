@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, array, scalar, vector
 from nmm.collisions.shapes import Shape
-from nmm.errors import InputError
+from nmm.errors import InputError, NmmError, RunError
+from nmm.words import one_line
 
 #: Where a shape is: (3,) its origin, (6,) origin and rotation vector, or (4, 4); m, rad, world axes.
 Placement: TypeAlias = ArrayLike
@@ -63,7 +64,7 @@ class Obstacle:
             )
         self._velocity = velocity
         standing = (0.0, 0.0, 0.0) if placement is None else placement
-        self._placement = self._checked(standing if motion is None else motion(0.0))
+        self._placement = self._checked(standing if motion is None else self._moved(motion, 0.0, InputError))
         self._twist = np.zeros(6)
 
     def __repr__(self) -> str:
@@ -100,7 +101,20 @@ class Obstacle:
 
     def at(self, t: float) -> Any:
         """As `placement`, Pinocchio's; the same object as long as nothing sets it."""
-        return self._placement if self.motion is None else self._checked(self.motion(t))
+        return self._placement if self.motion is None else self._checked(self._moved(self.motion, t))
+
+    def _moved(
+        self, motion: Callable[[float], Placement], t: float, kind: type[NmmError] = RunError
+    ) -> Placement:
+        """What the motion says at t, s; an error of that kind where it raises one of its own."""
+        try:
+            return motion(t)
+        except NmmError:
+            raise
+        except Exception as error:  # a user's function may raise anything
+            raise kind(
+                f"obstacle {self.name}: motion({t:g}) raised {type(error).__name__}: {one_line(str(error))}"
+            ) from error
 
     def twist(self, t: float) -> Array:
         """Velocity of its origin over its angular velocity at t, (6,), m/s and rad/s, world axes."""

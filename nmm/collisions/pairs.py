@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from xml.etree import ElementTree
 
 import coal
 import numpy as np
@@ -12,6 +11,8 @@ import pinocchio as pin
 
 from nmm.arrays import Array
 from nmm.errors import InputError, RobotError, expect_known
+from nmm.robots.loading.text import read_text
+from nmm.robots.loading.xml_tree import XmlError, parse
 from nmm.robots.robot import Robot
 from nmm.words import one_line
 
@@ -79,12 +80,15 @@ def _measured(
 def srdf_pairs(file: str | Path) -> tuple[tuple[str, str], ...]:
     """The pairs of links that an SRDF disables; `InputError` for a file that is missing or is none."""
     path = Path(file)
-    if not path.is_file():
-        raise InputError(f"srdf: there is no file {path}")
     try:
-        root = ElementTree.parse(path).getroot()
-    except ElementTree.ParseError as error:
+        root = parse(read_text(path))
+    except FileNotFoundError:
+        raise InputError(f"srdf: there is no file {path}") from None
+    except (RobotError, XmlError) as error:
         raise InputError(f"srdf: {path} cannot be read: {one_line(str(error))}") from None
+    if root.tag != "robot" or root.find("link") is not None:
+        what = "this is a robot's description: it has links" if root.tag == "robot" else f"got <{root.tag}>"
+        raise InputError(f"srdf: {path}: expected an SRDF, a <robot> with disable_collisions, {what}")
     found = [(one.get("link1", ""), one.get("link2", "")) for one in root.iter("disable_collisions")]
     return tuple(found)
 

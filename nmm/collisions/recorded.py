@@ -13,6 +13,7 @@ import pinocchio as pin
 from nmm.arrays import Array
 from nmm.collisions.obstacle import Obstacle
 from nmm.collisions.shapes import Box, Capsule, Cylinder, Hull, Mesh, Plane, Shape, Sphere
+from nmm.errors import expect_known
 
 KINDS: Mapping[str, type[Shape]] = {
     kind.__name__.lower(): kind for kind in (Box, Sphere, Cylinder, Capsule, Plane, Hull)
@@ -100,7 +101,8 @@ def described(shape: Shape) -> tuple[dict[str, Any], Array]:
 
 
 def shape_of(data: Mapping[str, Any], points: Array) -> Shape:
-    """The shape that `described` described."""
+    """The shape that `described` described; `InputError` or `TypeError` for what it cannot have."""
+    expect_known("kind", data.get("kind"), KINDS)
     given = {key: value for key, value in data.items() if key != "kind"}
     if data["kind"] == "hull":
         given["points"] = points

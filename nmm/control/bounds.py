@@ -32,7 +32,7 @@ class LimitNumbers(NamedTuple):
     slowest, fastest, acceleration (m,) : of the inputs
     coordinate (m,) : the coordinate whose rate an input is, -1 where none; low, high (m,) : its limits
     recovery () : speed of the way back from beyond a limit, m/s or rad/s
-    wheels (w, 7) : how they turn (`nmm.robots.wheel_rates`); spin (w,) : their largest rates, rad/s
+    wheels (w, 9) : how they turn (`nmm.robots.wheel_rates`); spin (w,) : their largest rates, rad/s
     rows (f,) : of the program; row_low, row_high (f,) : limits of these values; braking (f,) : counted on for
         them, not a number where it is a share of what the inputs' accelerations give
     elapsed () : time since the inputs before, s
@@ -110,14 +110,20 @@ def wheel_rows(limits: LimitNumbers, q: Array, G: Array, problem: ProblemArrays)
     for i in range(limits.spin.shape[0]):
         x, y, angle = limits.wheels[i, 0], limits.wheels[i, 1], limits.wheels[i, 2]
         steer = int(limits.wheels[i, 4])
+        slope = 0.0
         if steer >= 0:
-            c, s = math.cos(q[steer]), math.sin(q[steer])
+            # The wheel's angle φ follows δ = q[steer]: tan φ = a sin δ / (cos δ - b sin δ).
+            a, b = limits.wheels[i, 7], limits.wheels[i, 8]
+            s, c = a * math.sin(q[steer]), math.cos(q[steer]) - b * math.sin(q[steer])
+            length = math.sqrt(c * c + s * s)
+            slope = a / (length * length)
+            s, c = s / length, c / length
             x, y = limits.wheels[i, 5] + c * x - s * y, limits.wheels[i, 6] + s * x + c * y
-            angle += q[steer]
+            angle += math.atan2(s, c)
         for j in range(problem.u_lower.shape[0]):
             problem.limit_rows[i, j] = 0.0
         for j in range(G.shape[1]):
-            turning = G[steer, j] if steer >= 0 else 0.0
+            turning = slope * G[steer, j] if steer >= 0 else 0.0
             forward = cosine * G[0, j] + sine * G[1, j] - y * G[2, j] - (y - limits.wheels[i, 6]) * turning
             sideways = cosine * G[1, j] - sine * G[0, j] + x * G[2, j] + (x - limits.wheels[i, 5]) * turning
             rolling = math.cos(angle) * forward + math.sin(angle) * sideways

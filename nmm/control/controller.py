@@ -293,6 +293,11 @@ class Controller:
         return self._program.blocks
 
     @property
+    def costs(self) -> tuple[str, ...]:
+        """What makes its users' Python functions dear, a sentence each."""
+        return self._program.costs
+
+    @property
     def compilable(self) -> bool:
         """Whether nothing but its kinematics needs Python, so that `compiled` makes it one compiled call."""
         return self.flies and not (self.backing or self.step_size)

@@ -98,6 +98,10 @@ RK4 = RungeKutta(
 )
 
 
+#: Adaptive steps from a sample to the next; fast motions take a few.
+MOST_STEPS = 20_000
+
+
 class Adaptive:
     """SciPy's DOP853 between the samples, with a step that keeps the local error below `tolerance`."""
 
@@ -113,7 +117,15 @@ class Adaptive:
         solver = DOP853(
             velocity, t, q, t + dt, rtol=max(self.tolerance, 1e-13), atol=self.tolerance, first_step=dt
         )
+        taken = 0
         while solver.status == "running":
+            if taken == MOST_STEPS:
+                raise RunError(
+                    f"at t = {solver.t:g} s: {MOST_STEPS} adaptive steps did not lead from t = {t:g} s to "
+                    f"the next sample at {t + dt:g} s: gains are too high, or the tolerance is too small or "
+                    "dt too large for method adaptive"
+                )
+            taken += 1
             message = solver.step()
             if solver.status == "failed":
                 raise RunError(

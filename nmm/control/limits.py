@@ -12,6 +12,7 @@ from nmm.control.bounds import SAMPLE, LimitNumbers
 from nmm.control.limited_function import Bound, Kept
 from nmm.errors import InputError, expect_known
 from nmm.functions.tasks.coordinates import Coordinates
+from nmm.robots.coordinates import UNLIMITED
 from nmm.robots.robot import Robot
 from nmm.robots.wheel_rates import wheel_rates
 
@@ -20,8 +21,6 @@ Range: TypeAlias = float | Sequence[float]
 #: What the robot's file says (True), nothing (False), or that with other numbers for some names.
 Named: TypeAlias = bool | Mapping[str, Range]
 
-#: Files write limits of this size, m or rad, for none.
-ENDLESS = 1e5
 #: Speed of the way back from beyond a limit, m/s or rad/s.
 RECOVERY = 0.1
 
@@ -36,7 +35,8 @@ class Limits:
         [lower, upper]; m/s, rad/s
     position : of coordinates, in the same way: [lower, upper]; m, rad
     acceleration : of inputs: None for none, a number for all, or numbers for inputs or groups; m/s², rad/s²
-    wheels : largest rolling rate of the driven wheels, rad/s: None for none, a number, or numbers by joint
+    wheels : largest rolling rates, rad/s: numbers by joint in place of the robot's, or one for all wheels
+        that are no casters; None for the robot's own, which velocity=False leaves out
     bounds : limits of functions
     recovery : speed at which a coordinate beyond its limit comes back, m/s or rad/s
 
@@ -91,7 +91,7 @@ class LimitsOn:
         self.accelerations = _per_input(limits.acceleration, robot, "acceleration")
         self.recovery = limits.recovery
         self._moved = robot.rate_coordinates
-        wheels, self._wheels, self._spin = _wheel_limits(limits.wheels, robot)
+        wheels, self._wheels, self._spin = _wheel_limits(limits, robot)
         held = [
             Bound(Coordinates(robot.q_names[i]), *self.coordinates[i])
             for i in robot.following.independent
@@ -168,7 +168,7 @@ def _positions(given: Named, robot: Robot) -> Array:
             except InputError as error:
                 raise InputError(f"position: {error}") from None
             limits[i] = _ends(value, f"position: {name}", symmetric=False)
-    limits[np.abs(limits) >= ENDLESS] *= np.inf
+    limits[np.abs(limits) >= UNLIMITED] *= np.inf
     return np.asarray(limits)
 
 
@@ -196,20 +196,21 @@ def _inputs(
     return found
 
 
-def _wheel_limits(
-    given: float | Mapping[str, float] | None, robot: Robot
-) -> tuple[tuple[str, ...], Array, Array]:
+def _wheel_limits(limits: Limits, robot: Robot) -> tuple[tuple[str, ...], Array, Array]:
+    given = limits.wheels
     names, rows = wheel_rates(robot)
-    if given is None:
-        return (), rows[:0], np.zeros(0)
-    if not names:
+    if given is not None and not names:
         raise InputError(f"wheels: robot {robot.name} has no wheels on its main body whose rates are known")
+    own = {wheel.joint: wheel.velocity for wheel in robot.wheels}
+    speeds = np.array([np.inf if limits.velocity is False else own[name] for name in names])
     if isinstance(given, Mapping):
-        for name in given:
+        for name, speed in given.items():
             expect_known("wheel", name, names, "wheels")
-        chosen = [i for i, name in enumerate(names) if name in given]
-        return tuple(names[i] for i in chosen), rows[chosen], np.array([given[names[i]] for i in chosen])
-    return names, rows, np.full(len(names), float(given))
+            speeds[names.index(name)] = speed
+    elif given is not None:
+        speeds[:] = given
+    kept = np.flatnonzero(np.isfinite(speeds))
+    return tuple(names[i] for i in kept), rows[kept], speeds[kept]
 
 
 def _none(count: int) -> Array:

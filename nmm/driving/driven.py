@@ -12,6 +12,7 @@ from nmm.collisions.obstacle import Obstacle
 from nmm.control.controller import Controller
 from nmm.control.step import Step
 from nmm.driving.choices import Choice, named
+from nmm.driving.reaching import Reaching
 from nmm.driving.setups import Settings, Setup
 from nmm.driving.targets import aimed, targets_of
 from nmm.errors import InputError, NmmError
@@ -33,12 +34,14 @@ class Look:
     step : all that the controller found
     sigma_min : smallest singular value of J
     at : (targets, 3) where in the world the tasks' frames are, m; not numbers for tasks without one
+    against : why it does not get to its targets; "" where nothing is known
     """
 
     t: float
     step: Step
     sigma_min: float
     at: Array
+    against: str
 
 
 class Driven:
@@ -65,6 +68,7 @@ class Driven:
         self.targets = targets_of(first, setup.q0, at_robot=setup.at_robot)
         self._began = [target.signal.value for target in self.targets]
         self._controller = aimed(first, self.targets)
+        self._reaching = Reaching()
         self.choices = setup.choices({})
         self.trouble = ""
         self._stand()
@@ -151,4 +155,6 @@ class Driven:
                 at[i] = here.placement(target.frame).translation if on_robot else here.center_of_mass()[0]
         known = bool(np.all(np.isfinite(step.J)))
         sigma = np.linalg.svd(step.J, compute_uv=False).min(initial=math.inf) if known else math.nan
-        return Look(self.t, step, float(sigma), at)
+        wanted = np.concatenate([target.signal.value for target in self.targets])
+        against = self._reaching.words(self._controller, self.t, step, wanted)
+        return Look(self.t, step, float(sigma), at, against)

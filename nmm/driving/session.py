@@ -229,9 +229,11 @@ class Session:
     def _told(self, look: Look) -> tuple[str, bool]:
         """What a page says of the state, and whether that is bad news."""
         if self._driven.trouble:
-            return f"Stands still: {self._driven.trouble}", True
+            return "; ".join(filter(None, [f"Stands still: {self._driven.trouble}", look.against])), True
         if time.monotonic() < self._until:
             return self._notice, True
+        if look.against:
+            return f"{look.against[0].upper()}{look.against[1:]}.", True
         parts = [f"t = {look.t:.1f} s"]
         if self._making is not None:
             parts.append("another controller is being made")

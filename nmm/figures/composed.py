@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from nmm import looks
 from nmm.arrays import Array
@@ -19,16 +18,23 @@ from nmm.figures.files import save_as
 from nmm.figures.limits import draw_scale, has_limits, limits
 from nmm.figures.motion import Scene, stroboscopic
 from nmm.figures.objective import draw_best_objective, has_objective, objective_comparison
+from nmm.figures.paths import Paths
+from nmm.figures.views import Viewed
 from nmm.runs.ellipsoid_options import Wanted
 from nmm.runs.figure_options import PLAIN, FigureOptions
+from nmm.runs.settling import BAND, settling_time
 from nmm.runs.trajectory import Trajectory
 
 #: Width of a figure of two columns, in.
 _WIDTH = 10.4
 #: A narrower one has one column, in.
 _NARROW = 6.0
-#: The tallest drawing of a motion, in.
-_TALLEST = 6.2
+#: What a comparison calls the marks on its errors.
+_SETTLED = f"down to {100 * BAND:g} %"
+#: The tallest drawing of a motion, and of compared paths in one of two views, in.
+_TALLEST, _TALL = 6.2, 3.6
+#: The panel below the drawings, where it has room, in.
+_LOW, _HIGH = 0.8, 1.4
 
 
 class _Columns:
@@ -78,9 +84,9 @@ def overview(trajectory: Trajectory, *, width: float = _WIDTH) -> Figure:
         each = max(each, (above + drawn - style.column_height([], legends)) / len(legends))
     heights = [each] * len(legends)
     made, begins, top = columns.made(style.column_height(heights, legends), above + drawn)
-    below = _draw_views(made, scene, columns, top)
-    if columns.beside and below > style.BOTTOM + style.GAP + 0.8:
-        height = min(below - style.BOTTOM - style.GAP, 1.4)
+    below = _draw_views(made, scene, columns, top, style.BOTTOM if columns.beside else begins)
+    if columns.beside and below > style.BOTTOM + style.GAP + _LOW:
+        height = min(below - style.BOTTOM - style.GAP, _HIGH)
         axes = style.place(made, style.LEFT, below - style.GAP - height, columns.view, height)
         curves.draw_singular_value(axes, trajectory)
     panels = style.column(made, heights, legends, columns.left, columns.right, begins)
@@ -100,12 +106,14 @@ def overview(trajectory: Trajectory, *, width: float = _WIDTH) -> Figure:
     return style.aligned(made)
 
 
-def _draw_views(made: Figure, scene: Scene, columns: _Columns, top: float) -> float:
-    """Draw the views of the motion that fit, from the top down; returns where the room left begins, in."""
-    for index, view in enumerate(scene.views if columns.beside else scene.views[:1]):
+def _draw_views(
+    made: Figure, scene: Viewed, columns: _Columns, top: float, bottom: float, tallest: float = _TALLEST
+) -> float:
+    """Draw the views that fit, from the top down; returns where the room left begins, in."""
+    for index, view in enumerate(scene.views):
         tall = scene.height(view, columns.view)
-        height = min(tall, _TALLEST)
-        if index and top - style.GAP - height < style.BOTTOM:
+        height = min(tall, tallest)
+        if index and top - style.GAP - height < bottom - 1e-6:
             break
         rows = 1 if index else style.legend_rows(scene.names, columns.view)
         top -= style.room(rows) + height
@@ -118,7 +126,10 @@ def _draw_views(made: Figure, scene: Scene, columns: _Columns, top: float) -> fl
 
 
 def comparison(trajectories: Sequence[Trajectory], *, width: float = _WIDTH) -> Figure:
-    """Several runs side by side: their paths from above, objective, error and size of the inputs.
+    """Several runs side by side: their paths, objective, error and size of the inputs.
+
+    The paths from above, and from the side, too, where they rise; below them, where there is room, or in
+    place of an objective that there is not, the smallest singular values of J.
 
     Parameters
     ----------
@@ -131,18 +142,35 @@ def comparison(trajectories: Sequence[Trajectory], *, width: float = _WIDTH) -> 
     runs = [run for run in trajectories if len(run)]
     if not runs:
         raise InputError("figure of a comparison: expected a run with at least one sample, got none")
-    worn, columns = looks.looks([run.resolver for run in runs]), _Columns(width)
-    rows = columns.rows([look.name for look in worn])
-    heights, legends = [1.3] * 3, [rows] * 3
-    high = style.column_height(heights, legends)
-    above = style.room(style.legend_rows(_path_names(runs, worn), columns.view))
-    drawing = high if columns.beside else above + 0.8 * columns.view
-    made, begins, top = columns.made(high, drawing)
-    view = style.place(made, style.LEFT, top - drawing, columns.view, drawing - above)
-    _draw_paths(view, runs, worn)
-    panels = style.column(made, heights, legends, columns.left, columns.right, begins)
-    draw_best_objective(panels[0], runs)
+    worn, columns = looks.looks_of_labels([run.called for run in runs]), _Columns(width)
+    scene = Paths(runs, worn)
+    tallest = _TALL if len(scene.views) > 1 else _TALLEST
+    drawn = [min(scene.height(view, columns.view), tallest) for view in scene.views]
+    rooms = [style.legend_rows(scene.names, columns.view), *[1] * (len(drawn) - 1)]
+    drawing = style.column_height(drawn, rooms) + style.BOTTOM * (len(drawn) - 1)
+    names = [look.name for look in worn]
+    settle = [_SETTLED] * any(settling_time(run) is not None for run in runs)
+    rows = columns.rows(names)
+    legends = [rows, columns.rows(names + settle), rows]
+    each = 1.3
+    if columns.beside:
+        each = max(each, (drawing - style.column_height([], legends)) / 3)
+    made, begins, top = columns.made(style.column_height([each] * 3, legends), drawing)
+    bottom = style.BOTTOM if columns.beside else begins
+    below = _draw_views(made, scene, columns, top, bottom, tallest) - style.room(rows)
+    panels = style.column(made, [each] * 3, legends, columns.left, columns.right, begins)
+    if columns.beside and below > style.BOTTOM + _LOW and has_objective(runs):
+        height = min(below - style.BOTTOM, _HIGH)
+        axes = style.place(made, style.LEFT, below - height, columns.view, height)
+        _draw_singular_values(axes, runs, worn)
+        style.label(axes, x="time t [s]")
+        style.legend(axes)
+    if has_objective(runs):
+        draw_best_objective(panels[0], runs)
+    else:
+        _draw_singular_values(panels[0], runs, worn)
     _draw_norms(panels[1], runs, worn, [run.error_norm for run in runs])
+    _mark_settled(panels[1], runs, worn)
     style.label(panels[1], y=f"‖e‖ {style.units(runs[0].r_units)}")
     _draw_norms(panels[2], runs, worn, [np.linalg.norm(run.u, axis=1) for run in runs])
     style.label(panels[2], y=f"‖u‖ {style.units(runs[0].robot.u_units)}")
@@ -159,44 +187,9 @@ def _name_last(panels: Sequence[Axes]) -> None:
     style.label(panels[-1], x="time t [s]")
 
 
-def _path_names(runs: Sequence[Trajectory], worn: Sequence[looks.Look]) -> list[str]:
-    """The entries of the paths' legend."""
-    names = ["target"] * bool(len(runs[0].held)) + ["desired path"] * (runs[0].moving is not None)
-    for run, (name, *_) in zip(runs, worn, strict=True):
-        names += [f"{name}: {run.frame}"] * (run.path is not None)
-        names += [f"{name}: platform"] * bool(run.robot.platform.n_p)
-    return names
-
-
-def _draw_paths(axes: Axes, runs: Sequence[Trajectory], worn: Sequence[looks.Look]) -> None:
-    desired, held = runs[0].moving, runs[0].held
-    if len(held):
-        axes.plot(
-            *held[:, :2].T,
-            "*",
-            color=looks.ORANGE,
-            markersize=12,
-            markeredgecolor=looks.BLACK,
-            label="target",
-            linestyle="none",
-            zorder=6,
-        )
-    if desired is not None:
-        axes.plot(desired[:, 0], desired[:, 1], color="#C3C8D0", linewidth=5.0, label="desired path")
-    for k, (run, (name, color, dashes)) in enumerate(zip(runs, worn, strict=True)):
-        # The later ones are thinner: those below are seen where they run the same way.
-        below = len(runs) - 1 - k
-        if run.path is not None:
-            width = 1.5 + style.WIDER * below
-            axes.plot(*run.path[:, :2].T, dashes, color=color, linewidth=width, label=f"{name}: {run.frame}")
-        if run.robot.platform.n_p:
-            width = 0.8 + 0.5 * below
-            axes.plot(*run.q[:, :2].T, dashes, color=color, linewidth=width, label=f"{name}: platform")
-    axes.set_aspect("equal", adjustable="datalim")
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(MaxNLocator(nbins=9, steps=[1, 2, 5, 10]))
-    style.label(axes, x="x [m]", y="y [m]")
-    style.legend(axes)
+def _draw_singular_values(axes: Axes, runs: Sequence[Trajectory], worn: Sequence[looks.Look]) -> None:
+    _draw_norms(axes, runs, worn, [run.sigma_min for run in runs])
+    style.label(axes, y="σ_min")
 
 
 def _draw_norms(
@@ -210,6 +203,18 @@ def _draw_norms(
         style.log_axis(axes, max(float(positive.min()), 1e-16), float(positive.max()))
     else:
         style.note(axes, "zero throughout")
+
+
+def _mark_settled(axes: Axes, runs: Sequence[Trajectory], worn: Sequence[looks.Look]) -> None:
+    """Where each run's error has come down for good; all runs begin alike, so the legend has one mark."""
+    label = _SETTLED
+    for run, look in zip(runs, worn, strict=True):
+        if (after := settling_time(run)) is not None:
+            band = BAND * run.error_norm[0]
+            axes.plot(
+                run.t[0] + after, band, "o", color=look.color, markersize=5.0, label=label, linestyle="none"
+            )
+            label = "_"
 
 
 def write_run_figures(

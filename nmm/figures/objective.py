@@ -48,7 +48,7 @@ def objective_comparison(
         raise InputError("figure of the objective: expected a run with at least one sample, got none")
     logarithmic = _can_be_logarithmic(runs)
     heights = [1.9, 1.4] if logarithmic else [2.1]
-    made, panels = style.stack(heights, [[run.resolver for run in runs], []][: len(heights)], width)
+    made, panels = style.stack(heights, [[run.called for run in runs], []][: len(heights)], width)
     draw_objective(panels[0], runs, symbol, named=not logarithmic)
     style.legend(panels[0])
     first, last = _transient(runs) if zoom is None else zoom
@@ -73,7 +73,9 @@ def draw_objective(
     named: bool = True,
 ) -> None:
     """H of each run over time, in its resolver's colour."""
-    for k, (run, look) in enumerate(zip(runs, looks.looks([run.resolver for run in runs]), strict=True)):
+    for k, (run, look) in enumerate(
+        zip(runs, looks.looks_of_labels([run.called for run in runs]), strict=True)
+    ):
         H = np.where(run.objective > 0.0, run.objective, np.nan) if logarithmic else run.objective
         style.curve(axes, run.t, H, *look, below=len(runs) - 1 - k)
     style.label(axes, y=symbol)
@@ -136,7 +138,9 @@ def _inset_is_free(axes: Axes, runs: Sequence[Trajectory], last: float) -> bool:
 def _draw_inset(axes: Axes, runs: Sequence[Trajectory], first: float, last: float) -> None:
     """The initial transient, in the empty upper right of the axes."""
     inset = axes.inset_axes(_INSET)
-    for k, (run, look) in enumerate(zip(runs, looks.looks([run.resolver for run in runs]), strict=True)):
+    for k, (run, look) in enumerate(
+        zip(runs, looks.looks_of_labels([run.called for run in runs]), strict=True)
+    ):
         seen = (run.t >= first - 1e-9) & (run.t <= last + 1e-9)
         style.curve(
             inset, run.t[seen], run.objective[seen], None, look.color, look.dashes, below=len(runs) - 1 - k

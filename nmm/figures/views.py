@@ -81,9 +81,11 @@ class Viewed(ABC):
     Attributes
     ----------
     views : those in which there is something to see, the one from above first
+    on_the_ground : whether a view from the side reaches down to it
     """
 
     views: tuple[View, ...]
+    on_the_ground = True
 
     @property
     @abstractmethod
@@ -106,7 +108,7 @@ class Viewed(ABC):
             # One above the other: x is where it is.
             above = np.vstack(self.points(ABOVE, width))[:, 0]
             low[0], high[0] = np.nanmin(above), np.nanmax(above)
-        if view.up == SIDE.up:
+        if view.up == SIDE.up and self.on_the_ground:
             low[1] = min(low[1], 0.0)
         margin = _MARGIN * float(np.max(high - low))
         return [(float(a) - margin, float(b) + margin) for a, b in zip(low, high, strict=True)]

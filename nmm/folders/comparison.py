@@ -1,14 +1,18 @@
-"""A comparison's folder: a run a resolver, and one summary, figure and playback of all."""
+"""A comparison's folder: several runs, and one summary, figure and playback of all."""
 
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from nmm.errors import InputError
 from nmm.folders.whole import has_format, replaced_folder
 from nmm.runs.figure_options import PLAIN, FigureOptions
+from nmm.scenario.numbers import shown
 
 if TYPE_CHECKING:
     from nmm.runs.ellipsoid_options import Wanted
@@ -24,8 +28,30 @@ def is_comparison(folder: Path) -> bool:
 
 
 def runs_of(folder: Path) -> list[Path]:
-    """The folders of a comparison's runs."""
-    return [folder / kind for kind in json.loads((folder / "summary.json").read_text("utf-8"))["runs"]]
+    """The folders of a comparison's runs; `InputError` names what is wrong with its summary.json."""
+    from nmm.folders.told import ToldComparison, read_told
+
+    file = folder / "summary.json"
+    names = list(read_told(file, ToldComparison, FORMAT).runs)
+    for name in names:
+        if not name or name in (".", "..") or Path(name).name != name:
+            raise InputError(f"{file}: runs: expected names of folders, got {shown(name)}")
+    return [folder / name for name in names]
+
+
+def folder_name(called: str) -> str:
+    """What a run's folder is named after: "rg" of RG, "pg-alpha-50" of PG α=50."""
+    return re.sub(r"[^\w.]+", "-", called.replace("α", "alpha")).strip("-.").lower() or "run"
+
+
+def names_of(trajectories: Sequence[Trajectory]) -> list[str]:
+    """The name of each run's folder; no two are the same."""
+    found: list[str] = []
+    for trajectory in trajectories:
+        name = folder_name(trajectory.called)
+        again = (f"{name}-{k}" for k in count(2))
+        found.append(name if name not in found else next(other for other in again if other not in found))
+    return found
 
 
 def save(
@@ -40,7 +66,7 @@ def save(
 
     Parameters
     ----------
-    trajectories : a run a resolver
+    trajectories : the runs; what they are called tells them apart
     folder : a new folder, or one of a comparison, which is replaced
     title : of the playback
     ellipsoids : whether the playback shows manipulability ellipsoids, or how
@@ -51,12 +77,13 @@ def save(
     InputError : the folder exists and is not a comparison's, or cannot be written
     """
     with replaced_folder(folder, is_comparison) as temporary:
-        for trajectory in trajectories:
-            trajectory.save(temporary / trajectory.resolver, figures=False)
+        runs = dict(zip(names_of(trajectories), trajectories, strict=True))
+        for name, trajectory in runs.items():
+            trajectory.save(temporary / name, figures=False)
         summary = {
             "format": FORMAT,
             "complete": all(trajectory.complete for trajectory in trajectories),
-            "runs": {trajectory.resolver: trajectory.summary() for trajectory in trajectories},
+            "runs": {name: trajectory.summary() for name, trajectory in runs.items()},
         }
         (temporary / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
         shown = [trajectory for trajectory in trajectories if len(trajectory) > 1]

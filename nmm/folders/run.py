@@ -13,20 +13,22 @@ import yaml
 
 from nmm.collisions.recorded import described, made, places, shape_of
 from nmm.errors import InputError, RobotError
-from nmm.folders.whole import has_format, replaced_folder
+from nmm.folders.recorded_arrays import ARRAYS, OPTIONAL_ARRAYS
+from nmm.folders.whole import has_format, replaced_folder, steady
 from nmm.runs.figure_options import Drawn, drawn_as
-from nmm.runs.summary import FORMAT, unmet
+from nmm.runs.residuals import Residuals
+from nmm.runs.summary import FORMAT
 
 if TYPE_CHECKING:
     from nmm.collisions.obstacle import Obstacle
+    from nmm.folders.told import ToldObstacle, ToldRobot, ToldRun
     from nmm.robots.robot import Robot
     from nmm.runs.ellipsoid_options import Wanted
     from nmm.runs.trajectory import Trajectory
-
-ARRAYS = ("t", "q", "u", "q_dot", "r", "r_d", "error", "objective", "sigma_min", "partition", "residual")
-OPTIONAL_ARRAYS = ("path", "desired", "target")
-#: Arrays that older folders lack, with what they then were.
-LATER_ARRAYS = {
+#: Samples that are written to trajectory.csv at a time.
+ROWS = 10_000
+#: What the arrays were that older folders lack.
+WERE = {
     "scale": lambda count: np.ones((count, 1)),
     "margin": lambda count: np.full(count, np.inf),
     "step_size": lambda count: np.ones(count),
@@ -109,70 +111,94 @@ def load(folder: str | Path, robot: Robot | None = None) -> Trajectory:
     ------
     InputError : names what is missing, or says that the robot is another
     """
+    folder = Path(folder)
+    return steady(folder, lambda: _loaded(folder, robot))
+
+
+def _loaded(folder: Path, robot: Robot | None) -> Trajectory:
     from nmm.control.sequence import Event
-    from nmm.runs.trajectory import Outcome, Trajectory
+    from nmm.folders.recorded_arrays import check_arrays, read_arrays
+    from nmm.folders.told import ToldRun, read_told
+    from nmm.runs.trajectory import Trajectory
     from nmm.scenario import Scenario
 
-    folder = Path(folder)
-    if not is_run(folder):
+    if not folder.is_dir():
         raise InputError(f"{folder}: expected a run's folder (with trajectory.npz and nmm's summary.json)")
-    summary: dict[str, Any] = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-    try:
-        with np.load(folder / "trajectory.npz", allow_pickle=False) as file:
-            arrays = {name: file[name] for name in ARRAYS}
-            arrays |= {name: file.get(name) for name in OPTIONAL_ARRAYS}
-            count = len(arrays["t"])
-            arrays |= {name: file[name] if name in file else was(count) for name, was in LATER_ARRAYS.items()}
-            obstacles = _obstacles(summary.get("obstacles", ()), file)
-    except (OSError, ValueError, KeyError) as error:
-        raise InputError(f"{folder / 'trajectory.npz'}: cannot be read: {error}") from None
+    summary = folder / "summary.json"
+    told = read_told(summary, ToldRun, FORMAT)
+    file = folder / "trajectory.npz"
+    found = read_arrays(file)
+    check_arrays(found, file, len(told.limit_names), len(told.clearance_names))
+    _check_counts(told, found, summary)
+    count = len(found["t"])
+    arrays = {name: found[name] for name in ARRAYS} | {name: found.get(name) for name in OPTIONAL_ARRAYS}
+    arrays |= {name: found.get(name, was(count)) for name, was in WERE.items()}
+    obstacles = _obstacles(told.obstacles or (), found, file)
     scenario = None
     if (folder / "scenario.yaml").exists():
         loaded = Scenario.load(folder / "scenario.yaml")
         scenario = loaded.resolved()
         robot = loaded.robot() if robot is None else robot
-        if "obstacles" not in summary:
+        if told.obstacles is None:
             obstacles = loaded.obstacles(robot)
     elif robot is None:
-        robot = _from_its_file(folder, summary["robot"])
-    if robot.fingerprint != summary["robot"].get("fingerprint", robot.fingerprint):
+        robot = _from_its_file(folder, told.robot)
+    same = told.robot.fingerprint in (None, robot.fingerprint)
+    if not same or (found["q"].shape[1], found["u"].shape[1]) != (robot.n, robot.n_u):
         raise InputError(f"{folder}: {robot.name} is another robot than the run's ({_ASK})")
+    if told.frame is not None:
+        try:
+            robot.frame_id(told.frame)
+        except InputError as error:
+            raise InputError(f"{summary}: frame: {error}") from None
+    off = told.kinematics_off
     return Trajectory(
         robot=robot,
-        r_names=tuple(summary["r_names"]),
-        r_units=tuple(summary["r_units"]),
-        resolver=summary["resolver"],
-        method=summary["method"],
-        dt=summary["dt"],
-        outcome=Outcome(summary["outcome"]),
-        message=summary["message"],
-        warnings=tuple(summary["warnings"]),
-        frame=summary["frame"],
-        unmet=unmet(summary),
-        limited=summary.get("limited", False),
-        kinematics_off=float("nan") if (off := summary.get("kinematics_off")) is None else off,
-        limit_names=tuple(summary.get("limit_names", ())),
-        clearance_names=tuple(summary.get("clearance_names", ())),
-        clearance_asked=summary.get("clearance_asked", 0.0),
+        r_names=told.r_names,
+        r_units=told.r_units,
+        resolver=told.resolver,
+        method=told.method,
+        dt=told.dt,
+        outcome=told.outcome,
+        message=told.message,
+        warnings=told.warnings,
+        frame=told.frame,
+        unmet=Residuals(*(getattr(told, f"unmet_{name}") for name in Residuals._fields)),
+        limited=told.limited,
+        kinematics_off=float("nan") if off is None else off,
+        limit_names=told.limit_names,
+        clearance_names=told.clearance_names,
+        clearance_asked=told.clearance_asked,
         obstacles=obstacles,
         scenario=scenario,
-        events=tuple(Event(**event) for event in summary.get("events", ())),
+        events=tuple(Event(one.t, one.task, one.what, one.why) for one in told.events),
+        label=told.label,
         **arrays,
     )
 
 
-def _from_its_file(folder: Path, said: dict[str, Any]) -> Robot:
+def _check_counts(told: ToldRun, found: Mapping[str, Any], summary: Path) -> None:
+    """`InputError` where summary.json speaks of other numbers of samples or rows than the arrays have."""
+    count, rows = found["r"].shape
+    if told.samples not in (None, count):
+        raise InputError(f"{summary}: samples: expected {count}, as in trajectory.npz, got {told.samples}")
+    for key, names in (("r_names", told.r_names), ("r_units", told.r_units)):
+        if len(names) != rows:
+            raise InputError(f"{summary}: {key}: expected {rows}, as in trajectory.npz, got {len(names)}")
+
+
+def _from_its_file(folder: Path, said: ToldRobot) -> Robot:
     """The robot of the file that a run names."""
     from nmm.robots.loading import load as load_robot
 
     try:
-        return load_robot(said["source"], arguments=said["arguments"])
+        return load_robot(said.source, arguments=said.arguments)
     except RobotError as error:
-        raise InputError(f"{folder}: its robot {said['name']} cannot be loaded ({_ASK}): {error}") from None
+        raise InputError(f"{folder}: its robot {said.name} cannot be loaded ({_ASK}): {error}") from None
 
 
 def _arrays(trajectory: Trajectory) -> dict[str, Any]:
-    arrays = {name: getattr(trajectory, name) for name in (*ARRAYS, *LATER_ARRAYS)}
+    arrays = {name: getattr(trajectory, name) for name in (*ARRAYS, *WERE)}
     arrays |= {
         name: getattr(trajectory, name) for name in OPTIONAL_ARRAYS if getattr(trajectory, name) is not None
     }
@@ -187,17 +213,25 @@ def _arrays(trajectory: Trajectory) -> dict[str, Any]:
     return arrays
 
 
-def _obstacles(listed: Sequence[dict[str, Any]], file: Mapping[str, Any]) -> tuple[Obstacle, ...]:
+def _obstacles(listed: Sequence[ToldObstacle], found: Mapping[str, Any], file: Path) -> tuple[Obstacle, ...]:
     """The obstacles of a summary, where the arrays say that they were."""
-    return tuple(
-        made(
-            shape_of(one["shape"], file[f"obstacle_{i}_points"]),
-            one["name"],
-            file["t"],
-            file[f"obstacle_{i}_places"],
-        )
-        for i, one in enumerate(listed)
-    )
+    from nmm.folders.recorded_arrays import check_placements
+
+    obstacles = []
+    for i, one in enumerate(listed):
+        names = f"obstacle_{i}_places", f"obstacle_{i}_points"
+        for name in names:
+            if name not in found:
+                raise InputError(f"{file}: {name}: this array is missing")
+        passed, points = (found[name] for name in names)
+        check_placements(passed, f"{file}: {names[0]}", (1, len(found["t"])))
+        try:
+            shape = shape_of(one.shape, points)
+        except (InputError, TypeError) as error:
+            where = file.with_name("summary.json")
+            raise InputError(f"{where}: obstacles.{i}.shape: {error}") from None
+        obstacles.append(made(shape, one.name, found["t"], passed))
+    return tuple(obstacles)
 
 
 def _write_csv(trajectory: Trajectory, path: Path) -> None:
@@ -219,6 +253,10 @@ def _write_csv(trajectory: Trajectory, path: Path) -> None:
     ]
     with path.open("w", newline="", encoding="utf-8") as file:
         csv.writer(file, lineterminator="\n").writerow([name for name, _ in columns])
-        # Numbers need no quotes: joined by hand they are written in two thirds of the writer's time.
-        lines = zip(*(map(repr, values.tolist()) for _, values in columns), strict=True)
-        file.writelines(f"{','.join(line)}\n" for line in lines)
+        # Numbers need no quotes: joined by hand they are written in two thirds of the writer's time. All of a
+        # long run as Python's numbers would fill more memory than the run itself.
+        for first in range(0, len(trajectory), ROWS):
+            some = [values[first : first + ROWS].tolist() for _, values in columns]
+            file.writelines(
+                f"{','.join(line)}\n" for line in zip(*(map(repr, one) for one in some), strict=True)
+            )

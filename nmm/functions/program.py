@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import types
 
 from nmm.arrays import Array, Integers
 from nmm.functions.function import Callback, Evaluation, Function, Stage
@@ -115,8 +116,14 @@ def run(t: float, q: Array, integers: Integers, floats: Array) -> None:
         call_function(stage.kernel, at, frames, stage.numbers, rows)
 
 
+PLACE = types.void(
+    *(types.int64[::1], types.float64[::1], types.int64, types.float64[::1]),
+    *(types.float64[:, :, ::1], types.float64[:, :, ::1], types.float64[:, :, :, ::1]),
+)
+
+
 @compiled
-def _place(
+def place(
     integers: Integers,
     floats: Array,
     table: int,
@@ -143,6 +150,7 @@ class Program:
     blocks : what `run` takes, made by `lay_out`
     buffers : what it reads and writes, as views
     calls_python : whether users' Python functions are among them
+    costs : what makes such functions dear, a sentence each
     prepare : prepare(t, q) does Pinocchio's part at q and the users' Python functions at (t, q); `nothing`
         where there is neither
     """
@@ -150,6 +158,7 @@ class Program:
     blocks: Blocks
     buffers: Buffers
     calls_python: bool
+    costs: tuple[str, ...]
     prepare: Callable[[float, Array], None]
 
     def __init__(self, robot: Robot, functions: Sequence[Function], kinematics: str = PINOCCHIO) -> None:
@@ -229,6 +238,8 @@ class Program:
             if stage.callback is not None
         ]
         self.calls_python = bool(callbacks)
+        said = (getattr(callback, "costs", "") for callback, _ in callbacks)
+        self.costs = tuple(dict.fromkeys(sentence for sentence in said if sentence))
         if callbacks:
             self.prepare = _with_callbacks(robot, update, callbacks)
 
@@ -250,7 +261,7 @@ class Program:
         off = 0.0
         for q in configurations:
             update(0.0, q)
-            _place(*self.blocks, self._table, q, *ours)
+            place(*self.blocks, self._table, q, *ours)
             off = max(
                 off, *(float(np.abs(a - z).max(initial=0.0)) for a, z in zip(theirs, ours, strict=True))
             )
@@ -295,5 +306,6 @@ def _with_callbacks(
         for callback, block in callbacks:
             value, value_t, value_q = callback(t, configuration)
             block[:] = np.concatenate([value, value_t, value_q.ravel()])
+        configuration.forget_neighbours()
 
     return prepare

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import _thread
 import atexit
+import gc
 import importlib
 import os
 import pickle
@@ -105,21 +106,28 @@ class _Child:
             os.close(theirs_out)
         _children.append(self._process)
         self._begun = b""
+        self._left = [*functions.values()]
         atexit.register(self._end)
         os.set_blocking(told, False)
-        for what in (sys.path, [*functions.values()]):
+        for what in (sys.path, self._left):
             self._asked.write(pickle.dumps(what))
         self._asked.flush()
         for number, path in enumerate(functions):
             under_way[path] = partial(self._wait, number, path)
 
     def _wait(self, number: int, path: Path) -> None:
-        """Until the function is there, or is not going to be; at once if it has not been begun."""
+        """Until the function is there, or is not going to be; at once if it has not been begun.
+
+        Meanwhile this process takes what has not been begun, the last first.
+        """
         while not path.exists() and self._process.poll() is None:
             self._begun += self._told.read() or b""
             # The last that was begun: what was begun before it and is not there, failed.
             if len(self._begun) != number + 1:
                 return
+            if len(self._left) > len(self._begun):
+                _compile(*self._left.pop())
+                continue
             with suppress(subprocess.TimeoutExpired):
                 self._process.wait(AGAIN)
 
@@ -138,17 +146,23 @@ class _Child:
 def serve() -> None:
     """In a child: compile what is asked for, as long as whoever asked is there."""
     functions = pickle.load(sys.stdin.buffer)
+    gc.disable()  # it does not live long enough
     # Interrupted, not killed: files are then written whole or removed.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     threading.Thread(target=_end_with_the_other, daemon=True).start()
     with suppress(KeyboardInterrupt):
         for module, name, signature in functions:
             os.write(1, b".")
-            function = getattr(importlib.import_module(module), name)
-            if isinstance(function, Kernel):
-                _ = function.address
-            else:
-                function.compile(signature.args)
+            _compile(module, name, signature)
+
+
+def _compile(module: str, name: str, signature: Any) -> None:
+    """Compile a function, or read it from the cache where another process has been sooner."""
+    function = getattr(importlib.import_module(module), name)
+    if isinstance(function, Kernel):
+        _ = function.address
+    else:
+        function.compile(signature.args)
 
 
 def _end_with_the_other() -> None:

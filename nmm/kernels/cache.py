@@ -11,7 +11,7 @@ import shutil
 import sys
 from collections.abc import Callable
 from contextlib import suppress
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ import numba
 import platformdirs
 from numba.core import caching
 from numba.core.compiler import CompileResult
+from numba.core.runtime import rtsys
 
 from nmm import kept
 
@@ -73,6 +74,11 @@ class KernelCache(caching.FunctionCache):
         self._source = Path(function.__code__.co_filename)
         self.enable()
 
+    @cached_property
+    def _ours(self) -> bool:
+        """Whether the function is nmm's."""
+        return self._source.resolve().is_relative_to(PACKAGE)
+
     @property
     def cache_path(self) -> str:
         """Folder of the function's files: the source's place in nmm, or one for each other source."""
@@ -86,6 +92,21 @@ class KernelCache(caching.FunctionCache):
         for path in Path(self.cache_path).glob(f"{self._stem}.*.nbc"):
             with suppress(OSError):
                 path.unlink()
+
+    def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
+        """The compiled form kept on disk, None where there is none.
+
+        numba first loads all that it can compile, which nmm's own kernels, once compiled, do without: of the
+        C functions that come with it they call those alone that make arrays (none takes hashes).
+        """
+        if self._ours:
+            rtsys.initialize(target_context)
+        else:
+            _get_ready(target_context)
+        found = self._load_overload(sig, target_context)
+        if found is None:
+            _get_ready(target_context)
+        return found
 
     def _load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
         key = self._key(sig, target_context.codegen())
@@ -114,7 +135,7 @@ class KernelCache(caching.FunctionCache):
 
     def _key(self, sig: Any, codegen: Any) -> object | None:
         """What the compiled form depends on beside nmm's text; None for a function that no file holds."""
-        if self._source.resolve().is_relative_to(PACKAGE):
+        if self._ours:
             text = ""  # the folder is that of nmm's very text, wherever and whenever it was installed
         else:
             try:
@@ -137,6 +158,24 @@ class KernelCache(caching.FunctionCache):
         code = self._py_func.__code__
         name = re.sub(r"[^\w.]", "", code.co_qualname)[-80:]
         return f"{self._source.stem[:80]}.{name}-{code.co_firstlineno}"
+
+
+def _get_ready(target_context: Any) -> None:
+    """Load all that numba can compile, but SciPy's linear algebra.
+
+    numba imports it to see whether it is installed, which nmm's requirements say; compiled code that
+    multiplies matrices still loads it, and checks it, when it is compiled.
+    """
+    from numba.np import linalg
+
+    ensure, linalg.ensure_blas = linalg.ensure_blas, lambda: None
+    try:
+        from numba.np import arraymath
+
+        arraymath.ensure_blas = ensure
+    finally:
+        linalg.ensure_blas = ensure
+    target_context.refresh()
 
 
 @cache

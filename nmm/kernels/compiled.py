@@ -32,25 +32,6 @@ from nmm.kernels.parts import KernelDispatcher
 Plain = Callable[..., Any]
 
 
-def _without_scipy() -> None:
-    """Load numba's functions of arrays without SciPy's linear algebra: a tenth of a short run's time.
-
-    numba imports it there to see whether it is installed, which nmm's requirements say; compiled code that
-    multiplies matrices still loads it, and checks it, when it is compiled.
-    """
-    from numba.np import linalg
-
-    ensure, linalg.ensure_blas = linalg.ensure_blas, lambda: None
-    try:
-        from numba.np import arraymath
-
-        arraymath.ensure_blas = ensure
-    finally:
-        linalg.ensure_blas = ensure
-
-
-_without_scipy()
-
 _vector = types.float64[::1]
 _matrix = types.float64[:, ::1]
 _stack = types.float64[:, :, ::1]

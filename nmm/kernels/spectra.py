@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import types
 
 from nmm.arrays import Array
 from nmm.cores import Work, over_cores
@@ -52,6 +53,9 @@ def orthogonal_rows(A: Array, squares: Array) -> None:
                 squares[b] = max(other + tangent * product, 0.0)
         if not turned:
             break
+
+
+WRITE_SPECTRA = types.void(types.float64[:, :, ::1], types.float64[:, ::1])
 
 
 @compiled_without_gil

@@ -82,7 +82,7 @@ def write_paper(
         if progress is not None:
             progress(sum(done.values()) / len(done))
 
-    with replaced_folder(folder, is_paper) as temporary:
+    with replaced_folder(folder, is_paper, patience=1.0) as temporary:
         found = share_out(partial(_case, folder=temporary, figures=shown), list(done), jobs, advance)
         results = tuple(found[number] for number in sorted(found))
         from nmm.paper.page import render

@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, positive, vector
-from nmm.errors import expect_known
+from nmm.errors import InputError, expect_known
 from nmm.kernels.compiled import Kernel
-from nmm.platforms.layout import Layout
+from nmm.platforms.layout import NEAR, AddedJoint, Layout
 from nmm.platforms.steering import SteeredAxle
 
+#: Given and measured lengths that differ by a smaller share are the same.
+CLOSE = 0.01
 #: The methods `pfaffian` that `of_many` marked: an overriding one counts as of one configuration.
 _of_many: set[Callable[[Any, Array], Array]] = set()
 
@@ -36,9 +38,10 @@ class Platform(ABC):
        of G (from the rolling of the wheels): the tests check the one against the other.
 
     It may say more: `parameters` (the numbers that the kernel reads) and their `parameter_names`, `fit` (how
-    to measure them in a robot's file), `coordinate_limits`, `problem` (where its wheels cannot roll, and
-    why), `roller`, `rolls_at` and `sliding` (of wheels that do more than roll), `steered_axle` (what turns
-    it where no task feels that).
+    to measure them in a robot's file) and `lengths` (what a file is compared with), `coordinate_limits`,
+    `problem` (where its wheels cannot roll, and why), `roller`, `rolls_at` and `sliding` (of wheels that do
+    more than roll), `steered_axle` (what turns it where no task feels that), `added_joint` (a coordinate that
+    files lack).
 
     Parameters
     ----------
@@ -80,6 +83,40 @@ class Platform(ABC):
         InputError : the file lacks what the platform needs (a steering joint, two wheels on one axle, ...)
         """
         return cls()
+
+    @property
+    def lengths(self) -> Mapping[str, float]:
+        """What `fit` measures, by name, m; nothing by default."""
+        return {}
+
+    def measured(self, layout: Layout) -> Mapping[str, float]:
+        """`lengths` as a robot's file has them, m; `InputError` where it lacks what the platform needs."""
+        return type(self).fit(layout).lengths
+
+    def compared(self, layout: Layout) -> tuple[str, ...]:
+        """What a robot's file says against this platform, a sentence each, with both numbers.
+
+        Nothing where the file has no wheels or the platform no `lengths`, which may differ by 1 mm or 1 %.
+
+        Raises
+        ------
+        InputError : its joints cannot be those of the file
+        """
+        if not layout.wheels or not self.lengths:
+            return ()
+        try:
+            measured = self.measured(layout)
+        except InputError as error:
+            return (f"given by hand, and not what its file holds: {error}",)
+        return tuple(
+            f"platform {self.name}: {name} is {given:g} m as given, and {measured[name]:.6g} m in the file"
+            for name, given in self.lengths.items()
+            if name in measured and abs(given - measured[name]) > max(NEAR, CLOSE * abs(measured[name]))
+        )
+
+    def added_joint(self, layout: Layout) -> AddedJoint | None:
+        """A coordinate of its own that the file lacks, or limits of one that the file's others imply."""
+        return None
 
     @property
     @abstractmethod

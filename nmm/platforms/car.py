@@ -12,13 +12,12 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array, positive
 from nmm.errors import InputError
 from nmm.kernels.compiled import PLATFORM, Kernel, kernel
+from nmm.platforms.ackermann import are_below, steered_pair
 from nmm.platforms.base import Platform, of_many
-from nmm.platforms.layout import Layout, Pivot
+from nmm.platforms.layout import NEAR, AddedJoint, Layout, Pivot
 from nmm.platforms.measuring import (
-    NEAR,
     check_axle,
     misfit,
-    rolls_forward,
     say_pivots,
     say_wheels,
     symmetric_limit,
@@ -28,6 +27,8 @@ from nmm.platforms.own_joints import coordinates_with
 from nmm.platforms.steering import SteeredAxle, SteeringPivot
 from nmm.platforms.unicycle import across
 
+#: The coordinate of a car whose two wheels steer without a joint midway between them.
+STEER = "steer"
 #: |cos δ| below which a steering angle counts as 90 degrees.
 _ACROSS = 1e-6
 
@@ -100,26 +101,67 @@ class _Bicycle(Platform):
         """Wheelbase and steering joint of the file; the joint's limits when they are symmetric.
 
         The steering joint is the upright joint on the root's body whose name holds "steer" and which stands
-        on the x axis, ahead of the reference point.
+        on the x axis, ahead of the reference point. Without one, two such joints with wheels, equally far
+        beside the x axis, count as one midway between them, the coordinate `steer`.
 
         Raises
         ------
         InputError : there is none, or there are several; the rear wheels are not at the reference point
         """
         named = [pivot for pivot in layout.pivots if _may_steer(pivot)]
-        if len(named) != 1:
-            expected = 'one steering joint: upright, "steer" in its name, on the x axis of the root, x > 0'
+        pair = None if named else steered_pair(layout)
+        if len(named) != 1 and pair is None:
+            expected = (
+                'one steering joint: upright, "steer" in its name, on the x axis of the root, x > 0; or two '
+                "with wheels, equally far beside it"
+            )
             wrong = f"there are {len(named)}" if named else "there is none"
             raise misfit(layout, cls.name, expected, wrong, say_pivots(layout.pivots))
         check_axle(layout, cls.name)
+        if pair is not None:
+            lower, upper = pair.range(cls._widest)
+            even = upper < cls._widest and abs(lower + upper) <= NEAR
+            return cls(pair.x, steering=STEER, max_steering=upper if even else None)
         for wheel in wheels_on(layout, named[0].joint):
-            if abs(wheel.x) > NEAR or not rolls_forward(wheel):
+            if not are_below([wheel]):
                 expected = "the steered wheel below its steering axis, rolling ahead (see platform wheeled)"
                 raise misfit(layout, cls.name, expected, "it is off it or turned", say_wheels([wheel]))
         limit = symmetric_limit(named[0])
         if limit is not None and limit > cls._widest:
             limit = None
         return cls(named[0].x, steering=named[0].joint, max_steering=limit)
+
+    @property
+    def lengths(self) -> Mapping[str, float]:
+        return {"wheelbase": self.wheelbase}
+
+    def measured(self, layout: Layout) -> Mapping[str, float]:
+        own = self._pivot(layout)
+        if own is None:
+            return super().measured(layout)
+        check_axle(layout, self.name)
+        return {"wheelbase": own.x}
+
+    def compared(self, layout: Layout) -> tuple[str, ...]:
+        own = self._pivot(layout)
+        if own is not None and abs(own.y) > NEAR:
+            expected = "its steering joint on the x axis: its angle is that of a wheel there"
+            wrong = f"{own.joint} is beside it: leave it out, and two such joints make the coordinate {STEER}"
+            raise misfit(layout, self.name, expected, wrong, say_pivots(layout.pivots))
+        return super().compared(layout)
+
+    def added_joint(self, layout: Layout) -> AddedJoint | None:
+        """Midway between two wheels that steer, within what their joints allow of angle and rate."""
+        pair, own = steered_pair(layout), self._pivot(layout)
+        if pair is None:
+            return None
+        lower, upper = pair.range(self._widest)
+        for lowest, highest in ((own.lower, own.upper) if own else (lower, upper), self.coordinate_limits[3]):
+            lower, upper = max(lower, float(lowest)), min(upper, float(highest))
+        return AddedJoint(self.steering, pair.x, 0.0, lower, upper, pair.rate(lower, upper))
+
+    def _pivot(self, layout: Layout) -> Pivot | None:
+        return next((pivot for pivot in layout.pivots if pivot.joint == self.steering), None)
 
     @property
     def parameters(self) -> Array:
@@ -130,7 +172,7 @@ class _Bicycle(Platform):
         return {"L": ""}
 
     def described(self) -> dict[str, str]:
-        widest = "no limit" if self.max_steering is None else f"{math.degrees(self.max_steering):.4g}°"
+        widest = "its joint's" if self.max_steering is None else f"{math.degrees(self.max_steering):.4g}°"
         return {"wheelbase": f"{self.wheelbase:g} m", "steering": self.steering, "max_steering": widest}
 
     @property

@@ -77,6 +77,10 @@ class DifferentialDrive(Platform):
         return cls(wheels[0].radius, abs(wheels[0].y - wheels[1].y))
 
     @property
+    def lengths(self) -> Mapping[str, float]:
+        return {"radius": self.radius, "track": self.track}
+
+    @property
     def parameters(self) -> Array:
         return np.array([self.radius, self.track])
 

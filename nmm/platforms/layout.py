@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
+#: Two lengths (m) or angles (rad) of a robot's file that differ by less are meant to be the same.
+NEAR = 1e-3
 #: Parts of an upright joint's name, in lower case, that say what it is.
 STEERING = ("steer",)
 HITCHES = ("hitch", "trailer")
@@ -20,6 +23,7 @@ class Pivot:
     carrier : name of the movable joint that carries it; "theta" for the root link's body
     x, y : its axis in the carrier's frame, at zero, m
     lower, upper : its limits, rad (infinite without)
+    velocity : its largest rate, rad/s (infinite without)
     """
 
     joint: str
@@ -28,6 +32,7 @@ class Pivot:
     y: float
     lower: float
     upper: float
+    velocity: float = math.inf
 
     @property
     def steers(self) -> bool:
@@ -69,3 +74,23 @@ class Layout:
     robot: str
     pivots: tuple[Pivot, ...] = ()
     wheels: tuple[RollingJoint, ...] = ()
+
+
+@dataclass(frozen=True)
+class AddedJoint:
+    """An upright joint on the main body that a platform needs and a robot's file lacks, or its limits.
+
+    Attributes
+    ----------
+    joint : its name
+    x, y : its axis, from the platform's reference point, m
+    lower, upper : its limits, rad
+    velocity : its largest rate, rad/s
+    """
+
+    joint: str
+    x: float
+    y: float
+    lower: float
+    upper: float
+    velocity: float

@@ -6,10 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 from nmm.errors import InputError
-from nmm.platforms.layout import Layout, Pivot, RollingJoint
-
-#: Two lengths (m) or angles (rad) of a robot's file that differ by less are meant to be the same.
-NEAR = 1e-3
+from nmm.platforms.layout import NEAR, Layout, Pivot, RollingJoint
 
 
 def wheels_on(layout: Layout, carrier: str) -> tuple[RollingJoint, ...]:

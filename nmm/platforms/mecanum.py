@@ -93,6 +93,10 @@ class Mecanum(Platform):
         return cls(wheels[0].radius, 2.0 * abs(wheels[0].x), 2.0 * abs(wheels[0].y))
 
     @property
+    def lengths(self) -> Mapping[str, float]:
+        return {"radius": self.radius, "length": self.length, "width": self.width}
+
+    @property
     def parameters(self) -> Array:
         return np.array([self.radius, (self.length + self.width) / 2.0])
 

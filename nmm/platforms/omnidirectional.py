@@ -9,6 +9,8 @@ import numpy as np
 from nmm.arrays import Array
 from nmm.kernels.compiled import PLATFORM, Kernel, kernel
 from nmm.platforms.base import Platform
+from nmm.platforms.layout import Layout
+from nmm.platforms.measuring import say_wheels, wheels_on
 
 
 @kernel(PLATFORM)
@@ -36,6 +38,16 @@ class Omnidirectional(Platform):
     name = "omnidirectional"
     inputs = ("vx", "vy", "omega")
     input_units = ("m/s", "m/s", "rad/s")
+
+    def compared(self, layout: Layout) -> tuple[str, ...]:
+        """That the main body stands on one or two wheels, which have to be plain ones: they roll one way."""
+        wheels = wheels_on(layout, "theta")
+        if not 0 < len(wheels) < 3:
+            return ()
+        return (
+            f"platform {self.name} moves sideways, which needs three wheels with rollers or more; the file's "
+            f"main body stands on {say_wheels(wheels)}",
+        )
 
     @property
     def velocity_map(self) -> Kernel:

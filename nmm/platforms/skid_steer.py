@@ -122,6 +122,10 @@ class SkidSteer(Platform):
     def parameters(self) -> Array:
         return np.array([self.radius, self.left, self.right, self.ahead])
 
+    @property
+    def lengths(self) -> Mapping[str, float]:
+        return {"radius": self.radius, "length": self.length, "width": self.width}
+
     def described(self) -> dict[str, str]:
         return {
             "radius": f"{self.radius:g} m",

@@ -142,6 +142,11 @@ class Tractor(Platform):
         return cls([Trailer(one.length, one.hitch, one.joint, one.max_angle) for one in measured])
 
     @property
+    def lengths(self) -> Mapping[str, float]:
+        own = {f"length of trailer {trailer.joint}": trailer.length for trailer in self.trailers}
+        return own | {f"hitch of trailer {trailer.joint}": trailer.hitch for trailer in self.trailers}
+
+    @property
     def parameters(self) -> Array:
         return np.array([[trailer.hitch, trailer.length] for trailer in self.trailers]).ravel()
 

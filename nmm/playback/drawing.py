@@ -116,17 +116,15 @@ class DrawnRobot:
             )
         return animations
 
-    def ghosts(self, path: str, q: Array, wheels: Array, texts: Sequence[str], height: float) -> None:
-        """Transparent copies at q (G, n), each with its text at a height (m) above its root; the page makes
-        them from the robot's own geometry."""
+    def ghosts(self, path: str, q: Array, wheels: Array, texts: Sequence[str]) -> None:
+        """Transparent copies at q (G, n), each with its text above it; the page makes them from the robot's
+        own geometry."""
         matrices = np.array([self.placements.world(*at) for at in zip(q, wheels, strict=True)])
         poses = np.concatenate(position_and_quaternion(matrices), axis=-1)
         self._drawing.add(
             "ghosts",
             path=path,
-            root=self.root,
             texts=list(texts),
-            height=height,
             joints=[
                 {"path": joint, "poses": packed(poses[:, i], np.float64)}
                 for i, joint in enumerate(self.paths)

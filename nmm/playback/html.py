@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from nmm.errors import InputError
+from nmm.files import replaceable
 from nmm.playback.page import file_page
 from nmm.playback.scene import Shown, playback_scene
 from nmm.runs.ellipsoid_options import Wanted
@@ -57,16 +58,16 @@ def page_of(
 
 
 def _write_atomically(path: Path, text: str) -> Path:
-    temporary = ""
+    temporary, target = "", replaceable(path)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        descriptor, temporary = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        descriptor, temporary = tempfile.mkstemp(prefix=f".{target.name}-", dir=target.parent)
         with os.fdopen(descriptor, "w", encoding="utf-8") as file:
             file.write(text)
         umask = os.umask(0)
         os.umask(umask)
         os.chmod(temporary, 0o666 & ~umask)
-        os.replace(temporary, path)
+        os.replace(temporary, target)
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror}") from None
     finally:

@@ -65,8 +65,12 @@ def of_robot(robot: Robot) -> str:
 
 
 def framed(page: str, title: str, height: int) -> str:
-    """A page in an element of another one, from which it is shut off."""
+    """A page in an element of another one, from which it is shut off.
+
+    Of a notebook that is not trusted JupyterLab leaves out the frame, and shows the words in it.
+    """
+    instead = f"{html.escape(title)}: this page is drawn once the notebook is trusted."
     return (
         f'<iframe sandbox="allow-scripts" title="{html.escape(title)}" '
-        f'style="width: 100%; height: {height}px; border: 0" srcdoc="{html.escape(page)}"></iframe>'
+        f'style="width: 100%; height: {height}px; border: 0" srcdoc="{html.escape(page)}">{instead}</iframe>'
     )

@@ -20,6 +20,7 @@ SCRIPTS = (
     "runs.js",
     "legend.js",
     "scenery.js",
+    "texts.js",
     "ghosts.js",
     "ellipsoids.js",
     "obstacles.js",
@@ -66,7 +67,7 @@ def socket_page(
     return _page(
         title,
         source="socket",
-        sources=f"ws://{host}",
+        sources=f"ws://{host} ws://localhost:{host.rpartition(':')[2]}",
         before_scripts="",
         token=token,
         scripts=scripts,

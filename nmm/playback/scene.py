@@ -111,7 +111,7 @@ def playback_scene(
         if samples:
             whose = f"{look.name} " if several else ""
             texts = [f"{whose}{motion.t[k]:.3g} s" for k in samples]
-            robot.ghosts(f"{path}/ghosts", motion.q[samples], wheels[i][samples], texts, height)
+            robot.ghosts(f"{path}/ghosts", motion.q[samples], wheels[i][samples], texts)
         drawing.add(
             "motion",
             path=path,

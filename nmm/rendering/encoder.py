@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from nmm.errors import InputError, RunError
+from nmm.files import replaceable
 
 #: ffmpeg's options by the file's suffix.
 CODECS = {
@@ -20,13 +21,14 @@ CODECS = {
 
 
 def expect_video(file: Path) -> Path:
-    """A file that can be a video; `InputError` for another suffix or a folder that is not there."""
+    """The file that a video takes the place of; `InputError` for another suffix, a folder that is not there,
+    a device."""
     if file.suffix.lower() not in CODECS:
         raise InputError(f"{file}: expected a file that ends in {', '.join(CODECS)}")
     if file.is_dir() or not file.parent.is_dir():
         what = "is a folder" if file.is_dir() else f"the folder {file.parent} is not there"
         raise InputError(f"{file}: cannot be written: {what}")
-    return file
+    return replaceable(file)
 
 
 def find_ffmpeg() -> str:
@@ -58,9 +60,9 @@ def encode(pictures: Iterable[bytes], file: Path, fps: float) -> None:
     InputError : another suffix, a file that cannot be written
     RunError : no ffmpeg, or one that fails
     """
-    expect_video(file)
+    target = expect_video(file)
     program = find_ffmpeg()
-    with tempfile.TemporaryDirectory(prefix=f".{file.name}-", dir=file.parent) as folder:
+    with tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as folder:
         made = Path(folder) / f"made{file.suffix.lower()}"
         log = Path(folder) / "log"
         command = [
@@ -85,6 +87,6 @@ def encode(pictures: Iterable[bytes], file: Path, fps: float) -> None:
             lines = log.read_text(errors="replace").strip().splitlines()
             raise RunError(f"ffmpeg: {lines[-1] if lines else 'ended without a word'}")
         try:
-            made.replace(file)
+            made.replace(target)
         except OSError as error:
             raise InputError(f"{file}: cannot be written: {error.strerror}") from None

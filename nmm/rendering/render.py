@@ -68,7 +68,7 @@ def render(
     expect_known("view", view, VIEWS, "render")
     if not 0.0 <= apart <= 1.0:
         raise InputError(f"apart: expected 0 to 1, got {apart:g}")
-    target = expect_video(Path(file))
+    expect_video(Path(file))
     if not motions:
         raise InputError("motions: expected at least one motion, got none")
     times = _times(motions, start, end, fps, speed)
@@ -80,8 +80,8 @@ def render(
             browser.evaluate(
                 f"nmm.film({{view: '{view}', follow: {_js(follow)}, plots: {_js(plots)}, apart: {apart}}})"
             )
-            encode(_pictures(browser, times, progress), target, fps)
-    return target
+            encode(_pictures(browser, times, progress), Path(file), fps)
+    return Path(file)
 
 
 def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
@@ -107,11 +107,13 @@ def _times(
             f"start and end (--from, --to): expected instants of the run, from {first:g} to {last:g} s, one "
             f"after the other, got {begin:g} and {stop:g}"
         )
-    count = math.floor((stop - begin) * fps / speed + 1e-9) + 1
-    if count > MOST_PICTURES:
+    wanted = (stop - begin) * fps / speed
+    if not wanted < MOST_PICTURES:
         raise InputError(
-            f"fps: {count} pictures; expected at most {MOST_PICTURES}: fewer a second, or a part of the run"
+            f"fps: {wanted:.6g} pictures; expected at most {MOST_PICTURES}: fewer a second, or a part of "
+            "the run"
         )
+    count = math.floor(wanted + 1e-9) + 1
     return [begin + k * speed / fps for k in range(count)]
 
 

@@ -21,6 +21,13 @@ from nmm.resolvers.state import State
 Partition = Sequence[str | int]
 
 MOST_CANDIDATES = 20_000
+#: Automatic candidates beyond this number are searched, not tried.
+MOST_TRIED = 2_000
+#: An exchange of columns has to make |det Ja| larger by more than this share.
+_GAIN = 1e-9
+_MOST_EXCHANGES = 1_000
+#: A block as irregular as this has lost rank.
+_LOST = 1e-13
 
 #: The integers of the state: FREE, HELD or OVERDUE; the sign of det Ja; the columns of Ja, NONE before
 #: the first call and where there is no such block.
@@ -127,10 +134,85 @@ def solve_partition(
     return eliminate(M, scales)
 
 
+def are_searched(dimensions: Dimensions) -> bool:
+    """Whether there are too many automatic candidates to try them all."""
+    return math.comb(dimensions.m, dimensions.s) > MOST_TRIED
+
+
+def searched_threshold(threshold: float, dimensions: Dimensions) -> float:
+    """Θ for as many candidates: half of what the best one's measure is at least, if that is less.
+
+    The measures' squares add up to 1, so the best one's is at least 1 / sqrt(count).
+    """
+    return min(threshold, 0.5 / math.sqrt(math.comb(dimensions.m, dimensions.s)))
+
+
+@compiled
+def search_partition(J: Array, columns: Integers) -> None:
+    """Write into `columns` a partition whose |det Ja| no exchange of one column makes larger.
+
+    A rank-revealing QR: columns by pivoted orthogonalisation, then exchanged while an entry of Ja⁻¹ Jb, by
+    which |det Ja| grows, is above 1. Where J has lost rank the columns are the pivots.
+
+    Source: M. Gu, S. Eisenstat, "Efficient algorithms for computing a strong rank-revealing QR
+    factorization", SIAM J. Scientific Computing 17(4), 1996, with f = 1.
+    """
+    s, m = J.shape
+    rest = scratch((s, m))
+    for i in range(s):
+        for j in range(m):
+            rest[i, j] = J[i, j]
+    for k in range(s):
+        largest = -1.0
+        for j in range(m):
+            square = 0.0
+            for i in range(s):
+                square += rest[i, j] * rest[i, j]
+            taken = False
+            for i in range(k):
+                taken = taken or columns[i] == j
+            if square > largest and not taken:
+                largest = square
+                columns[k] = j
+        if largest <= 0.0:
+            continue
+        for j in range(m):
+            along = 0.0
+            if j != columns[k]:
+                for i in range(s):
+                    along += rest[i, columns[k]] * rest[i, j]
+                for i in range(s):
+                    rest[i, j] -= along / largest * rest[i, columns[k]]
+        for i in range(s):
+            rest[i, columns[k]] = 0.0
+    M, scales = scratch((s, s + m)), scratch(s)
+    for _ in range(_MOST_EXCHANGES):
+        for i in range(s):
+            scales[i] = 1.0
+            for j in range(s):
+                M[i, j] = J[i, columns[j]]
+            for j in range(m):
+                M[i, s + j] = J[i, j]
+        if eliminate(M, scales)[1] <= _LOST:
+            return
+        out, into, gain = -1, -1, 1.0 + _GAIN
+        for i in range(s):
+            for j in range(m):  # of a column of Ja itself, 0 or 1 up to rounding
+                if abs(M[i, s + j]) > gain:
+                    out, into, gain = i, j, abs(M[i, s + j])
+        if out < 0:
+            return
+        columns[out] = into
+
+
 @compiled
 def choose_partition(J: Array, candidates: Integers, columns: Integers) -> None:
-    """Write into `columns` the candidate with the largest |det Ja|, the first of equals."""
+    """Write into `columns` the candidate with the largest |det Ja|, the first of equals; without candidates,
+    `search_partition`."""
     s = J.shape[0]
+    if candidates.shape[0] == 0:
+        search_partition(J, columns)
+        return
     Ja = scratch((s, s))
     scales = scratch(s)
     largest = -1.0

@@ -24,8 +24,10 @@ from nmm.resolvers.partitions import (
     SIGN,
     Partition,
     PartitionState,
+    are_searched,
     candidate_columns,
     choose_partition,
+    searched_threshold,
     solve_partition,
     volume,
 )
@@ -235,7 +237,8 @@ class ReducedGradient(Resolver):
     ----------
     alpha : step size α > 0, 1/s times the unit of H's curvature
     partitions : "automatic": all candidates, measured by |det Ja| / sqrt(det J Jᵀ), a number in
-        [0, 1] (Cauchy-Binet); or a list of candidates, measured by |det Ja| (the paper's rule:
+        [0, 1] (Cauchy-Binet); above 2,000 of them they are searched by a rank-revealing QR, with Θ at
+        most 1 / (2 sqrt(their number)); or a list of candidates, measured by |det Ja| (the paper's rule:
         [("v", "q1"), ("v", "omega")] in case 1; the arm's joints when n_m = s)
     threshold : Θ; 0.01 for given candidates (the paper's), 0.05 for automatic ones
     tolerance : Ja or J counts as singular where its last pivot, rows in their natural scales, is below
@@ -289,11 +292,13 @@ class ReducedGradient(Resolver):
 
     def setup(self, dimensions: Dimensions) -> Setup:
         self.check(dimensions, all_levels=True)
-        candidates = candidate_columns(self.partitions, dimensions)
+        searched = self.automatic and are_searched(dimensions)
+        candidates = () if searched else candidate_columns(self.partitions, dimensions)
+        threshold = searched_threshold(self.threshold, dimensions) if searched else self.threshold
         c = np.zeros(0) if self.weights is None else weight_diagonal(self.weights, dimensions) ** -0.5
         damped = self.singular == "damped" or len(dimensions.levels) > 1  # levels may contradict each other
         options = [self.automatic, damped, *candidates]
-        numbers = np.array([self.alpha, self.threshold, self.tolerance, *c])
+        numbers = np.array([self.alpha, threshold, self.tolerance, *c])
         return Setup(numbers, np.array(options, dtype=np.int64))
 
     def start(self, dimensions: Dimensions) -> PartitionState:

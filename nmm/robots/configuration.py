@@ -35,15 +35,42 @@ class Configuration:
     """
 
     def __init__(self, robot: Robot, q: ArrayLike) -> None:
+        self._compute(robot, robot.q(q), _spare_data.setdefault(robot, []))
+
+    def _compute(self, robot: Robot, q: Array, spare: list[pin.Data]) -> None:
         self.robot = robot
-        self.q = unwritable(robot.q(q))
-        self._spare = _spare_data.setdefault(robot, [])
+        self.q = unwritable(q)
+        self._spare = spare
         try:
-            self._data = self._spare.pop()
+            self._data = spare.pop()
         except IndexError:
             self._data = robot.model.createData()
-        pin.computeJointJacobians(robot.model, self._data, self.q)
+        pin.computeJointJacobians(robot.model, self._data, q)
         self._hessians_computed = False
+        self._neighbours: list[tuple[Configuration, Configuration]] = []
+
+    def neighbours(self, step: float) -> list[tuple[Configuration, Configuration]]:
+        """For each coordinate, a step (m, rad) ahead and behind along it; the same until forgotten.
+
+        All functions whose derivatives are differences take these: their kinematics are computed once.
+        """
+        if not self._neighbours:
+            for j in range(self.robot.n):
+                ahead, behind = self.q.copy(), self.q.copy()
+                ahead[j] += step
+                behind[j] -= step
+                self._neighbours.append((self._elsewhere(ahead), self._elsewhere(behind)))
+        return self._neighbours
+
+    def forget_neighbours(self) -> None:
+        """Let go of them: someone may keep the configuration."""
+        self._neighbours = []
+
+    def _elsewhere(self, q: Array) -> Configuration:
+        """The robot at q (n,), taken as it is: nobody typed it in."""
+        found = object.__new__(Configuration)
+        found._compute(self.robot, q, self._spare)
+        return found
 
     def __del__(self) -> None:
         # Nobody holds it, so nobody reads Pinocchio's data any more: making them anew is three quarters of

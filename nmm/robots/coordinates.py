@@ -15,7 +15,7 @@ from nmm.platforms.base import Platform
 from nmm.robots.followers import SLACK, Follower, Following
 
 #: A limit this large is none, m or rad.
-UNLIMITED = 1e6
+UNLIMITED = 1e5
 
 
 class Coordinates:
@@ -86,10 +86,10 @@ class Coordinates:
 
     @cached_property
     def limited(self) -> Flags:
-        """Whether each lower and upper limit of `q_limits` is one, (n, 2): finite and below 1e6 in size.
+        """Whether each lower and upper limit of `q_limits` is one, (n, 2): finite and below 1e5 in size.
 
         URDF asks for two numbers at every sliding joint, so files write ±1e9 or the largest float for
-        "none". No joint slides a thousand kilometres or turns 160 000 times.
+        "none". No joint slides a hundred kilometres or turns 16 000 times.
         """
         return unwritable(np.isfinite(self.q_limits) & (np.abs(self.q_limits) < UNLIMITED))
 

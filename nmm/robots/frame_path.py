@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import types
 
 from nmm.arrays import Array, Integers
-from nmm.kernels.compiled import clear, compiled, scratch, view
+from nmm.kernels.compiled import clear, kernel, scratch, view
 from nmm.kernels.kinematics import Kinematics, compose, place_frames, place_joints
 from nmm.kernels.memory import Memory, views
 from nmm.progress import Progress
@@ -16,7 +17,12 @@ from nmm.robots.robot import CENTER_OF_MASS, Robot
 AT_ONCE = 10_000
 
 
-@compiled
+@kernel(
+    types.void(
+        *(types.int64[::1], types.float64[::1], types.float64[:, ::1]),
+        *(types.float64[:, ::1], types.float64[:, :, ::1]),
+    )
+)
 def follow(integers: Integers, floats: Array, q: Array, points: Array, jacobians: Array) -> None:
     """points (N, 3) of the one frame at q (N, n), and, if there is room for them, jacobians (N, 3, n)."""
     here = views(Kinematics, integers, floats, 0)

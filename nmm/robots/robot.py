@@ -132,6 +132,16 @@ class Robot(Coordinates):
 
     def frame_id(self, name: str) -> int:
         """Pinocchio's index of a frame; of the link's where a link and a joint share the name."""
+        found = self._frame_ids.get(name)
+        if found is None:
+            found = self._frame_ids[name] = self._found_frame(name)
+        return found
+
+    @cached_property
+    def _frame_ids(self) -> dict[str, int]:
+        return {}
+
+    def _found_frame(self, name: str) -> int:
         for kind in (pin.FrameType.BODY, pin.FrameType.OP_FRAME):
             if self.model.existFrame(name, kind):
                 return int(self.model.getFrameId(name, kind))

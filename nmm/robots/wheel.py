@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -27,6 +28,7 @@ class Wheel:
     swivel : name of the swivel's joint in the display model, or "" without
     pivot : (3,) a point of the swivel's axis in the carrier's frame, m
     roller : angle γ of its rollers, rad (see `Platform.roller`)
+    velocity : largest rate of its joint, rad/s; infinite without
     """
 
     joint: str
@@ -38,6 +40,7 @@ class Wheel:
     swivel: str = ""
     pivot: Array = field(default_factory=lambda: np.zeros(3))
     roller: float = 0.0
+    velocity: float = math.inf
 
     @property
     def joints(self) -> tuple[str, ...]:

@@ -11,13 +11,14 @@ import numpy as np
 
 from nmm.arrays import Array
 from nmm.errors import InputError, expect_known
+from nmm.memory import expect_memory
 from nmm.runs.recorded import Recorded
 from nmm.words import listed
 
 #: What can be kept: quantities of a sample, by the names of a trajectory.
 QUANTITIES = ("q", "q_dot", "u", "r", "r_d", "error", "objective", "residual", "scale", "partition")
-#: How much of the memory that is free may be filled, and how large a file of a part is, bytes.
-SHARE, PART = 0.7, 64e6
+#: How large a file of a part is, bytes.
+PART = 64e6
 
 
 class Kept:
@@ -54,13 +55,11 @@ class Kept:
         each = {name: getattr(shapes, name)[::every] for name in names}
         of_one = sum(one.nbytes for one in each.values())
         self.part = count if folder is None else max(1, min(count, int(PART / max(of_one, 1))))
-        free = free_memory()
-        if of_one * self.part > SHARE * free:
-            raise InputError(
-                f"keep: {', '.join(names)} of {count} runs with {len(self.t)} samples each are "
-                f"{of_one * count / 1e9:.3g} GB, and {free / 1e9:.3g} GB are free; keep less, every "
-                "so many samples (every=), or in files (folder=)"
-            )
+        expect_memory(
+            of_one * self.part,
+            f"keep: {', '.join(names)} of {count} runs with {len(self.t)} samples each are",
+            "keep less, every so many samples (every=), or in files (folder=)",
+        )
         self._each, self.count = each, count
         self.files: list[Path] = []
 
@@ -89,11 +88,3 @@ class Kept:
             np.savez(file, **arrays)
         os.replace(unfinished, path)
         self.files.append(path)
-
-
-def free_memory() -> float:
-    """Bytes that are free; as good as no bound where the system does not say."""
-    try:
-        return float(os.sysconf("SC_AVPHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
-    except (ValueError, OSError, AttributeError):
-        return float("inf")

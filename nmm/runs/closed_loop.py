@@ -17,7 +17,7 @@ from nmm.control.sample import Snapshot
 from nmm.control.sequenced import SequencedController
 from nmm.control.step import Step
 from nmm.errors import DivergedError, RunError, SingularError
-from nmm.robots.slip import slip_warnings
+from nmm.robots.loading.provenance import platform_warnings
 from nmm.runs.broken_limits import outside_at_start
 from nmm.runs.compiled_loop import BOUND, CompiledLoop, compiled_loop
 from nmm.runs.judgement import Ended
@@ -75,7 +75,7 @@ def record(
         watch(recorder)
     if len(times) > 1 and not advance.tolerance:  # adaptive steps are shorter than the samples
         controller.dt = float(times[1] - times[0])
-    recorder.warnings += slip_warnings(controller.robot)
+    recorder.warnings += [*platform_warnings(controller.robot), *controller.costs]
     if controller.limits is not None:
         recorder.warnings += outside_at_start(controller.robot, controller.kept, q)
     idle = idle_inputs(controller, q)

@@ -15,13 +15,12 @@ from numba import types
 
 from nmm.arrays import Array, Integers
 from nmm.control.controller import Controller
-from nmm.control.equations import ControlStep, call_step, step
+from nmm.control.equations import ControlStep, call_step
 from nmm.control.goal import Goal
 from nmm.control.integrators import Integrator
 from nmm.control.step_size import Descent, call_shorten, shorten
 from nmm.control.stepping import Tableau, go_on, tableau
 from nmm.functions.program import BESIDE, LaidOut
-from nmm.kernels.ahead import compile_ahead
 from nmm.kernels.compiled import (
     checked_by_caller,
     compiled,
@@ -65,7 +64,7 @@ class Choice(NamedTuple):
     floats: Vector
 
 
-_FLY = types.int64(
+FLY = types.int64(
     *(types.int64[::1], types.float64[::1], record_type(Tableau), types.float64[::1], types.int64),
     *(types.int64, types.int64, record_type(Ends), record_type(Choice), record_type(Recorded)),
 )
@@ -250,7 +249,7 @@ class CompiledLoop:
             if chosen is None
             else Choice(shorten.address, *chosen.blocks)
         )
-        self._fly = checked_by_caller(fly, _FLY)
+        self._fly = checked_by_caller(fly, FLY)
         self._at_once = 16
 
     def __call__(self, times: Array, first: int, last: int, found: Recorded) -> tuple[int, bool]:
@@ -273,11 +272,6 @@ class CompiledLoop:
             fitting = 0.8 * A_CALL * (last - first) / max(time.perf_counter() - began, 1e-9)
             self._at_once = max(self._at_once, min(int(fitting), MOST_TIMES * self._at_once))
         return reached, reached == last
-
-
-def compile_loop_ahead() -> None:
-    """Have other processes compile the loop and the step in it where the cache lacks them."""
-    compile_ahead((fly, _FLY), step)
 
 
 def compiled_loop(controller: Controller, advance: Integrator, until: Goal | None) -> CompiledLoop | None:

@@ -21,9 +21,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numba import types
 
 from nmm.arrays import Array, Integers
-from nmm.kernels.compiled import compiled, view
+from nmm.kernels.compiled import compiled, kernel, view
 from nmm.runs.feedback import Feedback
 from nmm.runs.residuals import differs
 
@@ -175,7 +176,12 @@ def step_errors(samples: Samples, order: int) -> Array:
     return found
 
 
-@compiled
+@kernel(
+    types.void(
+        *(types.float64[::1], types.float64[:, ::1], types.float64[:, ::1], types.float64[:, :, ::1]),
+        *(types.float64[:, ::1], types.int64[:, ::1], types.float64, types.int64, types.float64[::1]),
+    )
+)
 def write_step_errors(
     t: Array,
     moved: Array,

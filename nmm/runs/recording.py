@@ -13,11 +13,12 @@ from nmm.control.guard import Counts
 from nmm.control.limits import Limits
 from nmm.control.step import Step
 from nmm.errors import InputError
-from nmm.functions.function import Function, Shown
+from nmm.functions.function import Function, Row, Shown
 from nmm.functions.program import COMPILED
 from nmm.functions.tasks.position import AXES
 from nmm.functions.tasks.task import Task
 from nmm.kernels.spectra import spectra
+from nmm.memory import expect_memory
 from nmm.resolvers.answer import Status
 from nmm.robots.frame_path import FramePath
 from nmm.robots.robot import Robot
@@ -30,11 +31,13 @@ from nmm.runs.reasons import weakest_words
 from nmm.runs.recorded import Recorded, room
 from nmm.runs.residuals import residuals
 from nmm.runs.trajectory import Outcome, Trajectory
-from nmm.words import counted
+from nmm.words import counted, listed
 
 #: What `Recorded` and `Step` call by one name.
 SAME_NAME = tuple(name for name in Recorded._fields if name not in ("limited", "unanswered"))
 
+#: A run fills its record's memory so many times: with copies, and what is worked out of it.
+COPIES = 2.5
 #: Below this ratio of smallest to largest singular value a run is warned about.
 NEARLY_SINGULAR = 1e-3
 #: Below this one J has lost rank.
@@ -58,7 +61,13 @@ class Recorder:
         robot, s = controller.robot, len(controller.rows)
         count = len(times)
         kept = controller.kept.row_limits if controller.limits is not None else ()
-        self.found = room(count, robot.n, robot.n_u, s, len(controller.task.levels(robot)), len(kept))
+        sizes = robot.n, robot.n_u, s, len(controller.task.levels(robot)), len(kept)
+        expect_memory(
+            COPIES * count * sum(one.nbytes for one in room(1, *sizes)),
+            f"{count} samples need",
+            "expected a larger dt or a shorter duration; nmm.rollout keeps every so many samples (every=)",
+        )
+        self.found = room(count, *sizes)
         # By sample: one that is taken again counts once.
         self._beyond: dict[int, dict[str, float]] = {}
         self._against: dict[str, str] = {}
@@ -210,7 +219,7 @@ class Recorder:
             self.warnings.append(
                 f"the limit of {name} could not be kept with the others in {counted(len(broken), 'sample')}, "
                 f"from t = {times[min(broken)]:.3g} s on: its rate was beyond what would keep it by up to "
-                f"{max(broken.values()):.3g} a second"
+                f"{max(broken.values()):.3g} {self._rate_unit(name)}"
                 f"{f' (what contradicts each other: {against})' if (against := self._against[name]) else ''}"
             )
         backed_off = times[np.diff(self._retreats[: len(self)], prepend=self.backed_off) > 0]
@@ -224,7 +233,7 @@ class Recorder:
             self.warnings.append(
                 f"the added task was not done in {counted(len(missed), 'sample')}, from "
                 f"t = {missed[0]:.4g} to {missed[-1]:.4g} s{back}: its rate was "
-                f"missed by up to {added.max():.3g} a second"
+                f"missed by up to {added.max():.3g} {_of_rates(row.unit for row in self._added_rows)}"
             )
         unanswered = times[self.so_far.unanswered > 0]
         if len(unanswered):
@@ -235,6 +244,15 @@ class Recorder:
                 f"t = {unanswered[0]:.3g} s on, {'where J has lost rank' if lost else 'within the limits'}: "
                 "its inputs were those nearest to rest"
             )
+
+    @property
+    def _added_rows(self) -> tuple[Row, ...]:
+        return self._controller.added_task.rows(self._controller.robot)
+
+    def _rate_unit(self, limit: str) -> str:
+        """Of the rate of what a limit is about; what no row of the limits names is a distance."""
+        units = {row.name: row.unit for row in self._controller.kept.row_limits}
+        return _of_rates([units.get(limit, "m").removesuffix("/s")])
 
     def trajectory(self, outcome: Outcome, message: str, dt: float, method: str) -> Trajectory:
         """What was recorded."""
@@ -311,6 +329,11 @@ class Recorder:
             kinematics_off=self._kinematics_off(),
             **distances,
         )
+
+
+def _of_rates(units: Iterable[str]) -> str:
+    """The unit of a rate of such quantities, or of several together."""
+    return listed([f"{unit}/s" for unit in dict.fromkeys(units)])
 
 
 def shown(tasks: Iterable[Task], robot: Robot) -> tuple[str | None, dict[int, int], Array | None]:

@@ -9,20 +9,37 @@ from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, positive
 from nmm.control.controller import Controller
+from nmm.control.equations import step
 from nmm.control.goal import Goal
 from nmm.control.integrators import Integrator, integrator
 from nmm.control.sequenced import SequencedController
 from nmm.errors import InputError, RunError
+from nmm.functions.program import PLACE, place
+from nmm.kernels.ahead import compile_ahead
+from nmm.kernels.spectra import WRITE_SPECTRA, write_spectra
+from nmm.robots.frame_path import follow
 from nmm.robots.held import Held
 from nmm.runs.clearance import Guarded
 from nmm.runs.closed_loop import Leaving, record, sample_times
+from nmm.runs.compiled_loop import FLY, fly
 from nmm.runs.joining import Leg, join
 from nmm.runs.judgement import Ended, Verdict, blocked, judge, reached_or_not
+from nmm.runs.promise import write_step_errors
 from nmm.runs.recording import Recorder
+from nmm.runs.stability import LINEARISE, linearise
 from nmm.runs.trajectory import Outcome, Trajectory
 
 #: The most samples that a run may have; beyond it the numbers do not fit in memory.
 MOST_SAMPLES = 20_000_000
+
+
+def compile_ahead_of_a_run() -> None:
+    """Have other processes compile what every run needs, where the cache lacks it: its loop, and the step in
+    it, then what looks over it afterwards. The resolver and the tasks' functions are left to this process."""
+    compile_ahead(
+        *((fly, FLY), step, (place, PLACE), follow),
+        *(write_step_errors, (linearise, LINEARISE), (write_spectra, WRITE_SPECTRA)),
+    )
 
 
 def simulate(

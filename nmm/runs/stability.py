@@ -54,7 +54,7 @@ class Instability:
         return f"{said}; a dt below {advice.dt:.3g} s follows it ({tried})"
 
 
-_LINEARISE = types.void(
+LINEARISE = types.void(
     *(types.int64[::1], types.float64[::1], types.float64[::1], types.float64[:, ::1]),
     *(types.int64[::1], types.int64, types.float64[:, :, ::1]),
 )
@@ -112,7 +112,7 @@ def linearisations(controller: Controller, times: Array, q: Array) -> Array:
             start = controller.state.snapshot()
             with controller.compiled() as blocks:
                 at = np.ascontiguousarray(times), np.ascontiguousarray(q)
-                checked_by_caller(linearise, _LINEARISE)(*blocks, *at, start, partitioned, F)
+                checked_by_caller(linearise, LINEARISE)(*blocks, *at, start, partitioned, F)
         else:
             for k, t in enumerate(times):
                 controller.reset()

@@ -8,7 +8,8 @@ import numpy as np
 
 from nmm.arrays import Array
 from nmm.collisions.recorded import described
-from nmm.runs.residuals import NONE, Residuals
+from nmm.robots.wheel_rates import inputs_held_by
+from nmm.runs.settling import settling_time
 
 if TYPE_CHECKING:
     from nmm.runs.trajectory import Trajectory
@@ -41,6 +42,7 @@ def summarise(trajectory: Trajectory) -> dict[str, Any]:
         },
         "platform": robot.platform.name,
         "resolver": trajectory.resolver,
+        "label": trajectory.label,
         "method": trajectory.method,
         "dt": trajectory.dt,
         "limited": trajectory.limited,
@@ -70,6 +72,7 @@ def summarise(trajectory: Trajectory) -> dict[str, Any]:
             "error_max_second_half": float(norm[half].max()),
             "error_rms": _rms(norm),
             "error_max": float(norm.max()),
+            "settling_time": settling_time(trajectory),
             "objective_initial": float(trajectory.objective[0]),
             "objective_final": float(trajectory.objective[-1]),
             "objective_mean_second_half": float(trajectory.objective[half].mean()),
@@ -108,14 +111,9 @@ def without_velocity_limit(trajectory: Trajectory) -> list[str]:
     if not trajectory.limited or not len(trajectory):
         return []
     named, moved = {*trajectory.limit_names}, np.ptp(trajectory.u, axis=0) > 0.0
+    named |= {f"u_{name}" for name in inputs_held_by(trajectory.robot, trajectory.limit_names)}
     names = trajectory.robot.u_names
     return [name for name, moves in zip(names, moved, strict=True) if moves and f"u_{name}" not in named]
-
-
-def unmet(summary: dict[str, Any]) -> Residuals:
-    """Where J u differed from the rate, read back from a summary; older ones do not say."""
-    found = {name: summary[f"unmet_{name}"] for name in NONE._fields if f"unmet_{name}" in summary}
-    return NONE._replace(**found)
 
 
 def _clearance(trajectory: Trajectory) -> dict[str, Any]:

@@ -76,6 +76,7 @@ class Trajectory:
         middle and the last sample, m and rad; not a number where Pinocchio computed all
     scenario : the scenario as resolved, if it came from one
     events : when tasks that come and go began and ended, and why
+    label : what it is called among other runs; "" for its resolver
     """
 
     robot: Robot
@@ -119,6 +120,7 @@ class Trajectory:
     kinematics_off: float = float("nan")
     scenario: dict[str, Any] | None = field(default=None)
     events: tuple[Event, ...] = ()
+    label: str = ""
 
     def __len__(self) -> int:
         return len(self.t)
@@ -131,6 +133,11 @@ class Trajectory:
     def complete(self) -> bool:
         """Whether the run reached its end, and its task error went as its gain promises."""
         return self.outcome is Outcome.COMPLETED
+
+    @property
+    def called(self) -> str:
+        """What tables, legends and messages call it."""
+        return self.label or self.resolver.upper()
 
     @property
     def error_norm(self) -> Array:
@@ -171,9 +178,9 @@ class Trajectory:
         events = np.searchsorted(self.t, sorted({event.t for event in self.events}))
         return [part for part in np.split(self.desired, events) if len(part)]
 
-    def with_scenario(self, scenario: dict[str, Any]) -> Trajectory:
-        """The same trajectory with the scenario that it came from."""
-        return replace(self, scenario=scenario)
+    def with_scenario(self, scenario: dict[str, Any], warnings: tuple[str, ...] = ()) -> Trajectory:
+        """The same trajectory with the scenario that it came from, and with what that warns of."""
+        return replace(self, scenario=scenario, warnings=(*warnings, *self.warnings))
 
     def summary(self) -> dict[str, Any]:
         """The run in numbers, ready for JSON."""
@@ -213,7 +220,7 @@ class Trajectory:
             path=self.path,
             desired=self.moving,
             target=self.marks if len(self.marks) else None,
-            label=self.resolver.upper() if label is None else label,
+            label=self.called if label is None else label,
             frame=self.frame,
             bodies=tuple(Body(one.name, one.shape.geometry(), places(one, self.t)) for one in self.obstacles),
             nearest=self._nearest(),

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from nmm.errors import ScenarioError
+from nmm.files import read_bytes
+from nmm.scenario.named_reference import is_path
 from nmm.scenario.numbers import shown
+from nmm.words import listed
 
 #: Where a value stands: mapping keys and list indices, from the top.
 Place = tuple[str | int, ...]
 
-MOST_NODES = 200_000
+#: How long a file may be, bytes, how many values it may have, and how deep lists and mappings may nest.
+LONGEST, MOST_NODES, DEEPEST = 20_000_000, 200_000, 100
 _NULL = ("", "~", "null", "Null", "NULL")
 _TRUE = ("true", "True", "TRUE")
 _FALSE = ("false", "False", "FALSE")
@@ -43,6 +47,7 @@ class Document:
     lines : line of each key and item, from 1
     folder : where the file is
     settings : the places that were set since, and the working folder at that time
+    tied : places that an anchor (&) and its aliases (*) gave one value
     """
 
     name: str
@@ -50,6 +55,7 @@ class Document:
     lines: dict[Place, int] = field(default_factory=dict)
     folder: Path = field(default_factory=Path.cwd)
     settings: dict[Place, Path] = field(default_factory=dict)
+    tied: list[list[Place]] = field(default_factory=list)
 
     def where(self, path: Place) -> str:
         """How errors name a place: "file.yaml:12: task.0.gain", "file.yaml: set resolver.alpha"."""
@@ -69,6 +75,29 @@ class Document:
         folder = self.folder if setting is None else self.settings[setting]
         return (folder / Path(file).expanduser()).resolve()
 
+    def parted(self) -> list[str]:
+        """A sentence for each setting whose value an anchor tied to others, which stay as they were."""
+        sentences = []
+        for path in self.settings:
+            tied = dict.fromkeys(
+                (*other, *path[len(place) :])
+                for places in self.tied
+                for place in places
+                if path[: len(place)] == place
+                for other in places
+            )
+            left = [dotted(place) for place in tied if not self._touched(place)]
+            if left:
+                sentences.append(
+                    f"{dotted(path)} was set alone: an anchor (&) in {self.name} had given "
+                    f"{listed(left)} the same value, which stays"
+                )
+        return sentences
+
+    def _touched(self, path: Place) -> bool:
+        """Whether a place was set, or what it is in, or something in it."""
+        return any(path[: len(place)] == place[: len(path)] for place in self.settings)
+
     def _setting_of(self, path: Place) -> Place | None:
         return next((place for place in self.settings if path[: len(place)] == place), None)
 
@@ -84,7 +113,7 @@ class Document:
         ------
         ScenarioError : a path leads nowhere, or the text is not YAML
         """
-        copy = Document(self.name, _copied(self.data), self.lines, self.folder, dict(self.settings))
+        copy = replace(self, data=_copied(self.data), settings=dict(self.settings))
         for key, value in settings.items():
             copy._set(key, value)
         return copy
@@ -134,6 +163,8 @@ def _parsed(key: str, document: Document) -> Place:
         elif isinstance(place, str) and (shorthand := _shorthand(path, document.data)) is not None:
             path = (*path, step)
             place = place if step == shorthand else {}
+        elif is_path(place):
+            raise ScenarioError(f"{where}: {dotted(path)} is {place}: set {place}.{step}")
         else:
             raise ScenarioError(
                 f"{where}: {dotted(path)} is {shown(place)}, which has no keys: "
@@ -155,7 +186,7 @@ def _copied(value: Any) -> Any:
 def read_file(path: Path) -> Document:
     """Read a scenario file; `ScenarioError` names file and line of what is wrong with it."""
     try:
-        text = path.read_bytes().decode("utf-8-sig")
+        text = read_bytes(path, LONGEST).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise ScenarioError(f"{path}: expected UTF-8 text") from None
     except OSError as error:
@@ -165,7 +196,8 @@ def read_file(path: Path) -> Document:
     if not isinstance(data, dict):
         raise ScenarioError(f"{path}: expected a mapping (key: value), got {shown(data)}")
     lines = {place[1:]: line for place, line in document.lines.items() if len(place) > 1}
-    return Document(str(path), data, lines, path.resolve().parent)
+    tied = [[place[1:] for place in places] for places in document.tied]
+    return Document(str(path), data, lines, path.resolve().parent, tied=tied)
 
 
 def read_text(text: str, name: str, *, lines: bool = True) -> Document:
@@ -182,14 +214,24 @@ def read_text(text: str, name: str, *, lines: bool = True) -> Document:
     except RecursionError:
         raise ScenarioError(f"{name}: not valid YAML: nested too deeply") from None
     reader = _Reader(name)
-    return Document(name, {"value": None if root is None else reader.plain(root, ("value",))}, reader.lines)
+    data = {"value": None if root is None else reader.plain(root, ("value",))}
+    return Document(name, data, reader.lines, tied=reader.tied)
 
 
 def _check_events(text: str, name: str) -> None:
-    """Refuse tags and a second document, which a node graph no longer shows."""
-    documents = 0
+    """Refuse tags and a second document, which a node graph no longer shows, and what takes long to read."""
+    documents = depth = nodes = 0
     for event in yaml.parse(text, yaml.SafeLoader):
         line = 1 if event.start_mark is None else event.start_mark.line + 1
+        nodes += isinstance(event, yaml.NodeEvent)
+        if nodes > MOST_NODES:
+            raise ScenarioError(f"{name}:{line}: expected at most {MOST_NODES} values")
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > DEEPEST:
+            raise ScenarioError(
+                f"{name}:{line}: not valid YAML: nested too deeply; expected at most {DEEPEST} lists and "
+                "mappings in one another"
+            )
         if isinstance(event, yaml.DocumentStartEvent):
             documents += 1
             if documents > 1:
@@ -205,9 +247,15 @@ class _Reader:
 
     def __init__(self, name: str) -> None:
         self.lines: dict[Place, int] = {}
+        self._places: dict[int, list[Place]] = {}
         self._name = name
         self._open: set[int] = set()
         self._count = 0
+
+    @property
+    def tied(self) -> list[list[Place]]:
+        """The places of each node that has several."""
+        return [places for places in self._places.values() if len(places) > 1]
 
     def plain(self, node: yaml.Node, path: Place) -> Any:
         line = node.start_mark.line + 1
@@ -215,6 +263,7 @@ class _Reader:
         self._count += 1
         if self._count > MOST_NODES:  # aliases of aliases multiply
             raise ScenarioError(f"{self._name}:{line}: expected at most {MOST_NODES} values")
+        self._places.setdefault(id(node), []).append(path)
         if id(node) in self._open:
             raise ScenarioError(f"{self._name}:{line}: an alias (*) that holds itself")
         if isinstance(node, yaml.ScalarNode):

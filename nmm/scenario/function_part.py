@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, Self
+
+from pydantic import PrivateAttr, SerializerFunctionWrapHandler, model_serializer
 
 from nmm.functions.function import Function
 from nmm.robots.robot import Robot
@@ -16,6 +18,18 @@ FRAMES, COORDINATES = ("frame", "relative_to"), ("of", "joints")
 
 class FunctionPart(MadePart):
     """A function phi(t, q)."""
+
+    _path: str = PrivateAttr("")
+
+    def named(self, path: str) -> Self:
+        """The same function, which the file names by this path; plain data name it so again."""
+        part = self.model_copy()
+        part._path = path
+        return part
+
+    @model_serializer(mode="wrap")
+    def _as_named(self, plain: SerializerFunctionWrapHandler) -> Any:
+        return self._path or plain(self)
 
     def build(self, robot: Robot, unit: str = "m") -> Function:
         """The function, with the robot's word on it: errors know their key."""

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import BeforeValidator
+from pydantic import ValidationInfo, ValidatorFunctionWrapHandler, WrapValidator
 
 from nmm.kinds import REFERENCES, TASKS
 from nmm.scenario.function_part import FunctionPart
 from nmm.scenario.keys import Part, one_of
 from nmm.scenario.made_part import part_of
+from nmm.scenario.named_reference import is_path, references_of
 from nmm.scenario.numbers import Numbers
 from nmm.scenario.special_references import (
     FixedOrientation,
@@ -40,6 +41,20 @@ def _point(value: object) -> object:
     return {"kind": "position", "frame": value} if isinstance(value, str) else _short(value)
 
 
+def _reference(value: Any, read: ValidatorFunctionWrapHandler, info: ValidationInfo) -> FunctionPart:
+    """A path to a task's reference stands for what is written there, as it is when the scenario is read."""
+    if not is_path(value):
+        part: FunctionPart = read(_short(value))
+        return part
+    path = value.strip()
+    with references_of(info).followed(path) as written:
+        return _reference(written, read, info).named(path)
+
+
+def _point_or_reference(value: Any, read: ValidatorFunctionWrapHandler, info: ValidationInfo) -> FunctionPart:
+    return _reference(value if is_path(value) else _point(value), read, info)
+
+
 #: The functions of tasks, by kind.
 FUNCTION_PARTS = {kind: part_of(kind, made, FunctionPart) for kind, made in TASKS.items()}
 #: The references, by kind; after those of time what a task can follow of the robot itself.
@@ -55,10 +70,10 @@ REFERENCES_BY_NAME: dict[str, Any]
 if TYPE_CHECKING:
     Reference = FunctionPart
 else:
-    Reference = Annotated[one_of(REFERENCE_PARTS), BeforeValidator(_short)]
+    Reference = Annotated[one_of(REFERENCE_PARTS), WrapValidator(_reference)]
     REFERENCES_BY_NAME = {
         "Reference": Reference,
-        "Point": Annotated[one_of(REFERENCE_PARTS), BeforeValidator(_point)],
+        "Point": Annotated[one_of(REFERENCE_PARTS), WrapValidator(_point_or_reference)],
         "FixedOrientation": FixedOrientation,
     }
     for _part in {*FUNCTION_PARTS.values(), *REFERENCE_PARTS.values()}:

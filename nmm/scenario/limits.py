@@ -99,7 +99,9 @@ class LimitsPart(Part):
         None, description="of inputs: a number for all, or numbers by input or group; m/s², rad/s²"
     )
     wheels: Speeds = Field(
-        None, description="largest rolling rate of the driven wheels: a number, or by joint; rad/s"
+        None,
+        description="largest rolling rates of wheels: a number for all, or by joint in place of the robot's "
+        "own; rad/s",
     )
     bounds: BoundList = Field(
         default_factory=list, description="functions whose values are kept within limits"

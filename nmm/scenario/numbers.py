@@ -17,6 +17,8 @@ from simpleeval import (  # type: ignore[import-untyped]  # it has no annotation
     SimpleEval,
 )
 
+from nmm.words import quoted
+
 #: Numbers, or lists of them to any depth, as plain data.
 Nested = float | list[Any]
 
@@ -120,8 +122,7 @@ def shown(value: object) -> str:
         return "nothing (null)"
     if isinstance(value, bool):
         return str(value).lower()
-    text = " ".join(repr(value).split())
-    return text if len(text) <= 60 else f"{text[:59]}…"
+    return quoted(value)
 
 
 Number = Annotated[float, BeforeValidator(number)]

@@ -18,6 +18,7 @@ from nmm.scenario.function_part import FunctionPart, check_coordinates, check_fu
 from nmm.scenario.functions import REFERENCES_BY_NAME, Reference
 from nmm.scenario.keys import FUNCTION, NUMBER, Part, at, one_of
 from nmm.scenario.made_part import MadePart, part_of
+from nmm.scenario.named_reference import is_path
 from nmm.scenario.numbers import Number, Positive
 from nmm.scenario.spelling import Combination
 
@@ -26,7 +27,7 @@ USUAL = Clearance()
 
 def _spelled(value: object) -> str:
     """Whether a value is a function of time or of the configuration, or a number."""
-    return FUNCTION if isinstance(value, Mapping | FunctionPart) else NUMBER
+    return FUNCTION if isinstance(value, Mapping | FunctionPart) or is_path(value) else NUMBER
 
 
 if TYPE_CHECKING:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, model_validator
 
 from nmm.kinds import RESOLVERS
-from nmm.scenario.keys import one_of
+from nmm.scenario.keys import KeyedError, one_of
 from nmm.scenario.made_part import MadePart, part_of
 from nmm.scenario.numbers import Positive, integer, shown
 from nmm.scenario.tasks import TaskList, listed
@@ -68,7 +68,31 @@ RESOLVER_PARTS: dict[str, type[ResolverPart]] = {
     kind: part_of(kind, made, BASES.get(kind, ResolverPart), **SPELLED.get(kind, {}))
     for kind, made in RESOLVERS.items()
 }
+
+
+class OwnPart(ResolverPart):
+    """The resolver of a Python file, as a run's folder records it. It is named on the command line, or given
+    in Python: code of a file that a scenario names is never run, whoever wrote the scenario."""
+
+    kind: Literal["own"]
+    source: str
+
+    def make(self, unit: str = "m") -> Any:
+        raise KeyedError(
+            ("source",),
+            f"a scenario runs no Python; expected {self.source} as --resolver FILE.py:NAME, or in Python as "
+            "scenario.with_resolver(resolver)",
+        )
+
+    @model_validator(mode="after")
+    def _can_be_made(self) -> OwnPart:
+        return self
+
+    def explicit(self) -> dict[str, Any]:
+        return self.model_dump()
+
+
 if TYPE_CHECKING:
     AnyResolver = ResolverPart
 else:
-    AnyResolver = one_of(RESOLVER_PARTS)
+    AnyResolver = one_of({**RESOLVER_PARTS, "own": OwnPart})

@@ -106,7 +106,8 @@ class RobotPart(Part):
     platform: Annotated[str | dict[str, Any] | None, BeforeValidator(_kind_of_platform)] = Field(
         None,
         description="how the base moves: a kind (car), measured in the file, or with its parameters, as "
-        "{kind: car, wheelbase: 0.5}; when not given, what the file declares, or a unicycle",
+        "{kind: car, wheelbase: 0.5}; when not given, what the file declares, or a car or a unicycle, as "
+        "its wheels steer",
     )
     package_dirs: list[FileName] = Field(
         default_factory=list,
@@ -118,7 +119,9 @@ class RobotPart(Part):
         "when not given, the loader finds them",
     )
     lock: dict[str, Number] = Field(
-        default_factory=dict, description="joints to fix, and their values, rad or m, as {torso: 0.2}"
+        default_factory=dict,
+        description="joints to fix, and their values, rad or m, as {torso: 0.2}, or {'*finger*': 0} for all "
+        "that match",
     )
     axle: Annotated[str | list[float] | None, BeforeValidator(_axle)] = Field(
         None,
@@ -203,6 +206,9 @@ class MountedPart(Part):
     xyz: Three | None = Field(None, description="as in the list")
     rpy: Three | None = Field(None, description="as in the list")
     prefix: str | None = Field(None, description="as in the list")
+    limits: dict[str, Number] = Field(
+        default_factory=dict, description="largest absolute values of the platform's inputs, as {v: 0.5}"
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -217,8 +223,10 @@ class MountedPart(Part):
 
     def build(self, absolute: Absolute, place: Place) -> Robot:
         """The platform with its arms; `place` is where this part stands in the scenario."""
+        for name in self.limits.keys() & self.platform.limits.keys():
+            raise KeyedError(("limits", name), f"expected once, it is in platform.limits.{name} too")
         with at("platform"):
-            robot = self.platform.build(absolute, (*place, "platform"))
+            robot = self._limited().build(absolute, (*place, "platform"))
         single = self._single()
         if single is not None:
             return single.mount_on(robot, absolute, place)
@@ -229,12 +237,16 @@ class MountedPart(Part):
 
     def explicit(self, absolute: Absolute, place: Place) -> dict[str, Any]:
         """Every key of the form that was used, as plain data, files with absolute paths."""
-        platform = {"platform": self.platform.explicit(absolute, (*place, "platform"))}
+        platform = {"platform": self._limited().explicit(absolute, (*place, "platform"))}
         single = self._single()
         if single is not None:
             return platform | single.explicit(absolute, place)
         arms = [arm.explicit(absolute, (*place, "arms", i)) for i, arm in enumerate(self.arms)]
         return {**platform, "arms": arms}
+
+    def _limited(self) -> RobotPart:
+        """The platform with the limits that stand beside it."""
+        return self.platform.model_copy(update={"limits": self.platform.limits | self.limits})
 
     def _single(self) -> ArmPart | None:
         if self.arm is None:

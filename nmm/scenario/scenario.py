@@ -18,11 +18,14 @@ from nmm.scenario.keys import KeyedError, as_written, at, first_error
 if TYPE_CHECKING:
     from nmm.collisions.obstacle import Obstacle
     from nmm.control.controller import Controller
+    from nmm.resolvers.base import Resolver
     from nmm.robots.robot import Robot
     from nmm.runs.recording import Recorder
     from nmm.runs.trajectory import Trajectory
 
 SUFFIXES = (".yaml", ".yml")
+#: The kind of a resolver that is no kind of ours.
+OWN = "own"
 #: The keys that a controller does not depend on.
 KEYS_OF_A_RUN = ("q0", "duration", "method", "tolerance")
 
@@ -46,17 +49,21 @@ class Scenario:
         self.path = Path(document.name)
         own_name = re.sub(r"[^\w.-]", "_", self.path.name.split(".", 1)[0]) or "scenario"
         data = {"name": own_name, **document.data}
+        from nmm.scenario.named_reference import NamedReferences
         from nmm.scenario.schema import ScenarioPart
 
         try:
-            self.parts = ScenarioPart.model_validate(data)
+            self.parts = ScenarioPart.model_validate(data, context=NamedReferences(data))
         except ValidationError as error:
             raise self._located(first_error(error, data)) from None
+        #: What is worth a warning of what was set, a sentence each.
+        self.warnings = tuple(document.parted())
         self.name = self.parts.name
         self.title = self.parts.title
         #: The absolute path of a file that is named at a place of it.
         self.absolute = document.absolute
         self._robot: Robot | None = None
+        self._own: Resolver | None = None
 
     @classmethod
     def load(cls, name_or_path: str | Path, overrides: Mapping[str, object] | None = None) -> Scenario:
@@ -96,14 +103,25 @@ class Scenario:
         ScenarioError : as `override`
         """
         derived = Scenario(_with_settings(self.document, settings))
+        derived._own = self._own
         of_robot = any(key.split(".", 1)[0] == "robot" for key in settings)
         if not of_robot or derived._explicit_robot() == self._explicit_robot():
             derived._robot = self._robot
         return derived
 
-    def with_resolver(self, kind: str) -> Scenario:
-        """This scenario with another kind of resolver, which keeps those keys that the kind knows."""
-        return self if kind == self.parts.resolver.kind else self.override("resolver.kind", kind)
+    def with_resolver(self, resolver: str | Resolver, source: str = "") -> Scenario:
+        """This scenario with another resolver: a kind, which keeps the keys that it knows, or your own.
+
+        Parameters
+        ----------
+        resolver : "rg", "pg", ..., or a `Resolver`
+        source : where one of your own is from, as a run's folder records it
+        """
+        if isinstance(resolver, str):
+            return self if resolver == self.parts.resolver.kind else self.override("resolver.kind", resolver)
+        derived = self.override("resolver", {"kind": OWN, "source": source or resolver.name})
+        derived._own = resolver
+        return derived
 
     def robot(self) -> Robot:
         """The robot, loaded once."""
@@ -122,12 +140,13 @@ class Scenario:
         ------
         ScenarioError : what the robot does not have, or what does not fit together
         """
-        from nmm.runs.compiled_loop import compile_loop_ahead
+        from nmm.runs.simulation import compile_ahead_of_a_run
 
-        compile_loop_ahead()  # most who have a controller made run it
+        compile_ahead_of_a_run()  # most who have a controller made run it
         robot = self.robot()
         try:
-            return self.parts.build(robot, self.absolute)
+            own = self._own if self.parts.resolver.kind == OWN else None
+            return self.parts.build(robot, self.absolute, own)
         except KeyedError as error:
             raise self._located(error) from None
 
@@ -179,7 +198,7 @@ class Scenario:
                 )
         except KeyedError as error:
             raise self._located(error) from None
-        return trajectory.with_scenario(self.resolved())
+        return trajectory.with_scenario(self.resolved(), self.warnings)
 
     def resolved(self) -> dict[str, Any]:
         """Every key as plain data, defaults included, numbers evaluated, files with absolute paths.

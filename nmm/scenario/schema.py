@@ -13,6 +13,7 @@ from nmm.control.sequenced import SequencedController
 from nmm.errors import InputError
 from nmm.functions.tasks.task import Stack
 from nmm.kinds import RESOLVERS
+from nmm.resolvers.base import Resolver
 from nmm.robots.robot import Robot
 from nmm.scenario.collisions import CollisionsPart
 from nmm.scenario.functions import REFERENCE_PARTS
@@ -80,8 +81,9 @@ class ScenarioPart(Part):
         description="what steers a platform where neither task nor objective does: true, false, or a mapping",
     )
 
-    def build(self, robot: Robot, absolute: Absolute) -> Controller:
-        """The controller, after a check of q0; errors know their key. `absolute` finds the files named."""
+    def build(self, robot: Robot, absolute: Absolute, own: Resolver | None = None) -> Controller:
+        """The controller, after a check of q0; errors know their key. `absolute` finds the files named, `own`
+        is a resolver in the place of the file's."""
         self.check_start(robot)
         with at("task"):
             task = build_tasks(self.task, robot)
@@ -108,7 +110,7 @@ class ScenarioPart(Part):
             retreat = None if self.retreat is None else self.retreat.build(robot, goal)
         steering = None if self.steering is None else self.steering.build()
         with at("resolver"):
-            resolver, added = self.resolver.make(), None
+            resolver, added = own or self.resolver.make(), None
             if sequenced:
                 return SequencedController(
                     robot, task, resolver, objective, limits, self.dt, retreat, steering or False

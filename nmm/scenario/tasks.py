@@ -32,7 +32,8 @@ class TaskPart(FunctionPart):
 
     reference: Reference = Field(
         description="the target: a number, numbers, or a mapping with a kind of reference, among them "
-        "functions of the configuration (position, orientation, heading, coordinates, ...)"
+        "functions of the configuration (position, orientation, heading, coordinates, ...); or another "
+        "task's, by its path (task.0.reference)"
     )
     gain: Numbers | None = Field(
         1.0,

@@ -89,9 +89,19 @@ class SweepFolder:
                     fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 except OSError:
                     raise InputError(f"{self.path}: another process is at this sweep") from None
+            self._remove_leftovers()
             if not is_sweep(self.path):
                 self._write_manifest(complete=False)
             yield
+
+    def _remove_leftovers(self) -> None:
+        """What a process that was killed had not finished."""
+        for folder in (self.path, self.parts, self.path / "runs"):
+            for left in folder.glob(".*"):
+                if left.is_dir():
+                    shutil.rmtree(left, ignore_errors=True)
+                elif left.name != ".lock":
+                    left.unlink()
 
     @property
     def complete(self) -> bool:
@@ -103,8 +113,6 @@ class SweepFolder:
         if self.complete:
             return []
         self.parts.mkdir(exist_ok=True)
-        for left in self.parts.glob(".*"):  # of a write that was killed
-            left.unlink()
         chunks = range(self.definition.chunks)
         return [
             chunk for chunk in chunks if rows_in(self._part(chunk)) != len(self.definition.indices(chunk))

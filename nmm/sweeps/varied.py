@@ -11,11 +11,11 @@ from typing import Any
 from nmm.arrays import Array
 from nmm.errors import InputError
 from nmm.scenario.numbers import evaluate, number, shown
+from nmm.words import split_outside_brackets
 
 EXPECTED = "expected LOWER:UPPER, LOWER:UPPER:COUNT or VALUE,VALUE,..., as in -pi:pi or rg,pg"
 #: The most values of one key that are written down one by one.
 MOST_VALUES = 100_000
-_OPENING, _CLOSING = "[{(", "]})"
 
 
 @dataclass(frozen=True)
@@ -123,24 +123,12 @@ def parsed(text: str) -> Varied:
 
 
 def _from_text(key: str, text: str) -> Varied:
-    values = _split(text, ",")
-    if len(values) == 1 and len(bounds := _split(text, ":")) > 1:
+    values = split_outside_brackets(text, ",")
+    if len(values) == 1 and len(bounds := split_outside_brackets(text, ":")) > 1:
         return _range(key, bounds, repr(text))
     if len(values) > 1 and not all(values):
         raise InputError(f"vary {key}: {EXPECTED}, got {text!r} (a value is missing)")
     return _listed(key, values)
-
-
-def _split(text: str, mark: str) -> list[str]:
-    """The parts between marks that stand in no bracket."""
-    parts, depth = [""], 0
-    for character in text:
-        depth += (character in _OPENING) - (character in _CLOSING)
-        if character == mark and depth == 0:
-            parts.append("")
-        else:
-            parts[-1] += character
-    return [part.strip() for part in parts]
 
 
 def _range(key: str, bounds: Sequence[Any], came: str) -> Varied:

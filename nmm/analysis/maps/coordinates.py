@@ -19,6 +19,8 @@ from nmm.robots.robot import Robot
 
 #: Most nodes of a map in all; for more there is no picture, and soon no memory.
 MOST_NODES = 4000 * 4000
+#: Beyond it, m or rad, the digits of a sine or a position are lost.
+FARTHEST = 1e6
 #: How far to both sides a coordinate without limits is mapped when no range is given, m.
 SIDE = 1.0
 
@@ -162,6 +164,10 @@ def checked_range(given: Sequence[float], name: str) -> tuple[float, float]:
     lower, upper = vector(given, 2, f"range of {name}")
     if not lower < upper:
         raise InputError(f"range of {name}: expected lower below upper, got {lower:g} to {upper:g}")
+    if max(-lower, upper) > FARTHEST:
+        raise InputError(
+            f"range of {name}: expected no more than {FARTHEST:g} to either side, got {lower:g} to {upper:g}"
+        )
     return float(lower), float(upper)
 
 

@@ -47,6 +47,8 @@ GAIN = 10.0
 SHORTER = 0.98
 #: The integration's steps are at most so long, s, and along the path, m and rad.
 STEP, STRIDE = 0.01, 0.005
+#: The most samples and steps of a way.
+MOST_SAMPLES, MOST_STEPS = 100_000, 1_000_000
 #: Half the range about q in which J's rank is looked at, m and rad.
 AROUND = 1e-2
 
@@ -117,12 +119,13 @@ def self_motion(
     if dt > duration / 4.0:
         raise InputError(f"dt: expected at most a quarter of the duration, {duration / 4.0:g} s, got {dt:g}")
     robot.check_limits(q)
+    length = 2.0 * speed * duration / np.pi
+    _check_effort(duration, speed, dt, length)
     J = jacobians.J(t, q)
     rank = jacobians.rank(J, TOLERANCE)
     expect_direction(robot, J, rank, direction)
     nearby = _nearby(jacobians, t, q, rank)
     motion = _Motion(robot, held(jacobians, t, q), t, q, null_field(robot, J, nearby, rank, direction))
-    length = 2.0 * speed * duration / np.pi
     steps = max(4, round(duration / dt))
     times = np.linspace(0.0, duration, steps + 1)
     samples, ended = motion.run(times, length)
@@ -138,6 +141,21 @@ def self_motion(
         if not ended:
             return motion.there_and_back(samples, times, length, why)
     return motion.there_and_back(samples, times, length, "")
+
+
+def _check_effort(duration: float, speed: float, dt: float, length: float) -> None:
+    """`InputError` for a way of too many samples or steps."""
+    if not duration / dt <= MOST_SAMPLES:
+        raise InputError(
+            f"duration: {duration:g} s in steps of {dt:g} s are {duration / dt:.3g} samples; expected at "
+            f"most {MOST_SAMPLES}"
+        )
+    steps = length * np.pi / 2.0 / STRIDE
+    if not steps <= MOST_STEPS:
+        raise InputError(
+            f"speed: a way of {length:.3g} m and rad (speed {speed:g}, duration {duration:g} s) takes "
+            f"{steps:.3g} steps; expected at most {MOST_STEPS}"
+        )
 
 
 def held(jacobians: Jacobians, t: float, q: Array) -> Stack:

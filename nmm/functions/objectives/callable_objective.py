@@ -31,4 +31,4 @@ class CallableObjective(Objective):
         self._gradient = gradient
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
-        return of_configuration(self.function, self._gradient, 1, "callable objective", robot)
+        return of_configuration(self.function, self._gradient, 1, "callable objective", robot, "gradient")

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from numpy.typing import ArrayLike
 
 from nmm.errors import InputError
-from nmm.functions.callbacks import TimeConfigurationFunction, differentiated, stage
+from nmm.functions.callbacks import Differentiated, TimeConfigurationFunction, called, stage
 from nmm.functions.function import Function, Row, Stage
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
@@ -46,6 +46,7 @@ class CallableReference(Function):
         self.dimension = dimension
         self.unit = unit
         self.of_configuration = of_configuration
+        self._called = called(function)
         self._function = self._with_configuration(function)
         self._rate = None if rate is None else self._with_configuration(rate)
         self._jacobian = jacobian
@@ -63,12 +64,12 @@ class CallableReference(Function):
         return tuple(Row(f"g{i}", self.unit) for i in range(self.dimension))
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
-        callback = differentiated(
+        callback = Differentiated(
             self._function,
             self._rate,
             self._jacobian,
             self.dimension,
-            "callable reference",
+            f"callable reference {self._called}",
             depends_on_configuration=self.of_configuration,
         )
         return (stage(self.dimension, robot.n, callback),)

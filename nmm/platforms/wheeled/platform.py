@@ -102,6 +102,14 @@ class WheeledPlatform(Platform):
         return platform
 
     @property
+    def lengths(self) -> Mapping[str, float]:
+        return _lengths(self.wheels, self.hitches)
+
+    def measured(self, layout: Layout) -> Mapping[str, float]:
+        """Of the wheels and hitches that have the names of the file's joints."""
+        return _lengths(*parts_from(layout))
+
+    @property
     def velocity_map(self) -> Kernel:
         return wheeled
 
@@ -196,3 +204,9 @@ def _check_distinct(names: Sequence[str], what: str) -> None:
     twice = [name for k, name in enumerate(names) if name in names[:k]]
     if twice:
         raise InputError(f"{what} {twice[0]}: the name is given twice; {what}s: {', '.join(names)}")
+
+
+def _lengths(wheels: Sequence[Wheel], hitches: Sequence[Hitch]) -> dict[str, float]:
+    places = {wheel.name: wheel for wheel in wheels} | {hitch.joint: hitch for hitch in hitches}
+    found = {f"{axis} of {name}": getattr(at, axis) for name, at in places.items() for axis in ("x", "y")}
+    return found | {f"radius of {wheel.name}": wheel.radius for wheel in wheels}

@@ -1,4 +1,5 @@
-// The address is the state: #t=12.5&view=top&apart=1&grid=off&hide=pg&plots=H,error&zoom=2,7. What it says otherwise is ignored.
+// The address is the state: #t=12.5&view=top&apart=1&grid=off&hide=pg&plots=H,error&zoom=2,7, and where somebody
+// has put the camera, &camera=eye's x,y,z,target's x,y,z. What it says otherwise is ignored.
 "use strict";
 {
   const address = (nmm.address = {});
@@ -13,6 +14,7 @@
     const parts = [`t=${short(Math.min(player.time, stage.duration))}`];
     if (camera.from !== "iso") parts.push(`view=${camera.from}`);
     if (camera.following) parts.push("follow");
+    if (camera.moved) parts.push(`camera=${camera.place().map((x) => Number(x.toPrecision(6))).join(",")}`);
     if (nmm.apart.share > 0) parts.push(`apart=${Number(nmm.apart.share.toFixed(3))}`);
     for (const part of SHOWN) if (!pressed(part)) parts.push(`${part}=off`);
     const hidden = nmm.runs.filter((run) => run.hidden).map((run) => encodeURIComponent(run.id));
@@ -70,6 +72,9 @@
     if (to > from && to > 0 && from < stage.duration) plots.zoom(from, to);
     const time = Number(wanted.get("t") || NaN);
     if (Number.isFinite(time)) player.seek(time - stage.start);
+    // Where it was put, it was at that time: it may go along with the robots.
+    const place = (wanted.get("camera") || "").split(",").map((text) => Number(text || NaN));
+    if (place.length === 6 && place.every(Number.isFinite)) camera.put(place);
     if (wanted.has("play")) player.play();
   };
 

@@ -31,6 +31,7 @@
     controls.minDistance = 0.05 * size;
     controls.maxDistance = 30 * size;
     controls.addEventListener("start", () => (camera.moved = true));
+    controls.addEventListener("end", nmm.address.changed);
     camera.reset();
   };
 
@@ -42,7 +43,8 @@
     const narrow = tools.top > 0.5 * view.clientHeight; // the tools are below
     const lowest = Math.min(bar.height ? bar.top : Infinity, narrow && tools.height ? tools.top : Infinity, view.clientHeight);
     const bottom = view.clientHeight - lowest + (bar.height ? 10 : view.clientHeight < window.innerHeight ? 56 : 24);
-    if (narrow || camera.held) return [[head.bottom + 4, bottom, 0, 0]];
+    if (narrow) return [[head.bottom + 4, bottom, 0, 0]];
+    if (camera.held) return [[Math.max(head.bottom, tools.bottom) + 4, bottom, 0, 0]];
     const [aside, above] = room(named.length > 0).map((pixels) => pixels + 4);
     const tops = [24, tools.bottom + above, Math.max(head.bottom, tools.bottom) + above];
     const lefts = [0, head.right + aside];
@@ -178,6 +180,25 @@
     camera.look(sides[(sides.indexOf(camera.from) + 1) % sides.length]);
   };
   chooser.addEventListener("change", () => camera.look(chooser.value));
+
+  // Where somebody has put it: the eye and what it looks at, in the world's axes.
+  camera.place = () => [eye.position, nmm.viewer.controls.target].flatMap(({ x, y, z }) => [x, -z, y]);
+  camera.put = (numbers) => {
+    const [from, at] = vectors(numbers);
+    camera.moved = true;
+    eye.position.copy(from);
+    nmm.viewer.controls.target.copy(at);
+    nmm.viewer.controls.update();
+    nmm.viewer.set_dirty();
+  };
+
+  // What is held may have left the picture since: then all of it is fitted again, if nobody has moved the eye.
+  camera.refit = () => {
+    if (camera.moved || !camera.held) return;
+    eye.updateMatrixWorld();
+    const out = ({ x, y }) => Math.abs(x) > 1 || Math.abs(y) > 1;
+    if (camera.held().some((p) => out(p.project(eye)))) camera.reset();
+  };
 
   camera.follow = (on) => {
     camera.following = on;

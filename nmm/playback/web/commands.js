@@ -20,6 +20,7 @@ const nmm = (window.nmm = { hooks: {}, geometries: {} });
   nmm.resize = () => {
     nmm.viewer.set_3d_pane_size();
     nmm.scenery.fit();
+    nmm.texts.fit();
     if (nmm.stage && !nmm.camera.moved) nmm.camera.reset();
     nmm.viewer.set_dirty();
   };

@@ -4,7 +4,7 @@
   const curves = (nmm.curves = {});
   // Pixels left of the curves and right of them; a lane's height alone in its panel and among others, where its
   // name stands above it; and below a lane.
-  Object.assign(curves, { LEFT: 52, RIGHT: 10, GAP: 6 });
+  Object.assign(curves, { LEFT: 56, RIGHT: 10, GAP: 6 });
   const [ALONE, AMONG, NAME] = [84, 46, 15];
   const ROW = 20;
   const TINY = 1e-13;
@@ -14,7 +14,7 @@
 
   const having = (lane) => nmm.runs.filter((run) => run.columns[lane.key] && !run.hidden);
 
-  // 1, 2 or 5 times a power of ten, so that about `count` of them fit into a width.
+  // 1, 2 or 5 times a power of ten, of which at most about `count` fit into a width.
   curves.step = (width, count) => {
     const raw = width / count;
     const power = 10 ** Math.floor(Math.log10(raw));
@@ -24,9 +24,15 @@
     const size = Math.abs(value);
     if (size < 1e-9 * step) return "0";
     const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
-    const text = size >= 1e5 || digits > 4 ? value.toExponential(1).replace(".0e", "e") : value.toFixed(digits);
-    return text.replaceAll("-", "−").replace("e+", "e");
+    const text = value.toFixed(digits);
+    // As many digits as tell one tick from the next.
+    const told = Math.max(0, Math.floor(Math.log10(size)) - Math.floor(Math.log10(step) + 1e-9));
+    const short = size >= 1e5 || text.length > 8 ? value.toExponential(told) : text;
+    return short.replaceAll("-", "−").replace("e+", "e");
   };
+
+  // A time to the digits of a step, without the zeros that say nothing.
+  curves.time = (value, step) => String(Number(value.toFixed(Math.max(0, Math.ceil(-Math.log10(step) - 1e-9))))).replace("-", "−");
 
   // The samples of a run that are seen between two times, and one beyond each.
   const seen = (run, [from, to]) => [
@@ -64,17 +70,28 @@
       if (wide <= Math.max(2.5 * span, 1e-12)) [low, high] = [Math.min(low, end), Math.max(high, end)];
     }
     // A value that hardly moves is not shown as noise, nor with numbers that have no room.
-    const least = Math.max(5e-4 * Math.max(Math.abs(low), Math.abs(high)), 1e-12);
-    if (high - low < least) [low, high] = [low - 0.5 * least || -1, high + 0.5 * least || 1];
+    const most = Math.max(Math.abs(low), Math.abs(high));
+    const half = most < 1e-12 ? 1 : 2.5e-4 * most;
+    if (high - low < 2 * half) [low, high] = [low - half, high + half];
     const room = 0.08 * (high - low);
     return { log: false, low: low - room, high: high + room, limits: [...limits] };
   };
 
+  // The least of 1, 2, 4 or 5 times a power of ten of which no more than `most` lie between two values: that
+  // leaves at least two of them, for `most` of 3 or more.
+  function between(low, high, most) {
+    const count = (step) => Math.floor(high / step + 1e-9) - Math.ceil(low / step - 1e-9) + 1;
+    for (let power = 10 ** Math.floor(Math.log10((high - low) / most) - 1); ; power *= 10) {
+      const factor = [1, 2, 4, 5].find((factor) => count(factor * power) <= most);
+      if (factor) return factor * power;
+    }
+  }
+
   const raised = (power) => `10${String(power).replace(/./g, (c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[c]))}`;
 
   function ticks({ log, low, high }, height) {
-    const count = height > 70 ? 4 : 2;
-    const step = log ? Math.max(1, Math.ceil((high - low) / (count + 1))) : curves.step(high - low, count);
+    const most = height > 70 ? 5 : 3;
+    const step = log ? Math.max(1, Math.ceil((high - low) / most)) : between(low, high, most);
     const found = [];
     for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) {
       found.push({ at: k * step, text: log ? raised(k * step) : curves.number(k * step, step) });

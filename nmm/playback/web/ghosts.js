@@ -4,7 +4,6 @@
   const THREE = MeshCat.THREE;
   const SLATE = nmm.color([0.36, 0.44, 0.54]);
   let copies = 0;
-  const labelled = []; // where copies with texts stand
 
   // Everything fixed to the joints' nodes as one geometry: which triangles, in which colours, and each part
   // with its joint's number and its place in that joint's frame.
@@ -61,10 +60,16 @@
     return geometry;
   }
 
-  nmm.hooks.ghosts = ({ path, joints, root, texts, height }) => {
+  // The highest point of a copy.
+  function top({ attributes: { position } }) {
+    let highest = 0;
+    for (let i = 1; i < position.count; i++) if (position.getZ(i) > position.getZ(highest)) highest = i;
+    return position.count ? new THREE.Vector3().fromBufferAttribute(position, highest) : null;
+  }
+
+  nmm.hooks.ghosts = ({ path, joints, texts }) => {
     nmm.viewer.scene.updateMatrixWorld(true);
     const shape = merged(joints);
-    const platform = joints.find((joint) => joint.path === root);
     const count = joints[0].poses.length / 7;
     for (let k = 0; k < count; k++) {
       copies += 1;
@@ -95,16 +100,8 @@
         group.add(mesh);
       });
       nmm.viewer.set_object(nmm.split(`${path}/${k}/robot`), group);
-      if (platform === undefined) continue;
-      const label = nmm.scenery.label(texts[k], [0.4, 0.47, 0.56], false, 0.75);
-      // Those of robots at one place are stacked.
-      const place = new THREE.Vector3().fromArray(platform.poses, 7 * k);
-      const below = labelled.filter((other) => other.distanceTo(place) < 0.4 * height).length;
-      label.center.set(0.5, 0.5 - 1.05 * below);
-      labelled.push(place);
-      label.position.copy(place);
-      label.position.z += height;
-      nmm.viewer.set_object(nmm.split(`${path}/${k}/text`), label);
+      const highest = top(geometry);
+      if (highest) nmm.viewer.set_object(nmm.split(`${path}/${k}/text`), nmm.texts.add(texts[k], highest));
     }
     nmm.ghosts = (nmm.ghosts || []).concat(nmm.node(path));
   };

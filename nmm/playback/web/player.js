@@ -42,9 +42,10 @@
     player.setRange(0, nmm.stage.duration);
     nmm.plots.show(nmm.stage.plots);
     player.seek(0);
+    nmm.camera.reset(); // the play bar is there only now
+    nmm.texts.fit();
     nmm.address.start();
-    if (nmm.stage.autoplay) player.play();
-    return nmm.camera.reset(); // the play bar is there only now
+    return nmm.stage.autoplay && player.play();
   };
 
   // The bar reaches over a part of the motion, at least a thousandth of it.
@@ -144,6 +145,7 @@
     reset: () => {
       nmm.camera.reset();
       nmm.viewer.set_dirty();
+      nmm.address.changed();
     },
     ghosts: () => setShown("ghosts", nmm.ghosts, !isPressed("ghosts")),
     ellipsoids: () => setShown("ellipsoids", nmm.ellipsoids, !isPressed("ellipsoids")),

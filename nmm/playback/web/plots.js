@@ -58,13 +58,18 @@
 
   function drawRuler({ at, step }, { quiet, font }) {
     const pen = fresh(ruler, 18);
-    Object.assign(pen, { font, fillStyle: quiet, textBaseline: "middle", textAlign: "center" });
-    pen.fillText("t [s]", 0.5 * nmm.curves.LEFT, 9);
-    for (const time of at) {
-      const text = nmm.curves.number(nmm.stage.start + time, step);
-      const half = 0.5 * pen.measureText(text).width;
-      if (x(time) + half < width && x(time) - half > nmm.curves.LEFT - 8) pen.fillText(text, x(time), 9);
-    }
+    Object.assign(pen, { font, fillStyle: quiet, textBaseline: "middle", textAlign: "left" });
+    pen.fillText("t [s]", 2, 9);
+    // Both ends first, to a hundredth of a step, and of what is between them what has room.
+    const taken = [[0, pen.measureText("t [s]").width + 4]];
+    range().concat(at).forEach((time, i) => {
+      const text = nmm.curves.time(nmm.stage.start + time, i < 2 ? 0.01 * step : step);
+      const long = pen.measureText(text).width;
+      const left = Math.min(Math.max(x(time) - 0.5 * long, taken[0][1]), width - long);
+      if (taken.some(([from, to]) => left < to + 6 && left + long + 6 > from) && i > 1) return;
+      pen.fillText(text, left, 9);
+      taken.push([left, left + long]);
+    });
   }
 
   // Everything that is open and out of date.

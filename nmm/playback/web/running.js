@@ -116,11 +116,12 @@
     nmm.send({ type: "drawn", picture: shown, drawn: running.drawn });
   }
 
-  // As it is now: the time, the plots that are open.
+  // As it is now: the time, the plots that are open, where one looks from.
   nmm.hooks.whole = () => {
     if (!document.body.classList.contains("running")) return;
-    const open = nmm.plots.shown ? nmm.plots.opened().join(",") || "folded" : "none";
-    history.replaceState(null, "", `#t=${nmm.player.time}&plots=${open}`);
+    // To follow is how a run is shown; with a camera that somebody has moved it is what he sees.
+    if (!nmm.camera.moved) nmm.camera.following = false;
+    history.replaceState(null, "", nmm.address.text());
     location.reload();
   };
 }

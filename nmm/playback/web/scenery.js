@@ -144,7 +144,7 @@
   const labels = [];
   scenery.fit = () => {
     const unit = (2 * Math.tan(Math.PI / 10)) / Math.max(document.getElementById("view").clientHeight, 1);
-    for (const { sprite, wide, high } of labels) sprite.scale.set(wide * high * unit, high * unit, 1);
+    for (const { scale, userData } of labels) scale.set(userData.wide * unit, userData.high * unit, 1);
   };
 
   // A text that faces the viewer and keeps its size on the screen.
@@ -174,7 +174,8 @@
     const sprite = new THREE.Sprite(
       new THREE.SpriteMaterial({ map, depthTest: !filled, depthWrite: false, sizeAttenuation: false }),
     );
-    labels.push({ sprite, wide: width / height, high: HIGH * part });
+    sprite.userData = { wide: (width / height) * HIGH * part, high: HIGH * part };
+    labels.push(sprite);
     scenery.fit();
     sprite.renderOrder = filled ? 1000 : 0;
     return sprite;

@@ -35,6 +35,7 @@
   function moved() {
     nmm.viewer.scene.updateMatrixWorld();
     nmm.camera.update();
+    nmm.camera.refit();
     const root = new THREE.Vector3().setFromMatrixPosition(nmm.node(nmm.motions[0].root).matrixWorld);
     nmm.scenery.center(root.x, -root.z);
     for (const listener of joints.listeners) listener();

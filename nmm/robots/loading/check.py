@@ -17,7 +17,7 @@ from nmm.robots.followers import Follower
 from nmm.robots.loading.check_joints import check_joint
 from nmm.robots.loading.check_links import FindMesh, check_link, check_material
 from nmm.robots.loading.check_mimics import check_mimics
-from nmm.robots.loading.check_tree import check_names, check_tree
+from nmm.robots.loading.check_tree import check_names, check_tree, movable_on_root
 from nmm.robots.loading.findings import Findings, Problem, children
 from nmm.robots.loading.xml_tree import Element, XmlError, parse
 
@@ -128,8 +128,9 @@ def _check_robot(root: Element, findings: Findings, find_mesh: FindMesh, lock: C
     meshes: dict[str, Path] = {}
     for link in links:
         meshes |= check_link(link, findings, find_mesh)
+    first = movable_on_root(joints)
     for joint in joints:
-        check_joint(joint, findings)
+        check_joint(joint, findings, carries_all=first == [joint])
     followers = check_mimics(joints, findings, lock)
     return CheckedUrdf(root, root.get("name") or "", meshes, followers, _declared_platform(root, findings))
 

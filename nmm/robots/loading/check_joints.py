@@ -8,25 +8,46 @@ from nmm.robots.loading.findings import Findings, child
 from nmm.robots.loading.xml_tree import Element
 
 TYPES = ("revolute", "continuous", "prismatic", "fixed")
+#: Joints of several degrees of freedom, which are taken where they carry the whole robot.
+BASES = ("planar", "floating")
+#: How far from upright the normal of a base's plane may be.
+_UPRIGHT = 1e-6
 
 
-def check_joint(joint: Element, findings: Findings) -> None:
-    """Add the problems inside a joint."""
+def check_joint(joint: Element, findings: Findings, carries_all: bool = False) -> None:
+    """Add the problems inside a joint; carries_all: the only movable one on the root link's body."""
     owner = f"joint {joint.get('name')!r}"
     findings.origin(joint, owner)
     kind = joint.get("type")
     if kind is None:
         findings.add(joint, f"{owner}: no type, expected one of {', '.join(TYPES)}")
-    elif kind in ("planar", "floating"):
+    elif kind in BASES:
+        _check_base(joint, kind, owner, findings, carries_all)
+    elif kind in ("helical", "screw"):
         findings.add(
             joint,
-            f"{owner}: a {kind} joint is refused inside the tree: nmm itself puts the platform's x, y and "
-            "theta above the root link",
+            f"{owner}: a {kind} joint is refused: it turns and slides at once; expected one of "
+            f"{', '.join(TYPES)}",
         )
     elif findings.choice(joint, kind, TYPES, "joint type", owner) and kind != "fixed":
         _check_axis(joint, owner, findings)
         _check_limit(joint, kind, owner, findings)
         _check_dynamics(joint, owner, findings)
+
+
+def _check_base(joint: Element, kind: str, owner: str, findings: Findings, carries_all: bool) -> None:
+    if not carries_all:
+        findings.add(
+            joint,
+            f"{owner}: a {kind} joint is refused inside the tree: it stands for the platform's x, y and "
+            "theta only where it is the one movable joint on the root link's body",
+        )
+        return
+    axis = child(joint, "axis")
+    xyz = None if axis is None else findings.vector(axis, "xyz", 3, owner, required=True)
+    if kind == "planar" and xyz is not None and math.hypot(*xyz[:2]) > _UPRIGHT * abs(xyz[2]):
+        shown = " ".join(f"{value:g}" for value in xyz)
+        findings.add(axis, f"{owner}: <axis> of a planar joint: expected it upright, 0 0 1, got {shown}")
 
 
 def _check_axis(joint: Element, owner: str, findings: Findings) -> None:

@@ -58,6 +58,29 @@ def check_tree(links: list[Element], joints: list[Element], findings: Findings) 
         findings.add(None, f"expected one root link, found {found}: {', '.join(roots)}")
 
 
+def movable_on_root(joints: list[Element]) -> list[Element]:
+    """The movable joints on the root link's body: on the root link, and on what is fixed to it."""
+    ends = {tag: [_link(joint, tag) for joint in joints] for tag in ("parent", "child")}
+    body = {name for name in ends["parent"] if name not in ends["child"]}
+    fixed = [joint.get("type") == "fixed" for joint in joints]
+    for _ in joints:
+        pairs = zip(ends["parent"], ends["child"], fixed, strict=True)
+        grown = body | {child for parent, child, still in pairs if still and parent in body}
+        if grown == body:
+            break
+        body = grown
+    return [
+        joint
+        for joint, parent, still in zip(joints, ends["parent"], fixed, strict=True)
+        if not still and parent in body
+    ]
+
+
+def _link(joint: Element, tag: str) -> str:
+    element = child(joint, tag)
+    return "" if element is None else element.get("link", "")
+
+
 def _end(joint: Element, tag: str, names: list[str], findings: Findings) -> str | None:
     """The parent or child link of a joint, or None with a problem."""
     owner = f"joint {joint.get('name')!r}"

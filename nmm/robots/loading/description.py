@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,9 +14,11 @@ from nmm.errors import RobotError
 from nmm.robots.loading.packages import Packages
 from nmm.robots.loading.text import read_text
 from nmm.robots.loading.xacro_file import expand
+from nmm.robots.loading.xml_tree import XmlError, parse
 from nmm.words import one_line
 
 SUFFIXES = (".urdf", ".xacro")
+_LINK = re.compile(r"<link\b")
 
 
 @dataclass(frozen=True)
@@ -63,11 +66,30 @@ def describe(
     packages = Packages(file, package_dirs)
     if file.suffix.lower() == ".xacro":
         xml, used, warnings = expand(file.absolute(), texts, packages)
+        if not _LINK.search(xml):
+            _complain_of_macros(file)
         notes = tuple(f"xacro {warning}" for warning in warnings)
         return Description(xml, file, packages, True, used, notes)
     if texts:
         raise RobotError(f"{file}: arguments ({', '.join(texts)}) are for .xacro files, a .urdf has none")
     return Description(read_text(file), file, packages, False, {}, ())
+
+
+def _complain_of_macros(file: Path) -> None:
+    """`RobotError` that names the macros of a file that only defines some."""
+    try:
+        macros = [one for one in parse(read_text(file)).iter("xacro:macro") if one.get("name")]
+    except XmlError:
+        return
+    if macros:
+        told = "; ".join(
+            f"{one.get('name')} ({one.get('params', '').strip() or 'no parameters'})" for one in macros
+        )
+        raise RobotError(
+            f"{file}: holds no robot, only macros: {one_line(told, 400)}; write a .xacro file that includes "
+            f"it and calls one: <xacro:include filename={str(file.name)!r}/> "
+            f"<xacro:{macros[0].get('name', '').removeprefix('xacro:')} .../>"
+        )
 
 
 def argument_texts(arguments: Mapping[str, object] | None) -> dict[str, str]:

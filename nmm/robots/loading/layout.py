@@ -242,10 +242,11 @@ def _why_no_wheel(measured: Measured, joint: int) -> str | None:
 def _pivot(measured: Measured, joint: int) -> Pivot:
     model = measured.model
     lower, upper = -math.inf, math.inf
+    velocity = speed_limit(model, joint)
     if model.joints[joint].nq == 1:
         index = model.joints[joint].idx_q
         lower, upper = _finite(model.lowerPositionLimit[index]), _finite(model.upperPositionLimit[index])
-    return Pivot(str(model.names[joint]), *_carried(measured, joint), lower, upper)
+    return Pivot(str(model.names[joint]), *_carried(measured, joint), lower, upper, velocity)
 
 
 def _rolling(measured: Measured, joint: int, radius: float | None) -> RollingJoint:
@@ -266,6 +267,12 @@ def _carried(measured: Measured, joint: int) -> tuple[str, float, float]:
     offset = measured.placements[joint].translation - measured.placements[carrier].translation
     name = str(measured.model.names[carrier]) if carrier > measured.root else "theta"
     return name, float(offset[0]), float(offset[1])
+
+
+def speed_limit(model: pin.Model, joint: int) -> float:
+    """The largest rate of a joint, rad/s or m/s; infinite where its file says none, or 0."""
+    own = float(model.velocityLimit[model.joints[joint].idx_v])
+    return _finite(own) if own > 0.0 else math.inf
 
 
 def _finite(limit: float) -> float:

@@ -47,13 +47,15 @@ def load(
         with joints x, y, theta first
     arguments : values of the xacro file's arguments
     platform : the platform, or its name, by which it is measured in the file; by default what the file
-        declares, `<nmm platform="car"/>` below <robot>, or else a unicycle
+        declares, `<nmm platform="car"/>` below <robot>, or a car where two wheels, or one, steer as a car's
+        do, or else a unicycle
     package_dirs : folders that are, or hold, the ROS packages that the file speaks of
     wheels : joints that only roll, or the radius (m) of each; `()` for none. By default those with "wheel"
         in the joint's or link's name, with a level axis and no joint below them; on a fixed base they
         stand still
     lock : joints to fix, and their values (rad or m), within their limits; joints that follow them are fixed
-        with them, and one that is fixed itself follows nobody
+        with them, and one that is fixed itself follows nobody. A name with * (any letters) or ? (one) stands
+        for all joints that match and that no other key names: {"*finger*": 0}
     axle : the platform's reference point in the root link: a frame, whose yaw counts too, or x, y(, z) in m
     name : the robot's name; by default that of the file or model
     limits : largest absolute values of the platform's inputs, by name, in their units

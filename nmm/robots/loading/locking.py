@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -10,7 +11,7 @@ import pinocchio as pin
 
 from nmm.arrays import scalar
 from nmm.errors import InputError, RobotError, unknown
-from nmm.robots.followers import Follower, settled
+from nmm.robots.followers import Follower, first_leaders, settled
 from nmm.robots.loading.chain import CHAIN, Rebuilt
 from nmm.robots.loading.reduction import reduced
 
@@ -49,7 +50,7 @@ def with_locked(
     Parameters
     ----------
     rebuilt : a model on the chain
-    lock : values by joint, rad or m
+    lock : values by joint, or by pattern, rad or m: see `load`
     followers : joints that follow others, each after the one that it follows
     where : what messages call the model
     own : the platform's own joints, as far as they are known: they cannot be locked
@@ -61,6 +62,7 @@ def with_locked(
     """
     model = rebuilt.model
     free = [str(name) for name in model.names][len(CHAIN) + 1 :]
+    lock = _named(lock, [name for name in free if name not in own], followers, where)
     values = {name: _value(name, value, free, own, where) for name, value in lock.items()}
     for name, value in values.items():
         _check_limits(model, name, value, where, "")
@@ -86,6 +88,28 @@ def with_locked(
         sentences = (f"{name} at {at:g} (follows {leader})" for name, (leader, at) in mimicked.items())
         notes.append(f"locked with the joint that they follow: {', '.join(sentences)}")
     return Locked(Rebuilt(lean, geometries, tuple(notes)), values, mimicked, moving)
+
+
+def _named(
+    lock: Mapping[str, float], free: Sequence[str], followers: Sequence[Follower], where: str
+) -> dict[str, float]:
+    """Values by joint: of a pattern's joints those that are not named themselves, and follow none of them."""
+    leaders = {one.joint: one.leader for one in first_leaders(followers)}
+    found: dict[str, float] = {}
+    for key, value in lock.items():
+        if not is_pattern(key):
+            continue
+        pattern = re.compile(re.escape(key).replace(r"\*", ".*").replace(r"\?", "."))
+        matched = [name for name in free if pattern.fullmatch(name)]
+        if not matched:
+            raise RobotError(f"{where}: lock: no joint matches {key!r}; joints: {', '.join(free)}")
+        found |= {name: value for name in matched if leaders.get(name) not in matched}
+    return found | {key: value for key, value in lock.items() if not is_pattern(key)}
+
+
+def is_pattern(name: object) -> bool:
+    """Whether a name of a joint to lock stands for several: * for any letters, ? for one."""
+    return isinstance(name, str) and ("*" in name or "?" in name)
 
 
 def _value(name: str, value: float, free: Sequence[str], own: Sequence[str], where: str) -> float:

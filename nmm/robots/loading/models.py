@@ -9,7 +9,8 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from nmm.errors import InputError, RobotError, expect_known
-from nmm.platforms import Layout, Platform, Unicycle, platform_by_name
+from nmm.platforms import Fixed, Layout, Platform, platform_by_name, usual_platform
+from nmm.robots.loading.added_joint import with_joint
 from nmm.robots.loading.axle import axle_note, axle_placement
 from nmm.robots.loading.chain import CHAIN, Rebuilt, rebuild
 from nmm.robots.loading.collision_pairs import add_pairs
@@ -19,6 +20,7 @@ from nmm.robots.loading.locking import Locked, with_locked
 from nmm.robots.loading.provenance import Parts
 from nmm.robots.loading.reduction import at_zero
 from nmm.robots.loading.source import Source
+from nmm.robots.loading.virtual_base import VirtualBase, find_virtual_base
 from nmm.robots.loading.wheels import find_wheels, held_joints
 from nmm.robots.robot import Robot
 from nmm.robots.slip import slip_warnings
@@ -54,44 +56,76 @@ def robot_from(source: Source, options: Options) -> Robot:
     stated = options.platform.coordinates[len(CHAIN) :] if isinstance(options.platform, Platform) else ()
     locked = with_locked(rebuilt, options.lock, source.followers, where, stated)
     rebuilt = locked.rebuilt
+    base = find_virtual_base(rebuilt.model, where)
+    if base is not None and not _is_fixed(source, options):
+        locked = _standing(locked, base.joints, where)
+        rebuilt = locked.rebuilt
     if options.axle is not None:
         placement = axle_placement(rebuilt.model, options.axle, where)
         moved = rebuild(rebuilt.model, rebuilt.geometries, where, root=placement.inverse())
         rebuilt = replace(moved, notes=(*rebuilt.notes, axle_note(placement)))
-    platform, origin = _platform(rebuilt, source, options)
+    platform, origin, layout, contradictions = _platform(rebuilt, source, options, base)
     if options.limits:
         try:
             platform = platform.with_limits(options.limits)
         except InputError as error:
             raise RobotError(f"{where}: {error}") from None
+    remarks = [*contradictions]
+    if base is not None:
+        platform = base.limited(platform)
+        remarks.append(base.note(platform))
+    added = None if layout is None else platform.added_joint(layout)
+    if added is not None:
+        rebuilt = with_joint(rebuilt, added, where)
     own = _own_joints(platform, rebuilt.model, locked.values, where)
     made = replace(locked, rebuilt=_on_platform(rebuilt, platform, own, where))
     if not platform.coordinates:
         made = _with_held_wheels(made, options.wheels, where)
     display = made.rebuilt
-    notes = (*source.notes, *display.notes)
-    provenance = replace(source.provenance, locked=made.values, mimicked=made.mimicked, platform=origin)
+    notes = (*source.notes, *display.notes, *remarks)
+    provenance = replace(
+        source.provenance,
+        locked=made.values,
+        mimicked=made.mimicked,
+        platform=origin,
+        contradictions=contradictions,
+    )
     parts = Parts(display.geometries[1], notes, provenance)
     return _without_wheels(made, platform, own, source, options, parts)
 
 
-def _platform(rebuilt: Rebuilt, source: Source, options: Options) -> tuple[Platform, str]:
-    """The platform, and who chose its kind."""
+def _platform(
+    rebuilt: Rebuilt, source: Source, options: Options, base: VirtualBase | None
+) -> tuple[Platform, str, Layout | None, tuple[str, ...]]:
+    """The platform, who chose its kind, what the file's wheels and joints are, and where that differs."""
     given = options.platform
-    if isinstance(given, Platform):
-        return given, "given"
     name, origin = (source.platform, "file") if given is None else (given, "given")
-    if name is None:
-        return Unicycle(), "default"
-    kind = platform_by_name(name)
-    if not kind.coordinates:
-        return kind.fit(Layout(source.name)), origin  # there is nothing to measure for a fixed base
+    if name is None and base is not None and base.kind is not None:
+        name, origin = base.kind, "base"
+    if _is_fixed(source, options):
+        return Fixed(), origin, None, ()  # there is nothing to measure
     visual, collision = rebuilt.geometries
-    layout = measure_layout(rebuilt.model, (collision, visual), options.wheels, source.where)
     try:
-        return kind.fit(layout), origin
+        layout = measure_layout(rebuilt.model, (collision, visual), options.wheels, source.where)
+    except RobotError:
+        if name is not None and not isinstance(name, Platform):
+            raise
+        layout = None  # its lengths are not needed
+    try:
+        if isinstance(name, Platform):
+            platform = name
+        elif name is None or layout is None:
+            platform, origin = usual_platform(layout)
+        else:
+            platform = platform_by_name(name).fit(layout)
+        return platform, origin, layout, () if layout is None else platform.compared(layout)
     except InputError as error:
         raise RobotError(f"{source.where}: {error}") from None
+
+
+def _is_fixed(source: Source, options: Options) -> bool:
+    chosen = source.platform if options.platform is None else options.platform
+    return isinstance(chosen, Fixed) or chosen == Fixed.name
 
 
 def _own_joints(
@@ -161,18 +195,23 @@ def _without_wheels(
     return replace(robot, **robot.shapes._asdict(), notes=(*robot.notes, *remarks))
 
 
+def _standing(made: Locked, names: Sequence[str], where: str) -> Locked:
+    """The model with more joints fixed at zero, of which nothing is said, and what follows them."""
+    others = [one for one in made.followers if one.joint not in names]
+    still = with_locked(made.rebuilt, {}, others, where, standing=dict.fromkeys(names, 0.0))
+    return replace(still, values=made.values, mimicked={**made.mimicked, **still.mimicked})
+
+
 def _with_held_wheels(made: Locked, asked: Sequence[str] | Mapping[str, float] | None, where: str) -> Locked:
     """The model of a base that does not move, with its wheels fixed, and what follows them."""
     display = made.rebuilt
     names, notes = held_joints(display.model, asked, where)
     if not names:
         return replace(made, rebuilt=replace(display, notes=(*display.notes, *notes)))
-    others = [one for one in made.followers if one.joint not in names]
-    still = with_locked(display, {}, others, where, standing=dict.fromkeys(names, 0.0))
+    still = _standing(made, names, where)
     note = f"wheels of a fixed base, which stand still: {', '.join(names)}"
     notes = (*display.notes, *notes, note, *still.rebuilt.notes[len(display.notes) :])
-    mimicked = {**made.mimicked, **still.mimicked}
-    return Locked(replace(still.rebuilt, notes=notes), made.values, mimicked, still.followers)
+    return replace(still, rebuilt=replace(still.rebuilt, notes=notes))
 
 
 def _wheels(

@@ -11,6 +11,7 @@ import pinocchio as pin
 
 from nmm.errors import RobotError
 from nmm.robots.robot import Robot
+from nmm.robots.slip import slip_warnings
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,9 @@ class Provenance:
     mimicked : followers that were fixed with the joint that they follow: its name, and their value
     reduced : wheels and swivels that are no coordinates
     prefixed : the prefix of each mounted arm that has one, by the arm's name
-    platform : where the kind of platform comes from: "given", "file" or "default"
+    platform : where the kind of platform comes from: "given", "file", "wheels", "base" (of
+        joints) or "default"
+    contradictions : where the platform is not what the files' wheels and joints are, a sentence each
     """
 
     packages: Mapping[str, Path | None] = field(default_factory=dict)
@@ -37,6 +40,7 @@ class Provenance:
     reduced: tuple[str, ...] = ()
     prefixed: Mapping[str, str] = field(default_factory=dict)
     platform: str = "given"
+    contradictions: tuple[str, ...] = ()
 
     def with_arm(self, arm: Provenance, key: str, prefix: str) -> Provenance:
         """This platform's, with that of an arm mounted under the name `key`."""
@@ -73,6 +77,11 @@ class Parts:
 def provenance_of(robot: Robot) -> Provenance:
     """What is known of the robot's making; nothing when `load` did not make it."""
     return robot.parts.provenance if isinstance(robot.parts, Parts) else Provenance()
+
+
+def platform_warnings(robot: Robot) -> list[str]:
+    """Where a robot's platform is not what its file holds, and wheels that slide, a sentence each."""
+    return [*provenance_of(robot).contradictions, *slip_warnings(robot)]
 
 
 def parts_of(robot: Robot) -> Parts:

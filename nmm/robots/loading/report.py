@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 from nmm.errors import InputError, RobotError
 from nmm.robots.loading.advice import advice, joints_by_type
@@ -16,6 +18,7 @@ from nmm.robots.loading.findings import Problem, child, children
 from nmm.robots.loading.following import limit_notes
 from nmm.robots.loading.load import load
 from nmm.robots.loading.packages import Packages
+from nmm.robots.loading.provenance import provenance_of
 from nmm.robots.loading.second_opinion import second_opinion
 from nmm.robots.loading.wheel_advice import wheel_advice
 from nmm.robots.loading.xacro_file import expand
@@ -57,6 +60,7 @@ def report(
     path: str | Path,
     arguments: Mapping[str, object] | None = None,
     package_dirs: Sequence[str | Path] = (),
+    **options: Any,
 ) -> Report:
     """Look at a .urdf or .xacro file from all sides; every problem is named, not only the first.
 
@@ -67,6 +71,7 @@ def report(
     path : the file
     arguments : values of its `xacro:arg`s
     package_dirs : folders that are, or hold, the ROS packages that the file speaks of
+    options : platform, lock and wheels, with which `load` is tried
 
     Raises
     ------
@@ -79,7 +84,7 @@ def report(
         if not file.is_file() or file.suffix.lower() not in (".urdf", ".xacro") or _is_callers(str(error)):
             raise
         return _unread(file, error, arguments, package_dirs)
-    return _Report(description, arguments, package_dirs).made()
+    return _Report(description, arguments, package_dirs, options).made()
 
 
 def _is_callers(message: str) -> bool:
@@ -140,9 +145,10 @@ class _Report:
         description: Description,
         arguments: Mapping[str, object] | None,
         package_dirs: Sequence[str | Path],
+        options: Mapping[str, Any] = MappingProxyType({}),
     ) -> None:
         self.description, self.packages = description, description.packages
-        self.arguments, self.package_dirs = arguments, package_dirs
+        self.arguments, self.package_dirs, self.options = arguments, package_dirs, options
         self.meshes: dict[str, Path | str] = {}
         self.warnings: list[Problem] = [Problem(note) for note in description.notes]
         self.facts: dict[str, str] = {}
@@ -151,7 +157,7 @@ class _Report:
     def made(self, found: Sequence[Problem] = ()) -> Report:
         """The report, with problems that were found before."""
         text = self.description.xml
-        problems = find_problems(text, self._mesh)
+        problems = find_problems(text, self._mesh, self.options.get("lock") or ())
         root = None
         if not any("XML" in p.message for p in problems[:1]):
             root = _root(text)
@@ -218,6 +224,7 @@ class _Report:
                 arguments=self.arguments,
                 package_dirs=self.package_dirs,
                 missing_meshes="skip",
+                **self.options,
             )
             for shapes in robot.shapes:
                 read_meshes(shapes.geometryObjects, robot.name)
@@ -227,6 +234,7 @@ class _Report:
             return [Problem(f"cannot be loaded: {type(error).__name__}: {one_line(str(error))}")]
         self.warnings += [Problem(text) for text in wheel_advice(robot, _top(root))]
         self.warnings += [Problem(text) for text in limit_notes(robot)]
+        self.warnings += [Problem(text) for text in provenance_of(robot).contradictions]
         self.warnings += [Problem(text) for text in second_opinion(self.description.xml)]
         self._about(robot)
         self.robot = robot

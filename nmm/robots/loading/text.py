@@ -5,6 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from nmm.errors import RobotError
+from nmm.files import read_bytes
+
+#: A description with its meshes beside it is far shorter, bytes.
+LONGEST = 50_000_000
 
 
 def read_text(path: Path) -> str:
@@ -16,11 +20,12 @@ def read_text(path: Path) -> str:
     RobotError : a directory, unreadable, or not UTF-8
     """
     try:
-        return path.read_bytes().decode("utf-8-sig")
+        content = read_bytes(path, LONGEST)
+        return content.decode("utf-8-sig")
     except FileNotFoundError:
         raise
     except UnicodeDecodeError as error:
-        line = path.read_bytes()[: error.start].count(b"\n") + 1
+        line = content[: error.start].count(b"\n") + 1
         raise RobotError(f"{path}: line {line}: not UTF-8 text") from None
     except IsADirectoryError:
         raise RobotError(f"{path}: expected a .urdf or .xacro file, this is a directory") from None

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from nmm.platforms import Platform
-from nmm.robots.loading.layout import Measured
+from nmm.robots.loading.layout import Measured, speed_limit
 from nmm.robots.wheel import Wheel
 
 
@@ -126,4 +126,5 @@ def _wheel(
         swivel=swivel,
         pivot=pivot,
         roller=roller,
+        velocity=speed_limit(model, joint),
     )

@@ -5,6 +5,9 @@ from __future__ import annotations
 from xml.etree import ElementTree
 from xml.parsers import expat
 
+#: How deep elements may stand in one another: what reads them further recurses.
+DEEPEST = 200
+
 
 class Element(ElementTree.Element):
     """An element and the line that it starts in."""
@@ -28,7 +31,8 @@ def parse(text: str) -> Element:
 
     Raises
     ------
-    XmlError : empty or malformed text, or a DOCTYPE (entities could be endless, or read other files)
+    XmlError : empty or malformed text, elements more than `DEEPEST` deep, or a DOCTYPE (entities could be
+        endless, or read other files)
     """
     if not text.strip():
         raise XmlError("the file is empty", None)
@@ -36,10 +40,23 @@ def parse(text: str) -> Element:
     parser = expat.ParserCreate()
     parser.buffer_text = True
 
+    depth = 0
+
     def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal depth
+        depth += 1
+        if depth > DEEPEST:
+            raise XmlError(
+                f"elements stand more than {DEEPEST} deep in one another", parser.CurrentLineNumber
+            )
         element = builder.start(tag, attributes)
         if isinstance(element, Element):
             element.line = parser.CurrentLineNumber
+
+    def end(tag: str) -> None:
+        nonlocal depth
+        depth -= 1
+        builder.end(tag)
 
     def doctype(*_: object) -> None:
         raise XmlError(
@@ -47,7 +64,7 @@ def parse(text: str) -> Element:
         )
 
     parser.StartElementHandler = start
-    parser.EndElementHandler = builder.end
+    parser.EndElementHandler = end
     parser.CharacterDataHandler = builder.data
     parser.StartDoctypeDeclHandler = doctype
     try:

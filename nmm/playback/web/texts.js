@@ -1,0 +1,68 @@
+// The texts of the robot's copies: each right above its own, moved aside or upwards where another one has the room.
+"use strict";
+{
+  const THREE = MeshCat.THREE;
+  const [ABOVE, GAP] = [3, 2]; // px
+  const [ROWS, ASIDE] = [[0, 1, -1, 2, -2, 3, -3, 4, 5, 6], [0, -1, 1, -2, 2]];
+  const COLORS = { light: [0.31, 0.38, 0.46], dark: [0.72, 0.78, 0.85] };
+  const view = document.getElementById("view");
+  const texts = (nmm.texts = { all: [] });
+  let cards = [];
+
+  texts.add = (text, place) => {
+    const sprite = nmm.scenery.label(text, [1, 1, 1], false, 0.75);
+    sprite.position.copy(place);
+    sprite.renderOrder = 900;
+    // What is cut off by a robot before it says another time.
+    sprite.material.depthTest = false;
+    const themed = () => sprite.material.color.copy(nmm.color(COLORS[nmm.theme.dark ? "dark" : "light"]));
+    themed();
+    nmm.theme.listeners.push(themed);
+    texts.all.push(sprite);
+    return sprite;
+  };
+
+  // What lies over the view stands still, but for another size of the window.
+  texts.fit = () => {
+    cards = ["heading", "tools", "bar"].map((id) => document.getElementById(id).getBoundingClientRect());
+  };
+
+  function shown(sprite) {
+    for (let part = sprite; part; part = part.parent) if (!part.visible) return false;
+    return true;
+  }
+
+  // The nearest free place: above the point, beside that, or rows higher or lower.
+  function free(taken, { x, y, wide, high }, width) {
+    for (const row of ROWS) {
+      for (const aside of ASIDE) {
+        const [left, top] = [x - 0.5 * wide + aside * (wide + GAP + 1), y - ABOVE - (row + 1) * high];
+        const box = { left, top, right: left + wide, bottom: top + high };
+        const clear = (other) =>
+          box.left > other.right + GAP || other.left > box.right + GAP || box.top > other.bottom || other.top > box.bottom;
+        if (left >= 0 && box.right <= width && top >= 0 && taken.every(clear)) return box;
+      }
+    }
+    return null;
+  }
+
+  // Before each picture: where they are depends on where one looks from.
+  nmm.viewer.scene.onBeforeRender = (renderer, scene, camera) => {
+    const [width, height] = [view.clientWidth, view.clientHeight];
+    const found = [];
+    for (const sprite of texts.all) {
+      if (!shown(sprite)) continue;
+      const { x, y, z } = new THREE.Vector3().setFromMatrixPosition(sprite.matrixWorld).project(camera);
+      const { wide, high } = sprite.userData;
+      if (z < 1) found.push({ sprite, x: 0.5 * (1 + x) * width, y: 0.5 * (1 - y) * height, wide, high });
+    }
+    found.sort((a, b) => b.y - a.y || a.x - b.x);
+    const taken = [...cards];
+    for (const one of found) {
+      const { sprite, x, y, wide, high } = one;
+      const box = free(taken, one, width) || { left: x - 0.5 * wide, bottom: y - ABOVE };
+      sprite.center.set((x - box.left) / wide, (box.bottom - y) / high);
+      taken.push(box);
+    }
+  };
+}

@@ -1,0 +1,151 @@
+"""Functions of a user's own: what they get, what their differences cost, and what a run says of it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from derivatives import check_function
+from numpy.typing import NDArray
+
+import nmm
+from nmm import Configuration
+from nmm.functions.program import evaluate
+from nmm.robots.robot import Robot
+
+Array = NDArray[np.float64]
+Q = [0.1, -0.2, 0.3, 0.8, -0.5]
+
+
+def hand(configuration: Configuration) -> Array:
+    return np.array(configuration.placement("ee").translation[:2])
+
+
+def hand_moves(configuration: Configuration) -> Array:
+    return configuration.jacobian("ee")[:2]
+
+
+def folded(configuration: Configuration) -> float:
+    return 0.5 * float(configuration.q[4]) ** 2
+
+
+def controller(robot: Robot, **derivatives: Callable[..., Any] | None) -> nmm.Controller:
+    task = nmm.Task(
+        nmm.CallableFunction(hand, ["x", "y"], units=["m", "m"], jacobian=derivatives.get("jacobian")),
+        nmm.CallableReference(lambda t: [1.0, 0.1 * t], 2, rate=derivatives.get("rate")),
+        2.0,
+    )
+    objective = nmm.CallableObjective(folded, derivatives.get("gradient"))
+    return nmm.Controller(robot, task, nmm.ProjectedGradient(), objective)
+
+
+def test_the_pages_example_runs_and_its_derivatives_are_right() -> None:
+    page = (Path(__file__).parent.parent / "docs" / "own_functions.md").read_text(encoding="utf-8")
+    example, law = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
+    names: dict[str, Any] = {}
+    exec(example, names)
+    run, robot, task, objective = (names[name] for name in ("run", "robot", "task", "objective"))
+    assert (run.outcome, run.warnings) == ("completed", ())
+    for function in (task.function, task.reference, objective):
+        check_function(function, robot, 0.7, np.array(Q))
+    exec(law, names)
+    resolver = nmm.CallableResolver(names["least_norm"])
+    scenario = nmm.Scenario.load("unicycle_2r_position", {"duration": "0.5"}).with_resolver(resolver)
+    with_own = scenario.override("duration", 1).run()
+    assert (with_own.outcome, with_own.resolver, with_own.t[-1]) == ("completed", "callable", 1.0)
+    assert with_own.scenario is not None
+    assert with_own.scenario["resolver"] == {"kind": "own", "source": "callable"}
+    assert scenario.with_resolver("pg").run().resolver == "pg"
+
+
+def test_every_row_of_the_pages_tables_is_what_a_configuration_has(robot_2r: Robot) -> None:
+    page = (Path(__file__).parent.parent / "docs" / "own_functions.md").read_text(encoding="utf-8")
+    _, _, table = page.partition("A `Configuration` is not q")
+    here, n = Configuration(robot_2r, Q), robot_2r.n
+    named = re.findall(r"^\| `(?:configuration)?\.(\w+)", table, flags=re.MULTILINE)
+    assert named == ["q", "placement", "jacobian", "hessian", "center_of_mass", "S"]
+    assert here.q.shape == (n,)
+    assert here.placement("ee").translation.shape == (3,)
+    assert here.jacobian("ee").shape == (6, n)
+    assert here.hessian("ee").shape == (6, n, n)
+    assert [part.shape for part in here.center_of_mass()] == [(3,), (3, n)]
+    assert here.S.shape == (n, robot_2r.n_u)
+
+
+def test_a_run_says_once_what_differences_stand_for(robot_2r: Robot) -> None:
+    run = nmm.simulate(controller(robot_2r), Q, 0.1)
+    function, reference, objective = run.warnings
+    assert "callable function hand has no jacobian" in function
+    assert "jacobian=" in function
+    assert "twice a coordinate" in function
+    assert re.match(r"callable reference <lambda> \(test_callables.py:\d+\) has no rate:", reference)
+    assert "called once for its value and, for differences, twice; rate=" in reference
+    assert "callable objective folded has no gradient" in objective
+    assert "gradient=" in objective
+
+
+def test_nothing_is_said_where_all_derivatives_are_given(robot_2r: Robot) -> None:
+    given = controller(
+        robot_2r,
+        jacobian=hand_moves,
+        rate=lambda t: [0.0, 0.1],
+        gradient=lambda configuration: configuration.q * [0, 0, 0, 0, 1],
+    )
+    assert nmm.simulate(given, Q, 0.1).warnings == ()
+
+
+def test_of_tasks_that_come_and_go_it_is_said_once(robot_2r: Robot) -> None:
+    function = nmm.CallableFunction(hand, ["x", "y"], units=["m", "m"])
+    tasks = [
+        nmm.Task(function, [1.0, 0.5], 2.0, name="first", when=[nmm.Between(0.0, 0.1)]),
+        nmm.Task(function, [1.0, 0.4], 2.0, name="second", when=[nmm.Between(0.1)]),
+    ]
+    run = nmm.simulate(nmm.SequencedController(robot_2r, tasks, nmm.ProjectedGradient()), Q, 0.2)
+    assert len(run.events) >= 2
+    assert sum("has no jacobian" in warning for warning in run.warnings) == 1
+
+
+def test_two_functions_are_compared_at_the_same_configurations(robot_2r: Robot) -> None:
+    """Kinematics are computed once for both: 2 n neighbours and the configuration itself, a call."""
+    seen: dict[str, list[Configuration]] = {"f": [], "H": []}
+
+    def noting(key: str, function: Callable[[Configuration], Any]) -> Callable[[Configuration], Any]:
+        def noted(configuration: Configuration) -> Any:
+            seen[key].append(configuration)
+            return function(configuration)
+
+        return noted
+
+    task = nmm.Task(nmm.CallableFunction(noting("f", hand), ["x", "y"]), [1.0, 0.5], 1.0)
+    objective = nmm.CallableObjective(noting("H", folded))
+    made = nmm.Controller(robot_2r, task, nmm.ProjectedGradient(), objective)
+    for one in seen.values():
+        one.clear()
+    made(0.0, Q)
+    assert len(seen["f"]) == 2 * robot_2r.n + 1
+    assert [id(one) for one in seen["f"]] == [id(one) for one in seen["H"]]
+    # One that is kept keeps no others alive.
+    assert not seen["f"][0]._neighbours
+
+
+def test_a_function_that_returns_one_array_again_and_again(robot_2r: Robot) -> None:
+    kept = np.zeros(2)
+
+    def same(configuration: Configuration) -> Array:
+        kept[:] = hand(configuration)
+        return kept
+
+    here = Configuration(robot_2r, Q)
+    found = evaluate(nmm.CallableFunction(same, ["x", "y"]), 0.0, here)
+    np.testing.assert_allclose(found.value_q, hand_moves(here), atol=1e-9)
+    np.testing.assert_array_equal(found.value, hand(here))
+
+
+@pytest.mark.parametrize("value", [1, True, np.float32(2.5), [2.5], np.array([[2.5]])])
+def test_one_number_may_come_in_any_shape(value: Any, robot_2r: Robot) -> None:
+    objective = nmm.CallableObjective(lambda configuration: value, lambda configuration: np.zeros(5))
+    assert objective.value(Configuration(robot_2r, Q)) == float(np.ravel(value)[0])

@@ -1,0 +1,61 @@
+"""A page by both of its server's names, and before it has been told anything, in a real browser."""
+
+from __future__ import annotations
+
+import pytest
+from playback_browser import Window
+from playback_browser import browser as browser
+from playback_browser import empty_page as empty_page
+from playback_browser import small_robot as small_robot
+from playback_browser import window as window
+from playwright.sync_api import Browser
+from ports import MOST
+
+from nmm.playback import LiveViewer
+from nmm.playback.page import socket_page
+from nmm.playback.server import PageServer
+from nmm.robots.robot import Robot
+
+pytestmark = pytest.mark.browser
+
+
+def test_a_page_by_the_name_of_this_machine_is_told_all_the_same(
+    browser: Browser, small_robot: Robot
+) -> None:
+    page = browser.new_page()
+    complaints: list[str] = []
+    page.on("console", lambda message: message.type == "error" and complaints.append(message.text))
+    with LiveViewer(small_robot) as viewer:
+        page.goto(viewer.url.replace("127.0.0.1", "localhost"))
+        page.wait_for_function("!document.body.classList.contains('loading')", timeout=1000.0 * MOST)
+        q = [0.7, *[0.0] * (small_robot.n - 1)]
+        viewer.display(q)
+        page.wait_for_function("nmm.node('/nmm/motion 0/robot/x').position.x === 0.7")
+        # Another server's page is not listened to by either name.
+        port = viewer.url.rsplit(":", 1)[1].strip("/")
+        closed = """(url) => new Promise((done) => {
+          const socket = new WebSocket(url);
+          socket.onopen = () => done("open");
+          socket.onerror = () => done("closed");
+        })"""
+        token = page.evaluate("document.body.dataset.token")
+        stranger = browser.new_page()
+        for name in ("localhost", "127.0.0.1"):
+            assert stranger.evaluate(closed, f"ws://{name}:{port}/socket?token={token}") == "closed"
+        stranger.close()
+    page.close()
+    assert complaints == []
+
+
+def test_before_there_is_a_scene_there_is_no_run(window: Window) -> None:
+    """The server has the page and not yet anything to tell it."""
+    server = PageServer(
+        lambda host, token: socket_page("empty", host, token), ['{"type": "places", "transforms": []}']
+    )
+    try:
+        window.page.goto(server.url)
+        assert window.page.evaluate("nmm.state()") == {"t": 0, "runs": []}
+        window.page.evaluate("nmm.seek(1.5)")
+        assert window.page.evaluate("nmm.state()") == {"t": 0, "runs": []}
+    finally:
+        server.close()
