@@ -45,7 +45,7 @@ def rewritten(text: str, kinds: tuple[str, ...] = WRITTEN) -> str:
 
 def _run(command: str) -> str:
     """What a command prints, errors included, as a terminal would show it."""
-    from nmm.cli.app import status_of
+    from nmm.cli.exit_status import status_of
 
     program, *arguments = shlex.split(command.removeprefix(_PROMPT))
     if program != "nmm":

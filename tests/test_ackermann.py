@@ -12,7 +12,7 @@ from ackermann_car import RADIUS, RATE, SPIN, STOP, TRACK, WHEELBASE, car
 from urdf_parts import write
 
 import nmm
-from nmm.cli.app import status_of
+from nmm.cli.exit_status import status_of
 from nmm.platforms import Car, FrontDriveCar
 from nmm.playback.placements import Placements
 from nmm.playback.rolling import Rolling

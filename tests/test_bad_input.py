@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from nmm.cli.app import status_of
+from nmm.cli.exit_status import status_of
 
 SCENARIO = """\
 robot: unicycle_2r

@@ -12,7 +12,7 @@ import pytest
 import nmm
 from nmm import memory
 from nmm.analysis.redundancy.moving import self_motion
-from nmm.cli.app import status_of
+from nmm.cli.exit_status import status_of
 from nmm.control import integrators
 from nmm.control.integrators import Adaptive
 from nmm.errors import RunError

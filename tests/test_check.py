@@ -14,7 +14,7 @@ from urdf_parts import AXIS, inertial, joint, link, random_tree, robot, shape, w
 
 import nmm
 from nmm.bundled import bundled_robots
-from nmm.cli.app import status_of
+from nmm.cli.exit_status import status_of
 from nmm.collisions.pairs import SAMPLES, touching
 from nmm.collisions.robot_shapes import link_names, query_shapes
 from nmm.collisions.touch import touching_links

@@ -16,7 +16,7 @@ import nmm
 from nmm import kinds
 from nmm.analysis.maps.measures import MEASURES
 from nmm.bundled import bundled_robots, bundled_scenarios
-from nmm.cli.app import status_of
+from nmm.cli.exit_status import status_of
 
 Command = Callable[..., Result]
 

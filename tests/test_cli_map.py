@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nmm.cli.app import status_of
+from nmm.cli.exit_status import status_of
 from nmm.cli.mapping import map_measures
 from nmm.errors import InputError
 from nmm.robots.configuration import Configuration

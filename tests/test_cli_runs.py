@@ -21,7 +21,7 @@ from ports import MOST
 
 import nmm
 import nmm.cli.runs
-from nmm.cli.app import status_of
+from nmm.cli.exit_status import status_of
 from nmm.cli.runs import run_scenario
 from nmm.runs.figure_options import FigureOptions
 

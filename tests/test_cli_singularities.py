@@ -17,7 +17,7 @@ from numpy import pi
 
 from nmm import Scenario
 from nmm.analysis import analyse, analyse_along
-from nmm.cli.app import status_of
+from nmm.cli.exit_status import status_of
 from nmm.functions.tasks import Heading, Position
 from nmm.robots.loading import load
 from nmm.runs.trajectory import Trajectory

@@ -14,7 +14,7 @@ from numpy import pi
 from spatial_arms import load_ur5
 
 from nmm.analysis import analyse
-from nmm.cli.app import status_of
+from nmm.cli.exit_status import status_of
 from nmm.functions.tasks import Pose, Position
 from nmm.robots.loading import load
 

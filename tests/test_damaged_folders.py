@@ -16,7 +16,7 @@ import pytest
 
 import nmm
 from nmm.bundled import bundled_robots
-from nmm.cli.app import status_of
+from nmm.cli.exit_status import status_of
 from nmm.cli.runs import runs_in
 from nmm.folders import comparison
 from nmm.playback.html import page_of

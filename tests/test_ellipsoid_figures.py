@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from nmm.analysis.singular.drawn_ellipsoids import drawn_ellipsoids, drawn_scale
 from nmm.analysis.singular.ellipsoids import ellipsoids_along
 from nmm.arrays import Array
-from nmm.cli.app import status_of
+from nmm.cli.exit_status import status_of
 from nmm.errors import InputError
 from nmm.figures.ellipses import ellipses
 from nmm.playback.ellipsoids import CLOSE, EllipsoidOptions, SceneEllipsoids, between_error

@@ -22,7 +22,7 @@ from nmm.analysis.redundancy import redundancy
 from nmm.analysis.search import find_singularities, nearest_singularity
 from nmm.analysis.singular.jacobians import Jacobians
 from nmm.analysis.singular.singularity import analyse
-from nmm.cli.app import status_of
+from nmm.cli.exit_status import status_of
 from nmm.errors import InputError, RobotError
 from nmm.playback.viewer_scene import viewer_scene
 from nmm.robots.configuration import Configuration

@@ -10,7 +10,7 @@ import pytest
 from urdf_parts import write
 
 import nmm
-from nmm.cli.app import status_of
+from nmm.cli.exit_status import status_of
 
 ROBOT = nmm.load("unicycle_3r")
 TIP = nmm.Position("ee", "xy")

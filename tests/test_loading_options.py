@@ -10,7 +10,7 @@ from gripping import FINGERS, panda
 from urdf_parts import joint, link, robot, shape, write
 
 import nmm
-from nmm.cli.app import status_of
+from nmm.cli.exit_status import status_of
 
 PANDA = "package://example-robot-data/robots/panda_description/urdf/panda.urdf"
 HAND = [

@@ -11,7 +11,7 @@ from short_scenario import MINIMAL, scenario
 
 from nmm import Configuration, Scenario, ScenarioError, Trajectory
 from nmm.bundled import bundled_scenarios
-from nmm.cli.app import status_of
+from nmm.cli.exit_status import status_of
 from nmm.scenario.document import read_file
 
 TWO = """\

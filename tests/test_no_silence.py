@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import nmm
-from nmm.cli.app import status_of
+from nmm.cli.exit_status import status_of
 from nmm.cli.output import readable, show_table, show_text
 from nmm.playback import write_html
 from nmm.rendering.encoder import expect_video
@@ -63,8 +63,8 @@ def test_an_interrupt_is_told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Ca
         def read(**_: object) -> None:
             raise error
 
-        monkeypatch.setattr("nmm.cli.app.app", read)
-        monkeypatch.setattr("nmm.cli.app._commands", lambda: ["run"])
+        monkeypatch.setattr("nmm.cli.exit_status.app", read)
+        monkeypatch.setattr("nmm.cli.exit_status._commands", lambda: ["run"])
 
     for error, status, words in (
         (KeyboardInterrupt(), 130, "interrupted"),
@@ -73,7 +73,7 @@ def test_an_interrupt_is_told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Ca
         (BrokenPipeError(), 1, "nobody reads the output any more; what is written is whole"),
     ):
         raises(error)
-        monkeypatch.setattr("nmm.cli.app._discard_output", lambda: None)
+        monkeypatch.setattr("nmm.cli.exit_status._discard_output", lambda: None)
         assert status_of(["run"]) == status
         assert capsys.readouterr().err == f"nmm run: {words}\n"
 

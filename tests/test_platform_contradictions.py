@@ -9,7 +9,7 @@ from ackermann_car import RADIUS, TRACK, WHEELBASE, car
 from urdf_parts import write
 
 import nmm
-from nmm.cli.app import status_of
+from nmm.cli.exit_status import status_of
 from nmm.platforms import (
     Car,
     DifferentialDrive,

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 import nmm
-from nmm.cli.app import status_of
+from nmm.cli.exit_status import status_of
 from nmm.errors import InputError
 from nmm.folders import whole
 from nmm.folders.whole import check_folder, has_format, replaced_folder, steady

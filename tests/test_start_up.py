@@ -10,7 +10,7 @@ import pytest
 
 LOADED = """
 import json, sys
-from nmm.cli.app import status_of
+from nmm.cli.exit_status import status_of
 status = status_of({arguments!r})
 sys.stdout.flush()
 print(json.dumps([status, sorted({{name.split(".")[0] for name in sys.modules}})]), file=sys.stderr)

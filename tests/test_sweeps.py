@@ -19,7 +19,7 @@ from short_scenario import MINIMAL
 
 import nmm
 from nmm.bundled import bundled_sweeps
-from nmm.cli.app import status_of
+from nmm.cli.exit_status import status_of
 from nmm.sweeps import folder as sweep_folder
 from nmm.sweeps import rows as sweep_rows
 from nmm.sweeps.columns import columns_of

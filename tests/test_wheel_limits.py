@@ -10,7 +10,7 @@ import pytest
 from urdf_parts import joint, link, robot, write
 
 import nmm
-from nmm.cli.app import status_of
+from nmm.cli.exit_status import status_of
 from nmm.playback.rolling import Rolling
 from nmm.robots.robot import Robot
 from nmm.robots.wheel_rates import inputs_held_by

@@ -1,6 +1,7 @@
 """The command line, `nmm`: what comes in, what goes out, and the exit status.
 
-    app             the commands about runs with their options and help; errors and exit status
+    exit_status     errors as lines, and the exit status
+    app             the commands about runs with their options and help
     robot_commands  likewise those about robots, and the listings
     singularities, mapping, redundancy   likewise those that analyse: singularities, map, redundancy and laps
     options         options that several commands have, and what their texts mean
@@ -22,6 +23,6 @@
 Commands import what they need when they run: `nmm --help` is quick.
 """
 
-from nmm.cli.app import main
+from nmm.cli.exit_status import main
 
 __all__ = ["main"]
