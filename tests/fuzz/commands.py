@@ -13,7 +13,8 @@ import click
 import typer.main
 from hypothesis import strategies as st
 
-from nmm.cli.app import app, status_of
+from nmm.cli.app import app
+from nmm.cli.exit_status import status_of
 
 from .hunting import LONGEST_LINE, Hunt
 from .mutants import VALUES
