@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import NMM, process
 
 import nmm
 from nmm.cli.exit_status import status_of
@@ -19,7 +20,6 @@ from nmm.cli.output import readable, show_table, show_text
 from nmm.playback import write_html
 from nmm.rendering.encoder import expect_video
 from nmm.robots.motion import Motion
-from tests.command_line import NMM, process
 
 MOST = 120.0
 #: NMM_KILLS=30 interrupts so often.

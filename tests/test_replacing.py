@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from command_line import NMM
 
 import nmm
 from nmm.cli.exit_status import status_of
@@ -20,7 +21,6 @@ from nmm.errors import InputError
 from nmm.folders import whole
 from nmm.folders.whole import check_folder, has_format, replaced_folder, steady
 from nmm.folders.writing import writing
-from tests.command_line import NMM
 
 #: NMM_KILLS=30 kills each command so often; few do not.
 KILLS = int(os.environ.get("NMM_KILLS", "0"))
