@@ -20,6 +20,7 @@ from nmm.cli.options import (
     PackageOption,
     PlatformOption,
     PortOption,
+    SrdfOption,
     SubjectArgument,
     SubjectSetOption,
     TaskOption,
@@ -90,6 +91,7 @@ class Loading:
     lock: LockOption = None
     axle: AxleOption = None
     package_dir: PackageOption = None
+    srdf: SrdfOption = None
 
     def keywords(self) -> dict[str, Any]:
         """As `nmm.load` takes them."""
@@ -98,6 +100,7 @@ class Loading:
             "lock": lock_of(self.lock),
             "axle": axle_of(self.axle),
             "package_dirs": list(self.package_dir or ()),
+            "srdf": self.srdf,
         }
 
 

@@ -21,7 +21,13 @@ if TYPE_CHECKING:
     from nmm.scenario import Scenario
 
 #: Options by the arguments of `nmm.load`.
-_OPTIONS = {"platform": "--platform", "lock": "--lock", "axle": "--axle", "package_dirs": "--package-dir"}
+_OPTIONS = {
+    "platform": "--platform",
+    "lock": "--lock",
+    "axle": "--axle",
+    "package_dirs": "--package-dir",
+    "srdf": "--srdf",
+}
 
 
 @dataclass(frozen=True, eq=False)

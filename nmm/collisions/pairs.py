@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
-from xml.etree import ElementTree
 
 import coal
 import numpy as np
@@ -13,7 +11,6 @@ import pinocchio as pin
 from nmm.arrays import Array
 from nmm.errors import InputError, RobotError, expect_known
 from nmm.robots.robot import Robot
-from nmm.words import one_line
 
 #: How many configurations are drawn to see which pairs always touch.
 SAMPLES = 200
@@ -74,19 +71,6 @@ def _measured(
         return distances
 
     return measure
-
-
-def srdf_pairs(file: str | Path) -> tuple[tuple[str, str], ...]:
-    """The pairs of links that an SRDF disables; `InputError` for a file that is missing or is none."""
-    path = Path(file)
-    if not path.is_file():
-        raise InputError(f"srdf: there is no file {path}")
-    try:
-        root = ElementTree.parse(path).getroot()
-    except ElementTree.ParseError as error:
-        raise InputError(f"srdf: {path} cannot be read: {one_line(str(error))}") from None
-    found = [(one.get("link1", ""), one.get("link2", "")) for one in root.iter("disable_collisions")]
-    return tuple(found)
 
 
 def named_pairs(
