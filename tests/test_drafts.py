@@ -196,6 +196,12 @@ def test_it_begins_in_a_posture_that_is_regular(run: Command, tmp_path: Path) ->
     assert "posture" not in yaml.safe_load(Path("first.yaml").read_text(encoding="utf-8"))["q0"]
 
 
+def test_it_does_not_begin_inside_its_own_base() -> None:
+    draft = nmm.first_scenario(DATA + "ur_description/urdf/ur5_robot.urdf")
+    setting = nmm.Collisions(distance=0.0).on(draft.scenario.robot())
+    assert setting.check_start(0.0, draft.trajectory.q[0]) == []
+
+
 def test_shapes_whose_meshes_are_missing_are_left_out_in_writing(run: Command, tmp_path: Path) -> None:
     started(run, str(arm(tmp_path / "arm.urdf", more=MESH)))
     data = yaml.safe_load(Path("first.yaml").read_text(encoding="utf-8"))

@@ -34,7 +34,7 @@ def touching(
 ) -> dict[tuple[int, int], float]:
     """In which share of random configurations each pair of shapes is nearer than `distance`, m."""
     near = np.zeros(len(pairs))
-    measure = _measured(robot, shapes, pairs)
+    measure = measured(robot, shapes, pairs)
     for q in sampled(robot):
         near += measure(q) < distance
     return dict(zip(pairs, (near / SAMPLES).tolist(), strict=True))
@@ -48,14 +48,15 @@ def always_near(
     for q in sampled(robot):
         if not left:
             break
-        near = _measured(robot, shapes, left)(q) < distance
+        near = measured(robot, shapes, left)(q) < distance
         left = [pair for pair, is_near in zip(left, near, strict=True) if is_near]
     return left
 
 
-def _measured(
+def measured(
     robot: Robot, shapes: pin.GeometryModel, pairs: Sequence[tuple[int, int]]
 ) -> Callable[[Array], Array]:
+    """A function of q (n,): each pair's distance there (pairs,), m; below 0 inside each other."""
     model, data, found = robot.model, robot.model.createData(), pin.GeometryData(shapes)
     request, result = coal.DistanceRequest(), coal.DistanceResult()
     objects = shapes.geometryObjects

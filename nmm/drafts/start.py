@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any, NamedTuple
@@ -10,9 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from nmm.arrays import Array
-from nmm.collisions.pairs import sampled
+from nmm.collisions.pairs import measured, sampled
+from nmm.collisions.robot_shapes import HULLS, query_shapes
 from nmm.drafts.hand import Hand, movable
-from nmm.errors import InputError
+from nmm.errors import InputError, RobotError
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 from nmm.robots.semantics import POSTURE
@@ -31,6 +32,8 @@ _ABOVE = 0.05
 #: What people call a posture to begin with, the likeliest first.
 _NAMES = ("home", "ready", "default", "up", "standing", "sitting")
 _COUNT = 400
+#: So many of the best are looked at for shapes that touch, if they are worth this share of the best.
+_BEST, _GOOD = 40, 0.4
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +116,19 @@ class _Look:
             room = np.where(both, np.minimum(q[columns] - lower, upper - q[columns]) / (upper - lower), 1.0)
         return worth * float(np.clip(room.min(initial=1.0) / _ROOM, 0.0, 1.0))
 
+    def touching(self) -> Callable[[Array], int]:
+        """How many pairs of shapes with the arm's are inside each other, a function of q (n,)."""
+        robot = self.robot
+        joints = {robot.model.getJointId(name) for name in self.hand.joints}
+        try:
+            shapes = query_shapes(robot, HULLS)
+        except RobotError:  # a mesh that nothing can read: the run does without
+            return lambda _: 0
+        of_arm = [shape.parentJoint in joints for shape in shapes.geometryObjects]
+        pairs = [(pair.first, pair.second) for pair in robot.collision_model.collisionPairs]
+        distances = measured(robot, shapes, [pair for pair in pairs if of_arm[pair[0]] or of_arm[pair[1]]])
+        return lambda q: int((distances(q) < 0.0).sum())
+
 
 def _posture(look: _Look, axes: str) -> Start | None:
     """A named posture of the hand's joints that is within limits and regular, the likeliest name first."""
@@ -135,11 +151,19 @@ def _posture(look: _Look, axes: str) -> Start | None:
 
 
 def _searched(look: _Look, seen: list[_Seen], axes: str) -> Start | None:
-    """Of the rest position and random ones the one with the best-conditioned arm, away from its limits."""
+    """Of the rest position and random ones the one with the best-conditioned arm, away from its limits.
+
+    Of the best few the first in which the arm touches the fewest shapes.
+    """
     robot = look.robot
-    best = max(seen, key=lambda one: look.worth(one, axes))
-    q = robot.following.placed(np.clip(np.round(best.q, 2), *robot.q_limits.T))
-    if look.worth(best, axes) <= 0.0 or look.at(q).sigma(axes, look.all) < REGULAR:
+    best = sorted(seen, key=lambda one: -look.worth(one, axes))[:_BEST]
+    good = [one.q for one in best if look.worth(one, axes) > _GOOD * look.worth(best[0], axes)]
+    if not good:
+        return None
+    touching = look.touching()
+    q = min(good, key=touching)
+    q = robot.following.placed(np.clip(np.round(q, 2), *robot.q_limits.T))
+    if look.at(q).sigma(axes, look.all) < REGULAR:
         return None
     following = {one.joint for one in robot.followers}
     named = {

@@ -9,6 +9,7 @@ from typing import Any
 import yaml
 
 from nmm.kinds import OBJECTIVES, REFERENCES, RESOLVERS, TASKS
+from nmm.words import printable
 
 WIDTH = 116
 
@@ -33,7 +34,7 @@ def text_of(data: Mapping[str, Any], head: str, words: Mapping[str, str]) -> str
 
 
 def _comment(text: str) -> list[str]:
-    return [f"# {line}" for line in wrap(text, WIDTH - 2, break_long_words=False, break_on_hyphens=False)]
+    return [f"# {line}" for line in wrap(printable(text), WIDTH - 2, break_long_words=False, break_on_hyphens=False)]
 
 
 def _entry(key: str, value: Any) -> Iterator[str]:
