@@ -151,6 +151,31 @@ def test_an_arm_without_wheels_gets_a_base_and_is_told(run: Command, tmp_path: P
     assert run("run", "arm.yaml", "--out", "out").status == 0
 
 
+def test_paths_are_seen_from_the_file_that_is_written(run: Command, tmp_path: Path) -> None:
+    (tmp_path / "robots").mkdir()
+    (tmp_path / "scenarios").mkdir()
+    arm(tmp_path / "robots" / "arm.urdf")
+    arm(tmp_path / "scenarios" / "own.urdf")
+    for file, written in (
+        ("robots/arm.urdf", str(tmp_path / "robots/arm.urdf")),
+        ("scenarios/own.urdf", "./own.urdf"),
+    ):
+        out = f"scenarios/{Path(file).stem}.yaml"
+        assert run("init", file, "--out", out, "--platform", "unicycle").status == 0
+        data = yaml.safe_load(Path(out).read_text(encoding="utf-8"))
+        assert data["robot"] == {"source": written, "platform": "unicycle"}
+        assert run("run", out, "--out", f"runs/{Path(file).stem}").status == 0
+
+
+def test_names_with_control_characters_are_written_so_that_they_are_read(
+    run: Command, tmp_path: Path
+) -> None:
+    file = arm(tmp_path / "arm.urdf")
+    file.write_text(file.read_text(encoding="utf-8").replace('"ee"', '"ee &#x9b;31m"'), encoding="utf-8")
+    started(run, str(file), "--platform", "unicycle")
+    assert "\x9b" not in Path("first.yaml").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize("platform", ["fixed", "unicycle"])
 def test_a_platform_that_is_asked_for_is_taken(run: Command, tmp_path: Path, platform: str) -> None:
     trajectory = started(run, str(arm(tmp_path / "arm.urdf")), "--platform", platform)

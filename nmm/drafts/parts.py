@@ -58,15 +58,15 @@ def chosen_robot(
         own = {key: value for key, value in given.items() if key in (*_ARMS, "package_dirs")}
         base = {key: value for key, value in given.items() if key not in _ARMS}
         data = _mounted(_part(source, folder, base), _part(arm, folder, own), at)
-        robot, data = _loaded(data)
+        robot, data = _loaded(data, folder)
         return Chosen(robot, data, f"{robot.platform.name}, {_origin(robot)}")
-    robot, data = _loaded(_part(source, folder, given))
+    robot, data = _loaded(_part(source, folder, given), folder)
     if given.get("platform") or robot.wheels or provenance_of(robot).platform == "file":
         return Chosen(robot, data, f"{robot.platform.name}, {_origin(robot)}")
     if not robot.q_names[robot.platform.n_p :]:
         raise InputError(f"{source} has neither wheels nor movable joints: there is nothing to lead")
     own = {key: value for key, value in data.items() if key != "axle"}
-    robot, data = _loaded(_mounted(_BASE_PART, own, None))
+    robot, data = _loaded(_mounted(_BASE_PART, own, None), folder)
     why = (
         f"{Path(source).name} has no wheels: it stands on the bundled {BASE}. Another base: nmm init BASE "
         "--arm FILE; none: --platform fixed; its root as a unicycle without wheels: --platform unicycle"
@@ -97,23 +97,23 @@ def _written(file: str, folder: Path) -> str:
     return path if inside.startswith(os.pardir) else inside if os.sep in inside else f"./{inside}"
 
 
-def _loaded(data: dict[str, Any]) -> tuple[Robot, dict[str, Any]]:
+def _loaded(data: dict[str, Any], folder: Path) -> tuple[Robot, dict[str, Any]]:
     """The robot of a key `robot`, which gets `missing_meshes: skip` where the file's are missing."""
     try:
-        return _built(data), data
+        return _built(data, folder), data
     except RobotError as error:
         part = dict(data["arm"]) if "arm" in data else data
         without = {**part, "missing_meshes": "skip"}
         without = {**data, "arm": without} if "arm" in data else without
         try:
-            return _built(without), without
+            return _built(without, folder), without
         except RobotError:
             raise error from None
 
 
-def _built(data: Mapping[str, Any]) -> Robot:
+def _built(data: Mapping[str, Any], folder: Path) -> Robot:
     part = (MountedPart if "arm" in data else RobotPart).model_validate(data)
-    return part.build(lambda file, _: Path(file), ())
+    return part.build(lambda file, _: folder / file, ())
 
 
 def _origin(robot: Robot) -> str:

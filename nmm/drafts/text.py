@@ -34,7 +34,8 @@ def text_of(data: Mapping[str, Any], head: str, words: Mapping[str, str]) -> str
 
 
 def _comment(text: str) -> list[str]:
-    return [f"# {line}" for line in wrap(printable(text), WIDTH - 2, break_long_words=False, break_on_hyphens=False)]
+    lines = wrap(printable(text), WIDTH - 2, break_long_words=False, break_on_hyphens=False)
+    return [f"# {line}" for line in lines]
 
 
 def _entry(key: str, value: Any) -> Iterator[str]:
