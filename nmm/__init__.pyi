@@ -22,6 +22,7 @@ from .control.sequence import Event as Event
 from .control.sequenced import SequencedController as SequencedController
 from .control.steering import Steering as Steering
 from .control.step import Step as Step
+from .drafts import first_scenario as first_scenario
 from .errors import DivergedError as DivergedError
 from .errors import InputError as InputError
 from .errors import NmmError as NmmError

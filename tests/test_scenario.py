@@ -310,6 +310,7 @@ def test_resolved_holds_every_default_as_plain_data() -> None:
         "axle": None,
         "limits": {},
         "missing_meshes": "error",
+        "srdf": None,
     }
 
     def plain(value: object) -> bool:

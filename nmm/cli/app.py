@@ -19,7 +19,7 @@ from nmm.cli.options import (
     settings_of,
 )
 from nmm.cli.redundancy import laps, redundancy
-from nmm.cli.robot_commands import check, drive, info, robots, scenarios, view
+from nmm.cli.robot_commands import check, drive, info, init, robots, scenarios, view
 from nmm.cli.singularities import singularities
 from nmm.cli.sweeping import sweep
 from nmm.errors import InputError
@@ -59,6 +59,7 @@ def nmm(
 
     \b
     nmm scenarios                             what there is to run
+    nmm init my_robot.urdf                    a first scenario for a robot of your own
     nmm run unicycle_2r_position              run it: figures and numbers in runs/
     nmm run unicycle_2r_position --play       and watch it in the browser
     nmm compare unicycle_2r_position          reduced against projected gradient
@@ -256,6 +257,7 @@ def render(
 
 for _name, _command in (
     ("info", info),
+    ("init", init),
     ("check", check),
     ("view", view),
     ("drive", drive),

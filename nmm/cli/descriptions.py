@@ -35,8 +35,10 @@ def describe_robot(source: str | None, scenario: str | None, **loading: Any) -> 
 
     if source is None and scenario is None:
         raise InputError("expected ROBOT, a bundled name or a file, or --scenario SCENARIO, which has one")
-    if source is None and any(loading[key] for key in ("platform", "axle", "package_dirs")):
-        raise InputError("--platform, --axle and --package-dir are for ROBOT, a scenario says its own")
+    if source is None and any(loading[key] for key in ("platform", "axle", "package_dirs", "srdf")):
+        raise InputError(
+            "--platform, --axle, --package-dir and --srdf are for ROBOT, a scenario says its own"
+        )
     given: Robot | None = None
     if source is not None:
         given = load(source, **{"missing_meshes": "skip", **loading})
@@ -101,6 +103,8 @@ def _show(robot: Robot, tasks: Sequence[tuple[str, int]]) -> None:
     show_text()
     for name, inputs in robot.groups.items():
         show_text(f"group {name}: {', '.join(inputs) or 'none'}")
+    for name, values in robot.postures.items():
+        show_text(f"posture {name}: {', '.join(f'{joint} {value:.4g}' for joint, value in values.items())}")
     show_text(f"frames: {', '.join(robot.frames)}")
     for name, value in robot.platform.described().items():
         show_text(f"platform {name}: {value}")
@@ -169,6 +173,7 @@ def _show_loading(robot: Robot) -> None:
     if made.platform in _CHOSEN:
         lines.insert(0, f"platform: {robot.platform.name}, {_CHOSEN[made.platform]}")
     lines += [f"prefix of {arm}: {prefix}" for arm, prefix in made.prefixed.items()]
+    lines += [f"SRDF: {file}" for file in robot.semantics.files]
     lines += _files(made)
     if lines:
         show_text()

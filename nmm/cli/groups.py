@@ -21,6 +21,7 @@ from nmm.cli.options import (
     PackageOption,
     PlatformOption,
     PortOption,
+    SrdfOption,
     SubjectArgument,
     SubjectSetOption,
     TaskOption,
@@ -110,6 +111,7 @@ class Loading(OfRobot):
     platform: PlatformOption = None
     axle: AxleOption = None
     package_dir: PackageOption = None
+    srdf: SrdfOption = None
 
     def keywords(self) -> dict[str, Any]:
         """As `nmm.load` takes them."""
@@ -117,6 +119,7 @@ class Loading(OfRobot):
             "platform": self.platform,
             "axle": axle_of(self.axle),
             "package_dirs": list(self.package_dir or ()),
+            "srdf": self.srdf,
         }
 
 

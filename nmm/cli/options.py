@@ -120,6 +120,14 @@ PackageOption = Annotated[
         help="A folder that is, or holds, the packages of package:// and $(find ...). May be repeated.",
     ),
 ]
+SrdfOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="FILE",
+        help="An SRDF with named postures and groups.",
+        show_default="the one beside the robot's file, if there is one",
+    ),
+]
 PortOption = Annotated[
     int | None, typer.Option(metavar="N", help="Port on this machine.", show_default="a free one")
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -132,6 +133,49 @@ def drive(subject: Subject, browser: Browser, loading: Loading) -> None:
     from nmm.cli.driving import drive_subject
 
     drive_subject(subject.subject, **subject.keywords(), **browser.keywords(), **loading.keywords())
+
+
+@command
+def init(
+    robot: Annotated[str, typer.Argument(metavar="ROBOT", help=ROBOT_HELP)],
+    *,
+    arm: Annotated[
+        str | None,
+        typer.Option(metavar="ARM", help="A file or bundled name of an arm, to be mounted on the robot."),
+    ] = None,
+    at: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FRAME",
+            help="The robot's frame that carries the arm.",
+            show_default="mount, arm_mount or top",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Where to write; never over a file.", show_default="<robot>.yaml"),
+    ] = None,
+    settings: ArgumentOption = None,
+    loading: Loading,
+) -> None:
+    """Write a first scenario for a robot.
+
+    A YAML file with a word on every key: the end of the longest arm is led along a gentle path, from a start
+    within limits and away from singularities (a posture of the robot's SRDF, if one will do), with a
+    resolver that fits. It has been run before it is written, and runs as it stands. What has no wheels is put
+    on a bundled base. With --arm, --lock and --srdf are the arm's.
+
+    \b
+    nmm init my_robot.urdf && nmm run my_robot.yaml --play
+    nmm init my_arm.urdf --out scenarios/first.yaml
+    nmm init car_base --arm my_arm.urdf --at arm_mount
+    nmm init my_arm.urdf --platform fixed
+    """
+    from nmm.cli.starting import write_first_scenario
+
+    write_first_scenario(
+        robot, arm=arm, at=at, out=out, arguments=arguments_of(settings), **loading.keywords()
+    )
 
 
 def scenarios(

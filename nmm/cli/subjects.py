@@ -29,6 +29,7 @@ _OPTIONS = {
     "missing_meshes": "--missing-meshes",
     "axle": "--axle",
     "package_dirs": "--package-dir",
+    "srdf": "--srdf",
 }
 #: Those that a scenario's robot takes, too.
 _OF_SCENARIO = ("lock", "wheels", "missing_meshes")

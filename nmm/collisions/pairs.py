@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 import coal
 import numpy as np
@@ -11,10 +10,7 @@ import pinocchio as pin
 
 from nmm.arrays import Array
 from nmm.errors import InputError, RobotError, expect_known
-from nmm.robots.loading.text import read_text
-from nmm.robots.loading.xml_tree import XmlError, parse
 from nmm.robots.robot import Robot
-from nmm.words import one_line
 
 #: How many configurations are drawn to see which pairs always touch.
 SAMPLES = 200
@@ -38,7 +34,7 @@ def touching(
 ) -> dict[tuple[int, int], float]:
     """In which share of random configurations each pair of shapes is nearer than `distance`, m."""
     near = np.zeros(len(pairs))
-    measure = _measured(robot, shapes, pairs)
+    measure = measured(robot, shapes, pairs)
     for q in sampled(robot):
         near += measure(q) < distance
     return dict(zip(pairs, (near / SAMPLES).tolist(), strict=True))
@@ -52,14 +48,15 @@ def always_near(
     for q in sampled(robot):
         if not left:
             break
-        near = _measured(robot, shapes, left)(q) < distance
+        near = measured(robot, shapes, left)(q) < distance
         left = [pair for pair, is_near in zip(left, near, strict=True) if is_near]
     return left
 
 
-def _measured(
+def measured(
     robot: Robot, shapes: pin.GeometryModel, pairs: Sequence[tuple[int, int]]
 ) -> Callable[[Array], Array]:
+    """A function of q (n,): each pair's distance there (pairs,), m; below 0 inside each other."""
     model, data, found = robot.model, robot.model.createData(), pin.GeometryData(shapes)
     request, result = coal.DistanceRequest(), coal.DistanceResult()
     objects = shapes.geometryObjects
@@ -75,22 +72,6 @@ def _measured(
         return distances
 
     return measure
-
-
-def srdf_pairs(file: str | Path) -> tuple[tuple[str, str], ...]:
-    """The pairs of links that an SRDF disables; `InputError` for a file that is missing or is none."""
-    path = Path(file)
-    try:
-        root = parse(read_text(path))
-    except FileNotFoundError:
-        raise InputError(f"srdf: there is no file {path}") from None
-    except (RobotError, XmlError) as error:
-        raise InputError(f"srdf: {path} cannot be read: {one_line(str(error))}") from None
-    if root.tag != "robot" or root.find("link") is not None:
-        what = "this is a robot's description: it has links" if root.tag == "robot" else f"got <{root.tag}>"
-        raise InputError(f"srdf: {path}: expected an SRDF, a <robot> with disable_collisions, {what}")
-    found = [(one.get("link1", ""), one.get("link2", "")) for one in root.iter("disable_collisions")]
-    return tuple(found)
 
 
 def named_pairs(

@@ -17,6 +17,7 @@ from nmm.collisions.queries import Queries
 from nmm.collisions.robot_shapes import link_names, query_shapes
 from nmm.collisions.shapes import Plane
 from nmm.errors import InputError
+from nmm.robots.loading.srdf import read_srdf
 from nmm.robots.robot import Robot
 
 #: So many names are told.
@@ -84,7 +85,7 @@ def set_up(
     distance: float,
     band: float,
     ignore: Sequence[tuple[str, str]],
-    srdf: str | Path | None,
+    srdf: str | Path | bool | None,
     meshes: str,
 ) -> Setting:
     """The shapes and pairs of one robot among obstacles.
@@ -116,10 +117,11 @@ def set_up(
         return f"{known[pair[0]][-1]} and {known[pair[1]][-1]}"
 
     left_out = choice.named_pairs(ignore, known, "collisions: ignore")
-    if srdf is not None:
-        disabled = [
-            pair for pair in choice.srdf_pairs(srdf) if all(any(one in n for n in known) for one in pair)
-        ]
+    if srdf is True and not robot.semantics.files:
+        raise InputError(f"srdf: none was found beside the file of {robot.name}: expected one's path")
+    if srdf:
+        all_disabled = robot.semantics.disabled if srdf is True else read_srdf(srdf).disabled
+        disabled = [pair for pair in all_disabled if all(any(one in n for n in known) for one in pair)]
         found = choice.named_pairs(disabled, known, "srdf") & {*wanted}
         touch = choice.touching(robot, shapes, sorted(found), 0.0)
         told = [f"{name(pair)} ({share:.1%})" for pair, share in touch.items() if 0.0 < share < 1.0]

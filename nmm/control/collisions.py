@@ -29,7 +29,8 @@ class Collisions:
     self : whether the robot keeps off itself, too
     obstacles : what it keeps off, `Obstacle`s
     ignore : pairs of names (links, shapes, obstacles) that are not kept apart
-    srdf : a file of MoveIt's whose disabled pairs are left out, too; those that do touch are told
+    srdf : a file of MoveIt's whose disabled pairs are left out, too, or True for the robot's own (see
+        `nmm.load`); those that do touch are told
     shapes : what stands for the robot's meshes, "hulls" or "capsules"
     band : pairs nearer than this have rows, m; `distance` and 0.2 m more when not given
     gain : 1/s, a distance falls no faster than this times what is left of it
@@ -48,7 +49,7 @@ class Collisions:
     self: bool = True
     obstacles: Sequence[Obstacle] = ()
     ignore: Sequence[tuple[str, str]] = ()
-    srdf: str | Path | None = None
+    srdf: str | Path | bool | None = None
     shapes: str = HULLS
     band: float | None = None
     gain: float = 4.0

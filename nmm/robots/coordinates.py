@@ -13,6 +13,7 @@ from nmm.arrays import Array, Flags, Integers, scalar, unwritable, vector
 from nmm.errors import InputError, expect_known
 from nmm.platforms.base import Platform
 from nmm.robots.followers import SLACK, Follower, Following
+from nmm.robots.semantics import POSTURE, Named, Postures
 
 #: A limit this large is none, m or rad.
 UNLIMITED = 1e5
@@ -25,6 +26,11 @@ class Coordinates:
     model: pin.Model
     platform: Platform
     followers: tuple[Follower, ...]
+
+    @property
+    def postures(self) -> Postures:
+        """Named postures: coordinates by name, m and rad."""
+        raise NotImplementedError
 
     @cached_property
     def _joints(self) -> list[int]:
@@ -152,12 +158,15 @@ class Coordinates:
         expect_known("input", name, self.u_names, f"robot {self.name}")
         return self.u_names.index(name)
 
-    def q(self, values: Mapping[str, float] | ArrayLike | None = None) -> Array:
-        """A configuration: from a vector, taken as it is, or by name.
+    def q(self, values: Named | ArrayLike | None = None) -> Array:
+        """A configuration: from a vector, taken as it is, or by name, {"posture": "home", "q1": 0.3}.
 
-        What is not named is zero, and a follower that is not named is where its leader has it.
+        What is not named is zero, and a follower that is not named is where its leader has it. Coordinates
+        have the last word over a posture.
         """
         if values is None or isinstance(values, Mapping):
+            if values and POSTURE in values and POSTURE not in self.q_names:
+                values = self.postures.within(values)
             given = {self.coordinate(name): scalar(value, name) for name, value in (values or {}).items()}
             q = np.zeros(self.n)
             q[list(given)] = list(given.values())

@@ -21,6 +21,7 @@ from nmm.robots.coordinates import Coordinates
 from nmm.robots.followers import Follower
 from nmm.robots.joint_table import joint_table, own_axes
 from nmm.robots.meshes import MeshesWhenAsked, Shapes
+from nmm.robots.semantics import Postures, Semantics
 from nmm.robots.wheel import Wheel
 
 #: Stands for the robot's centre of mass where a function names a frame (`tasks.CenterOfMass`).
@@ -45,6 +46,7 @@ class Robot(Coordinates):
     notes : what loading did to the file, a sentence each
     arms : the joints of each arm by the arm's name, when several were mounted or one was named
     followers : coordinates that follow another one, which follows nobody; they have no input of their own
+    semantics : what its SRDF says
     parts : what loading keeps for mounting and for reports (`nmm.robots.loading.provenance.Parts`)
     """
 
@@ -60,6 +62,7 @@ class Robot(Coordinates):
     notes: tuple[str, ...] = ()
     arms: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     followers: tuple[Follower, ...] = ()
+    semantics: Semantics = field(default_factory=Semantics)
     parts: Any = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -119,10 +122,16 @@ class Robot(Coordinates):
 
     @cached_property
     def groups(self) -> Mapping[str, tuple[str, ...]]:
-        """Inputs that are spoken of together: "platform", "arm" (all joints), and each arm by its name."""
+        """Inputs that are spoken of together: "platform", "arm" (all joints), each arm by its name, and the
+        SRDF's groups."""
         p = self.platform.p
         own = {arm: tuple(j for j in joints if j in self.u_names) for arm, joints in self.arms.items()}
-        return {"platform": self.u_names[:p], "arm": self.u_names[p:], **own}
+        return {"platform": self.u_names[:p], "arm": self.u_names[p:], **self.semantics.groups, **own}
+
+    @property
+    def postures(self) -> Postures:
+        """The SRDF's named postures: the coordinates that each sets, m and rad; `q` takes them by name."""
+        return self.semantics.postures
 
     @property
     def frames(self) -> tuple[str, ...]:

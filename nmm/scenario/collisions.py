@@ -41,10 +41,10 @@ class CollisionsPart(Part):
         default_factory=list,
         description="pairs of names (links, shapes, obstacles) that are not kept apart, as [[hand, table]]",
     )
-    srdf: FileName | None = Field(
+    srdf: bool | FileName | None = Field(
         None,
         description="a file of MoveIt's whose disabled pairs are left out, too; relative to the scenario, or "
-        "package://PACKAGE/PATH",
+        "package://PACKAGE/PATH; true for the robot's own",
     )
     shapes: Literal["hulls", "capsules"] = Field("hulls", description="what stands for the robot's meshes")
     band: Positive | None = Field(
@@ -91,9 +91,9 @@ class CollisionsPart(Part):
             collisions.on(robot)
         return collisions
 
-    def _srdf(this, absolute: Absolute, place: Place) -> str | None:
-        if this.srdf is None:
-            return None
+    def _srdf(this, absolute: Absolute, place: Place) -> str | bool | None:
+        if not isinstance(this.srdf, str):
+            return this.srdf
         if this.srdf.startswith(PACKAGE):
             return str(package_file(this.srdf))
         return str(absolute(this.srdf, (*place, "srdf")))

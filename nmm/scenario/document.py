@@ -191,13 +191,18 @@ def read_file(path: Path) -> Document:
         raise ScenarioError(f"{path}: expected UTF-8 text") from None
     except OSError as error:
         raise ScenarioError(f"{path}: cannot be read ({error.strerror})") from None
-    document = read_text(text, str(path))
+    return document_of(text, str(path), path.resolve().parent)
+
+
+def document_of(text: str, name: str, folder: Path) -> Document:
+    """The document of a scenario's text; `name` is what errors call it, `folder` where it stands."""
+    document = read_text(text, name)
     data = document.data["value"]
     if not isinstance(data, dict):
-        raise ScenarioError(f"{path}: expected a mapping (key: value), got {shown(data)}")
+        raise ScenarioError(f"{name}: expected a mapping (key: value), got {shown(data)}")
     lines = {place[1:]: line for place, line in document.lines.items() if len(place) > 1}
     tied = [[place[1:] for place in places] for places in document.tied]
-    return Document(str(path), data, lines, path.resolve().parent, tied=tied)
+    return Document(name, data, lines, folder, tied=tied)
 
 
 def read_text(text: str, name: str, *, lines: bool = True) -> Document:

@@ -131,6 +131,11 @@ class RobotPart(Part):
     limits: dict[str, Number] = Field(
         default_factory=dict, description="largest absolute values of the platform's inputs, as {v: 0.5}"
     )
+    srdf: FileName | None = Field(
+        None,
+        description="a file of MoveIt's with named postures and groups, relative to the scenario, or "
+        "package://PACKAGE/PATH; when not given, the one beside the robot's file, if there is one",
+    )
     missing_meshes: Literal["error", "skip"] = Field(
         "error", description="error, or skip to leave out shapes whose mesh is not there"
     )
@@ -151,7 +156,10 @@ class RobotPart(Part):
         if not is_name and not source.startswith(PACKAGE):
             source = str(absolute(source, (*place, "source")))
         folders = [str(absolute(folder, (*place, "package_dirs"))) for folder in self.package_dirs]
-        return {**self.model_dump(), "source": source, "package_dirs": folders}
+        srdf = self.srdf
+        if srdf is not None and not srdf.startswith(PACKAGE):
+            srdf = str(absolute(srdf, (*place, "srdf")))
+        return {**self.model_dump(), "source": source, "package_dirs": folders, "srdf": srdf}
 
 
 def _named(value: object) -> object:

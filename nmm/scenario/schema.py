@@ -15,12 +15,13 @@ from nmm.functions.tasks.task import Stack
 from nmm.kinds import RESOLVERS
 from nmm.resolvers.base import Resolver
 from nmm.robots.robot import Robot
+from nmm.robots.semantics import POSTURE
 from nmm.scenario.collisions import CollisionsPart
 from nmm.scenario.functions import REFERENCE_PARTS
 from nmm.scenario.goals import GoalPart, RetreatPart
-from nmm.scenario.keys import Part, at
+from nmm.scenario.keys import Part, at, at_key
 from nmm.scenario.limits import LimitsPart, part_or_none
-from nmm.scenario.numbers import Nested, Positive, numbers, numbers_by_name
+from nmm.scenario.numbers import Nested, Positive, numbers, numbers_by_name, shown
 from nmm.scenario.objectives import ObjectiveList, QuadraticPart, build_objective
 from nmm.scenario.resolvers import AnyResolver, WithAddedTask
 from nmm.scenario.robot import Absolute, RobotChoice
@@ -29,9 +30,17 @@ from nmm.scenario.tasks import TASK_PARTS, TaskList, TaskPart, build_tasks, list
 from nmm.words import listed as in_words
 
 
-def _coordinates(value: object) -> dict[str, float] | list[Nested]:
-    """Numbers by name, or a list of them."""
-    return numbers_by_name(value) if isinstance(value, Mapping) else numbers(value)
+def _start(value: object) -> dict[str, Any] | list[Nested]:
+    """Numbers by name, one or several postures among them, or a list of numbers."""
+    if not isinstance(value, Mapping):
+        return numbers(value)
+    named, rest = value.get(POSTURE), {name: item for name, item in value.items() if name != POSTURE}
+    if POSTURE not in value:
+        return numbers_by_name(rest)
+    names = [named] if isinstance(named, str) else named
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise at_key(POSTURE, f"expected a posture's name, or a list of such, got {shown(named)}")
+    return {POSTURE: named, **numbers_by_name(rest)}
 
 
 class ScenarioPart(Part):
@@ -44,8 +53,9 @@ class ScenarioPart(Part):
     robot: RobotChoice = Field(
         description="a name, a path, a mapping with source, or one with platform and arm (or arms), mounted"
     )
-    q0: Annotated[dict[str, float] | list[Nested], BeforeValidator(_coordinates)] = Field(
-        description="configuration at t = 0, m and rad: by name (0 for the rest), or a list in q's order"
+    q0: Annotated[dict[str, Any] | list[Nested], BeforeValidator(_start)] = Field(
+        description="configuration at t = 0, m and rad: by name (0 for the rest), or a list in q's order; "
+        "posture: home takes a named posture of the robot's SRDF, for what has no value beside it"
     )
     duration: Positive = Field(description="s, above 0")
     dt: Positive = Field(0.005, description="time between samples and step of the fixed-step methods, s")
@@ -139,9 +149,13 @@ class ScenarioPart(Part):
     def check_start(self, robot: Robot) -> None:
         """`KeyedError` for a q0 that is none of the robot's, or outside limits that are not kept."""
         with at("q0"):
-            for name in self.q0 if isinstance(self.q0, dict) else ():
+            named = self.q0 if isinstance(self.q0, dict) else {}
+            for name in named:
                 with at(name):
-                    robot.coordinate(name)
+                    if name == POSTURE and name not in robot.q_names:
+                        robot.postures.within({name: named[name]})
+                    else:
+                        robot.coordinate(name)
             come_back = self.limits is not None and self.limits.position is not False
             robot.check_limits(robot.q(self.q0), come_back=come_back)
 

@@ -93,7 +93,7 @@ def _from_words(text: str, robot: Robot) -> dict[str, Any]:
             f"task {text}: expected KIND:FRAME:AXES, as in position:ee:xy; axes are of positions"
         )
     if "axes" in keys:
-        data["axes"] = axes or _moving_axes(data, robot)
+        data["axes"] = axes or moving_axes(data, robot)
     return data
 
 
@@ -107,9 +107,9 @@ def _tip(robot: Robot, text: str) -> str:
     return ends[0]
 
 
-def _moving_axes(data: dict[str, Any], robot: Robot) -> str:
-    """Those of x, y, z along which some input moves the point at some of a few configurations."""
-    function = FUNCTION_PARTS[data["kind"]].model_validate(data | {"axes": "xyz"}).build(robot)
+def moving_axes(data: Mapping[str, Any], robot: Robot) -> str:
+    """Those of x, y, z along which some input moves a position at some of a few configurations."""
+    function = FUNCTION_PARTS[data["kind"]].model_validate({**data, "axes": "xyz"}).build(robot)
     lower, upper = np.clip(robot.q_limits, -np.pi, np.pi).T
     rng = np.random.default_rng(0)
     moved = np.zeros(3)

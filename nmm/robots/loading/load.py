@@ -12,7 +12,9 @@ from numpy.typing import ArrayLike
 from nmm.errors import InputError, RobotError
 from nmm.platforms import Platform, platform_by_name
 from nmm.robots.loading.models import Options, robot_from
-from nmm.robots.loading.source import read_file, read_model
+from nmm.robots.loading.packages import package_file
+from nmm.robots.loading.postures import with_srdf
+from nmm.robots.loading.source import PACKAGE, path_of, read_file, read_model
 from nmm.robots.robot import Robot
 from nmm.words import printable
 
@@ -31,6 +33,7 @@ def load(
     missing_meshes: Literal["error", "skip"] = "error",
     visual_model: pin.GeometryModel | None = None,
     collision_model: pin.GeometryModel | None = None,
+    srdf: str | Path | None = None,
 ) -> Robot:
     """Load a mobile manipulator, or an arm that is put on a platform.
 
@@ -61,6 +64,8 @@ def load(
     limits : largest absolute values of the platform's inputs, by name, in their units
     missing_meshes : "error", or "skip" to leave out, with a note, the shapes whose mesh is not there
     visual_model, collision_model : the shapes, with a Pinocchio model
+    srdf : a file of postures, groups and pairs of links that may touch; by default the one beside the file
+        or in ../srdf that has the file's name or the robot's
 
     Returns
     -------
@@ -89,16 +94,22 @@ def load(
             raise RobotError(f"name: expected a string, got {name!r}")
         if limits is not None and not isinstance(limits, Mapping):
             raise RobotError(f"limits: expected a value for each input's name, got {limits!r}")
+        if srdf is not None and not isinstance(srdf, str | Path):
+            raise RobotError(f"srdf: expected a path, got {srdf!r}")
+        if isinstance(srdf, str) and srdf.startswith(PACKAGE):
+            srdf = package_file(srdf, folders)
         options = Options(platform, wheels, lock or {}, axle, name, limits or {})
         if isinstance(source, pin.Model):
             if arguments or folders:
                 raise RobotError("arguments and package_dirs are for files, the source is a pin.Model")
-            return robot_from(read_model(source, visual_model, collision_model), options)
+            model = read_model(source, visual_model, collision_model)
+            return with_srdf(robot_from(model, options), srdf, None, model.name)
         if visual_model is not None or collision_model is not None:
             raise RobotError(
                 "visual_model and collision_model are for a pin.Model, a file holds its own shapes"
             )
-        return robot_from(read_file(source, arguments, folders, options.lock, missing_meshes), options)
+        read = read_file(source, arguments, folders, options.lock, missing_meshes)
+        return with_srdf(robot_from(read, options), srdf, path_of(source, folders), read.name)
     except RobotError as error:
         # Names in files and of files may hold anything, a message is one line.
         raise RobotError(printable(str(error))) from None

@@ -155,7 +155,9 @@ def _mounted(
             platform=provenance.platform,
         ),
     )
-    return replace(robot, **robot.shapes._asdict(), arms={**base.arms, key: joints}, parts=kept)
+    semantics = base.semantics.with_arm(arm.semantics, prefix, joints)
+    arms = {**base.arms, key: joints}
+    return replace(robot, **robot.shapes._asdict(), arms=arms, semantics=semantics, parts=kept)
 
 
 def _arm_body(arm: Robot, parts: Parts) -> _Body:

@@ -65,7 +65,7 @@ def read_file(
 ) -> Source:
     """The models of a bundled robot or of a file; see `load`."""
     expect_known("missing_meshes", missing_meshes, ("error", "skip"), error=RobotError)
-    description = describe(_path(source, package_dirs), arguments, package_dirs)
+    description = describe(path_of(source, package_dirs), arguments, package_dirs)
     where, packages = str(source), description.packages
     meshes: dict[str, Path | None] = {}
 
@@ -112,7 +112,7 @@ def read_model(
     )
 
 
-def _path(source: str | Path, package_dirs: Sequence[str | Path]) -> Path:
+def path_of(source: str | Path, package_dirs: Sequence[str | Path]) -> Path:
     """The file of a bundled name, of a package:// name or of a path: a string without folder and suffix is a
     bundled name."""
     if isinstance(source, Path):

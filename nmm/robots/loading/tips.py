@@ -10,7 +10,7 @@ import pinocchio as pin
 from nmm.robots.robot import Robot
 
 #: What the frames at the end of an arm are called, the likeliest first.
-TIPS = ("ee", "tcp", "tool", "grasp", "gripper", "hand", "flange", "tip")
+TIPS = ("ee", "tcp", "effector", "tool", "grasp", "gripper", "hand", "flange", "tip")
 
 
 def tips(robot: Robot) -> tuple[str, ...]:
@@ -23,20 +23,26 @@ def first_tip(robot: Robot) -> str | None:
     return min(tips(robot), key=_rank, default=None)
 
 
+def end_at(robot: Robot, joint: int) -> str | None:
+    """The frame at the end of a joint's body: the one whose name says so, or the farthest out."""
+    kinds = (pin.FrameType.BODY, pin.FrameType.OP_FRAME)
+    above = {frame.parentFrame for frame in robot.model.frames}
+    there = [
+        (i in above, *_how_little_a_tip(frame), frame.name)
+        for i, frame in enumerate(robot.model.frames)
+        if frame.parentJoint == joint and frame.type in kinds
+    ]
+    return min(there)[-1] if there else None
+
+
 def _tips(robot: Robot) -> Iterator[str]:
     model = robot.model
     carrying = set(model.parents)
-    above = {frame.parentFrame for frame in model.frames}
     for name in robot.q_names[robot.platform.n_p :]:
         joint = model.getJointId(name)
-        kinds = (pin.FrameType.BODY, pin.FrameType.OP_FRAME)
-        ends = [
-            frame
-            for i, frame in enumerate(model.frames)
-            if frame.parentJoint == joint and frame.type in kinds and i not in above
-        ]
-        if joint not in carrying and ends:
-            yield min(ends, key=_how_little_a_tip).name
+        end = None if joint in carrying else end_at(robot, joint)
+        if end is not None:
+            yield end
 
 
 def _how_little_a_tip(frame: pin.Frame) -> tuple[int, float]:

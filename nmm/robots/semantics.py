@@ -1,0 +1,70 @@
+"""What people call parts and postures of a robot, as an SRDF says it; and which links it lets touch."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from nmm.errors import InputError, unknown
+
+#: Coordinates by name, m and rad, and under the key `posture` one or several postures.
+Named = Mapping[str, float | str | Sequence[str]]
+#: Stands among the names of coordinates for those of a posture.
+POSTURE = "posture"
+
+
+class Postures(dict[str, Mapping[str, float]]):
+    """Named postures: coordinates by name, m and rad; `InputError` lists the names for one that is none."""
+
+    def __missing__(self, name: object) -> Mapping[str, float]:
+        there = self or {"none, for no SRDF was found beside the robot's file that holds one": None}
+        raise InputError(unknown(POSTURE, name, there))
+
+    def within(self, values: Named) -> dict[str, float]:
+        """Coordinates by name, where the key `posture` stands for those of one or several postures.
+
+        Later ones have the last word over earlier ones, and the coordinates beside them over all.
+        """
+        given = dict(values)
+        named = given.pop(POSTURE)
+        found: dict[str, float] = {}
+        for name in (named,) if isinstance(named, str) or not isinstance(named, Sequence) else named:
+            found |= self[name] if isinstance(name, str) else self.__missing__(name)
+        return {**found, **given}  # type: ignore[dict-item]  # the caller asks whether they are numbers
+
+
+@dataclass(frozen=True)
+class Semantics:
+    """What the SRDF beside a robot's file says of it, in the robot's own names.
+
+    Attributes
+    ----------
+    postures : the coordinates that each state sets, m and rad; a follower is set by the joint that it follows
+    groups : the inputs that move each group
+    disabled : pairs of links that are not to be kept apart
+    files : where it was read
+    """
+
+    postures: Postures = field(default_factory=Postures)
+    groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    disabled: tuple[tuple[str, str], ...] = ()
+    files: tuple[Path, ...] = ()
+
+    def with_arm(self, arm: Semantics, prefix: str, arms_own: Collection[str]) -> Semantics:
+        """A platform's, with those of an arm: its names with a prefix, and its joints alone, not its base's.
+
+        A posture of both is what both say.
+        """
+        postures = Postures(self.postures)
+        for name, values in arm.postures.items():
+            own = {prefix + joint: value for joint, value in values.items() if prefix + joint in arms_own}
+            if own:
+                postures[prefix + name] = {**postures.get(prefix + name, {}), **own}
+        groups = dict(self.groups)
+        for name, inputs in arm.groups.items():
+            members = tuple(prefix + one for one in inputs if prefix + one in arms_own)
+            if members:
+                groups.setdefault(prefix + name, members)
+        disabled = tuple((prefix + one, prefix + other) for one, other in arm.disabled)
+        return Semantics(postures, groups, self.disabled + disabled, self.files + arm.files)
