@@ -13,7 +13,7 @@ from urdf_parts import joint, link, robot, shape, write
 
 import nmm
 from nmm.bundled import bundled_robots
-from nmm.cli.app import status_of
+from nmm.cli.exit_status import status_of
 from nmm.drafts.hand import hands
 from nmm.folders.run import is_run
 from nmm.robots.configuration import Configuration

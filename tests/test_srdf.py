@@ -11,7 +11,7 @@ from command_line import Result
 from urdf_parts import joint, link, robot, write
 
 import nmm
-from nmm.cli.app import status_of
+from nmm.cli.exit_status import status_of
 from nmm.robots.loading.packages import package_file
 from nmm.robots.loading.srdf import read_srdf
 
