@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from typing import Any
 
-from nmm.words import quoted
+from nmm.words import one_line, quoted
 
 
 class NmmError(Exception):
@@ -54,7 +54,7 @@ def unknown(kind: str, name: object, available: Iterable[str], where: str = "") 
     names, asked = list(available), str(name)
     near = difflib.get_close_matches(asked, names, n=1) if len(asked) < LONGEST else []
     hint = f" (did you mean {near[0]!r}?)" if near else ""
-    listing = ", ".join(names) if names else "none"
+    listing = ", ".join(one_line(name, LONGEST) for name in names) if names else "none"
     prefix = f"{where}: " if where else ""
     return f"{prefix}unknown {kind} {quoted(name)}{hint}; available: {listing}"
 

@@ -139,6 +139,7 @@ def test_a_page_that_comes_late_is_told_everything_so_far() -> None:
             t = unpacked(run_told["t"])
             assert t[0] == 0.0
             assert t[-1] > 0.2
+            wait_for(lambda: first.of("run")[-1]["whole"])  # then a page can be told all of it
             first.says(ALL)
             wait_for(lambda: bool(late.of("whole")) and bool(first.of("whole")))
         np.testing.assert_array_equal(told(late)[1], told(first)[1])

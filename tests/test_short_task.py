@@ -273,7 +273,7 @@ def test_a_run_without_its_scenario_needs_a_task(folder: Path, tmp_path: Path) -
         ("unicycle_2r", {"tasks": ["position"], "platform": "hover"}, "unknown platform 'hover'"),
         ("unicycle_2r_position", {"settings": ["nope=1"]}, "unknown key 'nope'"),
         ("unicycle_2r_position", {"platform": "fixed"}, "--platform: of a robot's file"),
-        ("unicycle_2r_position", {"lock": {"q1": 0.0}, "axle": "ee"}, "--lock, --axle: of a robot's file"),
+        ("unicycle_2r_position", {"platform": "car", "axle": "ee"}, "--platform, --axle: of a robot's file"),
         ("unicycle_2r_position", {"package_dirs": ["x"]}, "--package-dir: of a robot's file"),
         ("RUN", {"settings": ["dt=1"]}, "--set: expected a robot or a scenario"),
         ("RUN", {"platform": "fixed"}, "--platform: of a robot's file"),

@@ -8,10 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
+
 from nmm.bundled import bundled_robots
 from nmm.errors import InputError, RobotError
 from nmm.robots.loading.provenance import provenance_of
 from nmm.robots.robot import Robot
+from nmm.scenario.document import dotted
+from nmm.scenario.keys import first_error
 from nmm.scenario.robot import PACKAGE, MountedPart, RobotPart
 
 #: The base of an arm that comes without one: two driven wheels, with v and omega for inputs.
@@ -112,7 +116,11 @@ def _loaded(data: dict[str, Any], folder: Path) -> tuple[Robot, dict[str, Any]]:
 
 
 def _built(data: Mapping[str, Any], folder: Path) -> Robot:
-    part = (MountedPart if "arm" in data else RobotPart).model_validate(data)
+    try:
+        part = (MountedPart if "arm" in data else RobotPart).model_validate(data)
+    except ValidationError as error:
+        wrong = first_error(error, data)
+        raise InputError(f"{dotted(wrong.place)}: {wrong.text}") from None
     return part.build(lambda file, _: folder / file, ())
 
 

@@ -89,7 +89,7 @@ def check_arrays(found: dict[str, Any], path: Path, limits: int, pairs: int) -> 
     lengths = {"L": limits, "K": np.size(found.get("t", ())) if pairs else 0, "3": 3, "6": 6}
     for name, shape in SHAPES.items():
         if name not in found:
-            if name in ARRAYS:
+            if name in ARRAYS or (pairs and shape.startswith("K")):
                 raise InputError(f"{path}: {name}: this array is missing")
             continue
         array, kind = found[name], "i" if name in WHOLE_NUMBERS else "f"

@@ -122,11 +122,10 @@ def _loaded(folder: Path, robot: Robot | None) -> Trajectory:
     from nmm.runs.trajectory import Trajectory
     from nmm.scenario import Scenario
 
-    if not folder.is_dir():
+    summary, file = folder / "summary.json", folder / "trajectory.npz"
+    if not summary.exists() and not file.exists():
         raise InputError(f"{folder}: expected a run's folder (with trajectory.npz and nmm's summary.json)")
-    summary = folder / "summary.json"
     told = read_told(summary, ToldRun, FORMAT)
-    file = folder / "trajectory.npz"
     found = read_arrays(file)
     check_arrays(found, file, len(told.limit_names), len(told.clearance_names))
     _check_counts(told, found, summary)

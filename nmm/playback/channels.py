@@ -116,7 +116,7 @@ def _of_task(run: Trajectory) -> Iterator[Channel]:
     for i, (name, unit) in enumerate(zip(run.r_names, run.r_units, strict=True)):
         yield Channel(f"error_{name}", f"e of {name}", unit, "components", run.error[:, i])
     if np.any(run.objective != 0.0):
-        yield Channel("objective", "H", "", "H", run.objective, log=bool(np.nanmin(run.objective) >= 0.0))
+        yield Channel("objective", "H", "", "H", run.objective, log=not np.any(run.objective < 0.0))
     yield Channel("sigma_min", "σ_min", "", "sigma", run.sigma_min)
     if run.limited:
         levels = run.scale.shape[1]

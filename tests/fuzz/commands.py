@@ -9,7 +9,6 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-import click
 import typer.main
 from hypothesis import strategies as st
 
@@ -33,9 +32,9 @@ _group: Any = typer.main.get_command(app)
 COMMANDS = {name: one for name, one in _group.commands.items() if name not in NOT_HUNTED}
 
 
-def _options(command: click.Command) -> list[tuple[str, bool]]:
+def _options(command: Any) -> list[tuple[str, bool]]:
     """Names of its options, and whether they take a value."""
-    options = [one for one in command.params if isinstance(one, click.Option)]
+    options = [one for one in command.params if one.param_type_name == "option"]
     names = [(name, not one.is_flag) for one in options for name in (*one.opts, *one.secondary_opts)]
     return [(name, takes) for name, takes in names if name not in STAYING and not name.startswith("--help")]
 
@@ -44,7 +43,9 @@ def _options(command: click.Command) -> list[tuple[str, bool]]:
 def _lines(draw: st.DrawFn) -> list[str]:
     name = draw(st.sampled_from(sorted(COMMANDS)))
     line = [name, draw(SUBJECTS)]
-    for option, takes in draw(st.lists(st.sampled_from(_options(COMMANDS[name])), max_size=3, unique=True)):
+    options = _options(COMMANDS[name])
+    some = st.lists(st.sampled_from(options), max_size=3, unique=True) if options else st.just([])
+    for option, takes in draw(some):
         line += [option, draw(st.one_of(WORDS, WORDS, VALUES))] if takes else [option]
     if name in ("run", "compare", "laps"):
         line += ["--set", "duration=0.05"]

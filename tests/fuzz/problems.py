@@ -75,7 +75,7 @@ def check(case: Any) -> str:
         task = nmm.Task(nmm.Position(frame, axes), reference, gain=case["gain"])
         kind = RESOLVERS[case["resolver"]]
         resolver = kind() if case["resolver"] in ("ej", "dls") else kind(alpha=case["alpha"])
-        objective = nmm.JointRange() if case["objective"] and robot.arm_coordinates else None
+        objective = nmm.JointRange() if case["objective"] and len(robot.arm_coordinates) else None
         options: dict[str, Any] = {"limits": nmm.Limits(), "dt": DT} if case["limits"] else {}
         controller = nmm.Controller(robot, task, resolver, objective, **options)
         q0 = np.resize(case["q0"], robot.n)
