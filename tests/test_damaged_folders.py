@@ -11,27 +11,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fuzz.damaging import copied
+from fuzz.damaging import copied, whole_folders
 
 import nmm
 from nmm.bundled import bundled_robots
 from nmm.cli.exit_status import status_of
 from nmm.cli.runs import runs_in
-from nmm.folders import comparison
 from nmm.robots.loading.description import describe
 
 
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """A run among obstacles, one of tasks that come and go, and a comparison."""
-    top = tmp_path_factory.mktemp("whole")
-    short = {"duration": 0.1}
-    for name in ("unicycle_3r_crossing", "unicycle_3r_sequence"):
-        nmm.Scenario.load(name, short).run().save(top / name, figures=False)
-    case = nmm.Scenario.load("unicycle_2r_position", short)
-    compared = [case.with_resolver(kind).run() for kind in ("rg", "pg")]
-    comparison.save(compared, top / "compared", "compared")
-    return {path.name: path for path in top.iterdir()}
+    return whole_folders(tmp_path_factory.mktemp("whole"))
 
 
 def arrays_of(folder: Path) -> dict[str, Any]:

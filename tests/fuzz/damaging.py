@@ -12,6 +12,9 @@ from typing import Any
 import numpy as np
 import yaml
 
+import nmm
+from nmm.folders import comparison
+
 #: What stands in the place of a value in JSON or YAML.
 WRONG: tuple[Any, ...] = (
     None, True, False, 0, -1, 2, 10**25, -1e308, float("nan"), float("inf"), "", "nan", "\x1b[31mred",
@@ -117,6 +120,17 @@ def _places(content: Any) -> Any:
         yield content, key
         if isinstance(value, dict | list):
             yield from _places(value)
+
+
+def whole_folders(top: Path) -> dict[str, Path]:
+    """Folders to damage, by name: a run among obstacles, one of tasks that come and go, and a comparison."""
+    short = {"duration": 0.1}
+    for name in ("unicycle_3r_crossing", "unicycle_3r_sequence"):
+        nmm.Scenario.load(name, short).run().save(top / name, figures=False)
+    case = nmm.Scenario.load("unicycle_2r_position", short)
+    compared = [case.with_resolver(kind).run() for kind in ("rg", "pg")]
+    comparison.save(compared, top / "compared", "compared")
+    return {path.name: path for path in top.iterdir()}
 
 
 def copied(folder: Path, to: Path) -> Path:

@@ -13,28 +13,19 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-import nmm
 from nmm.cli.runs import runs_in
 from nmm.errors import NmmError
-from nmm.folders import comparison
 from nmm.playback.html import page_of
 
-from .damaging import copied, damage
+from .damaging import copied, damage, whole_folders
 from .hunting import Hunt, refused
 
 
 @cache
 def _whole() -> list[Path]:
-    """A run among obstacles, one of tasks that come and go, and a comparison."""
     top = Path(tempfile.mkdtemp())
     atexit.register(shutil.rmtree, top, ignore_errors=True)
-    short = {"duration": 0.1}
-    for name in ("unicycle_3r_crossing", "unicycle_3r_sequence"):
-        nmm.Scenario.load(name, short).run().save(top / name, figures=False)
-    case = nmm.Scenario.load("unicycle_2r_position", short)
-    compared = [case.with_resolver(kind).run() for kind in ("rg", "pg")]
-    comparison.save(compared, top / "compared", "compared")
-    return sorted(top.iterdir())
+    return sorted(whole_folders(top).values())
 
 
 def check(seed: Any) -> str:
