@@ -11,7 +11,7 @@ PAGE = Path(__file__).with_name("scenarios.md")
 HEAD = """# Scenarios
 
 A scenario is a YAML file: a robot, a start, a task, an objective and a resolver. `nmm scenarios` lists the
-bundled ones; copy one and change it, or let [`nmm init ROBOT`](command_line.md#nmm-init) write one for$
+bundled ones; copy one and change it, or let [`nmm init ROBOT`](command_line.md#nmm-init) write one for
 your robot. Any key can be set from the command line by its dotted path, lists counting from 0:
 
     nmm run unicycle_2r_position --set dt=0.001 --set resolver.alpha=5 --set task.0.gain=2

@@ -76,7 +76,7 @@ def test_a_camera_that_somebody_has_moved_stays_where_it_is(window: Window) -> N
     """When the run has been shown, and its page becomes the one that plays it."""
     place = "nmm.camera.place()"
     window.page.set_viewport_size({"width": 1280, "height": 800})
-    with live(60.0) as (shown, run):
+    with live(scenario(60.0)) as (shown, run):
         page = window.open(shown.url)
         run()
         page.wait_for_function("nmm.runs[0].t.length > 20")

@@ -50,6 +50,7 @@ TOLD: list[tuple[str, Platform, list[str]]] = [
         Unicycle(),
         ["would have to steer to 90 degrees; steering ends at -34.38 and 34.38 degrees: platform car?"],
     ),
+    ("car_base", DifferentialDrive(0.1, 0.5), ["platform differential turns on the spot"]),
     ("differential_base", Mecanum(0.1, 0.5, 0.5), ["expects four wheels", "the root's body carries 2"]),
     ("differential_base", Omnidirectional(), ["moves sideways", "left_wheel_joint at (0, 0.25) m"]),
     (
@@ -96,7 +97,9 @@ def test_a_car_without_a_steering_joint_between_its_wheels(tmp_path: Path) -> No
     robot = nmm.load(path, platform=Car(5.0, steering="steer"))
     (told,) = provenance_of(robot).contradictions
     assert told == f"platform car: wheelbase is 5 m as given, and {WHEELBASE:g} m in the file"
-    (told,) = provenance_of(nmm.load(path, platform=DifferentialDrive(RADIUS, 0.4))).contradictions
+    *steering, told = provenance_of(nmm.load(path, platform=DifferentialDrive(RADIUS, 0.4))).contradictions
+    assert len(steering) == 2
+    assert all("turns on the spot" in one for one in steering)
     assert told == f"platform differential: track is 0.4 m as given, and {TRACK:g} m in the file"
 
 

@@ -32,6 +32,11 @@ def test_it_is_measured_in_a_file() -> None:
     )  # fmt: skip
 
 
+def test_a_unicycle_on_such_wheels_is_told_of_it() -> None:
+    (said,) = slip_warnings(base("unicycle"))
+    assert said.endswith('cannot all roll in turns: platform="skid_steer" is made for that')
+
+
 @pytest.mark.parametrize("platform", ["skid_steer", GRASS])
 def test_its_wheels_turn_as_their_sides_do(platform: Platform | str, rng: np.random.Generator) -> None:
     """In playback, too, however much they slide on the way."""

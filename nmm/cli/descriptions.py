@@ -20,14 +20,6 @@ if TYPE_CHECKING:
     from nmm.robots.robot import Robot
     from nmm.robots.wheel import Wheel
 
-#: Where the kind of platform comes from, for `Provenance.platform`.
-_CHOSEN = {
-    "file": "declared in the file",
-    "wheels": "by its wheels",
-    "base": "by its base of joints",
-    "default": "by default",
-}
-
 
 def describe_robot(source: str | None, scenario: str | None, **loading: Any) -> None:
     """Everything about a robot, or about a scenario's robot and task."""
@@ -166,12 +158,12 @@ def _redundancies(robot: Robot, tasks: Sequence[tuple[str, int]]) -> Iterator[li
 
 def _show_loading(robot: Robot) -> None:
     """What loading found and did."""
-    from nmm.robots.loading.provenance import provenance_of
+    from nmm.robots.loading.provenance import CHOSEN, provenance_of
 
     made = provenance_of(robot)
     lines = [f"note: {note}" for note in robot.notes]
-    if made.platform in _CHOSEN:
-        lines.insert(0, f"platform: {robot.platform.name}, {_CHOSEN[made.platform]}")
+    if made.platform in CHOSEN:
+        lines.insert(0, f"platform: {robot.platform.name}, {CHOSEN[made.platform]}")
     lines += [f"prefix of {arm}: {prefix}" for arm, prefix in made.prefixed.items()]
     lines += [f"SRDF: {file}" for file in robot.semantics.files]
     lines += _files(made)

@@ -16,7 +16,11 @@ def write_first_scenario(
     """Write it, whole or not at all, to a file that is not there yet; say what was chosen."""
     from nmm.drafts import first_scenario
     from nmm.drafts.draft import usual_file
+    from nmm.robots.loading.source import path_of
 
+    for source in (robot, arm):
+        if source is not None:
+            path_of(source, loading.get("package_dirs", ()))  # a slip of the pen, before anything else
     file = usual_file(robot if arm is None else arm) if out is None else out
     _expect_free(file)
     draft = first_scenario(robot, arm=arm, at=at, file=file, **loading)

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from nmm.bundled import bundled_robots
 from nmm.errors import InputError, RobotError
-from nmm.robots.loading.provenance import provenance_of
+from nmm.robots.loading.provenance import CHOSEN, provenance_of
 from nmm.robots.robot import Robot
 from nmm.scenario.document import dotted
 from nmm.scenario.keys import first_error
@@ -126,4 +126,4 @@ def _built(data: Mapping[str, Any], folder: Path) -> Robot:
 
 def _origin(robot: Robot) -> str:
     made = provenance_of(robot).platform
-    return {"file": "as its file says", "default": "by its wheels"}.get(made, "as asked for")
+    return CHOSEN.get(made, "as asked for")

@@ -13,7 +13,16 @@ from nmm.arrays import Array, positive
 from nmm.kernels.compiled import PLATFORM, Kernel, kernel
 from nmm.platforms.base import Platform, of_many
 from nmm.platforms.layout import Layout, RollingJoint
-from nmm.platforms.measuring import NEAR, ahead, misfit, rolls_forward, same, say_wheels, wheels_on
+from nmm.platforms.measuring import (
+    NEAR,
+    ahead,
+    misfit,
+    rolls_forward,
+    same,
+    say_wheels,
+    steered_too_little,
+    wheels_on,
+)
 from nmm.platforms.unicycle import across
 
 
@@ -79,6 +88,9 @@ class DifferentialDrive(Platform):
     @property
     def lengths(self) -> Mapping[str, float]:
         return {"radius": self.radius, "track": self.track}
+
+    def compared(self, layout: Layout) -> tuple[str, ...]:
+        return (*steered_too_little(layout, self.name), *super().compared(layout))
 
     @property
     def parameters(self) -> Array:

@@ -64,6 +64,20 @@ def misfit(layout: Layout, platform: str, expected: str, wrong: str, found: str)
     return InputError(f"{robot}platform {platform} expects {expected}; {wrong} (found: {found})")
 
 
+def steered_too_little(layout: Layout, platform: str) -> tuple[str, ...]:
+    """That wheels steer which cannot turn so far as a turn on the spot asks, a sentence each."""
+    steering = [pivot for pivot in layout.pivots if pivot.steers and pivot.carrier == "theta"]
+    if not any(wheels_on(layout, pivot.joint) for pivot in steering):
+        return ()
+    return tuple(
+        f"platform {platform} turns on the spot, for which the file's wheels would have to steer to 90 "
+        f"degrees; {pivot.joint} ends at {math.degrees(pivot.lower):.4g} and "
+        f"{math.degrees(pivot.upper):.4g} degrees: platform car?"
+        for pivot in steering
+        if max(-pivot.lower, pivot.upper) < math.pi / 2
+    )
+
+
 def check_axle(layout: Layout, platform: str) -> None:
     """That the reference point is on an axle, where the root's body carries wheels that roll forward.
 

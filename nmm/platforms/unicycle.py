@@ -10,7 +10,7 @@ from nmm.arrays import Array
 from nmm.kernels.compiled import PLATFORM, Kernel, kernel
 from nmm.platforms.base import Platform, of_many
 from nmm.platforms.layout import Layout
-from nmm.platforms.measuring import wheels_on
+from nmm.platforms.measuring import steered_too_little
 
 
 @kernel(PLATFORM)
@@ -44,17 +44,7 @@ class Unicycle(Platform):
     input_units = ("m/s", "rad/s")
 
     def compared(self, layout: Layout) -> tuple[str, ...]:
-        """That wheels steer which cannot turn so far as a turn on the spot asks."""
-        steering = [pivot for pivot in layout.pivots if pivot.steers and pivot.carrier == "theta"]
-        if not any(wheels_on(layout, pivot.joint) for pivot in steering):
-            return ()
-        return tuple(
-            f"platform {self.name} turns on the spot, for which the file's wheels would have to steer to 90 "
-            f"degrees; {pivot.joint} ends at {math.degrees(pivot.lower):.4g} and "
-            f"{math.degrees(pivot.upper):.4g} degrees: platform car?"
-            for pivot in steering
-            if max(-pivot.lower, pivot.upper) < math.pi / 2
-        )
+        return steered_too_little(layout, self.name)
 
     @property
     def velocity_map(self) -> Kernel:

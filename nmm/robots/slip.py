@@ -45,7 +45,12 @@ def slip_warnings(robot: Robot) -> list[str]:
     if not slipping:
         return []
     names = ", ".join(f"{name} ({speed:.3g} m/s for an input of 1)" for name, speed in slipping.items())
-    return [
-        f"wheels slide sideways under platform {robot.platform.name}: {names}; is its reference point on "
-        "their axle? (axle=)"
-    ]
+    what = f"wheels slide sideways under platform {robot.platform.name}: {names}"
+    plain = [wheel for wheel in robot.wheels if wheel.is_fixed]
+    across = plain[0].axis[:2]
+    ahead = [wheel.center[0] * across[1] - wheel.center[1] * across[0] for wheel in plain]
+    if np.ptp(ahead) > SLACK:
+        return [
+            f'{what}; on several axles they cannot all roll in turns: platform="skid_steer" is made for that'
+        ]
+    return [f"{what}; is its reference point on their axle? (axle=)"]

@@ -43,7 +43,7 @@
   // What a lane's axis reaches over: the curves seen, and their limits where these are not far away.
   curves.scale = (lane, range) => {
     let [low, high, positive] = [Infinity, -Infinity, Infinity];
-    const limits = new Set();
+    const limits = new Map(); // each with whether it is an upper one
     for (const run of having(lane)) {
       const column = run.columns[lane.key];
       const [first, last] = seen(run, range);
@@ -54,7 +54,7 @@
         if (value > high) high = value;
         if (value > TINY && value < positive) positive = value;
       }
-      for (const end of column.limits) if (end !== null) limits.add(end);
+      column.limits.forEach((end, i) => end !== null && limits.set(end, i === 1));
     }
     if (low > high) return { nothing: "no values here" };
     if (lane.log && high <= TINY) return { nothing: high === 0 ? "0 throughout" : "0 throughout, but for rounding" };
@@ -65,7 +65,7 @@
       return { log: true, low: least - room, high: most + room, limits: [] };
     }
     const span = high - low;
-    for (const end of limits) {
+    for (const end of limits.keys()) {
       const wide = Math.max(high, end) - Math.min(low, end);
       if (wide <= Math.max(2.5 * span, 1e-12)) [low, high] = [Math.min(low, end), Math.max(high, end)];
     }
@@ -214,9 +214,9 @@
       pen.beginPath();
       pen.rect(curves.LEFT, top, right - curves.LEFT, height);
       pen.clip();
-      for (const end of scale.limits) {
+      for (const [end, upper] of scale.limits) {
         if (end < scale.low || end > scale.high) away.push(end);
-        else limit(pen, y(end), top, height, { upper: end > 0.5 * (scale.low + scale.high), right, colors });
+        else limit(pen, y(end), top, height, { upper, right, colors });
       }
       pen.lineJoin = "round";
       pen.lineWidth = 1.7;

@@ -13,6 +13,14 @@ from nmm.errors import RobotError
 from nmm.robots.robot import Robot
 from nmm.robots.slip import slip_warnings
 
+#: Where the kind of platform comes from (`Provenance.platform`), in words; otherwise it was given.
+CHOSEN = {
+    "file": "declared in the file",
+    "wheels": "by its wheels",
+    "base": "by its base of joints",
+    "default": "by default",
+}
+
 
 @dataclass(frozen=True)
 class Provenance:
