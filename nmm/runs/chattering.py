@@ -1,4 +1,4 @@
-"""Inputs that jump back and forth from sample to sample."""
+"""Inputs that jump back and forth, from sample to sample or within the steps between them."""
 
 from __future__ import annotations
 
@@ -15,6 +15,12 @@ IN_A_ROW = 4
 SMALL = 0.1
 #: and neither is one smaller than this share of the largest input of the run.
 NEGLIGIBLE = 1e-3
+#: A coordinate that moves otherwise than its recorded rate, by this share of that rate
+OTHERWISE = 0.5
+#: and of the run's largest,
+SLOW = 0.05
+#: in so many steps in a row, has rates that jump within the steps: fewer are a transient.
+STEPS = 10
 
 
 class Chattering(NamedTuple):
@@ -67,11 +73,39 @@ def chattering(t: Array, u: Array, names: Sequence[str]) -> Chattering | None:
     return found
 
 
-def _in_rows(flags: Array) -> Array:
-    """The flags (K,) that stand in rows of at least `IN_A_ROW`."""
+def moving_otherwise(t: Array, q: Array, q_dot: Array, names: Sequence[str]) -> str:
+    """Which coordinate q (N, n) moves otherwise than its rates q_dot (N, n) at times t (N,) say, and when.
+
+    A method of several stages a step asks for the inputs at each and records the first's: where limits or a
+    resolver switch between them, the motion is their mean. "" where motion and rates agree.
+    """
+    if len(t) <= STEPS:
+        return ""
+    moved = np.diff(q, axis=0) / np.diff(t)[:, np.newaxis]
+    mean, size = 0.5 * (q_dot[1:] + q_dot[:-1]), np.maximum(np.abs(q_dot[1:]), np.abs(q_dot[:-1]))
+    off = np.minimum(np.abs(moved - mean), np.abs(moved - q_dot[:-1]))
+    flags = off > np.maximum(OTHERWISE * size, SLOW * np.abs(q_dot).max(axis=0, initial=0.0))
+    found, most = "", 0
+    for i, name in enumerate(names):
+        if np.count_nonzero(flags[:, i]) < STEPS:
+            continue
+        (steps,) = np.nonzero(_in_rows(flags[:, i], STEPS))
+        if len(steps) > most:
+            most = len(steps)
+            found = (
+                f"{name} moves otherwise than its recorded rate says from t = {t[steps[0]]:.4g} s to "
+                f"{t[steps[-1] + 1]:.4g} s ({np.abs(moved[steps, i]).mean():.3g} a second where "
+                f"{np.abs(mean[steps, i]).mean():.3g} is recorded): the inputs jump within the steps; method "
+                "zoh shows what a sampled controller does"
+            )
+    return found
+
+
+def _in_rows(flags: Array, least: int = IN_A_ROW) -> Array:
+    """The flags (K,) that stand in rows of at least so many."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
     kept = np.zeros(len(flags), dtype=bool)
     for first, last in zip(edges[::2], edges[1::2], strict=True):
-        if last - first >= IN_A_ROW:
+        if last - first >= least:
             kept[first:last] = True
     return kept

@@ -20,7 +20,7 @@ from nmm.functions.function import Row
 from nmm.runs import reasons
 from nmm.runs.advice import Trial, advised
 from nmm.runs.assessment import Assessment, assess
-from nmm.runs.chattering import Chattering, chattering
+from nmm.runs.chattering import Chattering, chattering, moving_otherwise
 from nmm.runs.promise import Departure, Samples
 from nmm.runs.recording import Recorder
 from nmm.runs.residuals import residuals, run_up
@@ -86,6 +86,10 @@ def judge(
     unmet = residuals(samples.t, residual, samples.rate)
     chatter = chattering(samples.t, samples.u, controller.robot.u_names)
     warnings = [_joined(unmet.sentence, _relaxed(recorder.scale, controller))] if unmet.samples else []
+    otherwise = moving_otherwise(
+        samples.t, recorder.so_far.q, recorder.so_far.q_dot, controller.robot.q_names
+    )
+    warnings += [otherwise] if otherwise else []
     seen = _seen(controller, recorder, samples, found, chatter)
     if outcome is Outcome.INTERRUPTED:
         return Verdict(outcome, message, warnings)
