@@ -191,8 +191,8 @@ def test_a_description_is_no_srdf(tmp_path: Path, robot_3r: nmm.Robot) -> None:
 
     check(
         lambda: controller(written(tmp_path, "a.urdf", ROBOT.format(""))),
-        r"srdf: .*a\.urdf: expected an SRDF, .* this is a robot's description: it has links",
+        r"srdf: .*a\.urdf: expected an SRDF .* this is a URDF",
     )
-    check(lambda: controller(written(tmp_path, "a.xml", "<html/>")), r"expected an SRDF, .* got <html>")
-    check(lambda: controller(Path("/dev/zero")), r"srdf: /dev/zero cannot be read: .*a device or a pipe")
+    check(lambda: controller(written(tmp_path, "a.xml", "<html/>")), r"expected an SRDF .* this is <html>")
+    check(lambda: controller(Path("/dev/zero")), r"srdf: /dev/zero.*a device or a pipe")
     check(lambda: controller(tmp_path / "none"), r"srdf: there is no file")

@@ -47,7 +47,7 @@ def numbers(folder: Path) -> set[str]:
 WRITER = """
 import sys
 from itertools import count
-from tests.test_replacing import Path, write
+from test_replacing import Path, write
 for number in count():
     write(Path(sys.argv[1]), number, 1e-4)
     if number == 0:
@@ -58,7 +58,7 @@ for number in count():
 def writer(folder: Path) -> subprocess.Popen[str]:
     """A process that replaces a folder again and again, once it has done so for the first time."""
     command = [sys.executable, "-c", WRITER, str(folder)]
-    found = subprocess.Popen(command, cwd=Path(__file__).parents[1], stdout=subprocess.PIPE, text=True)
+    found = subprocess.Popen(command, cwd=Path(__file__).parent, stdout=subprocess.PIPE, text=True)
     assert found.stdout is not None
     found.stdout.readline()
     return found

@@ -57,13 +57,15 @@ def read_srdf(file: str | Path) -> Srdf:
     RobotError : no such file, no SRDF (a URDF among them), a state without a name, values that are no numbers
     """
     path = Path(os.path.expanduser(file))
-    if not os.path.isfile(path):
-        raise RobotError(f"srdf: there is no file {path}")
     try:
         root = parse(read_text(path))
+    except FileNotFoundError:
+        raise RobotError(f"srdf: there is no file {path}") from None
     except XmlError as error:
         line = "" if error.line is None else f":{error.line}"
         raise RobotError(f"srdf: {path}{line}: {error}") from None
+    except RobotError as error:
+        raise RobotError(f"srdf: {error}") from None
     if root.tag != "robot" or root.find("link") is not None:
         what = "a URDF" if root.tag == "robot" else f"<{root.tag}>"
         raise RobotError(f"srdf: {path}: expected an SRDF (groups, states, pairs of links), this is {what}")
