@@ -34,6 +34,12 @@ def test_a_motion_that_stands_still_at_a_rate_is_told() -> None:
     assert moving_otherwise(T, q, q_dot, ("bend", "other")) == ""
 
 
+def test_rounding_is_no_motion(rng: np.random.Generator) -> None:
+    q_dot = np.column_stack([np.ones_like(T), 1e-16 * rng.normal(size=len(T))])
+    q = np.column_stack([T, np.zeros_like(T)])
+    assert moving_otherwise(T, q, q_dot, ("a", "b")) == ""
+
+
 @pytest.mark.parametrize("method", ["rk4", "zoh"])
 def test_a_run_whose_stages_disagree_says_so(method: str) -> None:
     """Stretched after a target that runs away, with joints at their limits: what is recorded is the first

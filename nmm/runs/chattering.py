@@ -17,8 +17,8 @@ SMALL = 0.1
 NEGLIGIBLE = 1e-3
 #: A coordinate that moves otherwise than its recorded rate, by this share of that rate
 OTHERWISE = 0.5
-#: and of the run's largest,
-SLOW = 0.05
+#: of the run's largest, and of the largest of all coordinates,
+SLOW, NO_RATE = 0.05, 1e-6
 #: in so many steps in a row, has rates that jump within the steps: fewer are a transient.
 STEPS = 10
 
@@ -84,7 +84,8 @@ def moving_otherwise(t: Array, q: Array, q_dot: Array, names: Sequence[str]) -> 
     moved = np.diff(q, axis=0) / np.diff(t)[:, np.newaxis]
     mean, size = 0.5 * (q_dot[1:] + q_dot[:-1]), np.maximum(np.abs(q_dot[1:]), np.abs(q_dot[:-1]))
     off = np.minimum(np.abs(moved - mean), np.abs(moved - q_dot[:-1]))
-    flags = off > np.maximum(OTHERWISE * size, SLOW * np.abs(q_dot).max(axis=0, initial=0.0))
+    largest = np.abs(q_dot).max(axis=0, initial=0.0)
+    flags = off > np.maximum(OTHERWISE * size, np.maximum(SLOW * largest, NO_RATE * largest.max(initial=0.0)))
     found, most = "", 0
     for i, name in enumerate(names):
         if np.count_nonzero(flags[:, i]) < STEPS:
