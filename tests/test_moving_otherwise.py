@@ -15,7 +15,7 @@ def test_rates_of_a_smooth_motion_are_its_rates() -> None:
     """Those of a polynomial and of swings of up to a tenth of the samples' rate; at rest, too."""
     q = np.column_stack([T**3 - T, np.sin(2 * np.pi * 5 * T), np.zeros_like(T)])
     q_dot = np.column_stack([3 * T**2 - 1, 10 * np.pi * np.cos(2 * np.pi * 5 * T), np.zeros_like(T)])
-    assert moving_otherwise(T, q, q_dot, ("a", "b", "c")) == ""
+    assert moving_otherwise(T, q, q_dot, ("a", "b", "c"), ("m", "rad", "rad")) == ""
 
 
 def test_a_motion_that_stands_still_at_a_rate_is_told() -> None:
@@ -25,19 +25,19 @@ def test_a_motion_that_stands_still_at_a_rate_is_told() -> None:
     stands = slice(30, 30 + STEPS + 1)
     q[stands, 0] = q[30, 0]
     q[31 + STEPS :, 0] = q[30, 0] + T[31 + STEPS :] - T[30 + STEPS]
-    found = moving_otherwise(T, q, q_dot, ("bend", "other"))
+    found = moving_otherwise(T, q, q_dot, ("bend", "other"), ("rad", "rad"))
     assert found.startswith(
-        "bend moves otherwise than its recorded rate says from t = 0.3 s to 0.4 s (0 a second"
+        "bend moves otherwise than its recorded rate says from t = 0.3 s to 0.4 s (0 rad/s"
     )
-    assert "where 1 is recorded" in found
+    assert "where 1 rad/s is recorded" in found
     q[30 + STEPS :, 0] = q[30, 0] + T[30 + STEPS :] - T[29 + STEPS]
-    assert moving_otherwise(T, q, q_dot, ("bend", "other")) == ""
+    assert moving_otherwise(T, q, q_dot, ("bend", "other"), ("rad", "rad")) == ""
 
 
 def test_rounding_is_no_motion(rng: np.random.Generator) -> None:
     q_dot = np.column_stack([np.ones_like(T), 1e-16 * rng.normal(size=len(T))])
     q = np.column_stack([T, np.zeros_like(T)])
-    assert moving_otherwise(T, q, q_dot, ("a", "b")) == ""
+    assert moving_otherwise(T, q, q_dot, ("a", "b"), ("m", "rad")) == ""
 
 
 @pytest.mark.parametrize("method", ["rk4", "zoh"])

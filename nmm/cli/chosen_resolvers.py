@@ -75,13 +75,18 @@ def chosen(text: str, option: str) -> Chosen:
 
 def several(given: str, option: str) -> list[Chosen]:
     """Those with commas between them; `InputError` for none, and for one that is given twice."""
+    return [chosen(text, option) for text in named(given, option)]
+
+
+def named(given: str, option: str, expected: str = EXPECTED) -> list[str]:
+    """As they are given; `InputError` for none, and for one that is given twice."""
     texts = [text for text in split_outside_brackets(given, ",") if text]
     if not texts:
-        raise InputError(f"{option}: expected {EXPECTED}, got {given!r}")
+        raise InputError(f"{option}: expected {expected}, got {given!r}")
     for k, text in enumerate(texts):
         if text in texts[:k]:
             raise _twice(option, text, text)
-    return [chosen(text, option) for text in texts]
+    return texts
 
 
 def check_different(resolvers: Sequence[Chosen], scenarios: Sequence[Scenario], option: str) -> None:

@@ -201,17 +201,6 @@ def out_option(default: str) -> Any:
     )
 
 
-def resolvers_of(given: str) -> list[str]:
-    """The kinds in `--resolvers`; `InputError` for one that is given twice: both runs would be the same."""
-    kinds = names_of(given, "--resolvers", "kinds with commas between them, as in rg,pg")
-    twice = next((kind for kind in kinds if kinds.count(kind) > 1), None)
-    if twice is not None:
-        raise InputError(
-            f"--resolvers: expected each kind once, got {twice} {kinds.count(twice)} times in {given!r}"
-        )
-    return kinds
-
-
 def names_of(given: str, option: str, expected: str = "names with commas between them") -> list[str]:
     """Names with commas between them; `InputError` where there is none."""
     names = [name.strip() for name in given.split(",") if name.strip()]

@@ -13,7 +13,6 @@ from nmm.cli.options import (
     ScenarioArgument,
     SetOption,
     out_option,
-    resolvers_of,
     settings_of,
 )
 from nmm.cli.output import show_text
@@ -129,9 +128,10 @@ def laps(
 
     The folder holds laps.png, laps.csv, summary.json and, for each resolver, a folder with its run.
     """
+    from nmm.cli.chosen_resolvers import named
     from nmm.cli.laps import run_laps
 
-    kinds = resolvers_of(resolvers)
+    kinds = named(resolvers, "--resolvers", "kinds with commas between them, as in rg,pg")
     asked = figures.options()
     return run_laps(
         scenario, kinds, settings_of(settings), laps=number, period=period, out=out, figures=asked

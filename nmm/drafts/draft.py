@@ -12,8 +12,7 @@ import numpy as np
 
 from nmm.drafts.hand import Hand, hands
 from nmm.drafts.parts import Chosen, chosen_robot
-from nmm.drafts.paths import Path as HandsPath
-from nmm.drafts.paths import paths
+from nmm.drafts.paths import HandsPath, paths
 from nmm.drafts.start import Start, start_for
 from nmm.drafts.text import text_of
 from nmm.errors import InputError, ScenarioError
@@ -124,9 +123,7 @@ def _scenarios(chosen: Chosen, hand: Hand, start: Start) -> Iterator[tuple[dict[
                     "robot": " ".join([f"The platform: {chosen.why}.", *slips]),
                     "q0": f"This one: {start.why}.",
                     "task": f"The frame is {hand.why}. The {path.reference['kind']}: {path.why}.",
-                    "objective": ""
-                    if hand.joints
-                    else "# No objective: there is no arm to keep in a posture.",
+                    "objective": "" if hand.joints else "No objective: there is no arm to keep in a posture.",
                     "resolver": why,
                     **({} if _has_limits(robot) else {"limits": _NO_LIMITS}),
                 },
@@ -207,8 +204,7 @@ def _tried(
         f"A first scenario for {chosen.robot.name}, written by nmm init. It runs as it stands "
         f"(nmm run {file}); change what you like."
     )
-    words = {key: text.removeprefix("# ") for key, text in words.items() if text}
-    text = text_of(data, head, words)
+    text = text_of(data, head, {key: text for key, text in words.items() if text})
     try:
         scenario = Scenario(document_of(text, str(file), file.absolute().parent))
         trajectory = scenario.run()

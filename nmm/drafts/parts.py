@@ -14,9 +14,9 @@ from nmm.bundled import bundled_robots
 from nmm.errors import InputError, RobotError
 from nmm.robots.loading.provenance import CHOSEN, provenance_of
 from nmm.robots.robot import Robot
-from nmm.scenario.document import dotted
 from nmm.scenario.keys import first_error
 from nmm.scenario.robot import PACKAGE, MountedPart, RobotPart
+from nmm.scenario.yaml_text import dotted
 
 #: The base of an arm that comes without one: two driven wheels, with v and omega for inputs.
 BASE = "differential_base"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,7 +21,7 @@ _LEAST, _MOST = 10.0, 30.0
 
 
 @dataclass(frozen=True, eq=False)
-class Path:
+class HandsPath:
     """A reference as the file has it, how long it takes (s), and a line on it."""
 
     reference: dict[str, Any]
@@ -29,7 +29,7 @@ class Path:
     why: str
 
 
-def paths(robot: Robot, axes: str, place: Array) -> Iterator[Path]:
+def paths(robot: Robot, axes: str, place: Array) -> Iterator[HandsPath]:
     """Circles where the hand moves on the ground with a platform that drives, lines else.
 
     Parameters
@@ -48,33 +48,41 @@ def paths(robot: Robot, axes: str, place: Array) -> Iterator[Path]:
                     yield _line(axes, place, axis, sign * share * size, speed * size)
 
 
-def _circle(place: Array, radius: float, speed: float) -> Path:
+def _circle(place: Array, radius: float, speed: float) -> HandsPath:
     radius, rate = _rounded(radius), _rounded(speed / radius)
     center = [place[0], place[1] + radius, *place[2:]]
     reference = {
         "kind": "circle",
-        "center": [_rounded(value, 6) for value in center],
+        "center": _places(center),
         "radius": radius,
         "rate": rate,
         "phase": "-pi/2",
     }
     duration = float(np.clip(round(2 * math.pi / rate), _LEAST, _MOST))
-    return Path(reference, duration, "it begins where the hand is, straight ahead, and bends to the left")
+    return HandsPath(
+        reference, duration, "it begins where the hand is, straight ahead, and bends to the left"
+    )
 
 
-def _line(axes: str, place: Array, axis: int, length: float, speed: float) -> Path:
+def _line(axes: str, place: Array, axis: int, length: float, speed: float) -> HandsPath:
     end = place.copy()
     end[axis] += length
     duration = float(np.clip(round(2 * abs(length) / speed), _LEAST, _MOST))
     reference = {
         "kind": "line",
-        "start": [_rounded(value, 6) for value in place],
-        "end": [_rounded(value, 6) for value in end],
+        "start": _places(place),
+        "end": _places(end),
         "duration": duration,
         "profile": "smooth",
     }
-    return Path(reference, duration, f"it begins where the hand is, and goes along {axes[axis]}")
+    return HandsPath(reference, duration, f"it begins where the hand is, and goes along {axes[axis]}")
 
 
-def _rounded(value: float, digits: int = 2) -> float:
-    return float(f"{value:.{digits}g}") if digits < 6 else round(float(value), 4) + 0.0
+def _rounded(value: float) -> float:
+    """To two digits."""
+    return float(f"{value:.2g}")
+
+
+def _places(point: Sequence[float] | Array) -> list[float]:
+    """To a tenth of a millimetre, m, without -0."""
+    return [round(float(value), 4) + 0.0 for value in point]

@@ -12,8 +12,8 @@ from nmm.files import read_bytes
 from nmm.folders.whole import MOST
 from nmm.runs.residuals import NONE
 from nmm.runs.trajectory import Outcome
-from nmm.scenario.document import dotted
 from nmm.scenario.keys import first_error
+from nmm.scenario.yaml_text import dotted
 
 
 class Told(BaseModel):

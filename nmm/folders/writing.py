@@ -10,11 +10,7 @@ from pathlib import Path
 from typing import IO
 
 from nmm.errors import InputError
-
-try:
-    import fcntl
-except ImportError:  # Windows
-    fcntl = None  # type: ignore[assignment]  # a module where there is one
+from nmm.files import taken
 
 #: Between two looks whether another process is through, s.
 AGAIN = 0.05
@@ -40,7 +36,7 @@ def writing(final: Path, patience: float) -> Iterator[Path]:
             raise busy(final)
         time.sleep(AGAIN)
     with lock:
-        if _taken(lock):
+        if taken(lock):
             if (hidden / OLD).exists() and not final.exists():
                 (hidden / OLD).rename(final)
             for left in hidden.iterdir():
@@ -58,7 +54,7 @@ def at_work(final: Path) -> bool:
     """Whether a process is writing what is to stand there; `OSError` where nothing can."""
     try:
         with (_hidden(final) / LOCK).open("rb") as lock:
-            return _taken(lock) is False
+            return taken(lock) is False
     except FileNotFoundError:
         return False
 
@@ -80,20 +76,7 @@ def _claimed(hidden: Path) -> IO[bytes] | None:
     except FileNotFoundError:  # its writer has just ended
         return None
     with suppress(FileNotFoundError):
-        if _taken(lock) is not False and os.path.samestat(os.fstat(lock.fileno()), (hidden / LOCK).stat()):
+        if taken(lock) is not False and os.path.samestat(os.fstat(lock.fileno()), (hidden / LOCK).stat()):
             return lock
     lock.close()
     return None
-
-
-def _taken(lock: IO[bytes]) -> bool | None:
-    """Whether the lock is ours now; None where the system has none."""
-    if fcntl is None:
-        return None
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:
-        return None
-    return True

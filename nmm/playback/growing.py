@@ -12,7 +12,8 @@ from nmm.kernels.spectra import spectra
 from nmm.playback.channels import Channel, partition_text, still_channels
 from nmm.robots.frame_path import FramePath
 from nmm.runs.joining import row_names
-from nmm.runs.recording import Recorder, shown
+from nmm.runs.recording import Recorder
+from nmm.runs.shown_frame import shown
 
 
 class Growing:
@@ -37,9 +38,9 @@ class Growing:
         tasks = controller.task if self._sequence is None else self._sequence.all_tasks
         self._counts = [len(task.rows(robot)) for task in tasks]
         self._rows = sum(self._counts)
-        frame, self._axes, _ = shown(tasks, robot)
-        self._path = None if frame is None else FramePath(robot, frame)
-        self.drawn = self._path is not None, self._path is not None and bool(self._axes)
+        self._shown = shown(tasks, robot)
+        self._path = None if self._shown.frame is None else FramePath(robot, self._shown.frame)
+        self.drawn = self._path is not None, self._path is not None and bool(self._shown.rows)
         self.partitions: list[str] = []
         self._numbers: dict[tuple[int, ...], int] = {}
         self.channels = self._channels(controller, tasks)
@@ -94,12 +95,8 @@ class Growing:
         if self._path is not None:
             place = self._path.positions(found.q[at])
             parts.append(place)
-            if self._axes:
-                wanted = place.copy()
-                for axis, row in self._axes.items():
-                    said = np.isfinite(desired[:, row])
-                    wanted[said, axis] = desired[said, row]
-                parts.append(wanted)
+            if self._shown.rows:
+                parts.append(self._shown.desired(place, desired))
         return np.column_stack(parts)
 
     def _partition(self, columns: Integers) -> Array:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from nmm.errors import InputError
-from nmm.files import replaceable
+from nmm.files import replaceable, whole_file
 from nmm.playback.page import file_page
 from nmm.playback.scene import Shown, playback_scene
 from nmm.runs.ellipsoid_options import Wanted
@@ -44,7 +42,7 @@ def write_html(
     InputError : no motion, or the file cannot be written; ellipsoids as in `playback_scene`
     """
     options = {"ghosts": ghosts, "fps": fps, "autoplay": autoplay}
-    return _write_atomically(Path(path), page_of(motions, title, ellipsoids, **options)[1])
+    return _write(Path(path), page_of(motions, title, ellipsoids, **options)[1])
 
 
 def page_of(
@@ -57,21 +55,12 @@ def page_of(
     return title, file_page(commands, title)
 
 
-def _write_atomically(path: Path, text: str) -> Path:
-    temporary, target = "", replaceable(path)
+def _write(path: Path, text: str) -> Path:
+    target = replaceable(path)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        descriptor, temporary = tempfile.mkstemp(prefix=f".{target.name}-", dir=target.parent)
-        with os.fdopen(descriptor, "w", encoding="utf-8") as file:
-            file.write(text)
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(temporary, 0o666 & ~umask)
-        os.replace(temporary, target)
+        with whole_file(target) as temporary:
+            temporary.write_text(text, encoding="utf-8")
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror}") from None
-    finally:
-        # Gone already when it took the file's place.
-        if temporary:
-            Path(temporary).unlink(missing_ok=True)
     return path

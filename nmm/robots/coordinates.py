@@ -13,7 +13,7 @@ from nmm.arrays import Array, Flags, Integers, scalar, unwritable, vector
 from nmm.errors import InputError, expect_known
 from nmm.platforms.base import Platform
 from nmm.robots.followers import SLACK, Follower, Following
-from nmm.robots.semantics import POSTURE, Named, Postures
+from nmm.robots.semantics import POSTURE, Named, Postures, Semantics
 
 #: A limit this large is none, m or rad.
 UNLIMITED = 1e5
@@ -26,11 +26,12 @@ class Coordinates:
     model: pin.Model
     platform: Platform
     followers: tuple[Follower, ...]
+    semantics: Semantics
 
     @property
     def postures(self) -> Postures:
-        """Named postures: coordinates by name, m and rad."""
-        raise NotImplementedError
+        """The SRDF's named postures: the coordinates that each sets, m and rad; `q` takes them by name."""
+        return self.semantics.postures
 
     @cached_property
     def _joints(self) -> list[int]:

@@ -21,7 +21,7 @@ from nmm.robots.coordinates import Coordinates
 from nmm.robots.followers import Follower
 from nmm.robots.joint_table import joint_table, own_axes
 from nmm.robots.meshes import MeshesWhenAsked, Shapes
-from nmm.robots.semantics import Postures, Semantics
+from nmm.robots.semantics import Semantics
 from nmm.robots.wheel import Wheel
 
 #: Stands for the robot's centre of mass where a function names a frame (`tasks.CenterOfMass`).
@@ -127,11 +127,6 @@ class Robot(Coordinates):
         p = self.platform.p
         own = {arm: tuple(j for j in joints if j in self.u_names) for arm, joints in self.arms.items()}
         return {"platform": self.u_names[:p], "arm": self.u_names[p:], **self.semantics.groups, **own}
-
-    @property
-    def postures(self) -> Postures:
-        """The SRDF's named postures: the coordinates that each sets, m and rad; `q` takes them by name."""
-        return self.semantics.postures
 
     @property
     def frames(self) -> tuple[str, ...]:

@@ -73,8 +73,9 @@ def chattering(t: Array, u: Array, names: Sequence[str]) -> Chattering | None:
     return found
 
 
-def moving_otherwise(t: Array, q: Array, q_dot: Array, names: Sequence[str]) -> str:
-    """Which coordinate q (N, n) moves otherwise than its rates q_dot (N, n) at times t (N,) say, and when.
+def moving_otherwise(t: Array, q: Array, q_dot: Array, names: Sequence[str], units: Sequence[str]) -> str:
+    """Which coordinate q (N, n) moves otherwise than its rates q_dot (N, n) at times t (N,) say, and when;
+    `units` are the coordinates'.
 
     A method of several stages a step asks for the inputs at each and records the first's: where limits or a
     resolver switch between them, the motion is their mean. "" where motion and rates agree.
@@ -87,7 +88,7 @@ def moving_otherwise(t: Array, q: Array, q_dot: Array, names: Sequence[str]) -> 
     largest = np.abs(q_dot).max(axis=0, initial=0.0)
     flags = off > np.maximum(OTHERWISE * size, np.maximum(SLOW * largest, NO_RATE * largest.max(initial=0.0)))
     found, most = "", 0
-    for i, name in enumerate(names):
+    for i, (name, unit) in enumerate(zip(names, units, strict=True)):
         if np.count_nonzero(flags[:, i]) < STEPS:
             continue
         (steps,) = np.nonzero(_in_rows(flags[:, i], STEPS))
@@ -95,9 +96,9 @@ def moving_otherwise(t: Array, q: Array, q_dot: Array, names: Sequence[str]) -> 
             most = len(steps)
             found = (
                 f"{name} moves otherwise than its recorded rate says from t = {t[steps[0]]:.4g} s to "
-                f"{t[steps[-1] + 1]:.4g} s ({np.abs(moved[steps, i]).mean():.3g} a second where "
-                f"{np.abs(mean[steps, i]).mean():.3g} is recorded): the inputs jump within the steps; method "
-                "zoh shows what a sampled controller does"
+                f"{t[steps[-1] + 1]:.4g} s ({np.abs(moved[steps, i]).mean():.3g} {unit}/s where "
+                f"{np.abs(mean[steps, i]).mean():.3g} {unit}/s is recorded): the inputs jump within the "
+                "steps; method zoh shows what a sampled controller does"
             )
     return found
 

@@ -12,12 +12,12 @@ from nmm.arrays import Array
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
 from nmm.control.sequenced import SequencedController
-from nmm.robots.frame_path import FramePath
 from nmm.runs.clearance import ran_into, swept
 from nmm.runs.judgement import Ended, Verdict, blocked, reached_or_not
-from nmm.runs.recording import Recorder, shown
+from nmm.runs.recording import Recorder
 from nmm.runs.repeated import told_once
 from nmm.runs.residuals import NONE, Residuals
+from nmm.runs.shown_frame import shown
 from nmm.runs.trajectory import Outcome, Trajectory
 from nmm.words import listed
 
@@ -99,14 +99,9 @@ def join(
             "clearance_points": found.points,
             "obstacles": found.obstacles,
         }
-    frame, axes, target = shown(stack, robot)
-    q = along("q")
-    path, desired = None, None
-    if frame is not None:
-        path = FramePath(robot, frame).positions(q)
-        desired = _desired(controller, path, r_d, first, frame)
-    if target is not None and path is not None and len(path) and target.size == 2:
-        target = np.array([*target, path[0, 2]])
+    drawn, q = shown(stack, robot), along("q")
+    path = drawn.path(robot, q)
+    desired = None if path is None or not drawn.rows else _desired(controller, path, r_d, first, drawn.frame)
     return replace(
         parts[0],
         t=along("t"),
@@ -132,10 +127,10 @@ def join(
         outcome=verdict.outcome,
         message=verdict.message,
         warnings=tuple(dict.fromkeys(warnings)),
-        frame=frame,
+        frame=drawn.frame,
         path=path,
-        desired=desired if axes else None,
-        target=target if path is not None else None,
+        desired=desired,
+        target=drawn.mark(path),
         events=tuple(controller.events),
         **distances,
     )
@@ -194,15 +189,13 @@ def _unmet(found: Sequence[Residuals], count: int) -> Residuals:
     return max(some, key=lambda one: one.largest)._replace(samples=samples, share=samples / count)
 
 
-def _desired(controller: SequencedController, path: Array, r_d: Array, first: Array, frame: str) -> Array:
+def _desired(
+    controller: SequencedController, path: Array, r_d: Array, first: Array, frame: str | None
+) -> Array:
     """Where tasks want the frame, (N, 3); where it is, along axes and at times that none speaks of."""
-    desired = path.copy()
+    desired = path
     for i, task in enumerate(controller.all_tasks):
-        named, columns, _ = shown([task], controller.robot)
-        if named != frame:
-            continue
-        for axis, column in columns.items():
-            wanted = r_d[:, int(first[i]) + column]
-            said = np.isfinite(wanted)
-            desired[said, axis] = wanted[said]
+        alone = shown([task], controller.robot)
+        if alone.frame == frame:
+            desired = alone.desired(desired, r_d[:, int(first[i]) :])
     return desired

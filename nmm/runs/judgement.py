@@ -87,7 +87,11 @@ def judge(
     chatter = chattering(samples.t, samples.u, controller.robot.u_names)
     warnings = [_joined(unmet.sentence, _relaxed(recorder.scale, controller))] if unmet.samples else []
     otherwise = moving_otherwise(
-        samples.t, recorder.so_far.q, recorder.so_far.q_dot, controller.robot.q_names
+        samples.t,
+        recorder.so_far.q,
+        recorder.so_far.q_dot,
+        controller.robot.q_names,
+        controller.robot.q_units,
     )
     warnings += [otherwise] if otherwise else []
     seen = _seen(controller, recorder, samples, found, chatter)

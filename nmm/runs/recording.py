@@ -12,16 +12,11 @@ from nmm.control.controller import Controller
 from nmm.control.guard import Counts
 from nmm.control.limits import Limits
 from nmm.control.step import Step
-from nmm.errors import InputError
-from nmm.functions.function import Function, Row, Shown
+from nmm.functions.function import Row
 from nmm.functions.program import COMPILED
-from nmm.functions.tasks.position import AXES
-from nmm.functions.tasks.task import Task
 from nmm.kernels.spectra import spectra
 from nmm.memory import expect_memory
 from nmm.resolvers.answer import Status
-from nmm.robots.frame_path import FramePath
-from nmm.robots.robot import Robot
 from nmm.runs.broken_limits import broken_limits, broken_rows
 from nmm.runs.clearance import ran_into, swept, told
 from nmm.runs.feedback import Feedback
@@ -30,6 +25,7 @@ from nmm.runs.promise import Samples
 from nmm.runs.reasons import weakest_words
 from nmm.runs.recorded import Recorded, room
 from nmm.runs.residuals import residuals
+from nmm.runs.shown_frame import shown
 from nmm.runs.trajectory import Outcome, Trajectory
 from nmm.words import counted, listed
 
@@ -284,16 +280,8 @@ class Recorder:
                 "obstacles": distance.obstacles,
             }
         limited, within = shares(kept, robot, found.q, found.u, found.limited)
-        frame, columns, target = self._shown
-        path, desired = None, None
-        if frame is not None:
-            path = FramePath(robot, frame).positions(found.q)
-            desired = path.copy()
-            for axis, column in columns.items():
-                desired[:, axis] = found.r_d[:, column]
-            desired = desired if columns else None
-        if target is not None and path is not None and len(path) and target.size == 2:
-            target = np.array([*target, path[0, 2]])
+        path = self._shown.path(robot, found.q)
+        desired = self._shown.desired(path, found.r_d) if path is not None and self._shown.rows else None
         return Trajectory(
             robot=robot,
             t=self.t.copy(),
@@ -322,10 +310,10 @@ class Recorder:
             outcome=outcome,
             message=message,
             warnings=tuple(self.warnings),
-            frame=frame,
+            frame=self._shown.frame,
             path=path,
             desired=desired,
-            target=target if path is not None else None,
+            target=self._shown.mark(path),
             kinematics_off=self._kinematics_off(),
             **distances,
         )
@@ -334,41 +322,3 @@ class Recorder:
 def _of_rates(units: Iterable[str]) -> str:
     """The unit of a rate of such quantities, or of several together."""
     return listed([f"{unit}/s" for unit in dict.fromkeys(units)])
-
-
-def shown(tasks: Iterable[Task], robot: Robot) -> tuple[str | None, dict[int, int], Array | None]:
-    """The positioned frame, for each world axis the task's row that holds it, and the target looked at.
-
-    Where no task positions a frame, the one that a task turns. `InputError` for what cannot be drawn.
-    """
-    frame: str | None = None
-    turned: str | None = None
-    columns: dict[int, int] = {}
-    target: Array | None = None
-    row = 0
-    for task in tasks:
-        count = len(task.rows(robot))
-        said = _said(task.function, robot, count)
-        if said.positions is not None and frame in (None, said.positions):
-            frame = said.positions
-            columns |= {AXES[axis]: row + i for axis, i in said.axes.items()}
-        turned = turned or said.turns
-        for part in (_said(task.reference, robot, count), said):
-            target = target if part.looks_at is None else np.array(part.looks_at, dtype=np.float64)
-        row += count
-    return frame or turned, columns, target
-
-
-def _said(function: Function, robot: Robot, rows: int) -> Shown:
-    """What the function shows, checked before the run that is to be shown."""
-    said, name = function.shown(), f"{type(function).__name__}.shown"
-    for frame in (said.positions, said.turns):
-        if frame is not None:
-            robot.frame_id(frame)
-    if not all(axis in AXES and row in range(rows) for axis, row in said.axes.items()):
-        raise InputError(
-            f"{name}: expected axes from x, y, z with rows from 0 to {rows - 1}, got {dict(said.axes)}"
-        )
-    if said.looks_at is not None and np.shape(said.looks_at) not in ((2,), (3,)):
-        raise InputError(f"{name}: expected 2 or 3 numbers as looks_at, got {said.looks_at!r}")
-    return said

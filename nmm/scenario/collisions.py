@@ -12,12 +12,12 @@ from nmm.collisions.obstacle import Obstacle
 from nmm.control.collisions import Collisions
 from nmm.robots.loading.packages import package_file
 from nmm.robots.robot import Robot
-from nmm.scenario.document import Place
 from nmm.scenario.keys import Part, at
 from nmm.scenario.numbers import Positive, Whole, number
 from nmm.scenario.obstacles import ObstaclePart
 from nmm.scenario.robot import PACKAGE, Absolute, FileName
 from nmm.scenario.shapes import without
+from nmm.scenario.yaml_text import Place
 
 USUAL = Collisions()
 

@@ -12,8 +12,8 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from nmm.errors import InputError, unknown
-from nmm.scenario.document import Place
 from nmm.scenario.numbers import shown
+from nmm.scenario.yaml_text import Place
 
 #: Which of two a value is, where a number or a function may stand: pydantic puts it into its locations.
 NUMBER, FUNCTION = "<number>", "<function>"

@@ -14,12 +14,12 @@ from nmm.functions.function import Function
 from nmm.functions.program import Program
 from nmm.functions.references.orientation import rotation_vector
 from nmm.robots.robot import Robot
-from nmm.scenario.document import Place
 from nmm.scenario.function_part import FunctionPart
 from nmm.scenario.functions import REFERENCE_PARTS
 from nmm.scenario.keys import Part, at, one_of
 from nmm.scenario.robot import Absolute, Three
 from nmm.scenario.shapes import AnyShape
+from nmm.scenario.yaml_text import Place
 
 #: References that are points of time alone.
 PATH_PARTS: dict[str, type[FunctionPart]] = {

@@ -86,6 +86,7 @@ class OwnPart(ResolverPart):
 
     @model_validator(mode="after")
     def _can_be_made(self) -> OwnPart:
+        """Not tried: a folder is read, and plays, without the file."""
         return self
 
     def explicit(self) -> dict[str, Any]:

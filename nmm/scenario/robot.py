@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, WrapValidator, model_validator
 
 from nmm.errors import InputError, unknown
-from nmm.scenario.document import Place
 from nmm.scenario.keys import KeyedError, Part, at, at_key
 from nmm.scenario.numbers import Number, number, numbers, numbers_by_name, shown
+from nmm.scenario.yaml_text import Place
 
 if TYPE_CHECKING:
     from nmm.platforms import Platform

@@ -10,10 +10,10 @@ from pydantic import Field
 
 from nmm.collisions.shapes import Box, Capsule, Cylinder, Mesh, Plane, Shape, Sphere
 from nmm.errors import InputError
-from nmm.scenario.document import Place
 from nmm.scenario.keys import Part, one_of
 from nmm.scenario.numbers import Positive
 from nmm.scenario.robot import Absolute, FileName, Three
+from nmm.scenario.yaml_text import Place
 
 
 class ShapePart(Part):

@@ -17,11 +17,11 @@ from nmm.robots.configuration import Configuration
 from nmm.robots.loading.tips import tips
 from nmm.robots.robot import Robot
 from nmm.scenario.constructors import STARRED, parameters
-from nmm.scenario.document import dotted, read_text
 from nmm.scenario.functions import FUNCTION_PARTS
 from nmm.scenario.keys import KeyedError, as_written, first_error
 from nmm.scenario.spelling import POINT, SPELLINGS
 from nmm.scenario.tasks import TASK_PARTS
+from nmm.scenario.yaml_text import dotted, read_text
 
 #: What a text may be.
 EXPECTED = "KIND:FRAME:AXES, as in position:ee:xy, or a mapping as in a scenario"
@@ -42,7 +42,7 @@ def short_task(text: str, robot: Robot) -> Task | Function:
     if not stripped:
         raise InputError(f"task: expected {EXPECTED}, got nothing")
     if stripped.startswith("{"):
-        data = read_text(stripped, f"task {text}", lines=False).data["value"]
+        data = read_text(stripped, f"task {text}", lines=False).value
     else:
         data = _from_words(stripped, robot)
     if not isinstance(data, Mapping):

@@ -11,17 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from nmm.errors import InputError
+from nmm.files import taken, whole_file
 from nmm.folders.whole import check_folder, has_format
 from nmm.scenario.numbers import shown
 from nmm.sweeps.columns import columns_of
 from nmm.sweeps.definition import Definition
-from nmm.sweeps.table import join_parts, rows_in, schema_of, whole_file, write_part
+from nmm.sweeps.table import join_parts, rows_in, schema_of, write_part
 from nmm.sweeps.work import Computed
-
-try:
-    import fcntl
-except ImportError:  # Windows: nothing keeps two sweeps out of one folder there
-    fcntl = None  # type: ignore[assignment]  # a module where there is one
 
 #: Marks a folder as one of ours.
 FORMAT = "nmm sweep 1"
@@ -80,15 +76,12 @@ class SweepFolder:
         self.check()
         try:
             self.path.mkdir(parents=True, exist_ok=True)
-            lock = (self.path / ".lock").open("w")
+            lock = (self.path / ".lock").open("wb")
         except OSError as error:
             raise InputError(f"{self.path}: cannot be written: {error.strerror}") from None
         with lock:
-            if fcntl is not None:
-                try:
-                    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                except OSError:
-                    raise InputError(f"{self.path}: another process is at this sweep") from None
+            if taken(lock) is False:
+                raise InputError(f"{self.path}: another process is at this sweep")
             self._remove_leftovers()
             if not is_sweep(self.path):
                 self._write_manifest(complete=False)

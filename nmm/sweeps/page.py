@@ -6,10 +6,10 @@ import json
 import math
 from typing import Any
 
+from nmm.files import whole_file
 from nmm.sweeps.columns import Column, columns_of
 from nmm.sweeps.definition import Definition
 from nmm.sweeps.swept import Swept
-from nmm.sweeps.table import whole_file
 from nmm.templates import template
 from nmm.words import listed
 

@@ -15,8 +15,8 @@ from nmm.errors import InputError, expect_known
 from nmm.processes import as_done
 from nmm.progress import Progress
 from nmm.scenario import Scenario
-from nmm.scenario.document import dotted
 from nmm.scenario.numbers import integer
+from nmm.scenario.yaml_text import dotted
 from nmm.sweeps.check import check_varied
 from nmm.sweeps.cluster import as_done_by, cluster
 from nmm.sweeps.definition import KEPT, Definition

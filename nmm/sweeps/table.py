@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from nmm.files import whole_file
 from nmm.sweeps.columns import columns_of
 from nmm.sweeps.definition import Definition
 from nmm.sweeps.extra import arrow, parquet
@@ -56,19 +54,3 @@ def join_parts(parts: Sequence[Path], path: Path, schema: Any) -> None:
                 tables = []
         if tables:
             writer.write_table(pa.concat_tables(tables).combine_chunks())
-
-
-@contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
-    """A temporary file beside `path` that takes its place, and is on the disk, when the block ends well."""
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
-    os.close(handle)
-    temporary = Path(name)
-    try:
-        yield temporary
-        with temporary.open("rb") as file:
-            os.fsync(file.fileno())
-        temporary.chmod(0o644)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)

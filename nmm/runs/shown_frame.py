@@ -1,0 +1,84 @@
+"""What is drawn of a run's tasks: the frame that they position, where they want it, what they look at."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from nmm.arrays import Array
+from nmm.errors import InputError
+from nmm.functions.function import Function, Shown
+from nmm.functions.tasks.position import AXES
+from nmm.functions.tasks.task import Task
+from nmm.robots.frame_path import FramePath
+from nmm.robots.robot import Robot
+
+
+class ShownFrame(NamedTuple):
+    """The frame that tasks position, or without one the frame that a task turns.
+
+    Attributes
+    ----------
+    frame : its name; None where no task speaks of one
+    rows : of the tasks' values, the one that holds each world axis
+    target : what a task looks at, (2,) or (3,) m
+    """
+
+    frame: str | None
+    rows: dict[int, int]
+    target: Array | None
+
+    def path(self, robot: Robot, q: Array) -> Array | None:
+        """Where the frame is at q (N, n), (N, 3) m; None without a frame."""
+        return None if self.frame is None else FramePath(robot, self.frame).positions(q)
+
+    def desired(self, path: Array, r_d: Array) -> Array:
+        """Where tasks want it by r_d (N, s), (N, 3) m; where it is, along axes and times without a task."""
+        desired = path.copy()
+        for axis, row in self.rows.items():
+            said = np.isfinite(r_d[:, row])
+            desired[said, axis] = r_d[said, row]
+        return desired
+
+    def mark(self, path: Array | None) -> Array | None:
+        """The target, (3,) m: one in the plane at the height at which the frame begins."""
+        if self.target is None or path is None:
+            return None
+        return np.array([*self.target, path[0, 2]]) if len(path) and self.target.size == 2 else self.target
+
+
+def shown(tasks: Iterable[Task], robot: Robot) -> ShownFrame:
+    """What tasks show of themselves; `InputError` for what cannot be drawn."""
+    frame: str | None = None
+    turned: str | None = None
+    rows: dict[int, int] = {}
+    target: Array | None = None
+    row = 0
+    for task in tasks:
+        count = len(task.rows(robot))
+        said = _said(task.function, robot, count)
+        if said.positions is not None and frame in (None, said.positions):
+            frame = said.positions
+            rows |= {AXES[axis]: row + i for axis, i in said.axes.items()}
+        turned = turned or said.turns
+        for part in (_said(task.reference, robot, count), said):
+            target = target if part.looks_at is None else np.array(part.looks_at, dtype=np.float64)
+        row += count
+    return ShownFrame(frame or turned, rows, target)
+
+
+def _said(function: Function, robot: Robot, rows: int) -> Shown:
+    """What the function shows, checked before the run that is to be shown."""
+    said, name = function.shown(), f"{type(function).__name__}.shown"
+    for frame in (said.positions, said.turns):
+        if frame is not None:
+            robot.frame_id(frame)
+    if not all(axis in AXES and row in range(rows) for axis, row in said.axes.items()):
+        raise InputError(
+            f"{name}: expected axes from x, y, z with rows from 0 to {rows - 1}, got {dict(said.axes)}"
+        )
+    if said.looks_at is not None and np.shape(said.looks_at) not in ((2,), (3,)):
+        raise InputError(f"{name}: expected 2 or 3 numbers as looks_at, got {said.looks_at!r}")
+    return said
