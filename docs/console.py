@@ -1,62 +1,136 @@
-"""Commands in the documentation with what they print: `python docs/console.py` runs and rewrites them.
+"""Pages of the documentation that run: `python docs/console.py [PAGE …]` runs them and writes what comes out.
 
-A block ```console holds what the commands in it print ("$ nmm ..."). They run in an empty folder, one after
-the other through the page, so that a page may run a scenario and analyse the run. The tests compare them. A
-block ```text with commands is written too, but not compared: its numbers are rounding, or chaotic.
+A page's blocks run in order, in one empty folder:
+
+- ```console: what the commands in it ("$ nmm …", "$ python FILE", "$ cat FILE") print. The tests compare it.
+- ```text with commands: the same, not compared: its numbers are times, rounding, or chaotic.
+- ```bash: lines "nmm …" run, without what they print. What waits for Ctrl-C (view, drive, --play, …) gets it
+  when its page is open.
+- a block of any language whose first line is "# NAME" or "<!-- NAME -->" is the file NAME.
+- ```python else runs as it stands, with the names of the page's blocks before it.
+
+A picture "](STEM/PATH)" or a frame src="STEM/PATH" of page STEM.md is the PATH that the commands wrote; a
+copy stays in the folder STEM/. Pages in frames are large and not in the repository: the site has them where
+this ran before it was built.
 """
 
 from __future__ import annotations
 
 import contextlib
 import io
-import os
 import re
 import shlex
+import shutil
+import signal
+import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
 FOLDER = Path(__file__).parent
-#: Pages whose blocks are written here.
-PAGES = ("singularities.md", "sweeps.md")
-COMPARED, WRITTEN = ("console",), ("console", "text")
+TUTORIALS = sorted((FOLDER / "tutorials").glob("*.md"))
+#: Pages whose blocks run.
+PAGES = (FOLDER / "singularities.md", FOLDER / "sweeps.md", *TUTORIALS)
+COMPARED, WRITTEN = "console", ("console", "text")
 
-_BLOCK = re.compile(r"^```(?P<kind>\w+)\n(?P<body>\$ .*?)^```$", re.DOTALL | re.MULTILINE)
+_BLOCK = re.compile(r"^```(?P<kind>\w+)\n(?P<body>.*?)^```$", re.DOTALL | re.MULTILINE)
+_NAMED = re.compile(r"(?:# |<!-- )(?P<name>[\w-]+\.\w+)(?: -->)?\n")
 _PROMPT = "$ "
+_STAYS = ("view", "drive", "play")
+_PATIENCE = 120.0
 
 
-def rewritten(text: str, kinds: tuple[str, ...] = WRITTEN) -> str:
-    """The page with the commands in blocks of these kinds run anew, in a folder of its own."""
+def rewritten(text: str, folder: Path | None = None) -> str:
+    """The page with what its commands print now, run in an empty folder."""
+    names: dict[str, object] = {"__name__": "__main__"}
 
     def anew(block: re.Match[str]) -> str:
-        if block["kind"] not in kinds:
-            return block.group()
-        commands = [line for line in block["body"].splitlines() if line.startswith(_PROMPT)]
-        printed = "\n".join(f"{command}\n{_run(command)}".rstrip() for command in commands)
-        return f"```{block['kind']}\n{printed}\n```"
+        kind, body = block["kind"], block["body"]
+        if named := _NAMED.match(body):
+            Path(named["name"]).write_text(body, encoding="utf-8")
+        elif kind in WRITTEN and body.startswith(_PROMPT):
+            commands = [line for line in body.splitlines() if line.startswith(_PROMPT)]
+            printed = "\n".join(
+                f"{line}\n{_printed(line.removeprefix(_PROMPT))}".rstrip() for line in commands
+            )
+            return f"```{kind}\n{printed}\n```"
+        elif kind == "bash":
+            for line in body.splitlines():
+                _run(line)
+        elif kind == "python":
+            exec(compile(body, "a block of the page", "exec"), names)
+        return block.group()
 
-    before = Path.cwd()
-    with tempfile.TemporaryDirectory() as folder:
-        os.chdir(folder)
-        try:
-            return _BLOCK.sub(anew, text)
-        finally:
-            os.chdir(before)
+    with tempfile.TemporaryDirectory() as empty, contextlib.chdir(folder or empty):
+        return _BLOCK.sub(anew, text)
 
 
-def _run(command: str) -> str:
+def compared(text: str) -> str:
+    """The page's blocks whose numbers are the same everywhere."""
+    return "\n".join(block["body"] for block in _BLOCK.finditer(text) if block["kind"] == COMPARED)
+
+
+def _printed(command: str) -> str:
     """What a command prints, errors included, as a terminal would show it."""
     from nmm.cli.exit_status import status_of
 
-    program, *arguments = shlex.split(command.removeprefix(_PROMPT))
+    program, *arguments = shlex.split(command, comments=True)
+    if program == "cat":
+        return "\n".join(Path(name).read_text(encoding="utf-8").strip("\n") for name in arguments)
+    if program == "python":
+        done = subprocess.run(
+            [sys.executable, *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        )
+        return done.stdout.strip("\n")
     if program != "nmm":
-        raise ValueError(f"expected a command of nmm, got {command!r}")
+        raise ValueError(f"expected nmm, python or cat, got {command!r}")
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
         status_of(arguments)
     return printed.getvalue().strip("\n")
 
 
+def _run(line: str) -> None:
+    """A command in a process of its own; `RuntimeError` where it fails."""
+    program, *arguments = shlex.split(line, comments=True) or [""]
+    if program != "nmm":
+        return
+    stays = arguments[0] in _STAYS or "--play" in arguments
+    command = [sys.executable, "-u", "-m", "nmm", *arguments, *(("--no-open",) if stays else ())]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    said = ""
+    try:
+        if stays:
+            assert process.stdout is not None
+            for printed in process.stdout:
+                said += printed
+                if "http://" in printed:
+                    break
+            process.send_signal(signal.SIGINT)
+        said += process.communicate(timeout=_PATIENCE)[0]
+    finally:
+        process.kill()
+    if process.returncode not in ((0, 130) if stays else (0,)) or (stays and "http://" not in said):
+        raise RuntimeError(f"{line}: exit status {process.returncode}\n{said}")
+
+
+def shown(page: Path) -> list[str]:
+    """What the page shows of what its commands write."""
+    found = re.findall(rf"(?:\]\(|src=\"){page.stem}/([^)\"]+)", page.read_text(encoding="utf-8"))
+    return [str(path) for path in found]
+
+
+def write(page: Path, folder: Path) -> None:
+    """Run a page in a folder, write what it prints, and keep what it shows."""
+    page.write_text(rewritten(page.read_text(encoding="utf-8"), folder), encoding="utf-8")
+    shutil.rmtree(page.with_suffix(""), ignore_errors=True)
+    for path in shown(page):
+        kept = page.with_suffix("") / path
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(folder / path, kept)
+
+
 if __name__ == "__main__":
-    for name in PAGES:
-        page = FOLDER / name
-        page.write_text(rewritten(page.read_text(encoding="utf-8")), encoding="utf-8")
+    for page in [FOLDER / name for name in sys.argv[1:]] or PAGES:
+        with tempfile.TemporaryDirectory() as empty:
+            write(page, Path(empty))

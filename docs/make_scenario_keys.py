@@ -18,8 +18,8 @@ your robot. Any key can be set from the command line by its dotted path, lists c
     nmm run my_scenario.yaml --resolver pg
 
 Numbers may be arithmetic with pi (`5/4*pi`). Units are metres, radians and seconds. A key that does not
-exist, a frame that the robot does not have, a number that is none: each is one line that names the file, the
-key and what was expected.
+exist, a frame that the robot does not have, text where a number belongs: each is one line that names the
+file, the key and what was expected.
 
 ```yaml
 %s```

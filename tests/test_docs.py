@@ -5,20 +5,25 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import re
+import shlex
 import subprocess
 import sys
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import typer
 from derivatives import check_function
 
 import nmm
+from nmm.cli.app import app
 from nmm.kinds import OBJECTIVES, PLATFORMS, REFERENCES, RESOLVERS, TASKS, Kinds
 
 ROOT = Path(__file__).resolve().parent.parent
+DOCUMENTS = ["README.md", *(path.relative_to(ROOT).as_posix() for path in sorted(ROOT.glob("docs/**/*.md")))]
 
 
 def script(name: str) -> Any:
@@ -37,21 +42,45 @@ def test_the_page_of_scenario_keys_is_the_schemas() -> None:
 
 
 def words_and_numbers(text: str) -> tuple[list[str], list[float]]:
-    """A text's lines without their numbers and spaces, and the numbers."""
+    """A text's lines without their numbers and spaces, and the numbers; none that were timed."""
     number = r"(?<![A-Za-z_\d])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?"
+    text = re.sub(rf"{number} µs here", "", text)
     lines = ["".join(re.sub(number, "#", line).split()) for line in text.splitlines()]
     return lines, [float(found) for found in re.findall(number, text)]
 
 
-def test_commands_in_the_docs_print_what_the_docs_say() -> None:
+console = script("console")
+
+
+@pytest.mark.parametrize("page", console.PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_a_page_that_runs_prints_what_it_says(page: Path, tmp_path: Path) -> None:
     """The same words, and the same numbers but for rounding, counts of starts among them."""
-    console = script("console")
-    for name in console.PAGES:
-        page = (ROOT / "docs" / name).read_text(encoding="utf-8")
-        said, said_numbers = words_and_numbers(page)
-        printed, printed_numbers = words_and_numbers(console.rewritten(page, console.COMPARED))
-        assert printed == said, "run python docs/console.py"
-        np.testing.assert_allclose(printed_numbers, said_numbers, rtol=0.05, atol=1e-6)
+    text = page.read_text(encoding="utf-8")
+    said, said_numbers = words_and_numbers(console.compared(text))
+    printed, printed_numbers = words_and_numbers(console.compared(console.rewritten(text, tmp_path)))
+    assert printed == said, "run python docs/console.py"
+    np.testing.assert_allclose(printed_numbers, said_numbers, rtol=0.05, atol=1e-6)
+    for path in console.shown(page):
+        assert (tmp_path / path).stat().st_size > 10_000, path
+
+
+def commands(text: str) -> Iterator[list[str]]:
+    """The arguments of each line of nmm in a block of a page."""
+    blocks = re.findall(r"^```\w*\n(.*?)^```$", text, flags=re.DOTALL | re.MULTILINE)
+    indented = re.findall(r"^ {4}(nmm .*)$", text, flags=re.MULTILINE)
+    for line in "\n".join([*blocks, *indented]).splitlines():
+        if found := re.match(r"(?:\$ )?nmm (?!check: |[\w-]+: )(.*?)(?:  .*)?$", line):
+            yield shlex.split(found[1], comments=True)
+
+
+@pytest.mark.parametrize("page", DOCUMENTS)
+def test_every_command_on_a_page_exists_with_its_options(page: str) -> None:
+    group = typer.main.get_command(app)
+    for arguments in commands((ROOT / page).read_text(encoding="utf-8")):
+        with group.make_context("nmm", list(arguments)) as context:
+            name, command, rest = group.resolve_command(context, list(arguments))
+            assert command is not None
+            command.make_context(name, rest, parent=context)
 
 
 def test_the_readmes_python_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -96,13 +125,23 @@ def test_the_worked_examples_can_be_typed_in(tmp_path: Path, monkeypatch: pytest
     assert np.all(run.scale > 0.5)
 
 
-@pytest.mark.parametrize(
-    "page", ["README.md", *(f"docs/{path.name}" for path in sorted((ROOT / "docs").glob("*.md")))]
-)
+@pytest.mark.parametrize("page", DOCUMENTS)
 def test_links_between_files_lead_somewhere(page: str) -> None:
     text = (ROOT / page).read_text(encoding="utf-8")
     for target in re.findall(r"\]\((?!http)([^)#]+)\)", text):
         assert ((ROOT / page).parent / target).exists(), target
+
+
+def test_the_pages_of_the_tutorials_lead_on() -> None:
+    """From the first to the last, by their links; and the README leads to the first."""
+    folder = ROOT / "docs" / "tutorials"
+    page, seen = "paper.md", []
+    while page:
+        seen.append(page)
+        found = re.search(r"Next: \[[^]]+\]\(([\w.]+)\)", (folder / page).read_text(encoding="utf-8"))
+        page = found[1] if found else ""
+    assert sorted(seen) == sorted(path.name for path in folder.glob("*.md"))
+    assert "docs/tutorials/paper.md" in (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 def test_the_python_on_singularities_runs() -> None:

@@ -58,6 +58,13 @@ def test_a_file_opened_is_not_taken_for_the_output(tmp_path: Path) -> None:
     assert len(nmm.Trajectory.load(tmp_path / "o")) == 21
 
 
+def test_a_reader_that_has_gone_costs_nothing_of_what_is_written(tmp_path: Path) -> None:
+    command = "nmm run unicycle_2r_position --set duration=0.1 --out o | true; exit ${PIPESTATUS[0]}"
+    status, err = shell(tmp_path, command)
+    assert (status, err) == (1, "nmm run: nobody reads the output any more; what is written is whole\n")
+    assert len(nmm.Trajectory.load(tmp_path / "o")) == 21
+
+
 def test_an_interrupt_is_told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     def raises(error: BaseException) -> None:
         def read(**_: object) -> None:

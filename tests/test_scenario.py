@@ -209,6 +209,20 @@ def test_settings_change_nothing_but_the_copy() -> None:
     assert other.resolved()["task"]["reference"]["radius"] == 2.0
 
 
+def test_a_task_alone_is_the_first_of_a_list(tmp_path: Path) -> None:
+    """A file may hold the mapping itself, as nmm init and a run's folder write it."""
+    file = tmp_path / "alone.yaml"
+    file.write_text(yaml.safe_dump(Scenario.load("unicycle_2r_position").resolved()), encoding="utf-8")
+    assert "task:\n  " in file.read_text(encoding="utf-8")
+    given = Scenario.load(str(file), {"task.0.gain": 4, "objective.0.terms.1.weight": 2})
+    assert given.parts.task[0].gain == 4.0
+    assert given.resolved()["objective"]["terms"][1]["weight"] == 2.0
+    with pytest.raises(ScenarioError, match=r"unknown key 'gian'.*available: .*gain"):
+        Scenario.load(str(file), {"task.0.gian": 4})
+    with pytest.raises(ScenarioError, match="unknown key '1'"):
+        Scenario.load(str(file), {"task.1.gain": 4})
+
+
 def test_settings_take_data_and_arrays() -> None:
     given = Scenario.load("unicycle_2r_position", {"q0": np.arange(5.0), "task.0.gain": np.eye(2) * 3})
     assert given.parts.q0 == [0.0, 1.0, 2.0, 3.0, 4.0]

@@ -249,7 +249,13 @@ def test_every_key_is_described() -> None:
     others = (*others, "limits", "limits.bounds", "until", "retreat", "steering")
     others = (*others, *(f"task.when, kind: {kind}" for kind in CONDITION_PARTS))
     others = (*others, "collisions", "collisions.obstacles", *SHAPE_PARTS)
+    others = (*others, *(title for title in titles if title.endswith(", of any kind")))
     assert len(titles) == len(others) + sum(len(parts) for _, parts in REGISTERED) - len(shared)
+
+
+def test_keys_that_all_kinds_have_are_told_once() -> None:
+    told = [key for section in sections() if section.title.startswith("task, ") for key, _, _ in section.keys]
+    assert [told.count(key) for key in ("gain", "reference", "priority", "when")] == [1] * 4
 
 
 def test_a_unit_that_is_not_the_tasks(tmp_path: Path) -> None:

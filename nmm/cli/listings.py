@@ -22,7 +22,8 @@ def list_keys() -> None:
 
     for section in sections():
         show_text(f"{section.title} ({section.summary.rstrip('.')})")
-        show_table(["key", "default", "meaning"], section.keys)
+        if section.keys:
+            show_table(["key", "default", "meaning"], section.keys)
         show_text()
 
 

@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 from nmm.words import one_line, printable
 
@@ -24,7 +24,13 @@ def console() -> Console:
     from rich.console import Console
 
     piped = not sys.stdout.isatty() and "COLUMNS" not in os.environ
-    return Console(markup=False, highlight=False, emoji=False, width=WIDTH_OF_A_PIPE if piped else None)
+    out = Console(markup=False, highlight=False, emoji=False, width=WIDTH_OF_A_PIPE if piped else None)
+    out.on_broken_pipe = _raise  # type: ignore[method-assign]  # rich would end the process
+    return out
+
+
+def _raise() -> NoReturn:
+    raise  # the error that rich is handling
 
 
 def show_table(

@@ -70,10 +70,8 @@ def _rows(trajectory: Trajectory, numbers: dict[str, Any]) -> Iterator[tuple[str
         yield "share of α taken", f"{numbers['step_size_mean']:.3g}, {numbers['step_size_min']:.3g} at least"
     if trajectory.limited:
         share = numbers["scaled_share"]
-        yield (
-            "λ under limits",
-            f"{numbers['scale_min']:.3g} at least; below 1 {100 * share:.3g} % of the time",
-        )
+        least = f"{numbers['scale_min']:.3g} at least; below 1 {100 * share:.3g} % of the time"
+        yield "λ under limits", least if share else "1 throughout"
     if free := numbers["without_velocity_limit"]:
         groups = [name for name, inputs in trajectory.robot.groups.items() if not {*free}.isdisjoint(inputs)]
         keys = ", ".join(f"limits.velocity.{name}" for name in groups)

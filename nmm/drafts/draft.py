@@ -144,7 +144,7 @@ _NO_LIMITS = (
 def _data(chosen: Chosen, hand: Hand, start: Start, path: HandsPath, kind: str) -> dict[str, Any]:
     robot = chosen.robot
     data: dict[str, Any] = {
-        "title": f"{robot.name}: {hand.frame} along a {path.reference['kind']}",
+        "title": f"{hand.frame} along a {path.reference['kind']}",
         "robot": _short(chosen.data),
         "q0": dict(start.named),
         "duration": _whole(path.duration),

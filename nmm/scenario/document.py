@@ -14,6 +14,9 @@ from nmm.scenario.numbers import shown
 from nmm.scenario.yaml_text import LONGEST, Place, dotted, read_text
 from nmm.words import listed
 
+#: Where one mapping may stand for a list of one: its index 0 is the mapping.
+_ONE_OR_MORE = ("task", "objective", "added_task")
+
 
 def _shorthand(path: Place, data: Mapping[str, Any]) -> str | None:
     """Which key of the mapping a name is that stands at `path` in the mapping's place; None elsewhere."""
@@ -142,6 +145,8 @@ def _parsed(key: str, document: Document) -> Place:
                 )
             path = (*path, int(step))
             place = place[int(step)]
+        elif isinstance(place, dict) and step == "0" and path and path[-1] in _ONE_OR_MORE:
+            continue
         elif isinstance(place, dict):
             path = (*path, step)
             place = place.get(step, {})

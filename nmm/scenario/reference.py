@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 from pydantic_core import PydanticUndefined
@@ -38,28 +39,39 @@ def sections() -> Iterator[Section]:
     yield _section("robot", RobotPart)
     yield _section("robot, with arms mounted", MountedPart)
     yield _section("robot.arms", ArmPart)
-    for kind, task in TASK_PARTS.items():
-        yield _section(f"task, kind: {kind}", task)
-    for kind, condition in CONDITION_PARTS.items():
-        yield _section(f"task.when, kind: {kind}", condition)
-    for kind, reference in REFERENCE_PARTS.items():
-        if reference is not FUNCTION_PARTS.get(kind):
-            yield _section(f"reference, kind: {kind}", reference)
-    for kind, objective in OBJECTIVE_PARTS.items():
-        yield _section(f"objective, kind: {kind}", objective)
+    yield from _kinds("task", TASK_PARTS)
+    yield from _kinds("task.when", CONDITION_PARTS)
+    own = {kind: part for kind, part in REFERENCE_PARTS.items() if part is not FUNCTION_PARTS.get(kind)}
+    yield from _kinds("reference", own)
+    yield from _kinds("objective", OBJECTIVE_PARTS)
     yield _section("objective.terms", TermPart)
-    for kind, resolver in RESOLVER_PARTS.items():
-        called = RESOLVERS.words(kind)
-        yield _section(f"resolver, kind: {kind}", resolver, f"{called[0].upper()}{called[1:]}. ")
+    yield from _kinds("resolver", RESOLVER_PARTS, {kind: RESOLVERS.words(kind) for kind in RESOLVER_PARTS})
     yield _section("until", GoalPart)
     yield _section("retreat", RetreatPart)
     yield _section("limits", LimitsPart)
     yield _section("limits.bounds: a task's function and its keys, with these", BoundPart)
     yield _section("collisions", CollisionsPart)
     yield _section("collisions.obstacles", ObstaclePart)
-    for kind, shape in SHAPE_PARTS.items():
-        yield _section(f"collisions.obstacles.shape, kind: {kind}", shape)
+    yield from _kinds("collisions.obstacles.shape", SHAPE_PARTS)
     yield _section("steering", SteeringPart)
+
+
+def _kinds(
+    where: str, parts: Mapping[str, type[Part]], called: Mapping[str, str] = MappingProxyType({})
+) -> Iterator[Section]:
+    """The kinds of a part, one by one; keys that all of them have stand once, before."""
+    found = []
+    for kind, part in parts.items():
+        words = called.get(kind, "")
+        section = _section(
+            f"{where}, kind: {kind}", part, f"{words[0].upper()}{words[1:]}. " if words else ""
+        )
+        found.append(section)
+    shared = [key for key in found[0].keys if all(key in section.keys for section in found)]
+    if shared:
+        yield Section(f"{where}, of any kind", "Beside the kind's own keys.", shared)
+    for section in found:
+        yield section._replace(keys=[key for key in section.keys if key not in shared])
 
 
 def _section(title: str, part: type[Part], called: str = "") -> Section:
