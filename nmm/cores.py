@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
-import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from typing import TypeAlias
 
 from nmm.progress import Progress
@@ -28,7 +28,8 @@ def over_cores(
 ) -> None:
     """Do pieces of `at_once` items, the last one shorter, in as many threads as there are cores.
 
-    What is found must not depend on the pieces. Ctrl-C ends it when the pieces under way are done.
+    This thread takes pieces, too, so that all are done whether or not others come to help. What is found must
+    not depend on the pieces. Ctrl-C ends it when the pieces under way are done.
 
     Parameters
     ----------
@@ -37,29 +38,35 @@ def over_cores(
     progress : called with the fraction done, from this thread
     threads : how many at most, as many as there are cores when None
     """
-    pieces = [(first, min(first + at_once, count)) for first in range(0, count, at_once)]
-    threads = min(cores() if threads is None else threads, len(pieces))
-    if threads <= 1:
-        work = worker()
-        for first, last in pieces:
-            if progress is not None:
-                progress(first / count)
-            work(first, last)
-        return
-    own = threading.local()
+    left = iter(range(0, count, at_once))  # next(left) is one step to all threads: none takes another's piece
+    threads = min(cores() if threads is None else threads, -(-count // at_once))
 
-    def one(piece: tuple[int, int]) -> None:
-        if not hasattr(own, "work"):
-            own.work = worker()
-        own.work(*piece)
-
-    with ThreadPoolExecutor(threads) as pool:
+    def take(told: Progress | None = None) -> None:
         try:
-            waiting = [pool.submit(one, piece) for piece in pieces]
-            for (first, _), future in zip(pieces, waiting, strict=True):
-                if progress is not None:
-                    progress(first / count)
-                future.result()
+            work = worker()
+            for first in left:
+                if told is not None:
+                    told(first / count)
+                work(first, min(first + at_once, count))
         except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
+            for _ in left:  # nobody shall take it
+                pass
             raise
+
+    helping = [_helpers().submit(take) for _ in range(1, threads)]
+    try:
+        take(progress)
+    finally:
+        for one in helping:
+            if not one.cancel():
+                one.result()
+
+
+@cache
+def _helpers() -> ThreadPoolExecutor:
+    """Threads that stay: one that begins costs as much as a hundred items."""
+    return ThreadPoolExecutor(max(1, cores() - 1), thread_name_prefix="nmm")
+
+
+if hasattr(os, "register_at_fork"):  # a forked process has none of them
+    os.register_at_fork(after_in_child=_helpers.cache_clear)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import threading
+import time
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -13,7 +16,7 @@ from nmm.analysis.maps.reach import Reach
 from nmm.analysis.maps.workspace import workspace_map
 from nmm.analysis.singular.jacobians import Jacobians
 from nmm.functions.tasks import CallableFunction, Pose, Position
-from nmm.kernels.spectra import FEW_ROWS, spectra
+from nmm.kernels.spectra import FEW_ROWS, SIDE_BY_SIDE, spectra, write_spectrum
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 
@@ -33,6 +36,22 @@ def test_singular_values_are_numpys(shape: tuple[int, int], rng: np.random.Gener
     found, expected = spectra(J), np.linalg.svd(J, compute_uv=False)
     assert np.all(np.diff(found, axis=1) <= 0.0)
     assert np.all(np.abs(found - expected) <= 1e-14 * expected[:, :1])
+
+
+@pytest.mark.parametrize("shape", [(2, 4), (6, 10), (4, 2), (FEW_ROWS + 3, 14)])
+def test_singular_values_do_not_depend_on_the_matrices_beside(
+    shape: tuple[int, int], rng: np.random.Generator
+) -> None:
+    J = rng.normal(size=(3 * SIDE_BY_SIDE + 5, *shape))
+    J[::3, -1] = J[::3, 0]
+    J[1::4] *= np.logspace(0.0, -9.0, shape[1])
+    J[4], J[7, 0, 0], J[9] = 0.0, np.nan, np.eye(*shape)
+    found = spectra(J)
+    for one, values in zip(J, found, strict=True):
+        alone = np.empty(min(shape))
+        write_spectrum(one, alone) if np.isfinite(one).all() else alone.fill(np.nan)
+        np.testing.assert_array_equal(values, spectra(one[np.newaxis])[0])
+        np.testing.assert_array_equal(values, alone)
 
 
 def test_small_singular_values_are_as_accurate_as_large_ones() -> None:
@@ -184,9 +203,37 @@ def test_ctrl_c_leaves_the_pieces_that_have_not_begun(monkeypatch: pytest.Monkey
         done.clear()
 
         def work(first: int, last: int) -> None:
-            cores.threading.Event().wait(0.002)
+            time.sleep(0.002)
             done.append(first)
 
         with pytest.raises(KeyboardInterrupt):
             cores.over_cores(1000, 1, lambda: work, progress)
         assert 90 <= len(done) < 500
+
+
+def test_what_fails_in_another_thread_is_raised(monkeypatch: pytest.MonkeyPatch) -> None:
+    with_cores(monkeypatch, 2)
+    here = threading.current_thread()
+
+    def work(first: int, last: int) -> None:
+        if threading.current_thread() is not here:
+            raise ArithmeticError
+        time.sleep(0.001)
+
+    with pytest.raises(ArithmeticError):
+        cores.over_cores(2000, 1, lambda: work)
+
+
+def test_work_within_work_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
+    with_cores(monkeypatch, 2)
+    done = np.zeros((6, 7), dtype=np.int64)
+
+    def outer(first: int, last: int) -> None:
+        def inner(a: int, b: int) -> None:
+            time.sleep(0.001)
+            done[first:last, a:b] += 1
+
+        cores.over_cores(7, 1, lambda: inner)
+
+    cores.over_cores(6, 1, lambda: outer)
+    assert np.all(done == 1)

@@ -81,17 +81,28 @@ class Kernel:
 _plain_by_address: dict[int, Plain] = {}
 
 
-def compiled(function: Callable[..., Any], allocates: bool = False, nogil: bool = False) -> Any:
+def compiled(
+    function: Callable[..., Any],
+    allocates: bool = False,
+    nogil: bool = False,
+    vectorized: bool = False,
+    forceinline: bool = False,
+) -> Any:
     """`numba.njit` with nmm's options and nmm's cache folder; `.py_func` is the plain function.
 
     Divisions by zero give inf and nan as in numpy (`error_model`): a singular matrix is a case
     that the resolvers report, not an exception out of compiled code. Arrays are neither made (but see
     `scratch`) nor returned: counting references to them would take half of a control step.
+
+    vectorized : for innermost loops that run over many alike; those over three or seven numbers lose by it
+    forceinline : callers take in its instructions, with what is constant there
     """
     if numba.config.DISABLE_JIT:
         return function
     options = {"nopython": True, "error_model": "numpy", "_nrt": allocates, "nogil": nogil}
-    made = KernelDispatcher(function, options)
+    if forceinline:
+        options["forceinline"] = True
+    made = KernelDispatcher(function, options, vectorized)
     made._cache = KernelCache(function)  # as `enable_caching` does with numba's own
     return made
 
@@ -101,6 +112,12 @@ allocating = functools.partial(compiled, allocates=True)
 
 #: Decorator for functions that run for so long that other threads should, too.
 compiled_without_gil = functools.partial(compiled, nogil=True)
+
+#: Decorator for such functions whose innermost loops run over many matrices side by side.
+vectorized_without_gil = functools.partial(compiled_without_gil, vectorized=True)
+
+#: Decorator for functions that are written into each caller, for its constants.
+inlined_in_callers = functools.partial(compiled, forceinline=True)
 
 #: Decorator for helpers of compiled functions that stay plain Python when called from Python.
 inlined = numba.extending.register_jitable

@@ -46,10 +46,20 @@ class _WholeLibrary(JITCodeLibrary):
     Vectorised, these take as long or, for TIAGo's seven joints, a tenth longer, and longer to compile.
     """
 
+    vectorized = False
+
     def _optimize_final_module(self) -> None:
-        manager, builder = self._codegen._module_pass_manager(loop_vectorize=False, slp_vectorize=False)
+        manager, builder = self._codegen._module_pass_manager(
+            loop_vectorize=self.vectorized, slp_vectorize=False
+        )
         with self._recorded_timings.record("nmm's module passes", builder):
             manager.run(self._final_module, builder)
+
+
+class _VectorLibrary(_WholeLibrary):
+    """A function whose innermost loops run over many alike, side by side."""
+
+    vectorized = True
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -77,9 +87,10 @@ class _WholeLowering(NativeLowering):
     """Lowering of a function with its parts."""
 
     _name = "nmm_whole_lowering"
+    _library = _WholeLibrary
 
     def run_pass(self, state: Any) -> bool:
-        state.library = _WholeLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library = self._library(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
         super().run_pass(state)
         for one in state.library._final_module.global_variables:
@@ -87,6 +98,14 @@ class _WholeLowering(NativeLowering):
             if environment is not None:
                 state.library.codegen.set_env(one.name, environment)
         return True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _VectorLowering(_WholeLowering):
+    """The same, vectorised."""
+
+    _name = "nmm_vector_lowering"
+    _library = _VectorLibrary
 
 
 #: What kernels are not written in (`with`, `literal_unroll`, functions inlined by their source); each pass
@@ -135,11 +154,19 @@ class _WholeCompiler(_Compiler):
     lowering = _WholeLowering
 
 
+class _VectorCompiler(_Compiler):
+    lowering = _VectorLowering
+
+
 class KernelDispatcher(CPUDispatcher):
     """A function's machine code for Python, and its instructions for compiled functions that call it."""
 
-    def __init__(self, function: Any, options: dict[str, Any]) -> None:
-        super().__init__(function, targetoptions=dict(options), pipeline_class=_WholeCompiler)
+    def __init__(self, function: Any, options: dict[str, Any], vectorized: bool = False) -> None:
+        super().__init__(
+            function,
+            targetoptions=dict(options),
+            pipeline_class=_VectorCompiler if vectorized else _WholeCompiler,
+        )
         self._part = CPUDispatcher(
             function, targetoptions={**options, **_NO_DOORS}, pipeline_class=_PartCompiler
         )

@@ -9,90 +9,149 @@ from numba import types
 
 from nmm.arrays import Array
 from nmm.cores import Work, over_cores
-from nmm.kernels.compiled import compiled, compiled_without_gil, integer_scratch, scratch
+from nmm.kernels.compiled import (
+    compiled,
+    inlined_in_callers,
+    integer_scratch,
+    scratch,
+    vectorized_without_gil,
+    view,
+)
 from nmm.kernels.linear_algebra import EPSILON, orthonormal_rows
 from nmm.kernels.singular_values import MOST_SWEEPS
 
 #: Matrices a compiled call: what nothing interrupts.
-AT_ONCE = 1000
+AT_ONCE = 128
 #: More rows than these are first made triangular, which then turn orthogonal sooner.
 FEW_ROWS = 6
+#: So many matrices lie side by side; fewer, where they have so many numbers that a stack would overflow.
+SIDE_BY_SIDE, MOST_NUMBERS = 16, 1 << 14
 
 
-@compiled
+@inlined_in_callers
 def orthogonal_rows(A: Array, squares: Array) -> None:
-    """Turn the rows of A (k, m) until they are orthogonal, in place: their lengths are its singular values.
+    """Turn the rows of each matrix in A (k, m, N) until they are orthogonal, in place: their lengths are its
+    singular values.
 
-    squares (k,) : what they become. One-sided Jacobi (Hestenes 1958), as
+    The N matrices lie side by side, so that one instruction is for several; what a matrix becomes does not
+    depend on those beside it.
+
+    squares (k, N) : what the lengths squared become. One-sided Jacobi (Hestenes 1958), as
     `nmm.kernels.singular_values.singular_rows`, without the vectors and with each length carried along
     """
-    k, m = A.shape
+    k, m, N = A.shape
+    product, cosine, sine = scratch(N), scratch(N), scratch(N)
     for _ in range(MOST_SWEEPS):
         for i in range(k):
-            squares[i] = 0.0
+            for p in range(N):
+                squares[i, p] = 0.0
             for j in range(m):
-                squares[i] += A[i, j] * A[i, j]
+                for p in range(N):
+                    squares[i, p] += A[i, j, p] * A[i, j, p]
         turned = False
         for a in range(k - 1):
             for b in range(a + 1, k):
-                one, other, product = squares[a], squares[b], 0.0
+                for p in range(N):
+                    product[p] = 0.0
                 for j in range(m):
-                    product += A[a, j] * A[b, j]
-                if not abs(product) > EPSILON * math.sqrt(one) * math.sqrt(other):
+                    for p in range(N):
+                        product[p] += A[a, j, p] * A[b, j, p]
+                turning = 0
+                for p in range(N):
+                    turning += abs(product[p]) > EPSILON * math.sqrt(squares[a, p]) * math.sqrt(squares[b, p])
+                if turning == 0:
                     continue
                 turned = True
-                zeta = (other - one) / (2.0 * product)
-                tangent = (1.0 if zeta >= 0.0 else -1.0) / (abs(zeta) + math.sqrt(1.0 + zeta * zeta))
-                cosine = 1.0 / math.sqrt(1.0 + tangent * tangent)
-                sine = cosine * tangent
+                for p in range(N):
+                    one, other = squares[a, p], squares[b, p]
+                    turns = abs(product[p]) > EPSILON * math.sqrt(one) * math.sqrt(other)
+                    zeta = (other - one) / (2.0 * product[p] if turns else 1.0)
+                    tangent = (1.0 if zeta >= 0.0 else -1.0) / (abs(zeta) + math.sqrt(1.0 + zeta * zeta))
+                    along = 1.0 / math.sqrt(1.0 + tangent * tangent)
+                    cosine[p] = along if turns else 1.0
+                    sine[p] = along * tangent if turns else 0.0
+                    moved = tangent * product[p] if turns else 0.0
+                    squares[a, p] = max(one - moved, 0.0)
+                    squares[b, p] = max(other + moved, 0.0)
                 for j in range(m):
-                    first, second = A[a, j], A[b, j]
-                    A[a, j] = cosine * first - sine * second
-                    A[b, j] = sine * first + cosine * second
-                squares[a] = max(one - tangent * product, 0.0)
-                squares[b] = max(other + tangent * product, 0.0)
+                    for p in range(N):
+                        first, second = A[a, j, p], A[b, j, p]
+                        A[a, j, p] = cosine[p] * first - sine[p] * second
+                        A[b, j, p] = sine[p] * first + cosine[p] * second
         if not turned:
             break
+
+
+@compiled
+def put(J: Array, A: Array, p: int) -> None:
+    """A[:, :, p] = J (s, m), lying: A is (min(s, m), max(s, m), N); not numbers where one of J is not finite.
+
+    Of many rows the triangle that has their singular values, and zeros beside it.
+    """
+    s, m = J.shape
+    k, longer = A.shape[:2]
+    finite = True
+    for i in range(s):
+        for j in range(m):
+            finite = finite and math.isfinite(J[i, j])
+            if s <= m:
+                A[i, j, p] = J[i, j]
+            else:
+                A[j, i, p] = J[i, j]
+    if not finite:
+        for i in range(k):
+            for j in range(longer):
+                A[i, j, p] = math.nan
+    elif k > FEW_ROWS:
+        rows, ones, order = scratch((k, longer)), scratch(k), integer_scratch(k)
+        L, Q = scratch((k, k)), scratch((k, longer))
+        for i in range(k):
+            ones[i] = 1.0
+            for j in range(longer):
+                rows[i, j] = A[i, j, p]
+        if orthonormal_rows(rows, ones, order, L, Q) > 0.0:
+            for i in range(k):
+                for j in range(longer):
+                    A[i, j, p] = L[j, i] if j < k else 0.0
+
+
+@compiled
+def write_roots(squares: Array, p: int, found: Array) -> None:
+    """found (k,): the roots of squares[:, p], falling."""
+    for i in range(squares.shape[0]):
+        value, place = math.sqrt(squares[i, p]), i
+        while place > 0 and found[place - 1] < value:
+            found[place] = found[place - 1]
+            place -= 1
+        found[place] = value
 
 
 WRITE_SPECTRA = types.void(types.float64[:, :, ::1], types.float64[:, ::1])
 
 
-@compiled_without_gil
+@vectorized_without_gil
 def write_spectra(J: Array, found: Array) -> None:
     """found (N, k): the singular values of J (N, s, m), k = min(s, m), falling; NaN where J is not finite."""
     s, m = J.shape[1], J.shape[2]
     k, longer = min(s, m), max(s, m)
-    A, R, squares, ones = scratch((k, longer)), scratch((k, k)), scratch(k), scratch(k)
-    L, Q, order = scratch((k, k)), scratch((k, longer)), integer_scratch(k)
-    for i in range(k):
-        ones[i] = 1.0
-    for p in range(J.shape[0]):
-        finite = True
-        for i in range(s):
-            for j in range(m):
-                finite = finite and math.isfinite(J[p, i, j])
-                if s <= m:
-                    A[i, j] = J[p, i, j]
-                else:
-                    A[j, i] = J[p, i, j]
-        if not finite:
-            for i in range(k):
-                found[p, i] = math.nan
-            continue
-        if k > FEW_ROWS and orthonormal_rows(A, ones, order, L, Q) > 0.0:
-            for i in range(k):
-                for j in range(k):
-                    R[i, j] = L[j, i]
-            orthogonal_rows(R, squares)
-        else:
-            orthogonal_rows(A, squares)
-        for i in range(k):
-            value, place = math.sqrt(squares[i]), i
-            while place > 0 and found[p, place - 1] < value:
-                found[p, place] = found[p, place - 1]
-                place -= 1
-            found[p, place] = value
+    width = max(1, min(SIDE_BY_SIDE, J.shape[0], MOST_NUMBERS // (k * longer)))
+    A, squares = scratch((k, longer, width)), scratch((k, width))
+    for first in range(0, J.shape[0], width):
+        for p in range(width):  # where none is left, the last one again
+            put(view(J, min(first + p, J.shape[0] - 1) * s * m, (s, m)), A, p)
+        orthogonal_rows(A, squares)
+        for p in range(min(width, J.shape[0] - first)):
+            write_roots(squares, p, view(found, (first + p) * k, (k,)))
+
+
+@compiled
+def write_spectrum(J: Array, found: Array) -> None:
+    """found (min(s, m),): the singular values of one J (s, m), as `write_spectra`."""
+    k, longer = min(J.shape), max(J.shape)
+    A, squares = scratch((k, longer, 1)), scratch((k, 1))
+    put(J, A, 0)
+    orthogonal_rows(A, squares)
+    write_roots(squares, 0, found)
 
 
 def spectra(J: Array, threads: int | None = None) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 
 from nmm.arrays import Array
 from nmm.kernels.compiled import compiled, compiled_without_gil, scratch, view
-from nmm.kernels.spectra import write_spectra
+from nmm.kernels.spectra import write_spectrum
 from nmm.runs.recorded import Recorded
 
 #: What `measure` writes, in order. Norms are over the task's rows in their mixed units, as in a summary.
@@ -43,7 +43,7 @@ def least_singular_value(J: Array, count: int) -> float:
     to the last one decomposed that it stays above the least so far nothing more need be known.
     """
     s, m = J.shape[1], J.shape[2]
-    found = scratch((1, min(s, m)))
+    found = scratch(min(s, m))
     least = math.inf
     for stride in STRIDES:
         last = -1
@@ -53,10 +53,10 @@ def least_singular_value(J: Array, count: int) -> float:
                 for i in range(s):
                     for j in range(m):
                         square += (J[k, i, j] - J[last, i, j]) ** 2
-                if found[0, found.shape[1] - 1] - math.sqrt(square) > least + ROUNDING * found[0, 0]:
+                if found[found.shape[0] - 1] - math.sqrt(square) > least + ROUNDING * found[0]:
                     continue
-            write_spectra(view(J, k * s * m, (1, s, m)), found)
-            least, last = min(least, found[0, found.shape[1] - 1]), k
+            write_spectrum(view(J, k * s * m, (s, m)), found)
+            least, last = min(least, found[found.shape[0] - 1]), k
     return least
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from nmm.analysis.maps.measures import Spectra, chosen, volume
 from nmm.analysis.singular.jacobians import Jacobians, Subject
-from nmm.analysis.singular.parts import WHOLE, expect_inputs, groups, ranks
+from nmm.analysis.singular.parts import WHOLE, expect_inputs, groups, ranks, some_columns
 from nmm.analysis.singular.singularity import TOLERANCE
 from nmm.arrays import Array, Integers, scalar
 from nmm.errors import InputError
@@ -124,12 +124,14 @@ class Evaluator:
 
     def J(self, q: Array, progress: Progress | None = None) -> Array:
         """Scaled J (N, s, m) at q (N, n)."""
-        return self.jacobians.batch(q, self.t, progress) * self._factors
+        J = self.jacobians.batch(q, self.t, progress)
+        J *= self._factors
+        return J
 
     def part_of(self, part: str) -> Callable[[Array], Array]:
         """q (N, n) -> the part's columns of the scaled J."""
         columns = self.columns[part]
-        return lambda q: self.J(q)[:, :, columns]
+        return lambda q: some_columns(self.J(q), columns)
 
     def __call__(self, q: Array, progress: Progress | None = None, *, arm: bool = False) -> Evaluated:
         """All measures at q (N, n), chunk after chunk; what is the arm's only if it is asked for."""

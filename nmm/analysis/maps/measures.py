@@ -13,7 +13,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from nmm.analysis.singular.parts import singular_values
+from nmm.analysis.singular.parts import singular_values, some_columns
 from nmm.arrays import Array
 from nmm.errors import InputError, expect_known
 
@@ -29,14 +29,14 @@ class Spectra:
 
     def __init__(self, J: Array, columns: Mapping[str, Sequence[int]]) -> None:
         self.undefined = np.asarray(~np.isfinite(J).all(axis=(1, 2)))
-        self._J = np.where(self.undefined[:, np.newaxis, np.newaxis], 0.0, J)
+        self._J = np.where(self.undefined[:, np.newaxis, np.newaxis], 0.0, J) if self.undefined.any() else J
         self._columns = columns
         self._found: dict[str, Array] = {}
 
     def of(self, part: str) -> Array:
         """(N, s), falling; zeros where the part has fewer inputs than the task rows; NaN where J is."""
         if part not in self._found:
-            values = singular_values(self._J[:, :, list(self._columns[part])])
+            values = singular_values(some_columns(self._J, self._columns[part]))
             values[self.undefined] = np.nan
             self._found[part] = values
         return self._found[part]

@@ -19,7 +19,7 @@ AXES = "xyz"
 #: Newton steps onto a place.
 STEPS = 12
 #: Postures a compiled call: what nothing interrupts.
-AT_ONCE = 1000
+AT_ONCE = 128
 
 
 class Reach:

@@ -10,7 +10,7 @@ the determinant changes its sign. So a range's end that is singular is found too
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -18,6 +18,7 @@ import numpy as np
 from nmm.analysis.maps.lines import curves_and_points
 from nmm.analysis.singular.singularity import TOLERANCE
 from nmm.arrays import Array, Integers
+from nmm.cores import over_cores
 from nmm.kernels.spectra import spectra
 from nmm.progress import Progress
 
@@ -27,6 +28,8 @@ STEP = 1e-4
 FARTHEST, STEPS = 2.5, 40
 #: A minimum whose value is this many times what its neighbours are above it is far from zero.
 STEEP = 4.0
+#: So many points' steps are found at a time.
+AT_ONCE = 128
 #: Where all nodes are singular, so many places between them tell whether all the plane is; if not, curves run
 #: as regularly as the nodes, and are searched on a grid of at least so many nodes along each axis.
 BETWEEN, FINEST = 16, 41
@@ -192,29 +195,40 @@ def polish(
     return x[done]
 
 
-def _steps(J_of: Callable[[Array], Array], x: Array, U: Array, values: Array, Vt: Array) -> Iterator[Array]:
-    """The shortest steps (N, d) to where uᵀJ is zero to first order, as a whole and in its leading part.
+def _steps(J_of: Callable[[Array], Array], x: Array, U: Array, values: Array, Vt: Array) -> Array:
+    """The shortest steps (2, N, d) to where uᵀJ is zero to first order, as a whole and in its leading part.
 
     u belongs to the singular value that would be zero first along its own gradient. The other singular
     vectors turn so that they take their own part of uᵀ dJ; only what is outside them counts. A point needs
     the whole of that. On the way to a curve what is not the leading part tells only how the curve bends, and
     a step that heeds it goes astray.
     """
-    rates = np.stack(
-        [(J_of(x + STEP * unit) - J_of(x - STEP * unit)) / (2.0 * STEP) for unit in np.eye(x.shape[1])],
-        axis=-1,
-    )
-    rates = np.nan_to_num(rates)  # (N, s, m, d)
+    ways = STEP * np.eye(x.shape[1])
+    beside = np.concatenate([*(x + way for way in ways), *(x - way for way in ways)])
+    ahead, behind = J_of(beside).reshape(2, len(ways), *U.shape[:2], -1)
+    rates = np.nan_to_num(np.stack(list((ahead - behind) / (2.0 * STEP)), axis=-1))  # (N, s, m, d)
+    found = np.empty((2, *x.shape))
+
+    def write(first: int, last: int) -> None:
+        some = slice(first, last)
+        found[:, some] = _shortest(rates[some], U[some], values[some], Vt[some])
+
+    over_cores(len(x), AT_ONCE, lambda: write)
+    return found
+
+
+def _shortest(rates: Array, U: Array, values: Array, Vt: Array) -> Array:
+    """These steps, from dJ (N, s, m, d)."""
     turned = np.einsum("nai,najk->nijk", U, rates)
     gradients = np.einsum("nijk,nij->nik", turned, Vt)
     steepness = np.linalg.norm(gradients, axis=2)
     distance = np.where(steepness > 0.0, values / np.where(steepness > 0.0, steepness, 1.0), np.inf)
     own = np.argmin(distance, axis=1)
-    every = np.arange(len(x))
+    every = np.arange(len(rates))
     rate = turned[every, own]
     others = Vt.copy()
     others[every, own] = 0.0
     rate = rate - np.einsum("nij,nik->njk", others, np.einsum("nij,njk->nik", others, rate))
     residual = values[every, own, np.newaxis] * Vt[every, own]
-    for rcond in (1e-5, 0.99):
-        yield -np.einsum("ndm,nm->nd", np.linalg.pinv(rate, rcond=rcond), residual)
+    ways = [np.linalg.pinv(rate, rcond=rcond) for rcond in (1e-5, 0.99)]
+    return np.array([-np.einsum("ndm,nm->nd", way, residual) for way in ways])

@@ -16,7 +16,7 @@ from nmm.kernels.memory import views
 from nmm.progress import Progress
 
 #: Configurations a compiled call: what nothing interrupts.
-AT_ONCE = 1000
+AT_ONCE = 128
 
 
 @compiled_without_gil

@@ -86,6 +86,11 @@ def singular_values(J: Array) -> Array:
     return found
 
 
+def some_columns(J: Array, columns: Sequence[int]) -> Array:
+    """Some columns of J (N, s, m); J itself, not a copy, where they are all."""
+    return J if list(columns) == list(range(J.shape[2])) else J[:, :, list(columns)]
+
+
 def ranks(values: Array, largest: Array, tolerance: float, natural: float = 1.0) -> Integers:
     """How many singular values (..., s) exceed tolerance * largest (...), or * natural if that is more.
 
