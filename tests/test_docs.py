@@ -16,6 +16,7 @@ import pytest
 from derivatives import check_function
 
 import nmm
+from nmm.bundled import bundled_scenarios
 from nmm.kinds import OBJECTIVES, PLATFORMS, REFERENCES, RESOLVERS, TASKS, Kinds
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -34,6 +35,14 @@ def script(name: str) -> Any:
 def test_the_page_of_scenario_keys_is_the_schemas() -> None:
     expected = (ROOT / "docs" / "scenarios.md").read_text(encoding="utf-8")
     assert script("make_scenario_keys").page() == expected, "run python docs/make_scenario_keys.py"
+
+
+def test_the_gallery_is_that_of_the_scenarios() -> None:
+    expected = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    gallery = script("make_gallery")
+    assert gallery.page() == expected, "run python docs/make_gallery.py"
+    pictures = {path.stem for path in gallery.PICTURES.iterdir()}
+    assert pictures == {*bundled_scenarios()}, "run python docs/make_gallery.py"
 
 
 def words_and_numbers(text: str) -> tuple[list[str], list[float]]:
@@ -97,7 +106,7 @@ def test_the_worked_examples_can_be_typed_in(tmp_path: Path, monkeypatch: pytest
 
 
 @pytest.mark.parametrize(
-    "page", ["README.md", *(f"docs/{path.name}" for path in sorted((ROOT / "docs").glob("*.md")))]
+    "page", ["README.md", *(f"{path.relative_to(ROOT)}" for path in sorted((ROOT / "docs").rglob("*.md")))]
 )
 def test_links_between_files_lead_somewhere(page: str) -> None:
     text = (ROOT / page).read_text(encoding="utf-8")

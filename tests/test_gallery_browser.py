@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-import functools
-import http.server
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
-
 import pytest
 from playback_browser import Window
 from playback_browser import browser as browser
 from playback_browser import empty_page as empty_page
 from playback_browser import window as window
+from ports import served_folder
 
 from nmm.gallery import Gallery, write_gallery
 
@@ -26,24 +20,12 @@ def gallery(tmp_path_factory: pytest.TempPathFactory) -> Gallery:
     return write_gallery(folder, ["unicycle_2r_position"], jobs=1)
 
 
-@contextmanager
-def served(folder: Path) -> Iterator[str]:
-    handler = functools.partial(http.server.SimpleHTTPRequestHandler, directory=folder)
-    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    try:
-        yield f"http://127.0.0.1:{server.server_port}"
-    finally:
-        server.shutdown()
-        server.server_close()
-
-
 @pytest.mark.parametrize("width", [420, 1280])
 def test_the_page_fits_its_window(gallery: Gallery, window: Window, width: int) -> None:
     page = window.open(gallery.index.as_uri())
     page.set_viewport_size({"width": width, "height": 900})
     assert page.evaluate("document.documentElement.scrollWidth") == width
-    assert page.evaluate("[...document.images].every(image => image.naturalWidth > 500)")
+    page.wait_for_function("[...document.images].every(image => image.naturalWidth > 500)")
 
 
 @pytest.mark.parametrize("how", ["as a file", "from a server"])
@@ -58,6 +40,6 @@ def test_a_motion_plays_with_the_script_beside_it(gallery: Gallery, window: Wind
     if how == "as a file":
         plays(gallery.folder.as_uri())
         return
-    with served(gallery.folder) as start:
+    with served_folder(gallery.folder) as start:
         plays(start)
         window.page.goto("about:blank")
