@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import http.server
 import socket
 import subprocess
 import sys
@@ -80,3 +82,16 @@ def served(program: Callable[..., object], *arguments: object, **options: object
         thread.join(timeout=MOST)
     assert not thread.is_alive()
     assert port not in listening()
+
+
+@contextmanager
+def served_folder(folder: Path) -> Iterator[str]:
+    """The address, without a stroke at its end, at which a folder's files are served."""
+    handler = functools.partial(http.server.SimpleHTTPRequestHandler, directory=folder)
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    try:
+        yield f"http://127.0.0.1:{server.server_port}"
+    finally:
+        server.shutdown()
+        server.server_close()

@@ -19,6 +19,7 @@ from short_scenario import MINIMAL
 
 import nmm
 from nmm.driving import ScenarioSetup, drive
+from nmm.gallery import write_gallery
 from nmm.playback import view, write_html
 
 pytestmark = pytest.mark.browser
@@ -54,6 +55,11 @@ def a_sweep(folder: Path) -> Iterator[str]:
     yield sweep.run(folder / "out", jobs=1).page.as_uri()
 
 
+@contextmanager
+def a_gallery(folder: Path) -> Iterator[str]:
+    yield write_gallery(folder / "out", ["unicycle_3r_out_of_reach"], jobs=1).index.as_uri()
+
+
 def a_robot(folder: Path) -> AbstractContextManager[str]:
     robot = nmm.load("unicycle_3r")
     return served(view, robot, None, task=[nmm.Position("ee")])
@@ -64,7 +70,7 @@ def a_driven_robot(folder: Path) -> AbstractContextManager[str]:
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("shown", [a_run, a_comparison, a_sweep, a_robot, a_driven_robot])
+@pytest.mark.parametrize("shown", [a_run, a_comparison, a_sweep, a_gallery, a_robot, a_driven_robot])
 def test_a_page_has_no_serious_fault(
     empty_page: Page,
     axe: str,

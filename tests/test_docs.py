@@ -19,6 +19,7 @@ import typer
 from derivatives import check_function
 
 import nmm
+from nmm.bundled import bundled_scenarios
 from nmm.cli.app import app
 from nmm.kinds import OBJECTIVES, PLATFORMS, REFERENCES, RESOLVERS, TASKS, Kinds
 
@@ -39,6 +40,14 @@ def script(name: str) -> Any:
 def test_the_page_of_scenario_keys_is_the_schemas() -> None:
     expected = (ROOT / "docs" / "scenarios.md").read_text(encoding="utf-8")
     assert script("make_scenario_keys").page() == expected, "run python docs/make_scenario_keys.py"
+
+
+def test_the_gallery_is_that_of_the_scenarios() -> None:
+    expected = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    gallery = script("make_gallery")
+    assert gallery.page() == expected, "run python docs/make_gallery.py"
+    pictures = {path.stem for path in gallery.PICTURES.iterdir()}
+    assert pictures == {*bundled_scenarios()}, "run python docs/make_gallery.py"
 
 
 def words_and_numbers(text: str) -> tuple[list[str], list[float]]:

@@ -7,6 +7,7 @@
     options         options that several commands have, and what their texts mean
     subjects        what an analysis is about: a robot with a task, a scenario, a run
     runs            run, compare, paper, play
+    gallery         gallery
     descriptions    info
     checking        check
     viewing         view

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from nmm.cli.gallery import gallery
 from nmm.cli.groups import Browser, Ellipsoids, Figures, OfRobot, command
 from nmm.cli.mapping import map_measures
 from nmm.cli.options import (
@@ -58,7 +59,7 @@ def nmm(
     """Motion generation for nonholonomic mobile manipulators: a manipulator on a wheeled platform.
 
     \b
-    nmm scenarios                             what there is to run
+    nmm scenarios                             what there is to run (nmm gallery shows it)
     nmm init my_robot.urdf                    a first scenario for a robot of your own
     nmm run unicycle_2r_position              run it: figures and numbers in runs/
     nmm run unicycle_2r_position --play       and watch it in the browser
@@ -266,6 +267,7 @@ for _name, _command in (
     ("redundancy", redundancy),
     ("laps", laps),
     ("sweep", sweep),
+    ("gallery", gallery),
     ("scenarios", scenarios),
     ("robots", robots),
 ):

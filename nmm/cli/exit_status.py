@@ -21,7 +21,7 @@ _USAGE_ERROR: type[Exception] = typer.BadParameter.mro()[2]
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 #: Their exit status tells how a run ended.
-TELLING = ("run", "compare", "laps", "paper", "sweep")
+TELLING = ("run", "compare", "laps", "paper", "sweep", "gallery")
 
 
 def status_of(arguments: Sequence[str]) -> int:

@@ -41,18 +41,18 @@ def write_html(
     ------
     InputError : no motion, or the file cannot be written; ellipsoids as in `playback_scene`
     """
-    options = {"ghosts": ghosts, "fps": fps, "autoplay": autoplay}
+    options: dict[str, Any] = {"ghosts": ghosts, "fps": fps, "autoplay": autoplay}
     return _write(Path(path), page_of(motions, title, ellipsoids, **options)[1])
 
 
 def page_of(
-    motions: Sequence[Shown], title: str | None, ellipsoids: Wanted, **options: Any
+    motions: Sequence[Shown], title: str | None, ellipsoids: Wanted, viewer: str = "", **options: Any
 ) -> tuple[str, str]:
-    """The page's heading, and the page; options as of `playback_scene`."""
+    """The page's heading, and the page; viewer as of `file_page`, options as of `playback_scene`."""
     if title is None:
         title = motions[0].robot.name if motions else ""
     commands = playback_scene(motions, title=title, ellipsoids=ellipsoids, **options)
-    return title, file_page(commands, title)
+    return title, file_page(commands, title, viewer=viewer)
 
 
 def _write(path: Path, text: str) -> Path:

@@ -38,21 +38,44 @@ SCRIPTS = (
     "start.js",
 )
 
-#: What the browser may load: nothing but the page itself (and the socket that it came with). MeshCat
-#: evaluates text, and so do the tools that test pages.
+#: What the browser may load: nothing but the page itself (and the socket that it came with, or the script
+#: beside it). MeshCat evaluates text, and so do the tools that test pages.
 POLICY = (
-    "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; "
+    "default-src 'none'; script-src {beside}'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; "
     "img-src data: blob:; connect-src {sources}"
 )
 
 
 def file_page(
-    commands: Iterable[Command], title: str, *, scripts: Sequence[str] = (), styles: Sequence[str] = ()
+    commands: Iterable[Command],
+    title: str,
+    *,
+    scripts: Sequence[str] = (),
+    styles: Sequence[str] = (),
+    viewer: str = "",
 ) -> str:
-    """A page that holds its commands and needs nothing else; scripts and styles as of `socket_page`."""
+    """A page that holds its commands and needs nothing else; scripts and styles as of `socket_page`.
+
+    Parameters
+    ----------
+    viewer : where, seen from the page, a file with the text of `viewer_script` is, which it then needs
+    """
     lines = "\n".join(encode(command) for command in commands)
     block = f'<script type="application/json" id="commands">\n{lines}\n</script>\n'
-    return _page(title, source="page", sources="'none'", before_scripts=block, scripts=scripts, styles=styles)
+    return _page(
+        title,
+        source="page",
+        sources="'none'",
+        before_scripts=block,
+        scripts=scripts,
+        styles=styles,
+        viewer=viewer,
+    )
+
+
+def viewer_script() -> str:
+    """The scripts of pages that play, for many pages beside one another: most of a short run's page."""
+    return "\n".join([_meshcat_viewer(), *(_resource(name) for name in SCRIPTS)])
 
 
 def socket_page(
@@ -84,17 +107,22 @@ def _page(
     token: str = "",
     scripts: Sequence[str] = (),
     styles: Sequence[str] = (),
+    viewer: str = "",
 ) -> str:
     *libraries, start = SCRIPTS
-    code = "\n".join(f"<script>\n{_resource(name)}</script>" for name in (*libraries, *scripts, start))
+    if viewer:
+        meshcat, code = "", f'<script src="{html.escape(viewer)}"></script>'
+    else:
+        meshcat = f"<script>\n{_meshcat_viewer()}\n</script>"
+        code = "\n".join(f"<script>\n{_resource(name)}</script>" for name in (*libraries, *scripts, start))
     parts = {
-        "policy": POLICY.format(sources=sources),
+        "policy": POLICY.format(sources=sources, beside="'self' file: " if viewer else ""),
         "version": metadata.version("nmm"),
         "title": html.escape(title),
         "source": source,
         "token": token,
         "style": "\n".join(_resource(name) for name in ("style.css", "plots.css", *styles)),
-        "meshcat": _meshcat_viewer(),
+        "meshcat": meshcat,
         "scripts": before_scripts + code,
     }
     # Split once, so that nothing that is put in is searched for more places.

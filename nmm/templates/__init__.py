@@ -1,14 +1,17 @@
-"""Pages from templates: strict about names, and careful with what users wrote."""
+"""Pages from templates: strict about names, and careful with what users wrote.
+
+`page.css` is the look of a page to be read, light and dark; any template may include it.
+"""
 
 from __future__ import annotations
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, Template
 
 
 def template(package: str, folder: str, name: str) -> Template:
     """A template in a package's folder; a name that it is not given is an error, and text is escaped."""
     environment = Environment(
-        loader=PackageLoader(package, folder),
+        loader=ChoiceLoader([PackageLoader(package, folder), PackageLoader("nmm.templates", ".")]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

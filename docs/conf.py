@@ -1,0 +1,67 @@
+"""The site: `sphinx-build -W -b html docs site`, offline; `pip install 'nmm[docs]'` has what it needs."""
+
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE.parent), str(HERE / "building")]
+
+from docstrings import as_rst  # noqa: E402
+from frames import copy_frames, without_missing_frames  # noqa: E402
+from keyboards import for_keyboards  # noqa: E402
+from notebooks import NotebookParser  # noqa: E402
+from short_names import short_name  # noqa: E402
+
+import nmm  # noqa: E402
+
+project, author, copyright = "nmm", "The nmm developers", "The nmm developers"
+version = release = nmm.__version__
+extensions = ["sphinx.ext.autodoc", "myst_parser"]
+exclude_patterns = ["building"]
+
+# Anchors as code hosts make them, so that a link works here and there.
+myst_heading_anchors = 4
+myst_enable_extensions = ["colon_fence"]
+
+default_role = "py:obj"
+autodoc_default_options = {"members": True, "inherited-members": False}
+autodoc_member_order = "bysource"
+autodoc_inherit_docstrings = False  # a kind's methods are told once, at its base class
+autodoc_typehints_format = "short"
+autodoc_preserve_defaults = True
+#: What these stand for is told in words.
+autodoc_type_aliases = {
+    name: name for name in ("Array", "ArrayLike", "Integers", "Subject", "Named", "Weights")
+}
+add_module_names = False
+toc_object_entries_show_parents = "hide"
+
+html_theme = "furo"
+html_title = f"nmm {release}"
+html_static_path = ["building/site.css"]
+html_css_files = ["site.css"]
+html_favicon = "building/icon.svg"
+html_copy_source = False
+pygments_style, pygments_dark_style = "a11y-high-contrast-light", "a11y-high-contrast-dark"
+
+
+def setup(app: Any) -> None:
+    """Docstrings and notebooks as they are written here; pages that a keyboard can read."""
+    app.add_source_suffix(".ipynb", "notebook")
+    app.add_source_parser(NotebookParser)
+    app.connect("source-read", only_folders_that_are_there)
+    app.connect("autodoc-process-docstring", lambda *given: as_rst(given[-1]))
+    app.connect("missing-reference", short_name)
+    app.connect("html-page-context", without_missing_frames, priority=900)
+    app.connect("html-page-context", for_keyboards, priority=900)
+    app.connect("build-finished", copy_frames)
+
+
+def only_folders_that_are_there(app: Any, name: str, source: list[str]) -> None:
+    """Leave out a part of the contents whose folder has no page yet, of which Sphinx warns."""
+    for part in re.findall(r"```\{toctree\}\n.*?```\n", source[0] if name == "index" else "", re.DOTALL):
+        patterns = re.findall(r"^\S*\*$", part, re.MULTILINE)
+        if patterns and not any(found for one in patterns for found in HERE.glob(f"{one}.*")):
+            source[0] = source[0].replace(part, "")

@@ -1,0 +1,45 @@
+"""The gallery in a browser: its page on a screen and on a phone, and its motions, which share one script."""
+
+from __future__ import annotations
+
+import pytest
+from playback_browser import Window
+from playback_browser import browser as browser
+from playback_browser import empty_page as empty_page
+from playback_browser import window as window
+from ports import served_folder
+
+from nmm.gallery import Gallery, write_gallery
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture(scope="module")
+def gallery(tmp_path_factory: pytest.TempPathFactory) -> Gallery:
+    folder = tmp_path_factory.mktemp("out") / "gallery"
+    return write_gallery(folder, ["unicycle_2r_position"], jobs=1)
+
+
+@pytest.mark.parametrize("width", [420, 1280])
+def test_the_page_fits_its_window(gallery: Gallery, window: Window, width: int) -> None:
+    page = window.open(gallery.index.as_uri())
+    page.set_viewport_size({"width": width, "height": 900})
+    assert page.evaluate("document.documentElement.scrollWidth") == width
+    page.wait_for_function("[...document.images].every(image => image.naturalWidth > 500)")
+
+
+@pytest.mark.parametrize("how", ["as a file", "from a server"])
+def test_a_motion_plays_with_the_script_beside_it(gallery: Gallery, window: Window, how: str) -> None:
+    def plays(start: str) -> None:
+        page = window.open(f"{start}/unicycle_2r_position/playback.html")
+        page.evaluate("nmm.seek(12.5)")
+        state = page.evaluate("nmm.state()")
+        assert state["t"] == pytest.approx(12.5)
+        assert [run["name"] for run in state["runs"]] == ["RG"]
+
+    if how == "as a file":
+        plays(gallery.folder.as_uri())
+        return
+    with served_folder(gallery.folder) as start:
+        plays(start)
+        window.page.goto("about:blank")
