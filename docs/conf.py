@@ -44,6 +44,7 @@ html_static_path = ["building/site.css"]
 html_css_files = ["site.css"]
 html_favicon = "building/icon.svg"
 html_copy_source = False
+suppress_warnings = ["misc.highlighting_failure"]  # a terminal's text may hold anything
 pygments_style, pygments_dark_style = "a11y-high-contrast-light", "a11y-high-contrast-dark"
 
 
