@@ -35,18 +35,26 @@ def over_cores(
     ----------
     count : how many items
     worker : called once in each thread: what does the pieces there, with memory that is this thread's alone
-    progress : called with the fraction done, from this thread
+    progress : called with the fraction begun, once for each piece in their order, from this thread
     threads : how many at most, as many as there are cores when None
     """
     left = iter(range(0, count, at_once))  # next(left) is one step to all threads: none takes another's piece
     threads = min(cores() if threads is None else threads, -(-count // at_once))
+    untold = iter(range(0, count, at_once))
 
-    def take(told: Progress | None = None) -> None:
+    def tell(last: int) -> None:
+        for first in untold:
+            if progress is not None:
+                progress(first / count)
+            if first >= last:
+                break
+
+    def take(begun: Callable[[int], None] | None = None) -> None:
         try:
             work = worker()
             for first in left:
-                if told is not None:
-                    told(first / count)
+                if begun is not None:
+                    begun(first)
                 work(first, min(first + at_once, count))
         except BaseException:
             for _ in left:  # nobody shall take it
@@ -55,7 +63,8 @@ def over_cores(
 
     helping = [_helpers().submit(take) for _ in range(1, threads)]
     try:
-        take(progress)
+        take(tell)
+        tell(count)
     finally:
         for one in helping:
             if not one.cancel():

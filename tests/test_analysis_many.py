@@ -237,3 +237,14 @@ def test_work_within_work_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
 
     cores.over_cores(6, 1, lambda: outer)
     assert np.all(done == 1)
+
+
+def test_progress_is_told_piece_by_piece_whoever_does_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    with_cores(monkeypatch, 2)
+    here, seen = threading.current_thread(), list[float]()
+
+    def work(first: int, last: int) -> None:
+        time.sleep(0.05 if threading.current_thread() is here else 0.0)
+
+    cores.over_cores(40, 1, lambda: work, seen.append)
+    assert seen == [k / 40 for k in range(40)]
