@@ -152,10 +152,7 @@ class ScenarioPart(Part):
             named = self.q0 if isinstance(self.q0, dict) else {}
             for name in named:
                 with at(name):
-                    if name == POSTURE and name not in robot.q_names:
-                        robot.postures.within({name: named[name]})
-                    else:
-                        robot.coordinate(name)
+                    robot.q({name: named[name]})
             come_back = self.limits is not None and self.limits.position is not False
             robot.check_limits(robot.q(self.q0), come_back=come_back)
 

@@ -10,7 +10,6 @@ import numpy as np
 import pinocchio as pin
 
 from nmm.errors import RobotError, unknown
-from nmm.robots.loading.provenance import provenance_of
 from nmm.robots.loading.srdf import Group, Srdf, read_srdf, srdf_beside
 from nmm.robots.robot import Robot
 from nmm.robots.semantics import Postures, Semantics
@@ -77,8 +76,7 @@ def _coordinates(
     state: Mapping[str, tuple[float, ...]], roots: set[str], robot: Robot, name: str, notes: list[str]
 ) -> dict[str, float]:
     """The coordinates that a state sets, m and rad: neither wheels nor what is locked or follows."""
-    made = provenance_of(robot)
-    still = {**made.locked, **{joint: value for joint, (_, value) in made.mimicked.items()}}
+    still = robot.locked
     values: dict[str, float] = {}
     for joint, numbers in state.items():
         if joint in roots:
