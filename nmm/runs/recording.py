@@ -20,7 +20,7 @@ from nmm.resolvers.answer import Status
 from nmm.runs.broken_limits import broken_limits, broken_rows
 from nmm.runs.clearance import ran_into, swept, told
 from nmm.runs.feedback import Feedback
-from nmm.runs.margins import margin, shares
+from nmm.runs.margins import margin, shares, standing
 from nmm.runs.promise import Samples
 from nmm.runs.reasons import weakest_words
 from nmm.runs.recorded import Recorded, room
@@ -298,7 +298,7 @@ class Recorder:
             scale=found.scale.copy(),
             step_size=found.step_size.copy(),
             limited=controller.limits is not None,
-            margin=margin(within),
+            margin=margin(within[:, ~standing(robot, limited, within)]),
             shares=within,
             limit_names=limited,
             unmet=residuals(self.t, found.residual, found.rate),
