@@ -17,6 +17,7 @@ from nmm.functions.program import COMPILED
 from nmm.kernels.spectra import spectra
 from nmm.memory import expect_memory
 from nmm.resolvers.answer import Status
+from nmm.runs.binding import binding
 from nmm.runs.broken_limits import broken_limits, broken_rows
 from nmm.runs.clearance import ran_into, swept, told
 from nmm.runs.feedback import Feedback
@@ -280,6 +281,8 @@ class Recorder:
                 "obstacles": distance.obstacles,
             }
         limited, within = shares(kept, robot, found.q, found.u, found.limited)
+        if outcome is Outcome.MISSED and controller.limits is not None:
+            message = "; ".join(filter(None, [message, binding(limited, within, found.scale)]))
         path = self._shown.path(robot, found.q)
         desired = self._shown.desired(path, found.r_d) if path is not None and self._shown.rows else None
         return Trajectory(

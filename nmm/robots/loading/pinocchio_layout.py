@@ -247,7 +247,11 @@ class PinocchioLayout:
         names = {str(model.names[joint]) for joint, _ in pairs}
         missing = [name for name in own if name not in names]
         if missing:
-            raise InputError(f"{robot.name}: the model has no joint {', '.join(missing)}")
+            steered = [wheel.swivel for wheel in robot.wheels if wheel.swivel in model.names]
+            own = [name for name in missing if name in robot.platform.coordinates and steered]
+            why = f": {own[0]} is nmm's own, and {', '.join(steered)} follow it" if own else ""
+            hint = "; give a root (planar, freeflyer, chain) for a model made here" if own else ""
+            raise InputError(f"{robot.name}: the model has no joint {', '.join(missing)}{why}{hint}")
         return pairs, still
 
     def _is_angle(self, joint: int) -> bool:
