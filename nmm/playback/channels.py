@@ -122,8 +122,9 @@ def _of_task(run: Trajectory) -> Iterator[Channel]:
         for i in range(levels):
             text = "λ" if levels == 1 else f"λ of level {i + 1}"
             yield Channel(f"scale_{i}", text, "", "scale", run.scale[:, i])
-    if run.shares.shape[1] and len(run.shares) == len(run):
-        yield Channel("margin", "least margin", "", "margin", np.round(run.margin, 8) + 0.0, (0.0, np.inf))
+    if run.shares.shape[1] and len(run.shares) == len(run.margin) == len(run):
+        least = np.where(np.abs(run.margin) < ROUNDING, 0.0, run.margin)
+        yield Channel("margin", "least margin", "", "margin", least, (0.0, np.inf))
     yield Channel("residual", "‖J u − rate‖", "", "residual", run.residual, log=True)
     if np.isfinite(run.clearance).any():
         yield Channel(
