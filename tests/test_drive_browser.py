@@ -15,6 +15,7 @@ from ports import MOST, served
 
 import nmm
 from nmm.driving import ScenarioSetup, drive
+from nmm.looks import RESOLVERS
 from nmm.robots.configuration import Configuration
 
 pytestmark = pytest.mark.browser
@@ -115,6 +116,13 @@ def test_an_arrow_goes_along_its_axis_and_keys_too(window: Window, setup: Scenar
         box.fill("0.25")
         box.press("Enter")
         assert target(page)[0] == 0.25
+        box.fill("1e9")  # the program does not listen to that
+        box.press("Enter")
+        assert target(page)[0] == 0.25
+        assert box.evaluate("box => box.validationMessage").startswith("from ")
+        box.fill("0.5")
+        box.press("Enter")
+        assert target(page)[0] == 0.5
         box.press("ArrowUp")  # the box's own key, and nobody else's
         assert target(page)[1] == before[1]
 
@@ -124,7 +132,11 @@ def test_what_is_chosen_changes_the_controller(window: Window, setup: ScenarioSe
         page = opened(window, url)
         kinds = page.locator('select[data-key="resolver.kind"]')
         assert kinds.input_value() == "rg"
+        assert page.evaluate("nmm.camera.following")
+        assert page.locator("#follow").get_attribute("aria-pressed") == "true"
+        assert page.evaluate("nmm.runs[0].color") == RESOLVERS["rg"][0]
         kinds.select_option("pg")
+        page.wait_for_function(f"nmm.runs[0].color === '{RESOLVERS['pg'][0]}'")
         page.locator('input[data-key="limits"]').check()
         page.wait_for_function("document.getElementById('told').textContent.match(/^t = [\\d.]+ s/)")
         page.evaluate("document.activeElement.blur()")  # the space bar is the check box's own

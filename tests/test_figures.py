@@ -254,6 +254,23 @@ def test_objective_below_zero_has_no_logarithmic_axis() -> None:
     assert [axes.get_yscale() for axes in made.axes] == ["linear"]
 
 
+def test_an_objective_that_ends_at_zero_is_drawn_to_its_end() -> None:
+    trajectory = run("unicycle_2r_position")
+    falling = np.geomspace(1.0, 1e-30, len(trajectory))
+    falling[-10:] = 0.0
+    other = replace(trajectory, resolver="ej", objective=np.geomspace(1.0, 1e-3, len(trajectory)))
+    made = figures.objective_comparison([replace(trajectory, objective=falling), other])
+    lower = made.axes[1]
+    end, _ = lower.get_ylim()
+    x, y = lower.get_lines()[0].get_data()
+    assert x[-1] == trajectory.t[-1]
+    assert np.all(np.isfinite(y))
+    assert np.all(y > end)
+    check_legible(made)
+    texts = [label.get_text() for label in lower.get_yticklabels()]
+    assert [text.startswith("≤") for text in texts] == [True] + [False] * (len(texts) - 1)
+
+
 def test_objective_falls_and_is_enlarged_where_no_curve_is() -> None:
     pair = [run(PAPER[0]), run(PAPER[0], "pg")]
     upper, lower = figures.objective_comparison(pair, zoom=(0.0, 2.0)).axes

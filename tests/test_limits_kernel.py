@@ -98,3 +98,28 @@ def test_an_arm_that_is_all_but_straight_comes_away() -> None:
         errors.append(run.error_norm[-1])
     assert errors[0] < 1e-4
     assert errors[1] > 0.4
+
+
+def test_rows_hold_where_a_last_digit_of_the_scale_moves_them(rng: np.random.Generator) -> None:
+    """An arm that hardly moves one way, and wheels at their limits: inputs change by 1e8 per λ."""
+    J = np.array(
+        [
+            [-0.99167679, 0.525244, 0.55099446, -0.18479449, -0.0926881],
+            [0.12875226, -0.71098163, -0.51264628, -0.19861792, -0.09962158],
+            [0.0, 0.0, 0.0, -0.75259624, -0.3761442],
+        ]
+    )
+    rate, h = (
+        np.array([-1.19504361, -0.84905016, 0.00621034]),
+        np.array([0, 0, 0.95054692, 0.82595795, -1.40226949]),
+    )
+    wheels = np.array([[25.0, -7.0, 0.0, 0.0, 0.0], [25.0, 7.0, 0.0, 0.0, 0.0]]) / 3.0
+    limits = {"u_lower": [-np.inf, -np.inf, *[-1.5] * 3], "u_upper": [np.inf, np.inf, *[1.5] * 3]}
+    rows = {"limit_rows": wheels, "lower": [-2.0, -2.0], "upper": [2.0, 2.0]}
+    worst = 0.0
+    for _ in range(200):
+        near = [part * (1.0 + 1e-6 * rng.normal(size=part.shape)) for part in (J, rate, h)]
+        found = ProjectedGradient(1.0).resolve(Problem(*near, **limits, **rows))
+        assert found.status is Status.RELAXED
+        worst = max(worst, float((np.abs(wheels @ found.u) - 2.0).max()))
+    assert worst <= 1e-11

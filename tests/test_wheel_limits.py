@@ -21,15 +21,17 @@ Array = np.ndarray
 FILES = 30.0
 
 
-def far_away(base: Robot, limits: nmm.Limits, duration: float = 1.5) -> nmm.Trajectory:
+def far_away(
+    base: Robot, limits: nmm.Limits | None, duration: float = 1.5, dt: float = 0.01
+) -> nmm.Trajectory:
     """A run of the base with an arm to a target that asks for more than its wheels give."""
     moving = nmm.mount(base, "small_arm", at="arm_mount" if "arm_mount" in base.frames else "base")
     task = nmm.Task(nmm.Position("ee", "xy"), nmm.Constant([9.0, 7.0]))
-    controller = nmm.Controller(moving, task, nmm.ProjectedGradient(alpha=1.0), limits=limits, dt=0.01)
+    controller = nmm.Controller(moving, task, nmm.ProjectedGradient(alpha=1.0), limits=limits, dt=dt)
     start = {"q1": 0.3, "q2": 0.5}
     if "steering" in moving.q_names:
         start["steering"] = 0.3
-    return nmm.simulate(controller, start, duration, 0.01)
+    return nmm.simulate(controller, start, duration, dt)
 
 
 def rates(run: nmm.Trajectory) -> dict[str, Array]:
@@ -61,8 +63,25 @@ def test_a_run_keeps_the_wheels_limits(name: str, platform: str | None) -> None:
     assert max(np.abs(turned[name]).max() for name in kept) == pytest.approx(FILES, abs=1e-8)
     assert run.scale.min() < 1.0
     assert run.summary()["without_velocity_limit"] == []
-    free = rates(far_away(base, nmm.Limits(velocity=False, position=False), 0.1))
-    assert max(np.abs(free[name]).max() for name in kept) > FILES
+    for limits in (nmm.Limits(velocity=False, position=False), None):
+        run = far_away(base, limits, 0.1, 0.001)
+        largest = {name: np.abs(turned).max() for name, turned in rates(run).items() if name in kept}
+        assert max(largest.values()) > FILES
+        above = {name: rate for name, rate in largest.items() if rate > FILES}
+        assert run.summary()["fast_wheels"] == pytest.approx(above, rel=1e-9)
+    assert far_away(base, nmm.Limits(), 0.1).summary()["fast_wheels"] == {}
+
+
+def test_a_run_without_limits_says_which_wheels_are_too_fast(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = ["unicycle_2r_position", "--out", str(tmp_path / "o"), "--set", "duration=0.2", "--set"]
+    assert status_of(["run", *given, "task.0.gain=8"]) == 0
+    (said,) = [line for line in capsys.readouterr().out.splitlines() if "wheels beyond" in line]
+    assert "left_wheel_joint" in said
+    assert f"rad/s (at most {FILES:g})" in said
+    assert status_of(["run", *given, "task.0.gain=0.1"]) == 0
+    assert "wheels beyond" not in capsys.readouterr().out
 
 
 def differential(tmp_path: Path, limit: str) -> Path:
@@ -140,6 +159,28 @@ def test_info_lists_them_and_what_is_not_kept(capsys: pytest.CaptureFixture[str]
     }
     assert "30 rad/s  " in lines["left_wheel_joint"]
     assert "30 rad/s, not kept" in lines["front_caster_wheel_joint"]
+
+
+def test_info_says_which_inputs_the_wheels_limit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def limits(*arguments: str) -> dict[str, str]:
+        assert status_of(["info", *arguments]) == 0
+        table = capsys.readouterr().out.split("limit\n", 1)[1].split("\n\n", 1)[0]
+        return {line.split()[0]: line.split("platform")[-1].strip() for line in table.splitlines()}
+
+    both = dict.fromkeys(("omega_left", "omega_right"), "by its wheels")
+    assert limits("differential_base") == both
+    axle = [f"{side}{end}" for end in ("_ahead", "_behind") for side in ("left", "right")]
+    parts = [link("base")]
+    for name, x, y in zip(axle, (0.3, 0.3, -0.3, -0.3), (0.25, -0.25) * 2, strict=True):
+        body = '<axis xyz="0 1 0"/><limit velocity="5" effort="1"/>'
+        origin = f'<origin xyz="{x} {y} 0.1"/>'
+        parts += [joint(f"{name}_wheel", "base", name, "continuous", body, origin), link(name)]
+    path = write(tmp_path / "rover.urdf", robot(*parts))
+    given = (str(path), "--platform", "skid_steer")
+    radii = ",".join(f"{name}_wheel=0.1" for name in axle)
+    assert limits(*given, "--wheels", radii) == both
+    path.write_text(path.read_text().replace('velocity="5"', 'velocity="0"'))
+    assert limits(*given, "--wheels", radii) == dict.fromkeys(both, "-")
 
 
 def test_a_scenario_that_keeps_limits_has_them_in_its_summary_and_figure(tmp_path: Path) -> None:

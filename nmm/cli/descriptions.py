@@ -10,7 +10,7 @@ from nmm.cli.output import show_table, show_text
 from nmm.cli.subjects import scenario_with
 from nmm.errors import InputError
 from nmm.robots.coordinates import UNLIMITED
-from nmm.robots.wheel_rates import wheel_rates
+from nmm.robots.wheel_rates import inputs_held_by, wheel_rates
 
 if TYPE_CHECKING:
     from nmm.arrays import Array
@@ -123,9 +123,15 @@ def _coordinates(robot: Robot) -> Iterator[list[str]]:
 
 
 def _inputs(robot: Robot) -> Iterator[list[str]]:
+    held = inputs_held_by(robot, [wheel.joint for wheel in robot.wheels if isfinite(wheel.velocity)])
     for i, (name, unit, limit) in enumerate(zip(robot.u_names, robot.u_units, robot.u_limits, strict=True)):
         of = "platform" if i < robot.platform.p else _arm(robot, name)
-        yield [name, unit, of, _limit(float(limit))]
+        yield [
+            name,
+            unit,
+            of,
+            "by its wheels" if name in held and not isfinite(limit) else _limit(float(limit)),
+        ]
 
 
 def _arm(robot: Robot, joint: str) -> str:

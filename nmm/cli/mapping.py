@@ -110,7 +110,7 @@ def map_measures(
     from nmm.analysis.maps.coordinates import check_held, singularity_map
     from nmm.analysis.maps.workspace import check_given, workspace_map
     from nmm.cli.map_files import counts_of, range_of, ranges_of, refuse, show_map, two_first
-    from nmm.cli.subjects import studied
+    from nmm.cli.subjects import coordinates_at, studied
     from nmm.folders.map import is_map
 
     drawn = figures.options()
@@ -134,7 +134,7 @@ def map_measures(
         "weights": values_of(weight, "--weight", "NAME=VALUE, as in platform=4") or None,
         "length": length,
     }
-    given = values_of(subject.at, "--at", "COORDINATE=VALUE")
+    given = coordinates_at(what.robot, subject.at)
     with progress(f"map of {what.name}") as common["progress"]:
         if workspace is None:
             names = two_first(what.robot) if over is None else names_of(over, "--over")

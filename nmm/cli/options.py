@@ -46,7 +46,7 @@ PlatformOption = Annotated[
     typer.Option(
         metavar="NAME",
         help=f"How the base moves: {listed(list(PLATFORMS), 'or')}.",
-        show_default="what the file says, or unicycle",
+        show_default="what the file says, or a car or a unicycle, as its wheels steer",
     ),
 ]
 LockOption = Annotated[
@@ -99,7 +99,7 @@ AtOption = Annotated[
     typer.Option(
         "--at",
         metavar="COORDINATE=VALUE",
-        help="Where, m or rad; arithmetic with pi will do. May be repeated.",
+        help="Where, m or rad; arithmetic with pi will do; posture=NAME: one of the SRDF's. May be repeated.",
         show_default="a scenario's start; 0, or the nearest within the limits",
     ),
 ]
@@ -258,8 +258,10 @@ def wheels_of(given: str | None) -> list[str] | dict[str, float] | None:
 
 def axle_of(given: str | None) -> str | list[float] | None:
     """The `--axle` option: a frame, or x, y (and z), m."""
-    if given is None or "," not in given:
+    if given is None or ("," not in given and any(letter.isalpha() for letter in given)):
         return given
+    if "," not in given:
+        raise InputError(f"--axle: expected a frame, or X,Y in m with a comma between, got {quoted(given)}")
     from nmm.scenario.numbers import evaluate
 
     try:

@@ -78,7 +78,15 @@ def _rows(trajectory: Trajectory, numbers: dict[str, Any]) -> Iterator[tuple[str
         yield "no velocity limit for", f"{', '.join(free)} (give {keys})"
     if numbers["margin_min"] is not None:
         margin = round(100 * numbers["margin_min"], 9) + 0.0  # neither rounding, nor -0, is a limit broken
-        yield "least margin to a limit", f"{margin:.3g} % of its range"
+        name = numbers.get("margin_of", "")
+        what = f"input {name[2:]}" if name.startswith("u_") else name
+        yield "least margin to a limit", f"{margin:.3g} % of its range{f' ({what})' if what else ''}"
+    if fast := numbers.get("fast_wheels"):
+        own = {wheel.joint: wheel.velocity for wheel in trajectory.robot.wheels}
+        rates = [f"{name} {rate:.3g} rad/s (at most {own[name]:.3g})" for name, rate in fast.items()]
+        yield "wheels beyond their limits", ", ".join(rates)
+    if still := numbers.get("standing_at_limits"):
+        yield "at a limit throughout", f"{', '.join(still)}; not counted above"
     if numbers.get("clearance_min") is not None:
         yield (
             "least clearance",

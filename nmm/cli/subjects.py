@@ -149,11 +149,22 @@ def scenario_with(scenario: Scenario, loading: Mapping[str, Any]) -> Scenario:
 def configuration_at(robot: Robot, q: Array, at: Sequence[str] | None, locked: Mapping[str, float]) -> Array:
     """q (n,) with what `--at` says, COORDINATE=VALUE, m and rad; `InputError` for what is no coordinate."""
     q = q.copy()
-    for name, value in values_of(at, "--at", "COORDINATE=VALUE, as in q1=pi/2").items():
+    for name, value in coordinates_at(robot, at).items():
         if name in locked:
             raise InputError(f"--at: {name} is locked, and no coordinate then")
         q[robot.coordinate(name)] = scalar(value, f"--at: {name}")
     return q
+
+
+def coordinates_at(robot: Robot, at: Sequence[str] | None) -> dict[str, float]:
+    """What `--at` says by coordinate, m and rad; posture=NAME, one of the SRDF's, says several."""
+    from nmm.robots.semantics import POSTURE
+
+    named = [text for text in at or () if text.partition("=")[0].strip() == POSTURE not in robot.q_names]
+    numbers = [text for text in at or () if text not in named]
+    values = values_of(numbers, "--at", "COORDINATE=VALUE, as in q1=pi/2, or posture=NAME")
+    postures = [text.partition("=")[2].strip() for text in named]
+    return robot.postures.within({POSTURE: postures, **values}) if postures else values
 
 
 def _decide(controller: Controller, t: float, q: Array) -> None:

@@ -19,6 +19,7 @@ from nmm.arrays import Array
 from nmm.kernels.compiled import compiled
 from nmm.kernels.memory import Cell, IntegerCell, IntegerVector, Matrix, Vector
 from nmm.resolvers.problem_arrays import ProblemArrays
+from nmm.robots.wheel_rates import rolling
 
 #: What `LimitNumbers.mode` says of a step: a sample's, an integrator's stage after it, one without limits.
 SAMPLE, STAGE, OFF = 0, 1, 2
@@ -106,28 +107,16 @@ def bound_inputs(limits: LimitNumbers, q: Array, problem: ProblemArrays) -> None
 @compiled
 def wheel_rows(limits: LimitNumbers, q: Array, G: Array, problem: ProblemArrays) -> None:
     """The wheels' rolling rates, rad/s, as rows on the inputs; their bounds stay."""
-    cosine, sine = math.cos(q[2]), math.sin(q[2])
     for i in range(limits.spin.shape[0]):
-        x, y, angle = limits.wheels[i, 0], limits.wheels[i, 1], limits.wheels[i, 2]
         steer = int(limits.wheels[i, 4])
-        slope = 0.0
-        if steer >= 0:
-            # The wheel's angle φ follows δ = q[steer]: tan φ = a sin δ / (cos δ - b sin δ).
-            a, b = limits.wheels[i, 7], limits.wheels[i, 8]
-            s, c = a * math.sin(q[steer]), math.cos(q[steer]) - b * math.sin(q[steer])
-            length = math.sqrt(c * c + s * s)
-            slope = a / (length * length)
-            s, c = s / length, c / length
-            x, y = limits.wheels[i, 5] + c * x - s * y, limits.wheels[i, 6] + s * x + c * y
-            angle += math.atan2(s, c)
+        along, across, turn, steered = rolling(limits.wheels[i], q[2], q[steer] if steer >= 0 else 0.0)
         for j in range(problem.u_lower.shape[0]):
             problem.limit_rows[i, j] = 0.0
         for j in range(G.shape[1]):
-            turning = slope * G[steer, j] if steer >= 0 else 0.0
-            forward = cosine * G[0, j] + sine * G[1, j] - y * G[2, j] - (y - limits.wheels[i, 6]) * turning
-            sideways = cosine * G[1, j] - sine * G[0, j] + x * G[2, j] + (x - limits.wheels[i, 5]) * turning
-            rolling = math.cos(angle) * forward + math.sin(angle) * sideways
-            problem.limit_rows[i, j] = rolling / limits.wheels[i, 3]
+            rate = along * G[0, j] + across * G[1, j] + turn * G[2, j]
+            if steer >= 0:
+                rate += steered * G[steer, j]
+            problem.limit_rows[i, j] = rate
         problem.lower[i] = -limits.spin[i]
         problem.upper[i] = limits.spin[i]
 

@@ -188,6 +188,7 @@ def _inputs(
     leaders = {one.joint: one.leader for one in robot.followers if one.joint in followers}
     known = [*robot.groups, *robot.u_names, *leaders]
     for name in given:
+        robot.expect_unlocked(name)
         expect_known(f"input{', joint that follows another' if leaders else ''} or group", name, known, what)
     found = []
     for name in sorted(given, key=lambda name: (name not in robot.groups, name in leaders)):

@@ -7,15 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nmm.robots.loading.tips import end_at
+from nmm.robots.loading.tips import branches, end_at
 from nmm.robots.reach import reach
 from nmm.robots.robot import Robot
 from nmm.words import counted
 
-#: Words in the names of joints that a hand grips with.
-_FINGERS = ("finger", "grip", "jaw", "knuckle", "thumb", "hand")
-#: A branch with no more joints is a finger, where at least as many joints as in `_CARRYING` carry it.
-_FINGER, _CARRYING = 4, 3
 #: A range this small is none, m or rad.
 _NO_ROOM = 1e-6
 
@@ -39,9 +35,8 @@ class Hand:
 def hands(robot: Robot) -> list[Hand]:
     """Frames to lead, the best first: ends of arms, or of a robot without any what its platform carries."""
     n_p = robot.platform.n_p
-    chains = {tuple(_without_fingers(robot, chain)) for chain in _chains(robot)} - {()}
     found, free = [], movable(robot)
-    for chain in chains:
+    for chain in branches(robot):
         frame = end_at(robot, chain[-1])
         joints = tuple(name for name in map(robot.model.names.__getitem__, chain) if name in free)
         if frame and joints:
@@ -69,37 +64,6 @@ def movable(robot: Robot) -> list[str]:
         for name, i in zip(robot.u_names, robot.rate_coordinates, strict=True)
         if i < 0 or room[i] > _NO_ROOM
     ]
-
-
-def _chains(robot: Robot) -> Iterator[list[int]]:
-    """The joints of the arm from the platform to each end, by their numbers in the model."""
-    model, n_p = robot.model, robot.platform.n_p
-    parents = set(model.parents)
-    for joint in range(1, model.njoints):
-        if joint not in parents and model.joints[joint].idx_q >= n_p:
-            yield [one for one in model.supports[joint] if one > 0 and model.joints[one].idx_q >= n_p]
-
-
-def _without_fingers(robot: Robot, chain: list[int]) -> list[int]:
-    """The chain up to the palm, where its last joints are fingers."""
-    model = robot.model
-    for i, joint in enumerate(chain[:-1]):
-        branches = [child for child in range(1, model.njoints) if model.parents[child] == joint]
-        longest = max(len(_below(robot, branch)) for branch in branches)
-        if len(branches) > 1 and i + 1 >= _CARRYING and longest <= _FINGER:
-            return chain[: i + 1]
-    names = [model.names[joint].lower() for joint in chain]
-    grips = [any(word in name for word in _FINGERS) for name in names]
-    while not all(grips) and grips[-1]:  # a finger alone is an arm
-        chain, grips = chain[:-1], grips[:-1]
-    return chain
-
-
-def _below(robot: Robot, joint: int) -> list[int]:
-    """The longest way from a joint on outwards, itself included."""
-    model = robot.model
-    ways = [_below(robot, child) for child in range(1, model.njoints) if model.parents[child] == joint]
-    return [joint, *max(ways, key=len, default=[])]
 
 
 def _carried(robot: Robot) -> Iterator[str]:

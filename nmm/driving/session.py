@@ -6,16 +6,16 @@ import math
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
-from nmm.driving.choices import Choice
+from nmm.driving.choices import Choice, named
 from nmm.driving.driven import Driven, Look
 from nmm.driving.making import Making
-from nmm.driving.messages import Aim, Order, Pick, parsed
+from nmm.driving.messages import FAR, Aim, Order, Pick, parsed
 from nmm.driving.plotted import channels, numbers, values
 from nmm.driving.setups import Setup
 from nmm.errors import InputError, NmmError
@@ -115,7 +115,9 @@ class Session:
         self._surroundings = Surroundings(driven.obstacles, robot, driven.q, driven.wheels)
         drawing = Drawing()
         self._surroundings.draw(drawing, 2.0 * float(robot.reach))
-        draw_curves(drawing, [Channels(np.zeros(0), 0, channels(driven))], looks([""]), 0.0)
+        draw_curves(
+            drawing, [Channels(np.zeros(0), 0, channels(driven))], looks([_kind(driven.choices)]), 0.0
+        )
         targets = Drawing()
         targets.add(
             "targets",
@@ -123,6 +125,7 @@ class Session:
             values=[target.signal.value.tolist() for target in driven.targets],
             at=[numbers(at) for at in look.at],
             reach=float(robot.reach),
+            far=FAR,
         )
         # The last command of a scene says that it has come.
         self.commands = [*commands[:-1], *drawing.commands, commands[-1], *targets.commands]
@@ -144,7 +147,8 @@ class Session:
             number, choices = self._choices
             if number != version:
                 version = number
-                lines.append(encode({"type": "choices", "choices": [choice.told() for choice in choices]}))
+                told, (worn,) = [choice.told() for choice in choices], looks([_kind(choices)])
+                lines.append(encode({"type": "choices", "choices": told, "color": worn.color}))
             *placed, picture = self._picture
             fresh = [sample for count, sample in tuple(self._samples) if count > seen]
             seen = self._samples[-1][0] if self._samples else seen
@@ -240,3 +244,8 @@ class Session:
         if self._lost:
             parts.append(f"{self._lost} pictures late")
         return ", ".join(parts), False
+
+
+def _kind(choices: Sequence[Choice]) -> str:
+    """The resolver's, whose colour the curves have."""
+    return str(named(choices, "resolver.kind").value)

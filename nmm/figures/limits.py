@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from nmm import looks
 from nmm.figures import style
 from nmm.robots.wheel_rates import wheel_rates
-from nmm.runs.margins import margin
 from nmm.runs.trajectory import Trajectory
 
 #: A limit counts as near within this share of its range.
@@ -81,7 +80,7 @@ def draw_scale(axes: Axes, trajectory: Trajectory, *, named: bool = True) -> Non
     """λ of each level, and the least margin of all limits: 0.5 in the middle of its range, 0 at a limit."""
     for level, name in enumerate(_levels(trajectory)):
         style.curve(axes, trajectory.t, trajectory.scale[:, level], name, looks.CYCLE[level % 7])
-    least = margin(trajectory.shares)
+    least = trajectory.margin
     lowest = 0.0
     if np.all(np.isfinite(least)):
         style.curve(axes, trajectory.t, least, _LEAST, looks.VERMILLION, "--")

@@ -72,20 +72,21 @@ def draw_objective(
     logarithmic: bool = False,
     named: bool = True,
 ) -> None:
-    """H of each run over time, in its resolver's colour."""
+    """H of each run over time, in its resolver's colour; on a logarithmic axis it ends where that does."""
+    H = _finite(runs)
+    positive = H[H > 0.0]
+    lowest = max(float(positive.min()), _FLOOR * float(positive.max())) if logarithmic else 0.0
+    end = 10.0 ** style.decades(lowest, float(positive.max()))[0] if logarithmic else -np.inf
     for k, (run, look) in enumerate(
         zip(runs, looks.looks_of_labels([run.called for run in runs]), strict=True)
     ):
-        H = np.where(run.objective > 0.0, run.objective, np.nan) if logarithmic else run.objective
-        style.curve(axes, run.t, H, *look, below=len(runs) - 1 - k)
+        style.curve(axes, run.t, np.maximum(run.objective, end), *look, below=len(runs) - 1 - k)
     style.label(axes, y=symbol)
     style.time_axis(axes, _longest(runs), named=named)
     if not logarithmic:
         style.value_axis(axes)
         return
-    H = _finite(runs)
-    H = H[H > 0.0]
-    style.log_axis(axes, max(float(H.min()), _FLOOR * float(H.max())), float(H.max()))
+    style.log_axis(axes, lowest, float(positive.max()), below=bool(H.min() < end))
 
 
 def draw_best_objective(axes: Axes, runs: Sequence[Trajectory], symbol: str = "H(q)") -> None:

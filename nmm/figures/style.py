@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
 from nmm.arrays import Array
 from nmm.looks import BLACK
@@ -165,14 +165,28 @@ def value_axis(axes: Axes) -> None:
     axes.yaxis.set_major_formatter(plain())
 
 
-def log_axis(axes: Axes, lowest: float, highest: float) -> None:
-    """A logarithmic y axis over whole decades that hold [lowest, highest], both above 0."""
+def decades(lowest: float, highest: float) -> tuple[int, int]:
+    """The powers of ten, two at least, between which [lowest, highest] lies, both above 0."""
     low, high = int(np.floor(np.log10(lowest))), int(np.ceil(np.log10(highest)))
-    high = max(high, low + 1)
+    return low, max(high, low + 1)
+
+
+def log_axis(axes: Axes, lowest: float, highest: float, *, below: bool = False) -> None:
+    """A logarithmic y axis over whole decades that hold [lowest, highest], both above 0.
+
+    below : whether its lowest power of ten stands for all that is less, and 0
+    """
+    low, high = decades(lowest, highest)
+
+    def text(value: float, _: int | None) -> str:
+        least = below and value < 1.01 * 10.0**low
+        return f"≤ {power(value)}" if least else power(value)
+
     axes.set_yscale("log")
-    axes.set_ylim(10.0**low, 10.0**high)
-    axes.yaxis.set_major_locator(LogLocator(base=10.0, numticks=7))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: power(value)))
+    axes.set_ylim(10.0 ** (low - 0.04 * (high - low) * below), 10.0**high)
+    shown = FixedLocator([10.0**k for k in range(low, high + 1, -(-(high - low) // 6))])
+    axes.yaxis.set_major_locator(shown if below else LogLocator(base=10.0, numticks=7))
+    axes.yaxis.set_major_formatter(FuncFormatter(text))
     axes.yaxis.set_minor_locator(NullLocator())
     axes.yaxis.set_minor_formatter(NullFormatter())
 

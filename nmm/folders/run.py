@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
     from nmm.robots.robot import Robot
     from nmm.runs.ellipsoid_options import Wanted
     from nmm.runs.trajectory import Trajectory
+#: More samples take seconds to write, which is said.
+MANY = 50_000
 #: Samples that are written to trajectory.csv at a time.
 ROWS = 10_000
 #: What the arrays were that older folders lack.
@@ -71,6 +74,8 @@ def save(
         sizes that the robot does not have
     """
     drawn = drawn_as(figures)
+    if len(trajectory) > MANY:
+        logging.getLogger("nmm").info("writing %d samples to %s", len(trajectory), folder)
     with replaced_folder(folder, is_run) as temporary:
         np.savez(temporary / "trajectory.npz", **_arrays(trajectory))  # compressing gains little on doubles
         summary = trajectory.summary()

@@ -25,6 +25,10 @@ DEPENDENT = 1e-9
 FEASIBLE, ROUNDED = 1e-12, 1e-7
 #: Steps and cuts per row before a problem is given up.
 STEPS_PER_ROW, CUTS = 10, 60
+EPSILON = 2.0**-52
+#: Where normals are nearly dependent, a last digit of λ can be 1e8 times as much of a row: so often, and by
+#: no more at once, λ is then taken back for what a row still misses.
+BACKS, BACK = 4, 1e-12
 
 
 class Rows(NamedTuple):
@@ -257,7 +261,7 @@ def nearest_within(rows: Rows, target: Array, least: float, active: Integers, y:
             k += 1
     k = settle(rows, basis, k, scale, target, work, multipliers, y)
     active[0] = 0
-    cuts = 0
+    cuts, backs = 0, 0
     tolerance = FEASIBLE
     for _ in range(STEPS_PER_ROW * (c + m)):
         p = most_violated(rows, scale, y, tolerance)
@@ -290,6 +294,15 @@ def nearest_within(rows: Rows, target: Array, least: float, active: Integers, y:
                 if a1 >= 0.0 or cuts > CUTS:
                     return math.nan
                 if -a0 / a1 >= scale:  # it is met, but for rounding
+                    missing = b0 + scale * b1
+                    for j in range(m):
+                        missing -= n[j] * y[j]
+                    back = max(-missing / a1, EPSILON * scale)
+                    if backs < BACKS and back <= BACK and scale - back >= least:
+                        backs += 1
+                        scale -= back
+                        k = settle(rows, basis, k, scale, target, work, multipliers, y)
+                        break
                     tolerance *= 10.0
                     if tolerance > ROUNDED:
                         return math.nan

@@ -12,7 +12,6 @@ from nmm.looks import pretty, rate
 from nmm.playback.keyframes import MOST_FRAMES, samples_kept
 from nmm.robots.motion import Motion
 from nmm.robots.robot import Robot
-from nmm.runs.margins import margin
 from nmm.runs.trajectory import Trajectory
 
 #: A page draws at most so many samples for each second of motion, Hz, besides those that it must not miss.
@@ -123,8 +122,9 @@ def _of_task(run: Trajectory) -> Iterator[Channel]:
         for i in range(levels):
             text = "λ" if levels == 1 else f"λ of level {i + 1}"
             yield Channel(f"scale_{i}", text, "", "scale", run.scale[:, i])
-    if run.shares.shape[1] and len(run.shares) == len(run):
-        yield Channel("margin", "least margin", "", "margin", margin(run.shares), (0.0, np.inf))
+    if run.shares.shape[1] and len(run.shares) == len(run.margin) == len(run):
+        least = np.where(np.abs(run.margin) < ROUNDING, 0.0, run.margin)
+        yield Channel("margin", "least margin", "", "margin", least, (0.0, np.inf))
     yield Channel("residual", "‖J u − rate‖", "", "residual", run.residual, log=True)
     if np.isfinite(run.clearance).any():
         yield Channel(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -27,6 +28,12 @@ class Coordinates:
     platform: Platform
     followers: tuple[Follower, ...]
     semantics: Semantics
+    parts: Any
+
+    @property
+    def locked(self) -> Mapping[str, float]:
+        """The joints that loading fixed, because they were named or follow such a joint: where, m or rad."""
+        return {} if self.parts is None else dict(self.parts.provenance.held)
 
     @property
     def postures(self) -> Postures:
@@ -142,7 +149,8 @@ class Coordinates:
         return self.platform.p + len(self.arm_coordinates)
 
     def coordinate(self, name: str) -> int:
-        """Index of a coordinate in q; `InputError` lists the names."""
+        """Index of a coordinate in q; `InputError` lists the names, or says that it is locked."""
+        self.expect_unlocked(name)
         expect_known("coordinate", name, self.q_names, f"robot {self.name}")
         return self.q_names.index(name)
 
@@ -155,20 +163,33 @@ class Coordinates:
         return index
 
     def input(self, name: str) -> int:
-        """Index of an input in u; `InputError` lists the names."""
+        """Index of an input in u; `InputError` lists the names, or says that it is locked."""
+        self.expect_unlocked(name)
         expect_known("input", name, self.u_names, f"robot {self.name}")
         return self.u_names.index(name)
+
+    def expect_unlocked(self, name: str) -> None:
+        """`InputError` for a joint that was locked, and so is neither coordinate nor input."""
+        if name in self.locked and name not in self.q_names:
+            raise InputError(
+                f"robot {self.name}: {name} is locked at {self.locked[name]:g} (by lock, or --lock), and so "
+                "neither coordinate nor input: leave it out here, or do not lock it"
+            )
 
     def q(self, values: Named | ArrayLike | None = None) -> Array:
         """A configuration: from a vector, taken as it is, or by name, {"posture": "home", "q1": 0.3}.
 
         What is not named is zero, and a follower that is not named is where its leader has it. Coordinates
-        have the last word over a posture.
+        have the last word over a posture. A locked joint may be named where it is locked.
         """
         if values is None or isinstance(values, Mapping):
             if values and POSTURE in values and POSTURE not in self.q_names:
                 values = self.postures.within(values)
-            given = {self.coordinate(name): scalar(value, name) for name, value in (values or {}).items()}
+            given = {
+                self.coordinate(name): scalar(value, name)
+                for name, value in (values or {}).items()
+                if name in self.q_names or abs(self.locked.get(name, np.inf) - scalar(value, name)) > SLACK
+            }
             q = np.zeros(self.n)
             q[list(given)] = list(given.values())
             q = self.following.placed(q)

@@ -44,12 +44,14 @@ class Semantics:
     groups : the inputs that move each group
     disabled : pairs of links that are not to be kept apart
     files : where it was read
+    notes : what of it does not fit the robot, a sentence each
     """
 
     postures: Postures = field(default_factory=Postures)
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     disabled: tuple[tuple[str, str], ...] = ()
     files: tuple[Path, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def with_arm(self, arm: Semantics, prefix: str, arms_own: Collection[str]) -> Semantics:
         """A platform's, with those of an arm: its names with a prefix, and its joints alone, not its base's.
@@ -67,4 +69,5 @@ class Semantics:
             if members:
                 groups.setdefault(prefix + name, members)
         disabled = tuple((prefix + one, prefix + other) for one, other in arm.disabled)
-        return Semantics(postures, groups, self.disabled + disabled, self.files + arm.files)
+        whole = self.disabled + disabled, self.files + arm.files, self.notes + arm.notes
+        return Semantics(postures, groups, *whole)

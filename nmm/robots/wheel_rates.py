@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
+from typing import Any
 
 import numpy as np
 
 from nmm.arrays import Array
+from nmm.kernels.compiled import inlined
 from nmm.platforms import Car, FrontDriveCar
 from nmm.robots.robot import Robot
 from nmm.robots.wheel import Wheel
@@ -32,18 +34,53 @@ def wheel_rates(robot: Robot) -> tuple[tuple[str, ...], Array]:
     return tuple(rows), np.array(list(rows.values())).reshape(-1, 9)
 
 
+@inlined
+def rolling(wheel: Any, theta: Any, delta: Any) -> tuple[Any, Any, Any, Any]:
+    """What the rates of x, y, θ and δ add to that of a wheel, 1/m and 1: its row of `wheel_rates` at θ and δ.
+
+    Numbers, or as arrays as many of them. δ is 0 where nothing steers the wheel.
+    """
+    # The wheel's angle φ follows δ: tan φ = a sin δ / (cos δ - b sin δ).
+    sine = wheel[7] * np.sin(delta)
+    cosine = np.cos(delta) - wheel[8] * np.sin(delta)
+    length = np.sqrt(cosine * cosine + sine * sine)
+    sine, cosine, slope = sine / length, cosine / length, wheel[7] / (length * length)
+    ahead, beside = cosine * wheel[0] - sine * wheel[1], sine * wheel[0] + cosine * wheel[1]
+    angle = wheel[2] + np.arctan2(sine, cosine)
+    grips, slides = np.cos(angle) / wheel[3], np.sin(angle) / wheel[3]
+    return (
+        np.cos(theta + angle) / wheel[3],
+        np.sin(theta + angle) / wheel[3],
+        (ahead + wheel[5]) * slides - (beside + wheel[6]) * grips,
+        slope * (ahead * slides - beside * grips),
+    )
+
+
+def turning(robot: Robot, q: Array, q_dot: Array) -> tuple[tuple[str, ...], Array]:
+    """The wheels of `wheel_rates`, and how fast they turn, (N, w) rad/s, at q and q_dot, (N, n)."""
+    names, rows = wheel_rates(robot)
+    rates = np.zeros((len(q), len(names)))
+    for k, wheel in enumerate(rows):
+        steer = int(wheel[4])
+        steered = (q[:, steer], q_dot[:, steer]) if steer >= 0 else (np.zeros(len(q)), 0.0)
+        for share, rate in zip(
+            rolling(wheel, q[:, 2], steered[0]), (*q_dot[:, :3].T, steered[1]), strict=True
+        ):
+            rates[:, k] += share * rate
+    return names, rates
+
+
 def inputs_held_by(robot: Robot, wheels: Collection[str]) -> list[str]:
     """The platform's inputs that limits of these wheels' rates bound.
 
     Looked at are the wheels on the main body, where the platform's own joints stand straight.
     """
     names, rows = wheel_rates(robot)
-    held = [row[:4] for name, row in zip(names, rows, strict=True) if name in wheels and row[4] < 0.0]
+    held = [row for name, row in zip(names, rows, strict=True) if name in wheels and row[4] < 0.0]
     if not held:
         return []
-    x, y, angle, radius = np.array(held).T
-    rolling = np.array([np.cos(angle), np.sin(angle), x * np.sin(angle) - y * np.cos(angle)]) / radius
-    spins = rolling.T @ robot.platform.G(np.zeros(robot.platform.n_p))[:3]
+    spins = np.array([rolling(row, 0.0, 0.0)[:3] for row in held])
+    spins = spins @ robot.platform.G(np.zeros(robot.platform.n_p))[:3]
     bounded = np.diag(np.linalg.pinv(spins) @ spins)  # 1 where nothing moves the input without the wheels
     return [name for name, share in zip(robot.platform.inputs, bounded, strict=True) if share > 1.0 - 1e-9]
 

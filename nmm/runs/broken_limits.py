@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from nmm.arrays import Array
 from nmm.control.limits import LimitsOn
 from nmm.robots.robot import Robot
+from nmm.robots.wheel_rates import turning
 
 #: Beyond a limit by less than this part of it is rounding.
 SLACK = 1e-6
@@ -50,6 +53,19 @@ def broken_limits(robot: Robot, t: Array, q: Array, u: Array) -> list[str]:
     if inputs:
         sentences.append(f"inputs exceed their limits: {', '.join(inputs)}")
     return sentences
+
+
+def fast_wheels(robot: Robot, q: Array, q_dot: Array, kept: Collection[str]) -> dict[str, float]:
+    """Of the wheels that turn faster than their file's limit, their largest rate, rad/s; q and q_dot (N, n).
+
+    kept : those that had limits in the run, and are not looked at
+    """
+    names, rates = turning(robot, q, q_dot)
+    own = {wheel.joint: wheel.velocity for wheel in robot.wheels}
+    largest = dict(zip(names, np.abs(rates).max(axis=0, initial=0.0).tolist(), strict=True))
+    return {
+        name: rate for name, rate in largest.items() if name not in kept and rate > own[name] * (1.0 + SLACK)
+    }
 
 
 def broken_rows(kept: LimitsOn, t: Array, rows: Array) -> list[str]:

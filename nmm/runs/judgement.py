@@ -78,13 +78,10 @@ def judge(
     samples = recorder.samples
     if not len(recorder):
         return Verdict(outcome, _joined(message, *_lost(controller, recorder, ended)), [])
-    there = goal is not None and goal.reached(samples.error[-1], controller.rows)
-    found = assess(controller, recorder, advance, dt, held=not there)
     residual = samples.residual.copy()
     if controller.limits is not None:  # of a start from rest λ says it
         residual[: run_up(samples.t, samples.u, controller.kept.accelerations, dt)] = 0.0
     unmet = residuals(samples.t, residual, samples.rate)
-    chatter = chattering(samples.t, samples.u, controller.robot.u_names)
     warnings = [_joined(unmet.sentence, _relaxed(recorder.scale, controller))] if unmet.samples else []
     otherwise = moving_otherwise(
         samples.t,
@@ -94,9 +91,12 @@ def judge(
         controller.robot.q_units,
     )
     warnings += [otherwise] if otherwise else []
-    seen = _seen(controller, recorder, samples, found, chatter)
     if outcome is Outcome.INTERRUPTED:
         return Verdict(outcome, message, warnings)
+    there = goal is not None and goal.reached(samples.error[-1], controller.rows)
+    found = assess(controller, recorder, advance, dt, held=not there)
+    chatter = chattering(samples.t, samples.u, controller.robot.u_names)
+    seen = _seen(controller, recorder, samples, found, chatter)
     troubled = found.unstable or found.missed or outcome is Outcome.DIVERGED
     advice = None
     # A task that distances hold back departs from its promise with any dt, and to try costs many runs.

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.arrays import Array, Flags
 from nmm.control.limits import LimitsOn
 from nmm.functions.function import natural_size
 from nmm.robots.robot import Robot
 
 #: From the middle of a range on its other half counts; a limit that stands alone has none.
 MIDDLE = 0.5
+#: What moves by no more than this share of its range stands still.
+STILL = 1e-9
 
 
 def shares(kept: LimitsOn, robot: Robot, q: Array, u: Array, rows: Array) -> tuple[tuple[str, ...], Array]:
@@ -48,6 +52,31 @@ def _share(x: Array, lower: float, upper: float, size: float) -> Array:
     if np.isinf(lower):
         return np.asarray(np.maximum(1.0 - (upper - x) / size, MIDDLE))
     return np.asarray((x - lower) / (upper - lower))
+
+
+def standing(robot: Robot, names: Sequence[str], shares: Array) -> Flags:
+    """Which of `names` are coordinates that stay where they are, within their limits, in all samples,
+    (limited,): a gripper that stays closed."""
+    still = np.ptp(shares, axis=0) <= STILL if len(shares) > 1 else np.zeros(len(names), dtype=bool)
+    within = np.all((shares >= -STILL) & (shares <= 1.0 + STILL), axis=0)
+    return np.asarray(still & within & np.array([name in robot.q_names for name in names], dtype=bool))
+
+
+def at_limits(robot: Robot, names: Sequence[str], shares: Array) -> list[str]:
+    """The coordinates that stand at a limit in all samples."""
+    still = standing(robot, names, shares)
+    return [
+        name
+        for name, stands, share in zip(names, still, shares.T, strict=True)
+        if stands and min(share[0], 1.0 - share[0]) <= STILL
+    ]
+
+
+def nearest(robot: Robot, names: Sequence[str], shares: Array) -> str:
+    """What comes nearest to a limit, or farthest beyond it, of all that does not stand; "" for nothing."""
+    distances = np.minimum(shares, 1.0 - shares).min(axis=0, initial=np.inf)
+    distances[standing(robot, names, shares)] = np.inf
+    return names[int(np.argmin(distances))] if np.isfinite(distances).any() else ""
 
 
 def margin(shares: Array) -> Array:

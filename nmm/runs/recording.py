@@ -17,10 +17,11 @@ from nmm.functions.program import COMPILED
 from nmm.kernels.spectra import spectra
 from nmm.memory import expect_memory
 from nmm.resolvers.answer import Status
+from nmm.runs.binding import binding
 from nmm.runs.broken_limits import broken_limits, broken_rows
 from nmm.runs.clearance import ran_into, swept, told
 from nmm.runs.feedback import Feedback
-from nmm.runs.margins import margin, shares
+from nmm.runs.margins import margin, shares, standing
 from nmm.runs.promise import Samples
 from nmm.runs.reasons import weakest_words
 from nmm.runs.recorded import Recorded, room
@@ -280,6 +281,8 @@ class Recorder:
                 "obstacles": distance.obstacles,
             }
         limited, within = shares(kept, robot, found.q, found.u, found.limited)
+        if outcome is Outcome.MISSED and controller.limits is not None:
+            message = "; ".join(filter(None, [message, binding(limited, within, found.scale)]))
         path = self._shown.path(robot, found.q)
         desired = self._shown.desired(path, found.r_d) if path is not None and self._shown.rows else None
         return Trajectory(
@@ -298,7 +301,7 @@ class Recorder:
             scale=found.scale.copy(),
             step_size=found.step_size.copy(),
             limited=controller.limits is not None,
-            margin=margin(within),
+            margin=margin(within[:, ~standing(robot, limited, within)]),
             shares=within,
             limit_names=limited,
             unmet=residuals(self.t, found.residual, found.rate),

@@ -9,6 +9,8 @@ import numpy as np
 from nmm.arrays import Array
 from nmm.collisions.recorded import described
 from nmm.robots.wheel_rates import inputs_held_by
+from nmm.runs.broken_limits import fast_wheels
+from nmm.runs.margins import at_limits, nearest
 from nmm.runs.settling import settling_time
 
 if TYPE_CHECKING:
@@ -64,6 +66,7 @@ def summarise(trajectory: Trajectory) -> dict[str, Any]:
     if count:
         norm, sizes = trajectory.error_norm, np.linalg.norm(trajectory.u, axis=1)
         half = trajectory.t >= 0.5 * (trajectory.t[0] + trajectory.t[-1])
+        limited = (robot, trajectory.limit_names, trajectory.shares)
         summary |= _clearance(trajectory)
         summary |= {
             "t_end": float(trajectory.t[-1]),
@@ -86,6 +89,9 @@ def summarise(trajectory: Trajectory) -> dict[str, Any]:
             "step_size_min": float(trajectory.step_size.min()),
             "step_size_mean": float(trajectory.step_size.mean()),
             "margin_min": float(trajectory.margin.min()) if np.all(np.isfinite(trajectory.margin)) else None,
+            "margin_of": nearest(*limited),
+            "standing_at_limits": at_limits(*limited),
+            "fast_wheels": fast_wheels(robot, trajectory.q, trajectory.q_dot, trajectory.limit_names),
             "lateral_slip_max": lateral_slip(trajectory),
             "sliding_max": sliding(trajectory),
             "partition_switches": trajectory.switches,

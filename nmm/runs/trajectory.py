@@ -55,8 +55,8 @@ class Trajectory:
     scale (N, levels): the share λ of the task's rate that was left, a priority level a column; 1 where
         nothing was relaxed on purpose
     step_size (N,): the share of α that was taken, 1 where it is constant
-    margin (N,): least distance to a limit, as a share of its range (see `nmm.runs.margins`); below 0 where
-        one is broken, infinite without limits
+    margin (N,): least distance to a limit, as a share of its range (see `nmm.runs.margins`), of all but the
+        coordinates that stand still throughout; below 0 where one is broken, infinite without limits
     shares (N, limited): where each of `limit_names` is between its limits, 0 at the lower, 1 at the upper one
     limited : whether the controller kept limits
     unmet : where J u differed from the rate

@@ -131,7 +131,7 @@ class ScenarioPart(Part):
                     rows = sum(len(item.rows(robot)) for item in added)
                     law = None if steering is None else steering.on(robot, task)
                     held = 0 if law is None else len(law.inputs)
-                    self._check_added(self.resolver, rows, robot.n_u - s, held)
+                    self._check_added(robot, rows, robot.n_u - s, held)
             with self.resolver.own_keys():
                 return Controller(
                     robot,
@@ -152,10 +152,7 @@ class ScenarioPart(Part):
             named = self.q0 if isinstance(self.q0, dict) else {}
             for name in named:
                 with at(name):
-                    if name == POSTURE and name not in robot.q_names:
-                        robot.postures.within({name: named[name]})
-                    else:
-                        robot.coordinate(name)
+                    robot.q({name: named[name]})
             come_back = self.limits is not None and self.limits.position is not False
             robot.check_limits(robot.q(self.q0), come_back=come_back)
 
@@ -181,14 +178,21 @@ class ScenarioPart(Part):
             for term in part.terms
         ]
 
-    @staticmethod
-    def _check_added(resolver: WithAddedTask, rows: int, redundancy: int, held: int) -> None:
+    def _check_added(self, robot: Robot, rows: int, redundancy: int, held: int) -> None:
         if rows in (redundancy, redundancy - held):
             return
         came = f"none is given and the objective has {rows} quadratic terms"
-        if resolver.added_task is not None:
+        if isinstance(self.resolver, WithAddedTask) and self.resolver.added_task is not None:
             came = f"got {rows}"
-        raise InputError(f"expected {redundancy} rows (the inputs less the rows of the task), {came}")
+        own = robot.following.independent.tolist()
+        arm = [*own[robot.platform.n_p :], *own[: robot.platform.n_p][::-1]][:redundancy]
+        q = robot.q(self.q0)
+        names, values = ", ".join(robot.q_names[i] for i in arm), ", ".join(f"{q[i]:.4g}" for i in arm)
+        raise InputError(
+            f"expected {redundancy} rows (the inputs less the rows of the task), {came}; as in --set "
+            f"'resolver.added_task={{kind: coordinates, of: [{names}], reference: [{values}], gain: 1}}' "
+            "(docs/resolvers.md)"
+        )
 
     def explicit(self) -> dict[str, Any]:
         """Every key as plain data, with what the library chooses where the file leaves it open."""

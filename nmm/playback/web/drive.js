@@ -48,7 +48,11 @@
       aim(target, target.value.map((old, i) => (i === k ? x : old)));
     };
     slider.addEventListener("input", () => chosen(slider.value));
-    box.addEventListener("change", () => chosen(box.value));
+    box.addEventListener("change", () => {
+      // Farther away the program does not listen.
+      box.setCustomValidity(Math.abs(Number(box.value)) > drive.far ? `from −${drive.far} to ${drive.far}` : "");
+      if (box.reportValidity()) chosen(box.value);
+    });
     return { slider, box };
   }
 
@@ -65,7 +69,8 @@
     nmm.gizmos.put(target.gizmo, at.x, at.y, at.z);
   }
 
-  nmm.hooks.targets = ({ targets, values, at, reach, title }) => {
+  nmm.hooks.targets = ({ targets, values, at, reach, far, title }) => {
+    drive.far = far;
     const head = nmm.element(panel, "div", { class: "head" });
     nmm.element(head, "h2", {}, "Drive");
     parts.pause = nmm.element(head, "button", { id: "pause", title: "Pause or go on (space)" }, "Pause");
@@ -99,7 +104,7 @@
     empty(run);
     const upright = ([x, y, z]) => new THREE.Vector3(x, z, -y);
     nmm.camera.also = () => drive.targets.filter((target) => target.gizmo).map((target) => upright(target.gizmo.place.toArray()));
-    nmm.actions.follow();
+    if (!nmm.camera.following) nmm.actions.follow();
     nmm.plots.show(true);
     nmm.camera.reset();
   };
@@ -177,7 +182,8 @@
 
   // What may be chosen.
   const controls = new Map();
-  nmm.hooks.choices = ({ choices }) => {
+  nmm.hooks.choices = ({ choices, color }) => {
+    nmm.runs[0].color = color;
     const keys = choices.map(({ key, options }) => `${key} ${options}`).join();
     if (keys !== drive.keys) {
       drive.keys = keys;

@@ -161,7 +161,10 @@ def _without_wheels(
     names = list(dict.fromkeys(name for wheel in wheels for name in wheel.joints))
     model = whole
     if names:
-        notes.append(f"wheels that only roll, left out of q: {', '.join(names)}")
+        turned = [wheel.joint for wheel in wheels]
+        notes.append(f"wheels that only roll, left out of q: {', '.join(turned)}")
+        if swivels := [name for name in names if name not in turned]:
+            notes.append(f"joints that steer them or swivel, left out of q: {', '.join(swivels)}")
         model, (solid,) = at_zero(whole, (solid,), names)
     elif source.all_pairs or options.add_pairs:
         solid = solid.copy()

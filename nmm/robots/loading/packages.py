@@ -65,7 +65,7 @@ class Packages:
             package, _, inside = rest.lstrip("/").partition("/")
             folders = self._candidates(package)
             if not folders:
-                return f"package {package!r} not found (give its folder in package_dirs)"
+                return f"package {package!r} not found (give its folder in package_dirs, --package-dir)"
             return _first_file(folder / inside for folder in folders) or "no such file in the package"
         if scheme == "file":
             return _first_file((Path(rest), Path(unquote(rest)))) or "no such file"

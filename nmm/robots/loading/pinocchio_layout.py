@@ -17,7 +17,7 @@ from nmm.arrays import Array, array
 from nmm.errors import InputError, expect_known, unknown
 from nmm.robots.loading.chain import CHAIN_JOINTS, Head, rebuild, replaced_joints
 from nmm.robots.loading.joint_kinds import is_continuous, is_mimic, is_simple, kind
-from nmm.robots.loading.provenance import parts_of, provenance_of
+from nmm.robots.loading.provenance import parts_of
 from nmm.robots.loading.reduction import at_zero
 from nmm.robots.loading.root_layout import ROOTS, ChainRoot, RootLayout
 from nmm.robots.meshes import read_meshes
@@ -226,8 +226,7 @@ class PinocchioLayout:
     def _matched(self) -> tuple[list[tuple[int, int]], dict[int, float]]:
         """Joints of the model with the columns of q, and those that stand at a value."""
         robot, model = self.robot, self.model
-        made = provenance_of(robot)
-        held = {**made.locked, **{name: value for name, (_, value) in made.mimicked.items()}}
+        held = robot.locked
         standing = {name for wheel in robot.wheels for name in wheel.joints}
         own = list(robot.q_names[self._n_root :])
         following = [one.joint for one in robot.followers]
@@ -248,7 +247,11 @@ class PinocchioLayout:
         names = {str(model.names[joint]) for joint, _ in pairs}
         missing = [name for name in own if name not in names]
         if missing:
-            raise InputError(f"{robot.name}: the model has no joint {', '.join(missing)}")
+            steered = [wheel.swivel for wheel in robot.wheels if wheel.swivel in model.names]
+            own = [name for name in missing if name in robot.platform.coordinates and steered]
+            why = f": {own[0]} is nmm's own, and {', '.join(steered)} follow it" if own else ""
+            hint = "; give a root (planar, freeflyer, chain) for a model made here" if own else ""
+            raise InputError(f"{robot.name}: the model has no joint {', '.join(missing)}{why}{hint}")
         return pairs, still
 
     def _is_angle(self, joint: int) -> bool:

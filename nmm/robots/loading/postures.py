@@ -10,7 +10,6 @@ import numpy as np
 import pinocchio as pin
 
 from nmm.errors import RobotError, unknown
-from nmm.robots.loading.provenance import provenance_of
 from nmm.robots.loading.srdf import Group, Srdf, read_srdf, srdf_beside
 from nmm.robots.robot import Robot
 from nmm.robots.semantics import Postures, Semantics
@@ -37,15 +36,16 @@ def with_srdf(robot: Robot, given: str | Path | None, file: Path | None, name: s
     if path is None:
         return robot
     try:
-        semantics, notes = _fitted(read_srdf(path), robot, strict=given is not None)
+        semantics = _fitted(read_srdf(path), robot, strict=given is not None)
     except RobotError as error:
         if given is not None:
             raise
-        notes, semantics = (f"not used: {one_line(str(error))}",), Semantics()
-    return replace(robot, **robot.shapes._asdict(), semantics=semantics, notes=(*robot.notes, *notes))
+        semantics = Semantics(notes=(f"not used: {one_line(str(error))}",))
+    notes = (*robot.notes, *semantics.notes)
+    return replace(robot, **robot.shapes._asdict(), semantics=semantics, notes=notes)
 
 
-def _fitted(srdf: Srdf, robot: Robot, *, strict: bool) -> tuple[Semantics, tuple[str, ...]]:
+def _fitted(srdf: Srdf, robot: Robot, *, strict: bool) -> Semantics:
     known = _joints(robot)
     roots = {_ROOT, *srdf.roots} - known
     notes: list[str] = []
@@ -60,10 +60,11 @@ def _fitted(srdf: Srdf, robot: Robot, *, strict: bool) -> tuple[Semantics, tuple
         values = _coordinates(state, roots, robot, name, notes)
         if values:
             postures[name] = values
+            notes += _beyond(name, values, robot)
     groups = _groups(srdf.groups, robot)
     links = set(robot.frames)
     disabled = tuple(pair for pair in srdf.disabled if links.issuperset(pair))
-    return Semantics(postures, groups, disabled, (srdf.path,)), tuple(notes)
+    return Semantics(postures, groups, disabled, (srdf.path,), tuple(notes))
 
 
 def _joints(robot: Robot) -> set[str]:
@@ -77,8 +78,7 @@ def _coordinates(
     state: Mapping[str, tuple[float, ...]], roots: set[str], robot: Robot, name: str, notes: list[str]
 ) -> dict[str, float]:
     """The coordinates that a state sets, m and rad: neither wheels nor what is locked or follows."""
-    made = provenance_of(robot)
-    still = {**made.locked, **{joint: value for joint, (_, value) in made.mimicked.items()}}
+    still = robot.locked
     values: dict[str, float] = {}
     for joint, numbers in state.items():
         if joint in roots:
@@ -99,6 +99,16 @@ def _coordinates(
         elif one.leader in values and abs(one.value(values[one.leader]) - wanted) > _SLACK:
             notes.append(f"posture {name}: {one.joint} follows {one.leader} ({one}), not at {wanted:g}")
     return values
+
+
+def _beyond(name: str, values: Mapping[str, float], robot: Robot) -> list[str]:
+    """A sentence for the coordinates that a state sets beyond their limits."""
+    far = []
+    for joint, value in values.items():
+        lower, upper = robot.q_limits[robot.coordinate(joint)]
+        if not lower - _SLACK <= value <= upper + _SLACK:
+            far.append(f"{joint} = {value:g} (from {lower:g} to {upper:g})")
+    return [f"posture {name} is outside limits: {', '.join(far)}"] if far else []
 
 
 def _place(numbers: Sequence[float], robot: Robot) -> dict[str, float]:

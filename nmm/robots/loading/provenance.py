@@ -50,6 +50,11 @@ class Provenance:
     platform: str = "given"
     contradictions: tuple[str, ...] = ()
 
+    @property
+    def held(self) -> Mapping[str, float]:
+        """All joints that were fixed, and their values, rad or m."""
+        return {**self.locked, **{joint: value for joint, (_, value) in self.mimicked.items()}}
+
     def with_arm(self, arm: Provenance, key: str, prefix: str) -> Provenance:
         """This platform's, with that of an arm mounted under the name `key`."""
         return replace(

@@ -25,7 +25,7 @@ from nmm.robots.loading.xacro_file import expand
 from nmm.robots.loading.xml_tree import Element, parse
 from nmm.robots.meshes import read_meshes
 from nmm.robots.robot import Robot
-from nmm.words import one_line, printable
+from nmm.words import counted, one_line, printable
 
 _LINE = re.compile(r"(?:.*: )?line (\d+): ", re.DOTALL)
 _NOWHERE = "/(package not found)"
@@ -133,7 +133,8 @@ class _Going(Packages):
 def _not_found(package: str, by: str, packages: Packages) -> Problem:
     searched = ", ".join(map(str, dict.fromkeys(packages.searched)))
     return Problem(
-        f"{by}: package {package!r} not found (give its folder in package_dirs); looked in {searched}"
+        f"{by}: package {package!r} not found (give its folder in package_dirs, --package-dir); looked in "
+        f"{searched}"
     )
 
 
@@ -193,7 +194,9 @@ class _Report:
         for name, mesh in missing.items():
             self.warnings.append(
                 Problem(
-                    f"mesh {name!r}: {self.meshes[name]}: refused unless missing_meshes='skip'", mesh.line
+                    f"mesh {name!r}: {self.meshes[name]}: refused unless missing_meshes='skip' "
+                    "(--missing-meshes skip)",
+                    mesh.line,
                 )
             )
         for package, folder in self.packages.found.items():
@@ -235,6 +238,7 @@ class _Report:
         self.warnings += [Problem(text) for text in wheel_advice(robot, _top(root))]
         self.warnings += [Problem(text) for text in limit_notes(robot)]
         self.warnings += [Problem(text) for text in provenance_of(robot).contradictions]
+        self.warnings += [Problem(f"SRDF: {text}") for text in robot.semantics.notes]
         self.warnings += [Problem(text) for text in second_opinion(self.description.xml)]
         self._about(robot)
         self.robot = robot
@@ -246,6 +250,9 @@ class _Report:
         if robot.followers:
             self.facts["followers"] = ", ".join(map(str, robot.followers))
         self.facts["wheels"] = ", ".join(wheel.joint for wheel in robot.wheels) or "none"
+        if robot.semantics.files:
+            files = ", ".join(map(str, robot.semantics.files))
+            self.facts["SRDF"] = f"{files}: {counted(len(robot.postures), 'posture')}"
         self.facts["mass"] = f"{sum(inertia.mass for inertia in robot.model.inertias):.4g} kg"
 
 

@@ -11,11 +11,16 @@ from nmm.robots.robot import Robot
 
 #: What the frames at the end of an arm are called, the likeliest first.
 TIPS = ("ee", "tcp", "effector", "tool", "grasp", "gripper", "hand", "flange", "tip")
+#: Words in the names of joints that a hand grips with.
+_FINGERS = ("finger", "grip", "jaw", "knuckle", "thumb", "hand")
+#: A branch with no more joints is a finger, where at least as many joints as in `_CARRYING` carry it.
+_FINGER, _CARRYING = 4, 3
 
 
 def tips(robot: Robot) -> tuple[str, ...]:
-    """The frame at the end of each branch of the arm: the one whose name says so, or the farthest out."""
-    return tuple(_tips(robot))
+    """The frame at the end of each of `branches`: the one whose name says so, or the farthest out."""
+    ends = (end_at(robot, branch[-1]) for branch in branches(robot))
+    return tuple(end for end in ends if end is not None)
 
 
 def first_tip(robot: Robot) -> str | None:
@@ -35,14 +40,37 @@ def end_at(robot: Robot, joint: int) -> str | None:
     return min(there)[-1] if there else None
 
 
-def _tips(robot: Robot) -> Iterator[str]:
-    model = robot.model
-    carrying = set(model.parents)
-    for name in robot.q_names[robot.platform.n_p :]:
-        joint = model.getJointId(name)
-        end = None if joint in carrying else end_at(robot, joint)
-        if end is not None:
-            yield end
+def branches(robot: Robot) -> tuple[tuple[int, ...], ...]:
+    """The joints of the arm from the platform to each end, by their numbers in the model: to the palm where
+    fingers follow it."""
+    return tuple(dict.fromkeys(tuple(_without_fingers(robot.model, chain)) for chain in _chains(robot)))
+
+
+def _chains(robot: Robot) -> Iterator[list[int]]:
+    """The joints of the arm from the platform to each end, by their numbers in the model."""
+    model, n_p = robot.model, robot.platform.n_p
+    parents = set(model.parents)
+    for joint in range(1, model.njoints):
+        if joint not in parents and model.joints[joint].idx_q >= n_p:
+            yield [one for one in model.supports[joint] if one > 0 and model.joints[one].idx_q >= n_p]
+
+
+def _without_fingers(model: pin.Model, chain: list[int]) -> list[int]:
+    """The chain up to the palm, where its last joints are fingers."""
+    for i, joint in enumerate(chain[:-1]):
+        several = len(model.children[joint]) > 1
+        if several and i + 1 >= _CARRYING and _longest(model, joint) <= 1 + _FINGER:
+            return chain[: i + 1]
+    names = [model.names[joint].lower() for joint in chain]
+    grips = [any(word in name for word in _FINGERS) for name in names]
+    while not all(grips) and grips[-1]:  # a finger alone is an arm
+        chain, grips = chain[:-1], grips[:-1]
+    return chain
+
+
+def _longest(model: pin.Model, joint: int) -> int:
+    """How many joints the longest way from one on outwards has, itself included."""
+    return 1 + max((_longest(model, child) for child in model.children[joint]), default=0)
 
 
 def _how_little_a_tip(frame: pin.Frame) -> tuple[int, float]:

@@ -97,7 +97,7 @@ def _patched(xacro: Any, packages: Packages) -> Iterator[None]:
         if folder is None:
             raise RobotError(
                 f"{_where(packages.file, xacro)}: $(find {package}): package {package!r} not found "
-                "(give its folder in package_dirs)"
+                "(give its folder in package_dirs, --package-dir)"
             )
         return str(folder)
 
