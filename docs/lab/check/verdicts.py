@@ -155,8 +155,12 @@ def compared(
         same = [k for k in range(len(columns)) if np.allclose(given[:, :, j], wanted[:, :, k], atol=1e-9)]
         if same and j not in same and off[:, j].any():
             raise Wrong(f"{name}: column {column} is what belongs into column {columns[same[0]]}")
-    if np.allclose(given[:, off], -wanted[:, off], atol=1e-9):
-        raise Wrong(f"{name}: the sign of {_places(off, rows, columns)} is wrong, the rest is right")
+    factor = float(np.sum(given[:, off] * wanted[:, off]) / np.sum(wanted[:, off] ** 2 + 1e-300))
+    if np.allclose(given[:, off], factor * wanted[:, off], atol=1e-9):
+        what = {-1.0: "has the wrong sign", 0.0: "is 0"}.get(
+            round(factor, 9), f"is {factor:.3g} times what it should be"
+        )
+        raise Wrong(f"{name}: {_places(off, rows, columns)} {what}, the rest is right")
     for i in np.flatnonzero(angles):
         at = samples.copy()
         at[:, i] = 0.0
