@@ -1,12 +1,10 @@
-"""Files that are read, replaced as a whole, or locked: no device, no pipe, no more than is reasonable."""
+"""Files that are read, replaced or locked: no device, no pipe, no more than is reasonable."""
 
 from __future__ import annotations
 
 import errno
 import os
 import stat
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
@@ -55,26 +53,6 @@ def replaceable(path: Path) -> Path:
     if target.exists() and not target.is_file():
         raise InputError(f"{path}: expected a file, this is a device or a pipe")
     return target
-
-
-@contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
-    """A temporary file beside `path` that takes its place, and is on the disk, when the block ends well."""
-    import tempfile  # here: `nmm --help` would pay
-
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
-    os.close(handle)
-    temporary = Path(name)
-    try:
-        yield temporary
-        with temporary.open("rb") as file:
-            os.fsync(file.fileno())
-        umask = os.umask(0)
-        os.umask(umask)
-        temporary.chmod(0o666 & ~umask)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def taken(lock: IO[bytes]) -> bool | None:

@@ -12,7 +12,7 @@ from typing import NoReturn
 import typer
 
 from nmm.cli.app import app
-from nmm.cli.interrupts import raise_interrupts
+from nmm.cli.interrupts import ignore_interrupts, raise_interrupts
 from nmm.cli.output import complain, tell_what_takes_long
 from nmm.errors import InputError, NmmError, RunError
 
@@ -119,5 +119,6 @@ def main() -> NoReturn:
     raise_interrupts()
     tell_what_takes_long()
     status = status_of(sys.argv[1:])
+    ignore_interrupts()
     gc.freeze()
     sys.exit(status)
