@@ -72,7 +72,9 @@ def test_tasks_settling_and_the_end(switching: Trajectory) -> None:
         assert (event.t, f"{event.task} {event.what}: {event.why}") in told(going, event.task)
     bad = run("unicycle_2r_pointing", resolver__alpha=1000, duration=1.0)
     assert bad.outcome is not Outcome.COMPLETED
-    assert told(bad, bad.message) == [(bad.t[-1], f"{bad.outcome}: {bad.message}")]
+    first, *more = bad.message.split("; ")
+    assert more
+    assert told(bad, bad.outcome) == [(bad.t[-1], f"{bad.outcome}: {first}")]
 
 
 def test_a_page_holds_so_many_events_and_says_how_many_more(

@@ -85,7 +85,9 @@ def events(run: Trajectory, channels: Channels) -> Iterator[tuple[float, str]]:
     if (settles := settling_time(run)) is not None:
         yield float(run.t[0]) + settles, "‖e‖ down to 2 % of its start"
     if len(run) and (run.message or not run.complete):
-        yield float(run.t[-1]), f"{run.outcome}{f': {run.message}' if run.message else ''}"
+        # The table has all of the message.
+        first = run.message.partition(";")[0]
+        yield float(run.t[-1]), f"{run.outcome}{f': {first}' if first else ''}"
 
 
 def _reached(margin: Array) -> Iterator[int]:
