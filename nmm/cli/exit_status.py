@@ -32,9 +32,9 @@ def status_of(arguments: Sequence[str]) -> int:
     0; 1 for a run that failed; 2 for bad input; 130 for Ctrl-C where there is nothing to write
     """
     prefix = "nmm"
-    if arguments and arguments[0] in _commands():
-        prefix = f"nmm {arguments[0]}"
     try:
+        if arguments and arguments[0] in _commands():
+            prefix = f"nmm {arguments[0]}"
         result = app(args=list(arguments), prog_name="nmm", standalone_mode=False)
         _flush()
         if result == INTERRUPTED:
@@ -116,8 +116,8 @@ def main() -> NoReturn:
     # The libraries' objects stay: looking through them for garbage, again and again and once more at the
     # end, is a fifth of a short run's time.
     gc.set_threshold(1_000_000, 50, 50)
-    raise_interrupts()
     tell_what_takes_long()
+    raise_interrupts()
     status = status_of(sys.argv[1:])
     ignore_interrupts()
     gc.freeze()

@@ -38,6 +38,9 @@ def ignore_interrupts() -> None:
     """What was asked is done, or told: nothing that comes while Python takes itself apart changes that."""
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
+    # An interrupt that was raised in a text that Python ran (a named tuple is made so) ends the process by
+    # the signal, although it was caught: until Python runs another.
+    exec("")
 
 
 @contextmanager
