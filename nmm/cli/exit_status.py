@@ -31,10 +31,8 @@ def status_of(arguments: Sequence[str]) -> int:
     -------
     0; 1 for a run that failed; 2 for bad input; 130 for Ctrl-C where there is nothing to write
     """
-    prefix = "nmm"
+    prefix = _called(arguments)
     try:
-        if arguments and arguments[0] in _commands():
-            prefix = f"nmm {arguments[0]}"
         result = app(args=list(arguments), prog_name="nmm", standalone_mode=False)
         _flush()
         if result == INTERRUPTED:
@@ -67,6 +65,11 @@ def status_of(arguments: Sequence[str]) -> int:
             _discard_output()  # it may have been that: nothing of it is tried again at the end
         what = "cannot write or read" if error.filename is None else error.filename
         return _complain(prefix, f"{what}: {error.strerror or error}", FAILED)
+
+
+def _called(arguments: Sequence[str]) -> str:
+    """What a line begins with: the command's name, where there is one."""
+    return f"nmm {arguments[0]}" if arguments and arguments[0] in _commands() else "nmm"
 
 
 def _commands() -> list[str]:
@@ -117,8 +120,11 @@ def main() -> NoReturn:
     # end, is a fifth of a short run's time.
     gc.set_threshold(1_000_000, 50, 50)
     tell_what_takes_long()
-    raise_interrupts()
-    status = status_of(sys.argv[1:])
+    try:
+        raise_interrupts()
+        status = status_of(sys.argv[1:])
+    except KeyboardInterrupt:  # just before, or just behind
+        status = _complain(_called(sys.argv[1:]), "interrupted", INTERRUPTED)
     ignore_interrupts()
     gc.freeze()
     sys.exit(status)
