@@ -1,14 +1,10 @@
-"""Files that are read, replaced as a whole, or locked: no device, no pipe, no more than is reasonable."""
+"""Files that are read, replaced or locked: no device, no pipe, no more than is reasonable."""
 
 from __future__ import annotations
 
 import errno
-import glob
 import os
 import stat
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
@@ -18,9 +14,6 @@ try:
     import fcntl
 except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]  # a module where there is one
-
-#: A file that nobody has written to for so long, s, is locked by then, if it is going to be.
-SETTLED = 5.0
 
 
 def read_bytes(path: Path, most: int) -> bytes:
@@ -60,39 +53,6 @@ def replaceable(path: Path) -> Path:
     if target.exists() and not target.is_file():
         raise InputError(f"{path}: expected a file, this is a device or a pipe")
     return target
-
-
-@contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
-    """A temporary file beside `path` that takes its place, and is on the disk, when the block ends well."""
-    import tempfile  # here: `nmm --help` would pay
-
-    _without_leftovers(path)
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
-    temporary = Path(name)
-    writing = os.fdopen(handle, "rb")
-    if not taken(writing):
-        writing.close()  # where there are no locks, what is open cannot be renamed
-    try:
-        yield temporary
-        with temporary.open("rb") as file:
-            os.fsync(file.fileno())
-        umask = os.umask(0)
-        os.umask(umask)
-        temporary.chmod(0o666 & ~umask)
-        temporary.replace(path)
-    finally:
-        writing.close()
-        temporary.unlink(missing_ok=True)
-
-
-def _without_leftovers(path: Path) -> None:
-    """Remove the temporary files of writers of `path` that were killed: nobody locks them any more."""
-    with suppress(OSError):  # what stands in the way is said when the file is made
-        for left in path.parent.glob(f".{glob.escape(path.name)}-????????"):
-            with left.open("rb") as file:
-                if time.time() - left.stat().st_mtime > SETTLED and taken(file):
-                    left.unlink()
 
 
 def taken(lock: IO[bytes]) -> bool | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from math import degrees, pi
 
@@ -69,6 +70,12 @@ def split_outside_brackets(text: str, mark: str) -> list[str]:
 def printable(text: str) -> str:
     """The text with control characters, line breaks among them, as escapes: names in files may hold any."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def short_words(text: str, limit: int = 280) -> str:
+    """The text with the middle of each longer word left out: a name in a file may be as long as the file."""
+    kept = limit // 2 - 1
+    return re.sub(rf"\S{{{limit + 1},}}", lambda word: f"{word[0][:kept]}…{word[0][-kept:]}", text)
 
 
 def quoted(value: object, limit: int = 60) -> str:

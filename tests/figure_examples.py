@@ -61,6 +61,6 @@ def drawn_points(axes: Axes) -> np.ndarray:
 
 
 def cut(trajectory: Trajectory, count: int) -> Trajectory:
-    arrays = ("t", "q", "u", "r", "r_d", "error", "objective", "sigma_min", "partition", "residual")
+    arrays = ("t", "q", "u", "q_dot", "r", "r_d", "error", "objective", "sigma_min", "partition", "residual")
     names = (*arrays, "path", "desired")
     return replace(trajectory, **{name: getattr(trajectory, name)[:count] for name in names})

@@ -113,7 +113,7 @@ def test_files_that_are_none(
 
 
 def test_values_are_counted_as_they_are_read(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("nmm.scenario.document.MOST_NODES", 1000)
+    monkeypatch.setattr("nmm.scenario.yaml_text.MOST_NODES", 1000)
     file = written(tmp_path, "a.yaml", f"robot: [{'1, ' * 2000}1]")
     with pytest.raises(nmm.ScenarioError, match=r"a\.yaml:1: expected at most 1000 values"):
         nmm.Scenario.load(file)

@@ -202,10 +202,20 @@ def test_ctrl_c_where_there_is_nothing_to_write(tmp_path: Path, later: float) ->
     time.sleep(later)
     running.send_signal(signal.SIGINT)
     out, err = running.communicate(timeout=MOST)
-    # The latter where it was raised in an `eval`, whatever is made of it: Python's own rule.
-    assert running.returncode in {130, -signal.SIGINT}
-    assert (out, err) == ("", "nmm run: interrupted\n" if running.returncode == 130 else "")
+    assert (running.returncode, out, err) == (130, "", "nmm run: interrupted\n")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_ctrl_c_in_a_text_that_python_runs_ends_as_any_other(tmp_path: Path) -> None:
+    """Python would end by the signal, although it was caught."""
+    (tmp_path / "ended.py").write_text(
+        "from nmm.cli import exit_status\n"
+        "def status_of(arguments):\n"
+        "    try:\n        exec('raise KeyboardInterrupt')\n"
+        "    except KeyboardInterrupt:\n        return 130\n"
+        "exit_status.status_of = status_of\nexit_status.main()\n"
+    )
+    assert subprocess.run([sys.executable, "-m", "ended"], cwd=tmp_path).returncode == 130
 
 
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])

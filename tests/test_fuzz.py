@@ -9,7 +9,9 @@ from fuzz import HUNTS
 from fuzz.hunting import KEPT, some, tried
 
 #: Cases of each hunt: about ten seconds of it.
-EXAMPLES = {"scenarios": 60, "robots": 80, "folders": 60, "caches": 15, "commands": 40, "problems": 60}
+EXAMPLES = {
+    "scenarios": 60, "robots": 80, "folders": 60, "caches": 15, "commands": 40, "films": 12, "problems": 60,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", HUNTS)

@@ -9,13 +9,14 @@ import struct
 import subprocess
 import time
 from pathlib import Path
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
 from command_line import NMM, process
 
 import nmm
-from nmm.cli.exit_status import status_of
+from nmm.cli.exit_status import main, status_of
 from nmm.cli.output import readable, show_table, show_text
 from nmm.playback import write_html
 from nmm.rendering.encoder import expect_video
@@ -227,3 +228,19 @@ def test_text_between_elements_is_nothing(tmp_path: Path, kind: str, platform: s
     robot = nmm.load(file, platform=platform)
     model = robot.visual_model if kind == "visual" else robot.collision_model
     assert len(model.geometryObjects) == 4
+
+
+def test_an_interrupt_before_anything_is_read(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted() -> None:
+        raise KeyboardInterrupt
+
+    for name in ("_open_streams", "tell_what_takes_long", "ignore_interrupts"):
+        monkeypatch.setattr(f"nmm.cli.exit_status.{name}", lambda: None)
+    monkeypatch.setattr("nmm.cli.exit_status.gc", MagicMock())
+    monkeypatch.setattr("nmm.cli.exit_status.raise_interrupts", interrupted)
+    monkeypatch.setattr("sys.argv", ["nmm", "run"])
+    with pytest.raises(SystemExit, match="130"):
+        main()
+    assert capsys.readouterr().err == "nmm run: interrupted\n"

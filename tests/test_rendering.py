@@ -113,7 +113,7 @@ def test_an_interrupted_video_leaves_nothing(tmp_path: Path) -> None:
     assert made.wait(timeout=MOST) == 0, made.communicate()
     running = process(tmp_path, "render", "run", "--video", "motion.mp4", "--size", "320x200")
     end = time.monotonic() + MOST
-    while not [path for path in tmp_path.iterdir() if path.name.startswith(".motion.mp4-")]:
+    while not [path for path in tmp_path.iterdir() if path.name == ".motion.mp4.nmm-writing"]:
         assert time.monotonic() < end
         assert running.poll() is None
         time.sleep(0.02)

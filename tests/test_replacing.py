@@ -20,7 +20,7 @@ from nmm.cli.exit_status import status_of
 from nmm.errors import InputError
 from nmm.folders import whole
 from nmm.folders.whole import check_folder, has_format, replaced_folder, steady
-from nmm.folders.writing import writing
+from nmm.writing import writing
 
 #: NMM_KILLS=30 kills each command so often; few do not.
 KILLS = int(os.environ.get("NMM_KILLS", "0"))
@@ -181,17 +181,11 @@ def test_a_place_where_no_folder_can_be(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "loop"]
 
 
+#: With their imports and processes of their own; all others, forked: test_killed_commands.py.
 COMMANDS = {
     "run": ["run", "unicycle_2r_position", "--set", "duration=0.5", "--html", "--out", "o"],
-    "compare": ["compare", "unicycle_2r_position", "--set", "duration=0.5", "--out", "o"],
-    "laps": ["laps", "unicycle_2r_position", "--laps", "2", "--set", "dt=0.05", "--out", "o"],
-    "map": ["map", "unicycle_2r", "--task", "position", "--samples", "30", "--out", "o"],
     "paper": ["paper", "--out", "o"],
-    "sweep": [
-        "sweep", "unicycle_2r_position", "--vary", "q0.x=-1:0", "--samples", "4", "--keep", "trajectories",
-        "--set", "duration=0.5", "--out", "o",
-    ],
-}  # fmt: skip
+}
 
 
 def files_in(folder: Path) -> Iterator[tuple[str, bytes]]:

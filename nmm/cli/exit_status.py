@@ -12,7 +12,7 @@ from typing import NoReturn
 import typer
 
 from nmm.cli.app import app
-from nmm.cli.interrupts import raise_interrupts
+from nmm.cli.interrupts import ignore_interrupts, raise_interrupts
 from nmm.cli.output import complain, tell_what_takes_long
 from nmm.errors import InputError, NmmError, RunError
 
@@ -31,9 +31,7 @@ def status_of(arguments: Sequence[str]) -> int:
     -------
     0; 1 for a run that failed; 2 for bad input; 130 for Ctrl-C where there is nothing to write
     """
-    prefix = "nmm"
-    if arguments and arguments[0] in _commands():
-        prefix = f"nmm {arguments[0]}"
+    prefix = _called(arguments)
     try:
         result = app(args=list(arguments), prog_name="nmm", standalone_mode=False)
         _flush()
@@ -67,6 +65,11 @@ def status_of(arguments: Sequence[str]) -> int:
             _discard_output()  # it may have been that: nothing of it is tried again at the end
         what = "cannot write or read" if error.filename is None else error.filename
         return _complain(prefix, f"{what}: {error.strerror or error}", FAILED)
+
+
+def _called(arguments: Sequence[str]) -> str:
+    """What a line begins with: the command's name, where there is one."""
+    return f"nmm {arguments[0]}" if arguments and arguments[0] in _commands() else "nmm"
 
 
 def _commands() -> list[str]:
@@ -116,8 +119,12 @@ def main() -> NoReturn:
     # The libraries' objects stay: looking through them for garbage, again and again and once more at the
     # end, is a fifth of a short run's time.
     gc.set_threshold(1_000_000, 50, 50)
-    raise_interrupts()
     tell_what_takes_long()
-    status = status_of(sys.argv[1:])
+    try:
+        raise_interrupts()
+        status = status_of(sys.argv[1:])
+    except KeyboardInterrupt:  # just before, or just behind
+        status = _complain(_called(sys.argv[1:]), "interrupted", INTERRUPTED)
+    ignore_interrupts()
     gc.freeze()
     sys.exit(status)

@@ -34,6 +34,15 @@ def raise_interrupts() -> None:
         signal.signal(number, _interrupt)
 
 
+def ignore_interrupts() -> None:
+    """What was asked is done, or told: nothing that comes while Python takes itself apart changes that."""
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+    # An interrupt that was raised in a text that Python ran (a named tuple is made so) ends the process by
+    # the signal, although it was caught: until Python runs another.
+    exec("")
+
+
 @contextmanager
 def shielded() -> Iterator[threading.Event]:
     """Whoever presses Ctrl-C twice wants the run to end, not to lose what there is of it.

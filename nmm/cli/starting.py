@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from nmm.cli.output import show_text
 from nmm.errors import InputError
+from nmm.writing import PATIENCE, writing
 
 
 def write_first_scenario(
@@ -42,13 +44,12 @@ def _expect_free(file: Path) -> None:
 
 def _write_new(file: Path, text: str) -> None:
     """A file with all of the text; one that has come meanwhile stays."""
-    part = file.with_name(f".{file.name}.{os.getpid()}")
     try:
-        part.write_text(text, encoding="utf-8")
-        os.link(part, file)  # unlike a rename, never in another's place
+        with writing(file, PATIENCE) as hidden, TemporaryDirectory(dir=hidden) as folder:
+            part = Path(folder) / file.name
+            part.write_text(text, encoding="utf-8")
+            os.link(part, file)  # unlike a rename, never in another's place
     except FileExistsError:
         raise InputError(f"{file} exists, and is left as it is: expected another --out") from None
     except OSError as error:
         raise InputError(f"--out: {file}: cannot be written: {error.strerror}") from None
-    finally:
-        part.unlink(missing_ok=True)

@@ -12,7 +12,7 @@ import numpy as np
 from nmm.errors import InputError
 from nmm.files import expect_file
 from nmm.memory import SHARE, free_memory
-from nmm.words import one_line
+from nmm.words import one_line, printable
 
 #: Arrays and their shapes: N samples, n coordinates, m inputs, s rows of the task; a dot is any length.
 ARRAYS = {
@@ -72,9 +72,11 @@ def read_arrays(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
     # zipfile, zlib and numpy raise whatever they meet in a damaged file.
     except Exception as error:
-        entry = f"{name}: " if name else ""
+        entry = f"{one_line(name)}: " if name else ""
         reason = one_line(str(error)) or type(error).__name__
-        raise InputError(f"{path}: {entry}damaged, or not what nmm wrote: {reason}") from None
+        raise InputError(
+            f"{path}: {printable(entry)}damaged, or not what nmm wrote: {printable(reason)}"
+        ) from None
     return found
 
 

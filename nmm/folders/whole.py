@@ -1,12 +1,11 @@
 """A folder written whole or not at all, which replaces only what is of the same kind.
 
-While `runs/o` is written, a folder `runs/.o.nmm-writing` beside it holds what there is of the new one, and a
-lock that ends with the process, however that ends. The new one then changes places with the old one in one
-step: whoever looks sees the old or the new. What a writer that was killed has left, the next one removes.
+What there is of the new one lies in a hidden folder (`nmm.writing`). The new one then changes places with the
+old one in one step: whoever looks sees the old or the new.
 
 Where the system cannot exchange two folders (Windows, some network file systems), the old one is moved into
 the hidden folder for the moment until the new one stands; of a writer that was killed in that moment, the
-next one moves it back first. Where there are no locks either, writers are not kept apart, and leftovers stay.
+next one moves it back first.
 """
 
 from __future__ import annotations
@@ -21,14 +20,12 @@ from typing import TypeVar
 from nmm.errors import InputError
 from nmm.files import read_bytes
 from nmm.folders.exchange import exchanged
-from nmm.folders.writing import OLD, at_work, busy, writing
+from nmm.writing import OLD, PATIENCE, at_work, busy, writing
 
 Read = TypeVar("Read")
 
 #: A folder's JSON is not longer than that, bytes.
 MOST = 200_000_000
-#: How long one waits for another process that writes the same folder, s.
-PATIENCE = 30.0
 #: How often a folder that is replaced meanwhile is read anew.
 MOST_READINGS = 20
 

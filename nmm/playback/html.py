@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from nmm.errors import InputError
-from nmm.files import replaceable, whole_file
+from nmm.files import replaceable
 from nmm.playback.page import file_page
 from nmm.playback.scene import Shown, playback_scene
 from nmm.runs.ellipsoid_options import Wanted
+from nmm.writing import whole_file
 
 
 def write_html(

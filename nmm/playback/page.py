@@ -29,6 +29,7 @@ SCRIPTS = (
     "curves.js",
     "plots.js",
     "values.js",
+    "facts.js",
     "player.js",
     "film.js",
     "webm.js",

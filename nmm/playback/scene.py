@@ -15,6 +15,7 @@ from nmm.playback.curves import draw_curves
 from nmm.playback.drawing import Command, Drawing, DrawnRobot, Rgb
 from nmm.playback.encoding import packed
 from nmm.playback.extent import corners, robot_boxes
+from nmm.playback.facts import draw_facts
 from nmm.playback.framing import TAG, boxes_around, held, middle, reached, tag_places, view_points, wall
 from nmm.playback.keyframes import MOST_FRAMES, Keyframes, ghost_samples, keyframes, samples_kept
 from nmm.playback.obstacles import SceneObstacles, draw_nearest
@@ -144,7 +145,9 @@ def playback_scene(
     _targets(drawing, motions, size)
     if shown is not None:
         shown.tell(drawing, [f"/nmm/motion {i}" for i in range(len(motions))], worn[0].rgb)
-    draw_curves(drawing, [channels(run) for run in runs], worn, start)
+    told = [channels(run) for run in runs]
+    draw_curves(drawing, told, worn, start)
+    draw_facts(drawing, runs, told, worn, start)
     drawing.add("set_animation", animations=animations, options={"play": False, "repetitions": 1})
     drawing.add("ready")
     return drawing.commands

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from nmm.errors import InputError, RunError
 from nmm.files import replaceable
+from nmm.writing import writing
 
 #: ffmpeg's options by the file's suffix.
 CODECS = {
@@ -62,7 +63,7 @@ def encode(pictures: Iterable[bytes], file: Path, fps: float) -> None:
     """
     target = expect_video(file)
     program = find_ffmpeg()
-    with tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as folder:
+    with writing(target, patience=1.0) as hidden, tempfile.TemporaryDirectory(dir=hidden) as folder:
         made = Path(folder) / f"made{file.suffix.lower()}"
         log = Path(folder) / "log"
         command = [

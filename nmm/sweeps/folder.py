@@ -11,13 +11,14 @@ from pathlib import Path
 from typing import Any
 
 from nmm.errors import InputError
-from nmm.files import taken, whole_file
+from nmm.files import taken
 from nmm.folders.whole import check_folder, has_format
 from nmm.scenario.numbers import shown
 from nmm.sweeps.columns import columns_of
 from nmm.sweeps.definition import Definition
 from nmm.sweeps.table import join_parts, rows_in, schema_of, write_part
 from nmm.sweeps.work import Computed
+from nmm.writing import whole_file
 
 #: Marks a folder as one of ours.
 FORMAT = "nmm sweep 1"
@@ -155,7 +156,7 @@ class SweepFolder:
 
 def _hardly_begun(folder: Path) -> bool:
     """Whether a sweep was killed in a folder before it wrote what it is."""
-    return all(path.name.startswith((".lock", f".{MANIFEST}-")) for path in folder.iterdir())
+    return all(path.name.startswith((".lock", f".{MANIFEST}")) for path in folder.iterdir())
 
 
 def run_folder(index: int) -> str:

@@ -6,12 +6,12 @@ import json
 import math
 from typing import Any
 
-from nmm.files import whole_file
 from nmm.sweeps.columns import Column, columns_of
 from nmm.sweeps.definition import Definition
 from nmm.sweeps.swept import Swept
 from nmm.templates import template
 from nmm.words import listed
+from nmm.writing import whole_file
 
 #: The most rollouts of a page; of more, points at equal distances are shown, each with all combinations.
 MOST_ROWS = 10_000

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from nmm.files import whole_file
 from nmm.sweeps.columns import columns_of
 from nmm.sweeps.definition import Definition
 from nmm.sweeps.extra import arrow, parquet
+from nmm.writing import whole_file
 
 #: Rows of a group in the finished table.
 GROUP = 65_536

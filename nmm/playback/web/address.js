@@ -64,7 +64,7 @@
     }
     if (wanted.has("plots")) {
       const named = words(wanted.get("plots"));
-      const known = [...plots.panels.map((panel) => panel.id), "values"].filter((id) => named.includes(id.toLowerCase()));
+      const known = plots.ids().filter((id) => named.includes(id.toLowerCase()));
       if (known.length || named.includes("folded")) plots.open(known);
       if (known.length || named.includes("folded") || named.includes("none")) plots.show(!named.includes("none"));
     }

@@ -6,6 +6,7 @@
   const plots = (nmm.plots = { panels: [], shown: false, listeners: [] });
   const [dock, stack, cursor, ruler, tip] = ["plots", "stack", "cursor", "ruler", "tip"].map(get);
   const changed = () => plots.listeners.forEach((listener) => listener());
+  const TABLES = ["facts", "values"];
   let width = 0;
 
   const range = () => [nmm.player.range.from, nmm.player.range.to];
@@ -57,7 +58,7 @@
   }
 
   function drawRuler({ at, step }, { quiet, font }) {
-    const pen = fresh(ruler, 18);
+    const pen = fresh(ruler, nmm.facts.events.length ? 25 : 18);
     Object.assign(pen, { font, fillStyle: quiet, textBaseline: "middle", textAlign: "left" });
     pen.fillText("t [s]", 2, 9);
     // Both ends first, to a hundredth of a step, and of what is between them what has room.
@@ -70,6 +71,7 @@
       pen.fillText(text, left, 9);
       taken.push([left, left + long]);
     });
+    nmm.facts.mark(pen, x, range(), 18);
   }
 
   // Everything that is open and out of date.
@@ -103,9 +105,10 @@
   };
   plots.open = (ids) => {
     for (const panel of plots.panels) panel.part.open = ids.includes(panel.id);
-    get("values").open = ids.includes("values");
+    for (const id of TABLES) get(id).open = ids.includes(id);
   };
-  plots.opened = () => [...plots.panels.filter((panel) => panel.part.open).map((panel) => panel.id), ...(get("values").open ? ["values"] : [])];
+  plots.ids = () => [...plots.panels.map((panel) => panel.id), ...TABLES.filter((id) => !get(id).hidden)];
+  plots.opened = () => plots.ids().filter((id) => (plots.panels.find((panel) => panel.id === id)?.part ?? get(id)).open);
 
   function thinned() {
     const [drawn, all] = ["t", "samples"].map((key) => nmm.runs.map((run) => (key === "t" ? run.t.length : run.samples)));
@@ -137,7 +140,7 @@
       listen(panel);
     }
     plots.first = plots.opened();
-    get("values").addEventListener("toggle", changed);
+    for (const id of TABLES) get(id).addEventListener("toggle", changed);
     thinned();
   };
 
@@ -172,6 +175,11 @@
       return row;
     });
     tip.replaceChildren(title, ...rows);
+    place(event);
+  }
+
+  // The tip, beside the pointer.
+  function place(event) {
     const box = tip.getBoundingClientRect();
     const left = event.clientX + 14 + box.width > window.innerWidth - 8 ? event.clientX - 14 - box.width : event.clientX + 14;
     const top = Math.min(event.clientY + 14, window.innerHeight - 8 - box.height);
@@ -184,7 +192,14 @@
     ruler.setPointerCapture(event.pointerId);
     drag = { from: timeAt(event), x: event.clientX };
   });
+  ruler.addEventListener("pointerleave", () => (tip.hidden = true));
   ruler.addEventListener("pointermove", (event) => {
+    const near = drag ? [] : nmm.facts.near(timeAt(event), (6 * span()) / (right() - nmm.curves.LEFT));
+    tip.hidden = near.length === 0;
+    if (near.length) {
+      tip.replaceChildren(...near.map((one) => Object.assign(document.createElement("div"), { textContent: nmm.facts.told(one) })));
+      place(event);
+    }
     if (!drag) return;
     const [from, to] = [drag.from, timeAt(event)].sort((a, b) => a - b);
     Object.assign(get("chosen").style, { left: `${x(from)}px`, width: `${x(to) - x(from)}px` });

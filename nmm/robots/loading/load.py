@@ -16,7 +16,7 @@ from nmm.robots.loading.packages import package_file
 from nmm.robots.loading.postures import with_srdf
 from nmm.robots.loading.source import PACKAGE, path_of, read_file, read_model
 from nmm.robots.robot import Robot
-from nmm.words import printable
+from nmm.words import printable, short_words
 
 
 def load(
@@ -111,5 +111,5 @@ def load(
         read = read_file(source, arguments, folders, options.lock, missing_meshes)
         return with_srdf(robot_from(read, options), srdf, path_of(source, folders), read.name)
     except RobotError as error:
-        # Names in files and of files may hold anything, a message is one line.
-        raise RobotError(printable(str(error))) from None
+        # Names in files and of files may hold anything and be of any length, a message is one line.
+        raise RobotError(short_words(printable(str(error)))) from None

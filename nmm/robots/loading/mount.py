@@ -21,7 +21,7 @@ from nmm.robots.loading.provenance import Parts, parts_of
 from nmm.robots.loading.reduction import at_zero, told_apart
 from nmm.robots.loading.source import Source
 from nmm.robots.robot import Robot
-from nmm.words import printable
+from nmm.words import printable, short_words
 
 # Frames on which something is meant to be mounted.
 _PLACES = ("mount", "arm_mount", "top")
@@ -78,7 +78,7 @@ def mount(
     try:
         return _mounted(base, other, at, _pose(placement), prefix, name)
     except RobotError as error:
-        raise RobotError(printable(str(error))) from None
+        raise RobotError(short_words(printable(str(error)))) from None
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,91 @@
+"""A run in a few lines, for people: what `nmm run` and `nmm compare` print and a page tells."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from nmm.runs.trajectory import Trajectory
+
+
+def rows(trajectory: Trajectory, numbers: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Labels and values of the numbers of a run, as tables and pages show them.
+
+    numbers : its summary
+    """
+    method = f"{trajectory.called}, {trajectory.method}, dt {trajectory.dt:g} s"
+    yield "resolver", method
+    outcome = str(trajectory.outcome)
+    if len(trajectory):
+        outcome += f", {trajectory.t[-1]:g} s in {len(trajectory)} samples"
+    yield "outcome", outcome
+    redundancy = numbers["redundancy"]
+    left = redundancy["kinematic"] or "none left"
+    yield "redundancy", f"kinematic {left}, static {redundancy['static']}"
+    if not len(trajectory):
+        return
+    for row, (name, unit) in enumerate(zip(trajectory.r_names, trajectory.r_units, strict=True)):
+        seen = trajectory.error[:, row]
+        seen = seen[~np.isnan(seen)]
+        yield f"error of {name}", f"{seen[0]:.3g} → {seen[-1]:.3g} {unit}" if len(seen) else "never active"
+    for event in trajectory.events:
+        yield f"t = {event.t:.4g} s", f"{event.task} {event.what}{f': {event.why}' if event.why else ''}"
+    yield "tracking ‖e‖", f"RMS {numbers['error_rms']:.3g}, {numbers['error_max']:.3g} at most"
+    if (settles := numbers["settling_time"]) is not None:
+        yield "‖e‖ down to 2 % of its start", f"after {settles:.3g} s"
+    if (trajectory.scenario or {}).get("objective"):
+        yield "objective H", f"{trajectory.objective[0]:.4g} → {trajectory.objective[-1]:.4g}"
+        yield "mean H, second half", f"{numbers['objective_mean_second_half']:.4g}"
+        yield "∫ H dt", f"{numbers['objective_integral']:.4g}"
+    yield "inputs ‖u‖", f"RMS {numbers['input_rms']:.3g}, {numbers['input_peak']:.3g} at most"
+    yield "peak inputs", _peaks(trajectory, numbers["u_max"])
+    yield "smallest σ_min", f"{numbers['sigma_min']:.3g}"
+    if trajectory.unmet.samples:
+        unmet = trajectory.unmet
+        share = f"{unmet.samples} of {len(trajectory)} samples"
+        yield "J u differs from the rate", f"in {share}, by {unmet.largest:.3g} at most"
+    if numbers["step_size_min"] < 1.0:
+        yield "share of α taken", f"{numbers['step_size_mean']:.3g}, {numbers['step_size_min']:.3g} at least"
+    if trajectory.limited:
+        share = numbers["scaled_share"]
+        least = f"{numbers['scale_min']:.3g} at least; below 1 {100 * share:.3g} % of the time"
+        yield "λ under limits", least if share else "1 throughout"
+    if free := numbers["without_velocity_limit"]:
+        groups = [name for name, inputs in trajectory.robot.groups.items() if not {*free}.isdisjoint(inputs)]
+        keys = ", ".join(f"limits.velocity.{name}" for name in groups)
+        yield "no velocity limit for", f"{', '.join(free)} (give {keys})"
+    if numbers["margin_min"] is not None:
+        margin = round(100 * numbers["margin_min"], 9) + 0.0  # neither rounding, nor -0, is a limit broken
+        name = numbers.get("margin_of", "")
+        what = f"input {name[2:]}" if name.startswith("u_") else name
+        yield "least margin to a limit", f"{margin:.3g} % of its range{f' ({what})' if what else ''}"
+    if fast := numbers.get("fast_wheels"):
+        own = {wheel.joint: wheel.velocity for wheel in trajectory.robot.wheels}
+        rates = [f"{name} {rate:.3g} rad/s (at most {own[name]:.3g})" for name, rate in fast.items()]
+        yield "wheels beyond their limits", ", ".join(rates)
+    if still := numbers.get("standing_at_limits"):
+        yield "at a limit throughout", f"{', '.join(still)}; not counted above"
+    if numbers.get("clearance_min") is not None:
+        yield (
+            "least clearance",
+            f"{numbers['clearance_min']:.4g} m ({numbers['clearance_min_pair']}) "
+            f"at t = {numbers['clearance_min_t']:.3g} s",
+        )
+    if trajectory.resolver == "rg":
+        yield "switches of partition", str(numbers["partition_switches"])
+    yield "lateral slip", f"{numbers['lateral_slip_max']:.1g} m/s at most"
+    if numbers.get("sliding_max"):
+        yield "wheels slide by design", f"{numbers['sliding_max']:.3g} m/s at most"
+
+
+def _peaks(trajectory: Trajectory, largest: Mapping[str, float]) -> str:
+    """The largest input of each unit."""
+    units = dict(zip(trajectory.robot.u_names, trajectory.robot.u_units, strict=True))
+    names = [
+        max((name for name in units if units[name] == unit), key=largest.__getitem__)
+        for unit in dict.fromkeys(units.values())
+    ]
+    return ", ".join(f"{name} {largest[name]:.3g} {units[name]}" for name in names)

@@ -1,0 +1,176 @@
+"""Command lines that are ended at a moment: at the n-th file that they touch, or some seconds after it.
+
+`python killing.py` imports the command line once, forks a process for each line that it reads (a `Request` as
+JSON), and answers with its exit status. `Commands` talks to it. An audit hook counts the files that the
+process makes, moves and removes, so that a signal meets it while it writes, and not by luck.
+"""
+
+from __future__ import annotations
+
+import atexit
+import importlib
+import json
+import os
+import pkgutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+#: What touches files, by the name of Python's audit event; `open` counts where it is for writing.
+TOUCHING = {
+    "os.mkdir", "os.rename", "os.remove", "os.rmdir", "os.link", "os.chmod", "shutil.rmtree", "ctypes.dlsym",
+}  # fmt: skip
+WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT
+
+
+@dataclass(frozen=True)
+class Request:
+    """A command line in a folder, and the signal that it gets at a touched file, so many seconds later."""
+
+    folder: str
+    scratch: str
+    arguments: list[str]
+    number: int = 0
+    at: int = -1
+    later: float = 0.0
+    #: A module, and a function in it that is called before the command begins.
+    prepared: tuple[str, str] | None = None
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a command ended; below 0: by a signal."""
+
+    status: int
+    out: str
+    err: str
+    touched: list[str]
+
+
+class Commands:
+    """`with Commands(scratch) as commands: commands.run(folder, ["run", …])`."""
+
+    def __init__(self, scratch: Path) -> None:
+        self._scratch = scratch
+
+    def __enter__(self) -> Commands:
+        self._process = subprocess.Popen(
+            [sys.executable, __file__], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._process.kill()
+        self._process.communicate()
+
+    def run(self, folder: Path, arguments: list[str], **when: Any) -> Ended:
+        """How a command ends, with all processes that it started."""
+        asked = Request(str(folder), str(self._scratch), arguments)
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.write(json.dumps(asdict(replace(asked, **when))) + "\n")
+        self._process.stdin.flush()
+        group, status = json.loads(self._process.stdout.readline())
+        while any_alive(group):
+            time.sleep(0.005)
+        out, err, touched = (
+            (self._scratch / name).read_text(encoding="utf-8") for name in ("out", "err", "touched")
+        )
+        return Ended(status, out, err, touched.splitlines())
+
+
+def any_alive(session: int) -> bool:
+    """Whether a process of the session runs; one that has ended and that nobody has asked about does not."""
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            state, _, _, its = stat.read_text().rpartition(")")[2].split()[:4]
+            if int(its) == session and state != "Z":
+                return True
+    return False
+
+
+class _Touching:
+    """An audit hook: what the process touches, and the signal that it gets then."""
+
+    def __init__(self, request: Request) -> None:
+        self._request, self._pid = request, os.getpid()
+        self.touched: list[str] = []
+
+    def __call__(self, event: str, arguments: tuple[Any, ...]) -> None:
+        if event == "open":
+            if not isinstance(arguments[0], str) or not arguments[2] & WRITING or arguments[0] == os.devnull:
+                return
+        elif event not in TOUCHING or (event == "ctypes.dlsym" and "renameat2" not in arguments):
+            return
+        if os.getpid() != self._pid:
+            return
+        self.touched.append(event)
+        if len(self.touched) == self._request.at + 1:
+            if self._request.later:
+                threading.Thread(target=self._end).start()
+            else:
+                os.kill(self._pid, self._request.number)
+
+    def _end(self) -> None:
+        time.sleep(self._request.later)
+        os.kill(self._pid, self._request.number)
+
+
+def _begin(request: Request) -> None:
+    """In the forked process: it ends as the command does."""
+    os.setsid()
+    os.chdir(request.folder)
+    for number, path in enumerate((os.devnull, f"{request.scratch}/out", f"{request.scratch}/err")):
+        handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_TRUNC)
+        os.dup2(handle, number)
+        os.close(handle)
+    told = Path(request.scratch, "touched")
+    told.write_text("", encoding="utf-8")
+    if request.prepared:
+        module, name = request.prepared
+        getattr(importlib.import_module(module), name)()
+    touching = _Touching(request)
+    atexit.register(lambda: told.write_text("\n".join(touching.touched), encoding="utf-8"))
+    sys.argv = ["nmm", *request.arguments]
+    sys.addaudithook(touching)
+    from nmm.cli import main
+
+    main()
+
+
+def _picture(figure: Any, path: Path, **options: Any) -> None:
+    image = importlib.import_module("PIL.Image")
+    image.new("L", (8, 8)).save(path)
+
+
+def _serve() -> None:
+    import nmm
+
+    for module in pkgutil.walk_packages(nmm.__path__, "nmm."):
+        importlib.import_module(module.name)
+    for name in ("matplotlib.backends.backend_agg", "pyarrow.parquet"):
+        importlib.import_module(name)
+    # Drawing is most of a command's time, and writes no other files than this.
+    importlib.import_module("matplotlib.figure").Figure.savefig = _picture
+    nmm.Scenario.load("unicycle_2r_position").override("duration", 0.05).run()
+    for line in sys.stdin:
+        request = Request(**json.loads(line))
+        process = os.fork()
+        if not process:
+            _begin(request)
+        _, status = os.waitpid(process, 0)
+        print(json.dumps([process, os.waitstatus_to_exitcode(status)]), flush=True)
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _serve()

@@ -1,0 +1,69 @@
+"""Long commands made short, in a process of their own: one case of the paper, a film without a browser."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import shutil
+from pathlib import Path
+from typing import Any
+
+#: Takes pictures as ffmpeg does, and writes its file bit by bit.
+FFMPEG = """#!/bin/sh
+for made; do :; done
+while read -r line; do echo "$line" >>"$made"; done
+echo whole >>"$made"
+"""
+
+
+class Page:
+    """Pictures of no page."""
+
+    def __init__(self, file: Path, size: tuple[int, int]) -> None:
+        assert file.stat().st_size > 0
+
+    def __enter__(self) -> Page:
+        return self
+
+    def __exit__(self, *of: object) -> None:
+        pass
+
+    def wait_for(self, expression: str) -> None:
+        pass
+
+    evaluate = wait_for
+
+    def picture(self) -> bytes:
+        return b"picture\n"
+
+
+def film() -> None:
+    """`nmm render` with a small ffmpeg, and no browser."""
+    from nmm.rendering import render
+
+    folder = Path.cwd().parent / "programs"
+    folder.mkdir(exist_ok=True)
+    (folder / "ffmpeg").write_text(FFMPEG)
+    (folder / "ffmpeg").chmod(0o755)
+    os.environ["PATH"] = f"{folder}:{os.environ['PATH']}"
+    module: Any = __import__("sys").modules[render.__module__]
+    module.find_browser, module.HeadlessPage = lambda: "none", Page
+
+
+def one_case() -> None:
+    """`nmm paper` with one case, in this process, whose files are computed once."""
+    from nmm.paper import write
+
+    kept = Path.cwd().parent / "case"
+
+    def case(number: int, progress: Any, folder: Path, figures: Any) -> Any:
+        if not kept.exists():
+            kept.mkdir()
+            found = compute(number, progress, kept, figures)
+            (kept / "result").write_bytes(pickle.dumps(found))
+        shutil.copytree(kept, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("result"))
+        return pickle.loads((kept / "result").read_bytes())
+
+    compute, share_out = write._case, write.share_out
+    write._case = case
+    write.share_out = lambda work, items, jobs, advance: share_out(work, items[:1], 1, advance)
