@@ -13,6 +13,7 @@ from frames import copy_frames, without_missing_frames  # noqa: E402
 from keyboards import for_keyboards  # noqa: E402
 from notebooks import NotebookParser  # noqa: E402
 from short_names import short_name  # noqa: E402
+from sphinx.util.inspect import TypeAliasForwardRef  # noqa: E402
 
 import nmm  # noqa: E402
 
@@ -20,6 +21,7 @@ project, author, copyright = "nmm", "The nmm developers", "The nmm developers"
 version = release = nmm.__version__
 extensions = ["sphinx.ext.autodoc", "myst_parser"]
 exclude_patterns = ["building"]
+suppress_warnings = ["misc.highlighting_failure"]  # what a command prints is no shell script
 
 # Anchors as code hosts make them, so that a link works here and there.
 myst_heading_anchors = 4
@@ -35,6 +37,7 @@ autodoc_preserve_defaults = True
 autodoc_type_aliases = {
     name: name for name in ("Array", "ArrayLike", "Integers", "Subject", "Named", "Weights")
 }
+TypeAliasForwardRef.__repr__ = lambda alias: alias.name  # within a union Sphinx shows the object
 add_module_names = False
 toc_object_entries_show_parents = "hide"
 
