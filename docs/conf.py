@@ -8,7 +8,7 @@ from typing import Any
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent), str(HERE / "building")]
 
-from docstrings import as_rst  # noqa: E402
+from docstrings import as_rst, signature_that_helps  # noqa: E402
 from frames import copy_frames, without_missing_frames  # noqa: E402
 from keyboards import for_keyboards  # noqa: E402
 from notebooks import NotebookParser  # noqa: E402
@@ -56,6 +56,7 @@ def setup(app: Any) -> None:
     app.add_source_parser(NotebookParser)
     app.connect("source-read", only_folders_that_are_there)
     app.connect("autodoc-process-docstring", lambda *given: as_rst(given[-1]))
+    app.connect("autodoc-process-signature", signature_that_helps)
     app.connect("missing-reference", short_name)
     app.connect("html-page-context", without_missing_frames, priority=900)
     app.connect("html-page-context", for_keyboards, priority=900)
