@@ -8,11 +8,12 @@ from typing import Any
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent), str(HERE / "building")]
 
-from docstrings import as_rst  # noqa: E402
+from docstrings import as_rst, signature_that_helps  # noqa: E402
 from frames import copy_frames, without_missing_frames  # noqa: E402
 from keyboards import for_keyboards  # noqa: E402
 from notebooks import NotebookParser  # noqa: E402
 from short_names import short_name  # noqa: E402
+from sphinx.util.inspect import TypeAliasForwardRef  # noqa: E402
 
 import nmm  # noqa: E402
 
@@ -20,6 +21,7 @@ project, author, copyright = "nmm", "The nmm developers", "The nmm developers"
 version = release = nmm.__version__
 extensions = ["sphinx.ext.autodoc", "myst_parser"]
 exclude_patterns = ["building"]
+suppress_warnings = ["misc.highlighting_failure"]  # what a command prints is no shell script
 
 # Anchors as code hosts make them, so that a link works here and there.
 myst_heading_anchors = 4
@@ -35,6 +37,7 @@ autodoc_preserve_defaults = True
 autodoc_type_aliases = {
     name: name for name in ("Array", "ArrayLike", "Integers", "Subject", "Named", "Weights")
 }
+TypeAliasForwardRef.__repr__ = lambda alias: alias.name  # within a union Sphinx shows the object
 add_module_names = False
 toc_object_entries_show_parents = "hide"
 
@@ -54,6 +57,7 @@ def setup(app: Any) -> None:
     app.add_source_parser(NotebookParser)
     app.connect("source-read", only_folders_that_are_there)
     app.connect("autodoc-process-docstring", lambda *given: as_rst(given[-1]))
+    app.connect("autodoc-process-signature", signature_that_helps)
     app.connect("missing-reference", short_name)
     app.connect("html-page-context", without_missing_frames, priority=900)
     app.connect("html-page-context", for_keyboards, priority=900)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import re
+import shutil
 from functools import cache
 from pathlib import Path
 from urllib.parse import unquote, urldefrag
@@ -65,3 +67,44 @@ def test_signatures_lead_to_the_public_names(site: Path) -> None:
     page = (site / "api" / "run.html").read_text(encoding="utf-8")
     assert re.search(r'href="controller\.html#nmm\.Controller"[^>]*><span class="pre">Controller<', page)
     assert 'id="nmm.Trajectory.save"' in page
+
+
+def test_types_are_told_by_their_names(site: Path) -> None:
+    """Not by objects of Sphinx's, nor as text that it could not read."""
+    for page in (site / "api").glob("*.html"):
+        text = page.read_text(encoding="utf-8")
+        assert not re.search(r"TypeAliasForwardRef|~nmm\.|&lt;factory&gt;", text), page.name
+
+
+@pytest.mark.parametrize("made", [True, False])
+def test_tutorials_and_notebooks_are_in_the_site_when_they_are_there(tmp_path: Path, made: bool) -> None:
+    """With the page that a frame shows; without it the frame is left out."""
+    docs = tmp_path / "docs"
+    shutil.copytree(
+        ROOT / "docs" / "building", docs / "building", ignore=shutil.ignore_patterns("__pycache__")
+    )
+    shutil.copy(ROOT / "docs" / "conf.py", docs)
+    index = "# Docs\n\n```{toctree}\n:glob:\n\ntutorials/*\n```\n\n```{toctree}\n:glob:\n\nlab/*\n```\n"
+    (docs / "index.md").write_text(index, encoding="utf-8")
+    (docs / "tutorials").mkdir()
+    (docs / "tutorials" / "first.md").write_text(
+        '# First\n\n<iframe src="first/run/playback.html#t=2" title="A run"></iframe>\n', encoding="utf-8"
+    )
+    if made:
+        (docs / "tutorials" / "first" / "run").mkdir(parents=True)
+        (docs / "tutorials" / "first" / "run" / "playback.html").write_text("<p>here</p>", encoding="utf-8")
+        cells = [
+            {"cell_type": "markdown", "source": ["# Lab\n", "\n", "See [first](../tutorials/first.md)."]},
+            {"cell_type": "code", "source": ["print(1 + 1)"], "outputs": [{"text": ["2\n"]}]},
+        ]
+        (docs / "lab").mkdir()
+        (docs / "lab" / "one.ipynb").write_text(json.dumps({"cells": cells}), encoding="utf-8")
+    site = built(tmp_path, docs)
+    page = (site / "tutorials" / "first.html").read_text(encoding="utf-8")
+    assert ("<iframe" in page) is made
+    assert (site / "tutorials" / "first" / "run" / "playback.html").exists() is made
+    assert (site / "lab" / "one.html").exists() is made
+    if made:
+        lab = asked(site / "lab" / "one.html")
+        assert "../tutorials/first.html" in lab.links
+        assert any(link.endswith("/one.ipynb") for link in lab.links)

@@ -1,14 +1,17 @@
 """Docstrings as they are written here (docs/architecture.md), as reStructuredText.
 
 Sections are underlined as numpydoc has them; what stands behind a parameter's colon says what it is, its type
-stands in the signature. The text is for people: only `code` in it is markup.
+stands in the signature. The text is for people: only `code` and *words* in it are markup.
 """
 
 import re
+from typing import Any
 
 _SECTION = re.compile(r"-{3,}$")
 _ITEM = re.compile(r"^(?P<names>\S.*?)\s*(?:: |:$)(?P<text>.*)$")
 _DOCTEST = ">>> "
+#: A class with a longer signature and no Parameters is a record, characters.
+LONGEST = 350
 
 
 def as_rst(lines: list[str]) -> None:
@@ -32,6 +35,17 @@ def as_rst(lines: list[str]) -> None:
             made += _plain("\n".join(part)).split("\n")
         made.append("")
     lines[:] = made
+
+
+def signature_that_helps(
+    app: Any, what: str, name: str, thing: Any, options: Any, signature: str | None, returned: str | None
+) -> tuple[str, str | None] | None:
+    """None of a record, whose many fields are told as attributes; else one that can be read."""
+    if signature is None:
+        return None
+    if what == "class" and len(signature) > LONGEST and "Parameters\n" not in (vars(thing)["__doc__"] or ""):
+        return "", None
+    return re.sub(r"<[^<>]+>", "...", signature), returned
 
 
 def _parts(lines: list[str]) -> list[list[str]]:
@@ -66,12 +80,14 @@ def _definition(item: list[str]) -> list[str]:
 
 
 def _plain(text: str, *, quoted: bool = True) -> str:
-    """Text whose stars, bars and underscores are no markup; `code` stays what it is."""
-    pieces = re.split(r"(``.*?``|:\w+:`[^`]*`|`[^`]*`)", text) if quoted else [text]
+    """Text whose bars, underscores and single stars are no markup; `code` and *words* stay what they are."""
+    pieces = (
+        re.split(r"(``.*?``|:\w+:`[^`]*`|`[^`]*`|(?<!\w)\*[A-Za-z]+\*(?!\w))", text) if quoted else [text]
+    )
     for i in range(0, len(pieces), 2):
         pieces[i] = re.sub(r"([*|\\`])|_(?=\W|$)", lambda found: "\\" + found[0], pieces[i])
     for i in range(1, len(pieces), 2):
-        if not re.fullmatch(r"`[\w.]+`", pieces[i]):  # no name: nothing to look up
+        if pieces[i][0] == "`" and not re.fullmatch(r"`[\w.]+`", pieces[i]):  # no name: nothing to look up
             pieces[i] = f"``{pieces[i].strip('`')}``"
         if pieces[i + 1][:1].isalnum():  # the s of `Task`s
             pieces[i] += "\\ "

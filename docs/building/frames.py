@@ -9,7 +9,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-_FRAME = re.compile(r'<iframe\b[^>]*\bsrc="([^":]+)"[^>]*>\s*</iframe>')
+_FRAME = re.compile(r'<iframe\b[^>]*\bsrc="([^":#]+)[^"]*"[^>]*>\s*</iframe>')
 
 
 def without_missing_frames(app: Any, name: str, template: str, context: dict[str, Any], doctree: Any) -> None:

@@ -16,8 +16,8 @@ class NotebookParser(MystParser):
         """The notebook's text, as Markdown."""
         cells = json.loads(inputstring)["cells"]
         parts = ["".join(cells[0]["source"])] if cells else []
-        path = Path(self.env.doc2path(self.env.docname))
-        parts.append(f"{{download}}`{path.name} <{path.name}>` is this page as a notebook.")
+        name = Path(document["source"]).name
+        parts.append(f"{{download}}`{name}` is this page as a notebook.")
         for cell in cells[1:]:
             text = "".join(cell["source"])
             if cell["cell_type"] == "code":

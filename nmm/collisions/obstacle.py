@@ -36,6 +36,13 @@ class Obstacle:
     Raises
     ------
     InputError : no shape, a placement or a motion that gives no such numbers, both of them
+
+    Examples
+    --------
+    >>> pillar = nmm.Obstacle(nmm.Box([0.3, 0.6, 1.0]), [1.6, 0.0, 0.5], name="pillar")
+    >>> ball = nmm.Obstacle(nmm.Sphere(0.1), motion=lambda t: [2.0 - 0.1 * t, 1.5, 0.3], name="ball")
+    >>> pillar.moves, ball.moves, ball.at(10.0).translation
+    (False, True, array([1. , 1.5, 0.3]))
     """
 
     def __init__(

@@ -26,7 +26,14 @@ class Shape(ABC):
 
 @dataclass(frozen=True)
 class Box(Shape):
-    """A box about its placement's origin: `size` (3,), its edges along x, y, z."""
+    """A box about its placement's origin: `size` (3,), its edges along x, y, z.
+
+    Examples
+    --------
+    >>> wall = nmm.Obstacle(nmm.Box([2.0, 0.1, 1.0]), [0.0, 1.0, 0.5], name="wall")
+    >>> wall.shape
+    Box(size=(2.0, 0.1, 1.0))
+    """
 
     size: Sequence[float]
 
@@ -42,7 +49,15 @@ class Box(Shape):
 
 @dataclass(frozen=True)
 class Sphere(Shape):
-    """A sphere about its placement's origin."""
+    """A sphere about its placement's origin.
+
+    Examples
+    --------
+    >>> ball = nmm.Obstacle(nmm.Sphere(0.1), [1.0, 0.0, 0.8])
+    >>> ball.move_to([1.2, 0.0, 0.8])
+    >>> ball.at(0.0).translation
+    array([1.2, 0. , 0.8])
+    """
 
     radius: float
 
@@ -67,14 +82,28 @@ class Round(Shape):
 
 
 class Cylinder(Round):
-    """A cylinder along z, its middle in the origin."""
+    """A cylinder along z, its middle in the origin.
+
+    Examples
+    --------
+    >>> post = nmm.Obstacle(nmm.Cylinder(radius=0.2, length=0.8), [1.0, 0.0, 0.4], name="post")
+    >>> post.shape
+    Cylinder(radius=0.2, length=0.8)
+    """
 
     def geometry(self) -> Any:
         return coal.Cylinder(self.radius, self.length)
 
 
 class Capsule(Round):
-    """All points within `radius` of a segment of `length` along z, its middle in the origin."""
+    """All points within `radius` of a segment of `length` along z, its middle in the origin.
+
+    Examples
+    --------
+    >>> rail = nmm.Obstacle(nmm.Capsule(radius=0.05, length=1.0), [1.0, 0.0, 0.5], name="rail")
+    >>> rail.shape
+    Capsule(radius=0.05, length=1.0)
+    """
 
     def geometry(self) -> Any:
         return coal.Capsule(self.radius, self.length)
@@ -82,7 +111,14 @@ class Capsule(Round):
 
 @dataclass(frozen=True)
 class Plane(Shape):
-    """A half-space: everything below the plane through the origin, whose `normal` (3,) points out of it."""
+    """A half-space: everything below the plane through the origin, whose `normal` (3,) points out of it.
+
+    Examples
+    --------
+    >>> wall = nmm.Obstacle(nmm.Plane([-1, 0, 0]), [3.0, 0.0, 0.0], name="everything beyond x = 3 m")
+    >>> wall.at(0.0).translation
+    array([3., 0., 0.])
+    """
 
     normal: Sequence[float] = (0.0, 0.0, 1.0)
 
@@ -99,7 +135,15 @@ class Plane(Shape):
 
 @dataclass(frozen=True)
 class Mesh(Shape):
-    """The convex hull of a mesh file (STL, DAE, OBJ, PLY), its axes stretched by `scale` (3,)."""
+    """The convex hull of a mesh file (STL, DAE, OBJ, PLY), its axes stretched by `scale` (3,).
+
+    Examples
+    --------
+    >>> import trimesh
+    >>> _ = trimesh.creation.icosphere(radius=0.5).export("stone.stl")
+    >>> nmm.Obstacle(nmm.Mesh("stone.stl", scale=(1, 1, 0.5)), [2.0, 0.0, 0.0], name="stone").name
+    'stone'
+    """
 
     file: str | Path
     scale: Sequence[float] = (1.0, 1.0, 1.0)
@@ -114,7 +158,14 @@ class Mesh(Shape):
 
 @dataclass(frozen=True, eq=False)
 class Hull(Shape):
-    """The convex hull of `points` (N, 3)."""
+    """The convex hull of `points` (N, 3).
+
+    Examples
+    --------
+    >>> ramp = nmm.Hull([[0, 0, 0], [1, 0, 0], [1, 0, 0.2], [0, 1, 0], [1, 1, 0], [1, 1, 0.2]])
+    >>> nmm.Collisions(obstacles=[nmm.Obstacle(ramp, [1.0, 1.0, 0.0], name="ramp")]).distance
+    0.03
+    """
 
     points: Array
 

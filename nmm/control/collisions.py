@@ -43,6 +43,17 @@ class Collisions:
     ------
     InputError : a negative distance, no obstacles, two of one name, a band that is not beyond the distance,
         obstacles in the place of `self`
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_3r")
+    >>> pillar = nmm.Obstacle(nmm.Box([0.3, 0.6, 1.0]), [1.6, 0.0, 0.5], name="pillar")
+    >>> task = nmm.Task(nmm.Position("ee", "xy"), [3.0, 0.2], speed=0.5)
+    >>> keeps_off = nmm.Collisions(0.03, obstacles=[pillar])
+    >>> controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), collisions=keeps_off, dt=0.02)
+    >>> run = nmm.simulate(controller, {"q1": 0.3, "q2": 0.6}, 4, 0.02, "zoh")
+    >>> bool(run.clearance_between.min() >= 0.03)
+    True
     """
 
     distance: float = 0.03

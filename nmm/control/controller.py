@@ -82,6 +82,14 @@ class Controller:
     InputError : a frame, coordinate or input that the robot lacks; more rows than inputs; an
         added task with a resolver that takes none, or none with one that does; a step size to be chosen
         where there is no objective
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> task = nmm.Task(nmm.Position("ee", "xy"), nmm.Circle([2, 2], 3, rate=0.25))
+    >>> controller = nmm.Controller(robot, task, nmm.ReducedGradient(), nmm.Quadratic(nmm.Square("q1", 0.5)))
+    >>> dict(zip(robot.u_names, controller(0.0, robot.q({"q1": 0.5, "q2": 0.5})).round(3).tolist()))
+    {'v': 5.333, 'omega': 2.506, 'q1': -0.0, 'q2': -0.0}
     """
 
     def __init__(

@@ -15,6 +15,15 @@ class Goal:
     Parameters
     ----------
     m, rad : tolerances of rows in metres and of rows in radians; rows of other units are not looked at
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> task = nmm.Task(nmm.Position("ee", "xy"), [2.0, 1.0])
+    >>> controller = nmm.Controller(robot, task, nmm.ProjectedGradient())
+    >>> run = nmm.simulate(controller, robot.q({"q2": 0.5}), 20, until=nmm.Goal(m=0.01))
+    >>> bool(run.t[-1] < 6), bool(run.error_norm[-1] <= 0.01)
+    (True, True)
     """
 
     def __init__(self, m: float = 0.005, rad: float = 0.02) -> None:

@@ -42,6 +42,16 @@ class Bound:
     Raises
     ------
     InputError : no limit, one that is not a number, lower above upper
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> corridor = nmm.Bound(nmm.Position("base_footprint", "y"), -0.2, 0.2, name="corridor")
+    >>> task = nmm.Task(nmm.Position("ee", "xy"), nmm.Line([1.1, 0], [3, 0.8], duration=5))
+    >>> limits = nmm.Limits(bounds=corridor)
+    >>> controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), limits=limits, dt=0.01)
+    >>> nmm.simulate(controller, robot.q({"q2": 0.5}), 5.0, 0.01).q[:, 1:2].max(axis=0).round(3)
+    array([0.2])
     """
 
     def __init__(

@@ -45,6 +45,16 @@ class Limits:
     Raises
     ------
     InputError : lower above upper, an acceleration or a recovery that is not above 0, no numbers
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> limits = nmm.Limits(velocity={"v": 0.5, "arm": 1.0}, acceleration=2.0)
+    >>> task = nmm.Task(nmm.Position("ee", "xy"), [3.0, 1.0])
+    >>> controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), limits=limits, dt=0.01)
+    >>> run = nmm.simulate(controller, robot.q({"q2": 0.5}), 3.0, 0.01)
+    >>> np.abs(run.u[:, :1]).max(axis=0).round(3)
+    array([0.5])
     """
 
     def __init__(

@@ -40,6 +40,15 @@ class Retreat:
     Raises
     ------
     InputError : numbers that are not above 0, no durations, a progress of 1 or more, a goal that is none
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> task = nmm.Task(nmm.Position("ee", "xy"), [1.5, 0.5])
+    >>> keeps = {"limits": nmm.Limits(), "retreat": nmm.Retreat(stalled=0.5)}
+    >>> controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), dt=0.02, **keeps)
+    >>> nmm.simulate(controller, robot.q({"q2": 0.5}), 10, 0.02, "zoh", until=nmm.Goal()).complete
+    True
     """
 
     def __init__(

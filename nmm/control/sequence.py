@@ -22,7 +22,17 @@ from nmm.robots.robot import Robot
 
 
 class Event(NamedTuple):
-    """A task began or ended: t, s; the task's name; "begins" or "ends"; why, in words."""
+    """A task began or ended: t, s; the task's name; "begins" or "ends"; why, in words.
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> aim = nmm.Task(nmm.Posture("q1"), [0.5], name="aim", when=nmm.Between(0.5, 1.0))
+    >>> controller = nmm.SequencedController(robot, aim, nmm.ProjectedGradient())
+    >>> run = nmm.simulate(controller, robot.rest, 2.0, 0.01)
+    >>> run.events[0]
+    Event(t=0.5, task='aim', what='begins', why='its time is t = 0.5 to 1 s')
+    """
 
     t: float
     task: str

@@ -54,6 +54,15 @@ class SequencedController(Controller):
     RunError : when called, where the tasks that are then active do not fit together
     InputError : what `Controller` and `Sequence` raise; a resolver with an added task, whose rows are as many
         as the task leaves
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> hand = nmm.Task(nmm.Position("ee", "xy"), [2.0, 1.0], name="hand")
+    >>> aim = nmm.Task(nmm.Posture("q1"), [0.5], name="aim", priority=2, when=nmm.Between(1.0, 2.0))
+    >>> controller = nmm.SequencedController(robot, [hand, aim], nmm.ProjectedGradient())
+    >>> [event.what for event in nmm.simulate(controller, robot.q({"q2": 0.5}), 3.0).events]
+    ['begins', 'ends']
     """
 
     def __init__(

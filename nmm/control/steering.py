@@ -94,6 +94,18 @@ class Steering:
     Source: that the null space chooses the steering, De Luca, Oriolo, Robuffo Giordano, "Kinematic control of
     nonholonomic mobile manipulators in the presence of steering wheels", ICRA 2010; pursuit: Coulter,
     "Implementation of the pure pursuit path tracking algorithm", CMU-RI-TR-92-01, 1992.
+
+    Examples
+    --------
+    >>> robot = nmm.Scenario.load("kinova_car").robot()
+    >>> task = nmm.Task(nmm.Position("j2s6s200_end_effector"), nmm.Circle([0, 3, 1], 2.5, rate=0.1))
+    >>> gentle, none = (
+    ...     nmm.Controller(robot, task, nmm.ProjectedGradient(), steering=law)
+    ...     for law in (nmm.Steering(gain=1.0), False)
+    ... )
+    >>> q = robot.q(nmm.Scenario.load("kinova_car").parts.q0)
+    >>> np.allclose(gentle(0.0, q), none(0.0, q))
+    False
     """
 
     def __init__(self, gain: float = 5.0, spring: float = 2.0) -> None:

@@ -40,6 +40,12 @@ class Draft:
     scenario : the same, read
     trajectory : its run, as it was tried
     chosen : which robot, which frame, which start and path, and why, a line each
+
+    Examples
+    --------
+    >>> draft = nmm.first_scenario("unicycle_2r")
+    >>> draft.scenario.parts.resolver.kind, draft.trajectory.complete
+    ('pg', True)
     """
 
     text: str
@@ -70,6 +76,12 @@ def first_scenario(
     Raises
     ------
     InputError : the robot cannot be loaded, has nothing to lead, or none of the scenarios tried runs
+
+    Examples
+    --------
+    >>> draft = nmm.first_scenario("unicycle_3r")
+    >>> draft.trajectory.complete
+    True
     """
     for value in (robot,) if arm is None else (robot, arm):
         if not isinstance(value, str | Path):

@@ -66,6 +66,15 @@ def drive(
     Raises
     ------
     InputError : the port is taken, not allowed or not a port; a scenario that nobody can drive
+
+    Examples
+    --------
+    >>> from threading import Event, Timer
+    >>> ended = Event()
+    >>> Timer(0.5, ended.set).start()
+    >>> setup = nmm.driving.ScenarioSetup(nmm.Scenario.load("unicycle_2r_position"))
+    >>> nmm.driving.drive(setup, open_browser=False, stop=ended)
+    Driving at http://127.0.0.1:.../ (Ctrl-C ends it)
     """
     session = Session(Driven(setup))
     server = PageServer(

@@ -67,6 +67,12 @@ class ScenarioSetup(Setup):
     Raises
     ------
     InputError : tasks that come and go
+
+    Examples
+    --------
+    >>> setup = nmm.driving.ScenarioSetup(nmm.Scenario.load("unicycle_2r_position"))
+    >>> setup.name, setup.at_robot
+    ('Position task for the planar robot (paper, section VI, case 1)', False)
     """
 
     at_robot = False
@@ -161,6 +167,13 @@ class RobotSetup(Setup):
     Parameters
     ----------
     tasks : with or without references, which are left aside
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_3r")
+    >>> setup = nmm.driving.RobotSetup(robot, [nmm.Position("ee")], robot.q({"q2": 0.8, "q3": 0.5}))
+    >>> setup.controller({}).resolver.name
+    'dls'
     """
 
     at_robot = True

@@ -24,7 +24,15 @@ def has_clearance(trajectory: Trajectory) -> bool:
 
 def clearance(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
     """The least distance over time, on the way to the next sample included, coloured by the nearest pair;
-    the distance asked for as a line; `width` in wide."""
+    the distance asked for as a line; `width` in wide.
+
+    Examples
+    --------
+    >>> run = nmm.Scenario.load("unicycle_3r_door").run()
+    >>> figure = nmm.figures.clearance(run)
+    >>> figure.axes[0].get_ylabel()
+    'least distance [m]'
+    """
     t, d, pairs = trajectory.t, trajectory.clearance_between, trajectory.clearance_pairs
     kinds, counts = np.unique(pairs[(pairs >= 0) & np.isfinite(d)], return_counts=True)
     named = [int(pair) for pair in kinds[np.argsort(-counts, kind="stable")][:NAMED]]

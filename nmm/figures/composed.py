@@ -71,6 +71,12 @@ def overview(trajectory: Trajectory, *, width: float = _WIDTH) -> Figure:
     Parameters
     ----------
     width : of the figure, in; one narrower than 6 in has one column
+
+    Examples
+    --------
+    >>> run = nmm.Scenario.load("unicycle_2r_position").run()
+    >>> len(nmm.figures.overview(run).axes)
+    5
     """
     scene, columns = Scene(trajectory), _Columns(width)
     parts = list(curves.input_parts(trajectory).values())
@@ -138,6 +144,13 @@ def comparison(trajectories: Sequence[Trajectory], *, width: float = _WIDTH) -> 
     Raises
     ------
     InputError : no run with a sample
+
+    Examples
+    --------
+    >>> runs = [nmm.Scenario.load("unicycle_2r_position").with_resolver(name).run() for name in ("rg", "pg")]
+    >>> figure = nmm.figures.comparison(runs)
+    >>> figure.axes[-1].get_xlabel()
+    'time t [s]'
     """
     runs = [run for run in trajectories if len(run)]
     if not runs:
@@ -236,6 +249,12 @@ def write_run_figures(
     Returns
     -------
     The files written: motion.png and so on, or of the formats asked for.
+
+    Examples
+    --------
+    >>> run = nmm.Scenario.load("unicycle_2r_position").run()
+    >>> sorted(path.name for path in nmm.figures.write_run_figures(run, "."))
+    ['errors.png', 'inputs.png', 'motion.png', 'objective.png']
     """
     across = options.across()
     figures = {

@@ -33,6 +33,13 @@ def errors(trajectory: Trajectory, gain: float | None = None, *, width: float = 
     gain : K of the guide ‖e(0)‖ exp(-K t), 1/s; when not given, the one that all tasks of the run's
         scenario share, or else the rate fitted to the run
     width : of the figure, in
+
+    Examples
+    --------
+    >>> run = nmm.Scenario.load("unicycle_2r_position").run()
+    >>> figure = nmm.figures.errors(run, gain=1.0)
+    >>> figure.axes[-1].get_yscale()
+    'log'
     """
     kinds = style.groups(trajectory.r_units)
     legends = [_error_names(trajectory, rows) for rows in kinds.values()]
@@ -126,7 +133,14 @@ def fitted_rate(t: Array, values: Array) -> float | None:
 
 
 def tracking(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
-    """Each component of the task over time, its reference dashed (the paper's Fig. 9); `width` in wide."""
+    """Each component of the task over time, its reference dashed (the paper's Fig. 9); `width` in wide.
+
+    Examples
+    --------
+    >>> run = nmm.Scenario.load("unicycle_3r_position").run()
+    >>> [axes.get_ylabel() for axes in nmm.figures.tracking(run).axes]
+    ['ee.x [m]', 'ee.y [m]', 'ee.z [m]']
+    """
     count = len(trajectory.r_names)
     legends = [[name, "reference"] for name in trajectory.r_names]
     made, panels = style.stack([1.1] * count, legends, width)
@@ -160,6 +174,12 @@ def inputs(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
     Parameters
     ----------
     width : of the figure, in
+
+    Examples
+    --------
+    >>> run = nmm.Scenario.load("unicycle_2r_position").run()
+    >>> len(nmm.figures.inputs(run).axes)
+    4
     """
     parts = list(input_parts(trajectory).values())
     across = width - style.LEFT - style.RIGHT
@@ -251,7 +271,14 @@ def input_symbol(trajectory: Trajectory, column: int) -> str:
 
 
 def coordinates(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
-    """The coordinates over time: the platform's position, its angles, the arm; `width` in wide."""
+    """The coordinates over time: the platform's position, its angles, the arm; `width` in wide.
+
+    Examples
+    --------
+    >>> run = nmm.Scenario.load("unicycle_2r_position").run()
+    >>> len(nmm.figures.coordinates(run, width=3.5).axes)
+    3
+    """
     robot = trajectory.robot
     n_p = robot.platform.n_p
     parts = [
@@ -273,7 +300,15 @@ def coordinates(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
 
 def singular_values(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
     """The smallest singular value of J_bar over time; below it RG's partition, its switches marked; `width`
-    in wide."""
+    in wide.
+
+    Examples
+    --------
+    >>> run = nmm.Scenario.load("unicycle_2r_switching").run()
+    >>> figure = nmm.figures.singular_values(run)
+    >>> figure.axes[0].get_ylabel()
+    'σ_min'
+    """
     partitioned = bool(np.any(trajectory.partition >= 0))
     names = [_SIGMA, *["switch of partition"] * bool(_switched(trajectory))]
     heights, legends = ([1.7, 0.28], [names, []]) if partitioned else ([1.7], [names])

@@ -32,6 +32,12 @@ def save(made: Figure, path: str | Path) -> Path:
     Raises
     ------
     InputError : another suffix, a file that cannot be written
+
+    Examples
+    --------
+    >>> run = nmm.Scenario.load("unicycle_2r_position").run()
+    >>> nmm.figures.save(nmm.figures.stroboscopic(run), "motion.pdf").name
+    'motion.pdf'
     """
     path = Path(path)
     kind = path.suffix.lower().removeprefix(".")

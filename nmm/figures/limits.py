@@ -29,6 +29,13 @@ def limits(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
     """Each limited quantity in the band of its range over time, 0 at its lower and 1 at its upper limit.
 
     Inputs in one panel, coordinates and what else is limited in another; below them λ and the least margin.
+
+    Examples
+    --------
+    >>> run = nmm.Scenario.load("tiago_tray").run()
+    >>> figure = nmm.figures.limits(run)
+    >>> run.limited
+    True
     """
     count = trajectory.robot.n_u
     inputs = {f"u_{name}" for name in trajectory.robot.u_names[:count]}

@@ -49,6 +49,13 @@ def stroboscopic(
     Raises
     ------
     InputError : no sample; an instant outside the run
+
+    Examples
+    --------
+    >>> run = nmm.Scenario.load("unicycle_2r_position").run()
+    >>> figure = nmm.figures.stroboscopic(run, [0.0, 5.0, 25.0])
+    >>> figure.axes[0].get_xlabel()
+    'x [m]'
     """
     return page(Scene(trajectory, instants), width)
 

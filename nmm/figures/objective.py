@@ -42,6 +42,13 @@ def objective_comparison(
     Raises
     ------
     InputError : no run with a sample
+
+    Examples
+    --------
+    >>> runs = [nmm.Scenario.load("unicycle_2r_position").with_resolver(name).run() for name in ("rg", "pg")]
+    >>> figure = nmm.figures.objective_comparison(runs, zoom=(0.0, 1.0))
+    >>> figure.axes[0].get_ylabel()
+    'H(q)'
     """
     runs = [run for run in trajectories if len(run)]
     if not runs:

@@ -112,6 +112,13 @@ class Function(ABC):
     `comparison` is for values that cannot be subtracted (orientations, poses): a kernel of signature
     `records.FUNCTION` that sees the rows [value, target, error], s of each, with their derivatives, and
     writes those of the error. Without it the error is target - value, wrapped where a row is an angle.
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> heading = nmm.Heading("ee")
+    >>> isinstance(heading, nmm.Function), heading.rows(robot)[0].unit
+    (True, 'rad')
     """
 
     comparison: Kernel | None = None

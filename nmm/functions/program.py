@@ -289,6 +289,13 @@ def evaluate(function: Function, t: float, configuration: Configuration) -> Eval
     Raises
     ------
     InputError : a frame or coordinate that the robot lacks; a sum of objectives, which is its terms'
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> found = nmm.evaluate(nmm.Circle([0, 0], 1, rate=2.0), 0.0, nmm.Configuration(robot, robot.rest))
+    >>> found.value, found.value_t
+    (array([1., 0.]), array([-0.,  2.]))
     """
     program = Program(configuration.robot, (function,))
     program.lay_out()

@@ -33,6 +33,13 @@ class Card:
     message : why it did not end as asked; empty where it did
     numbers : labels with values as people read them, of summary.json
     shown : whether there is something to see: motion.png and playback.html
+
+    Examples
+    --------
+    >>> from nmm.gallery import write_gallery
+    >>> made = write_gallery("gallery", ["unicycle_2r_position"], jobs=1)
+    >>> made.cards[0].outcome, dict(made.cards[0].numbers)["resolver"]
+    ('completed', 'RG')
     """
 
     name: str

@@ -29,6 +29,13 @@ class Gallery:
     ----------
     folder, index : the folder, and the page in it
     cards : a card a scenario, by name
+
+    Examples
+    --------
+    >>> from nmm.gallery import write_gallery
+    >>> made = write_gallery("gallery", ["unicycle_2r_position"], jobs=1)
+    >>> made.index.name, len(made.cards)
+    ('index.html', 1)
     """
 
     folder: Path
@@ -59,6 +66,13 @@ def write_gallery(
     ------
     InputError : a name that is not bundled; jobs below 1; the folder exists and is not ours, or cannot be
         written
+
+    Examples
+    --------
+    >>> from nmm.gallery import write_gallery
+    >>> made = write_gallery("gallery", ["unicycle_2r_position"], jobs=1)
+    >>> sorted(path.name for path in made.folder.iterdir())
+    ['gallery.json', 'index.html', 'unicycle_2r_position', 'viewer.js']
     """
     names = checked(only)
     if jobs < 1:

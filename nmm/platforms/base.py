@@ -52,6 +52,15 @@ class Platform(ABC):
     coordinates : names of qp, length n_p (m and rad)
     inputs : names of the pseudovelocities up, length p <= n_p
     input_units : their units
+
+    Examples
+    --------
+    >>> platform = nmm.load("car_base").platform
+    >>> platform.name, platform.coordinates, platform.inputs
+    ('car', ('x', 'y', 'theta', 'steering'), ('v', 'steering_rate'))
+    >>> qp = [0, 0, 0, 0.3]
+    >>> np.allclose(platform.A(qp) @ platform.G(qp), 0)
+    True
     """
 
     name: str

@@ -224,6 +224,12 @@ class Car(_Bicycle):
     ------
     InputError : a wheelbase or steering angle out of range, a steering joint named x, y or theta, a limit of
         an input that does not exist
+
+    Examples
+    --------
+    >>> car = nmm.Car(wheelbase=0.7, max_steering=0.6)
+    >>> (car.G([0, 0, 0, 0.3]) @ [1.0, 0.0]).round(3)
+    array([1.   , 0.   , 0.442, 0.   ])
     """
 
     name = "car"
@@ -261,6 +267,12 @@ class FrontDriveCar(_Bicycle):
     Raises
     ------
     InputError : as `Car`
+
+    Examples
+    --------
+    >>> car = nmm.FrontDriveCar(wheelbase=0.7)
+    >>> (car.G([0, 0, 0, 0.3]) @ [1.0, 0.0]).round(3)
+    array([0.955, 0.   , 0.422, 0.   ])
     """
 
     name = "front_drive_car"

@@ -56,6 +56,12 @@ class DifferentialDrive(Platform):
     Raises
     ------
     InputError : a length that is not above zero; a limit of an input that does not exist
+
+    Examples
+    --------
+    >>> drive = nmm.DifferentialDrive(radius=0.1, track=0.5)
+    >>> (drive.G([0, 0, 0]) @ [9, 10]).round(3)
+    array([0.95, 0.  , 0.2 ])
     """
 
     name = "differential"

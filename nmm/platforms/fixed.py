@@ -15,7 +15,14 @@ def fixed(qp: Array, parameters: Array, G: Array, G_q: Array) -> None:
 
 
 class Fixed(Platform):
-    """qp = [], up = []: the root link stands where the world's axes are."""
+    """qp = [], up = []: the root link stands where the world's axes are.
+
+    Examples
+    --------
+    >>> arm = nmm.load("unicycle_3r", platform="fixed")
+    >>> arm.q_names
+    ('q1', 'q2', 'q3')
+    """
 
     name = "fixed"
     coordinates = ()

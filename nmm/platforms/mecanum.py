@@ -50,6 +50,14 @@ class Mecanum(Platform):
     Raises
     ------
     InputError : a length that is not above zero; a limit of an input that does not exist
+
+    Examples
+    --------
+    >>> base = nmm.Mecanum(radius=0.1, length=0.5, width=0.4)
+    >>> base.inputs
+    ('drive', 'strafe', 'turn')
+    >>> (base.G([0, 0, 0]) @ [0.0, 5.0, 0.0]).round(3)
+    array([0. , 0.5, 0. ])
     """
 
     name = "mecanum"

@@ -33,6 +33,11 @@ class Omnidirectional(Platform):
     """qp = [x, y, theta] (m, m, rad), up = [vx, vy, omega] (m/s, m/s, rad/s).
 
     vx and vy are the velocity of the point x, y along the platform's own axes, forward and to the left.
+
+    Examples
+    --------
+    >>> nmm.Omnidirectional().inputs
+    ('vx', 'vy', 'omega')
     """
 
     name = "omnidirectional"

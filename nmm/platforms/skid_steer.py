@@ -66,6 +66,12 @@ class SkidSteer(Platform):
     ------
     InputError : a length that is not above zero; centres that are not finite or in the wrong order; a limit
         of an input that does not exist
+
+    Examples
+    --------
+    >>> husky = nmm.SkidSteer(radius=0.17, length=0.51, width=0.57, left=0.4, right=-0.4)
+    >>> (husky.G([0, 0, 0]) @ [-5, 5]).round(3)
+    array([0.   , 0.   , 2.125])
     """
 
     name = "skid_steer"

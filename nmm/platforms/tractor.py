@@ -79,6 +79,12 @@ class Trailer:
     Raises
     ------
     InputError : a length or max_angle that is not above zero
+
+    Examples
+    --------
+    >>> trailer = nmm.Trailer(0.6, hitch=-0.2, max_angle=1.2)
+    >>> nmm.Tractor([trailer]).coordinates
+    ('x', 'y', 'theta', 'hitch1')
     """
 
     length: float
@@ -109,6 +115,14 @@ class Tractor(Platform):
     ------
     InputError : no trailers, or things that are none; joints named twice or x, y or theta; a limit of an
         input that does not exist
+
+    Examples
+    --------
+    >>> train = nmm.Tractor([nmm.Trailer(0.6), nmm.Trailer(0.6, hitch=-0.1, joint="hitch2")])
+    >>> train.coordinates
+    ('x', 'y', 'theta', 'hitch1', 'hitch2')
+    >>> (train.G([0, 0, 0, 0.3, 0]) @ [1.0, 0.0]).round(3)
+    array([ 1.   ,  0.   ,  0.   , -0.493,  0.41 ])
     """
 
     name = "tractor"

@@ -37,6 +37,13 @@ class Unicycle(Platform):
     """qp = [x, y, theta] (m, m, rad), up = [v, omega] (m/s, rad/s).
 
     x, y is the midpoint of the wheels' axle, theta its heading from the world's x axis.
+
+    Examples
+    --------
+    >>> nmm.Unicycle().G([0, 0, np.pi / 2]).round(3)
+    array([[0., 0.],
+           [1., 0.],
+           [0., 1.]])
     """
 
     name = "unicycle"

@@ -41,6 +41,12 @@ def write_html(
     Raises
     ------
     InputError : no motion, or the file cannot be written; ellipsoids as in `playback_scene`
+
+    Examples
+    --------
+    >>> runs = [nmm.Scenario.load("unicycle_2r_position").with_resolver(name).run() for name in ("rg", "pg")]
+    >>> nmm.playback.write_html(runs, "both.html", title="RG and PG").name
+    'both.html'
     """
     options: dict[str, Any] = {"ghosts": ghosts, "fps": fps, "autoplay": autoplay}
     return _write(Path(path), page_of(motions, title, ellipsoids, **options)[1])

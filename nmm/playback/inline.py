@@ -31,6 +31,13 @@ class Page:
     Raises
     ------
     InputError : as `write_html`
+
+    Examples
+    --------
+    >>> run = nmm.Scenario.load("unicycle_2r_position").run()
+    >>> page = nmm.playback.Page([run], fps=10)
+    >>> page.title
+    'unicycle_2r'
     """
 
     def __init__(

@@ -51,6 +51,15 @@ def play(
     Raises
     ------
     InputError : no motion; the port is taken, not allowed or not a port; ellipsoids as in `playback_scene`
+
+    Examples
+    --------
+    >>> from threading import Event, Timer
+    >>> ended = Event()
+    >>> Timer(0.5, ended.set).start()
+    >>> run = nmm.Scenario.load("unicycle_2r_position").run()
+    >>> nmm.playback.play([run], open_browser=False, stop=ended)
+    Playing at http://127.0.0.1:.../ (Ctrl-C ends it)
     """
     if title is None:
         title = motions[0].robot.name if motions else ""
@@ -113,6 +122,13 @@ class LiveViewer:
     Raises
     ------
     InputError : wrong q; the port is taken, not allowed or not a port
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> viewer = nmm.playback.LiveViewer(robot)
+    >>> viewer.display(robot.q({"q1": 0.5}))
+    >>> viewer.close()
     """
 
     def __init__(

@@ -120,11 +120,26 @@ class Rolling:
 
 
 def wheel_rates(robot: Robot, q: ArrayLike, u: ArrayLike, angles: ArrayLike | None = None) -> Array:
-    """Rates of the wheels and their swivels, (D,) rad/s: see `Rolling.rates`."""
+    """Rates of the wheels and their swivels, (D,) rad/s: see `Rolling.rates`.
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> nmm.playback.wheel_rates(robot, robot.rest, [0.5, 0.0, 0.0, 0.0]).round(3)
+    array([5., 5.])
+    """
     return Rolling(robot).rates(q, u, angles)
 
 
 def wheel_angles(motion: Motion) -> Array:
     """Angles of the wheels, then of their swivels, (N, D) rad; wheels at zero at the first sample: see
-    `Rolling.angles`."""
+    `Rolling.angles`.
+
+    Examples
+    --------
+    >>> run = nmm.Scenario.load("unicycle_2r_position").run()
+    >>> angles = nmm.playback.wheel_angles(nmm.playback.Motion(run.robot, run.t, run.q, run.u))
+    >>> angles.shape
+    (5001, 2)
+    """
     return Rolling(motion.robot).angles(motion.q, motion.u)

@@ -88,6 +88,16 @@ class LiveRun:
     Raises
     ------
     InputError : wrong q0; the port is taken, not allowed or not a port
+
+    Examples
+    --------
+    >>> scenario = nmm.Scenario.load("unicycle_2r_position")
+    >>> controller, q0 = scenario.controller(), scenario.robot().q(scenario.parts.q0)
+    >>> with nmm.playback.LiveRun(controller, q0, 1.0, open_browser=False) as live:
+    ...     run = nmm.simulate(controller, q0, 1.0, watch=live.watch)
+    Playing at http://127.0.0.1:.../ (Ctrl-C ends it)
+    >>> run.complete
+    True
     """
 
     def __init__(

@@ -56,6 +56,14 @@ def view(
     ------
     InputError : wrong q; a task of more rows than the robot has inputs; the port is taken, not allowed or
         not a port
+
+    Examples
+    --------
+    >>> from threading import Event, Timer
+    >>> ended = Event()
+    >>> Timer(0.5, ended.set).start()
+    >>> nmm.playback.view(nmm.load("unicycle_3r"), open_browser=False, stop=ended)
+    Showing the robot at http://127.0.0.1:.../ (Ctrl-C ends it)
     """
     at = robot.rest if q is None else robot.q(q)
     viewed = None if task is None else _viewed(robot, task, at)

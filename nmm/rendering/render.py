@@ -62,6 +62,12 @@ def render(
     ------
     InputError : no motion, another suffix, a size, view or time that cannot be
     RunError : no Chromium, no ffmpeg (`pip install 'nmm[video]'`), or one that fails
+
+    Examples
+    --------
+    >>> run = nmm.Scenario.load("unicycle_2r_position", {"duration": 0.2}).run()
+    >>> nmm.rendering.render([run], "motion.mp4", size=(320, 240), fps=10)
+    PosixPath('motion.mp4')
     """
     width, height = _checked_size(size)
     fps, speed = positive(fps, "fps"), positive(speed, "speed")

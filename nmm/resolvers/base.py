@@ -73,6 +73,14 @@ class Resolver(ABC):
     `takes_added_task` says whether it solves the added task's rows too, `start(dimensions)` gives the state
     of one that remembers, `alpha_at` where the step size α is among its numbers, if it has one. With `step`
     "armijo" a controller shortens α at each sample; the resolver itself, which knows no motion, does not.
+
+    Examples
+    --------
+    >>> from nmm.resolvers.problem import Problem
+    >>> resolver = nmm.ProjectedGradient(alpha=1.0)
+    >>> problem = Problem(J=[[1.0, 1.0]], rate=[2.0], h=[0.0, 1.0])
+    >>> isinstance(resolver, nmm.Resolver), resolver.resolve(problem).u.round(3)
+    (True, array([1.5, 0.5]))
     """
 
     name: ClassVar[str]

@@ -43,6 +43,14 @@ class CallableResolver(Resolver):
     Parameters
     ----------
     function : problem -> u; it may raise `numpy.linalg.LinAlgError` when J is singular
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> least_norm = nmm.CallableResolver(lambda problem: np.linalg.pinv(problem.J) @ problem.rate)
+    >>> controller = nmm.Controller(robot, nmm.Task(nmm.Position("ee", "xy"), [2.0, 1.0]), least_norm)
+    >>> nmm.simulate(controller, robot.q({"q2": 0.5}), 10).complete
+    True
     """
 
     name: ClassVar[str] = "callable"

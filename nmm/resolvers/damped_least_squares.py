@@ -60,6 +60,15 @@ class DampedLeastSquares(Resolver):
         (m, m) matrix
     step : "constant", α as it is; "armijo", α at most, at each sample shortened until the objective falls
         along the sample's motion, so that no α dt is too large
+
+    Examples
+    --------
+    >>> arm = nmm.load("unicycle_3r", platform="fixed")
+    >>> task = nmm.Task(nmm.Position("ee"), [2.0, 0.0, 0.5])
+    >>> controller = nmm.Controller(arm, task, nmm.DampedLeastSquares())
+    >>> run = nmm.simulate(controller, arm.q({"q2": 0.8, "q3": 0.5}), 10)
+    >>> str(run.outcome), bool(np.abs(run.u[-1]).max() < 0.01)
+    ('missed', True)
     """
 
     name: ClassVar[str] = "dls"

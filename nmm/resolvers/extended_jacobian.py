@@ -168,6 +168,15 @@ class ExtendedJacobian(Resolver):
         run ends there; "damped", the task is done and the added task damped, as by damped least squares with
         its usual numbers, in the directions in which the task leaves it hardly anything; levels of priority
         are damped, too, where those above leave them hardly anything
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> hand = nmm.Task(nmm.Position("ee", "xy"), [2.0, 1.0])
+    >>> arm = nmm.Task(nmm.Posture("q1", "q2"), [0.3, 0.6])
+    >>> controller = nmm.Controller(robot, hand, nmm.ExtendedJacobian(), added_task=arm)
+    >>> nmm.simulate(controller, robot.q({"q2": 0.5}), 10).q[-1, 3:].round(3)
+    array([0.3, 0.6])
     """
 
     name: ClassVar[str] = "ej"

@@ -86,6 +86,17 @@ class ProjectedGradient(Resolver):
         times the first pivot if that is above 1
     step : "constant", α as it is; "armijo", α at most, at each sample shortened until the objective falls
         along the sample's motion, so that no α dt is too large
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> task = nmm.Task(nmm.Position("ee", "xy"), [2.0, 1.0])
+    >>> resolver = nmm.ProjectedGradient(alpha=10, weights={"platform": 4.0})
+    >>> controller = nmm.Controller(robot, task, resolver, nmm.Quadratic(nmm.Square("q1")))
+    >>> q = robot.q({"q2": 0.5})
+    >>> u, step = controller(0.0, q), controller.evaluate(0.0, q)
+    >>> np.allclose(step.J @ u, step.rate)
+    True
     """
 
     name: ClassVar[str] = "pg"

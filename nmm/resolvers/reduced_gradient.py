@@ -251,6 +251,15 @@ class ReducedGradient(Resolver):
         answer goes over, step by step, to that of damped least squares with its usual numbers, and back
     step : "constant", α as it is; "armijo", α at most, at each sample shortened until the objective falls
         along the sample's motion, so that no α dt is too large
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> task = nmm.Task(nmm.Position("ee", "xy"), [2.0, 1.0])
+    >>> resolver = nmm.ReducedGradient(alpha=10, partitions=[["v", "omega"], ["v", "q1"]], threshold=0.01)
+    >>> controller = nmm.Controller(robot, task, resolver, nmm.Quadratic(nmm.Square("q1")))
+    >>> controller.evaluate(0.0, robot.q({"q2": 0.5})).partition
+    array([0, 1])
     """
 
     name: ClassVar[str] = "rg"

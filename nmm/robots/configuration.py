@@ -32,6 +32,15 @@ class Configuration:
     Raises
     ------
     InputError : wrong length, a number that is not finite, an unknown name
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> here = nmm.Configuration(robot, robot.q({"q1": np.pi / 2}))
+    >>> here.placement("ee").translation.round(3)
+    array([0.3, 0.8, 0.4])
+    >>> here.jacobian("ee").shape
+    (6, 5)
     """
 
     def __init__(self, robot: Robot, q: ArrayLike) -> None:

@@ -35,6 +35,16 @@ class Motion:
     ------
     InputError : wrong shapes, no samples, times that do not ascend, numbers that are not finite,
         an unknown frame
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> t = np.linspace(0, 2, 41)
+    >>> u = np.tile([0.5, 0.0, 0.0, 0.4], (41, 1))
+    >>> q = np.column_stack([0.5 * t, 0 * t, 0 * t, 0 * t, 0.4 * t])
+    >>> motion = nmm.playback.Motion(robot, t, q, u, label="by hand")
+    >>> nmm.playback.write_html([motion], "by_hand.html").name
+    'by_hand.html'
     """
 
     robot: Robot

@@ -48,6 +48,19 @@ class Robot(Coordinates):
     followers : coordinates that follow another one, which follows nobody; they have no input of their own
     semantics : what its SRDF says
     parts : what loading keeps for mounting and for reports (`nmm.robots.loading.provenance.Parts`)
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r", arguments={"d": 0.5})
+    >>> robot.u_names, robot.n, robot.n_u
+    (('v', 'omega', 'q1', 'q2'), 5, 4)
+    >>> q = robot.q({"theta": np.pi, "q1": 0.5})
+    >>> robot.S(q).round(3)
+    array([[-1.,  0.,  0.,  0.],
+           [ 0.,  0.,  0.,  0.],
+           [ 0.,  1.,  0.,  0.],
+           [ 0.,  0.,  1.,  0.],
+           [ 0.,  0.,  0.,  1.]])
     """
 
     name: str

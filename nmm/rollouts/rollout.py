@@ -47,6 +47,14 @@ class Rollouts:
         `simulate` does that
     samples (B,) : how many samples each has
     files : the files of the parts, in order
+
+    Examples
+    --------
+    >>> scenario = nmm.Scenario.load("unicycle_2r_position")
+    >>> starts = scenario.robot().q(scenario.parts.q0) + np.zeros((3, 1))
+    >>> found = nmm.rollout(scenario, starts, duration=2.0, dt=0.01, keep=["q"], every=10)
+    >>> found["q"].shape, found.outcome
+    ((3, 21, 5), ('ended', 'ended', 'ended'))
     """
 
     t: Array
@@ -111,6 +119,14 @@ def rollout(
     ------
     InputError : no runs, wrong shapes, a q0 outside limits that the controller does not keep; more to keep
         than there is memory for; tasks that come and go, which only `simulate` runs
+
+    Examples
+    --------
+    >>> scenario = nmm.Scenario.load("unicycle_2r_position")
+    >>> starts = scenario.robot().q(scenario.parts.q0) + np.linspace(-0.2, 0.2, 5)[:, None]
+    >>> found = nmm.rollout(scenario, starts, duration=5.0, dt=0.01)
+    >>> found["error_final"].shape, set(found.outcome)
+    ((5,), {'ended'})
     """
     if isinstance(subject, Scenario):
         parts = subject.parts

@@ -26,6 +26,13 @@ class EllipsoidOptions:
     Raises
     ------
     InputError : a scale that is not above zero
+
+    Examples
+    --------
+    >>> run = nmm.Scenario.load("unicycle_3r_position").run()
+    >>> options = nmm.playback.EllipsoidOptions(frame="ee", scale=0.2)
+    >>> nmm.playback.write_html([run], "ellipsoids.html", ellipsoids=options).name
+    'ellipsoids.html'
     """
 
     frame: str | None = None

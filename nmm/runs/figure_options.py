@@ -30,6 +30,14 @@ class FigureOptions:
     Raises
     ------
     InputError : an unknown format or width
+
+    Examples
+    --------
+    >>> options = nmm.figures.FigureOptions(formats=["pdf", "png"], width="column")
+    >>> options.inches
+    3.5
+    >>> run = nmm.Scenario.load("unicycle_2r_position").run()
+    >>> folder = run.save("case1", figures=nmm.figures.FigureOptions(width=4.0))
     """
 
     formats: Sequence[str] = ("png",)

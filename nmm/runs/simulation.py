@@ -82,6 +82,15 @@ def simulate(
     ------
     InputError : wrong q0 (also one outside limits that the controller does not keep, or with a joint that is
         not where the one that it follows has it), duration, dt, method; an `until` that is no Goal
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> task = nmm.Task(nmm.Position("ee", "xy"), [2.0, 1.0], gain=1.0)
+    >>> controller = nmm.Controller(robot, task, nmm.ProjectedGradient())
+    >>> run = nmm.simulate(controller, {"q2": 0.5}, duration=5.0, dt=0.01)
+    >>> np.allclose(run.error_norm[-1], run.error_norm[0] * np.exp(-5.0))
+    True
     """
     robot = controller.robot
     q = robot.q(q0)

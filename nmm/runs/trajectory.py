@@ -26,7 +26,14 @@ if TYPE_CHECKING:
 
 
 class Outcome(StrEnum):
-    """How a run ended (docs/outcomes.md)."""
+    """How a run ended (docs/outcomes.md).
+
+    Examples
+    --------
+    >>> run = nmm.Scenario.load("unicycle_3r_out_of_reach").run()
+    >>> run.outcome is nmm.Outcome.MISSED, run.complete
+    (True, False)
+    """
 
     COMPLETED = "completed"
     MISSED = "missed"
@@ -77,6 +84,15 @@ class Trajectory:
     scenario : the scenario as resolved, if it came from one
     events : when tasks that come and go began and ended, and why
     label : what it is called among other runs; "" for its resolver
+
+    Examples
+    --------
+    >>> run = nmm.Scenario.load("unicycle_2r_position").run()
+    >>> run.q.shape, run.u.shape, run.sigma_min[:1].round(3)
+    ((5001, 5), (5001, 4), array([1.]))
+    >>> folder = run.save("runs/first", figures=False)
+    >>> nmm.Trajectory.load(folder).complete
+    True
     """
 
     robot: Robot

@@ -42,6 +42,13 @@ class Scenario:
     path : the file that it was read from
     parts : its keys, checked
     document : its text as plain data, with what was set
+
+    Examples
+    --------
+    >>> scenario = nmm.Scenario.load("unicycle_2r_position", {"resolver.alpha": 5, "duration": 10})
+    >>> run = scenario.with_resolver("pg").run()
+    >>> run.complete, float(run.t[-1])
+    (True, 10.0)
     """
 
     def __init__(self, document: Document) -> None:

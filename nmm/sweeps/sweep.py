@@ -53,6 +53,13 @@ class Sweep:
     Raises
     ------
     InputError : what is wrong with any of these
+
+    Examples
+    --------
+    >>> sweep = nmm.Sweep("unicycle_2r_position", {"resolver.kind": ["rg", "pg"]}, settings={"duration": 2})
+    >>> swept = sweep.run("runs/kinds", jobs=1)
+    >>> swept.outcomes
+    {'completed': 2}
     """
 
     def __init__(

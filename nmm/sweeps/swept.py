@@ -19,6 +19,13 @@ class Swept:
     ----------
     folder : where it is
     definition : what it is
+
+    Examples
+    --------
+    >>> sweep = nmm.Sweep("unicycle_2r_position", {"q0.x": (-2, 0)}, samples=4, settings={"duration": 2})
+    >>> swept = sweep.run("runs/starts", jobs=1)
+    >>> len(swept.table["error_final"]), swept.page.name
+    (4, 'index.html')
     """
 
     folder: Path

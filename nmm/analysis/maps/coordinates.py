@@ -59,6 +59,13 @@ def singularity_map(
     InputError : an unknown coordinate, measure or part, a part without inputs, a coordinate given twice, a
         range of one that is not mapped, a value of one that is, an empty range, fewer than two samples or
         more than `MOST_NODES` in all, a task of more rows than inputs
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> found = nmm.analysis.singularity_map((robot, nmm.Position("ee", "xy")), ("q1", "q2"), samples=20)
+    >>> found.rank.shape, sorted(found.values)
+    ((20, 20), ['sigma_min'])
     """
     evaluator = Evaluator(subject, **judged)
     robot = evaluator.robot

@@ -99,6 +99,13 @@ class Map:
     frame, height : of a workspace: the frame mapped, and the slab (m) that it was held to
     worst : of a workspace, as `values`, the worst over the postures
     best_q, worst_q : of a workspace, the postures (rows, columns, n) that have these values, by measure
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> found = nmm.analysis.singularity_map((robot, nmm.Position("ee", "xy")), samples=20)
+    >>> sorted(path.name for path in found.save("map").iterdir())
+    ['map.json', 'map.npz', 'sigma_min.png']
     """
 
     kind: Literal["coordinates", "workspace"]

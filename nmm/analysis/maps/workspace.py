@@ -81,6 +81,13 @@ def workspace_map(
     InputError : a robot without an arm, or one that moves the frame in no way, or not in both directions of
         the plane; an unknown frame, joint, measure or part; an empty range; a value of a joint that is
         varied; fewer than two samples or too many; a part without inputs, a task of more rows than inputs
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> found = nmm.analysis.workspace_map((robot, nmm.Position("ee", "xy")), samples=40, configurations=1024)
+    >>> found.kind, found.names
+    ('workspace', ('x', 'y'))
     """
     evaluator = Evaluator(subject, **judged)
     robot = evaluator.robot

@@ -50,6 +50,14 @@ class Laps:
     asked : how many laps were asked for
     q (K + 1, n) : at the start and at each lap's end, angles not wrapped
     errors (K + 1,) : norm of the task error there
+
+    Examples
+    --------
+    >>> scenario = nmm.Scenario.load("unicycle_2r_position")
+    >>> both = nmm.analysis.repeatability(scenario, laps=2, dt=0.02, resolvers=["pg"])
+    >>> laps = both.laps[0]
+    >>> laps.finished, laps.q.shape
+    (True, (3, 5))
     """
 
     name: str
@@ -147,6 +155,12 @@ class Repeatability:
     ----------
     laps : of each, in the order given
     period : s
+
+    Examples
+    --------
+    >>> both = nmm.analysis.repeatability(nmm.Scenario.load("unicycle_2r_position"), laps=1, dt=0.02)
+    >>> round(both.period), both["pg"].q.shape
+    (25, (2, 5))
     """
 
     laps: tuple[Laps, ...]
@@ -204,6 +218,12 @@ def repeatability(
     Raises
     ------
     InputError : the task's references do not repeat themselves with a period, or one has to be given
+
+    Examples
+    --------
+    >>> both = nmm.analysis.repeatability(nmm.Scenario.load("unicycle_2r_position"), laps=2, dt=0.02)
+    >>> both.complete, [one.name for one in both.laps]
+    (True, ['rg', 'pg'])
     """
     laps = counted(laps, "laps")
     from nmm.scenario import Scenario  # imported by those who have one: it brings pydantic

@@ -63,6 +63,13 @@ class SelfMotion:
     text : in words, as it begins, the largest rate 1
     length : of the way there, ∫‖u‖ dt, in m and rad
     ended : why the way there is shorter than asked; "" where it is not
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> moved = nmm.analysis.self_motion((robot, nmm.Posture("q1", "q2")), robot.rest, duration=1.0)
+    >>> moved.text
+    'the platform drives forward at 1 m/s alone'
     """
 
     trajectory: Trajectory
@@ -110,6 +117,13 @@ def self_motion(
     InputError : no such direction, one that moves the task, numbers that are not above zero, q outside limits
     SingularError : J is singular at q, though not nearby: its null space there is not that of the motion; or
         the motion cannot begin, at a limit
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> moved = nmm.analysis.self_motion((robot, nmm.Position("ee", "xy")), {"q2": 0.5}, duration=1.0)
+    >>> bool(np.ptp(moved.trajectory.r, axis=0).max() < 1e-6)
+    True
     """
     jacobians = Jacobians(subject)
     t, q = checked(jacobians, t, q)

@@ -48,6 +48,13 @@ class RedundancyReport:
     withheld_texts : each in words, along the platform's own axes
     by_brackets : how many of the k the Lie brackets of two self-motions S(q) u give; None where the wheels
         or the task do not let them be taken
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> report = nmm.analysis.redundancy((robot, nmm.Posture("q1", "q2")), robot.rest)
+    >>> report.texts
+    ('the platform drives forward at 1 m/s alone', 'the platform turns left at 1 rad/s alone')
     """
 
     robot: Robot
@@ -198,6 +205,13 @@ def redundancy(
     ------
     InputError : a task of more rows than inputs, q of another length, an unknown name
     SingularError : there is no J: the wheels cannot roll there, or the task is undefined
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> report = nmm.analysis.redundancy((robot, nmm.Position("ee", "xy")), {"q2": 0.5})
+    >>> report.kinematic, report.static
+    (2, 3)
     """
     jacobians = Jacobians(subject)
     t, q = checked(jacobians, t, q)

@@ -26,6 +26,14 @@ class Relation:
     values : any of these, rad or m; an angle's from -π to π where whole turns do not matter
     unit : rad or m
     circular : whole turns do not matter
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> search = nmm.analysis.find_singularities((robot, nmm.Position("ee", "xy")), part="arm", starts=40)
+    >>> relation = search.families[0].constraints[0]
+    >>> relation.coefficients, relation.unit
+    ({'q2': 1}, 'rad')
     """
 
     coefficients: Mapping[str, int]
@@ -79,6 +87,14 @@ class SingularFamily:
     examples (E, n) : configurations
     starts : how many starts ended here
     names : of the coordinates that the examples have, in their order
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> search = nmm.analysis.find_singularities((robot, nmm.Position("ee", "xy")), part="arm", starts=40)
+    >>> family = search.families[0]
+    >>> family.free, family.dimension, family.rank
+    (('x', 'y', 'theta', 'q1'), 4, 1)
     """
 
     free: tuple[str, ...]

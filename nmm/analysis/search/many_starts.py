@@ -46,6 +46,13 @@ class SingularitySearch:
     fixed : coordinates that did not move, and where they stood
     units : of all coordinates, rad or m
     tolerance : singular values this small beside the largest are zero
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> search = nmm.analysis.find_singularities((robot, nmm.Position("ee", "xy")), part="arm", starts=40)
+    >>> search.full_rank, search.converged
+    (2, 40)
     """
 
     robot: str
@@ -165,6 +172,13 @@ def find_singularities(
     InputError : a number of starts below 1; an unknown coordinate or part; an empty range; a task of more
         rows than the robot has inputs
     SingularError : there is no J anywhere in the ranges
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> search = nmm.analysis.find_singularities((robot, nmm.Position("ee", "xy")), part="arm", starts=40)
+    >>> [family.text for family in search.families]
+    ['q2 = 0 or ±π; x, y, theta and q1 free; loses ee.x (rank 1); 40 starts']
     """
     jacobians = Jacobians(subject)
     measure, robot = Measure(jacobians, part, length, sizes, scalar(t, "t")), jacobians.robot

@@ -25,6 +25,13 @@ class LocalMinimum:
     q (n,) : m and rad
     sigma_min : smallest singular value, in the sizes of the search
     ratio : beside the largest of the whole J
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> search = nmm.analysis.find_singularities((robot, nmm.Position("ee", "xy")), starts=40)
+    >>> round(search.smallest.sigma_min, 3)
+    0.212
     """
 
     q: Array

@@ -45,6 +45,13 @@ class SingularPoint:
     lost : the task's directions that are lost at q
     sigma_min, ratio : smallest singular value at q, and beside the largest of the whole J
     starts, converged : local searches, and how many of them found a singular configuration
+
+    Examples
+    --------
+    >>> arm = nmm.load("unicycle_2r", platform="fixed")
+    >>> point = nmm.analysis.nearest_singularity((arm, nmm.Position("ee", "xy")), {"q2": 0.4}, starts=20)
+    >>> point.rank, point.full_rank, point.free
+    (1, 2, ('q1',))
     """
 
     q: Array
@@ -150,6 +157,14 @@ def nearest_singularity(
     Raises
     ------
     InputError, SingularError : as `find_singularities`
+
+    Examples
+    --------
+    >>> arm = nmm.load("unicycle_2r", platform="fixed")
+    >>> hand = nmm.Position("ee", "xy")
+    >>> point = nmm.analysis.nearest_singularity((arm, hand), {"q1": 0.3, "q2": 0.4}, starts=20)
+    >>> round(point.distance, 3), point.q.round(3) + 0.0
+    (0.4, array([0.3, 0. ]))
     """
     jacobians = Jacobians(subject)
     t, given = checked(jacobians, t, q)

@@ -28,6 +28,14 @@ class ExtendedSingularity(Ranked):
     lost (m - rank, m) : combinations of the rows that no input moves: what both tasks speak of
     kinematic : J itself lost rank
     added_singular : the added task's J_y itself lost rank
+
+    Examples
+    --------
+    >>> scenario = nmm.Scenario.load("unicycle_2r_extended_jacobian")
+    >>> robot = scenario.robot()
+    >>> report = nmm.analysis.analyse(scenario.controller(), robot.q(scenario.parts.q0))
+    >>> report.extended.rank, report.extended.algorithmic
+    (4, False)
     """
 
     rows: tuple[str, ...]
@@ -58,6 +66,14 @@ class PartitionSingularities:
     singular (count,) : whether Ja lost rank (σ_min(Ja) at most `tolerance` times J's largest singular value
         or, rows in their natural sizes, times 1)
     kinematic : J itself lost rank, and with it every Ja
+
+    Examples
+    --------
+    >>> scenario = nmm.Scenario.load("unicycle_3r_position")
+    >>> robot = scenario.robot()
+    >>> report = nmm.analysis.analyse(scenario.controller(), robot.q(scenario.parts.q0))
+    >>> len(report.partitions.names), report.partitions.algorithmic
+    (3, ())
     """
 
     names: tuple[tuple[str, ...], ...]

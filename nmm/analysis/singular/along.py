@@ -49,6 +49,13 @@ class SingularityHistory:
     crossings : where a minor changes its sign, in the order of time
     dips : local minima of σ_min below `threshold`
     extended_dips : local minima of J_e's σ_min below it; no entries without an added task
+
+    Examples
+    --------
+    >>> scenario = nmm.Scenario.load("unicycle_2r_position")
+    >>> history = nmm.analysis.analyse_along(scenario.controller(), scenario.run())
+    >>> history.J.shape, sorted(history.sigma_min)
+    ((5001, 2, 4), ['arm', 'platform', 'robot'])
     """
 
     t: Array
@@ -100,6 +107,13 @@ def analyse_along(
     ------
     InputError : as `analyse`; times and q that do not fit
     SingularError : there is no J at a sample
+
+    Examples
+    --------
+    >>> scenario = nmm.Scenario.load("unicycle_2r_stretched")
+    >>> history = nmm.analysis.analyse_along(scenario.controller(), scenario.run())
+    >>> bool(history.sigma_min["arm"].max() < 1e-9), bool(history.sigma_min["robot"].min() > 0.9)
+    (True, True)
     """
     if isinstance(motion, Trajectory):
         if q is not None:

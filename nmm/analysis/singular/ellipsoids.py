@@ -65,6 +65,13 @@ class Ellipsoids:
         near as can be to where it was, so that radii may cross but axes neither swap nor flip
     radii (N, 3) : m/s along each axis; 0 where the part cannot move the frame, NaN where the wheels cannot
         roll (the axes stay as they were)
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_3r")
+    >>> whole = nmm.analysis.ellipsoids_along(robot, "ee", robot.q({"q2": 0.8, "q3": 0.8})[None])
+    >>> whole.radii.round(2), whole.center.round(2)
+    (array([[1.3 , 1.11, 0.78]]), array([[1.06, 0.  , 1.04]]))
     """
 
     frame: str
@@ -129,6 +136,13 @@ def ellipsoids_along(
     ------
     InputError : an unknown frame, part or input; q of another shape; a size that is not above zero; an input
         without a limit
+
+    Examples
+    --------
+    >>> run = nmm.Scenario.load("unicycle_3r_position").run()
+    >>> arm = nmm.analysis.ellipsoids_along(run.robot, "ee", run.q[::500], part="arm")
+    >>> arm.radii.shape
+    (11, 3)
     """
     frame = frame_of(robot, frame)
     chosen = columns_of(robot, part)

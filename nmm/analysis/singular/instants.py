@@ -20,6 +20,14 @@ class Crossing:
     """A minor changes its sign at time `t` (s), between the samples `before` and `after`.
 
     sign : of the minor afterwards, 1 or -1
+
+    Examples
+    --------
+    >>> scenario = nmm.Scenario.load("unicycle_2r_switching")
+    >>> history = nmm.analysis.analyse_along(scenario.controller(), scenario.run())
+    >>> crossing = history.crossings[0]
+    >>> crossing.columns, round(crossing.t, 2), crossing.sign
+    (('v', 'q1'), 1.83, -1)
     """
 
     t: float
@@ -31,7 +39,16 @@ class Crossing:
 
 @dataclass(frozen=True)
 class Dip:
-    """A local minimum `value` at `t` (s), near sample `index`; `at_end`: at the motion's first or last."""
+    """A local minimum `value` at `t` (s), near sample `index`; `at_end`: at the motion's first or last.
+
+    Examples
+    --------
+    >>> arm = nmm.load("unicycle_2r", platform="fixed")
+    >>> q = np.array([[0.0, q2] for q2 in np.linspace(-1, 1, 21)])
+    >>> history = nmm.analysis.analyse_along((arm, nmm.Position("ee", "xy")), np.linspace(0, 2, 21), q)
+    >>> [(round(dip.t, 3), round(dip.value, 6)) for dip in history.dips]
+    [(1.0, 0.0)]
+    """
 
     t: float
     value: float

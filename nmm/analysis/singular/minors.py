@@ -41,6 +41,13 @@ class Minors(Mapping[tuple[str, ...], float | Array]):
     array (..., count) : their values, in the product of the rows' units over that of the inputs; with leading
         axes, such as the samples of a trajectory, an item is an array
     inputs : names of J's columns
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> minors = nmm.analysis.analyse((robot, nmm.Position("ee", "xy")), {"q2": 0.5}).minors
+    >>> len(minors), round(minors["q1, q2"], 3)
+    (6, 0.072)
     """
 
     def __init__(self, columns: Integers, values: Array, inputs: Sequence[str]) -> None:

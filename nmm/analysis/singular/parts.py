@@ -52,6 +52,14 @@ class Part(Ranked):
     singular_values (s,) : of their columns of J, falling; with fewer columns than rows the last are 0
     rank : how many of them exceed `tolerance` times the largest of the whole J
     lost (s - rank, s) : orthonormal directions of the task that these inputs do not move
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> report = nmm.analysis.analyse((robot, nmm.Position("ee", "xy")), {"q2": 0.0})
+    >>> arm = report.parts["arm"]
+    >>> arm.inputs, arm.rank, arm.lost.round(3) + 0.0
+    (('q1', 'q2'), 1, array([[1., 0.]]))
     """
 
     name: str

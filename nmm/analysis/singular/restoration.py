@@ -30,6 +30,14 @@ class Restoration:
     best (k,) : unit combination of the motions with the largest effect (‖Nᵀ dJ V‖ in Frobenius' norm, or the
         gradient of σ_min); zeros when nothing has an effect
     best_rate : growth of σ_min along it
+
+    Examples
+    --------
+    >>> arm = nmm.load("unicycle_2r", platform="fixed")
+    >>> report = nmm.analysis.analyse((arm, nmm.Position("ee", "xy")), {"q2": 0.0})
+    >>> back = report.by_input
+    >>> dict(zip(back.names, back.regained.tolist()))
+    {'q1': 0, 'q2': 1}
     """
 
     names: tuple[str, ...]

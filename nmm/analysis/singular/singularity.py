@@ -56,6 +56,13 @@ class SingularityReport:
     extended : J_e beside J; None without an added task
     partitions : every candidate's Ja beside J
     tolerance : singular values this small beside the largest, or beside a row of natural size, are zero
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> report = nmm.analysis.analyse((robot, nmm.Position("ee", "xy")), {"q1": 0.5})
+    >>> report.singular, round(report.minors["v, omega"], 3), report.parts["arm"].singular
+    (False, 1.002, True)
     """
 
     t: float
@@ -189,6 +196,13 @@ def analyse(
     ------
     InputError : a task of more rows than inputs, q of another length, an unknown name, too many minors
     SingularError : there is no J: the wheels cannot roll there, or the task is undefined
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> report = nmm.analysis.analyse((robot, nmm.Position("ee", "xy")), {"q2": 0.0})
+    >>> report.rank, round(report.sigma_min, 3), report.given_back_text
+    (2, 1.0, ('ee.x',))
     """
     jacobians = Jacobians(subject, added_task)
     t, q = checked(jacobians, t, q)

@@ -75,6 +75,13 @@ class Alignment(Objective):
         name (its origin), or a function with two or three rows (circle, position, ...)
     of : the heading: theta, the platform's, or a combination of coordinates ({theta: 1, hitch1: 1})
     offset : added to the heading, rad: π for a platform that backs, π/2 for one whose left side counts
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> H = nmm.Alignment(at=[0.0, 5.0])
+    >>> round(H.value(nmm.Configuration(robot, robot.rest)), 3)
+    1.0
     """
 
     def __init__(

@@ -16,6 +16,14 @@ class Objective(Function):
 
     `a + b`, `2.0 * a` and `-a` make sums and multiples; `ramp * a` with a function of one row (a line, a
     spline, a signal, ...) is a term whose weight changes.
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> H = nmm.Quadratic(nmm.Square("q1")) + 0.5 * nmm.Quadratic(nmm.Square("q2", 1.0))
+    >>> here = nmm.Configuration(robot, robot.q({"q1": 1.0}))
+    >>> isinstance(H, nmm.Objective), H.value(here), H.gradient(here)
+    (True, 0.75, array([ 0. ,  0. ,  0. ,  1. , -0.5]))
     """
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:

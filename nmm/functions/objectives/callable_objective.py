@@ -20,6 +20,14 @@ class CallableObjective(Objective):
     ----------
     function : configuration -> H
     gradient : configuration -> ∂H/∂q, shape (n,); central differences when not given
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> q2 = robot.coordinate("q2")
+    >>> H = nmm.CallableObjective(lambda here: 0.5 * (here.q[q2] - 1) ** 2)
+    >>> H.gradient(nmm.Configuration(robot, robot.rest)).round(3)
+    array([ 0.,  0.,  0.,  0., -1.])
     """
 
     def __init__(

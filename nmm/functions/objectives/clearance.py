@@ -67,6 +67,15 @@ class Clearance(Objective):
     ------
     InputError : a reach that is not above 0, numbers that are not finite; on a robot, no collisions, or
         neither obstacles nor `own`
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_3r")
+    >>> post = nmm.Obstacle(nmm.Cylinder(0.2, 0.8), [1.0, 0.6, 0.4])
+    >>> H = nmm.Clearance(nmm.Collisions(obstacles=[post]), reach=0.5)
+    >>> near, far = ({"q1": 0.5, "q2": 1.2}, {"q1": -1.5, "q2": 1.2})
+    >>> H.value(nmm.Configuration(robot, robot.q(near))) > H.value(nmm.Configuration(robot, robot.q(far)))
+    True
     """
 
     def __init__(

@@ -81,6 +81,15 @@ class DirectionalManipulability(JacobianObjective):
     of : "robot", with the platform's inputs (m/s and rad/s), "arm", with the arm's joints alone, or
         "platform"
     weights : of the inputs, as for manipulability
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> here = nmm.Configuration(robot, robot.q({"q2": np.pi / 2}))
+    >>> ahead = nmm.DirectionalManipulability("ee", [1, 0], "xy", of="arm")
+    >>> aside = nmm.DirectionalManipulability("ee", [0, 1], "xy", of="arm")
+    >>> round(ahead.value(here), 3), round(aside.value(here), 3)
+    (0.3, 0.354)
     """
 
     called = "directional manipulability"

@@ -59,6 +59,13 @@ class InverseCondition(JacobianObjective):
     weights : of the inputs, as for manipulability
     length : m, by which rows of metres are divided to be compared with those of radians; the robot's reach
         when not given. Without rows rx, ry, rz it has no effect
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> H = nmm.InverseCondition("ee", "xy", of="arm")
+    >>> round(H.value(nmm.Configuration(robot, robot.q({"q2": np.pi / 2}))), 3)
+    0.698
     """
 
     called = "condition number"

@@ -24,6 +24,13 @@ class JointRange(Objective):
     joints : names of coordinates; all the arm's, but those that follow others, when not given
     lower : their lower limits, rad or m; the robot's own when not given
     upper : their upper limits
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_3r")
+    >>> H = nmm.JointRange(["q2"], lower=[-1.0], upper=[1.0])
+    >>> H.value(nmm.Configuration(robot, robot.q({"q2": 1.0})))
+    0.125
     """
 
     def __init__(

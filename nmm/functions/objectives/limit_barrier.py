@@ -53,6 +53,13 @@ class LimitBarrier(Objective):
     lower : their lower limits, rad or m; the robot's own when not given
     upper : their upper limits
     margin : share of the range, above 0 and below 1/2, next to each limit in which the parabola stands
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_3r")
+    >>> H = nmm.LimitBarrier(["q2"], lower=[-1.0], upper=[1.0])
+    >>> [round(H.value(nmm.Configuration(robot, robot.q({"q2": q2}))), 2) for q2 in (0.0, 0.5, 0.9)]
+    [1.0, 1.33, 5.26]
     """
 
     def __init__(

@@ -44,6 +44,15 @@ class Manipulability(JacobianObjective):
     weights : None; a positive number for each of the robot's inputs; or a mapping from names of inputs or of
         their groups ("platform", "arm"), 1 for the rest. J's columns are divided by their roots, so that
         {"platform": 4} makes the platform count half
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> w = nmm.Manipulability("ee", "xy", of="arm")
+    >>> round(w.value(nmm.Configuration(robot, robot.q({"q2": np.pi / 2}))), 3)
+    0.15
+    >>> task = nmm.Task(nmm.Position("ee", "xy"), [1, 0.3])
+    >>> dexterous = nmm.Controller(robot, task, nmm.ProjectedGradient(), objective=-w)
     """
 
     called = "manipulability"
@@ -71,6 +80,13 @@ class WeighedManipulability(Sum):
     rows : rows of its Jacobian: "xy", "xyz", or a list of x, y, z, rx, ry, rz
     alpha : α from 0, the whole robot's alone, to 1, the arm's alone
     weights : of the inputs, as for manipulability, in both
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> here = nmm.Configuration(robot, robot.q({"q2": np.pi / 2}))
+    >>> [round(nmm.WeighedManipulability("ee", "xy", alpha).value(here), 3) for alpha in (0.0, 0.5, 1.0)]
+    [0.989, 0.57, 0.15]
     """
 
     def __init__(

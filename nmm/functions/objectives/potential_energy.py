@@ -33,6 +33,14 @@ class PotentialEnergy(Objective):
     Parameters
     ----------
     gravity : g, m/s², three numbers in world axes; the model's own, as a rule (0, 0, -9.81), when not given
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_3r")
+    >>> V = nmm.PotentialEnergy()
+    >>> up, ahead = (nmm.Configuration(robot, robot.q({"q2": q2})) for q2 in (0.0, np.pi / 2))
+    >>> V.value(up) > V.value(ahead)
+    True
     """
 
     def __init__(self, gravity: ArrayLike | None = None) -> None:

@@ -21,6 +21,13 @@ class PreferredPosture(Objective):
     posture : values of coordinates by name, rad or m, each a number or a function of one row; coordinates not
         named are free
     weights : numbers above 0 by name, 1 for the rest
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> H = nmm.PreferredPosture({"q1": 0.5, "q2": -0.5})
+    >>> H.gradient(nmm.Configuration(robot, robot.rest)).round(3)
+    array([ 0.   ,  0.   ,  0.   , -0.479,  0.479])
     """
 
     def __init__(

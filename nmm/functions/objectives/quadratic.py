@@ -15,7 +15,15 @@ from nmm.robots.robot import Robot
 @dataclass(frozen=True)
 class Square:
     """½ weight (combination - target)²: target in the combination's unit, rad or m, or a function of one row
-    in it (a line, a spline, a signal, ...)."""
+    in it (a line, a spline, a signal, ...).
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> H = nmm.Quadratic(nmm.Square("q2", target=1.0, weight=4.0))
+    >>> H.value(nmm.Configuration(robot, robot.rest))
+    2.0
+    """
 
     combination: Combination
     target: float | Function = 0.0
@@ -29,6 +37,13 @@ class Quadratic(Objective):
     ----------
     squares : the terms; H1 of the paper is
         `Quadratic(Square({"theta": 1, "q1": 1, "q2": 1}, pi / 2), Square("q1", pi / 4))`
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> H = nmm.Quadratic(nmm.Square({"theta": 1, "q1": 1, "q2": 1}, np.pi / 2), nmm.Square("q1", np.pi / 4))
+    >>> round(H.value(nmm.Configuration(robot, robot.rest)), 3)
+    1.542
     """
 
     def __init__(self, *squares: Square) -> None:

@@ -36,6 +36,13 @@ class Bearing(Function):
         case 2), or a point of the robot (position; case 3), which makes the bearing a function of the
         configuration
     towards : the fixed point, 2 numbers, m (a third, z, is only drawn)
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> looks = nmm.Bearing(of=nmm.Position("ee", "xy"), towards=[5.0, 5.0])
+    >>> float(nmm.evaluate(looks, 0.0, nmm.Configuration(robot, robot.rest)).value[0].round(3))
+    0.908
     """
 
     def __init__(self, of: Function, towards: ArrayLike) -> None:

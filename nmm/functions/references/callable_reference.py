@@ -25,6 +25,13 @@ class CallableReference(Function):
         differences when not given
     of_configuration : whether the functions take the configuration too
     unit : unit of the values
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> eight = nmm.CallableReference(lambda t: [np.sin(t), np.sin(2 * t)], 2)
+    >>> nmm.evaluate(eight, 0.0, nmm.Configuration(robot, robot.rest)).value_t.round(3)
+    array([1., 2.])
     """
 
     def __init__(

@@ -43,6 +43,13 @@ class Circle(Function):
     rate : angular speed, rad/s; negative runs clockwise
     phase : φ at t = 0, rad
     plane : xy, yz or zx, for a centre in space: the axes along which φ is 0 and π/2
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> circle = nmm.Circle([2, 2], radius=3, rate=0.25)
+    >>> nmm.evaluate(circle, 0.0, nmm.Configuration(robot, robot.rest)).value
+    array([5., 2.])
     """
 
     def __init__(

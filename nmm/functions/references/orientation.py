@@ -56,6 +56,13 @@ class Turn(Function):
     axis : a, three numbers, in the axes of the orientation itself; its length is not read
     rate : rad/s
     start : at t = 0, R0: a rotation vector (3,), rad; the world's axes when not given
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_3r")
+    >>> turn = nmm.Turn([0, 0, 1], rate=0.5)
+    >>> nmm.evaluate(turn, 1.0, nmm.Configuration(robot, robot.rest)).value
+    array([0. , 0. , 0.5])
     """
 
     def __init__(self, axis: ArrayLike, rate: float, start: RotationVector | None = None) -> None:
@@ -87,6 +94,13 @@ class Slerp(Function):
     duration : s, above 0
     profile : "constant" rate, or "smooth": a fifth-degree polynomial that starts and stops at rest with
         zero acceleration
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_3r")
+    >>> turn = nmm.Slerp(start=[0, 0, 0], end=[0, 0, 1], duration=2)
+    >>> nmm.evaluate(turn, 1.0, nmm.Configuration(robot, robot.rest)).value.round(3)
+    array([0. , 0. , 0.5])
     """
 
     def __init__(
@@ -134,7 +148,7 @@ def rotation_vector(
 
     Examples
     --------
-    >>> rotation_vector(rpy=[0, 0, 0.5])
+    >>> nmm.rotation_vector(rpy=[0, 0, 0.5])
     array([0. , 0. , 0.5])
     """
     given = {"rpy": rpy, "quaternion": quaternion, "matrix": matrix}

@@ -55,6 +55,15 @@ class PiecewisePolynomial(Function):
     breaks : (pieces + 1,) s, increasing
     coefficients : (order, pieces, s), highest power first, in the time since the piece's beginning
     unit : unit of the values, for tables and plots
+
+    Examples
+    --------
+    >>> from scipy.interpolate import CubicSpline
+    >>> robot = nmm.load("unicycle_2r")
+    >>> path = CubicSpline([0, 1, 2], [[0, 0], [1, 0], [1, 1]])
+    >>> reference = nmm.PiecewisePolynomial(path.x, path.c)
+    >>> nmm.evaluate(reference, 1.0, nmm.Configuration(robot, robot.rest)).value.round(3)
+    array([1., 0.])
     """
 
     def __init__(self, breaks: ArrayLike, coefficients: ArrayLike, unit: str = "m") -> None:
@@ -92,6 +101,13 @@ class Constant(PiecewisePolynomial):
     ----------
     value : s numbers
     unit : of the values: m, rad or 1
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> task = nmm.Task(nmm.Position("ee", "xy"), nmm.Constant([2.0, 1.0]))
+    >>> nmm.Controller(robot, task, nmm.ProjectedGradient()).evaluate(0.0, robot.rest).r_d
+    array([2., 1.])
     """
 
     def __init__(self, value: ArrayLike, unit: str = "m") -> None:
@@ -107,6 +123,13 @@ class Polynomial(PiecewisePolynomial):
     coefficients : (order, s), lowest power first, in m/s^k
     duration : s, above 0
     unit : of the values: m, rad or 1
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> throw = nmm.Polynomial([[0, 1], [1, 2], [0, -1]], duration=2)
+    >>> nmm.evaluate(throw, 1.0, nmm.Configuration(robot, robot.rest)).value
+    array([1., 2.])
     """
 
     def __init__(self, coefficients: ArrayLike, duration: float, unit: str = "m") -> None:
@@ -155,6 +178,13 @@ class Line(PiecewisePolynomial):
     profile : "constant" speed, or "smooth": a fifth-degree polynomial that starts and stops at
         rest with zero acceleration
     unit : of the values: m, rad or 1
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> line = nmm.Line([0, 0], [2, 1], duration=4)
+    >>> nmm.evaluate(line, 2.0, nmm.Configuration(robot, robot.rest)).value
+    array([1. , 0.5])
     """
 
     def __init__(
@@ -185,6 +215,13 @@ class Spline(PiecewisePolynomial):
         ends; the second derivative is zero, for degree 5 the third and fourth), or "periodic" (the
         last point equals the first; degree 3)
     unit : of the values: m, rad or 1
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> spline = nmm.Spline([0, 2, 4], [[0, 0], [1, 1], [2, 0]])
+    >>> nmm.evaluate(spline, 2.0, nmm.Configuration(robot, robot.rest)).value.round(3)
+    array([1., 1.])
     """
 
     def __init__(

@@ -21,6 +21,13 @@ class PoseReference(Function):
     position : three numbers (world axes, m), or a function with three rows, of time or the configuration
     orientation : a rotation vector, rad, or a function with three rows, read as one (slerp, turn, orientation
         of another frame, ...)
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_3r")
+    >>> target = nmm.PoseReference(nmm.Line([0, 0, 1], [1, 0, 1], duration=2), [0, 0, 0.5])
+    >>> nmm.evaluate(target, 1.0, nmm.Configuration(robot, robot.rest)).value
+    array([0.5, 0. , 1. , 0. , 0. , 0.5])
     """
 
     def __init__(self, position: Function | ArrayLike, orientation: Function | RotationVector) -> None:

@@ -45,6 +45,16 @@ class Signal(Function):
     ----------
     value : s numbers, or a number: where it begins, at rest
     unit : unit of the values, for tables and plots, and to tell points from angles
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> target = nmm.Signal([1.0, 0.0])
+    >>> task = nmm.Task(nmm.Position("ee", "xy"), target)
+    >>> controller = nmm.Controller(robot, task, nmm.ProjectedGradient())
+    >>> target.set([2.0, 0.5], rate=[0.1, 0.0])
+    >>> controller.evaluate(0.0, robot.rest).r_d
+    array([2. , 0.5])
     """
 
     def __init__(self, value: ArrayLike, unit: str = "m") -> None:

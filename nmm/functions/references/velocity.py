@@ -19,6 +19,13 @@ class Velocity(Function):
     Parameters
     ----------
     of : a circle, line, polynomial, spline or constant
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> along = nmm.Velocity(nmm.Circle([0, 0], radius=2, rate=0.5))
+    >>> nmm.evaluate(along, 0.0, nmm.Configuration(robot, robot.rest)).value.round(3)
+    array([0., 1.])
     """
 
     def __init__(self, of: Function) -> None:

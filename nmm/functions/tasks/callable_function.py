@@ -27,6 +27,16 @@ class CallableFunction(Function):
     jacobian : configuration -> df/dq, shape (s, n); central differences when not given
     scales : the natural size of each component in its unit, by which a lost rank is judged (when not given,
         the robot's reach for metres and 1 for the rest)
+
+    Examples
+    --------
+    >>> def z(here):
+    ...     return here.placement("ee").translation[2:]
+    >>> height = nmm.CallableFunction(z, ["height"], units=["m"])
+    >>> robot = nmm.load("unicycle_3r")
+    >>> found = nmm.evaluate(height, 0.0, nmm.Configuration(robot, robot.q({"q2": np.pi / 4})))
+    >>> found.value.round(3)
+    array([1.336])
     """
 
     def __init__(

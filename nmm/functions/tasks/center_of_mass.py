@@ -21,6 +21,14 @@ class CenterOfMass(Function):
     axes : some of x, y, z in the order wanted: "xy", "xyz", "z"
     relative_to : a frame of the robot that sees it, from its origin and in its axes (the platform's, to keep
         it above the wheels); the world when not given
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_3r")
+    >>> over_the_wheels = nmm.CenterOfMass("xy", relative_to="base_footprint")
+    >>> ahead = nmm.Configuration(robot, robot.q({"q2": np.pi / 2}))
+    >>> nmm.evaluate(over_the_wheels, 0.0, ahead).value.round(3) + 0.0
+    array([0.22, 0.  ])
     """
 
     def __init__(self, axes: str | Sequence[str] = "xyz", relative_to: str | None = None) -> None:

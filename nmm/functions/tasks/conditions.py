@@ -24,6 +24,15 @@ class Between:
     Raises
     ------
     InputError : an end that is not after the start
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> aim = nmm.Task(nmm.Posture("q1"), [0.5], name="aim", when=nmm.Between(0.5, 1.0))
+    >>> controller = nmm.SequencedController(robot, aim, nmm.ProjectedGradient())
+    >>> run = nmm.simulate(controller, robot.rest, 2.0, 0.01)
+    >>> [(event.t, event.what) for event in run.events]
+    [(0.5, 'begins'), (1.0, 'ends')]
     """
 
     def __init__(self, start: float = 0.0, end: float = math.inf) -> None:
@@ -45,6 +54,17 @@ class While:
     Raises
     ------
     InputError : what is no function, lower above upper, no bound at all, a margin below 0
+
+    Examples
+    --------
+    >>> near = nmm.While(nmm.Distance("ee", to=[2, 0, 0.4]), upper=1.5)
+    >>> aim = nmm.Task(nmm.Posture("q1"), [0.4], name="aim", when=near)
+    >>> go = nmm.Task(nmm.Posture("x"), [1.0], name="go")
+    >>> robot = nmm.load("unicycle_2r")
+    >>> controller = nmm.SequencedController(robot, [go, aim], nmm.ProjectedGradient())
+    >>> run = nmm.simulate(controller, robot.rest - [1, 0, 0, 0, 0], 3.0, 0.01)
+    >>> [(event.task, event.what) for event in run.events]
+    [('aim', 'begins')]
     """
 
     def __init__(
@@ -86,6 +106,16 @@ class After:
     Raises
     ------
     InputError : no name, a tolerance that is not above 0, a time below 0
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> first = nmm.Task(nmm.Posture("q1"), [0.5], gain=5, name="first")
+    >>> then = nmm.Task(nmm.Posture("q2"), [0.5], name="then", when=nmm.After("first", within=0.02))
+    >>> controller = nmm.SequencedController(robot, [first, then], nmm.ProjectedGradient())
+    >>> run = nmm.simulate(controller, robot.rest, 2.0)
+    >>> [(event.task, event.what) for event in run.events]
+    [('then', 'begins')]
     """
 
     def __init__(

@@ -58,6 +58,13 @@ class Coordinates(Function):
     Parameters
     ----------
     combinations : coordinates by name (q2), or combinations of them ({theta: 1, q1: 1})
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> here = nmm.Configuration(robot, robot.q({"q1": 0.2, "q2": 0.4}))
+    >>> nmm.evaluate(nmm.Coordinates({"q1": 1, "q2": 1}), 0.0, here).value.round(3)
+    array([0.6])
     """
 
     def __init__(self, *combinations: Combination) -> None:

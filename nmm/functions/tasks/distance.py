@@ -43,6 +43,13 @@ class Distance(Function):
     frame : a frame of the robot
     to : the point: the name of another frame (its origin), three numbers (world axes, m), or a function with
         three rows, of time (circle, spline, ...) or of the configuration (center_of_mass)
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> here = nmm.Configuration(robot, robot.rest)
+    >>> nmm.evaluate(nmm.Distance("base_footprint", to=[3, 4, 0]), 0.0, here).value
+    array([5.])
     """
 
     def __init__(self, frame: str, to: Function | str | ArrayLike) -> None:

@@ -58,6 +58,13 @@ class Heading(Function):
     direction : whose angle is taken: x, y, z or three numbers, in the frame's axes
     about : world axis x, y or z about which the angle is measured, from the next axis in the cyclic order
         x, y, z (about z: from x towards y)
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> here = nmm.Configuration(robot, robot.q({"theta": 0.5, "q1": 0.2}))
+    >>> nmm.evaluate(nmm.Heading("ee"), 0.0, here).value.round(3)
+    array([0.7])
     """
 
     def __init__(self, frame: str, direction: str | ArrayLike = "x", about: str = "z") -> None:

@@ -67,6 +67,13 @@ class Orientation(PartsOfPose):
     ----------
     frame : a frame of the robot
     relative_to : a frame of the robot that sees it, in its axes; the world when not given
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_3r")
+    >>> here = nmm.Configuration(robot, robot.q({"theta": 0.5}))
+    >>> nmm.evaluate(nmm.Orientation("base_footprint"), 0.0, here).value.round(3)
+    array([0. , 0. , 0.5])
     """
 
     comparison = orientation_error

@@ -93,6 +93,13 @@ class Pointing(Function):
     at : the point, world axes, m: three numbers, the name of a frame (its origin), or a function with
         three rows, of time (circle, spline, ...) or of the configuration (position, center_of_mass)
     axis : x, y, z or three numbers, in the frame's axes
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_3r")
+    >>> here = nmm.Configuration(robot, robot.rest)
+    >>> nmm.evaluate(nmm.Pointing("base_footprint", at=[2, 1, 0], axis="x"), 0.0, here).value.round(3)
+    array([0.464, 0.   ])
     """
 
     def __init__(self, frame: str, at: Function | str | ArrayLike, axis: str | ArrayLike = "z") -> None:

@@ -83,6 +83,13 @@ class Pose(PartsOfPose):
     ----------
     frame : a frame of the robot
     relative_to : a frame of the robot that sees it (two arms that hold one thing); the world when not given
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_3r")
+    >>> here = nmm.Configuration(robot, robot.q({"x": 1, "theta": 0.5}))
+    >>> nmm.evaluate(nmm.Pose("base_footprint"), 0.0, here).value.round(3)
+    array([1. , 0. , 0. , 0. , 0. , 0.5])
     """
 
     comparison = pose_error

@@ -47,6 +47,13 @@ class Position(PartsOfPose):
     axes : some of x, y, z in the order wanted: "xy", "xyz", "z"
     relative_to : a frame of the robot that sees it, from its origin and in its axes (two arms that hold one
         thing); the world when not given
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> here = nmm.Configuration(robot, robot.q({"q1": np.pi / 2}))
+    >>> nmm.evaluate(nmm.Position("ee", "xy"), 0.0, here).value.round(3)
+    array([0.3, 0.8])
     """
 
     def __init__(self, frame: str, axes: str | Sequence[str] = "xyz", relative_to: str | None = None) -> None:

@@ -14,6 +14,13 @@ class Posture(Function):
     Parameters
     ----------
     names : names of coordinates; all of the manipulator's, but those that follow others, when none is given
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> here = nmm.Configuration(robot, robot.q({"q1": 0.2, "q2": 0.4}))
+    >>> nmm.evaluate(nmm.Posture("q1", "q2"), 0.0, here).value
+    array([0.2, 0.4])
     """
 
     def __init__(self, *names: str) -> None:

@@ -39,6 +39,14 @@ class Task:
     Raises
     ------
     InputError : what is no function, a priority that is none, a speed that is not above 0
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> task = nmm.Task(nmm.Position("ee", "xy"), nmm.Circle([2, 2], 3, rate=0.25), gain=2.0)
+    >>> controller = nmm.Controller(robot, task, nmm.ProjectedGradient())
+    >>> controller.evaluate(0.0, robot.rest).error.round(3)
+    array([3.9, 2. ])
     """
 
     def __init__(
@@ -136,7 +144,15 @@ def _by_unit(given: float | Mapping[str, float] | None, name: str) -> dict[str, 
 
 @dataclass(frozen=True, eq=False)
 class Stack:
-    """Tasks executed together, one above the other by priority, each with its own reference and gain."""
+    """Tasks executed together, one above the other by priority, each with its own reference and gain.
+
+    Examples
+    --------
+    >>> hand = nmm.Task(nmm.Position("ee", "xy"), [2.0, 1.0])
+    >>> turn = nmm.Task(nmm.Heading("base_footprint"), [0.0], priority=2)
+    >>> nmm.Stack((hand, turn)).levels(nmm.load("unicycle_2r"))
+    (2, 1)
+    """
 
     tasks: tuple[Task, ...] = field(default=())
 

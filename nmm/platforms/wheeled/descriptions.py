@@ -43,6 +43,13 @@ class Hitch:
     x, y : the hitch in the carrier's frame, m
     carrier : "theta" for the main body, or the joint of another hitch
     lower, upper : its limits, rad
+
+    Examples
+    --------
+    >>> axle = [nmm.FixedWheel("left", 0, 0.3, 0.1), nmm.FixedWheel("right", 0, -0.3, 0.1)]
+    >>> behind = nmm.FixedWheel("behind", -0.6, 0, radius=0.1, body="hitch")
+    >>> nmm.WheeledPlatform([*axle, behind], [nmm.Hitch("hitch", -0.2)]).coordinates
+    ('x', 'y', 'theta', 'hitch')
     """
 
     joint: str
@@ -87,7 +94,14 @@ class Wheel:
 
 @dataclass(frozen=True)
 class FixedWheel(Wheel):
-    """A wheel that rolls along its heading and does not slip."""
+    """A wheel that rolls along its heading and does not slip.
+
+    Examples
+    --------
+    >>> wheels = [nmm.FixedWheel("left", 0, 0.3, radius=0.1), nmm.FixedWheel("right", 0, -0.3, radius=0.1)]
+    >>> nmm.WheeledPlatform(wheels).inputs
+    ('v', 'omega')
+    """
 
 
 @dataclass(frozen=True)
@@ -103,6 +117,13 @@ class SteeredWheel(Wheel):
     trail : how far the wheel's centre lies behind the pivot, against the rolling direction, m
     offset : how far it lies to the left of the pivot, m
     lower, upper : limits of the steering angle, rad
+
+    Examples
+    --------
+    >>> front = nmm.SteeredWheel("front", 0.8, 0, radius=0.1, joint="steer", upper=0.6, lower=-0.6)
+    >>> rear = nmm.FixedWheel("rear", 0, 0, radius=0.1)
+    >>> nmm.WheeledPlatform([rear, front]).coordinates
+    ('x', 'y', 'theta', 'steer')
     """
 
     joint: str = "steering"
@@ -132,6 +153,13 @@ class CasterWheel(Wheel):
     Attributes
     ----------
     trail : how far the wheel's centre lies behind the pivot, m, not 0
+
+    Examples
+    --------
+    >>> axle = [nmm.FixedWheel("left", 0, 0.3, 0.1), nmm.FixedWheel("right", 0, -0.3, 0.1)]
+    >>> caster = nmm.CasterWheel("caster", 0.4, 0, radius=0.05, trail=0.04)
+    >>> nmm.WheeledPlatform([*axle, caster]).coordinates
+    ('x', 'y', 'theta')
     """
 
     trail: float = 0.0
@@ -152,6 +180,16 @@ class OmniWheel(Wheel):
     ----------
     roller : angle γ from the heading to the direction along which it grips, rad: 0 for rollers that turn
         about the rolling direction, ±pi/4 for mecanum wheels
+
+    Examples
+    --------
+    >>> angles = 2 * np.pi * np.arange(3) / 3
+    >>> wheels = [
+    ...     nmm.OmniWheel(f"w{k}", 0.2 * np.cos(a), 0.2 * np.sin(a), radius=0.05, heading=a + np.pi / 2)
+    ...     for k, a in enumerate(angles)
+    ... ]
+    >>> nmm.WheeledPlatform(wheels).mobility
+    3
     """
 
     roller: float = 0.0

@@ -14,7 +14,14 @@ from nmm.errors import InputError
 
 @dataclass(frozen=True)
 class Speed:
-    """Speed of a wheel's centre along its rolling direction, m/s. Named "<wheel>_speed" by default."""
+    """Speed of a wheel's centre along its rolling direction, m/s. Named "<wheel>_speed" by default.
+
+    Examples
+    --------
+    >>> wheels = [nmm.FixedWheel("rear", 0, 0, 0.1), nmm.SteeredWheel("front", 0.8, 0, 0.1)]
+    >>> nmm.WheeledPlatform(wheels, inputs=[nmm.Speed("front", name="v")]).inputs
+    ('v', 'steering_rate')
+    """
 
     wheel: str
     name: str = ""
@@ -22,7 +29,15 @@ class Speed:
 
 @dataclass(frozen=True)
 class Spin:
-    """Spin rate of a wheel, rad/s. Named "<wheel>_spin" by default."""
+    """Spin rate of a wheel, rad/s. Named "<wheel>_spin" by default.
+
+    Examples
+    --------
+    >>> axle = [nmm.FixedWheel("left", 0, 0.3, 0.1), nmm.FixedWheel("right", 0, -0.3, 0.1)]
+    >>> drive = nmm.WheeledPlatform(axle, inputs=[nmm.Spin("left"), nmm.Spin("right")])
+    >>> drive.inputs, drive.input_units
+    (('left_spin', 'right_spin'), ('rad/s', 'rad/s'))
+    """
 
     wheel: str
     name: str = ""
@@ -30,7 +45,16 @@ class Spin:
 
 @dataclass(frozen=True)
 class Spins:
-    """A weighted sum of the wheels' spin rates, rad/s: {wheel: weight}."""
+    """A weighted sum of the wheels' spin rates, rad/s: {wheel: weight}.
+
+    Examples
+    --------
+    >>> axle = [nmm.FixedWheel("left", 0, 0.3, 0.1), nmm.FixedWheel("right", 0, -0.3, 0.1)]
+    >>> both = nmm.Spins({"left": 0.5, "right": 0.5})
+    >>> apart = nmm.Spins({"left": -0.5, "right": 0.5}, name="turn")
+    >>> nmm.WheeledPlatform(axle, inputs=[both, apart]).inputs
+    ('drive', 'turn')
+    """
 
     weights: Mapping[str, float] = field(hash=False)
     name: str = "drive"
@@ -52,6 +76,13 @@ class CommonSpeed:
     It determines the motion whatever the two steering angles are, as long as the wheels' axes are not one
     line; no single wheel's speed does, because the platform may turn about that wheel. Positive when, with
     both angles at zero, the first rolls forward, and on from there without a jump.
+
+    Examples
+    --------
+    >>> front = nmm.SteeredWheel("front", 0.4, 0, 0.1, joint="front_steering")
+    >>> rear = nmm.SteeredWheel("rear", -0.4, 0, 0.1, joint="rear_steering")
+    >>> nmm.WheeledPlatform([front, rear], inputs=[nmm.CommonSpeed("front", "rear")]).inputs
+    ('v', 'front_steering_rate', 'rear_steering_rate')
     """
 
     first: str

@@ -54,6 +54,15 @@ class WheeledPlatform(Platform):
 
     Source: Campion, Bastin, D'Andréa-Novel, "Structural properties and classification of kinematic and
     dynamic models of wheeled mobile robots", IEEE Trans. Robotics and Automation 12(1), 1996.
+
+    Examples
+    --------
+    >>> axle = [nmm.FixedWheel("left", 0, 0.3, 0.1), nmm.FixedWheel("right", 0, -0.3, 0.1)]
+    >>> car = nmm.WheeledPlatform([*axle, nmm.SteeredWheel("front", 0.8, 0, 0.1)])
+    >>> car.coordinates, car.inputs
+    (('x', 'y', 'theta', 'steering'), ('v', 'steering_rate'))
+    >>> car.wheel_rates([0, 0, 0, 0], [0.5, 0.0])["left"]
+    WheelRate(spin=5.0, turn=0.0)
     """
 
     name = "wheeled"

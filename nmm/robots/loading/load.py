@@ -79,7 +79,7 @@ def load(
 
     Examples
     --------
-    >>> load("unicycle_2r").q_names
+    >>> nmm.load("unicycle_2r").q_names
     ('x', 'y', 'theta', 'q1', 'q2')
     """
     if isinstance(platform, str):

@@ -67,7 +67,7 @@ def mount(
 
     Examples
     --------
-    >>> robot = mount("unicycle_2r", "unicycle_2r", at="arm_base", prefix="second_")
+    >>> robot = nmm.mount("unicycle_2r", "unicycle_2r", at="arm_base", prefix="second_")
     >>> robot.q_names
     ('x', 'y', 'theta', 'q1', 'q2', 'second_q1', 'second_q2')
     """

@@ -38,7 +38,14 @@ class PinocchioModels(NamedTuple):
 
 
 def pinocchio_model(robot: Robot, root: Root | str = "planar") -> pin.Model:
-    """The robot's kinematics and dynamics on another root joint; see `pinocchio_models`."""
+    """The robot's kinematics and dynamics on another root joint; see `pinocchio_models`.
+
+    Examples
+    --------
+    >>> model = nmm.pinocchio_model(nmm.load("unicycle_2r"), "freeflyer")
+    >>> model.nq, model.nv
+    (9, 8)
+    """
     return _models(robot, root).model
 
 
@@ -53,6 +60,14 @@ def pinocchio_models(robot: Robot, root: Root | str = "planar") -> PinocchioMode
     Raises
     ------
     InputError : no such root, or a robot of a fixed base on one that moves
+
+    Examples
+    --------
+    >>> models = nmm.pinocchio_models(nmm.load("unicycle_2r"))
+    >>> models.model.names[1]
+    'root_joint'
+    >>> models.collision_model.ngeoms
+    8
     """
     models = _models(robot, root)
     for shapes in (models.visual_model, models.collision_model):
@@ -102,6 +117,15 @@ class PinocchioLayout:
     Raises
     ------
     InputError : a joint that the one has and the other does not, or a root of another kind
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> planar = nmm.PinocchioLayout(robot)
+    >>> planar.configuration(robot.q({"x": 1, "theta": np.pi / 2})).round(3)
+    array([1., 0., 0., 1., 0., 0.])
+    >>> planar.coordinates(planar.configuration(robot.rest)).round(3)
+    array([0., 0., 0., 0., 0.])
     """
 
     def __init__(self, robot: Robot, model: pin.Model | Root = "planar") -> None:
