@@ -116,7 +116,7 @@ def _run(line: str) -> None:
 
 def shown(page: Path) -> list[str]:
     """What the page shows of what its commands write."""
-    found = re.findall(rf"(?:\]\(|src=\"){page.stem}/([^)\"]+)", page.read_text(encoding="utf-8"))
+    found = re.findall(rf"(?:\]\(|src=\"){page.stem}/([^)\"#]+)", page.read_text(encoding="utf-8"))
     return [str(path) for path in found]
 
 
