@@ -18,11 +18,12 @@ Command = Callable[..., Result]
 #: With a named factor, an auxiliary quantity, names of several letters, many minors that are 0, a note.
 SUBJECTS = [
     ("unicycle_2r", "--task", "position"),
-    ("unicycle_2r", "--task", "position", "--set", "d=0", "--minor", "v,omega"),
+    ("unicycle_2r", "--task", "position", "--set", "d=0", "--minor", "q1,q2"),
     ("unicycle_2r_link_pointing",),
     ("unicycle_3r", "--task", "position"),
     ("trailer_base", "--task", "position:trailer2"),
     ("unicycle_3r", "--task", "posture"),
+    ("omni_small_arm_door",),
 ]
 
 

@@ -106,6 +106,14 @@ def test_latex_and_markdown_say_what_the_csv_says(run: Command) -> None:
             assert value_of(cell) == (pytest.approx(float(told), rel=5e-3) if told else None)
 
 
+def test_a_run_that_failed_is_told_beside_the_table(run: Command) -> None:
+    command = ("compare", "unicycle_2r_position", "--resolvers", "pg", "--set", "dt=1.5", "--out", "out")
+    result = run(*command, "--set", "method=euler", "--table", "csv")
+    assert result.status == 1
+    assert result.out.startswith("run,outcome,")
+    assert "nmm compare: PG" in result.err
+
+
 def test_the_terminals_table_is_there_without_it(run: Command) -> None:
     result = run("compare", "unicycle_2r_position", *SHORT, "--out", "out")
     assert "tracking ‖e‖" in result.out

@@ -35,7 +35,8 @@ def _body(given: Studied, analysis: SymbolicAnalysis, shown: SymbolicAnalysis) -
     names = {*analysis.symbols, *analysis.u_names, *analysis.definition_latex}
 
     def sentence(line: str) -> str:
-        return f"{typeset(line[0].upper() + line[1:], names).rstrip('.')}."
+        written = typeset(line, names).rstrip(".")  # one that begins with a symbol begins with a dollar
+        return f"{written[0].upper()}{written[1:]}."
 
     formulas = shown.latex()
     conclusions = list(_listed(what_follows(given, analysis), names))
