@@ -20,7 +20,7 @@ import nmm  # noqa: E402
 project, author, copyright = "nmm", "The nmm developers", "The nmm developers"
 version = release = nmm.__version__
 extensions = ["sphinx.ext.autodoc", "myst_parser"]
-exclude_patterns = ["building"]
+exclude_patterns = ["building", "lab/solutions"]
 suppress_warnings = ["misc.highlighting_failure"]  # what a command prints is no shell script
 
 # Anchors as code hosts make them, so that a link works here and there.

@@ -117,5 +117,8 @@ from .runs.trajectory import Trajectory as Trajectory
 from .scenario import Scenario as Scenario
 from .sweeps import Sweep as Sweep
 from .sweeps import Swept as Swept
+from .tables import Table as Table
+from .tables import comparison_table as comparison_table
+from .tables import laps_table as laps_table
 
 __version__: str

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from math import degrees, pi
+from math import degrees, isfinite, pi
 
 #: Values this near a fraction of pi are written as one: files write pi/2 as 1.5708.
 NEAR_PI = 5e-5
@@ -41,6 +41,28 @@ def fraction_of_pi(value: float, parts: Sequence[int] = (1, 2, 3, 4, 6)) -> str:
             number = "" if abs(times) == 1 else str(abs(times))
             return f"{'-' if times < 0 else ''}{number}π{'' if part == 1 else f'/{part}'}"
     return ""
+
+
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def power_of_ten(value: float, digits: int = 3) -> tuple[str, int | None]:
+    """A number's digits, zeros too, and the power of ten that they are multiplied by: None from 0.01 up to
+    10^digits, and for 0, which has one digit."""
+    short = f"{value:#.{digits}g}"
+    if value == 0.0 or (abs(value) >= 1e-2 and "e" not in short):
+        return short.rstrip(".") if value else "0", None
+    mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
+    return mantissa, int(exponent)
+
+
+def number_text(value: float | None, digits: int = 3) -> str:
+    """A number for people: 0.0230, 2.10·10⁻²⁹; a dash for None and for what is not finite."""
+    if value is None or not isfinite(value):
+        return "–"
+    mantissa, exponent = power_of_ten(value, digits)
+    power = "" if exponent is None else f"·10{str(exponent).translate(_SUPERSCRIPTS)}"
+    return mantissa.replace("-", "−") + power
 
 
 def measured(value: float, unit: str) -> str:

@@ -24,6 +24,7 @@ import nmm.cli.runs
 from nmm.cli.exit_status import status_of
 from nmm.cli.runs import run_scenario
 from nmm.runs.figure_options import FigureOptions
+from nmm.tables import Table
 
 SHORT = ("--set", "duration=0.5")
 Command = Callable[..., Result]
@@ -412,6 +413,10 @@ def test_paper_hands_over_the_folder_and_prints_the_claims(
         assert result.value("open") == "here/index.html"
         assert len(result.err.splitlines()) == status
         assert asked == [Path("here"), None, FigureOptions(("pdf",), "column")]
+        report.table = lambda: Table(("1 RG",), ())
+        numbers = run("paper", "--out", "here", "--table", "csv")
+        assert (numbers.status, numbers.out) == (status, "run\n1 RG\n")
+        assert numbers.err.splitlines()[0] == "files in  here"
 
 
 # play

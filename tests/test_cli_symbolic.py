@@ -161,14 +161,6 @@ def test_what_is_not_decided_comes_first(run: Command, monkeypatch: pytest.Monke
     assert "has the formulas" not in out
 
 
-def test_latex_alone(run: Command) -> None:
-    out = run("unicycle_3r", "--task", "position", "--symbolic", "--latex").out
-    assert out.startswith("\\begin{align*}")
-    assert out.endswith("\\end{align*}\n")
-    assert out.count("{") == out.count("}")
-    assert r"\Lambda &= l_2 s_{2} + l_3 s_{23}" in out
-
-
 def test_only_the_minors_asked_for(run: Command) -> None:
     out = run(*POSITION, "--symbolic", "--minor", "omega,v").out
     listed = out[out.index("maximal minors") : out.index("what follows")].splitlines()[1:]

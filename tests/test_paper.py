@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import os
 from collections.abc import Callable
@@ -15,15 +17,17 @@ import pytest
 
 from nmm.errors import InputError, RunError
 from nmm.folders.run import is_run
+from nmm.machine import made_with
 from nmm.paper import PaperReport, write, write_paper
 from nmm.paper.cases import CASES
 from nmm.paper.claims import claims
-from nmm.paper.numbers import decay_rate, ripple, settling_time, smallest_determinant, text
+from nmm.paper.numbers import decay_rate, ripple, settling_time, smallest_determinant
 from nmm.paper.page import render
 from nmm.paper.results import CaseResult, Claim, Row
 from nmm.runs.figure_options import FigureOptions
 from nmm.runs.trajectory import Trajectory
 from nmm.scenario import Scenario
+from nmm.words import number_text
 
 Progress = Callable[[float], None]
 
@@ -105,13 +109,18 @@ def test_numbers_are_the_runs(paper: tuple[PaperReport, list[float]]) -> None:
     report, _ = paper
     content = json.loads((report.folder / "paper.json").read_text(encoding="utf-8"))
     assert content["holds"] is True
+    assert content["made_with"] == made_with()
+    head, *lines = csv.reader(io.StringIO(report.table().csv()))
+    assert [line[0] for line in lines] == [f"{k} {r}" for k in (1, 2, 3, 4) for r in ("RG", "PG")]
+    final = [float(line[head.index("objective_final")]) for line in lines]
     for case in content["cases"]:
         summary = json.loads(
             (report.folder / f"case{case['number']}" / "rg" / "summary.json").read_text(encoding="utf-8")
         )
         rows = {row["name"]: row["rg"] for row in case["rows"]}
-        assert rows["mean H in the second half"] == text(summary["objective_mean_second_half"])
-        assert rows["‖e‖ at the end"] == text(summary["error_final"])
+        assert final[2 * case["number"] - 2] == summary["objective_final"]
+        assert rows["mean H in the second half"] == number_text(summary["objective_mean_second_half"])
+        assert rows["‖e‖ at the end"] == number_text(summary["error_final"])
 
 
 def test_progress_rises_to_the_end(paper: tuple[PaperReport, list[float]]) -> None:
@@ -273,10 +282,13 @@ def test_measures() -> None:
         (None, "–"),
         (np.inf, "–"),
         (0.0, "0"),
-        (-2.5, "−2.5"),
+        (-2.5, "−2.50"),
+        (1234.0, "1.23·10³"),
+        (999.6, "1.00·10³"),
+        (100.0, "100"),
         (2.07e-29, "2.07·10⁻²⁹"),
         (0.00238, "2.38·10⁻³"),
     ],
 )
 def test_numbers_for_people(value: float | None, expected: str) -> None:
-    assert text(value) == expected
+    assert number_text(value) == expected

@@ -19,6 +19,7 @@ from nmm.cli.options import (
     out_option,
     settings_of,
 )
+from nmm.cli.paper_table import TableOption, form_of
 from nmm.cli.redundancy import laps, redundancy
 from nmm.cli.robot_commands import check, drive, info, init, robots, scenarios, view
 from nmm.cli.singularities import singularities
@@ -147,6 +148,7 @@ def compare(
     of_robot: OfRobot,
     out: Annotated[Path | None, out_option("runs/<scenario>-compare")] = None,
     html: Annotated[bool, typer.Option("--html", hidden=True, callback=_always_written)] = False,
+    table: TableOption = None,
     ellipsoids: Ellipsoids,
     figures: Figures,
 ) -> int:
@@ -158,6 +160,7 @@ def compare(
     nmm compare unicycle_2r_position
     nmm compare unicycle_2r_pointing --resolvers rg,pg,ej --set resolver.alpha=5
     nmm compare unicycle_2r_position --resolvers rg,rg:alpha=5,pg:alpha=50
+    nmm compare unicycle_2r_position --table latex > table.tex
     nmm compare unicycle_2r_position --resolvers rg,my_laws.py:law
 
     The folder holds comparison.png, playback.html (all robots in one scene), summary.json and, for each
@@ -175,6 +178,7 @@ def compare(
         ellipsoids=ellipsoids.wanted(),
         figures=figures.options(),
         of_robot=of_robot.keywords(),
+        form=form_of(table),
     )
 
 
@@ -185,6 +189,7 @@ def paper(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Where to write, as for `nmm run`.")] = Path(
         "paper"
     ),
+    table: TableOption = None,
     figures: Figures,
 ) -> int:
     """Redo the paper's cases and figures.
@@ -194,7 +199,7 @@ def paper(
     """
     from nmm.cli.runs import write_the_paper
 
-    return write_the_paper(out, figures.options())
+    return write_the_paper(out, figures.options(), form_of(table))
 
 
 @app.command()

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 
 from nmm.cli.interrupts import shielded
 from nmm.cli.output import complain, progress, show_table, show_text, warn
+from nmm.cli.paper_table import print_table
 from nmm.folders.laps import is_laps, save
 from nmm.folders.whole import check_folder
 from nmm.runs.figure_options import PLAIN, FigureOptions
 
 if TYPE_CHECKING:
-    from nmm.analysis.redundancy.laps import Laps
+    from nmm.analysis.redundancy.laps import Laps, Repeatability
 
 OK, FAILED = 0, 1
 
@@ -27,8 +28,12 @@ def run_laps(
     period: float | None,
     out: Path | None,
     figures: FigureOptions = PLAIN,
+    form: str | None = None,
 ) -> int:
-    """Run the laps, write the folder, print the tables; 1 when a run ended before its last lap."""
+    """Run the laps, write the folder, print the tables; 1 when a run ended before its last lap.
+
+    form : of one table with all, for a paper; the terminal's when not given
+    """
     from nmm.analysis.redundancy.laps import repeatability
     from nmm.scenario import Scenario
 
@@ -39,10 +44,27 @@ def run_laps(
         found = repeatability(scenario, laps=laps, resolvers=kinds, period=period, progress=report)
     with shielded():
         save(found, folder, figures=figures)
-    show_text(f"{scenario.name}: {found.transient}; period {found.period:.6g} s")
     for one in found.laps:
         for warning in one.trajectory.warnings:
             warn(f"{one.name.upper()}: {warning}")
+    if form is None:
+        _show(found, scenario.name, folder)
+    else:
+        from nmm.tables import laps_table
+
+        print_table(laps_table(found), form, folder)
+    for one in found.laps:
+        if not one.finished:
+            complain(
+                "nmm laps", f"{one.name.upper()} {one.verdict}; the part that was computed is in {folder}"
+            )
+    return OK if found.complete else FAILED
+
+
+def _show(found: Repeatability, name: str, folder: Path) -> None:
+    """A table a resolver, on the terminal."""
+    show_text(f"{name}: {found.transient}; period {found.period:.6g} s")
+    for one in found.laps:
         show_text()
         columns, rows = _table(one)
         show_table(columns, rows, title=f"{one.name.upper()} {one.verdict}", numeric=columns)
@@ -50,12 +72,6 @@ def run_laps(
             show_text(one.winding)
     show_text()
     show_table(["", ""], [["files in", str(folder)]])
-    for one in found.laps:
-        if not one.finished:
-            complain(
-                "nmm laps", f"{one.name.upper()} {one.verdict}; the part that was computed is in {folder}"
-            )
-    return OK if found.complete else FAILED
 
 
 def _table(one: Laps) -> tuple[list[str], list[list[str]]]:

@@ -16,6 +16,7 @@ from nmm.cli.options import (
     settings_of,
 )
 from nmm.cli.output import show_text
+from nmm.cli.paper_table import TableOption, form_of
 from nmm.errors import InputError, SingularError
 
 #: Between samples of a self-motion, s; less for short ones.
@@ -116,6 +117,7 @@ def laps(
     settings: SetOption = None,
     out: Annotated[Path | None, out_option("runs/<scenario>-laps")] = None,
     *,
+    table: TableOption = None,
     figures: Figures,
 ) -> int:
     """Go round a closed path several times: does the posture come back?
@@ -134,5 +136,12 @@ def laps(
     kinds = named(resolvers, "--resolvers", "kinds with commas between them, as in rg,pg")
     asked = figures.options()
     return run_laps(
-        scenario, kinds, settings_of(settings), laps=number, period=period, out=out, figures=asked
+        scenario,
+        kinds,
+        settings_of(settings),
+        laps=number,
+        period=period,
+        out=out,
+        figures=asked,
+        form=form_of(table),
     )

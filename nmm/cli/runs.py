@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from nmm.cli.chosen_resolvers import Chosen, check_different
 from nmm.cli.interrupts import shielded
 from nmm.cli.output import complain, progress, show_table
+from nmm.cli.paper_table import print_table
 from nmm.cli.report import describe, show_run
 from nmm.cli.subjects import scenario_with
 from nmm.errors import InputError
@@ -24,6 +25,7 @@ from nmm.scenario import Scenario
 
 if TYPE_CHECKING:
     from nmm.control.controller import Controller
+    from nmm.paper import PaperReport
     from nmm.playback import LiveRun
     from nmm.runs.ellipsoid_options import Wanted
     from nmm.runs.recording import Recorder
@@ -104,8 +106,12 @@ def compare_resolvers(
     ellipsoids: Wanted = False,
     figures: FigureOptions = PLAIN,
     of_robot: Mapping[str, Any] = MappingProxyType({}),
+    form: str | None = None,
 ) -> int:
-    """Run a scenario with several resolvers, or settings of one; write and print how they compare."""
+    """Run a scenario with several resolvers, or settings of one; write and print how they compare.
+
+    form : of the table, for a paper; a terminal's when not given
+    """
     from nmm.runs.timing import step_time
 
     scenarios = [_load(name, one, settings, limits, of_robot) for one in resolvers]
@@ -122,6 +128,11 @@ def compare_resolvers(
     with shielded():
         comparison.save(trajectories, folder, scenarios[0].name, ellipsoids=ellipsoids, figures=figures)
     table = [dict(describe(trajectory, trajectory.summary())) for trajectory in trajectories]
+    if form is not None:
+        from nmm.tables import comparison_table
+
+        print_table(comparison_table(trajectories), form, folder)
+        return _status("nmm compare", trajectories, folder)
     for column, scenario, trajectory in zip(table, scenarios, trajectories, strict=False):
         if len(trajectory):
             controller = scenario.controller()
@@ -137,12 +148,18 @@ def compare_resolvers(
     return _status("nmm compare", trajectories, folder)
 
 
-def write_the_paper(folder: Path, figures: FigureOptions = PLAIN) -> int:
-    """The paper's cases and figures; 0 when every claim holds."""
+def write_the_paper(folder: Path, figures: FigureOptions = PLAIN, form: str | None = None) -> int:
+    """The paper's cases and figures; 0 when every claim holds.
+
+    form : of a table with the numbers of the runs, for a paper; the claims are printed when not given
+    """
     from nmm.paper import write_paper
 
     with progress("the paper's four cases") as report:
         paper = write_paper(folder, progress=report, figures=figures)
+    if form is not None:
+        print_table(paper.table(), form, folder)
+        return _paper_status(paper)
     show_table(
         ["case", "what the paper claims", "holds"],
         [
@@ -152,6 +169,10 @@ def write_the_paper(folder: Path, figures: FigureOptions = PLAIN) -> int:
         ],
     )
     show_table(["", ""], [["open", str(paper.index)]])
+    return _paper_status(paper)
+
+
+def _paper_status(paper: PaperReport) -> int:
     if not paper.holds:
         complain("nmm paper", f"a claim does not hold; what came out is in {paper.index}")
     return OK if paper.holds else FAILED

@@ -56,7 +56,7 @@ def singularities(
         typer.Option("--symbolic", help="f, J and its minors as formulas, and what follows from them."),
     ] = False,
     latex: Annotated[
-        bool, typer.Option("--latex", help="With --symbolic: only the formulas, as LaTeX.")
+        bool, typer.Option("--latex", help="With --symbolic: the same as LaTeX, the body of a document.")
     ] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="The numbers as JSON on standard output, for scripts.")
@@ -212,7 +212,8 @@ def _formulas(
     given: Studied, choice: Choice, left_out: int, length: float | None, listed: bool, latex: bool
 ) -> None:
     """The formulas; the numbers where there are none that a person could read."""
-    from nmm.cli.symbolic_text import formulas, show_formulas, show_latex
+    from nmm.cli.symbolic_latex import show_latex
+    from nmm.cli.symbolic_text import formulas, show_formulas
 
     found, reason = formulas(given)
     if found is None:

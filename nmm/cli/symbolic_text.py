@@ -40,16 +40,11 @@ def formulas(given: Studied) -> tuple[SymbolicAnalysis | None, str]:
         return None, str(error).removeprefix("symbolic: ")
 
 
-def show_latex(given: Studied, analysis: SymbolicAnalysis, chosen: Sequence[Columns] | None) -> None:
-    """Print the formulas as LaTeX, and nothing else."""
-    print(_only(analysis, chosen).latex())
-
-
 def show_formulas(given: Studied, analysis: SymbolicAnalysis, chosen: Sequence[Columns] | None) -> None:
     """Print formulas and claims."""
-    formulas = [line for line in _only(analysis, chosen).text().splitlines() if not line.startswith("note: ")]
+    formulas = [line for line in only(analysis, chosen).text().splitlines() if not line.startswith("note: ")]
     body = "\n".join(formulas)
-    for line in (*header(given), *_geometry(analysis, body)):
+    for line in (*header(given), *geometry(analysis, body)):
         say(line)
     abbreviations = _abbreviations(analysis, body)
     if abbreviations:
@@ -58,14 +53,13 @@ def show_formulas(given: Studied, analysis: SymbolicAnalysis, chosen: Sequence[C
     for line in formulas:
         say(line)
     say("what follows")
-    # That the main question was not decided comes first: no one looks for it below the proofs.
-    for line in sorted(_claims(given, analysis), key=lambda line: not line.startswith(NOT_DECIDED)):
+    for line in what_follows(given, analysis):
         say(f"  {line}")
     for note in analysis.notes:
         say(f"note: {note}")
 
 
-def _only(analysis: SymbolicAnalysis, chosen: Sequence[Columns] | None) -> SymbolicAnalysis:
+def only(analysis: SymbolicAnalysis, chosen: Sequence[Columns] | None) -> SymbolicAnalysis:
     """With the chosen minors alone to be written."""
     if chosen is None:
         return analysis
@@ -92,7 +86,7 @@ def _abbreviations(analysis: SymbolicAnalysis, body: str) -> str:
     return ", ".join(said)
 
 
-def _geometry(analysis: SymbolicAnalysis, body: str) -> Iterator[str]:
+def geometry(analysis: SymbolicAnalysis, body: str) -> Iterator[str]:
     """Values of the lengths in the formulas, and the arguments that are 0."""
     used = {name: value for name, value in analysis.geometry.items() if re.search(rf"\b{name}\b", body)}
     if used:
@@ -120,6 +114,14 @@ def _zero(analysis: SymbolicAnalysis) -> list[str]:
         except ValueError:
             continue
     return found
+
+
+def what_follows(given: Studied, analysis: SymbolicAnalysis) -> list[str]:
+    """Statements, a line each, with reasons indented below them.
+
+    That the main question was not decided comes first: no one looks for it below the proofs.
+    """
+    return sorted(_claims(given, analysis), key=lambda line: not line.startswith(NOT_DECIDED))
 
 
 def _claims(given: Studied, analysis: SymbolicAnalysis) -> Iterator[str]:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from nmm.errors import InputError
 from nmm.folders.whole import has_format, replaced_folder
+from nmm.machine import made_with
 from nmm.runs.figure_options import PLAIN, FigureOptions
 from nmm.scenario.numbers import shown
 
@@ -82,6 +83,7 @@ def save(
             trajectory.save(temporary / name, figures=False)
         summary = {
             "format": FORMAT,
+            "made_with": made_with(),
             "complete": all(trajectory.complete for trajectory in trajectories),
             "runs": {name: trajectory.summary() for name, trajectory in runs.items()},
         }

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nmm.folders.whole import has_format, replaced_folder
+from nmm.machine import made_with
 from nmm.runs.figure_options import PLAIN, FigureOptions
 
 if TYPE_CHECKING:
@@ -56,6 +57,7 @@ def save(found: Repeatability, folder: str | Path, *, figures: FigureOptions = P
 def _summary(found: Repeatability) -> dict[str, Any]:
     return {
         "format": FORMAT,
+        "made_with": made_with(),
         "complete": found.complete,
         "period": found.period,
         "transient": found.transient,

@@ -13,6 +13,7 @@ from nmm.analysis.maps.extremes import EVERYWHERE, Extreme
 from nmm.analysis.maps.measures import MEASURES
 from nmm.arrays import Array, Integers
 from nmm.folders.whole import has_format, replaced_folder
+from nmm.machine import made_with
 from nmm.runs.figure_options import PLAIN, FigureOptions
 
 if TYPE_CHECKING:
@@ -57,6 +58,7 @@ def summary(made: Map) -> dict[str, Any]:
     about = made.about
     return {
         "format": FORMAT,
+        "made_with": made_with(),
         "kind": made.kind,
         "robot": about.robot,
         "task": list(about.task),

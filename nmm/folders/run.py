@@ -177,6 +177,7 @@ def _loaded(folder: Path, robot: Robot | None) -> Trajectory:
         scenario=scenario,
         events=tuple(Event(one.t, one.task, one.what, one.why) for one in told.events),
         label=told.label,
+        made_with=told.made_with,
         **arrays,
     )
 

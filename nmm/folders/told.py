@@ -70,6 +70,7 @@ class ToldRun(Told):
     clearance_asked: FiniteFloat = 0.0
     obstacles: tuple[ToldObstacle, ...] | None = None
     events: tuple[ToldEvent, ...] = ()
+    made_with: dict[str, str | int] = {}
     unmet_samples: int = NONE.samples
     unmet_share: float = NONE.share
     unmet_largest: float = NONE.largest

@@ -19,9 +19,9 @@ from nmm.paper.numbers import (
     ripple,
     second_half,
     settling_time,
-    text,
 )
 from nmm.paper.results import Claim
+from nmm.words import number_text
 
 if TYPE_CHECKING:
     from nmm.runs.trajectory import Trajectory
@@ -44,8 +44,8 @@ def _tracking(rg: Trajectory, pg: Trajectory) -> Claim:
         "The feedback recovers the initial task error exponentially, here with K = 1.",
         "section III",
         f"Rate fitted to ‖e‖: {rates[0]:.5f} 1/s (RG), {rates[1]:.5f} 1/s (PG). No component leaves "
-        f"e(0) exp(−t) by more than {text(max(deviations), 2)}. "
-        f"‖e‖ ends at {text(float(rg.error_norm[-1]), 2)} (RG).",
+        f"e(0) exp(−t) by more than {number_text(max(deviations), 2)}. "
+        f"‖e‖ ends at {number_text(float(rg.error_norm[-1]), 2)} (RG).",
         all(abs(rate - GAIN) < 1e-3 for rate in rates) and max(deviations) < INTEGRATOR,
     )
 
@@ -55,7 +55,7 @@ def _steady_state(rg: Trajectory, pg: Trajectory) -> Claim:
     return Claim(
         "RG optimises better than PG.",
         "section VII",
-        f"Mean H in the second half of the run: {text(means[0])} (RG), {text(means[1])} (PG).",
+        f"Mean H in the second half of the run: {number_text(means[0])} (RG), {number_text(means[1])} (PG).",
         means[0] <= means[1],
     )
 
@@ -73,7 +73,7 @@ def _faster(rg: Trajectory, pg: Trajectory, statement: str, source: str) -> Clai
 
 
 def _or_never(time: float | None) -> str:
-    return "never" if time is None else f"{text(time)} s"
+    return "never" if time is None else f"{number_text(time)} s"
 
 
 def _switching(rg: Trajectory, determinant: float, statement: str, source: str) -> Claim:
@@ -82,7 +82,7 @@ def _switching(rg: Trajectory, determinant: float, statement: str, source: str) 
         statement,
         source,
         f"The rule is in place and this motion needs no switch: Ja of {names} throughout, "
-        f"with |det Ja| at least {text(determinant)}."
+        f"with |det Ja| at least {number_text(determinant)}."
         if rg.switches == 0
         else f"{rg.switches} switches of partition.",
         rg.switches == 0 and determinant > 0.01,
@@ -96,14 +96,16 @@ def _first(rg: Trajectory, pg: Trajectory, determinant: float) -> list[Claim]:
         Claim(
             "Tracking is good despite the initial backup of the platform.",
             "Fig. 3",
-            f"v(0) = {text(float(rg.u[0, 0]))} m/s; the platform backs up for {text(backwards)} s.",
+            f"v(0) = {number_text(float(rg.u[0, 0]))} m/s; "
+            f"the platform backs up for {number_text(backwards)} s.",
             float(rg.u[0, 0]) < 0.0 < backwards,
         ),
         _faster(rg, pg, "RG is faster in approaching the minimum of H₁.", "Fig. 4"),
         Claim(
             "RG keeps a lower ripple in steady state.",
             "Fig. 4",
-            f"Ripple in the second half of the run: {text(ripples[0])} (RG), {text(ripples[1])} (PG).",
+            f"Ripple in the second half of the run: {number_text(ripples[0])} (RG), "
+            f"{number_text(ripples[1])} (PG).",
             ripples[0] < ripples[1],
         ),
         _switching(
@@ -130,21 +132,21 @@ def _second(rg: Trajectory, pg: Trajectory, determinant: float) -> list[Claim]:
         Claim(
             "… and firmly keeps its absolute minimum.",
             "Fig. 6",
-            f"Largest H₂ in the second half of the run: {text(largest[0], 2)} (RG, rounding), "
-            f"{text(largest[1], 2)} (PG).",
+            f"Largest H₂ in the second half of the run: {number_text(largest[0], 2)} (RG, rounding), "
+            f"{number_text(largest[1], 2)} (PG).",
             largest[0] < 1e-20 < largest[1],
         ),
         Claim(
             "With RG, H₂(t) = H₂(0) exp(−2 α t).",
             "follows from eq. (10)",
-            f"Fitted rate {rate:.6f} 1/s, where 2 α = 20 1/s; largest deviation {text(deviation, 2)}.",
+            f"Fitted rate {rate:.6f} 1/s, where 2 α = 20 1/s; largest deviation {number_text(deviation, 2)}.",
             abs(rate - 2.0 * ALPHA) < 1e-4 and deviation < 1e-6,
         ),
         Claim(
             "The platform waves around the nominal trajectory of the end-effector.",
             "Fig. 5",
-            f"After 3 s it is up to {text(float(-steady.min()), 2)} m inside "
-            f"and up to {text(float(steady.max()), 2)} m outside the circle.",
+            f"After 3 s it is up to {number_text(float(-steady.min()), 2)} m inside "
+            f"and up to {number_text(float(steady.max()), 2)} m outside the circle.",
             float(steady.min()) < -0.1 and float(steady.max()) > 0.1,
         ),
     ]
@@ -158,20 +160,22 @@ def _third(rg: Trajectory, pg: Trajectory, determinant: float) -> list[Claim]:
             "RG is built on the always nonsingular block Ja = [j₁ j₂ j₃].",
             "VI-3, corrected",
             "The printed minor, Δ₁₂₃ = d, is that of J; the method inverts the block of J̄, whose minor "
-            f"can vanish. On this motion it does not: |det Ja| is at least {text(determinant, 4)} m.",
+            f"can vanish. On this motion it does not: |det Ja| is at least {number_text(determinant, 4)} m.",
             rg.switches == 0 and determinant > 0.23,
         ),
         _faster(rg, pg, "RG approaches the minimum of H₃ faster.", "VII, Fig. 8"),
         Claim(
             "Tracking takes a complex reconfiguration only in the initial instants.",
             "Fig. 7",
-            f"Largest input {text(early)} m/s or rad/s in the first second, {text(late)} after 2 s.",
+            f"Largest input {number_text(early)} m/s or rad/s in the first second, "
+            f"{number_text(late)} after 2 s.",
             late < 0.1 * early,
         ),
         Claim(
             "H₃ reads θ as it is, which leaves (−π, π] and passes 11 rad: it must not be wrapped.",
             "follows from H₃",
-            f"θ goes from {text(float(rg.q[0, 2]), 4)} rad up to {text(float(rg.q[:, 2].max()), 4)} rad.",
+            f"θ goes from {number_text(float(rg.q[0, 2]), 4)} rad "
+            f"up to {number_text(float(rg.q[:, 2].max()), 4)} rad.",
             float(rg.q[:, 2].max()) > 11.0,
         ),
     ]

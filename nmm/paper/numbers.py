@@ -10,27 +10,17 @@ import numpy as np
 from nmm.arrays import Array
 from nmm.paper.results import Row
 from nmm.runs.summary import lateral_slip
+from nmm.words import number_text
 
 if TYPE_CHECKING:
     from nmm.control.controller import Controller
     from nmm.runs.trajectory import Trajectory
 
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 #: Centre (m) and radius (m) of the circle of eq. (16).
 CENTER, RADIUS = (2.0, 2.0), 3.0
 #: Step size of both methods and gain of all tasks in the paper's runs, 1/s.
 ALPHA, GAIN = 10.0, 1.0
-
-
-def text(value: float | None, digits: int = 3) -> str:
-    """A number for people: 0.0231, 2.1·10⁻²⁹; a dash for None."""
-    if value is None or not np.isfinite(value):
-        return "–"
-    if value == 0.0 or 1e-2 <= abs(value) < 1e4:
-        return f"{value:.{digits}g}".replace("-", "−")
-    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
-    return f"{mantissa.replace('-', '−')}·10{str(int(exponent)).translate(_SUPERSCRIPTS)}"
 
 
 def input_symbol(name: str) -> str:
@@ -87,7 +77,7 @@ def table(rg: Trajectory, pg: Trajectory, determinant: float | None) -> list[Row
     """The numbers of both runs of a case."""
 
     def row(name: str, unit: str, number: Callable[[Trajectory], float | None], digits: int = 3) -> Row:
-        return Row(name, unit, text(number(rg), digits), text(number(pg), digits))
+        return Row(name, unit, number_text(number(rg), digits), number_text(number(pg), digits))
 
     units = ", ".join(dict.fromkeys(rg.r_units))
     rows = [
@@ -107,7 +97,7 @@ def table(rg: Trajectory, pg: Trajectory, determinant: float | None) -> list[Row
         row("largest H in the second half", "1", lambda run: float(second_half(run).max())),
         row("ripple (largest less smallest H) there", "1", ripple),
         row("smallest singular value of J̄", "mixed", lambda run: float(run.sigma_min.min())),
-        Row("smallest |det Ja|", "mixed", text(determinant), "–"),
+        Row("smallest |det Ja|", "mixed", number_text(determinant), "–"),
         Row("switches of partition", "1", str(rg.switches), "–"),
         row("smallest θ", "rad", lambda run: float(run.q[:, 2].min())),
         row("largest θ", "rad", lambda run: float(run.q[:, 2].max()), 4),
@@ -117,5 +107,5 @@ def table(rg: Trajectory, pg: Trajectory, determinant: float | None) -> list[Row
     robot = rg.robot
     for column, (name, unit) in enumerate(zip(robot.u_names, robot.u_units, strict=True)):
         sizes = (float(np.abs(run.u[:, column]).max()) for run in (rg, pg))
-        rows.append(Row(f"largest |{input_symbol(name)}|", unit, *(text(size) for size in sizes)))
+        rows.append(Row(f"largest |{input_symbol(name)}|", unit, *(number_text(size) for size in sizes)))
     return rows

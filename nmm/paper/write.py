@@ -7,15 +7,19 @@ import time
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from nmm import __version__
 from nmm.errors import InputError
 from nmm.folders.whole import has_format, replaced_folder
-from nmm.paper.cases import CASES
+from nmm.machine import made_with
+from nmm.paper.cases import CASES, RESOLVERS
 from nmm.paper.results import CaseResult, Claim
 from nmm.processes import share_out
 from nmm.progress import Progress
 from nmm.runs.figure_options import PLAIN, FigureOptions
+
+if TYPE_CHECKING:
+    from nmm.tables import Table
 
 #: Marks a folder as one of ours.
 FORMAT = "nmm paper 1"
@@ -42,6 +46,21 @@ class PaperReport:
     def claims(self) -> tuple[Claim, ...]:
         """The claims of all cases, in order."""
         return tuple(claim for case in self.cases for claim in case.claims)
+
+    def table(self) -> Table:
+        """The numbers of all runs, a column each: "1 RG", "1 PG", "2 RG", ...; read from the folder."""
+        from nmm.runs.trajectory import Trajectory
+        from nmm.tables import comparison_table
+
+        runs = [
+            replace(
+                Trajectory.load(self.folder / case.folder / resolver),
+                label=f"{case.number} {resolver.upper()}",
+            )
+            for case in CASES
+            for resolver in RESOLVERS
+        ]
+        return comparison_table(runs)
 
     @property
     def holds(self) -> bool:
@@ -90,7 +109,7 @@ def write_paper(
         (temporary / "index.html").write_text(render(results), encoding="utf-8")
         content = {
             "format": FORMAT,
-            "nmm": __version__,
+            "made_with": made_with(),
             "holds": all(claim.holds for result in results for claim in result.claims),
             "cases": [asdict(result) for result in results],
         }

@@ -22,8 +22,6 @@ FORMAT = "nmm run 1"
 
 def summarise(trajectory: Trajectory) -> dict[str, Any]:
     """Numbers of a run, ready for JSON: outcome, errors, objective, singular values, lateral slip."""
-    from nmm import __version__
-
     robot, count = trajectory.robot, len(trajectory)
     rows = len(trajectory.r_names)
     if np.isnan(trajectory.error).any():  # of tasks that come and go: the most at one time
@@ -31,7 +29,7 @@ def summarise(trajectory: Trajectory) -> dict[str, Any]:
     redundancy = {"static": robot.n_independent - rows, "kinematic": robot.n_u - rows}
     summary: dict[str, Any] = {
         "format": FORMAT,
-        "nmm": __version__,
+        "made_with": dict(trajectory.made_with),
         "outcome": str(trajectory.outcome),
         "complete": trajectory.complete,
         "message": trajectory.message,

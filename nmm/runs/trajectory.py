@@ -14,6 +14,7 @@ from nmm.collisions.obstacle import Obstacle
 from nmm.collisions.recorded import places
 from nmm.control.sequence import Event
 from nmm.doors import door
+from nmm.machine import made_with
 from nmm.robots.bodies import Body, Nearest
 from nmm.robots.motion import Motion
 from nmm.robots.robot import Robot
@@ -84,6 +85,7 @@ class Trajectory:
     scenario : the scenario as resolved, if it came from one
     events : when tasks that come and go began and ended, and why
     label : what it is called among other runs; "" for its resolver
+    made_with : the versions and the machine that computed it (`nmm.machine`); empty where a folder lacks them
 
     Examples
     --------
@@ -137,6 +139,7 @@ class Trajectory:
     scenario: dict[str, Any] | None = field(default=None)
     events: tuple[Event, ...] = ()
     label: str = ""
+    made_with: dict[str, str | int] = field(default_factory=made_with)
 
     def __len__(self) -> int:
         return len(self.t)

@@ -13,6 +13,7 @@ from typing import Any
 from nmm.errors import InputError
 from nmm.files import taken
 from nmm.folders.whole import check_folder, has_format
+from nmm.machine import made_with
 from nmm.scenario.numbers import shown
 from nmm.sweeps.columns import columns_of
 from nmm.sweeps.definition import Definition
@@ -133,6 +134,7 @@ class SweepFolder:
     def _write_manifest(self, *, complete: bool) -> None:
         content = {
             "format": FORMAT,
+            "made_with": made_with(),
             "name": self.definition.name,
             "complete": complete,
             "rows": self.definition.rows,

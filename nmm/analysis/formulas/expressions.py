@@ -125,6 +125,11 @@ class _Style:
         inside = _linear(trig.angle, self.name, " ")
         return rf"\{trig.kind}({inside})" if self.latex else f"{trig.kind}({inside})"
 
+    def side_by_side(self, factors: list[str]) -> str:
+        """A product; names of several letters stand apart."""
+        apart = self.latex and any(r"\mathrm" in factor for factor in factors)
+        return (r" \, " if apart else " ").join(factors)
+
     def power(self, base: str, n: int) -> str:
         if n == 1:
             return base
@@ -158,7 +163,7 @@ def _written(product: Product, style: _Style) -> str:
         above.insert(0, str(number.numerator))
     if number.denominator != 1:
         below.insert(0, str(number.denominator))
-    top, bottom = " ".join(above), " ".join(below)
+    top, bottom = style.side_by_side(above), style.side_by_side(below)
     if not bottom:
         return sign + top
     if style.latex:

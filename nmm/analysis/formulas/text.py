@@ -30,14 +30,20 @@ def text_of(formulas: Formulas) -> str:
         lines += [f"  {name} = {value}" for name, value in formulas.definition_texts.items()]
     lines += [f"  {GREEK[name]} = {text(form)}" for name, form in formulas.named_forms.items()]
     lines.append("maximal minors")
-    zeros = [columns for columns, form in formulas.short_forms.items() if not form.number]
+    summed = zeros_summed(formulas)
     for columns, form in formulas.short_forms.items():
-        if form.number or len(zeros) < _MANY:
+        if form.number or not summed:
             lines.append(f"  {minor_name(columns)} = {text(form)}")
-    if len(zeros) >= _MANY:
-        lines.append(f"  the other {len(zeros)} are 0")
+    if summed:
+        lines.append(f"  the other {summed} are 0")
     lines += [f"note: {note}" for note in formulas.notes]
     return "\n".join(lines)
+
+
+def zeros_summed(formulas: Formulas) -> int:
+    """How many minors that are 0 are not listed, as they are many."""
+    zeros = sum(not form.number for form in formulas.short_forms.values())
+    return zeros if zeros >= _MANY else 0
 
 
 def latex_lines(formulas: Formulas) -> list[tuple[str, str]]:
@@ -45,19 +51,28 @@ def latex_lines(formulas: Formulas) -> list[tuple[str, str]]:
     lines = [(f"f_{{{i}}}", value.latex) for i, value in enumerate(formulas.values, 1)]
     lines += [(latex_name(name), value) for name, value in formulas.definition_latex.items()]
     lines += [(latex_name(name), latex(form)) for name, form in formulas.named_forms.items()]
-    zeros = sum(not form.number for form in formulas.short_forms.values())
+    summed = zeros_summed(formulas)
     for columns, form in formulas.short_forms.items():
-        if form.number or zeros < _MANY:
+        if form.number or not summed:
             names = ",".join(latex_name(name) for name in columns)
             lines.append((rf"\Delta_{{{names}}}", latex(form)))
     return lines
 
 
 def latex_of(formulas: Formulas) -> str:
-    """The same and J; one align* environment."""
-    rows = [" & ".join(latex(entry) for entry in row) for row in formulas.short_entries]
-    matrix = "\\begin{bmatrix} " + r" \\ ".join(rows) + " \\end{bmatrix}"
-    lines = [*latex_lines(formulas), ("J", matrix)]
+    """The same, and J column by column after f, as columns of a page are narrow; one align* environment."""
+    lines = latex_lines(formulas)
+    names = [f"J_{{{latex_name(name)}}}" for name in formulas.u_names]
+    moving = formulas.derivation.target_moves
+    of = r"\frac{\partial f}{\partial q}"
+    of = rf"\left({of} - \frac{{\partial g}}{{\partial q}}\right)" if moving else of
+    side_by_side = r" \; ".join(names)
+    columns = [("J", rf"{of} S = [\, {side_by_side} \,]")]
+    for name, column in zip(names, zip(*formulas.short_entries, strict=True), strict=True):
+        entries = r" \\ ".join(map(latex, column))
+        columns.append((name, rf"\begin{{bmatrix}} {entries} \end{{bmatrix}}"))
+    after_f = len(formulas.values)
+    lines[after_f:after_f] = columns
     return (
         "\\begin{align*}\n  "
         + " \\\\\n  ".join(f"{left} &= {right}" for left, right in lines)

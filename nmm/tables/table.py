@@ -1,0 +1,138 @@
+"""A table of runs, and the forms that papers and other programs take it in."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
+
+from nmm import latex
+from nmm.errors import InputError
+from nmm.words import listed, number_text, printable
+
+#: A number, a word, or None where a run has none.
+Value: TypeAlias = float | int | str | None
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A row: a quantity of every run.
+
+    Attributes
+    ----------
+    key : its name in summary.json; "u_max.v" for what lies deeper there
+    name, latex : for readers, as plain text and as LaTeX
+    unit : "" where it has none
+    values : of each run
+    """
+
+    key: str
+    name: str
+    latex: str
+    unit: str
+    values: tuple[Value, ...]
+
+
+@dataclass(frozen=True)
+class Table:
+    """Quantities of runs.
+
+    Attributes
+    ----------
+    runs : what they are called
+    quantities : each with as many values
+
+    Examples
+    --------
+    >>> table = nmm.comparison_table([nmm.Scenario.load("unicycle_2r_position", {"duration": 1}).run()])
+    >>> table.runs, table.save("case1.tex").name
+    (('RG',), 'case1.tex')
+    """
+
+    runs: tuple[str, ...]
+    quantities: tuple[Quantity, ...]
+
+    def latex(self) -> str:
+        """A tabular of package booktabs, with a column a run: three digits, powers of ten, names escaped."""
+        from nmm import __version__
+
+        rows = [["", *map(latex.escaped, self.runs)]]
+        for one in self.quantities:
+            unit = f" ({_latex_unit(one.unit)})" if one.unit else ""
+            rows.append([one.latex + unit, *map(_latex_value, one.values)])
+        head, *body = (" & ".join(row) + r" \\" for row in rows)
+        return "\n".join(
+            [
+                rf"% nmm {__version__}; needs \usepackage{{booktabs}}",
+                rf"\begin{{tabular}}{{@{{}}l{'r' * len(self.runs)}@{{}}}}",
+                *(rf"  {line}" for line in (r"\toprule", head, r"\midrule", *body, r"\bottomrule")),
+                "\\end{tabular}\n",
+            ]
+        )
+
+    def csv(self) -> str:
+        """A line a run under names with units: the numbers of summary.json, to the last digit."""
+        names = [f"{one.key} [{one.unit}]" if one.unit else one.key for one in self.quantities]
+        text = io.StringIO()
+        written = csv.writer(text, lineterminator="\n")
+        written.writerow(["run", *names])
+        for k, run in enumerate(self.runs):
+            written.writerow([run, *(one.values[k] for one in self.quantities)])
+        return text.getvalue()
+
+    def markdown(self) -> str:
+        """A table as GitHub and most others read it, with a column a run."""
+        rows = [["", *map(_markdown, self.runs)], ["---", *("---:" for _ in self.runs)]]
+        for one in self.quantities:
+            name = _markdown(f"{one.name} ({one.unit})" if one.unit else one.name)
+            rows.append([name, *(_markdown(_plain_value(value)) for value in one.values)])
+        return "".join(f"| {' | '.join(row)} |\n" for row in rows)
+
+    def save(self, path: str | Path) -> Path:
+        """Write it; the file's suffix says as what: .tex, .csv or .md.
+
+        Raises
+        ------
+        InputError : another suffix, a file that cannot be written
+        """
+        path = Path(path)
+        if path.suffix.lower() not in _SUFFIXES:
+            raise InputError(f"{path}: expected a file that ends in {listed(list(_SUFFIXES), 'or')}")
+        try:
+            path.write_text(FORMS[_SUFFIXES[path.suffix.lower()]](self), encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"{path}: cannot be written: {error.strerror}") from None
+        return path
+
+
+#: The forms by name.
+FORMS: dict[str, Callable[[Table], str]] = {
+    "latex": Table.latex,
+    "csv": Table.csv,
+    "markdown": Table.markdown,
+}
+_SUFFIXES = {".tex": "latex", ".csv": "csv", ".md": "markdown"}
+
+
+def _latex_value(value: Value) -> str:
+    if isinstance(value, str):
+        return latex.escaped(value)
+    return f"${value}$" if isinstance(value, int) else latex.number(value)
+
+
+def _latex_unit(unit: str) -> str:
+    """ "m^2" with its power raised."""
+    return re.sub(r"\\textasciicircum\{\}(-?\d+)", r"$^{\1}$", latex.escaped(unit))
+
+
+def _plain_value(value: Value) -> str:
+    return str(value) if isinstance(value, str | int) else number_text(value)
+
+
+def _markdown(text: str) -> str:
+    """Without what Markdown takes for marks."""
+    return re.sub(r"([\\`*_{}\[\]<>|])", r"\\\1", printable(text))
