@@ -59,7 +59,8 @@ def laps_table(found: Repeatability) -> Table:
 
     Examples
     --------
-    >>> found = nmm.analysis.repeatability(nmm.Scenario.load("unicycle_2r_position"), laps=1, resolvers=["pg"])
+    >>> scenario = nmm.Scenario.load("unicycle_2r_position")
+    >>> found = nmm.analysis.repeatability(scenario, laps=1, resolvers=["pg"])
     >>> [quantity.name for quantity in nmm.laps_table(found).quantities]
     ['posture drift, lap 1', 'platform displacement, lap 1', 'task error, lap 1']
     """
