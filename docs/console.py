@@ -56,7 +56,7 @@ def rewritten(text: str, folder: Path | None = None) -> str:
             return f"```{kind}\n{printed}\n```"
         elif kind == "bash":
             for line in body.splitlines():
-                _run(line)
+                run(line)
         elif kind == "python":
             exec(compile(body, "a block of the page", "exec"), names)
         return block.group()
@@ -90,7 +90,7 @@ def _printed(command: str) -> str:
     return printed.getvalue().strip("\n")
 
 
-def _run(line: str) -> None:
+def run(line: str) -> None:
     """A command in a process of its own; `RuntimeError` where it fails."""
     program, *arguments = shlex.split(line, comments=True) or [""]
     if program != "nmm":

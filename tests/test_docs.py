@@ -82,6 +82,27 @@ def commands(text: str) -> Iterator[list[str]]:
             yield shlex.split(found[1], comments=True)
 
 
+#: What the README's commands take in the tests, to be done in seconds.
+SMALLER = {"sweep": "--samples 2 --jobs 1", "gallery": "--only unicycle_2r_position"}
+
+
+def test_the_commands_of_the_readme_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All but `nmm render`, which needs a browser: tests/test_rendering.py."""
+    tutorial = (ROOT / "docs" / "tutorials" / "own_robot.md").read_text(encoding="utf-8")
+    robot = re.search(r"^```xml\n(.*?)^```$", tutorial, flags=re.DOTALL | re.MULTILINE)
+    assert robot is not None
+    (tmp_path / "my_robot.urdf").write_text(robot[1], encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    lines = re.findall(r"^nmm (.*?)(?:  .*)?$", readme, flags=re.MULTILINE)
+    assert len(lines) > 15
+    for line in lines:
+        name = line.split()[0]
+        if name != "render":
+            place = line.replace("runs/...", "runs/unicycle_2r_position-rg")
+            console.run(f"nmm {place} {SMALLER.get(name, '')}")
+
+
 @pytest.mark.parametrize("page", DOCUMENTS)
 def test_every_command_on_a_page_exists_with_its_options(page: str) -> None:
     group = typer.main.get_command(app)
