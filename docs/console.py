@@ -26,11 +26,12 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import TextIO
 
 FOLDER = Path(__file__).parent
 TUTORIALS = sorted((FOLDER / "tutorials").glob("*.md"))
 #: Pages whose blocks run.
-PAGES = (FOLDER / "singularities.md", FOLDER / "sweeps.md", *TUTORIALS)
+PAGES = (*(FOLDER / f"{name}.md" for name in ("singularities", "sweeps", "papers")), *TUTORIALS)
 COMPARED, WRITTEN = "console", ("console", "text")
 
 _BLOCK = re.compile(r"^```(?P<kind>\w+)\n(?P<body>.*?)^```$", re.DOTALL | re.MULTILINE)
@@ -85,7 +86,13 @@ def _printed(command: str) -> str:
     if program != "nmm":
         raise ValueError(f"expected nmm, python or cat, got {command!r}")
     printed = io.StringIO()
-    with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(contextlib.redirect_stderr(printed))
+        out: TextIO = printed
+        if ">" in arguments:  # what is printed goes to a file
+            *arguments, _, name = arguments
+            out = stack.enter_context(Path(name).open("w", encoding="utf-8"))
+        stack.enter_context(contextlib.redirect_stdout(out))
         status_of(arguments)
     return printed.getvalue().strip("\n")
 
