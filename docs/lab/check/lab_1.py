@@ -109,7 +109,9 @@ def projected_gradient(PG: object) -> str:
             raise Wrong("PG: its part with h climbs H: look at the sign")
         wanted = nmm.ProjectedGradient(alpha).resolve(Problem(J, rate, h)).u
         if not np.allclose(u, wanted, atol=1e-8):
-            raise Wrong("PG: it does the task and descends H, but not as nmm does: is alpha in it, once?")
+            raise Wrong(
+                "PG: it does the task, but the rest is not -alpha (I - J⁺ J) h: is h in it, and alpha, once?"
+            )
     return "the hand does its task, and H descends with what is left"
 
 
@@ -136,7 +138,7 @@ def reduced_gradient(RG: object) -> str:
             change = np.linalg.solve(J[:, basic], J[:, free])
             if np.allclose(u[free], -alpha * (h[free] - change @ h[basic])):
                 raise Wrong("RG: a matrix is transposed, or one is not that should be (2 x 2 hides it)")
-            raise Wrong("RG: it does the task, but u_b is not the reduced gradient times -alpha")
+            raise Wrong("RG: it does the task, but u_b is not as in eq. (10): is h in it, and alpha, once?")
     return "u_b descends H, u_a does the task, without a pseudoinverse"
 
 

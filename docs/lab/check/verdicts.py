@@ -121,7 +121,7 @@ def shaped(
     if columns and given.shape == wanted[::-1]:
         hint = "it is transposed"
     elif given.size == np.prod(wanted):
-        hint = "right many numbers, in another shape"
+        hint = "as many numbers as there should be, in another shape"
     got = " x ".join(map(str, given.shape)) or "one number"
     raise Wrong(f"{name}: expected {words}, got {got}" + (f": {hint}" if hint else ""))
 
@@ -154,7 +154,7 @@ def compared(
     for j, column in enumerate(columns):
         same = [k for k in range(len(columns)) if np.allclose(given[:, :, j], wanted[:, :, k], atol=1e-9)]
         if same and j not in same and off[:, j].any():
-            raise Wrong(f"{name}: column {column} is what belongs into column {columns[same[0]]}")
+            raise Wrong(f"{name}: column {column} is what belongs in column {columns[same[0]]}")
     factor = float(np.sum(given[:, off] * wanted[:, off]) / np.sum(wanted[:, off] ** 2 + 1e-300))
     if np.allclose(given[:, off], factor * wanted[:, off], atol=1e-9):
         what = {-1.0: "has the wrong sign", 0.0: "is 0"}.get(
@@ -168,7 +168,7 @@ def compared(
             where = f"right where {coordinates[i]} = 0, and only there"
             raise Wrong(f"{name}: {_places(off, rows, columns)}: {where}. How does {coordinates[i]} enter?")
     worst = samples[np.argmax(abs(given - wanted).max(axis=(1, 2)))]
-    raise Wrong(f"{name}: {_places(off, rows, columns)} not right, for one at q = {worst.round(2)}")
+    raise Wrong(f"{name}: {_places(off, rows, columns)} not right, for example at q = {worst.round(2)}")
 
 
 def _places(off: Matrix, rows: Sequence[str], columns: Sequence[str]) -> str:

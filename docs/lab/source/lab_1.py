@@ -5,8 +5,9 @@
 # *Kinematic Modeling and Redundancy Resolution for Nonholonomic Mobile Manipulators*, ICRA 2006. The numbers of equations
 # are that paper's.
 #
-# Replace each `...` by your answer and run the cell below it. It tells whether the answer is right, or in what it is not.
-# Run the cells in order: Shift + Enter.
+# Replace each `...` by your answer and run the cell below it. It says whether the answer is right, or what is wrong with it.
+# Run the cells in order: Shift + Enter. The folder `check` must lie beside this notebook: both are in `docs/lab` of the
+# repository.
 
 # %%
 import check
@@ -115,7 +116,7 @@ def J(q):
 check.jacobian(J)
 
 # %% [markdown]
-# Whoever has no `check` takes differences: drive a little ahead and back along each input, and look where the hand goes. The two
+# Without `check` you would take differences: drive a little ahead and back along each input, and look where the hand goes. The two
 # matrices agree to about ten digits.
 
 # %%
@@ -233,7 +234,7 @@ if check.ready("jacobian"):
     plt.show()
 
 # %% [markdown]
-# Give a configuration where the block of (v, q1) is singular, to 1e-6. (Multiply J_a out first: most terms cancel.)
+# Give a configuration where the block of (v, q1) is singular, to 1e-6. (Multiply its determinant out first: most terms cancel.)
 
 # %%
 q_singular = ...  # answer: q_singular = [0, 0, 0, pi / 2, 0]

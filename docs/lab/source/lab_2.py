@@ -5,6 +5,7 @@
 # costs, and at the end choose gains, objective and limits for a robot whose motors are small.
 #
 # Replace each `...` by your answer and run the cell below it. Run the cells in order: Shift + Enter.
+# The folder `check` must lie beside this notebook: both are in `docs/lab` of the repository.
 
 # %%
 import check
