@@ -171,7 +171,32 @@ def test_what_steers_is_no_wheel_in_the_notes(known: Path) -> None:
 
 def test_an_axle_that_is_neither_point_nor_frame(known: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert status_of(["info", str(known), "--axle", "1;2"]) == 2
-    assert "--axle: expected a frame, or X,Y in m with a comma between, got '1;2'" in capsys.readouterr().err
+    expected = "--axle: expected a frame, or X,Y (or X,Y,Z) in m with commas between, got '1;2'"
+    assert expected in capsys.readouterr().err
+
+
+def test_check_takes_the_axle_that_it_advises(known: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """As info takes it; in brackets, as the advice writes it, too."""
+    for given in ("0.1,0", "(0.1, 0)"):
+        assert status_of(["check", str(known), "--axle", given]) == 0
+        assert status_of(["info", str(known), "--axle", given]) == 0
+    assert status_of(["check", str(known), "--axle", "nowhere"]) == 2
+    assert "nowhere" in "".join(capsys.readouterr())
+
+
+def test_a_task_without_a_frame_takes_the_longest_arm() -> None:
+    """Not the head's end; arms of one length are named."""
+    tiago = "package://example-robot-data/robots/tiago_description/robots/tiago_no_hand.urdf"
+    with_head = nmm.load(tiago)
+    assert len(tips(with_head)) > 1
+    (row, *_) = short_task("position", with_head).rows(with_head)
+    frame = with_head.model.frames[with_head.frame_id(row.name.partition(".")[0])]
+    assert with_head.model.names[frame.parentJoint] == "arm_7_joint"
+    two = nmm.Scenario.load("two_arms_box").robot()
+    with pytest.raises(
+        nmm.InputError, match=r"expected a frame.*arms end at .*\(6 joints\) and .*\(6 joints\)"
+    ):
+        short_task("position", two)
 
 
 def test_a_missed_target_names_the_limits_that_bind(tmp_path: Path) -> None:

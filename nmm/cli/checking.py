@@ -26,6 +26,7 @@ def check_file(
     platform: str | None = None,
     lock: Mapping[str, float] | None = None,
     wheels: Sequence[str] | Mapping[str, float] | None = None,
+    axle: str | Sequence[float] | None = None,
 ) -> int:
     """Print every problem and warning, a line each; 2 when there are problems, else 0 and what it holds."""
     from nmm.robots.loading.packages import package_file
@@ -35,7 +36,7 @@ def check_file(
         path = package_file(file, package_dirs)
     else:
         path = bundled_robots().get(file, Path(file))
-    made = report(path, arguments, package_dirs, platform=platform, lock=lock, wheels=wheels)
+    made = report(path, arguments, package_dirs, platform=platform, lock=lock, wheels=wheels, axle=axle)
     shown = os.path.relpath(path) if file in bundled_robots() else file
     for problem in made.problems:
         print(_line(shown, problem, made))

@@ -261,11 +261,13 @@ def axle_of(given: str | None) -> str | list[float] | None:
     if given is None or ("," not in given and any(letter.isalpha() for letter in given)):
         return given
     if "," not in given:
-        raise InputError(f"--axle: expected a frame, or X,Y in m with a comma between, got {quoted(given)}")
+        raise InputError(
+            f"--axle: expected a frame, or X,Y (or X,Y,Z) in m with commas between, got {quoted(given)}"
+        )
     from nmm.scenario.numbers import evaluate
 
     try:
-        return [evaluate(part) for part in given.split(",")]
+        return [evaluate(part) for part in given.strip("([ ])").split(",")]
     except ValueError as error:
         raise InputError(f"--axle: expected a frame or X,Y in m, got {given!r}: {error}") from None
 

@@ -12,12 +12,14 @@ from nmm.cli.options import (
     ROBOT_HELP,
     ArgumentOption,
     AtOption,
+    AxleOption,
     LockOption,
     PackageOption,
     PlatformOption,
     ViewedTaskOption,
     WheelsOption,
     arguments_of,
+    axle_of,
     lock_of,
     wheels_of,
 )
@@ -67,6 +69,7 @@ def check(
     platform: PlatformOption = None,
     lock: LockOption = None,
     wheels: WheelsOption = None,
+    axle: AxleOption = None,
 ) -> int:
     """Say everything that is wrong with a robot's file.
 
@@ -84,7 +87,13 @@ def check(
     from nmm.cli.checking import check_file
 
     return check_file(
-        file, arguments_of(arguments), package_dir or [], platform, lock_of(lock), wheels_of(wheels)
+        file,
+        arguments_of(arguments),
+        package_dir or [],
+        platform,
+        lock_of(lock),
+        wheels_of(wheels),
+        axle_of(axle),
     )
 
 

@@ -282,7 +282,9 @@ class Recorder:
             }
         limited, within = shares(kept, robot, found.q, found.u, found.limited)
         if outcome is Outcome.MISSED and controller.limits is not None:
-            message = "; ".join(filter(None, [message, binding(limited, within, found.scale)]))
+            moving = np.flatnonzero(~standing(robot, limited, within))
+            held = binding([limited[i] for i in moving], within[:, moving], found.scale)
+            message = "; ".join(filter(None, [message, held]))
         path = self._shown.path(robot, found.q)
         desired = self._shown.desired(path, found.r_d) if path is not None and self._shown.rows else None
         return Trajectory(

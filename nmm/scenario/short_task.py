@@ -14,7 +14,7 @@ from nmm.functions.program import evaluate
 from nmm.functions.tasks.task import Task
 from nmm.kinds import TASKS
 from nmm.robots.configuration import Configuration
-from nmm.robots.loading.tips import tips
+from nmm.robots.loading.tips import branches, end_at
 from nmm.robots.robot import Robot
 from nmm.scenario.constructors import STARRED, parameters
 from nmm.scenario.functions import FUNCTION_PARTS
@@ -22,6 +22,7 @@ from nmm.scenario.keys import KeyedError, as_written, first_error
 from nmm.scenario.spelling import POINT, SPELLINGS
 from nmm.scenario.tasks import TASK_PARTS
 from nmm.scenario.yaml_text import dotted, read_text
+from nmm.words import counted, listed
 
 #: What a text may be.
 EXPECTED = "KIND:FRAME:AXES, as in position:ee:xy, or a mapping as in a scenario"
@@ -98,13 +99,16 @@ def _from_words(text: str, robot: Robot) -> dict[str, Any]:
 
 
 def _tip(robot: Robot, text: str) -> str:
-    ends = tips(robot)
-    if len(ends) != 1:
-        available = ", ".join(ends or robot.frames)
-        raise InputError(
-            f"task {text}: expected a frame, as in {text.split(':')[0]}:FRAME; available: {available}"
-        )
-    return ends[0]
+    """The end of the arm; of several branches (a head, a tray) that of the one with the most joints."""
+    found = [(len(branch), end_at(robot, branch[-1])) for branch in branches(robot)]
+    ends = sorted(((count, end) for count, end in found if end), key=lambda one: -one[0])
+    if not ends or (len(ends) > 1 and ends[0][0] == ends[1][0]):
+        several = [f"{end} ({counted(count, 'joint')})" for count, end in ends]
+        expected = f"task {text}: expected a frame, as in {text.split(':')[0]}:FRAME; "
+        if several:
+            raise InputError(f"{expected}arms end at {listed(several)}")
+        raise InputError(f"{expected}available: {', '.join(robot.frames)}")
+    return ends[0][1]
 
 
 def moving_axes(data: Mapping[str, Any], robot: Robot) -> str:

@@ -71,7 +71,7 @@ def report(
     path : the file
     arguments : values of its `xacro:arg`s
     package_dirs : folders that are, or hold, the ROS packages that the file speaks of
-    options : platform, lock and wheels, with which `load` is tried
+    options : platform, lock, wheels and axle, with which `load` is tried
 
     Raises
     ------
