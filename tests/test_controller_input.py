@@ -200,6 +200,13 @@ def test_what_is_undefined_is_an_error_too(kind: str, k: int, robot_2r: Robot) -
     assert controller.evaluate(0.0, np.zeros(5)).status is not Status.SOLVED
 
 
+@pytest.mark.parametrize("t", [np.nan, np.inf])
+def test_a_time_that_is_not_finite_is_named(t: float, robot_2r: Robot) -> None:
+    circling = Task(Position("ee", "xy"), Circle([0.0, 0.0], 1.0, 0.2))
+    with pytest.raises(InputError, match=r"^t: "):
+        Controller(robot_2r, circling, PG)(t, np.zeros(5))
+
+
 def test_an_undefined_objective_is_an_error(robot_2r: Robot) -> None:
     steep = CallableObjective(lambda c: 0.0, lambda c: np.full(5, np.nan))
     for resolver in (PG, RG):

@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager, contextmanager
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, positive
+from nmm.arrays import Array, positive, scalar
 from nmm.collisions.setting import Setting
 from nmm.control.bounds import OFF, SAMPLE, STAGE
 from nmm.control.collisions import Collisions
@@ -216,7 +216,7 @@ class Controller:
         Raises
         ------
         SingularError : the matrix to invert lost rank, or an input is not finite
-        InputError : q has the wrong length or holds numbers that are not finite
+        InputError : q has the wrong length; t is, or q holds, a number that is not finite
         """
         # Another kind of array would be compiled for anew, so anything but the plain kind is copied.
         if type(q) is not np.ndarray or q.dtype != FLOAT64 or q.shape != self._shape or not q.flags.carray:
@@ -456,8 +456,9 @@ class Controller:
         return bool(self._step.answer.status >= _FAILED)
 
     def failure(self, t: float, q: Array) -> SingularError:
-        """Why the last call, at (t, q), left no inputs; `InputError` for a q that is not finite."""
+        """Why the last call, at (t, q), left no inputs; `InputError` for a t or q that is not finite."""
         self.robot.q(q)
+        scalar(t, "t")
         apart = self.robot.platform.problem(q[: self.robot.platform.n_p])
         problem = self._step.problem
         status = Status(int(self._step.answer.status[()]))
