@@ -52,6 +52,14 @@ def target(page: Page) -> np.ndarray:
     return np.array(page.evaluate("nmm.drive.targets[0].value"))
 
 
+def place(page: Page, target: int, way: str, length: float) -> list[float]:
+    """Where a point of a gizmo is on the screen, and stays: a camera that follows would go on."""
+    if page.locator("#follow").get_attribute("aria-pressed") == "true":
+        page.locator("#follow").click()
+    found: list[float] = page.evaluate(WHERE, [target, way, length])
+    return found
+
+
 def drag(page: Page, start: list[float], by: tuple[float, float]) -> None:
     page.mouse.move(*start)
     page.mouse.down()
@@ -76,7 +84,7 @@ def test_the_end_effector_arrives_where_the_ball_is_dragged(window: Window, setu
         arrived(page)
         before = target(page)
         page.evaluate("nmm.camera.look('top')")
-        drag(page, page.evaluate(WHERE, [0, "", 0.0]), (25.0, -20.0))
+        drag(page, place(page, 0, "", 0.0), (25.0, -20.0))
         after = target(page)
         assert np.abs(after[:2] - before[:2]).min() > 0.05  # in the ground's plane
         assert after[2] == before[2]
@@ -99,7 +107,7 @@ def test_an_arrow_goes_along_its_axis_and_keys_too(window: Window, setup: Scenar
         page = opened(window, url)
         before = target(page)
         length = 0.2 * setup.robot.reach
-        drag(page, page.evaluate(WHERE, [0, "z", 0.9 * length]), (0.0, -25.0))
+        drag(page, place(page, 0, "z", 0.9 * length), (0.0, -25.0))
         after = target(page)
         np.testing.assert_array_equal(after[:2], before[:2])
         assert after[2] > before[2] + 0.02
