@@ -8,14 +8,14 @@ from typing import Any
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent), str(HERE / "building")]
 
-from docstrings import as_rst, signature_that_helps  # noqa: E402
-from frames import copy_frames, without_missing_frames  # noqa: E402
-from keyboards import for_keyboards  # noqa: E402
-from notebooks import NotebookParser  # noqa: E402
-from short_names import short_name  # noqa: E402
-from sphinx.util.inspect import TypeAliasForwardRef  # noqa: E402
+from docstrings import as_rst, signature_that_helps
+from frames import copy_frames, without_missing_frames
+from keyboards import for_keyboards
+from notebooks import NotebookParser
+from short_names import short_name
+from sphinx.util.inspect import TypeAliasForwardRef
 
-import nmm  # noqa: E402
+import nmm
 
 project, author, copyright = "nmm", "The nmm developers", "The nmm developers"
 version = release = nmm.__version__

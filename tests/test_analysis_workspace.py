@@ -8,14 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.stats import qmc
 from sliding_arm import sliding
 
 from nmm.analysis import analyse
 from nmm.analysis.maps.reach import Reach
 from nmm.analysis.maps.result import Map
 from nmm.analysis.maps.search import BENT
-from nmm.analysis.maps.sobol import DIRECTIONS, sobol
 from nmm.analysis.maps.workspace import in_curves, workspace_map
 from nmm.analysis.singular.jacobians import Jacobians
 from nmm.errors import InputError
@@ -277,10 +275,3 @@ def test_a_slide_whose_limits_are_none_needs_a_range(end: float, tmp_path: Path)
     )
     # Along x by the slide's 2 m and the arm's half metre to both sides, with some room.
     assert 2.5 < np.ptp(made.axes[0]) < 3.2
-
-
-@pytest.mark.parametrize("dimensions", [1, 2, 7, len(DIRECTIONS), len(DIRECTIONS) + 1])
-def test_the_points_of_the_joints_are_scipys(dimensions: int) -> None:
-    for count, seed in ((1, 0), (64, 2006), (1024, 7)):
-        expected = qmc.Sobol(dimensions, rng=seed).random(count)
-        np.testing.assert_array_equal(sobol(count, dimensions, seed), expected)

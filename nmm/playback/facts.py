@@ -12,6 +12,7 @@ from nmm.playback.channels import Channels, input_text
 from nmm.playback.drawing import Drawing
 from nmm.robots.motion import Motion
 from nmm.robots.robot import Robot
+from nmm.runs.binding import AT_LIMIT
 from nmm.runs.chattering import chattering
 from nmm.runs.settling import settling_time
 from nmm.runs.summary import summarise
@@ -20,8 +21,8 @@ from nmm.runs.trajectory import Trajectory
 
 #: A page lists so many events of a run.
 MOST = 100
-#: A limit is reached within this share of its range, and left beyond that one.
-REACHED, LEFT = 1e-6, 0.01
+#: A limit is left beyond this share of its range.
+LEFT = 0.01
 
 
 def draw_facts(
@@ -92,7 +93,7 @@ def events(run: Trajectory, channels: Channels) -> Iterator[tuple[float, str]]:
 
 def _reached(margin: Array) -> Iterator[int]:
     """The samples at which a margin (N,) comes down to nothing, after it had been left."""
-    near = margin <= REACHED
+    near = margin <= AT_LIMIT
     since = 0
     for k in np.flatnonzero(near & ~np.concatenate([[False], near[:-1]])):
         if k == 0 or since == 0 or margin[since:k].max() > LEFT:

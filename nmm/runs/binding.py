@@ -9,7 +9,7 @@ import numpy as np
 from nmm.arrays import Array
 
 #: A quantity is at its limit within this share of its range.
-AT = 1e-6
+AT_LIMIT = 1e-6
 #: So many limits are named.
 _SHOWN = 3
 
@@ -25,7 +25,7 @@ def binding(names: Sequence[str], shares: Array, scale: Array) -> str:
     relaxed = np.any(scale < 1.0, axis=1)
     if not relaxed.any() or not len(names):
         return ""
-    often = np.mean(np.minimum(shares, 1.0 - shares)[relaxed] <= AT, axis=0)
+    often = np.mean(np.minimum(shares, 1.0 - shares)[relaxed] <= AT_LIMIT, axis=0)
     order = [i for i in np.argsort(-often, kind="stable")[:_SHOWN] if often[i] > 0.0]
     if not order:
         return ""

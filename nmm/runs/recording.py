@@ -281,8 +281,8 @@ class Recorder:
                 "obstacles": distance.obstacles,
             }
         limited, within = shares(kept, robot, found.q, found.u, found.limited)
+        moving = np.flatnonzero(~standing(robot, limited, within))
         if outcome is Outcome.MISSED and controller.limits is not None:
-            moving = np.flatnonzero(~standing(robot, limited, within))
             held = binding([limited[i] for i in moving], within[:, moving], found.scale)
             message = "; ".join(filter(None, [message, held]))
         path = self._shown.path(robot, found.q)
@@ -303,7 +303,7 @@ class Recorder:
             scale=found.scale.copy(),
             step_size=found.step_size.copy(),
             limited=controller.limits is not None,
-            margin=margin(within[:, ~standing(robot, limited, within)]),
+            margin=margin(within[:, moving]),
             shares=within,
             limit_names=limited,
             unmet=residuals(self.t, found.residual, found.rate),

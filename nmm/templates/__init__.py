@@ -1,6 +1,7 @@
 """Pages from templates: strict about names, and careful with what users wrote.
 
-`page.css` is the look of a page to be read, light and dark; any template may include it.
+`head.html` begins a page to be read, called `title`, in the look of `page.css`, light and dark; any template
+may include it.
 """
 
 from __future__ import annotations

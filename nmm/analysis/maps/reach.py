@@ -8,7 +8,6 @@ import numpy as np
 
 from nmm.analysis.maps.coordinates import checked_range, usual_range
 from nmm.analysis.maps.newton import Plane, lead_onto, step_towards
-from nmm.analysis.maps.sobol import sobol
 from nmm.arrays import Array, Flags, Integers
 from nmm.cores import over_cores
 from nmm.errors import InputError, expect_known
@@ -81,7 +80,10 @@ class Reach:
 
     def postures(self, count: int, seed: int = 2006) -> Array:
         """`count` (a power of 2) configurations (count, n), spread evenly over the joints' ranges (Sobol)."""
-        unit = sobol(count, len(self.moving), seed)
+        # Here, as it takes a second to import: a map over coordinates does without.
+        from scipy.stats import qmc
+
+        unit = qmc.Sobol(len(self.moving), rng=seed).random(count)
         return self.placed(self.lower + unit * (self.upper - self.lower))
 
     def placed(self, joints: Array) -> Array:
