@@ -101,7 +101,7 @@ def watched(page: Page) -> Iterator[Window]:
         page.goto("about:blank")
         for event, handler in handlers.items():
             page.remove_listener(event, handler)
-    assert window.errors == []
+    assert window.errors == [], f"the page complained: {window.errors}"
     here = ("file:///", "http://127.0.0.1:", "ws://127.0.0.1:", "data:", "blob:")
     assert [url for url in window.requests if not url.startswith(here)] == []
 

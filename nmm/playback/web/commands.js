@@ -5,12 +5,30 @@ const nmm = (window.nmm = { hooks: {}, geometries: {} });
 
 {
   const view = document.getElementById("view");
-  const canvas = document.createElement("canvas");
-  const drawn = ["webgl2", "webgl"].some((kind) => canvas.getContext(kind) !== null);
+  const see = (drawn) => {
+    document.body.classList.toggle("blind", !drawn);
+    if (nmm.viewer) nmm.viewer.set_dirty();
+  };
+
   // Without WebGL all goes on as it does, and nothing is drawn.
-  const blind = { domElement: canvas, shadowMap: {}, render: () => {}, setSize: () => {}, setPixelRatio: () => {} };
-  nmm.viewer = window.viewer = drawn ? new MeshCat.Viewer(view) : new MeshCat.Viewer(view, true, blind);
-  document.body.classList.toggle("blind", !drawn);
+  function blind(domElement) {
+    see(false);
+    return { domElement, shadowMap: {}, render: () => {}, setSize: () => {}, setPixelRatio: () => {} };
+  }
+  // What MeshCat would make itself. But a browser draws only some 16 of these at a time, so none is made to ask.
+  function drawing() {
+    const canvas = Object.assign(document.createElement("canvas"), { style: "display: block" });
+    const wanted = { alpha: true, depth: true, stencil: true, antialias: true };
+    const context = canvas.getContext("webgl2", wanted) || canvas.getContext("webgl", wanted);
+    if (context === null || context.isContextLost()) return blind(canvas);
+    const renderer = new MeshCat.THREE.WebGLRenderer({ canvas, context, ...wanted });
+    // The shaders are three.js's own. Asking after each costs time, and throws where the graphics are being reset.
+    renderer.debug.checkShaderErrors = false;
+    canvas.addEventListener("webglcontextlost", () => see(false));
+    canvas.addEventListener("webglcontextrestored", () => see(true));
+    return renderer;
+  }
+  nmm.viewer = window.viewer = new MeshCat.Viewer(view, true, drawing());
 
   // MeshCat takes the window's height for the view's.
   const fit = nmm.viewer.set_3d_pane_size;

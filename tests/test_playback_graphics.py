@@ -1,0 +1,68 @@
+"""A page whose browser takes its graphics away, as when they crash or too many pages want to draw."""
+
+from __future__ import annotations
+
+import pytest
+from playback_browser import Window, draw_frames, file_url, watched
+from playback_browser import browser as browser
+from playback_browser import empty_page as empty_page
+from playback_browser import small_robot as small_robot
+from playback_browser import window as window
+from playback_robot import drive
+from playwright.sync_api import Browser
+
+from nmm.robots.robot import Robot
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture(scope="module")
+def opened(small_robot: Robot, tmp_path_factory: pytest.TempPathFactory) -> str:
+    return file_url([drive(small_robot, duration=4.0)], tmp_path_factory.mktemp("page"))
+
+
+def test_graphics_taken_away_come_back(window: Window, opened: str) -> None:
+    """As a browser takes them when its graphics crash, or when too many pages want to draw."""
+    page = window.open(f"{opened}#t=2")
+    draw_frames(page)
+    before = page.evaluate("nmm.picture()")
+    lose = (
+        "window.taken = viewer.renderer.getContext().getExtension('WEBGL_lose_context'); taken.loseContext()"
+    )
+    page.evaluate(lose)
+    page.wait_for_function("document.body.classList.contains('blind')")
+    assert page.locator("#blind").is_visible()
+    page.evaluate("nmm.seek(3)")
+    assert page.evaluate("nmm.state()")["t"] == 3.0
+    page.evaluate("nmm.seek(2); taken.restoreContext()")
+    page.wait_for_function("!document.body.classList.contains('blind')")
+    draw_frames(page)
+    assert page.evaluate("nmm.picture()") == before
+    assert window.errors == []
+
+
+#: The call after which they are lost: the one that makes them, or the first shader's.
+LOSSES = {
+    "when made": ("HTMLCanvasElement", "getContext", "lose(made)"),
+    "soon after": ("HTMLCanvasElement", "getContext", "setTimeout(() => lose(made))"),
+    "in the first picture": ("WebGL2RenderingContext", "linkProgram", "lose(this)"),
+}
+
+
+@pytest.mark.parametrize("loss", LOSSES)
+def test_graphics_taken_away_while_a_page_is_read(browser: Browser, opened: str, loss: str) -> None:
+    """three.js throws when it asks after shaders that are being lost, and the page would not be shown."""
+    kind, function, losing = LOSSES[loss]
+    page = browser.new_page()
+    page.add_init_script(
+        f"const usual = {kind}.prototype.{function};"
+        f"{kind}.prototype.{function} = function (...given) {{"
+        f"  const made = usual.apply(this, given); if (given[0] !== '2d') {losing}; return made; }};"
+        "const lose = (context) => context.getExtension('WEBGL_lose_context')?.loseContext();"
+    )
+    with watched(page) as window:
+        window.open(f"{opened}#t=2")
+        page.wait_for_function("document.body.classList.contains('blind')")
+        assert page.evaluate("nmm.state()")["t"] == 2.0
+        assert page.locator("#status").inner_text() == ""
+    page.close()
