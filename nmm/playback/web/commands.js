@@ -22,6 +22,9 @@ const nmm = (window.nmm = { hooks: {}, geometries: {} });
     const context = canvas.getContext("webgl2", wanted) || canvas.getContext("webgl", wanted);
     if (context === null || context.isContextLost()) return blind(canvas);
     const renderer = new MeshCat.THREE.WebGLRenderer({ canvas, context, ...wanted });
+    renderer.shadowMap.enabled = true;
+    renderer.shadowMap.type = MeshCat.THREE.PCFSoftShadowMap;
+    view.appendChild(canvas);
     // The shaders are three.js's own. Asking after each costs time, and throws where the graphics are being reset.
     renderer.debug.checkShaderErrors = false;
     canvas.addEventListener("webglcontextlost", () => see(false));
