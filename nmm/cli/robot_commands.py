@@ -12,16 +12,8 @@ from nmm.cli.options import (
     ROBOT_HELP,
     ArgumentOption,
     AtOption,
-    AxleOption,
-    LockOption,
-    PackageOption,
-    PlatformOption,
     ViewedTaskOption,
-    WheelsOption,
     arguments_of,
-    axle_of,
-    lock_of,
-    wheels_of,
 )
 
 
@@ -62,14 +54,12 @@ def info(
     describe_robot(robot, scenario, **loading.keywords())
 
 
+@command
 def check(
     file: Annotated[str, typer.Argument(metavar="FILE", help=ROBOT_HELP)],
     arguments: ArgumentOption = None,
-    package_dir: PackageOption = None,
-    platform: PlatformOption = None,
-    lock: LockOption = None,
-    wheels: WheelsOption = None,
-    axle: AxleOption = None,
+    *,
+    loading: Loading,
 ) -> int:
     """Say everything that is wrong with a robot's file.
 
@@ -86,15 +76,7 @@ def check(
     """
     from nmm.cli.checking import check_file
 
-    return check_file(
-        file,
-        arguments_of(arguments),
-        package_dir or [],
-        platform,
-        lock_of(lock),
-        wheels_of(wheels),
-        axle_of(axle),
-    )
+    return check_file(file, arguments_of(arguments), **loading.keywords())
 
 
 @command
