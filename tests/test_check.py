@@ -52,6 +52,40 @@ def moments(xx: float, yy: float, zz: float, xy: float = 0.0, mass: float = 1.0)
     return f'<inertial><mass value="{mass}"/><inertia {values}/></inertial>'
 
 
+# Options
+
+
+def test_missing_meshes_are_what_the_option_says(run: Command, tmp_path: Path) -> None:
+    mesh = shape('<mesh filename="none.stl"/>')
+    write(tmp_path / "r.urdf", robot(link("a", inertial() + mesh), link("b", inertial()), joint()))
+    given = [[], ["--missing-meshes", "skip"], ["--missing-meshes", "error"]]
+    as_it_is, skipped, refused = (run("check", "r.urdf", *more) for more in given)
+    assert (as_it_is.status, skipped.status, refused.status) == (0, 0, 2)
+    assert "warning: mesh 'none.stl'" in as_it_is.out
+    assert "refused unless missing_meshes='skip'" in as_it_is.out
+    assert "its shape is left out" in skipped.out
+    assert "r.urdf:1: mesh 'none.stl'" in refused.out
+    wrong = run("check", "r.urdf", "--missing-meshes", "maybe")
+    assert wrong.status == 2
+    assert "unknown missing_meshes 'maybe'" in wrong.out + wrong.err
+
+
+def test_the_srdf_is_the_one_given(run: Command, tmp_path: Path) -> None:
+    state = '<group_state name="up" group="arm"><joint name="j" value="{}"/></group_state>'
+    write(tmp_path / "r.urdf", robot(link("a", inertial()), link("b", inertial()), joint()))
+    for name, value in (("good", 0.1), ("far", 99.0)):
+        write(tmp_path / f"{name}.srdf", f'<robot name="r">{state.format(value)}</robot>')
+    assert "SRDF" not in run("check", "r.urdf").out
+    good = run("check", "r.urdf", "--srdf", "good.srdf")
+    assert good.value("SRDF") == "good.srdf: 1 posture"
+    far = run("check", "r.urdf", "--srdf", "far.srdf")
+    assert far.status == 0
+    assert "warning: SRDF: " in far.out
+    none = run("check", "r.urdf", "--srdf", "none.srdf")
+    assert none.status == 2
+    assert "none.srdf" in none.out + none.err
+
+
 # Problems
 
 
@@ -298,6 +332,76 @@ def wheeled(x: float = 0.0, left: str = "left_wheel", right: str = "right_wheel"
         parts += [link(f"{name}_link", inertial())]
         parts += [joint(name, "base", f"{name}_link", "continuous", f'<axis xyz="0 1 0"/>{limit}', at)]
     return robot(*parts, more)
+
+
+def on_wheels(*wheels: tuple[str, float, float], footprint: float | None = None) -> str:
+    """A body on wheels with round shapes: name, height of the centre and radius of each, m."""
+    parts = [link("base", inertial())]
+    if footprint is not None:
+        parts.append(link("base_footprint"))
+        parts.append(
+            joint("at_foot", "base", "base_footprint", "fixed", "", f'<origin xyz="0 0 {footprint}"/>')
+        )
+    for k, (name, z, radius) in enumerate(wheels):
+        tyre = '<origin rpy="1.5707963 0 0"/>'
+        tyre += f'<geometry><cylinder radius="{radius}" length="0.04"/></geometry>'
+        parts.append(link(f"{name}_link", inertial() + f"<collision>{tyre}</collision>"))
+        at, limit = f'<origin xyz="0 {(0.2, -0.2, 0.0)[k]} {z}"/>', '<limit effort="1" velocity="1"/>'
+        parts.append(joint(name, "base", f"{name}_link", "continuous", f'<axis xyz="0 1 0"/>{limit}', at))
+    return robot(*parts)
+
+
+def test_where_the_wheels_touch_the_ground_is_told(tmp_path: Path) -> None:
+    """From their shapes: a root link at the axle is seen to be there. A footprint must be on it."""
+    pair = [("left_wheel", 0.1), ("right_wheel", 0.1)]
+    for z, words in ((0.1, "at z = 0"), (0.0, "at z = -0.1 m in link 'base'"), (-0.02, "at z = -0.12 m in")):
+        made = reported(tmp_path, on_wheels(*((name, z, radius) for name, radius in pair)))
+        assert (made.problems, made.warnings) == ((), ())
+        assert words in made.facts["ground"]
+    assert "--axle 0,0,-0.12" in made.facts["ground"]
+    low = [(name, 0.0, radius) for name, radius in pair]
+    assert warned(tmp_path, on_wheels(*low, footprint=-0.1)) == []
+    (warning,) = warned(tmp_path, on_wheels(*low, footprint=-0.05))
+    assert warning.startswith("frame 'base_footprint' is 0.05 m above the ground")
+    moved = reported(tmp_path, on_wheels(*low), axle=(0.0, 0.0, -0.1))
+    assert "at z = 0" in moved.facts["ground"]
+
+
+def test_wheels_touch_one_level_ground(tmp_path: Path) -> None:
+    """Within 5 mm, or 1 % of a large wheel's radius."""
+    for off, count in ((0.004, 0), (-0.004, 0), (-0.008, 1)):
+        text = on_wheels(
+            ("left_wheel", 0.0, 0.1), ("right_wheel", 0.0, 0.1), ("caster_wheel", off - 0.06, 0.04)
+        )
+        assert len(warned(tmp_path, text)) == count, off
+    (warning,) = warned(tmp_path, text)
+    assert "caster_wheel at z = -0.108 m, left_wheel at z = -0.1 m" in warning
+    assert "expected within 5 mm" in warning
+    large = [("left_wheel", 0.0, 2.0), ("right_wheel", -0.015, 2.0)]
+    assert warned(tmp_path, on_wheels(*large)) == []
+
+
+def test_a_height_that_is_taken_for_a_radius_is_told_where_the_shape_has_another(tmp_path: Path) -> None:
+    wheels = [("left_wheel", 0.05, 0.1), ("right_wheel", 0.05, 0.1)]
+    warnings = warned(tmp_path, on_wheels(*wheels))
+    assert len(warnings) == 2
+    assert "0.05 m, is taken for its radius, and its shape's is 0.1 m" in warnings[0]
+    assert "--wheels left_wheel=0.1,..." in warnings[0]
+    given = reported(tmp_path, on_wheels(*wheels), wheels={"left_wheel": 0.1, "right_wheel": 0.1})
+    assert given.warnings == ()
+    assert "at z = -0.05 m" in given.facts["ground"]
+
+
+def test_sound_robots_stand_on_their_wheels() -> None:
+    """The bundled ones, and PAL's."""
+    pal = "package://example-robot-data/robots/tiago{0}_description/robots/tiago{1}.urdf"
+    files = [pal.format(*names) for names in (("", ""), ("", "_dual"), ("", "_no_hand"), ("_pro", "_pro"))]
+    found = [*bundled_robots().values(), *(package_file(file, ()) for file in files)]
+    on_ground = 0
+    for made in map(report, found):
+        on_ground += made.facts.get("ground") == "the wheels touch it at z = 0"
+        assert not [one for one in made.warnings if "ground" in one.message or "radius" in one.message]
+    assert on_ground == 10
 
 
 def test_the_root_link_belongs_on_the_wheels_axle(tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ from nmm.driving.driven import Driven
 from nmm.driving.messages import Aim, Order, Pick, parsed
 from nmm.driving.reaching import Reaching
 from nmm.driving.session import Session
-from nmm.driving.setups import RobotSetup, ScenarioSetup, Settings, Setup
+from nmm.driving.setups import DriveSetup, RobotSetup, ScenarioSetup, Settings
 from nmm.errors import InputError, ScenarioError
 from nmm.kinds import RESOLVERS
 from nmm.playback.rolling import Rolling
@@ -313,7 +313,7 @@ def test_a_huge_number_is_out_of_range_and_no_overflow() -> None:
 class Loop:
     """A session whose loop runs in a thread, and what a page would be told."""
 
-    def __init__(self, setup: Setup) -> None:
+    def __init__(self, setup: DriveSetup) -> None:
         self.session = Session(Driven(setup))
         self.pictures: list[float] = []
         self._stop = threading.Event()

@@ -6,13 +6,17 @@ import doctest
 import inspect
 import re
 from collections import Counter
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
+from typing import get_args, get_origin, get_type_hints
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import nmm
+from nmm.runs.recording import Recorder
 
 ROOT = Path(__file__).resolve().parent.parent
 #: Packages whose names are public; those that `nmm` has too are listed there.
@@ -61,3 +65,66 @@ def test_a_public_name_has_an_example_that_runs(
     told: list[str] = []
     doctest.DocTestRunner(optionflags=doctest.ELLIPSIS).run(example, out=told.append)
     assert not told, "".join(told)
+
+
+#: Members that nmm's rooms call of each other: nobody else makes or reads what they take and give.
+INNER = {
+    "nmm.Bound.rows",
+    "nmm.Collisions.on",
+    "nmm.Controller.blocks",
+    "nmm.Controller.compiled",
+    "nmm.LimitReport.__init__",  # made by a controller
+    "nmm.Limits.on",
+    "nmm.Retreat.on",
+    "nmm.Robot.joints",
+    "nmm.Scenario.__init__",  # made by load and from_dict
+    "nmm.SequencedController.settle",
+    "nmm.Steering.on",
+    "nmm.analysis.About.of",
+}
+#: Types in the place of a public one, which lies in a room above: any Collisions; LiveRun's recorder, which
+#: simulate hands it; what a Swept read of its folder.
+IN_THE_PLACE = {"Distances", "Recorder", "Definition"}
+#: Where a property, a cached one, a class's or a static method has its function.
+WRAPPED = ("fget", "func", "__func__")
+
+
+def types_in(annotation: object) -> Iterator[type]:
+    """The classes that an annotation speaks of."""
+    if isinstance(annotation, type):
+        yield annotation
+    for part in (get_origin(annotation), *get_args(annotation)):
+        for one in part if isinstance(part, list) else [part]:
+            if one is not None:
+                yield from types_in(one)
+
+
+def annotated(name: str) -> Iterator[tuple[str, object]]:
+    """A public name's members as the reference shows them, each with what it takes, holds or gives."""
+    thing = THINGS[name]
+    known = {one.__name__: one for one in THINGS.values() if inspect.isclass(one)}
+    known |= {"Figure": Figure, "Recorder": Recorder}  # imported for their types alone
+    functions = {name: thing}
+    if inspect.isclass(thing):
+        yield from ((f"{name}.{key}", hint) for key, hint in get_type_hints(thing, localns=known).items())
+        functions = {
+            f"{name}.{key}": next(filter(None, (getattr(member, part, None) for part in WRAPPED)), member)
+            for key, member in vars(thing).items()
+            if key == "__init__" or (key[0] != "_" and member.__doc__)
+        }
+    for where, function in functions.items():
+        if inspect.isfunction(function):
+            yield from ((where, hint) for hint in get_type_hints(function, localns=known).values())
+
+
+def test_what_a_public_name_takes_or_gives_has_a_public_name() -> None:
+    public = {*THINGS.values()}
+    reached = {
+        f"{where}: {one.__module__}.{one.__name__}"
+        for name in THINGS
+        for where, hint in annotated(name)
+        if where not in INNER
+        for one in types_in(hint)
+        if one.__module__.startswith("nmm") and one not in public and one.__name__ not in IN_THE_PLACE
+    }
+    assert not reached, "\n".join(sorted(reached))

@@ -22,6 +22,7 @@ from ports import MOST, free_port, listening, wait_for
 import nmm
 from nmm.errors import InputError
 from nmm.playback import view
+from nmm.playback.asked import asked_for
 from nmm.playback.viewed_task import ViewedTask
 from nmm.robots.robot import Robot
 from nmm.scenario.short_task import short_task
@@ -284,9 +285,69 @@ def test_bad_input_is_a_line(tmp_path: Path) -> None:
         (["unicycle_2r", "--at", "q9=1"], "q9"),
         (["unicycle_2r", "--lock", "q1=1", "--at", "q1=1"], "locked"),
         (["small_arm", "--at", "q2=9"], "outside its limits"),
+        (["nothing_like_it"], "unknown robot or scenario 'nothing_like_it'"),
+        (["unicycle_2r_position", "--platform", "car"], "--platform: of a robot's file"),
+        (["unicycle_2r_position", "--arm", "small_arm"], "is a scenario, which has one"),
+        (["car_base", "--arm", "small_arm", "--at", "a", "--at", "b"], "one frame that carries the arm"),
+        (["car_base", "--arm", "small_arm", "--at", "nowhere"], "nowhere"),
     ):
         running = process(tmp_path, "view", *arguments, "--no-open")
         out, err = running.communicate(timeout=MOST)
         assert running.returncode == 2, (out, err)
         assert words in err
         assert len(err.splitlines()) == 1
+
+
+def of(page: LivePage, kind: str) -> list[dict[str, Any]]:
+    """The commands of a kind that a page got at first."""
+    return [line for line in map(json.loads, page.hello) if line["type"] == kind]
+
+
+def test_a_scenario_is_shown_where_it_starts_with_what_it_asks_for(tmp_path: Path) -> None:
+    scenario = nmm.Scenario.load("unicycle_3r_crossing", {"q0.q1": 0.25})
+    running, url = page_of(tmp_path, "view", "unicycle_3r_crossing", "--set", "q0.q1=0.25")
+    with LivePage(url) as page:
+        (joints,), (told,) = of(page, "joints"), of(page, "task")
+        (obstacle,), targets = of(page, "obstacle"), of(page, "target")
+    values = [one["value"] for one in joints["coordinates"]]
+    robot = scenario.robot()
+    np.testing.assert_array_equal(values, robot.q(scenario.parts.q0))
+    assert 0.25 in values
+    assert told["parts"][0]["rank"] == len(scenario.controller().rows)
+    assert len(targets) == 1
+    assert obstacle["name"] == scenario.obstacles(robot)[0].name
+    running.send_signal(signal.SIGINT)
+    assert running.wait(timeout=MOST) == 0
+
+
+def test_the_desired_path_is_that_of_the_run() -> None:
+    """Before it runs; a task that holds a point has a target, one that comes and goes neither."""
+    scenario = nmm.Scenario.load("unicycle_2r_position", {"duration": 2})
+    run = scenario.run()
+    asked = asked_for(scenario, scenario.robot())
+    assert run.desired is not None
+    assert asked.desired is not None
+    way = np.linalg.norm(np.diff(run.desired, axis=0), axis=1).sum()
+    nearest = np.linalg.norm(run.desired[:, None] - asked.desired, axis=2).min(axis=1)
+    assert nearest.max() < way / 400
+    for end in (0, -1):
+        np.testing.assert_allclose(asked.desired[end], run.desired[end], atol=1e-9)
+    np.testing.assert_array_equal(asked.q[0], run.q[0])
+    held = nmm.Scenario.load("unicycle_2r_position", {"task.0.reference": [1.0, 2.0]})
+    standing = asked_for(held, held.robot())
+    assert standing.desired is None
+    np.testing.assert_allclose(np.asarray(standing.target)[:2], [1.0, 2.0])
+    timed = nmm.Scenario.load("unicycle_3r_sequence")
+    assert asked_for(timed, timed.robot()).desired is None
+
+
+def test_an_arm_is_mounted_as_for_init(tmp_path: Path) -> None:
+    arguments = ("car_base", "--arm", "small_arm", "--at", "arm_mount", "--at", "q1=0.3")
+    running, url = page_of(tmp_path, "view", *arguments)
+    with LivePage(url) as page:
+        (joints,) = of(page, "joints")
+    values = {one["name"]: one["value"] for one in joints["coordinates"]}
+    assert [*values] == [*nmm.mount("car_base", "small_arm").q_names]
+    assert values["q1"] == 0.3
+    running.send_signal(signal.SIGINT)
+    assert running.wait(timeout=MOST) == 0

@@ -10,7 +10,14 @@ import numpy as np
 from numpy import pi
 from numpy.typing import NDArray
 
-from nmm.platforms.wheeled.descriptions import CasterWheel, FixedWheel, Hitch, OmniWheel, SteeredWheel, Wheel
+from nmm.platforms.wheeled.descriptions import (
+    CasterWheel,
+    FixedWheel,
+    Hitch,
+    OmniWheel,
+    SteeredWheel,
+    WheelDescription,
+)
 from nmm.platforms.wheeled.inputs import CommonSpeed, Speed, Spin, Spins
 from nmm.platforms.wheeled.platform import WheeledPlatform
 
@@ -43,14 +50,14 @@ def mecanum(radius: float, length: float, width: float) -> WheeledPlatform:
     return WheeledPlatform(wheels, inputs=inputs)
 
 
-def trailer(name: str, joint: str, length: float, width: float = 0.25) -> list[Wheel]:
+def trailer(name: str, joint: str, length: float, width: float = 0.25) -> list[WheelDescription]:
     return [
         FixedWheel(f"{name}_left", -length, width, 0.08, body=joint),
         FixedWheel(f"{name}_right", -length, -width, 0.08, body=joint),
     ]
 
 
-def corners(**more: float) -> list[Wheel]:
+def corners(**more: float) -> list[WheelDescription]:
     return [SteeredWheel(name, *at, 0.1, joint=f"steer_{name}", **more) for name, at in CORNERS.items()]
 
 
@@ -162,7 +169,11 @@ def _body(platform: WheeledPlatform, name: str, qp: NDArray[np.complex128]) -> N
 
 
 def rim(
-    platform: WheeledPlatform, wheel: Wheel, qp: NDArray[np.complex128], swivel: complex, spin: complex
+    platform: WheeledPlatform,
+    wheel: WheelDescription,
+    qp: NDArray[np.complex128],
+    swivel: complex,
+    spin: complex,
 ) -> NDArray[np.complex128]:
     """Placement of the wheel: x along its heading, y along its axis when it has not turned."""
     carrier = _body(platform, wheel.body, qp) @ _shift(wheel.x, wheel.y)
@@ -174,7 +185,7 @@ def rim(
 
 def touching_velocity(
     platform: WheeledPlatform,
-    wheel: Wheel,
+    wheel: WheelDescription,
     qp: Array,
     qp_dot: Array,
     swivel: tuple[float, float],

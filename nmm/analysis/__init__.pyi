@@ -1,6 +1,10 @@
 from .maps import Map as Map
 from .maps import singularity_map as singularity_map
 from .maps import workspace_map as workspace_map
+from .maps.evaluation import Judged as Judged
+from .maps.extremes import Extreme as Extreme
+from .maps.result import About as About
+from .maps.singular_set import SingularSet as SingularSet
 from .redundancy import Laps as Laps
 from .redundancy import RedundancyReport as RedundancyReport
 from .redundancy import Repeatability as Repeatability
@@ -19,6 +23,7 @@ from .singular.algorithmic import ExtendedSingularity as ExtendedSingularity
 from .singular.algorithmic import PartitionSingularities as PartitionSingularities
 from .singular.along import SingularityHistory as SingularityHistory
 from .singular.along import analyse_along as analyse_along
+from .singular.ellipsoids import Ellipses as Ellipses
 from .singular.ellipsoids import Ellipsoids as Ellipsoids
 from .singular.ellipsoids import ellipsoids_along as ellipsoids_along
 from .singular.instants import Crossing as Crossing

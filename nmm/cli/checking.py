@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from nmm.bundled import bundled_robots
 from nmm.cli.output import complain, show_table, show_text
@@ -22,11 +22,9 @@ OK, BAD_INPUT = 0, 2
 def check_file(
     file: str,
     arguments: Mapping[str, object],
+    *,
     package_dirs: Sequence[Path],
-    platform: str | None = None,
-    lock: Mapping[str, float] | None = None,
-    wheels: Sequence[str] | Mapping[str, float] | None = None,
-    axle: str | Sequence[float] | None = None,
+    **loading: Any,
 ) -> int:
     """Print every problem and warning, a line each; 2 when there are problems, else 0 and what it holds."""
     from nmm.robots.loading.packages import package_file
@@ -36,7 +34,7 @@ def check_file(
         path = package_file(file, package_dirs)
     else:
         path = bundled_robots().get(file, Path(file))
-    made = report(path, arguments, package_dirs, platform=platform, lock=lock, wheels=wheels, axle=axle)
+    made = report(path, arguments, package_dirs, **loading)
     shown = os.path.relpath(path) if file in bundled_robots() else file
     for problem in made.problems:
         print(_line(shown, problem, made))

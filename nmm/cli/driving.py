@@ -13,10 +13,10 @@ def drive_subject(
 ) -> None:
     """Drive a scenario, or a robot with tasks, until Ctrl-C."""
     from nmm.driving import RobotSetup, ScenarioSetup, drive
-    from nmm.driving.setups import Setup
+    from nmm.driving.setups import DriveSetup
 
     subject = studied(source, tasks=tasks, usual_task="position", decide=False, **asked)
-    setup: Setup
+    setup: DriveSetup
     if subject.controller is None or subject.scenario is None:
         subject.robot.check_limits(subject.q)
         setup = RobotSetup(subject.robot, tuple(subject.task), subject.q)

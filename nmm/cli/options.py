@@ -81,6 +81,10 @@ AxleOption = Annotated[
         show_default="the root link's origin",
     ),
 ]
+ArmOption = Annotated[
+    str | None,
+    typer.Option(metavar="ARM", help="A file or bundled name of an arm, to be mounted on the robot."),
+]
 _TASK_HELP = (
     f"The task, of KIND {listed(list(TASKS), 'or')}: position:ee:xy, pose, coordinates:q1,q2; or "
     "a mapping as in a scenario, '{kind: pointing, frame: ee, at: [2, 0, 1]}'. Without FRAME the end of "

@@ -11,17 +11,11 @@ from nmm.cli.groups import Browser, Loading, Subject, command
 from nmm.cli.options import (
     ROBOT_HELP,
     ArgumentOption,
+    ArmOption,
     AtOption,
-    AxleOption,
-    LockOption,
-    PackageOption,
-    PlatformOption,
+    SubjectSetOption,
     ViewedTaskOption,
-    WheelsOption,
     arguments_of,
-    axle_of,
-    lock_of,
-    wheels_of,
 )
 
 
@@ -62,14 +56,12 @@ def info(
     describe_robot(robot, scenario, **loading.keywords())
 
 
+@command
 def check(
     file: Annotated[str, typer.Argument(metavar="FILE", help=ROBOT_HELP)],
     arguments: ArgumentOption = None,
-    package_dir: PackageOption = None,
-    platform: PlatformOption = None,
-    lock: LockOption = None,
-    wheels: WheelsOption = None,
-    axle: AxleOption = None,
+    *,
+    loading: Loading,
 ) -> int:
     """Say everything that is wrong with a robot's file.
 
@@ -86,20 +78,21 @@ def check(
     """
     from nmm.cli.checking import check_file
 
-    return check_file(
-        file,
-        arguments_of(arguments),
-        package_dir or [],
-        platform,
-        lock_of(lock),
-        wheels_of(wheels),
-        axle_of(axle),
-    )
+    return check_file(file, arguments_of(arguments), **loading.keywords())
 
 
 @command
 def view(
-    robot: Annotated[str, typer.Argument(metavar="ROBOT", help=ROBOT_HELP)],
+    subject: Annotated[
+        str,
+        typer.Argument(
+            metavar="ROBOT|SCENARIO",
+            help=f"{ROBOT_HELP} Or a scenario, whose robot is shown where it starts.",
+            show_default=False,
+        ),
+    ],
+    *,
+    arm: ArmOption = None,
     loading: Loading,
     browser: Browser,
     frames: Annotated[
@@ -107,22 +100,36 @@ def view(
     ] = True,
     task: ViewedTaskOption = None,
     at: AtOption = None,
+    settings: SubjectSetOption = None,
 ) -> None:
     """Look at a robot in the browser.
 
     In 3D, with MeshCat: a slider for each coordinate, frames with their names, and the pose of one of them
     in numbers. With --task what the robot can do for it where the sliders are: singular values of J, wheels
-    and all, manipulability, ellipsoids, and the directions that are lost. Only this machine can reach it.
-    Ctrl-C ends it.
+    and all, manipulability, ellipsoids, and the directions that are lost. Of a
+    scenario its robot at the start, its task, the desired path or target, and its obstacles. With --arm,
+    --lock and --srdf are the arm's, and --at without = is the frame that carries it. Only this machine can
+    reach it. Ctrl-C ends it.
 
     \b
     nmm view unicycle_3r
+    nmm view unicycle_3r_obstacles
+    nmm view car_base --arm small_arm --at arm_mount --at q1=0.3
     nmm view unicycle_3r --task position --at q2=pi/3
     nmm view my_robot.urdf --platform car --lock head=0.3 --no-frames
     """
-    from nmm.cli.viewing import view_robot
+    from nmm.cli.viewing import view_subject
 
-    view_robot(robot, **loading.keywords(), **browser.keywords(), frames=frames, tasks=task, at=at)
+    view_subject(
+        subject,
+        **loading.keywords(),
+        **browser.keywords(),
+        arm=arm,
+        frames=frames,
+        tasks=task,
+        at=at,
+        settings=settings,
+    )
 
 
 @command
@@ -148,10 +155,7 @@ def drive(subject: Subject, browser: Browser, loading: Loading) -> None:
 def init(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help=ROBOT_HELP)],
     *,
-    arm: Annotated[
-        str | None,
-        typer.Option(metavar="ARM", help="A file or bundled name of an arm, to be mounted on the robot."),
-    ] = None,
+    arm: ArmOption = None,
     at: Annotated[
         str | None,
         typer.Option(

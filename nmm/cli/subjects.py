@@ -95,7 +95,7 @@ def studied(
     """
     from nmm.scenario.short_task import short_task
 
-    run, scenario, loaded = _opened(source, settings, loading)
+    run, scenario, loaded = opened(source, settings, loading)
     own = None if scenario is None else scenario.controller()
     robot = loaded if own is None else own.robot
     if own is None and usual_task:
@@ -186,7 +186,15 @@ def _decide(controller: Controller, t: float, q: Array) -> None:
         )
 
 
-def _opened(
+def is_scenario(source: str) -> bool:
+    """Whether SOURCE is a scenario's name or a YAML file."""
+    from nmm.bundled import bundled_scenarios
+    from nmm.scenario.scenario import SUFFIXES
+
+    return source in bundled_scenarios() or Path(source).expanduser().suffix in SUFFIXES
+
+
+def opened(
     source: str, settings: Sequence[str] | None, loading: dict[str, Any]
 ) -> tuple[Trajectory | None, Scenario | None, Robot]:
     """The run, the scenario and the robot of SOURCE; run and scenario where it is one."""
@@ -194,10 +202,9 @@ def _opened(
     from nmm.robots.loading import load
     from nmm.runs.trajectory import Trajectory
     from nmm.scenario import Scenario
-    from nmm.scenario.scenario import SUFFIXES
 
     path = Path(source).expanduser()
-    of_scenario = source in bundled_scenarios() or path.suffix in SUFFIXES
+    of_scenario = is_scenario(source)
     of_folder = bool(source) and path.is_dir() and not of_scenario and source not in bundled_robots()
     if of_folder:
         _check_folder(source, path)

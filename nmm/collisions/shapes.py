@@ -17,7 +17,13 @@ from nmm.errors import InputError
 
 
 class Shape(ABC):
-    """What Coal measures distances to; `geometry()` makes it."""
+    """What Coal measures distances to; `geometry()` makes it.
+
+    Examples
+    --------
+    >>> isinstance(nmm.Sphere(0.2), nmm.Shape), nmm.Sphere(0.2).geometry().radius
+    (True, 0.2)
+    """
 
     @abstractmethod
     def geometry(self) -> Any:

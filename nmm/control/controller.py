@@ -92,6 +92,8 @@ class Controller:
     {'v': 5.333, 'omega': 2.506, 'q1': -0.0, 'q2': -0.0}
     """
 
+    report: LimitReport
+
     def __init__(
         self,
         robot: Robot,

@@ -20,6 +20,17 @@ class LimitReport:
     ----------
     kept, setting : its limits, and the distances that it keeps
     step, program : what it computes with, in memory
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> task = nmm.Task(nmm.Position("ee", "xy"), [9.0, 1.0])
+    >>> limits = nmm.Limits(velocity={"v": 0.1, "omega": 0.1, "q1": 0.1, "q2": 0.1})
+    >>> controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), limits=limits)
+    >>> u = controller(0.0, robot.q({"q2": 0.5}))
+    >>> report = controller.report
+    >>> isinstance(report, nmm.LimitReport), report.beyond(), report.contradiction()
+    (True, {}, ())
     """
 
     def __init__(

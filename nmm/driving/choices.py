@@ -20,6 +20,12 @@ class Choice:
     group : under which heading it stands
     value : the present one: a word of `options`, True or False, or a number from `least` to `most`
     unit : of a number
+
+    Examples
+    --------
+    >>> choice = nmm.driving.Choice("task.gain", "gain", "task", 2.0, least=0.0, most=10.0, unit="1/s")
+    >>> choice.checked(3)
+    3.0
     """
 
     key: str

@@ -13,7 +13,7 @@ from nmm.control.controller import Controller
 from nmm.control.step import Step
 from nmm.driving.choices import Choice, named
 from nmm.driving.reaching import Reaching
-from nmm.driving.setups import Settings, Setup
+from nmm.driving.setups import DriveSetup, Settings
 from nmm.driving.targets import aimed, targets_of
 from nmm.errors import InputError, NmmError
 from nmm.playback.rolling import Rolling
@@ -59,7 +59,7 @@ class Driven:
     trouble : why it stands still; "" while it moves
     """
 
-    def __init__(self, setup: Setup) -> None:
+    def __init__(self, setup: DriveSetup) -> None:
         self.setup = setup
         self.robot = setup.robot
         self._rolling = Rolling(self.robot)

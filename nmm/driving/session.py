@@ -17,7 +17,7 @@ from nmm.driving.driven import Driven, Look
 from nmm.driving.making import Making
 from nmm.driving.messages import FAR, Aim, Order, Pick, parsed
 from nmm.driving.plotted import channels, numbers, values
-from nmm.driving.setups import Setup
+from nmm.driving.setups import DriveSetup
 from nmm.errors import InputError, NmmError
 from nmm.looks import looks
 from nmm.playback.channels import Channels
@@ -45,7 +45,7 @@ TOLD = 5.0
 
 
 def drive(
-    setup: Setup,
+    setup: DriveSetup,
     *,
     port: int | None = None,
     open_browser: bool = True,

@@ -30,7 +30,7 @@ RESOLVER, GAINS, WEIGHTS = "Resolver", "Gains", "Weights of the inputs"
 Settings = Mapping[str, str | bool | float]
 
 
-class Setup(ABC):
+class DriveSetup(ABC):
     """What is driven.
 
     Attributes
@@ -40,6 +40,12 @@ class Setup(ABC):
     q0 : (n,) where it begins, m and rad
     dt : the controller's, s
     at_robot : whether targets begin where the robot is, not where references are
+
+    Examples
+    --------
+    >>> setup = nmm.driving.ScenarioSetup(nmm.Scenario.load("unicycle_2r_position"))
+    >>> isinstance(setup, nmm.driving.DriveSetup), setup.robot.name, setup.q0.shape
+    (True, 'unicycle_2r', (5,))
     """
 
     name: str
@@ -57,7 +63,7 @@ class Setup(ABC):
         """What may be chosen next, with the present values."""
 
 
-class ScenarioSetup(Setup):
+class ScenarioSetup(DriveSetup):
     """A scenario whose references are left aside, but for where they begin.
 
     Parameters
@@ -161,7 +167,7 @@ class ScenarioSetup(Setup):
         return self.scenario.with_settings(chosen)
 
 
-class RobotSetup(Setup):
+class RobotSetup(DriveSetup):
     """A robot with tasks, at rest where it is; damped least squares at first, which stands singularities.
 
     Parameters

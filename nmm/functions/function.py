@@ -30,6 +30,12 @@ class Row(NamedTuple):
     angular : whether it is an angle whose differences wrap
     scale : its natural size in its unit, against which ranks are judged; None for the robot's reach in
         metres, and 1 in any other unit
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> [(row.name, row.unit) for row in nmm.Position("ee", "xy").rows(robot)]
+    [('ee.x', 'm'), ('ee.y', 'm')]
     """
 
     name: str
@@ -49,7 +55,16 @@ def row_scales(rows: Sequence[Row], robot: Robot) -> Array:
 
 
 class Evaluation(NamedTuple):
-    """A function's value (s,), its partial time derivative (s,) and its Jacobian (s, n) in q."""
+    """A function's value (s,), its partial time derivative (s,) and its Jacobian (s, n) in q.
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> here = nmm.Configuration(robot, robot.q({"q2": 0.5}))
+    >>> found = nmm.evaluate(nmm.Position("ee", "xy"), 0.0, here)
+    >>> isinstance(found, nmm.Evaluation), found.value.shape, found.value_q.shape
+    (True, (2,), (2, 5))
+    """
 
     value: Array
     value_t: Array
@@ -73,6 +88,13 @@ class Stage:
     hessians : whether it reads the frames' kinematic Hessians
     callback : a user's Python function, run before the kernels; its results are the numbers
     live : what sets the numbers from outside, between two steps
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> (stage,) = nmm.Position("ee", "xy").stages(robot)
+    >>> isinstance(stage, nmm.Stage), stage.rows, stage.frames
+    (True, 2, ('ee',))
     """
 
     kernel: Kernel
@@ -92,6 +114,12 @@ class Shown(NamedTuple):
     axes : the world axes ("x", "y", "z") along which it does, each with the row that holds it, in m
     turns : the frame that it turns
     looks_at : the fixed point that it looks at, (2,) or (3,), m, world axes
+
+    Examples
+    --------
+    >>> shown = nmm.Position("ee", "xy").shown()
+    >>> isinstance(shown, nmm.Shown), shown.positions, dict(shown.axes)
+    (True, 'ee', {'x': 0, 'y': 1})
     """
 
     positions: str | None = None

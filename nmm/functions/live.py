@@ -16,6 +16,14 @@ class LiveNumbers:
     Attributes
     ----------
     numbers : what they are now; set as a whole, never written into, so that whoever looks sees one state
+
+    Examples
+    --------
+    >>> live, read = nmm.LiveNumbers(np.array([1.0, 2.0])), np.zeros(2)
+    >>> live.read_by(read)
+    >>> live.set(np.array([3.0, 4.0]))
+    >>> read
+    array([3., 4.])
     """
 
     def __init__(self, numbers: Array) -> None:

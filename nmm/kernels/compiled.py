@@ -45,6 +45,14 @@ class Kernel:
 
     It is compiled (or its compiled form read from the cache) when first called or when its
     `address` is first asked for: a run pays for the kernels that it uses.
+
+    Examples
+    --------
+    >>> kernel = nmm.Unicycle().velocity_map
+    >>> G, G_q = np.zeros((3, 2)), np.zeros((3, 2, 3))
+    >>> kernel(np.zeros(3), np.zeros(0), G, G_q)
+    >>> isinstance(kernel, nmm.Kernel), G[0].tolist(), callable(kernel.plain)
+    (True, [1.0, 0.0], True)
     """
 
     def __init__(self, plain: Plain, signature: Any) -> None:

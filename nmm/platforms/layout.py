@@ -24,6 +24,12 @@ class Pivot:
     x, y : its axis in the carrier's frame, at zero, m
     lower, upper : its limits, rad (infinite without)
     velocity : its largest rate, rad/s (infinite without)
+
+    Examples
+    --------
+    >>> column = nmm.Pivot("front_steer", "theta", x=0.5, y=0.0, lower=-0.6, upper=0.6)
+    >>> column.steers, column.hitches
+    (True, False)
     """
 
     joint: str
@@ -56,6 +62,12 @@ class RollingJoint:
     x, y : the wheel's centre in the carrier's frame, at zero, m
     heading : direction in which it rolls when it turns in the positive sense, from the carrier's x axis, rad
     radius : m
+
+    Examples
+    --------
+    >>> wheel = nmm.RollingJoint("left_wheel", "theta", x=0.0, y=0.3, heading=0.0, radius=0.1)
+    >>> wheel.joint, wheel.y, wheel.radius
+    ('left_wheel', 0.3, 0.1)
     """
 
     joint: str
@@ -69,7 +81,16 @@ class RollingJoint:
 @dataclass(frozen=True)
 class Layout:
     """The pivots and wheels of a robot. x and y count from the platform's reference point (see `load`'s
-    `axle`) on the body that "theta" carries, and from the joint's own frame on any other."""
+    `axle`) on the body that "theta" carries, and from the joint's own frame on any other.
+
+    Examples
+    --------
+    >>> sides = (("left", 0.3), ("right", -0.3))
+    >>> wheels = [nmm.RollingJoint(name, "theta", 0.0, y, heading=0.0, radius=0.1) for name, y in sides]
+    >>> platform = nmm.DifferentialDrive.fit(nmm.Layout("cart", wheels=tuple(wheels)))
+    >>> dict(platform.lengths)
+    {'radius': 0.1, 'track': 0.6}
+    """
 
     robot: str
     pivots: tuple[Pivot, ...] = ()
@@ -86,6 +107,12 @@ class AddedJoint:
     x, y : its axis, from the platform's reference point, m
     lower, upper : its limits, rad
     velocity : its largest rate, rad/s
+
+    Examples
+    --------
+    >>> joint = nmm.AddedJoint("steering", x=0.5, y=0.0, lower=-0.6, upper=0.6, velocity=1.0)
+    >>> joint.joint, joint.upper
+    ('steering', 0.6)
     """
 
     joint: str

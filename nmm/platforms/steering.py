@@ -18,6 +18,12 @@ class SteeringPivot:
     zero : the direction in which its wheel rolls at c = 0, from the body's direction, rad, in ±90 degrees
     sign : -1 where c grows as the wheel turns to the right (a hitch, whose angle is the body's), else 1
     widest : the direction to either side up to which it is steered, where its limits are wider, rad
+
+    Examples
+    --------
+    >>> (pivot,) = nmm.load("car_base").platform.steered_axle("theta").pivots
+    >>> isinstance(pivot, nmm.SteeringPivot), pivot.coordinate, pivot.input
+    (True, 'steering', 'steering_rate')
     """
 
     coordinate: str
@@ -38,6 +44,12 @@ class SteeredAxle:
     x, y : its middle, in the frame of the body that carries it, m
     heading : the direction in which it rolls, from that body's x axis, rad
     pivots : what steers it
+
+    Examples
+    --------
+    >>> axle = nmm.SteeredAxle((nmm.SteeringPivot("steering", "steering_rate", x=1.0),))
+    >>> round(axle.least_radius(((-np.pi / 4, np.pi / 4),)), 6)
+    1.0
     """
 
     pivots: tuple[SteeringPivot, ...]

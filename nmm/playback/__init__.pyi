@@ -3,6 +3,8 @@ from .html import write_html as write_html
 from .inline import Page as Page
 from .live import LiveViewer as LiveViewer
 from .live import play as play
+from .obstacles import Body as Body
+from .obstacles import Nearest as Nearest
 from .rolling import Motion as Motion
 from .rolling import wheel_angles as wheel_angles
 from .rolling import wheel_rates as wheel_rates

@@ -16,7 +16,7 @@ from nmm.playback.extent import corners
 from nmm.playback.keyframes import samples_kept
 from nmm.playback.placements import position_and_quaternion
 from nmm.playback.shapes import shapes, triangles
-from nmm.robots.bodies import Body
+from nmm.robots.bodies import Body, Nearest
 from nmm.robots.motion import Motion
 
 OBSTACLE: Rgb = (0.62, 0.55, 0.38)
@@ -116,7 +116,7 @@ def draw_nearest(
     drawing: Drawing, motion: Motion, path: str, color: Rgb | None, start: float, fps: float
 ) -> None:
     """The line between a motion's nearest points; of one of several motions in its colour."""
-    found = motion.nearest
+    found: Nearest | None = motion.nearest
     if found is None or not np.isfinite(found.distance).any():
         return
     kept = samples_kept(motion.t, fps)

@@ -154,7 +154,13 @@ def playback_scene(
 
 
 def live_scene(
-    robot: Robot, q: Array, wheels: Array, *, title: str, room: float = 2.0
+    robot: Robot,
+    q: Array,
+    wheels: Array,
+    *,
+    title: str,
+    room: float = 2.0,
+    seen: Array | None = None,
 ) -> tuple[list[Command], DrawnRobot]:
     """Commands for a robot that somebody moves from outside, and the robot, to place it.
 
@@ -162,9 +168,13 @@ def live_scene(
     ----------
     q, wheels : (n,) where it stands at first, and (D,) its wheels' angles, rad
     room : ground to show around it, m
+    seen : (K, 3) points that are to be seen besides, m
     """
     box = robot_boxes(robot, q[np.newaxis], wheels[np.newaxis])[0]
     around = box + np.array([[-room, -room, 0.0], [room, room, 0.0]])
+    if seen is not None and len(seen):
+        low, high = np.minimum(around[0], seen.min(axis=0)), np.maximum(around[1], seen.max(axis=0))
+        around = np.array([low, high])
     drawing = Drawing()
     drawing.add(
         "stage",
@@ -190,6 +200,23 @@ def live_scene(
     )
     drawing.add("ready")
     return drawing.commands, drawn
+
+
+def points_beside(motion: Motion, boxes: Array) -> Array:
+    """Points (K, 3) m that show what stands beside a robot: its desired path, target and bodies near it."""
+    given = [np.atleast_2d(one) for one in (motion.desired, motion.target) if one is not None]
+    return np.vstack([*given, SceneObstacles([motion], boxes[np.newaxis], 1.0).points()])
+
+
+def draw_beside(drawing: Drawing, motion: Motion, boxes: Array) -> None:
+    """Append the commands that draw it, as it is at the motion's first sample; boxes (1, 2, 3) as above."""
+    points = np.vstack([points_beside(motion, boxes), boxes.reshape(-1, 3)])
+    size = 0.5 * float(np.linalg.norm(np.ptp(points, axis=0)))
+    obstacles = SceneObstacles([motion], boxes[np.newaxis], 1.0)
+    obstacles.draw(drawing, size, 0.0)
+    obstacles.tell(drawing)
+    _desired(drawing, [motion])
+    _targets(drawing, [motion], size)
 
 
 def _ellipsoids(

@@ -16,6 +16,7 @@ from nmm.playback.live import serve
 from nmm.playback.page import socket_page
 from nmm.playback.server import PageServer
 from nmm.playback.viewer_scene import viewer_scene
+from nmm.robots.motion import Motion
 from nmm.robots.robot import Robot
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ def view(
     *,
     frames: bool = True,
     task: Task | Function | Sequence[Task | Function] | None = None,
+    beside: Motion | None = None,
     port: int | None = None,
     open_browser: bool = True,
     stop: threading.Event | None = None,
@@ -48,6 +50,7 @@ def view(
     q : (n,) m and rad, where it stands at first; when not given, zero, or the limit that is nearest to zero
     frames : whether frames are shown at first: the root link's, each joint's link, and those at the tips
     task : what the robot shall do: one task or several, or functions of the robot alone
+    beside : what stands around it: the desired path, the target and the bodies of a motion
     port : port on 127.0.0.1; a free one when not given
     open_browser : whether to open the page in the user's browser
     stop : ends it when set (by another thread)
@@ -67,7 +70,7 @@ def view(
     """
     at = robot.rest if q is None else robot.q(q)
     viewed = None if task is None else _viewed(robot, task, at)
-    commands = viewer_scene(robot, at, frames=frames, task=viewed)
+    commands = viewer_scene(robot, at, frames=frames, task=viewed, beside=beside)
     server = PageServer(
         lambda host, token: socket_page(robot.name, host, token, scripts=SCRIPTS, styles=STYLES),
         [encode(command) for command in commands],

@@ -14,9 +14,10 @@ from nmm.playback.drawing import Command, Drawing, DrawnRobot, segment
 from nmm.playback.extent import robot_boxes
 from nmm.playback.placements import position_and_quaternion
 from nmm.playback.rolling import Rolling
-from nmm.playback.scene import live_scene
+from nmm.playback.scene import draw_beside, live_scene, points_beside
 from nmm.playback.viewed_task import ViewedTask
 from nmm.robots.loading.tips import first_tip, tips
+from nmm.robots.motion import Motion
 from nmm.robots.robot import Robot
 
 #: Limits beyond this, m or rad, are none.
@@ -26,7 +27,12 @@ ANGLE, WAY, REACH = float(np.pi), 3.0, 1.0
 
 
 def viewer_scene(
-    robot: Robot, q: Array, *, frames: bool = True, task: ViewedTask | None = None
+    robot: Robot,
+    q: Array,
+    *,
+    frames: bool = True,
+    task: ViewedTask | None = None,
+    beside: Motion | None = None,
 ) -> list[Command]:
     """Commands for a robot at q (n,) that the page's sliders move.
 
@@ -34,12 +40,17 @@ def viewer_scene(
     ----------
     frames : whether frames are shown at first
     task : what the page tells of a task
+    beside : its desired path, target and bodies are drawn as they are at its first sample
     """
     wheels = Rolling(robot).settled(q)
-    commands, drawn = live_scene(robot, q, wheels, title=robot.name, room=1.0)
-    box = robot_boxes(robot, q[np.newaxis], wheels[np.newaxis])[0]
+    boxes = robot_boxes(robot, q[np.newaxis], wheels[np.newaxis])
+    seen = np.zeros((0, 3)) if beside is None else points_beside(beside, boxes)
+    commands, drawn = live_scene(robot, q, wheels, title=robot.name, room=1.0, seen=seen)
+    box = boxes[0]
     length = float(np.clip(0.08 * np.linalg.norm(np.ptp(box, axis=0)), 0.02, 0.25))
     drawing = Drawing()
+    if beside is not None:
+        draw_beside(drawing, beside, boxes)
     if task is not None:
         task.draw(drawing)
     listed = list(_frames(robot, drawn, drawing))

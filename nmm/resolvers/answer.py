@@ -17,7 +17,15 @@ from nmm.resolvers.problem_arrays import ProblemArrays
 
 
 class Status(IntEnum):
-    """How a resolution went. Those below `SINGULAR_J` come with inputs, those from there on without."""
+    """How a resolution went. Those below `SINGULAR_J` come with inputs, those from there on without.
+
+    Examples
+    --------
+    >>> problem = nmm.Problem(J=[[0.0, 0.0]], rate=[2.0], h=[0.0, 0.0])
+    >>> status = nmm.ProjectedGradient().resolve(problem).status
+    >>> status.name, status.usable, status.meaning
+    ('SINGULAR_J', False, 'the task Jacobian J lost rank')
+    """
 
     SOLVED = 0
     RELAXED = 1
@@ -67,6 +75,15 @@ class AnswerArrays(NamedTuple):
 
     Before the kernel is called u, residual, measure and excess are not numbers (an excess that is one says
     that limits were seen to), status is NOT_FINITE and scale is 1.
+
+    Examples
+    --------
+    >>> written = nmm.AnswerArrays(
+    ...     u=np.zeros(2), status=np.array(0.0), scale=np.ones(1),
+    ...     residual=np.array(0.0), measure=np.array(1.0), excess=np.array(0.0),
+    ... )
+    >>> nmm.Answer.of(written).status.name
+    'SOLVED'
     """
 
     u: Vector
@@ -104,6 +121,13 @@ class Answer:
         over 1 if that is larger; RG, |det Ja|, divided by sqrt(det J Jᵀ) with automatic partitions; DLS, the
         least singular value (rows in their scales)
     excess : by how much rows of limits that contradict each other had to be widened, in their units
+
+    Examples
+    --------
+    >>> problem = nmm.Problem(J=[[1.0, 1.0]], rate=[2.0], h=[0.0, 0.0])
+    >>> answer = nmm.ProjectedGradient().resolve(problem)
+    >>> answer.u.round(3), answer.status.name, answer.residual < 1e-12
+    (array([1., 1.]), 'SOLVED', True)
     """
 
     u: Array

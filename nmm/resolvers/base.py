@@ -55,7 +55,15 @@ def step_rule(step: StepRule) -> StepRule:
 
 
 class Setup(NamedTuple):
-    """The numbers and the integers that a resolver's kernel reads."""
+    """The numbers and the integers that a resolver's kernel reads.
+
+    Examples
+    --------
+    >>> dimensions = nmm.Dimensions(s=1, k=0, inputs=("v", "omega"))
+    >>> setup = nmm.ProjectedGradient(alpha=2.0).setup(dimensions)
+    >>> isinstance(setup, nmm.Setup), 2.0 in setup.numbers
+    (True, True)
+    """
 
     numbers: Array
     options: Integers

@@ -23,6 +23,12 @@ class Dimensions(NamedTuple):
 
     groups : inputs that are spoken of together, by the group's name ("platform", "arm")
     levels : the rows of each level of priority; one level when empty
+
+    Examples
+    --------
+    >>> dimensions = nmm.Dimensions(s=2, k=0, inputs=("v", "omega", "q1", "q2"))
+    >>> dimensions.m, nmm.ProjectedGradient().setup(dimensions).numbers.shape
+    (4, (2,))
     """
 
     s: int
@@ -61,6 +67,12 @@ class Problem:
     Raises
     ------
     InputError : shapes that do not fit, numbers that are not finite
+
+    Examples
+    --------
+    >>> problem = nmm.Problem(J=[[1.0, 0.5]], rate=[2.0], h=[0.0, 1.0], u_upper=[1.0, np.inf])
+    >>> problem.dimensions.inputs, nmm.ProjectedGradient().resolve(problem).u.round(3)
+    (('u0', 'u1'), array([1., 2.]))
     """
 
     J: ArrayLike

@@ -22,6 +22,12 @@ class ProblemArrays(NamedTuple):
     before (m,) : the inputs of the step before
     dt () : the time that u will stand, s; not a number where it is not known
     limiter : where the code of `limit` begins; 0 where there are no limits
+
+    Examples
+    --------
+    >>> arrays = nmm.Problem(J=[[1.0, 0.5]], rate=[2.0], h=[0.0, 1.0]).arrays
+    >>> isinstance(arrays, nmm.ProblemArrays), arrays.J.shape, arrays.ends.tolist()
+    (True, (1, 2), [1])
     """
 
     J: Matrix

@@ -24,6 +24,15 @@ class State:
     Attributes
     ----------
     memory : the integers, which the kernel reads and writes
+
+    Examples
+    --------
+    >>> state = nmm.State([3, 1])
+    >>> state.memory[0] = 7
+    >>> before = state.snapshot()
+    >>> state.reset()
+    >>> before.tolist(), state.memory.tolist(), nmm.State().partition(2).tolist()
+    ([7, 1], [3, 1], [-1, -1])
     """
 
     def __init__(self, start: Sequence[int] | Integers = ()) -> None:

@@ -16,7 +16,14 @@ SLACK = 1e-9
 
 @dataclass(frozen=True)
 class Follower:
-    """A joint that stands at `multiplier` times another's value plus `offset` (rad or m)."""
+    """A joint that stands at `multiplier` times another's value plus `offset` (rad or m).
+
+    Examples
+    --------
+    >>> finger = nmm.Follower("right_finger", "left_finger", multiplier=-1.0, offset=0.01)
+    >>> str(finger), round(finger.value(0.03), 6)
+    ('right_finger = -left_finger + 0.01', -0.02)
+    """
 
     joint: str
     leader: str

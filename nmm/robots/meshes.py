@@ -26,7 +26,14 @@ _SHOWN = 12
 
 
 class Shapes(NamedTuple):
-    """A robot's shapes, some of whose meshes may not be read yet."""
+    """A robot's shapes, some of whose meshes may not be read yet.
+
+    Examples
+    --------
+    >>> shapes = nmm.load("unicycle_2r").shapes
+    >>> isinstance(shapes, nmm.Shapes), len(shapes.visual_model.geometryObjects) > 0
+    (True, True)
+    """
 
     visual_model: pin.GeometryModel
     collision_model: pin.GeometryModel

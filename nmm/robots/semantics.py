@@ -15,7 +15,14 @@ POSTURE = "posture"
 
 
 class Postures(dict[str, Mapping[str, float]]):
-    """Named postures: coordinates by name, m and rad; `InputError` lists the names for one that is none."""
+    """Named postures: coordinates by name, m and rad; `InputError` lists the names for one that is none.
+
+    Examples
+    --------
+    >>> postures = nmm.Postures({"home": {"q1": 0.5, "q2": 1.0}})
+    >>> postures.within({"posture": "home", "q2": 0.3})
+    {'q1': 0.5, 'q2': 0.3}
+    """
 
     def __missing__(self, name: object) -> Mapping[str, float]:
         there = self or {"none, for no SRDF was found beside the robot's file that holds one": None}
@@ -45,6 +52,12 @@ class Semantics:
     disabled : pairs of links that are not to be kept apart
     files : where it was read
     notes : what of it does not fit the robot, a sentence each
+
+    Examples
+    --------
+    >>> semantics = nmm.Semantics(nmm.Postures({"home": {"q1": 0.5}}), groups={"arm": ("q1", "q2")})
+    >>> semantics.postures["home"]["q1"], semantics.groups["arm"], nmm.load("unicycle_2r").semantics.files
+    (0.5, ('q1', 'q2'), ())
     """
 
     postures: Postures = field(default_factory=Postures)

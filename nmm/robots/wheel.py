@@ -29,6 +29,12 @@ class Wheel:
     pivot : (3,) a point of the swivel's axis in the carrier's frame, m
     roller : angle γ of its rollers, rad (see `Platform.roller`)
     velocity : largest rate of its joint, rad/s; infinite without
+
+    Examples
+    --------
+    >>> wheel = nmm.load("unicycle_2r").wheels[0]
+    >>> isinstance(wheel, nmm.Wheel), wheel.joint, wheel.carrier, wheel.radius
+    (True, 'left_wheel_joint', 'theta', 0.1)
     """
 
     joint: str

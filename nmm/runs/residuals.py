@@ -20,6 +20,12 @@ class Residuals(NamedTuple):
     largest : ‖J u - rate‖ at most, in the mixed units of the rows per second; 0 where none differed
     relative : that beside ‖rate‖ there
     t : when, s
+
+    Examples
+    --------
+    >>> run = nmm.Scenario.load("unicycle_2r_position").with_settings({"duration": 1}).run()
+    >>> isinstance(run.unmet, nmm.Residuals), run.unmet.samples, run.unmet.sentence
+    (True, 0, '')
     """
 
     samples: int

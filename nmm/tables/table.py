@@ -28,6 +28,13 @@ class Quantity:
     name, latex : for readers, as plain text and as LaTeX
     unit : "" where it has none
     values : of each run
+
+    Examples
+    --------
+    >>> run = nmm.Scenario.load("unicycle_2r_position").with_settings({"duration": 1}).run()
+    >>> quantity = nmm.comparison_table([run]).quantities[0]
+    >>> isinstance(quantity, nmm.Quantity), quantity.name, quantity.unit
+    (True, 'step', 's')
     """
 
     key: str

@@ -52,6 +52,14 @@ class Judged(TypedDict, total=False):
     Attributes
     ----------
     t, measures, part, alpha, weights, length, sizes : see `Evaluator`; each has its default there
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> judged = nmm.analysis.Judged(measures="manipulability", part="arm")
+    >>> found = nmm.analysis.singularity_map((robot, nmm.Position("ee", "xy")), samples=20, **judged)
+    >>> list(found.values), found.about.part
+    (['manipulability'], 'arm')
     """
 
     t: float

@@ -28,6 +28,14 @@ EVERYWHERE = "everywhere"
 class Extreme(NamedTuple):
     """A value, where on the map it is, and on what: a singular set, in words, "everywhere" where the map has
     no other value (no place then says more than the others), or "" for a cell's sample.
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> found = nmm.analysis.singularity_map((robot, nmm.Position("ee", "xy")), samples=20)
+    >>> smallest = found.extremes("sigma_min")["smallest"]
+    >>> isinstance(smallest, nmm.analysis.Extreme), round(smallest.value, 4)
+    (True, 0.2135)
     """
 
     value: float

@@ -33,6 +33,13 @@ class About:
     units : of each measure
     sizes : in a sentence, what of different units counts as equal
     q_names, q_units : of the robot's coordinates
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> found = nmm.analysis.singularity_map((robot, nmm.Position("ee", "xy")), samples=20)
+    >>> isinstance(found.about, nmm.analysis.About), found.about.robot, found.about.task
+    (True, 'unicycle_2r', ('ee.x', 'ee.y'))
     """
 
     robot: str

@@ -45,6 +45,13 @@ class SingularSet:
     points (p, 2) : singular points that are on no curve
     everywhere : the rank is lost at each node of the map and at places drawn between them; lines and points
         are then empty
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> found = nmm.analysis.singularity_map((robot, nmm.Position("ee", "xy")), samples=20, part="arm")
+    >>> isinstance(found.singular, nmm.analysis.SingularSet), found.singular.text()
+    (True, 'lines')
     """
 
     lines: tuple[Array, ...] = ()

@@ -33,7 +33,16 @@ _TURNS = np.array(
 
 @dataclass(frozen=True, eq=False)
 class Ellipses:
-    """Projections of ellipsoids onto a plane: centre (N, 2) m, columns axes (N, 2, 2), radii (N, 2) m/s."""
+    """Projections of ellipsoids onto a plane: centre (N, 2) m, columns axes (N, 2, 2), radii (N, 2) m/s.
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_3r")
+    >>> whole = nmm.analysis.ellipsoids_along(robot, "ee", robot.q({"q2": 0.8, "q3": 0.8})[None])
+    >>> seen = whole.projected()
+    >>> isinstance(seen, nmm.analysis.Ellipses), seen.radii.shape, seen.outline().shape
+    (True, (1, 2), (1, 96, 2))
+    """
 
     center: Array
     axes: Array

@@ -66,7 +66,7 @@ class Hitch:
 
 
 @dataclass(frozen=True)
-class Wheel:
+class WheelDescription:
     """What all wheels have: use one of the kinds below.
 
     Attributes
@@ -76,6 +76,12 @@ class Wheel:
     radius : m
     heading : the direction in which it rolls, at a pivot's zero, rad
     body : "theta" for the main body, or the joint of the hitch in front of the body that carries it
+
+    Examples
+    --------
+    >>> wheel = nmm.FixedWheel("left", x=0.0, y=0.3, radius=0.1)
+    >>> isinstance(wheel, nmm.WheelDescription), wheel.heading, wheel.body
+    (True, 0.0, 'theta')
     """
 
     name: str
@@ -93,7 +99,7 @@ class Wheel:
 
 
 @dataclass(frozen=True)
-class FixedWheel(Wheel):
+class FixedWheel(WheelDescription):
     """A wheel that rolls along its heading and does not slip.
 
     Examples
@@ -105,7 +111,7 @@ class FixedWheel(Wheel):
 
 
 @dataclass(frozen=True)
-class SteeredWheel(Wheel):
+class SteeredWheel(WheelDescription):
     """A wheel on an upright pivot at x, y whose angle is a coordinate.
 
     Two wheels with one joint (and one pivot) hang on the same pivot. With a trail it is a driven caster: its
@@ -145,7 +151,7 @@ class SteeredWheel(Wheel):
 
 
 @dataclass(frozen=True)
-class CasterWheel(Wheel):
+class CasterWheel(WheelDescription):
     """A wheel that swivels freely on an upright pivot at x, y: it follows and constrains nothing.
 
     Its swivel's angle is no coordinate. `heading` is the direction in which it rolls at the swivel's zero.
@@ -173,7 +179,7 @@ class CasterWheel(Wheel):
 
 
 @dataclass(frozen=True)
-class OmniWheel(Wheel):
+class OmniWheel(WheelDescription):
     """A wheel with rollers on its rim: it grips along one direction and constrains nothing by itself.
 
     Attributes

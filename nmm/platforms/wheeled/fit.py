@@ -7,13 +7,20 @@ import math
 
 from nmm.errors import InputError
 from nmm.platforms.layout import HITCHES, Layout, Pivot, RollingJoint
-from nmm.platforms.wheeled.descriptions import MAIN, CasterWheel, FixedWheel, Hitch, SteeredWheel, Wheel
+from nmm.platforms.wheeled.descriptions import (
+    MAIN,
+    CasterWheel,
+    FixedWheel,
+    Hitch,
+    SteeredWheel,
+    WheelDescription,
+)
 
 #: How far a wheel's centre may be from a pivot's axis and count as on it, m.
 _ON_AXIS = 1e-6
 
 
-def parts_from(layout: Layout) -> tuple[list[Wheel], list[Hitch]]:
+def parts_from(layout: Layout) -> tuple[list[WheelDescription], list[Hitch]]:
     """Wheels and hitches of a robot's file.
 
     - a pivot with "hitch" or "trailer" in its joint's name: a hitch; wheels on its body are fixed
@@ -38,7 +45,7 @@ def parts_from(layout: Layout) -> tuple[list[Wheel], list[Hitch]]:
     return [_wheel(wheel, pivots, bodies, layout.robot) for wheel in layout.wheels], hitches
 
 
-def _wheel(wheel: RollingJoint, pivots: dict[str, Pivot], bodies: set[str], robot: str) -> Wheel:
+def _wheel(wheel: RollingJoint, pivots: dict[str, Pivot], bodies: set[str], robot: str) -> WheelDescription:
     if wheel.carrier in bodies:
         return FixedWheel(wheel.joint, wheel.x, wheel.y, wheel.radius, wheel.heading, wheel.carrier)
     if wheel.carrier not in pivots:

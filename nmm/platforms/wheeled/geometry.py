@@ -14,7 +14,14 @@ import numpy as np
 
 from nmm.arrays import Array
 from nmm.errors import InputError, expect_known
-from nmm.platforms.wheeled.descriptions import MAIN, CasterWheel, Hitch, OmniWheel, SteeredWheel, Wheel
+from nmm.platforms.wheeled.descriptions import (
+    MAIN,
+    CasterWheel,
+    Hitch,
+    OmniWheel,
+    SteeredWheel,
+    WheelDescription,
+)
 
 
 @dataclass(frozen=True)
@@ -45,7 +52,7 @@ class Term:
 class Bodies:
     """All bodies, the main one first, each before those it carries (Pinocchio's order of joints)."""
 
-    def __init__(self, wheels: Sequence[Wheel], hitches: Sequence[Hitch]) -> None:
+    def __init__(self, wheels: Sequence[WheelDescription], hitches: Sequence[Hitch]) -> None:
         names = [MAIN, *(hitch.joint for hitch in hitches)]
         for hitch in hitches:
             expect_known("carrier", hitch.carrier, names, f"hitch {hitch.joint}")
@@ -59,7 +66,9 @@ class Bodies:
                 f"hitches {', '.join(left)}: they carry each other, and the main body none of them"
             )
 
-    def _add_carried_by(self, carrier: int, wheels: Sequence[Wheel], hitches: Sequence[Hitch]) -> None:
+    def _add_carried_by(
+        self, carrier: int, wheels: Sequence[WheelDescription], hitches: Sequence[Hitch]
+    ) -> None:
         name = self.all[carrier].name
         for wheel in wheels:
             if isinstance(wheel, SteeredWheel) and wheel.body == name:
@@ -92,7 +101,7 @@ class Bodies:
     def number(self, name: str) -> int:
         return self.names.index(name)
 
-    def contact(self, wheel: Wheel, direction: float = 0.0, weight: float = 1.0) -> Term:
+    def contact(self, wheel: WheelDescription, direction: float = 0.0, weight: float = 1.0) -> Term:
         """The velocity of the wheel's centre (a caster's pivot) along its heading, turned by `direction`."""
         if isinstance(wheel, SteeredWheel):
             place = cmath.rect(1.0, wheel.heading) * complex(-wheel.trail, wheel.offset)
@@ -131,7 +140,7 @@ class Bodies:
         return chain
 
 
-def rolling_term(bodies: Bodies, wheel: Wheel) -> Term:
+def rolling_term(bodies: Bodies, wheel: WheelDescription) -> Term:
     """The wheel's spin rate, rad/s: radius times spin is the speed of the centre along the heading.
 
     With rollers at γ only the components along the grip agree: r spin cos γ = v · grip.

@@ -15,7 +15,7 @@ from nmm.kernels.compiled import Kernel
 from nmm.platforms.base import Platform
 from nmm.platforms.layout import Layout
 from nmm.platforms.steering import SteeredAxle
-from nmm.platforms.wheeled.descriptions import MAIN, FixedWheel, Hitch, OmniWheel, Wheel
+from nmm.platforms.wheeled.descriptions import MAIN, FixedWheel, Hitch, OmniWheel, WheelDescription
 from nmm.platforms.wheeled.fit import parts_from
 from nmm.platforms.wheeled.geometry import Bodies
 from nmm.platforms.wheeled.inputs import Input
@@ -69,7 +69,7 @@ class WheeledPlatform(Platform):
 
     def __init__(
         self,
-        wheels: Sequence[Wheel],
+        wheels: Sequence[WheelDescription],
         hitches: Sequence[Hitch] = (),
         inputs: Sequence[Input] | None = None,
         *,
@@ -77,8 +77,8 @@ class WheeledPlatform(Platform):
     ) -> None:
         self.wheels = tuple(wheels)
         self.hitches = tuple(hitches)
-        for part, kind in [(w, Wheel) for w in self.wheels] + [(h, Hitch) for h in self.hitches]:
-            if not isinstance(part, kind) or type(part) is Wheel:
+        for part, kind in [(w, WheelDescription) for w in self.wheels] + [(h, Hitch) for h in self.hitches]:
+            if not isinstance(part, kind) or type(part) is WheelDescription:
                 raise InputError(f"{self.name}: expected wheels of a kind and hitches, got {part!r}")
         _check_distinct([wheel.name for wheel in self.wheels], "wheel")
         self._bodies = Bodies(self.wheels, self.hitches)
@@ -215,7 +215,7 @@ def _check_distinct(names: Sequence[str], what: str) -> None:
         raise InputError(f"{what} {twice[0]}: the name is given twice; {what}s: {', '.join(names)}")
 
 
-def _lengths(wheels: Sequence[Wheel], hitches: Sequence[Hitch]) -> dict[str, float]:
+def _lengths(wheels: Sequence[WheelDescription], hitches: Sequence[Hitch]) -> dict[str, float]:
     places = {wheel.name: wheel for wheel in wheels} | {hitch.joint: hitch for hitch in hitches}
     found = {f"{axis} of {name}": getattr(at, axis) for name, at in places.items() for axis in ("x", "y")}
     return found | {f"radius of {wheel.name}": wheel.radius for wheel in wheels}

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from nmm.arrays import Array
-from nmm.platforms.wheeled.descriptions import SteeredWheel, Wheel
+from nmm.platforms.wheeled.descriptions import SteeredWheel, WheelDescription
 from nmm.platforms.wheeled.geometry import Bodies
 from nmm.platforms.wheeled.kernel import CONTRADICTION
 from nmm.platforms.wheeled.structure import Constraint, Structure
@@ -76,15 +76,15 @@ def _dependent(rows: list[Array]) -> list[int]:
     return [k for k, share in enumerate(left[:, -1]) if abs(share) > 1e-4]
 
 
-def _wheels(constraints: list[Constraint]) -> list[Wheel]:
+def _wheels(constraints: list[Constraint]) -> list[WheelDescription]:
     return [wheel for constraint in constraints for wheel in constraint.wheels]
 
 
-def _listed(wheels: list[Wheel]) -> str:
+def _listed(wheels: list[WheelDescription]) -> str:
     return listed([wheel.name for wheel in wheels])
 
 
-def _angles(wheels: list[Wheel], bodies: Bodies, qp: Array) -> str:
+def _angles(wheels: list[WheelDescription], bodies: Bodies, qp: Array) -> str:
     """The steering angles of these wheels, in degrees."""
     joints = dict.fromkeys(wheel.joint for wheel in wheels if isinstance(wheel, SteeredWheel))
     degrees = [f"{joint} = {math.degrees(qp[2 + bodies.number(joint)]):.6g} deg" for joint in joints]

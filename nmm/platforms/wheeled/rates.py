@@ -8,19 +8,28 @@ from typing import NamedTuple
 
 from nmm.arrays import Array, scalar
 from nmm.errors import expect_known
-from nmm.platforms.wheeled.descriptions import CasterWheel, SteeredWheel, Wheel
+from nmm.platforms.wheeled.descriptions import CasterWheel, SteeredWheel, WheelDescription
 from nmm.platforms.wheeled.geometry import Bodies, Term, rolling_term
 
 
 class WheelRate(NamedTuple):
-    """Spin about the wheel's axis, and turn of its pivot relative to the carrier (0 without), rad/s."""
+    """Spin about the wheel's axis, and turn of its pivot relative to the carrier (0 without), rad/s.
+
+    Examples
+    --------
+    >>> sides = [nmm.FixedWheel(name, 0.0, y, radius=0.1) for name, y in (("left", 0.3), ("right", -0.3))]
+    >>> platform = nmm.WheeledPlatform(sides)
+    >>> rate = platform.wheel_rates([0, 0, 0], [1.0, 0.0])["left"]
+    >>> isinstance(rate, nmm.WheelRate), round(rate.spin, 6), rate.turn
+    (True, 10.0, 0.0)
+    """
 
     spin: float
     turn: float
 
 
 def wheel_rates(
-    bodies: Bodies, wheels: Sequence[Wheel], qp: Array, qp_dot: Array, swivels: Mapping[str, float]
+    bodies: Bodies, wheels: Sequence[WheelDescription], qp: Array, qp_dot: Array, swivels: Mapping[str, float]
 ) -> dict[str, WheelRate]:
     """The rates of every wheel; `swivels` are the casters' angles now (rad), zero for those not named."""
     casters = [wheel.name for wheel in wheels if isinstance(wheel, CasterWheel)]

@@ -9,7 +9,7 @@ import numpy as np
 
 from nmm.arrays import Array
 from nmm.errors import InputError, expect_known, unknown
-from nmm.platforms.wheeled.descriptions import MAIN, FixedWheel, SteeredWheel, Wheel
+from nmm.platforms.wheeled.descriptions import MAIN, FixedWheel, SteeredWheel, WheelDescription
 from nmm.platforms.wheeled.geometry import Bodies, Term, rolling_term
 from nmm.platforms.wheeled.inputs import CommonSpeed, Input, Speed, Spin, Spins
 from nmm.platforms.wheeled.rows import Axis, Common, Rate, Row, Velocity, axis_of
@@ -18,7 +18,7 @@ from nmm.platforms.wheeled.rows import Axis, Common, Rate, Row, Velocity, axis_o
 Named = tuple[str, str, Row]
 
 
-def read(given: Input, bodies: Bodies, wheels: Mapping[str, Wheel]) -> Named:
+def read(given: Input, bodies: Bodies, wheels: Mapping[str, WheelDescription]) -> Named:
     """Name, unit and row of an input that a user asks for.
 
     Raises
@@ -46,7 +46,7 @@ def read(given: Input, bodies: Bodies, wheels: Mapping[str, Wheel]) -> Named:
     raise InputError(f"inputs: expected names, Speed, Spin, Spins or CommonSpeed, got {given!r}")
 
 
-def _by_name(name: str, bodies: Bodies, wheels: Mapping[str, Wheel]) -> Named:
+def _by_name(name: str, bodies: Bodies, wheels: Mapping[str, WheelDescription]) -> Named:
     rates = {f"{body}_rate": 2 + number for number, body in enumerate(bodies.names) if number > 0}
     if name == "v":
         return forward(bodies, list(wheels.values()))
@@ -59,7 +59,7 @@ def _by_name(name: str, bodies: Bodies, wheels: Mapping[str, Wheel]) -> Named:
     raise InputError(unknown("input", name, ("v", "vx", "vy", "omega", *rates), "inputs"))
 
 
-def forward(bodies: Bodies, wheels: Sequence[Wheel]) -> Named:
+def forward(bodies: Bodies, wheels: Sequence[WheelDescription]) -> Named:
     """What "v" is (m/s): of the main body's wheels, the first of these that there are:
 
     1. fixed wheels: the speed of the middle of the axle of the first, along its heading
@@ -99,7 +99,7 @@ def _line(wheel: SteeredWheel) -> Array:
     return Axis(-1, wheel.x, wheel.y, wheel.heading).line(np.zeros(0))
 
 
-def _common(bodies: Bodies, pair: Sequence[Wheel]) -> Common:
+def _common(bodies: Bodies, pair: Sequence[WheelDescription]) -> Common:
     for wheel in pair:
         grips = isinstance(wheel, FixedWheel) or (isinstance(wheel, SteeredWheel) and wheel.centered)
         if not grips or wheel.body != MAIN:
@@ -112,6 +112,6 @@ def _common(bodies: Bodies, pair: Sequence[Wheel]) -> Common:
     return row
 
 
-def _wheel(name: str, wheels: Mapping[str, Wheel], where: str) -> Wheel:
+def _wheel(name: str, wheels: Mapping[str, WheelDescription], where: str) -> WheelDescription:
     expect_known("wheel", name, wheels, f"input {where}")
     return wheels[name]

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nmm.arrays import Array
-from nmm.platforms.wheeled.descriptions import SteeredWheel, Wheel
+from nmm.platforms.wheeled.descriptions import SteeredWheel, WheelDescription
 from nmm.platforms.wheeled.geometry import Bodies, Term
 from nmm.platforms.wheeled.kernel import CLOSURES, COMMON, RATES, TERMS
 
@@ -42,7 +42,7 @@ class Axis(NamedTuple):
         return np.array([normal.real, normal.imag, (pivot.conjugate() * normal).imag])
 
 
-def axis_of(bodies: Bodies, wheel: Wheel) -> Axis:
+def axis_of(bodies: Bodies, wheel: WheelDescription) -> Axis:
     """The axis of a fixed wheel, or of a steered one without trail."""
     if isinstance(wheel, SteeredWheel):
         return Axis(2 + bodies.number(wheel.joint), wheel.x, wheel.y, wheel.heading)

@@ -7,10 +7,10 @@ import math
 from collections.abc import Sequence
 
 from nmm.platforms.steering import SteeredAxle, SteeringPivot
-from nmm.platforms.wheeled.descriptions import MAIN, FixedWheel, SteeredWheel, Wheel
+from nmm.platforms.wheeled.descriptions import MAIN, FixedWheel, SteeredWheel, WheelDescription
 
 
-def steered_axle(wheels: Sequence[Wheel], inputs: Sequence[str]) -> SteeredAxle | None:
+def steered_axle(wheels: Sequence[WheelDescription], inputs: Sequence[str]) -> SteeredAxle | None:
     """The point of the fixed axle that is beside the reference point, and the pivots whose rates are inputs.
 
     Without fixed wheels all wheels steer, and the reference point follows the body's x axis.

@@ -13,7 +13,7 @@ import numpy as np
 
 from nmm.arrays import Array
 from nmm.errors import InputError
-from nmm.platforms.wheeled.descriptions import MAIN, FixedWheel, SteeredWheel, Wheel
+from nmm.platforms.wheeled.descriptions import MAIN, FixedWheel, SteeredWheel, WheelDescription
 from nmm.platforms.wheeled.geometry import Bodies
 from nmm.platforms.wheeled.inputs import Input
 from nmm.platforms.wheeled.read_inputs import Named, read
@@ -27,7 +27,7 @@ DEPENDENT = 1e-4
 class Constraint:
     """A no-slip row and the wheels for which it stands: those of one axle, say."""
 
-    wheels: list[Wheel]
+    wheels: list[WheelDescription]
     row: Row
 
     @property
@@ -61,7 +61,9 @@ class Structure:
 class Chooser:
     """Makes the structure, step by step: fixed wheels, steered wheels, inputs."""
 
-    def __init__(self, bodies: Bodies, wheels: Sequence[Wheel], inputs: Sequence[Input] | None) -> None:
+    def __init__(
+        self, bodies: Bodies, wheels: Sequence[WheelDescription], inputs: Sequence[Input] | None
+    ) -> None:
         self.bodies = bodies
         self.n = 2 + len(bodies.all)
         self.wheels = {wheel.name: wheel for wheel in wheels}
@@ -147,7 +149,7 @@ class Chooser:
         self.structure.inputs = chosen
         self.structure.mobility = self.n - self.rank([*A, *self.held])
 
-    def _no_slip(self, wheel: Wheel) -> Constraint:
+    def _no_slip(self, wheel: WheelDescription) -> Constraint:
         return Constraint([wheel], Velocity((self.bodies.contact(wheel, np.pi / 2),)))
 
     def _repeats(self, constraint: Constraint) -> bool:
@@ -178,7 +180,7 @@ class Chooser:
             raise self._no_room(constraint.wheels[0])
         self.structure.constraints.append(constraint)
 
-    def _no_room(self, wheel: Wheel) -> InputError:
+    def _no_room(self, wheel: WheelDescription) -> InputError:
         names = ", ".join(name for name, _, _ in self.asked or ())
         return InputError(
             f"wheel {wheel.name} does not let the inputs {names or 'of steering'} be chosen freely"
@@ -226,7 +228,7 @@ class Chooser:
         return f"and {', '.join(named[0] for named in chosen)}" if chosen else "alone"
 
 
-def choose(bodies: Bodies, wheels: Sequence[Wheel], inputs: Sequence[Input] | None) -> Structure:
+def choose(bodies: Bodies, wheels: Sequence[WheelDescription], inputs: Sequence[Input] | None) -> Structure:
     """The rows of M for these wheels and inputs; `InputError` where they do not fit."""
     chooser = Chooser(bodies, wheels, inputs)
     chooser.add_fixed()

@@ -30,7 +30,14 @@ _HELD = 1e-6
 
 
 class PinocchioModels(NamedTuple):
-    """A robot's models as other tools take them; wheels stand still."""
+    """A robot's models as other tools take them; wheels stand still.
+
+    Examples
+    --------
+    >>> models = nmm.pinocchio_models(nmm.load("unicycle_2r"))
+    >>> isinstance(models, nmm.PinocchioModels), models.model.nv, len(models.visual_model.geometryObjects) > 0
+    (True, 5, True)
+    """
 
     model: pin.Model
     visual_model: pin.GeometryModel

@@ -10,12 +10,13 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from nmm.errors import InputError, RobotError
+from nmm.errors import InputError, RobotError, expect_known
 from nmm.robots.loading.advice import advice, joints_by_type
 from nmm.robots.loading.check import find_problems
 from nmm.robots.loading.description import Description, argument_texts, describe
 from nmm.robots.loading.findings import Problem, child, children
 from nmm.robots.loading.following import limit_notes
+from nmm.robots.loading.ground import Ground
 from nmm.robots.loading.load import load
 from nmm.robots.loading.packages import Packages
 from nmm.robots.loading.provenance import provenance_of
@@ -71,12 +72,14 @@ def report(
     path : the file
     arguments : values of its `xacro:arg`s
     package_dirs : folders that are, or hold, the ROS packages that the file speaks of
-    options : platform, lock, wheels and axle, with which `load` is tried
+    options : platform, lock, wheels, axle, srdf and missing_meshes, with which `load` is tried; meshes that
+        are not there are problems with missing_meshes "error" and else warnings
 
     Raises
     ------
     RobotError : there is no such file, it is none, or an argument or folder is wrong
     """
+    expect_known("missing_meshes", options.get("missing_meshes", "skip"), ("error", "skip"), error=RobotError)
     file = Path(path).expanduser()
     try:
         description = describe(file, arguments, package_dirs)
@@ -165,7 +168,8 @@ class _Report:
         if root is not None:
             problems += [*found, *_left_over(root)]
             self._count(root)
-            self._about_meshes(root)
+            problems += self._about_meshes(root)
+            self._about_packages()
             if not problems:
                 self.warnings += advice(root)
                 problems += self._load(root)
@@ -184,21 +188,28 @@ class _Report:
         self.meshes[name] = found = self.packages.mesh(name)
         return None if isinstance(found, str) else found
 
-    def _about_meshes(self, root: Element) -> None:
+    def _about_meshes(self, root: Element) -> list[Problem]:
+        """Meshes that are not there: problems where they are to be errors, else warnings."""
         missing: dict[str, Element] = {}
         for mesh in root.iter("mesh"):
             name = mesh.get("filename", "")
             lost = isinstance(self.meshes.get(name), str) and _NOWHERE not in name
             if lost and isinstance(mesh, Element):
                 missing.setdefault(name, mesh)
-        for name, mesh in missing.items():
-            self.warnings.append(
-                Problem(
-                    f"mesh {name!r}: {self.meshes[name]}: refused unless missing_meshes='skip' "
-                    "(--missing-meshes skip)",
-                    mesh.line,
-                )
-            )
+        words = {
+            None: ": refused unless missing_meshes='skip' (--missing-meshes skip)",
+            "skip": "; its shape is left out",
+        }.get(self.options.get("missing_meshes"), "")
+        found = [
+            Problem(f"mesh {name!r}: {self.meshes[name]}{words}", mesh.line) for name, mesh in missing.items()
+        ]
+        if self.options.get("missing_meshes") == "error":
+            return found
+        self.warnings += found
+        return []
+
+    def _about_packages(self) -> None:
+        """Packages that are not there, and what was found."""
         for package, folder in self.packages.found.items():
             if folder is None and not isinstance(self.packages, _Going):
                 self.warnings.append(_not_found(package, f"package://{package}", self.packages))
@@ -226,8 +237,7 @@ class _Report:
                 self.description.path,
                 arguments=self.arguments,
                 package_dirs=self.package_dirs,
-                missing_meshes="skip",
-                **self.options,
+                **{**self.options, "missing_meshes": "skip"},
             )
             for shapes in robot.shapes:
                 read_meshes(shapes.geometryObjects, robot.name)
@@ -240,16 +250,20 @@ class _Report:
         self.warnings += [Problem(text) for text in provenance_of(robot).contradictions]
         self.warnings += [Problem(f"SRDF: {text}") for text in robot.semantics.notes]
         self.warnings += [Problem(text) for text in second_opinion(self.description.xml)]
-        self._about(robot)
+        self._about(robot, _top(root))
         self.robot = robot
         return []
 
-    def _about(self, robot: Robot) -> None:
+    def _about(self, robot: Robot, root: str) -> None:
         self.facts["platform"] = robot.platform.name
         self.facts["coordinates"] = f"{robot.n}: {', '.join(robot.q_names)}"
         if robot.followers:
             self.facts["followers"] = ", ".join(map(str, robot.followers))
         self.facts["wheels"] = ", ".join(wheel.joint for wheel in robot.wheels) or "none"
+        ground = Ground.of(robot) if robot.platform.coordinates else None
+        if ground is not None:
+            self.facts["ground"] = ground.fact(root)
+            self.warnings += [Problem(text) for text in ground.warnings(robot)]
         if robot.semantics.files:
             files = ", ".join(map(str, robot.semantics.files))
             self.facts["SRDF"] = f"{files}: {counted(len(robot.postures), 'posture')}"
