@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from command_line import Result
 from urdf_parts import AXIS, inertial, joint, link, random_tree, robot, shape, write
 
@@ -381,13 +382,25 @@ def test_wheels_touch_one_level_ground(tmp_path: Path) -> None:
     assert warned(tmp_path, on_wheels(*large)) == []
 
 
-def test_a_height_that_is_taken_for_a_radius_is_told_where_the_shape_has_another(tmp_path: Path) -> None:
+def tyre(folder: Path, radius: float) -> str:
+    """A wheel's mesh on the y axis, as a shape of a link."""
+    mesh = trimesh.creation.cylinder(radius, 0.04, sections=24)
+    mesh.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0]))
+    mesh.export(folder / "tyre.stl")
+    return '<collision><geometry><mesh filename="tyre.stl"/></geometry></collision>'
+
+
+def test_a_height_that_is_taken_for_a_radius_is_told_where_the_mesh_has_another(tmp_path: Path) -> None:
     wheels = [("left_wheel", 0.05, 0.1), ("right_wheel", 0.05, 0.1)]
-    warnings = warned(tmp_path, on_wheels(*wheels))
+    round_ones = on_wheels(*wheels)
+    assert warned(tmp_path, round_ones) == []
+    assert "at z = -0.05 m" in reported(tmp_path, round_ones).facts["ground"]
+    meshes = re.sub("<collision>.*?</collision>", tyre(tmp_path, 0.1), round_ones)
+    warnings = warned(tmp_path, meshes)
     assert len(warnings) == 2
     assert "0.05 m, is taken for its radius, and its shape's is 0.1 m" in warnings[0]
     assert "--wheels left_wheel=0.1,..." in warnings[0]
-    given = reported(tmp_path, on_wheels(*wheels), wheels={"left_wheel": 0.1, "right_wheel": 0.1})
+    given = reported(tmp_path, meshes, wheels={"left_wheel": 0.1, "right_wheel": 0.1})
     assert given.warnings == ()
     assert "at z = -0.05 m" in given.facts["ground"]
 

@@ -549,6 +549,18 @@ def test_radius_from_the_shape(height: float, tmp_path: Path) -> None:
     assert load(path, wheels={"w_joint": 0.2}).wheels[0].radius == 0.2
 
 
+@pytest.mark.parametrize(("height", "radius"), [(0.05, 0.12), (0.3, 0.12), (0.1195, 0.1195)])
+def test_a_shape_says_the_radius_where_the_root_is_not_on_the_ground(
+    height: float, radius: float, tmp_path: Path
+) -> None:
+    """As of Husky: its root link is 0.13 m over the ground, and its wheels' centres 0.033 m over that."""
+    origin = f'<origin xyz="0 0.2 {height}" rpy="-1.5708 0 0"/>'
+    solid = shape('<cylinder radius="0.12" length="0.05"/>', "collision")
+    assert load(as_file(tmp_path, wheeled(origin=origin, solid=solid))).wheels[0].radius == radius
+    bare = load(as_file(tmp_path, wheeled(origin=origin, solid=shape('<box size="1 1 1"/>'))))
+    assert bare.wheels[0].radius == height
+
+
 # -------------------------------------------------------------------------------------- Pinocchio models
 
 

@@ -11,13 +11,12 @@ import pinocchio as pin
 
 from nmm.arrays import Array
 from nmm.robots.loading.joint_kinds import axis
-from nmm.robots.loading.layout import Measured
+from nmm.robots.loading.layout import ROUNDED, Measured
 from nmm.robots.robot import Robot
 from nmm.robots.wheel import Wheel
 
-#: Lowest points that differ by no more than this, m, or this share of the largest radius, are on one ground:
-#: so much do tyres and casters give way, and files round.
-LEVEL, LEVEL_SHARE = 5e-3, 0.01
+#: Lowest points that differ by no more than this, m, are on one ground: so much do casters give way.
+LEVEL = 5e-3
 #: In the name of a frame that is on the ground (REP-120).
 FOOTPRINT = "footprint"
 #: A radius and a height that differ by less are the same number, m.
@@ -47,7 +46,7 @@ class Ground:
         if not robot.wheels:
             return None
         measured = Measured(robot.model, (), robot.name)
-        near = max(LEVEL, LEVEL_SHARE * max(wheel.radius for wheel in robot.wheels))
+        near = max(LEVEL, ROUNDED * max(wheel.radius for wheel in robot.wheels))
         ground = cls({}, {}, {}, near)
         for wheel in robot.wheels:
             carrier = measured.placements[robot.model.getJointId(wheel.carrier)]
@@ -138,7 +137,8 @@ def _farthest(shape: pin.GeometryObject, point: Array, along: Array) -> float:
 
 
 def _points(geometry: Any) -> tuple[Array, float]:
-    """Points (k, 3) of a shape, m, and the radius of the balls around them that fill it."""
+    """Points (k, 3) of a shape, m, and the radius of the balls around them that fill it; none of a box, which
+    stands for a wheel that is round."""
     kind = type(geometry).__name__
     turns = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
     match kind:
@@ -150,8 +150,5 @@ def _points(geometry: Any) -> tuple[Array, float]:
             rim = geometry.radius * np.column_stack([np.cos(turns), np.sin(turns)])
             ends = [np.column_stack([rim, np.full(72, end * geometry.halfLength)]) for end in (-1.0, 1.0)]
             return np.vstack(ends), 0.0
-        case "Box":
-            corners = np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, 8).T
-            return corners * geometry.halfSide, 0.0
     mesh = getattr(geometry, "vertices", None)
     return (np.zeros((0, 3)) if mesh is None else np.array(mesh())), 0.0

@@ -21,6 +21,8 @@ _LEVEL = 1e-3
 # A centre so near the root link's xy plane lies in it: the plane is then not the ground.
 _ON_PLANE = 1e-6
 _SHAPES = ("Cylinder", "Sphere", "Capsule")
+#: The share of a radius by which files round it, and tyres give way.
+ROUNDED = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +160,7 @@ class Measured:
 
     def radius(self, joint: int, given: float | None = None) -> float:
         """The wheel's radius, m: as given, or its centre's height over the root link's xy plane, or its
-        largest round shape's.
+        largest round shape's where that is another: the plane is then not the ground.
 
         Raises
         ------
@@ -170,16 +172,17 @@ class Measured:
                 return positive(given, f"wheels: radius of {name}")
             except InputError as error:
                 raise RobotError(f"{self.where}: {error}") from None
-        # The root link stands on the ground (REP-103's base_footprint).
-        height = float(self.placements[joint].translation[2])
-        radius = height if height > _ON_PLANE else self._shape_radius(joint)
-        if radius is None:
+        # A root link may stand on the ground (REP-120's base_footprint), or be some part of the body.
+        height, shape = float(self.placements[joint].translation[2]), self._shape_radius(joint)
+        if height > _ON_PLANE and (shape is None or abs(shape - height) <= ROUNDED * shape):
+            return height
+        if shape is None:
             raise RobotError(
                 f"{self.where}: radius of wheel {name!r} not found: its centre is not above the root link's "
                 f"xy plane and it has no cylinder or sphere; give it, wheels={{{name!r}: ...}}, or no "
                 "wheels, wheels=()"
             )
-        return radius
+        return shape
 
     def _shape_radius(self, joint: int) -> float | None:
         """The largest radius among the joint's round shapes, of the first geometry model that has any."""
