@@ -423,7 +423,7 @@ def test_the_root_link_belongs_on_the_wheels_axle(tmp_path: Path) -> None:
     assert warning.startswith(
         "root link 'base' is not at the wheels' axle, whose midpoint is at (-0.25, 0) m"
     )
-    assert "axle=(-0.25, 0)" in warning
+    assert "--axle -0.25,0 (axle=(-0.25, 0))" in warning
     moved = nmm.load(tmp_path / "robot.urdf", axle=(-0.25, 0))
     np.testing.assert_allclose(np.mean([wheel.center for wheel in moved.wheels], axis=0)[:2], 0.0, atol=1e-15)
 
@@ -431,7 +431,7 @@ def test_the_root_link_belongs_on_the_wheels_axle(tmp_path: Path) -> None:
 def test_wheels_that_are_not_recognised_are_told_and_why(tmp_path: Path) -> None:
     warnings = warned(tmp_path, wheeled(left="left", right="right"))
     assert [warning.split("'")[1] for warning in warnings] == ["left", "right"]
-    assert all("if it is a wheel, say so, wheels=[" in warning for warning in warnings)
+    assert all("if it is a wheel, say so with the others, --wheels " in warning for warning in warnings)
     upright = joint("spare_wheel", "base", "spare", "continuous", AXIS + '<limit effort="1" velocity="1"/>')
     (warning,) = warned(tmp_path, wheeled(more=link("spare", inertial()) + upright))
     assert "spare_wheel stays a coordinate in spite of its name: its axis is not level" in warning

@@ -459,3 +459,25 @@ def test_playback_in_a_scripts_background_ends_when_told_to(
     shell.stdout.close()
     with pytest.raises(ProcessLookupError):
         os.kill(player, 0)
+
+
+@pytest.mark.parametrize(
+    ("scenario", "settings", "reason"),
+    [
+        ("unicycle_3r_out_of_reach", [], "out of reach: it is 1.7 m above q1"),
+        ("unicycle_2r_position", ["limits.velocity={v: 0.3, omega: 0.1}", "duration=5"], "input v (100 %)"),
+    ],
+)
+def test_what_was_missed_is_read_in_two_lines(
+    run: Command, scenario: str, settings: list[str], reason: str
+) -> None:
+    """Of a terminal of 100 columns, but for the names: how much, since when, and why."""
+    options = [part for setting in settings for part in ("--set", setting)]
+    result = run("run", scenario, *options, "--out", "missed")
+    assert result.status == 1
+    last = result.err.splitlines()[-1]
+    assert len(last) <= 200, last
+    assert reason in last
+    error = np.linalg.norm(nmm.Trajectory.load("missed").error, axis=1)
+    assert f"{error[0]:.3g} at first, {error[-1]:.3g} at the end (promised" in last
+    assert "missed" in result.out

@@ -21,6 +21,7 @@ from derivatives import check_function
 import nmm
 from nmm.bundled import bundled_scenarios
 from nmm.cli.app import app
+from nmm.cli.exit_status import status_of
 from nmm.kinds import OBJECTIVES, PLATFORMS, REFERENCES, RESOLVERS, TASKS, Kinds
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -101,6 +102,38 @@ def test_the_commands_of_the_readme_run(tmp_path: Path, monkeypatch: pytest.Monk
         if name not in ("render", "paper"):
             place = line.replace("runs/...", "runs/unicycle_2r_position-rg")
             console.run(f"nmm {place} {SMALLER.get(name, '')}")
+
+
+#: Commands on pages that are not run here, by what they hold, and why.
+NOT_RUN = {
+    "my_": "the reader's own file",
+    "bad_arm.urdf": "the reader's own file",
+    "view ": "waits for a browser: tests/test_view_task.py",
+    "drive ": "waits for a browser: tests/test_driving.py",
+    "gallery ": "minutes: the README's test runs one scenario's, tests/test_gallery.py more",
+    "--play": "waits for a browser: tests/test_bundled_scenarios.py runs the scenarios",
+}
+#: Pages whose commands are run elsewhere.
+ELSEWHERE = {"README.md", *(page.relative_to(ROOT).as_posix() for page in console.PAGES)}
+
+
+def test_the_commands_of_the_other_pages_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Each once, in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    lines = {
+        shlex.join(arguments): page
+        for page in DOCUMENTS
+        if page not in ELSEWHERE
+        for arguments in commands((ROOT / page).read_text(encoding="utf-8"))
+    }
+    skipped = {line: [why for why in NOT_RUN if why in f"{line} "] for line in lines}
+    assert {why for whys in skipped.values() for why in whys} == {*NOT_RUN}, "a reason that nothing needs"
+    run = [line for line, whys in skipped.items() if not whys]
+    assert len(run) > 3
+    for line in run:
+        assert status_of(shlex.split(line)) == 0, f"{lines[line]}: nmm {line}\n{capfd.readouterr().err}"
 
 
 @pytest.mark.parametrize("page", DOCUMENTS)

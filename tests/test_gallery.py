@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import shutil
 import signal
@@ -17,6 +18,7 @@ from nmm.cli.exit_status import status_of
 from nmm.errors import InputError, RunError
 from nmm.gallery import Gallery, card, write, write_gallery
 from nmm.gallery.card import Card, make_card
+from nmm.runs.table import rows
 
 TWO = ("unicycle_2r_position", "unicycle_3r_out_of_reach")
 
@@ -48,8 +50,11 @@ def test_numbers_are_those_of_the_scenarios_own_run(gallery: tuple[Gallery, list
         summary = json.loads((gallery[0].folder / one.name / "summary.json").read_text(encoding="utf-8"))
         assert summary == json.loads(json.dumps(run.summary()))
         numbers = dict(one.numbers)
-        assert numbers["‖e‖ RMS"] == f"{summary['error_rms']:.3g}"
+        assert numbers["tracking ‖e‖"].startswith(f"RMS {summary['error_rms']:.3g}, ")
         assert numbers["smallest σ_min"] == f"{summary['sigma_min']:.3g}"
+        printed = dict(rows(run, run.summary()))
+        assert next(iter(numbers)) == "robot"
+        assert all(printed[label] == value for label, value in one.numbers[1:])
         assert one.outcome == summary["outcome"]
 
 
@@ -68,7 +73,7 @@ def test_the_page_refers_to_what_is_there_and_says_what_came_out(
             assert f'<tr><th scope="row">{label}</th><td>{value}</td></tr>' in page
     missed = made.cards[1]
     assert (missed.outcome, missed.ran) == ("missed", True)
-    assert missed.message.split(":")[0] in page
+    assert missed.message.split(":")[0] in html.unescape(page)
 
 
 def test_pages_share_the_viewer(gallery: tuple[Gallery, list[float]]) -> None:

@@ -205,7 +205,7 @@ def test_a_missed_target_names_the_limits_that_bind(tmp_path: Path) -> None:
     relaxed = run.scale[:, 0] < 1.0
     share = np.mean(run.u[relaxed, 0] >= 0.1 - 1e-9)
     assert share > 0.5
-    assert f"limits that bind while λ is below 1, and how often: input v ({100 * share:.0f} %)" in run.message
+    assert f"limits that bind at λ < 1: input v ({100 * share:.0f} %)" in run.message
 
 
 def test_driven_fingers_without_a_velocity_limit_are_told(tmp_path: Path) -> None:

@@ -67,11 +67,11 @@ DIFFERENTIAL_MISFITS = {
     "two axles": ((LEFT, replace(RIGHT, x=0.1)), "they are not on one axle"),
     "ahead": (
         (replace(LEFT, x=0.2), replace(RIGHT, x=0.2)),
-        "their axle is 0.2 m ahead of the reference point: give axle= (found: left at (0.2, 0.2) m",
+        "their axle is 0.2 m ahead of the reference point: give axle (--axle X,Y) (found: left at (0.2,",
     ),
     "behind": (
         (replace(LEFT, x=-0.2), replace(RIGHT, x=-0.2)),
-        "their axle is 0.2 m behind the reference point: give axle=",
+        "their axle is 0.2 m behind the reference point: give axle (--axle X,Y)",
     ),
     "one side": ((LEFT, replace(RIGHT, y=0.1)), "they are not equally far to the left and right"),
     "off centre": ((LEFT, replace(RIGHT, y=-0.3)), "they are not equally far to the left and right"),
@@ -116,7 +116,7 @@ CAR_MISFITS = {
     ),
     "axle": (
         Layout("robot", (pivot("steer", 0.4),), (wheel("left", -0.25, 0.2), wheel("right", -0.25, -0.2))),
-        "the nearest wheel, left, is 0.25 m behind the reference point: give axle= (found: left at (-0.25",
+        "the nearest wheel, left, is 0.25 m behind the reference point: give axle (--axle X,Y) (found: left",
     ),
 }
 
@@ -177,7 +177,7 @@ TRACTOR_MISFITS = {
     "axle": (
         TRAILERS,
         (*TRAILER_WHEELS, wheel("left", 0.1, 0.2)),
-        "the nearest wheel, left, is 0.1 m ahead of the reference point: give axle=",
+        "the nearest wheel, left, is 0.1 m ahead of the reference point: give axle (--axle X,Y)",
     ),
 }
 
@@ -238,7 +238,7 @@ SKID_STEER_MISFITS = {
     "across": ((*CORNERS[:3], replace(CORNERS[3], heading=1.0)), "rear_right does not roll forward"),
     "ahead": (
         tuple(replace(w, x=w.x + 0.02) for w in CORNERS),
-        "the reference point is not midway between the first and the last axle: give axle=",
+        "the reference point is not midway between the first and the last axle: give axle (--axle X,Y)",
     ),
     "aside": (tuple(replace(w, y=w.y + 0.02) for w in CORNERS), "they are not equally far to the left and"),
     "one line": (tuple(replace(w, y=0.0) for w in CORNERS), "they are not equally far to the left and"),

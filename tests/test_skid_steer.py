@@ -34,7 +34,9 @@ def test_it_is_measured_in_a_file() -> None:
 
 def test_a_unicycle_on_such_wheels_is_told_of_it() -> None:
     (said,) = slip_warnings(base("unicycle"))
-    assert said.endswith('cannot all roll in turns: platform="skid_steer" is made for that')
+    assert said.endswith(
+        'cannot all roll in turns: --platform skid_steer (platform="skid_steer") is made for that'
+    )
 
 
 @pytest.mark.parametrize("platform", ["skid_steer", GRASS])

@@ -229,9 +229,7 @@ def _status(command: str, trajectories: Sequence[Trajectory], folder: Path) -> i
     """0, or 1 with a line for each run that did not end as asked."""
     failed = [trajectory for trajectory in trajectories if not trajectory.complete]
     for trajectory in failed:
-        complain(
-            command,
-            f"{trajectory.called} {trajectory.outcome}: {trajectory.message}; "
-            f"{'the run' if trajectory.outcome == 'missed' else 'the part that was computed'} is in {folder}",
-        )
+        whole = trajectory.outcome == "missed"
+        where = "" if whole else f"; the part that was computed is in {folder}"
+        complain(command, f"{trajectory.called} {trajectory.outcome}: {trajectory.message}{where}")
     return FAILED if failed else OK

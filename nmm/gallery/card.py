@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from nmm.bundled import bundled_scenarios
 from nmm.errors import NmmError
 from nmm.progress import Progress, between
+from nmm.runs.table import rows
 
 if TYPE_CHECKING:
     from nmm.runs.trajectory import Trajectory
@@ -20,6 +21,11 @@ if TYPE_CHECKING:
 VIEWER = "viewer.js"
 #: Pictures of a page for each second of motion; the page draws what is between them.
 FPS = 30.0
+#: Which rows of a run's table a card has.
+TOLD = (
+    *("resolver", "outcome", "tracking ‖e‖", "objective H", "smallest σ_min"),
+    *("least margin to a limit", "least clearance"),
+)
 
 
 @dataclass(frozen=True)
@@ -31,7 +37,7 @@ class Card:
     name, title : of the scenario
     outcome : how its run ended (`nmm.Outcome`); "refused" where it could not begin
     message : why it did not end as asked; empty where it did
-    numbers : labels with values as people read them, of summary.json
+    numbers : labels with values, rows of the table that `nmm run` prints
     shown : whether there is something to see: motion.png and playback.html
 
     Examples
@@ -39,7 +45,7 @@ class Card:
     >>> from nmm.gallery import write_gallery
     >>> made = write_gallery("gallery", ["unicycle_2r_position"], jobs=1)
     >>> made.cards[0].outcome, dict(made.cards[0].numbers)["resolver"]
-    ('completed', 'RG')
+    ('completed', 'RG, rk4, dt 0.005 s')
     """
 
     name: str
@@ -100,16 +106,4 @@ def _draw(run: Trajectory, title: str, folder: Path) -> None:
 
 def _numbers(run: Trajectory, summary: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "robot", f"{run.robot.name}, {summary['platform']}"
-    yield "resolver", summary["resolver"].upper()
-    if not len(run):
-        return
-    yield "time", f"{summary['t_end']:g} s in {summary['samples']} samples"
-    yield "‖e‖ at the end", f"{summary['error_final']:.3g}"
-    yield "‖e‖ RMS", f"{summary['error_rms']:.3g}"
-    if (run.scenario or {}).get("objective"):
-        yield "objective H", f"{summary['objective_initial']:.3g} → {summary['objective_final']:.3g}"
-    yield "smallest σ_min", f"{summary['sigma_min']:.3g}"
-    if summary["margin_min"] is not None:
-        yield "least margin to a limit", f"{summary['margin_min']:.3g} of its range"
-    if summary.get("clearance_min") is not None:
-        yield "least clearance", f"{summary['clearance_min']:.3g} m"
+    yield from ((label, value) for label, value in rows(run, summary) if label in TOLD)

@@ -130,9 +130,9 @@ def _misfit(wheels: tuple[RollingJoint, ...]) -> str | None:
     if not same([one.x, other.x]):
         return "they are not on one axle"
     if abs(one.x) > NEAR:
-        return f"their axle is {ahead(one.x)}: give axle="
+        return f"their axle is {ahead(one.x)}: give axle (--axle X,Y)"
     if one.y * other.y >= 0.0 or abs(one.y + other.y) > NEAR:
-        return "they are not equally far to the left and right of the reference point: give axle="
+        return "they are not equally far to the left and right of the reference point: give axle (--axle X,Y)"
     if not same([one.radius, other.radius]):
         return "their radii differ"
     return None

@@ -89,5 +89,5 @@ def check_axle(layout: Layout, platform: str) -> None:
     if wheels and all(abs(wheel.x) > NEAR for wheel in wheels):
         expected = "its reference point on the axle of wheels that do not steer"
         nearest = min(wheels, key=lambda wheel: abs(wheel.x))
-        wrong = f"the nearest wheel, {nearest.joint}, is {ahead(nearest.x)}: give axle="
+        wrong = f"the nearest wheel, {nearest.joint}, is {ahead(nearest.x)}: give axle (--axle X,Y)"
         raise misfit(layout, platform, expected, wrong, say_wheels(wheels))

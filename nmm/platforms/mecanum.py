@@ -145,9 +145,9 @@ def _misfit(wheels: tuple[RollingJoint, ...]) -> str | None:
             return f"{wheel.joint} does not roll forward"
     corners = {(wheel.x > 0.0, wheel.y > 0.0) for wheel in wheels}
     if len(corners) != 4:
-        return "they are not one in each quarter around it: give axle="
+        return "they are not one in each quarter around it: give axle (--axle X,Y)"
     if not same(abs(wheel.x) for wheel in wheels) or not same(abs(wheel.y) for wheel in wheels):
-        return "they are not equally far from it to the front and rear, left and right: give axle="
+        return "they are not equally far from it to the front, rear, left and right: give axle (--axle X,Y)"
     if abs(wheels[0].x) <= NEAR or abs(wheels[0].y) <= NEAR:
         return "they are on one line"
     if not same(wheel.radius for wheel in wheels):

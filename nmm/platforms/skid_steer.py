@@ -170,14 +170,14 @@ def _misfit(wheels: tuple[RollingJoint, ...]) -> str | None:
         if not rolls_forward(wheel):
             return f"{wheel.joint} does not roll forward"
     if not same(abs(wheel.y) for wheel in wheels) or abs(wheels[0].y) <= NEAR:
-        return "they are not equally far to the left and right of the reference point: give axle="
+        return "they are not equally far to the left and right of the reference point: give axle (--axle X,Y)"
     left, right = (sorted(wheel.x for wheel in wheels if wheel.y * side > 0.0) for side in (1.0, -1.0))
     if len(left) != len(right) or any(abs(a - b) > NEAR for a, b in zip(left, right, strict=True)):
         return "they do not stand in pairs, one to the left and one to the right"
     if left[-1] - left[0] <= NEAR:
         return "they are on one axle"
     if abs(left[-1] + left[0]) > 2.0 * NEAR:
-        return "the reference point is not midway between the first and the last axle: give axle="
+        return "the reference point is not midway between the first and the last axle: give axle (--axle X,Y)"
     if not same(wheel.radius for wheel in wheels):
         return "their radii differ"
     return None

@@ -51,6 +51,7 @@ def slip_warnings(robot: Robot) -> list[str]:
     ahead = [wheel.center[0] * across[1] - wheel.center[1] * across[0] for wheel in plain]
     if np.ptp(ahead) > SLACK:
         return [
-            f'{what}; on several axles they cannot all roll in turns: platform="skid_steer" is made for that'
+            f"{what}; on several axles they cannot all roll in turns: --platform skid_steer "
+            '(platform="skid_steer") is made for that'
         ]
-    return [f"{what}; is its reference point on their axle? (axle=)"]
+    return [f"{what}; is its reference point on their axle? (axle, --axle X,Y)"]

@@ -30,7 +30,7 @@ def binding(names: Sequence[str], shares: Array, scale: Array) -> str:
     if not order:
         return ""
     told = [f"{_words(names[i])} ({100 * often[i]:.0f} %)" for i in order]
-    return f"limits that bind while λ is below 1, and how often: {', '.join(told)}"
+    return f"limits that bind at λ < 1: {', '.join(told)}"
 
 
 def _words(name: str) -> str:

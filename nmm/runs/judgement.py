@@ -114,7 +114,12 @@ def judge(
         if stability and advice:
             return Verdict(Outcome.UNSTABLE, _joined(stability, *seen), warnings)
         told = _told(samples, found.departure)
-        return Verdict(Outcome.MISSED, _joined(told, *seen, _tried(advice, dt)), warnings)
+        # What is read first is short; what chatters, or follows from a target out of reach, is told apart.
+        chatters = "" if chatter is None else chatter.sentence
+        also = [one for one in seen if one == chatters or (_hopeless(seen) and one != seen[0])]
+        why = [one for one in seen if one not in also]
+        apart = [_joined(*also)] if also else []
+        return Verdict(Outcome.MISSED, _joined(told, *why, _tried(advice, dt)), [*warnings, *apart])
     if 2 * len(found.unstable) > found.examined:
         return Verdict(Outcome.UNSTABLE, stability, warnings)
     if found.departure is not None:
@@ -197,22 +202,13 @@ def _tried(advice: Advice | None, dt: float) -> str:
 
 
 def _told(samples: Samples, found: Departure) -> str:
-    """What was asked, promised and was."""
+    """What was promised and was: at the end, or where the end is as promised, where it was the worst."""
     norm = np.linalg.norm(samples.error, axis=1)
-    t = samples.t
-
-    def at(k: int) -> str:
-        allowed = (
-            f", {found.bound[k]:.3g} with the method's own error"
-            if found.bound[k] > 1.1 * found.promise[k]
-            else ""
-        )
-        return f"{norm[k]:.3g} (promised {found.promise[k]:.3g}{allowed})"
-
-    when, worst = f"t = {t[found.first]:.4g} s", f"t = {t[found.worst]:.4g} s"
+    k = len(norm) - 1 if norm[-1] > found.bound[-1] else found.worst
+    where = "at the end" if k == len(norm) - 1 else f"at t = {samples.t[k]:.4g} s"
     return (
-        f"the task error was not what its gain promises from {when} on: it began with {norm[0]:.3g}, "
-        f"was {at(found.worst)} at {worst} and {at(-1)} at the end"
+        f"the error left its gain's promise at t = {samples.t[found.first]:.4g} s: "
+        f"{norm[0]:.3g} at first, {norm[k]:.3g} {where} (promised {found.bound[k]:.2g})"
     )
 
 

@@ -54,8 +54,8 @@ def out_of_reach(controller: Controller, q: Array, target: Array) -> str:
         if fixed and away > arm.length:
             where = "above" if fixed == [2] and target[places[2]] > joint[2] else "from"
             return (
-                f"the target of {frame} is out of reach: it is {away:.3g} m {where} {arm.joint}, and the "
-                f"arm's links add up to {arm.length:.3g} m"
+                f"the target of {frame} is out of reach: it is {away:.3g} m {where} {arm.joint}, its "
+                f"links add up to {arm.length:.3g} m"
             )
     return ""
 
@@ -70,10 +70,7 @@ def stretched(controller: Controller, q: Array, J: Array) -> str:
         away = float(np.linalg.norm(line))
         along = sum(y[row] * line[axis] for axis, row in places.items())
         if away > STRETCHED * arm.length and abs(along) > ALONG * away * np.linalg.norm(y):
-            return (
-                f"the arm is stretched: {frame} is {away:.3g} m from {arm.joint}, and its links add up to "
-                f"{arm.length:.3g} m"
-            )
+            return f"the arm is stretched: {frame} is {away:.3g} m of {arm.length:.3g} m from {arm.joint}"
     return ""
 
 
@@ -111,7 +108,7 @@ def inputs_unmet(samples: Samples, found: Departure) -> str:
     excess = float(np.linalg.norm(samples.error[found.worst]) - found.bound[found.worst])
     if found.unmet[found.worst] < 0.5 * excess:
         return ""
-    return "the inputs did not do all that the task asked (clipped, scaled or damped), which explains it"
+    return "the inputs did not do all that the task asked (clipped, scaled or damped)"
 
 
 def unresolved(samples: Samples, found: Departure) -> str:

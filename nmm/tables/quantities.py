@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 Summary = dict[str, Any]
 #: What a run that was not limited says nothing of.
 _LIMITED = ("scale_min", "scaled_share")
+#: What a run says of which nothing happened.
+_NOTHING: dict[str, Value] = {"partition_switches": 0, "scaled_share": 0.0, "lateral_slip_max": 0.0}
 
 
 def comparison_table(trajectories: Sequence[Trajectory]) -> Table:
@@ -49,7 +51,7 @@ def comparison_table(trajectories: Sequence[Trajectory]) -> Table:
     quantities = [
         quantity
         for key, name, latex, unit in _rows(trajectories)
-        if (quantity := Quantity(key, name, latex, unit, _values(summaries, key))) and _told(quantity)
+        if _told(quantity := Quantity(key, name, latex, unit, _values(summaries, key), _NOTHING.get(key)))
     ]
     return Table(tuple(trajectory.called for trajectory in trajectories), tuple(quantities))
 

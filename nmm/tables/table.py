@@ -28,6 +28,7 @@ class Quantity:
     name, latex : for readers, as plain text and as LaTeX
     unit : "" where it has none
     values : of each run
+    nothing : the value of a run in which nothing of it happened; rows of no other are for `csv` alone
 
     Examples
     --------
@@ -42,6 +43,12 @@ class Quantity:
     latex: str
     unit: str
     values: tuple[Value, ...]
+    nothing: Value = None
+
+    @property
+    def says_something(self) -> bool:
+        """Whether it is worth a row to be read."""
+        return any(value not in (None, self.nothing) for value in self.values)
 
 
 @dataclass(frozen=True)
@@ -63,12 +70,17 @@ class Table:
     runs: tuple[str, ...]
     quantities: tuple[Quantity, ...]
 
+    @property
+    def read(self) -> tuple[Quantity, ...]:
+        """The rows to be read: those that say something."""
+        return tuple(one for one in self.quantities if one.says_something)
+
     def latex(self) -> str:
         """A tabular of package booktabs, with a column a run: three digits, powers of ten, names escaped."""
         from nmm import __version__
 
         rows = [["", *map(latex.escaped, self.runs)]]
-        for one in self.quantities:
+        for one in self.read:
             unit = f" ({_latex_unit(one.unit)})" if one.unit else ""
             rows.append([one.latex + unit, *map(_latex_value, one.values)])
         head, *body = (" & ".join(row) + r" \\" for row in rows)
@@ -94,7 +106,7 @@ class Table:
     def markdown(self) -> str:
         """A table as GitHub and most others read it, with a column a run."""
         rows = [["", *map(_markdown, self.runs)], ["---", *("---:" for _ in self.runs)]]
-        for one in self.quantities:
+        for one in self.read:
             name = _markdown(f"{one.name} ({one.unit})" if one.unit else one.name)
             rows.append([name, *(_markdown(_plain_value(value)) for value in one.values)])
         return "".join(f"| {' | '.join(row)} |\n" for row in rows)

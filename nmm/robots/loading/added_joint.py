@@ -36,7 +36,7 @@ def with_joint(rebuilt: Rebuilt, added: AddedJoint, where: str) -> Rebuilt:
     if model.existFrame(added.joint):
         raise RobotError(
             f"{where}: a frame is named {added.joint}, as the coordinate that this platform adds: give the "
-            "platform with another name for it, as in Car(wheelbase, steering=NAME)"
+            "frame another name, or the platform another for it, as in Car(wheelbase, steering=NAME)"
         )
     none, speed = np.full(1, np.inf), np.full(1, added.velocity)
     zero = np.zeros(1)

@@ -29,7 +29,7 @@ def among_coordinates(
         if one.leader in rolling:
             raise RobotError(
                 f"{where}: {one.joint} follows {one.leader}, which the ground turns and is no coordinate: "
-                f"lock {one.joint}, or name the wheels without {one.leader}, wheels=[...]"
+                f"lock {one.joint}, or name the wheels without {one.leader} (--wheels, wheels)"
             )
     notes = []
     if found:

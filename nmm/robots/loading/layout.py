@@ -179,8 +179,8 @@ class Measured:
         if shape is None:
             raise RobotError(
                 f"{self.where}: radius of wheel {name!r} not found: its centre is not above the root link's "
-                f"xy plane and it has no cylinder or sphere; give it, wheels={{{name!r}: ...}}, or no "
-                "wheels, wheels=()"
+                f"xy plane and it has no cylinder or sphere; give it, --wheels {name}=M,... "
+                f"(wheels={{{name!r}: ...}}), or no wheels, --wheels none (wheels=())"
             )
         return shape
 

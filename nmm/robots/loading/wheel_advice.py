@@ -42,7 +42,8 @@ def _nameless(robot: Robot) -> Iterator[str]:
         if on_root and endless and not named and measured.why_not_rolling(joint) is None:
             yield (
                 f"joint {name!r} turns without end about a level axis, with nothing below it: if it is a "
-                f'wheel, say so, wheels=[{name!r}, ...]; its name holds no "wheel"'
+                f"wheel, say so with the others, --wheels {name},... (wheels=[{name!r}, ...]); its name "
+                'holds no "wheel"'
             )
 
 
@@ -61,17 +62,21 @@ def _about_axle(robot: Robot, root: str) -> Iterator[str]:
     if np.ptp(ahead) > NEAR:
         yield (
             f"wheels that neither steer nor swivel are not on one axle ({names}): the robot slips in turns; "
-            'platform="skid_steer" takes that as its way of turning, and says how fast they slide'
+            '--platform skid_steer (platform="skid_steer") takes that as its way of turning, and says how '
+            "fast they slide"
         )
         return
     if abs(along[1]) > PARALLEL:
-        yield f"the wheels do not roll along the root link's x axis ({names}); axle=FRAME gives the direction"
+        yield (
+            f"the wheels do not roll along the root link's x axis ({names}); --axle FRAME (axle=FRAME) gives "
+            "the direction"
+        )
     middle = 0.5 * (
         np.min([wheel.center for wheel in fixed], axis=0) + np.max([wheel.center for wheel in fixed], axis=0)
     )
     if np.linalg.norm(middle[:2]) > NEAR:
         yield (
             f"root link {root!r} is not at the wheels' axle, whose midpoint is at ({middle[0]:.4g}, "
-            f"{middle[1]:.4g}) m in it ({names}): give axle=({middle[0]:.4g}, {middle[1]:.4g}), or the robot "
-            "turns about the wrong point"
+            f"{middle[1]:.4g}) m in it ({names}): give --axle {middle[0]:.4g},{middle[1]:.4g} "
+            f"(axle=({middle[0]:.4g}, {middle[1]:.4g})), or the robot turns about the wrong point"
         )
