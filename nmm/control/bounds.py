@@ -18,7 +18,7 @@ from typing import NamedTuple
 from nmm.arrays import Array
 from nmm.kernels.compiled import compiled
 from nmm.kernels.memory import Cell, IntegerCell, IntegerVector, Matrix, Vector
-from nmm.resolvers.problem_arrays import ProblemArrays
+from nmm.resolvers.problem_arrays import LOWER, UPPER, ProblemArrays
 from nmm.robots.wheel_rates import rolling
 
 #: What `LimitNumbers.mode` says of a step: a sample's, an integrator's stage after it, one without limits.
@@ -82,6 +82,7 @@ def bound_inputs(limits: LimitNumbers, q: Array, problem: ProblemArrays) -> None
         lower, upper = limits.slowest[j], limits.fastest[j]
         A = limits.acceleration[j]
         i = limits.coordinate[j]
+        low, high = -math.inf, math.inf
         if i >= 0:
             high = approach(limits.high[j] - q[i], dt, A, limits.recovery[()])
             low = -approach(q[i] - limits.low[j], dt, A, limits.recovery[()])
@@ -102,6 +103,7 @@ def bound_inputs(limits: LimitNumbers, q: Array, problem: ProblemArrays) -> None
                 lower, upper = max(lower, least), min(upper, most)
         problem.u_lower[j] = lower
         problem.u_upper[j] = upper
+        problem.stops[j] = (UPPER if upper == high else 0) + (LOWER if lower == low else 0)
 
 
 @compiled

@@ -23,6 +23,7 @@ from nmm.control.integrators import integrator
 from nmm.control.layout import lay_out
 from nmm.control.limit_report import LimitReport
 from nmm.control.limits import Limits
+from nmm.control.pace import Pace
 from nmm.control.retreat import Backing, Retreat
 from nmm.control.sample import SampleState
 from nmm.control.steering import Steered, Steering
@@ -76,6 +77,7 @@ class Controller:
     steered : the law in force for steering that the task does not feel; None where there is none
     step_size : what chooses α at each sample; None where it is constant
     sample : what the last call leaves for the stages of its sample and for the next call
+    pace : the period of the calls, where that is not dt (`pace.period`); a warning says so once
 
     Raises
     ------
@@ -167,6 +169,7 @@ class Controller:
             or resolver.step != "constant"
             or (limits is not None and self.kept.needs_dt)
         )
+        self.pace = Pace()
         self.dt = dt
         self.steered: Steered | None = None
         if steered is not None and self._unfelt(steered.inputs):
@@ -203,6 +206,7 @@ class Controller:
     @dt.setter
     def dt(self, dt: float | None) -> None:
         self._step.problem.dt[()] = math.nan if dt is None else positive(dt, "dt")
+        self.pace.keep(dt)
         self._step.limits.elapsed[()] = self._step.problem.dt
 
     @property
@@ -229,7 +233,11 @@ class Controller:
         self._busy = True
         try:
             if self._needs_dt:
-                self._sample(float(t), q)
+                t, pace = float(t), self.pace
+                if t - pace.called > pace.latest:
+                    pace.late(t)
+                pace.called = t
+                self._sample(t, q)
             elif self._at_hand is None:
                 if self._solve(float(t), q) >= _FAILED:
                     self._fail(t, q)
@@ -541,6 +549,7 @@ class Controller:
             step_size=1.0 if self.step_size is None else self.step_size.share,
             partition=self.state.partition(len(self.rows)),
             added_residual=added_residual(problem, answer.u),
+            side=int(answer.side[()]),
         )
 
     def velocity(self, t: float, q: ArrayLike) -> Array:
@@ -576,6 +585,7 @@ class Controller:
     def reset(self) -> None:
         """Forget what the resolver remembers and the inputs before: the next call decides anew, from rest."""
         self.state.reset()
+        self.pace.forget()
         self.before[:] = 0.0
         self._step.problem.active[0] = 0
         if self.guard is not None:

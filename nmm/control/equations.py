@@ -254,6 +254,7 @@ def resolve(q: Array, integers: Integers, floats: Array) -> float:
         answer.scale[level] = 1.0
     answer.residual[()] = math.nan
     answer.measure[()] = math.nan
+    answer.side[()] = 0.0
     answer.excess[()] = math.nan
     call_resolver(e.resolver, e.problem, e.numbers, e.options, e.state, answer)
     finish(q, integers, floats)

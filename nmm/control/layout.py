@@ -26,6 +26,7 @@ from nmm.resolvers.answer import unanswered
 from nmm.resolvers.base import Resolver
 from nmm.resolvers.limited import limit
 from nmm.resolvers.problem import Dimensions, Problem
+from nmm.resolvers.problem_arrays import LOWER, UPPER
 from nmm.resolvers.state import State
 from nmm.robots.robot import Robot
 
@@ -101,6 +102,9 @@ def lay_out(
         limit_rows=np.zeros((len(kept.rows) + len(near.d), m)),
         limit_levels=[*(task.place(priority) for priority in kept.priorities), *(0 for _ in near.d)],
     )
+    arrays = problem.arrays._replace(limiter=limit.address if limited else 0)
+    numbers = kept.numbers(first[after : after + len(kept.functions)], robot)
+    arrays.stops[m + len(numbers.spin) :] = UPPER + LOWER
     dimensions = problem.dimensions
     setup, state = resolver.setup(dimensions), resolver.start(dimensions)
     program.lay_out(
@@ -113,8 +117,8 @@ def lay_out(
             terms=np.array(first[tasks:after], dtype=np.int64),
             weights=np.array([weight for weight, _ in weighted]),
             H=np.array(0.0),
-            problem=problem.arrays._replace(limiter=limit.address if limited else 0),
-            limits=kept.numbers(first[after : after + len(kept.functions)], robot),
+            problem=arrays,
+            limits=numbers,
             steering=NOTHING
             if steered is None
             else steered.numbers(first[-1], getattr(resolver, "alpha", 1.0)),

@@ -45,7 +45,7 @@ class SampleState:
         rows: Sequence[Array | Integers] = (),
     ) -> None:
         bounds = (problem.u_lower, problem.u_upper, problem.lower, problem.upper)
-        self._arrays = (*bounds, problem.before, problem.active, *rows)
+        self._arrays = (*bounds, problem.stops, problem.before, problem.active, *rows)
         self._mode = limits.mode
         self.elapsed = limits.elapsed
         self._step_size, self._backing = step_size, backing

@@ -15,7 +15,8 @@ class Step:
     r, r_d, error, rate (s,), J (s, m) of J_bar u = rate; objective H and gradient h (m,);
     u (m,), q_dot = S u (n,); status, scale (levels,), residual ‖J u - rate‖, measure, excess: see `Answer`;
     partition (s,) the columns of Ja, -1 where there is none; retreats so far; step_size, the share of α that
-    was taken; added_residual, how far the added task's rows are from their rate, 0 where rounding hides it.
+    was taken; added_residual, how far the added task's rows are from their rate, 0 where rounding hides it;
+    side, the sign of det J_e where the extended Jacobian inverted it, else 0.
 
     Examples
     --------
@@ -46,3 +47,4 @@ class Step:
     retreats: int = 0
     step_size: float = 1.0
     added_residual: float = 0.0
+    side: int = 0

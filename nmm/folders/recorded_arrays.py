@@ -34,6 +34,7 @@ LATER_ARRAYS = {
     "scale": "N.",
     "margin": "N",
     "step_size": "N",
+    "crossed": "N",
     "shares": "NL",
     "clearance": "K",
     "clearance_between": "K",
@@ -41,7 +42,7 @@ LATER_ARRAYS = {
     "clearance_points": "K6",
 }
 SHAPES = ARRAYS | OPTIONAL_ARRAYS | LATER_ARRAYS
-WHOLE_NUMBERS = frozenset({"partition", "clearance_pairs"})
+WHOLE_NUMBERS = frozenset({"partition", "crossed", "clearance_pairs"})
 #: Rows of tasks that are not active are no numbers, and margins and distances may be infinite; not these.
 FINITE = frozenset({"t", "q", "u", "q_dot", "path", "target"})
 #: Beyond it a motion has diverged long ago, and what is drawn of it overflows.

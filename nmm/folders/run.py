@@ -35,6 +35,7 @@ WERE = {
     "scale": lambda count: np.ones((count, 1)),
     "margin": lambda count: np.full(count, np.inf),
     "step_size": lambda count: np.ones(count),
+    "crossed": lambda count: np.zeros(count, dtype=np.int64),
     "shares": lambda count: np.zeros((count, 0)),
     "clearance": lambda count: np.zeros(0),
     "clearance_between": lambda count: np.zeros(0),

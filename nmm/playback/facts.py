@@ -67,8 +67,8 @@ def _facts(run: Trajectory) -> Iterator[tuple[str, str]]:
 
 
 def events(run: Trajectory, channels: Channels) -> Iterator[tuple[float, str]]:
-    """When, s, and what: tasks that come and go, limits reached, another partition, chattering, the error has
-    settled, the end where it is not just the end of time."""
+    """When, s, and what: tasks that come and go, limits reached, another partition, a singularity passed,
+    chattering, the error has settled, the end where it is not just the end of time."""
     for event in run.events:
         yield event.t, f"{event.task} {event.what}{f': {event.why}' if event.why else ''}"
     if len(run.shares) == len(run):
@@ -81,6 +81,8 @@ def events(run: Trajectory, channels: Channels) -> Iterator[tuple[float, str]]:
         for last in np.flatnonzero(np.diff(number)):
             before, after = (channels.partitions[int(number[i])] for i in (last, last + 1))
             yield float(channels.t[last + 1]), f"partition {before} → {after}"
+    for t in run.t[run.crossed > 0].tolist():
+        yield t, "J_e was singular on the way from the sample before"
     if (jumps := chattering(run.t, run.u, run.robot.u_names)) is not None:
         yield jumps.start, jumps.sentence
     if (settles := settling_time(run)) is not None:

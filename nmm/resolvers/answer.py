@@ -71,16 +71,18 @@ EXACT = 1e-9
 
 
 class AnswerArrays(NamedTuple):
-    """An `Answer` as kernels write it: u (m,); status, residual, measure and excess (); scale (levels,).
+    """An `Answer` as kernels write it: u (m,); status, residual, measure, side, excess (); scale (levels,).
 
     Before the kernel is called u, residual, measure and excess are not numbers (an excess that is one says
-    that limits were seen to), status is NOT_FINITE and scale is 1.
+    that limits were seen to), status is NOT_FINITE, side is 0 and scale is 1. `side` is the sign of det J_e
+    where the extended Jacobian inverts it: two samples on different sides have a singular J_e between them.
 
     Examples
     --------
     >>> written = nmm.AnswerArrays(
     ...     u=np.zeros(2), status=np.array(0.0), scale=np.ones(1),
-    ...     residual=np.array(0.0), measure=np.array(1.0), excess=np.array(0.0),
+    ...     residual=np.array(0.0), measure=np.array(1.0), side=np.array(0.0),
+    ...     excess=np.array(0.0),
     ... )
     >>> nmm.Answer.of(written).status.name
     'SOLVED'
@@ -91,6 +93,7 @@ class AnswerArrays(NamedTuple):
     scale: Vector
     residual: Cell
     measure: Cell
+    side: Cell
     excess: Cell
 
 
@@ -102,6 +105,7 @@ def unanswered(m: int, levels: int) -> AnswerArrays:
         scale=np.ones(levels),
         residual=np.array(np.nan),
         measure=np.array(np.nan),
+        side=np.array(0.0),
         excess=np.array(np.nan),
     )
 

@@ -21,25 +21,28 @@ def damp(
 ) -> None:
     """u, measure, residual, status and scale; W holds C (m, m), or (0, 0) where every weight is 1."""
     s, m = problem.J.shape
-    plain = W.shape[0] == 0
     J, u0, solution = scratch((s, m)), scratch(m), scratch(m)
-    if plain:
-        for j in range(m):
-            u0[j] = -alpha * problem.h[j]
-            for i in range(s):
-                J[i, j] = problem.J[i, j]
-    else:
-        weigh(problem, alpha, W, J, u0)
+    weigh(problem, alpha, W, J, u0)
     scales, dt = problem.row_scales, problem.dt[()]
     shares = scratch(problem.ends.shape[0])
     least, damped = damped_solution(
         J, scales, problem.rate, problem.ends, u0, law, damping, threshold, dt, solution, shares
     )
-    if plain:
-        for j in range(m):
-            answer.u[j] = solution[j]
-    else:
-        unweigh(W, solution, answer.u)
+    give(problem, W, solution, least, damped, shares, answer)
+
+
+@compiled
+def give(
+    problem: ProblemArrays,
+    W: Array,
+    solution: Array,
+    least: float,
+    damped: bool,
+    shares: Array,
+    answer: AnswerArrays,
+) -> None:
+    """Write the answer with u = C solution; least, damped and shares are `damped_solution`'s."""
+    unweigh(W, solution, answer.u)
     answer.measure[()] = least
     certify(problem, answer)
     if answer.status[()] == INEXACT and damped:
@@ -52,6 +55,12 @@ def damp(
 def weigh(problem: ProblemArrays, alpha: float, W: Array, weighted_J: Array, u0: Array) -> None:
     """J C and u0 = -α Cᵀ h, in ũ = C⁻¹ u, in which the weighted norm is the Euclidean one; W holds C."""
     s, m = problem.J.shape
+    if W.shape[0] == 0:
+        for j in range(m):
+            u0[j] = -alpha * problem.h[j]
+            for i in range(s):
+                weighted_J[i, j] = problem.J[i, j]
+        return
     for j in range(m):
         u0[j] = 0.0
         for i in range(s):
@@ -66,6 +75,6 @@ def weigh(problem: ProblemArrays, alpha: float, W: Array, weighted_J: Array, u0:
 def unweigh(W: Array, solution: Array, u: Array) -> None:
     """u = C ũ."""
     for j in range(u.shape[0]):
-        u[j] = 0.0
-        for k in range(u.shape[0]):
+        u[j] = solution[j] if W.shape[0] == 0 else 0.0
+        for k in range(W.shape[0]):
             u[j] += W[j, k] * solution[k]

@@ -15,6 +15,7 @@ from nmm.resolvers.base import RESOLVER, Resolver, Setup, StepRule, step_rule
 from nmm.resolvers.damped import damp
 from nmm.resolvers.problem import Dimensions
 from nmm.resolvers.problem_arrays import ProblemArrays
+from nmm.resolvers.stops import any_passed, damp_between_stops
 from nmm.resolvers.weights import Weights, metric_root
 from nmm.resolvers.within import bring_within
 
@@ -29,11 +30,15 @@ Damping = Literal["constant", "variable", "directions"]
 def damped_least_squares(
     problem: ProblemArrays, numbers: Array, options: Integers, state: Integers, answer: AnswerArrays
 ) -> None:
-    """`damped_solution`, with weights in the coordinates in which limits keep u near to it, too."""
+    """`damped_solution`, between stops; weights give the coordinates in which limits keep u near it, too."""
     m = problem.J.shape[1]
     plain = numbers.shape[0] == C
     W = view(numbers, 0 if plain else C, (0, 0) if plain else (m, m))
     damp(problem, numbers[ALPHA], options[LAW], numbers[DAMPING], numbers[THRESHOLD], W, answer)
+    if problem.ends.shape[0] == 1 and any_passed(problem, answer.u):
+        damp_between_stops(
+            problem, numbers[ALPHA], options[LAW], numbers[DAMPING], numbers[THRESHOLD], W, answer
+        )
     bring_within(problem, W, answer)
 
 

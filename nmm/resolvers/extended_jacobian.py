@@ -50,7 +50,7 @@ def extended_jacobian(
             M[i, j] = J[i, j] if i < s else problem.added_J[i - s, j]
         M[i, m] = problem.rate[i] if i < s else problem.added_rate[i - s]
         scales[i] = problem.row_scales[i] if i < s else problem.added_row_scales[i - s]
-    _, answer.measure[()] = eliminate(M, scales)
+    determinant, answer.measure[()] = eliminate(M, scales)
     if answer.measure[()] <= numbers[TOLERANCE]:
         order = integer_scratch(s)
         L = scratch((s, s))
@@ -58,6 +58,7 @@ def extended_jacobian(
         regular = orthonormal_rows(J, problem.row_scales, order, L, Q) > numbers[TOLERANCE]
         answer.status[()] = SINGULAR_JE if regular else SINGULAR_J
         return
+    answer.side[()] = 1.0 if determinant > 0.0 else -1.0
     for j in range(m):
         answer.u[j] = M[j, m]
     certify(problem, answer)

@@ -15,7 +15,7 @@ from nmm.resolvers.limited import limit
 from nmm.resolvers.problem_arrays import ProblemArrays
 
 #: What kernels have beside the problem's own numbers.
-MEMORY = ("ends", "active", "limiter")
+MEMORY = ("ends", "stops", "active", "limiter")
 
 
 class Dimensions(NamedTuple):
@@ -155,9 +155,12 @@ class Problem:
         """The numbers, as kernels read them."""
         ends = np.cumsum(self.levels or (), dtype=np.int64)
         own = {name: np.asarray(getattr(self, name)) for name in ProblemArrays._fields if name not in MEMORY}
-        active = np.zeros(1 + len(own["h"]) + len(own["lower"]), dtype=np.int64)
+        stops, active = (
+            np.zeros(more + len(own["h"]) + len(own["lower"]), dtype=np.int64) for more in (0, 1)
+        )
         limited = len(own["lower"]) > 0 or np.isfinite([own["u_lower"], own["u_upper"]]).any()
-        return ProblemArrays(ends=ends, active=active, limiter=limit.address if limited else 0, **own)
+        limiter = limit.address if limited else 0
+        return ProblemArrays(ends=ends, stops=stops, active=active, limiter=limiter, **own)
 
 
 def _rows(value: ArrayLike, m: int, name: str) -> Array:

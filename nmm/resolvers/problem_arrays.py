@@ -6,6 +6,9 @@ from typing import NamedTuple
 
 from nmm.kernels.memory import Cell, IntegerVector, Matrix, Vector
 
+#: What `stops` says of a bound.
+UPPER, LOWER = 1, 2
+
 
 class ProblemArrays(NamedTuple):
     """A `Problem` as kernels read it: s rows in levels, k added rows, l rows of limits, m inputs.
@@ -18,6 +21,7 @@ class ProblemArrays(NamedTuple):
     u_lower, u_upper (m,) : u_lower <= u <= u_upper, infinite for none
     limit_rows (l, m), lower (l,), upper (l,) : lower <= limit_rows u <= upper
     limit_levels (l,) : 0 for rows that are always kept, k for those that are kept before the k-th level
+    stops (m + l,) : which bounds of inputs, then of rows, end a way and are no speeds: UPPER, LOWER or both
     active (1 + m + l,) : which of them held back the step before (see `nearest_within`); changed
     before (m,) : the inputs of the step before
     dt () : the time that u will stand, s; not a number where it is not known
@@ -44,6 +48,7 @@ class ProblemArrays(NamedTuple):
     lower: Vector
     upper: Vector
     limit_levels: IntegerVector
+    stops: IntegerVector
     active: IntegerVector
     before: Vector
     dt: Cell

@@ -247,6 +247,7 @@ def _sample(controller: Controller, t: float, q: Array, earlier: float = -math.i
     elapsed, dt = controller.sample.elapsed, math.nan if controller.dt is None else controller.dt
     if t - earlier < dt * (1.0 - 1e-9):
         elapsed[()] = t - earlier
+    controller.pace.forget()  # compiled code has made those between
     try:
         controller(t, q)
     finally:

@@ -83,6 +83,8 @@ def remember(e: ControlStep, floats: Array, integers: Integers) -> None:
         integers[i] = p.active[i]
     for i in range(state):
         integers[active + i] = e.state[i]
+    for j in range(m):  # rows' never change
+        integers[active + state + j] = p.stops[j]
 
 
 @compiled
@@ -98,6 +100,8 @@ def recall(e: ControlStep, floats: Array, integers: Integers) -> None:
         p.active[i] = integers[i]
     for i in range(state):
         e.state[i] = integers[active + i]
+    for j in range(m):
+        p.stops[j] = integers[active + state + j]
 
 
 @compiled
@@ -182,7 +186,7 @@ def fly(
     b = views(LaidOut, integers, floats, 0).buffers
     p = e.problem
     n, m = found.q.shape[1], p.before.shape[0]
-    size, count = 3 * m + 2 * p.lower.shape[0], p.active.shape[0] + e.state.shape[0]
+    size, count = 3 * m + 2 * p.lower.shape[0], p.active.shape[0] + e.state.shape[0] + m
     was, now, decided = scratch(size), scratch(size), integer_scratch(e.state.shape[0] + 1)
     was_integers, now_integers = integer_scratch(count + 1), integer_scratch(count + 1)
     ahead = scratch(n)

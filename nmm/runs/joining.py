@@ -115,6 +115,7 @@ def join(
         margin=along("margin"),
         shares=along("shares"),
         step_size=along("step_size"),
+        crossed=np.concatenate([part.crossed for part in parts]),
         r=r,
         r_d=r_d,
         error=error,

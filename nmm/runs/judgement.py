@@ -21,6 +21,7 @@ from nmm.runs import reasons
 from nmm.runs.advice import Trial, advised
 from nmm.runs.assessment import Assessment, assess
 from nmm.runs.chattering import Chattering, chattering, moving_otherwise
+from nmm.runs.crossings import Crossings, crossings
 from nmm.runs.promise import Departure, Samples
 from nmm.runs.recording import Recorder
 from nmm.runs.residuals import residuals, run_up
@@ -96,7 +97,9 @@ def judge(
     there = goal is not None and goal.reached(samples.error[-1], controller.rows)
     found = assess(controller, recorder, advance, dt, held=not there)
     chatter = chattering(samples.t, samples.u, controller.robot.u_names)
+    passed = _passed(controller, recorder)
     seen = _seen(controller, recorder, samples, found, chatter)
+    seen += [passed.sentence] if passed else []
     troubled = found.unstable or found.missed or outcome is Outcome.DIVERGED
     advice = None
     # A task that distances hold back departs from its promise with any dt, and to try costs many runs.
@@ -122,10 +125,13 @@ def judge(
         return Verdict(Outcome.MISSED, _joined(told, *why, _tried(advice, dt)), [*warnings, *apart])
     if 2 * len(found.unstable) > found.examined:
         return Verdict(Outcome.UNSTABLE, stability, warnings)
+    if passed is not None and passed.jumped:
+        told = _told(samples, found.departure) if found.departure else ""
+        return Verdict(Outcome.MISSED, _joined(told, *seen), warnings)
     if found.departure is not None:
         warnings.append(_joined(_told(samples, found.departure), *seen))
-    elif chatter is not None:
-        warnings.append(chatter.sentence)
+    else:
+        warnings += seen
     if found.target and found.departure is None:
         warnings.append(_moved(found.target))
     if stability:
@@ -182,9 +188,16 @@ def _advice(
         except Exception:  # a user's function may raise anything, where it was not made for
             return Trial(False, [], float(samples.t[start]), float(samples.t[start]))
         behaves = outcome is Outcome.COMPLETED and not again.unstable and again.departure is None
+        behaves = behaves and _passed(controller, tried) is None
         return Trial(behaves, again.unstable, float(samples.t[start]), tried.reached)
 
     return advised(try_with, dt, recorder.duration, found.unstable)
+
+
+def _passed(controller: Controller, recorder: Recorder) -> Crossings | None:
+    """The singularities of J_e that lie between samples."""
+    robot, found = controller.robot, recorder.so_far
+    return crossings(recorder.t, found.u, found.side, robot.u_names, robot.u_units)
 
 
 def _stability(unstable: list[Instability], advice: Advice | None, method: str, dt: float) -> str:
@@ -229,6 +242,7 @@ def _seen(
         sentences = [
             reasons.out_of_reach(controller, q[left.worst], target[left.worst]),
             reasons.inputs_unmet(samples, left),
+            reasons.still_moving(controller, samples),
             reasons.singularity(controller, samples, q, left),
             reasons.switching(samples, left),
             "" if chatter is None else chatter.sentence,

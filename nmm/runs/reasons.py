@@ -25,6 +25,8 @@ JUMP = 0.01
 #: An arm is stretched where its frame is this share of its reach from its first joint, and what it can hardly
 #: do is a motion along that line (cosine).
 STRETCHED, ALONG = 0.75, 0.9
+#: A robot still moves whose inputs are this share of their largest over the last part of a run.
+MOVES, LATE = 0.01, 0.1
 #: So many switches of the partition are told.
 SWITCHES = 3
 
@@ -109,6 +111,25 @@ def inputs_unmet(samples: Samples, found: Departure) -> str:
     if found.unmet[found.worst] < 0.5 * excess:
         return ""
     return "the inputs did not do all that the task asked (clipped, scaled or damped)"
+
+
+def still_moving(controller: Controller, samples: Samples) -> str:
+    """A sentence where the robot still moves at the end before a target that stands, and not as that asks."""
+    asked, feedback = samples.rate, samples.feedback.rates(samples.error)
+    late = samples.t >= samples.t[-1] - LATE * (samples.t[-1] - samples.t[0])
+    lacks = samples.residual[late] > 0.5 * np.linalg.norm(asked[late], axis=1)
+    stands = np.linalg.norm((asked - feedback)[late], axis=1) < MOVES * np.linalg.norm(feedback[late], axis=1)
+    mean, largest = np.abs(samples.u[late]).mean(axis=0), np.abs(samples.u).max(axis=0)
+    robot = controller.robot
+    alike = np.equal.outer(robot.u_units, robot.u_units)
+    share = mean / np.maximum(np.where(alike, largest, 0.0).max(axis=1), 1e-300)
+    j = int(np.argmax(share))
+    if not (lacks.all() and stands.all() and share[j] > MOVES):
+        return ""
+    return (
+        f"the robot has not come to rest: |{robot.u_names[j]}| is {mean[j]:.3g} {robot.u_units[j]} on "
+        f"average over the last {samples.t[-1] - samples.t[late][0]:.3g} s"
+    )
 
 
 def unresolved(samples: Samples, found: Departure) -> str:

@@ -24,6 +24,7 @@ class Recorded(NamedTuple):
     unanswered (N,) : 1 where the resolver had no answer
     excess (N,) : by how much limits were widened
     step_size (N,) : the share of α that was taken
+    side (N,) : the sign of det J_e where the extended Jacobian inverted it, else 0
     """
 
     q: Matrix
@@ -43,6 +44,7 @@ class Recorded(NamedTuple):
     unanswered: IntegerVector
     excess: Vector
     step_size: Vector
+    side: IntegerVector
 
 
 def room(count: int, n: int, m: int, s: int, levels: int, limited: int) -> Recorded:
@@ -65,6 +67,7 @@ def room(count: int, n: int, m: int, s: int, levels: int, limited: int) -> Recor
         unanswered=np.zeros(count, dtype=np.int64),
         excess=np.zeros(count),
         step_size=np.ones(count),
+        side=np.zeros(count, dtype=np.int64),
     )
 
 
@@ -88,6 +91,7 @@ def note(e: ControlStep, b: Buffers, q: Array, partitioned: int, k: int, found: 
     found.objective[k] = e.H[()]
     found.residual[k] = e.answer.residual[()]
     found.excess[k] = e.answer.excess[()]
+    found.side[k] = int(e.answer.side[()])
     found.added_residual[k] = added_residual(e.problem, e.answer.u)
     for level in range(found.scale.shape[1]):
         found.scale[k, level] = e.answer.scale[level]

@@ -20,6 +20,7 @@ from nmm.resolvers.answer import Status
 from nmm.runs.binding import binding
 from nmm.runs.broken_limits import broken_limits, broken_rows
 from nmm.runs.clearance import ran_into, swept, told
+from nmm.runs.crossings import crossed
 from nmm.runs.feedback import Feedback
 from nmm.runs.margins import margin, shares, standing
 from nmm.runs.promise import Samples
@@ -302,6 +303,7 @@ class Recorder:
             residual=found.residual.copy(),
             scale=found.scale.copy(),
             step_size=found.step_size.copy(),
+            crossed=crossed(found.side),
             limited=controller.limits is not None,
             margin=margin(within[:, moving]),
             shares=within,

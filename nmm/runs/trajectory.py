@@ -63,6 +63,7 @@ class Trajectory:
     scale (N, levels): the share λ of the task's rate that was left, a priority level a column; 1 where
         nothing was relaxed on purpose
     step_size (N,): the share of α that was taken, 1 where it is constant
+    crossed (N,): 1 where the extended Jacobian was singular on the way from the sample before, else 0
     margin (N,): least distance to a limit, as a share of its range (see `nmm.runs.margins`), of all but the
         coordinates that stand still throughout; below 0 where one is broken, infinite without limits
     shares (N, limited): where each of `limit_names` is between its limits, 0 at the lower, 1 at the upper one
@@ -128,6 +129,7 @@ class Trajectory:
     shares: Array = field(default_factory=lambda: np.zeros((0, 0)))
     limit_names: tuple[str, ...] = ()
     step_size: Array = field(default_factory=lambda: np.ones(0))
+    crossed: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     clearance: Array = field(default_factory=lambda: np.zeros(0))
     clearance_between: Array = field(default_factory=lambda: np.zeros(0))
     clearance_pairs: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
