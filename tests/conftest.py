@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import signal
+from pathlib import Path
 
 import numpy as np
 import pytest
 from gripping import folding
+from site_pages import built
 from spatial_arms import load_tiago, load_ur5
 
 from nmm.robots.loading import load
@@ -42,6 +44,12 @@ def ur5() -> Robot:
 @pytest.fixture(scope="session")
 def tiago() -> Robot:
     return load_tiago()
+
+
+@pytest.fixture(scope="session")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the documentation's site."""
+    return built(tmp_path_factory.mktemp("site"))
 
 
 @pytest.fixture
