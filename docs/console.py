@@ -73,8 +73,6 @@ def compared(text: str) -> str:
 
 def _printed(command: str) -> str:
     """What a command prints, errors included, as a terminal would show it."""
-    from nmm.cli.exit_status import status_of
-
     program, *arguments = shlex.split(command, comments=True)
     if program == "cat":
         return "\n".join(Path(name).read_text(encoding="utf-8").strip("\n") for name in arguments)
@@ -85,6 +83,13 @@ def _printed(command: str) -> str:
         return done.stdout.strip("\n")
     if program != "nmm":
         raise ValueError(f"expected nmm, python or cat, got {command!r}")
+    return _done(arguments)[1].strip("\n")
+
+
+def _done(arguments: list[str]) -> tuple[int, str]:
+    """A command's exit status, and what it prints, errors included, where no "> FILE" takes it."""
+    from nmm.cli.exit_status import status_of
+
     printed = io.StringIO()
     with contextlib.ExitStack() as stack:
         stack.enter_context(contextlib.redirect_stderr(printed))
@@ -93,32 +98,41 @@ def _printed(command: str) -> str:
             *arguments, _, name = arguments
             out = stack.enter_context(Path(name).open("w", encoding="utf-8"))
         stack.enter_context(contextlib.redirect_stdout(out))
-        status_of(arguments)
-    return printed.getvalue().strip("\n")
+        status = status_of(arguments)
+    return status, printed.getvalue()
 
 
 def run(line: str) -> None:
-    """A command in a process of its own; `RuntimeError` where it fails."""
+    """A command; `RuntimeError` where it fails."""
     program, *arguments = shlex.split(line, comments=True) or [""]
     if program != "nmm":
         return
-    stays = arguments[0] in _STAYS or "--play" in arguments
-    command = [sys.executable, "-u", "-m", "nmm", *arguments, *(("--no-open",) if stays else ())]
+    if arguments[0] in _STAYS or "--play" in arguments:
+        status, said = _interrupted(arguments)
+        failed = status not in (0, 130) or "http://" not in said
+    else:
+        status, said = _done(arguments)
+        failed = status != 0
+    if failed:
+        raise RuntimeError(f"{line}: exit status {status}\n{said}")
+
+
+def _interrupted(arguments: list[str]) -> tuple[int, str]:
+    """The exit status and the words of a command that gets Ctrl-C when its page is open."""
+    command = [sys.executable, "-u", "-m", "nmm", *arguments, "--no-open"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     said = ""
     try:
-        if stays:
-            assert process.stdout is not None
-            for printed in process.stdout:
-                said += printed
-                if "http://" in printed:
-                    break
-            process.send_signal(signal.SIGINT)
+        assert process.stdout is not None
+        for printed in process.stdout:
+            said += printed
+            if "http://" in printed:
+                break
+        process.send_signal(signal.SIGINT)
         said += process.communicate(timeout=_PATIENCE)[0]
     finally:
         process.kill()
-    if process.returncode not in ((0, 130) if stays else (0,)) or (stays and "http://" not in said):
-        raise RuntimeError(f"{line}: exit status {process.returncode}\n{said}")
+    return process.returncode, said
 
 
 def shown(page: Path) -> list[str]:

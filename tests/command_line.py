@@ -7,7 +7,14 @@ import pty
 import re
 import subprocess
 import sys
+import threading
+from _thread import interrupt_main
 from pathlib import Path
+
+import pytest
+from ports import MOST
+
+from nmm.cli.exit_status import status_of
 
 NMM = [sys.executable, "-m", "nmm"]
 
@@ -22,6 +29,16 @@ class Result:
         """The text beside a label of a table."""
         line = next(line for line in self.out.splitlines() if line.startswith(label))
         return line[len(label) :].strip()
+
+
+def refused(captured: pytest.CaptureFixture[str], *arguments: str) -> Result:
+    """A command line in this process; one that is not refused, and would stay, gets Ctrl-C."""
+    late = threading.Timer(MOST, interrupt_main)
+    late.start()
+    try:
+        return Result(status_of(arguments), *captured.readouterr())
+    finally:
+        late.cancel()
 
 
 def process(folder: Path, *arguments: str, **environment: str) -> subprocess.Popen[str]:

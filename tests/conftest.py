@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import signal
+from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
+from expanding import expanded_once
 from gripping import folding
+from site_pages import built
 from spatial_arms import load_tiago, load_ur5
 
-from nmm.robots.loading import load
+from nmm.robots.loading import description, load, xacro_file
 from nmm.robots.robot import Robot
 
 
@@ -17,6 +21,19 @@ def pytest_configure() -> None:
     """A shell's "&" has SIGINT ignored, by the commands, too, that the tests interrupt."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _bundled_robots_are_expanded_once() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(description, "expand", expanded_once)
+        yield
+
+
+@pytest.fixture
+def xacro_each_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For tests of the loading itself."""
+    monkeypatch.setattr(description, "expand", xacro_file.expand)
 
 
 @pytest.fixture(scope="session")
@@ -42,6 +59,12 @@ def ur5() -> Robot:
 @pytest.fixture(scope="session")
 def tiago() -> Robot:
     return load_tiago()
+
+
+@pytest.fixture(scope="session")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the documentation's site."""
+    return built(tmp_path_factory.mktemp("site"))
 
 
 @pytest.fixture

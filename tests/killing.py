@@ -15,6 +15,7 @@ import pkgutil
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from contextlib import suppress
@@ -133,6 +134,8 @@ def _begin(request: Request) -> None:
         handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_TRUNC)
         os.dup2(handle, number)
         os.close(handle)
+    # What a killed process leaves for good is in the system's temporary folder.
+    tempfile.tempdir = os.environ["TMPDIR"] = request.scratch
     told = Path(request.scratch, "touched")
     told.write_text("", encoding="utf-8")
     if request.prepared:

@@ -15,6 +15,8 @@ from urdf_parts import AXIS, LIMIT, inertial, joint, link, robot, shape, write
 from nmm.errors import RobotError
 from nmm.robots.loading import find_problems, load
 
+pytestmark = pytest.mark.usefixtures("xacro_each_time")
+
 XACRO = 'name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"'
 LINKS = link("a") + link("b")
 NO_LIMIT = AXIS

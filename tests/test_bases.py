@@ -21,6 +21,8 @@ from surfaces import coincident, reach_down, surface
 from nmm.platforms import Car, DifferentialDrive, Layout, Mecanum, Tractor
 from nmm.robots.loading.layout import measure_layout
 
+pytestmark = pytest.mark.usefixtures("xacro_each_time")
+
 Array = NDArray[np.float64]
 ROBOTS = Path(__file__).resolve().parents[1] / "robots"
 

@@ -18,6 +18,8 @@ import yourdfpy
 from numpy.typing import NDArray
 from surfaces import coincident, reach_down, surface
 
+pytestmark = pytest.mark.usefixtures("xacro_each_time")
+
 ROBOTS = Path(__file__).resolve().parents[1] / "robots"
 
 # The geometry that the xacro files have to have by default; 2r's height is ours, the rest is the paper's.

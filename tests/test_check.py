@@ -24,6 +24,8 @@ from nmm.robots.loading.packages import package_file
 from nmm.robots.loading.report import Report, report
 from nmm.robots.loading.second_opinion import second_opinion
 
+pytestmark = pytest.mark.usefixtures("xacro_each_time")
+
 Command = Callable[..., Result]
 TIAGO = "robots/tiago_description/robots/tiago_no_hand.urdf"
 XACRO = 'name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"'

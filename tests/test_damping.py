@@ -205,7 +205,7 @@ def test_u_is_continuous_through_singularities(name: str, rng: np.random.Generat
             first, last = (np.hstack([J, U[:, :1] @ more]) for J in (first, last))
         rate, h = rng.normal(size=2), rng.normal(size=4)
         jumps, largest = [], 0.0
-        for count in (2001, 4001, 8001):
+        for count in (1001, 2001, 4001):
             state = RESOLVERS[name].start(Problem(first, rate, h).dimensions)
             u = [RESOLVERS[name].resolve(Problem(J, rate, h), state).u for J in through(first, last, count)]
             jumps.append(np.linalg.norm(np.diff(u, axis=0), axis=1).max())
@@ -215,7 +215,7 @@ def test_u_is_continuous_through_singularities(name: str, rng: np.random.Generat
             assert shorter < 0.55 * longer
         if name == "rg":
             undamped = ReducedGradient(3.0, [("u0", "u1")], threshold=1e-300)
-            apart = [undamped.resolve(Problem(J, rate, h)).u for J in through(first, last, 4000)]
+            apart = [undamped.resolve(Problem(J, rate, h)).u for J in through(first, last, 1000)]
             assert largest < 0.2 * np.linalg.norm(apart, axis=1).max()
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import page_of, process
+from command_line import page_of, refused
 from ports import MOST, listening, wait_for
 from tornado.httpclient import HTTPClientError, HTTPRequest
 from tornado.ioloop import IOLoop
@@ -501,7 +501,7 @@ def test_only_its_own_page_is_listened_to(tmp_path: Path) -> None:
         running.communicate()
 
 
-def test_bad_input_is_a_line(tmp_path: Path) -> None:
+def test_bad_input_is_a_line(capfd: pytest.CaptureFixture[str]) -> None:
     for arguments, words in (
         (["nothing_like_it"], "unknown robot or scenario"),
         (["unicycle_3r_sequence"], "tasks that come and go"),
@@ -509,13 +509,11 @@ def test_bad_input_is_a_line(tmp_path: Path) -> None:
         (["unicycle_2r", "--task", "position:nowhere"], "nowhere"),
         (["unicycle_3r_position", "--port", "99999"], "from 1 to 65535"),
     ):
-        running = process(tmp_path, "drive", *arguments, "--no-open")
-        out, err = running.communicate(timeout=MOST)
-        assert running.returncode == 2
-        assert out == ""
-        (line,) = err.splitlines()  # nothing is warned of that is refused
+        done = refused(capfd, "drive", *arguments, "--no-open")
+        assert (done.status, done.out) == (2, "")
+        (line,) = done.err.splitlines()  # nothing is warned of that is refused
         assert line.startswith("nmm drive: ")
-        assert words in err
+        assert words in line
 
 
 def test_a_scenario_error_names_its_key() -> None:

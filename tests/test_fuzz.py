@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import tempfile
+from collections.abc import Iterator
 
 import pytest
 from fuzz import HUNTS
@@ -12,6 +14,14 @@ from fuzz.hunting import KEPT, some, tried
 EXAMPLES = {
     "scenarios": 60, "robots": 80, "folders": 60, "caches": 15, "commands": 40, "films": 12, "problems": 60,
 }  # fmt: skip
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _what_hunts_keep_is_the_tests_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """They remove it when their process ends, which a worker of pytest-xdist does without a word."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tempfile, "tempdir", str(tmp_path_factory.mktemp("hunts")))
+        yield
 
 
 @pytest.mark.parametrize("name", HUNTS)

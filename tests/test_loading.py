@@ -25,6 +25,8 @@ from nmm.platforms import PLATFORMS, Layout, Unicycle
 from nmm.robots.loading import load
 from nmm.robots.robot import Robot
 
+pytestmark = pytest.mark.usefixtures("xacro_each_time")
+
 Array = NDArray[np.float64]
 
 SHARE = next(p for p in Path(pin.__file__).parents if p.name == "cmeel.prefix") / "share"

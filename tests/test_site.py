@@ -13,11 +13,6 @@ import pytest
 from site_pages import ROOT, Asked, built
 
 
-@pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return built(tmp_path_factory.mktemp("site"))
-
-
 @cache
 def asked(page: Path) -> Asked:
     return Asked(page.read_text(encoding="utf-8"))

@@ -13,7 +13,6 @@ from playback_browser import empty_page as empty_page
 from playback_browser import window as window
 from playwright.sync_api import Page
 from ports import served_folder
-from site_pages import built
 
 pytestmark = pytest.mark.browser
 
@@ -21,15 +20,10 @@ PAGES = ["index", "gallery", "singularities", "scenarios", "api/resolver", "api/
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return built(tmp_path_factory.mktemp("site"))
-
-
-@pytest.fixture(scope="module")
-def site(folder: Path) -> Iterator[str]:
-    """Its address on a server."""
-    with served_folder(folder) as address:
-        yield address
+def address(site: Path) -> Iterator[str]:
+    """The site's, on a server."""
+    with served_folder(site) as found:
+        yield found
 
 
 def finds_the_resolvers(page: Page) -> None:
@@ -41,27 +35,27 @@ def finds_the_resolvers(page: Page) -> None:
     assert any("/api/resolver.html" in link for link in found)
 
 
-def test_the_search_finds_the_resolvers(site: str, window: Window) -> None:
-    finds_the_resolvers(window.open(f"{site}/index.html"))
+def test_the_search_finds_the_resolvers(address: str, window: Window) -> None:
+    finds_the_resolvers(window.open(f"{address}/index.html"))
     window.page.wait_for_load_state("networkidle")
 
 
-def test_the_search_works_without_a_server(folder: Path, empty_page: Page) -> None:
+def test_the_search_works_without_a_server(site: Path, empty_page: Page) -> None:
     """Not watched: of files a browser shows no excerpts of what is found, and says so."""
-    empty_page.goto((folder / "index.html").as_uri())
+    empty_page.goto((site / "index.html").as_uri())
     finds_the_resolvers(empty_page)
     empty_page.wait_for_load_state("networkidle")
     empty_page.goto("about:blank")
 
 
-def test_light_and_dark(site: str, window: Window) -> None:
+def test_light_and_dark(address: str, window: Window) -> None:
     """As the reader's system has it, and the other way at the press of a button."""
     page = window.page
     page.set_viewport_size({"width": 1280, "height": 900})
     grounds = {}
     for scheme in ("light", "dark"):
         page.emulate_media(color_scheme=scheme)
-        window.open(f"{site}/index.html")
+        window.open(f"{address}/index.html")
         grounds[scheme] = page.evaluate("getComputedStyle(document.body).backgroundColor")
     assert grounds["light"] != grounds["dark"]
     page.click(".theme-toggle-content button")
@@ -71,21 +65,21 @@ def test_light_and_dark(site: str, window: Window) -> None:
 
 
 @pytest.mark.parametrize("name", PAGES)
-def test_a_page_fits_a_phone(site: str, window: Window, name: str) -> None:
+def test_a_page_fits_a_phone(address: str, window: Window, name: str) -> None:
     window.page.set_viewport_size({"width": 420, "height": 900})
-    page = window.open(f"{site}/{name}.html")
+    page = window.open(f"{address}/{name}.html")
     assert page.evaluate("document.documentElement.scrollWidth") == 420
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("name", PAGES)
-def test_a_page_has_no_serious_fault(site: str, window: Window, name: str, scheme: str) -> None:
+def test_a_page_has_no_serious_fault(address: str, window: Window, name: str, scheme: str) -> None:
     file = os.environ.get("NMM_AXE", "")
     if not file:
         pytest.skip("axe-core is not here: npm install axe-core, and NMM_AXE=…/axe-core/axe.min.js")
     page = window.page
     page.emulate_media(color_scheme=scheme)
-    window.open(f"{site}/{name}.html")
+    window.open(f"{address}/{name}.html")
     page.evaluate(Path(file).read_text(encoding="utf-8"))
     faults = page.evaluate(
         "axe.run().then(({ violations }) => violations.map(({ impact, id }) => [impact, id]))"

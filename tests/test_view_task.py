@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from command_line import page_of, process
+from command_line import page_of, refused
 from gripping import folding
 from live_pages import LivePage
 from ports import MOST, free_port, listening, wait_for
@@ -277,7 +277,7 @@ def test_the_command_takes_a_strangers_robot_and_where_it_is(tmp_path: Path) -> 
     assert (running.returncode, err) == (0, "")
 
 
-def test_bad_input_is_a_line(tmp_path: Path) -> None:
+def test_bad_input_is_a_line(capfd: pytest.CaptureFixture[str]) -> None:
     for arguments, words in (
         (["unicycle_2r", "--task", "pose"], "at most 4"),
         (["unicycle_2r", "--task", "position:nowhere"], "nowhere"),
@@ -291,11 +291,10 @@ def test_bad_input_is_a_line(tmp_path: Path) -> None:
         (["car_base", "--arm", "small_arm", "--at", "a", "--at", "b"], "one frame that carries the arm"),
         (["car_base", "--arm", "small_arm", "--at", "nowhere"], "nowhere"),
     ):
-        running = process(tmp_path, "view", *arguments, "--no-open")
-        out, err = running.communicate(timeout=MOST)
-        assert running.returncode == 2, (out, err)
-        assert words in err
-        assert len(err.splitlines()) == 1
+        done = refused(capfd, "view", *arguments, "--no-open")
+        assert done.status == 2, (done.out, done.err)
+        (line,) = done.err.splitlines()
+        assert words in line
 
 
 def of(page: LivePage, kind: str) -> list[dict[str, Any]]:
