@@ -10,6 +10,8 @@ from nmm.kernels.memory import Cell, IntegerVector, Matrix, Vector
 class ProblemArrays(NamedTuple):
     """A `Problem` as kernels read it: s rows in levels, k added rows, l rows of limits, m inputs.
 
+    Attributes
+    ----------
     J (s, m), rate (s,) : J u = rate, one level of priority below the other
     row_scales (s,) : the natural size of each row, in its unit
     ends (levels,) : the row after the last of each level
