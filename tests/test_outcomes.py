@@ -177,7 +177,21 @@ def test_what_a_motion_does_otherwise_is_no_honest_error(robot_2r: Robot) -> Non
         run = nmm.simulate(nmm.Controller(robot_2r, TIP, Liar(wrong)), START, 4.0, dt, method)
         assert run.outcome is nmm.Outcome.MISSED, (method, dt)
         began, ended = run.error_norm[[0, -1]]
-        assert f"{began:.3g} at first, {ended:.3g} at the end (promised" in run.message
+        assert f": {began:.3g} at first, " in run.message
+        assert f"{ended:.3g} at the end (promised" in run.message
+
+
+def test_the_worst_error_is_told_beside_the_last() -> None:
+    """Of a run that went far off and came back only in part."""
+    run = nmm.Scenario.load("unicycle_3r_out_of_reach", {"resolver.kind": "pg"}).run()
+    assert run.outcome is nmm.Outcome.MISSED
+    told = re.findall(r"([\d.]+) at t = ([\d.]+) s \(promised", run.message)
+    assert len(told) == 1
+    size, t = map(float, told[0])
+    k = int(np.argmin(abs(run.t - t)))
+    assert run.error_norm[k] == pytest.approx(size, rel=5e-3)
+    assert f"{run.error_norm[-1]:.3g} at the end (promised" in run.message
+    assert size > 2.0 * run.error_norm[-1]
 
 
 def reference(function: Callable[[float], list[float]]) -> nmm.Task:

@@ -26,6 +26,8 @@ from nmm.robots.robot import Robot
 class Row(NamedTuple):
     """One component of a function.
 
+    Attributes
+    ----------
     name, unit : for people, and to tell metres from radians
     angular : whether it is an angle whose differences wrap
     scale : its natural size in its unit, against which ranks are judged; None for the robot's reach in
@@ -110,6 +112,8 @@ class Stage:
 class Shown(NamedTuple):
     """What a function is about, for those who draw a run.
 
+    Attributes
+    ----------
     positions : the frame whose origin it puts somewhere in the world
     axes : the world axes ("x", "y", "z") along which it does, each with the row that holds it, in m
     turns : the frame that it turns

@@ -21,6 +21,10 @@ MEMORY = ("ends", "stops", "active", "limiter")
 class Dimensions(NamedTuple):
     """What stays the same from step to step: rows of the task and of the added task, names of the inputs.
 
+    Attributes
+    ----------
+    s, k : rows of the task and of the added task
+    inputs : their names
     groups : inputs that are spoken of together, by the group's name ("platform", "arm")
     levels : the rows of each level of priority; one level when empty
 

@@ -13,6 +13,8 @@ UPPER, LOWER = 1, 2
 class ProblemArrays(NamedTuple):
     """A `Problem` as kernels read it: s rows in levels, k added rows, l rows of limits, m inputs.
 
+    Attributes
+    ----------
     J (s, m), rate (s,) : J u = rate, one level of priority below the other
     row_scales (s,) : the natural size of each row, in its unit
     ends (levels,) : the row after the last of each level

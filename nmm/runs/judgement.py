@@ -215,14 +215,19 @@ def _tried(advice: Advice | None, dt: float) -> str:
 
 
 def _told(samples: Samples, found: Departure) -> str:
-    """What was promised and was: at the end, or where the end is as promised, where it was the worst."""
+    """What was promised and was: where it was the worst, and at the end, where that is not as promised."""
     norm = np.linalg.norm(samples.error, axis=1)
-    k = len(norm) - 1 if norm[-1] > found.bound[-1] else found.worst
-    where = "at the end" if k == len(norm) - 1 else f"at t = {samples.t[k]:.4g} s"
-    return (
-        f"the error left its gain's promise at t = {samples.t[found.first]:.4g} s: "
-        f"{norm[0]:.3g} at first, {norm[k]:.3g} {where} (promised {found.bound[k]:.2g})"
-    )
+    last = len(norm) - 1
+
+    def at(k: int) -> str:
+        where = "at the end" if k == last else f"at t = {samples.t[k]:.4g} s"
+        return f"{norm[k]:.3g} {where} (promised {found.bound[k]:.2g})"
+
+    missed = norm[last] > found.bound[last]
+    stays = missed and f"{norm[last]:.3g}" == f"{norm[found.worst]:.3g}"
+    told = [at(last)] if stays or found.worst == last else [at(found.worst), *([at(last)] if missed else [])]
+    first = f"the error left its gain's promise at t = {samples.t[found.first]:.4g} s"
+    return f"{first}: {', '.join([f'{norm[0]:.3g} at first', *told])}"
 
 
 def _seen(
