@@ -30,6 +30,7 @@ from ports import MOST, free_port, listening, served
 
 import nmm
 from nmm.playback import view
+from nmm.playback.asked import asked_for
 from nmm.playback.extent import corners
 from nmm.playback.rolling import Rolling
 from nmm.robots.robot import Robot
@@ -231,6 +232,20 @@ def test_the_robot_is_in_the_picture_also_after_it_moved(
                 local = corners(np.array([box.min_, box.max_]))
                 points += (local @ placement[:3, :3].T + placement[:3, 3]).tolist()
             assert np.abs(page.evaluate(PROJECT, points)).max() < 1.0
+
+
+def test_what_a_scenario_asks_for_is_in_the_picture(window: Window) -> None:
+    """The target with its obstacle, which are metres away, and a path."""
+    window.page.set_viewport_size({"width": 1280, "height": 800})
+    for name in ("unicycle_3r_crossing", "unicycle_2r_position"):
+        scenario = nmm.Scenario.load(name)
+        robot = scenario.robot()
+        asked = asked_for(scenario, robot)
+        points = [one for one in (asked.desired, asked.target) if one is not None]
+        with shown(robot, q=asked.q[0], beside=asked) as url:
+            page = window.open(url)
+            assert np.abs(page.evaluate(PROJECT, np.vstack(points).tolist()))[:, :2].max() < 1.0
+            assert page.evaluate("nmm.camera.held().length") > 8
 
 
 def test_the_camera_comes_along_where_the_arm_bends_out_of_the_picture(

@@ -22,6 +22,8 @@ from nmm.robots.robot import Robot
 
 #: Limits beyond this, m or rad, are none.
 UNBOUNDED = 1e3
+#: About so many points of what stands beside the robot are kept in the picture.
+HELD = 60
 #: Where a slider ends to which there is no limit: rad, m of the platform, m of the arm.
 ANGLE, WAY, REACH = float(np.pi), 3.0, 1.0
 
@@ -59,7 +61,7 @@ def viewer_scene(
     drawing.add("frames", frames=listed, shown=frames, length=length, pose=shown_pose)
     if task is not None:
         drawing.commands.append(task.told(q))
-    drawing.add("hold")
+    drawing.add("hold", beside=seen[:: max(1, len(seen) // HELD)].tolist())
     # The last command says that everything has come.
     return [*commands[:-1], *drawing.commands, commands[-1]]
 

@@ -111,10 +111,11 @@
     return [...found, ...joints.beside.flatMap((points) => points())];
   }
 
-  // The camera holds the robot as it stands now, with some room for names, not all that it could reach.
-  nmm.hooks.hold = () => {
+  // The camera holds the robot as it stands now and what stands beside it (m, world), with some room for names,
+  // not all that it could reach.
+  nmm.hooks.hold = ({ beside }) => {
     nmm.camera.held = () => {
-      const held = corners();
+      const held = [...corners(), ...beside.map(([x, y, z]) => new THREE.Vector3(x, z, -y))];
       const box = new THREE.Box3().setFromPoints(held);
       const middle = box.getCenter(new THREE.Vector3());
       const room = 0.02 + 0.04 * box.getSize(new THREE.Vector3()).length();

@@ -196,14 +196,13 @@ class _Report:
             lost = isinstance(self.meshes.get(name), str) and _NOWHERE not in name
             if lost and isinstance(mesh, Element):
                 missing.setdefault(name, mesh)
-        words = {
-            None: ": refused unless missing_meshes='skip' (--missing-meshes skip)",
-            "skip": "; its shape is left out",
-        }.get(self.options.get("missing_meshes"), "")
+        usual = ": refused unless missing_meshes='skip' (--missing-meshes skip)"
+        asked = self.options.get("missing_meshes", usual)
+        words = {"skip": "; its shape is left out", "error": ""}.get(asked, asked)
         found = [
             Problem(f"mesh {name!r}: {self.meshes[name]}{words}", mesh.line) for name, mesh in missing.items()
         ]
-        if self.options.get("missing_meshes") == "error":
+        if asked == "error":
             return found
         self.warnings += found
         return []
