@@ -81,7 +81,7 @@ def events(run: Trajectory, channels: Channels) -> Iterator[tuple[float, str]]:
         for last in np.flatnonzero(np.diff(number)):
             before, after = (channels.partitions[int(number[i])] for i in (last, last + 1))
             yield float(channels.t[last + 1]), f"partition {before} → {after}"
-    for t in run.t[run.crossed > 0].tolist():
+    for t in run.t[np.flatnonzero(run.crossed)].tolist():
         yield t, "J_e was singular on the way from the sample before"
     if (jumps := chattering(run.t, run.u, run.robot.u_names)) is not None:
         yield jumps.start, jumps.sentence
