@@ -66,9 +66,9 @@ resolver: {{kind: pg, alpha: 1}}
 
 
 def scenario(
-    folder: Path, more: str = "", *, start: str = "", duration: float = 1.0, speed: float = 0.3, **of: float
+    folder: Path, more: str = "", *, start: str = "", duration: float = 1.0, speed: float = 0.3
 ) -> Path:
-    """A scenario that leads the cart's grasp along a line; `more`: keys, `of`: as `cart` takes them."""
-    source = cart(folder / "cart.urdf", **of)  # type: ignore[arg-type]
+    """A scenario that leads the cart's grasp along a line; `more`: keys of it."""
+    source = cart(folder / "cart.urdf")
     text = SCENARIO.format(source=source, start=start, more=more, duration=duration, end=1.2643 + 10 * speed)
     return write(folder / "cart.yaml", text)
