@@ -26,13 +26,21 @@ def controllers() -> tuple[dict[str, nmm.Controller], np.ndarray]:
     q = robot.q(scenario.parts.q0)
 
     def keeping(collisions: nmm.Collisions | None) -> nmm.Controller:
-        given = robot, plain.task, plain.resolver, plain.objective, None, plain.limits, scenario.parts.dt
+        given = (
+            robot,
+            plain.task,
+            plain.resolver,
+            plain.given.objective,
+            None,
+            plain.limits,
+            scenario.parts.dt,
+        )
         return nmm.Controller(*given, collisions=collisions)
 
     def active(controller: nmm.Controller) -> int:
         controller(T, q)
-        assert controller.setting is not None
-        return int(controller.setting.queries.scene.active.sum())
+        assert controller.solver.scene is not None
+        return int(controller.solver.scene.queries.scene.active.sum())
 
     far = [nmm.Obstacle(nmm.Sphere(0.1), [20.0, 0.0, 0.0], name="far")]
     found = {"none": keeping(None), "200 pairs": keeping(nmm.Collisions(0.02, obstacles=far))}
@@ -40,7 +48,7 @@ def controllers() -> tuple[dict[str, nmm.Controller], np.ndarray]:
     hand = nmm.Configuration(robot, q).placement(HAND).translation
     ball = [nmm.Obstacle(nmm.Sphere(0.05), hand + np.array([0.15, 0.0, 0.0]), name="ball")]
     for band in np.arange(0.1, 3.0, 0.02):
-        near = keeping(nmm.Collisions(0.02, obstacles=ball, self=False, band=float(band)))
+        near = keeping(nmm.Collisions(0.02, obstacles=ball, self_collisions=False, band=float(band)))
         if active(near) >= NEAR:
             break
     found["20 near"] = near
@@ -58,10 +66,10 @@ def main() -> None:
     print(f"{'':12}{'pairs':>7}{'near':>6}{'rows':>6}{'looked':>8}{'µs':>8}{'ratio':>7}{'aim':>6}")
     for (name, controller), aim in zip(found.items(), (None, 120, 60), strict=True):
         counts = ""
-        if controller.setting is not None and controller.guard is not None:
-            scene = controller.setting.queries.scene
-            looked = "yes" if controller.guard.held else "no"
-            rows = int(controller._step.near.used)
+        if controller.solver.scene is not None and controller.safety_filter is not None:
+            scene = controller.solver.scene.queries.scene
+            looked = "yes" if controller.safety_filter.held else "no"
+            rows = int(controller.solver.found.near.used)
             counts = f"{len(scene.pairs):7}{int(scene.active.sum()):6}{rows:6}{looked:>8}"
         best = min(times[name])
         print(f"{name:12}{counts:27}{best:8.1f}{best / min(times['none']):7.2f}{aim or '':>6}")

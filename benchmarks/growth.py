@@ -55,7 +55,7 @@ def snakes(folder: Path, *lengths: int) -> tuple[nmm.Robot, np.ndarray]:
     return robot, q
 
 
-def task(robot: nmm.Robot, q: np.ndarray, function: nmm.Function, priority: int = 1) -> nmm.Task:
+def task(robot: nmm.Robot, q: np.ndarray, function: nmm.extending.Function, priority: int = 1) -> nmm.Task:
     """A task whose target is near where the function is at q."""
     value = nmm.evaluate(function, 0.0, nmm.Configuration(robot, q)).value
     return nmm.Task(function, value + 0.01, priority=priority)
@@ -92,7 +92,7 @@ def timed(table: list[tuple[str, Calls]]) -> list[list[str]]:
     ]
 
 
-def functions() -> list[nmm.Function]:
+def functions() -> list[nmm.extending.Function]:
     """12 rows of two frames: position and orientation of the hand, and of a link in the middle."""
     middle = f"a{JOINTS // 2}_link"
     return [nmm.Position("a"), nmm.Orientation("a"), nmm.Position(middle), nmm.Orientation(middle)]

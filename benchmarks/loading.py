@@ -16,8 +16,8 @@ from collections.abc import Callable
 from typing import TypeVar
 
 import nmm
-from nmm.robots.loading.tips import first_tip
 from nmm.robots.meshes import is_unread
+from nmm.robots.reach import first_tip
 
 PUBLIC = "package://example-robot-data/robots"
 ROBOTS = {

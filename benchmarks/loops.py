@@ -17,7 +17,7 @@ import numpy as np
 
 import nmm
 from nmm.control.integrators import RK4
-from nmm.runs.closed_loop import driven, sample_times
+from nmm.runs.closed_loop import drive_loop, sample_times
 from nmm.runs.recording import Recorder
 
 ROBOTS, ROUNDS, STAGES = 64, 5, 4
@@ -45,7 +45,7 @@ def measured(name: str) -> tuple[float, float, float, float]:
 
     def integrated() -> None:
         recorder.clear()
-        driven(controller, RK4, recorder, times, q0)
+        drive_loop(controller, RK4, recorder, times, q0)
 
     def many(threads: int) -> float:
         each = STAGES * (len(times) - 1)

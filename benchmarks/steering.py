@@ -53,7 +53,7 @@ def robots() -> dict[str, tuple[nmm.Robot, str, dict[str, float]]]:
     }
 
 
-def paths(height: float) -> dict[str, nmm.Function]:
+def paths(height: float) -> dict[str, nmm.extending.Function]:
     """About 0.4 m/s: a circle of 2.5 m, an eight of 6 m by 3 m, a spline with a tight bend."""
     angle = np.linspace(0.0, 2.0 * np.pi, 33)
     eight = np.column_stack([3.0 * np.sin(angle), 1.5 * np.sin(2.0 * angle), np.full(33, height)])

@@ -106,7 +106,7 @@ class Workload:
         """nmm's controller of this workload."""
         free = self.without_limits
         return nmm.Controller(
-            *(self.robot, free.task, free.resolver, free.objective),
+            *(self.robot, free.task, free.resolver, free.given.objective),
             limits=self.limits if limits else None,
             dt=self.dt,
             kinematics=kinematics,
@@ -135,7 +135,7 @@ class Workload:
             if np.isfinite(upper - lower)
         }
 
-    def told(self) -> dict[str, Any]:
+    def describe(self) -> dict[str, Any]:
         """Everything that a worker without nmm needs, of plain numbers and text."""
         positions, orientations = self.targets()
         posture = self.posture()
@@ -243,7 +243,7 @@ def write(folder: Path) -> Path:
     """The file of both workloads that the workers read."""
     told = {}
     for name in WORKLOADS:
-        told[name] = Workload(name).told()
+        told[name] = Workload(name).describe()
         for base, text in told[name]["urdf"].items():
             path = folder / f"{name}_{base}.urdf"
             path.write_text(text)

@@ -2,6 +2,8 @@
 
     python docs/make_gallery.py             the page and the pictures, by running every scenario
     python docs/make_gallery.py --page      the page alone
+    python docs/make_gallery.py --folder DIR [NAME …]     a folder with every scenario, or those named:
+                                            index.html with pictures, numbers, files, pages that play them
 
 The titles are those of the scenario files; a test compares the page with them.
 """
@@ -14,6 +16,7 @@ import nmm
 from nmm.bundled import bundled_scenarios
 
 HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE / "building"))
 PICTURES = HERE / "images" / "gallery"
 #: Of a picture, px, and how many colours.
 WIDTH, COLOURS = 640, 256
@@ -21,8 +24,8 @@ INTRODUCTION = """\
 # Gallery
 
 Every scenario that comes with `nmm`, drawn at instants of its motion, from above and, where the arm
-rises, from the side. `nmm run NAME --play` plays one in the browser; `nmm gallery` writes a page with all
-of them to play, with their numbers.
+rises, from the side. `nmm run NAME --play` plays one in the browser. From the repository,
+`python docs/make_gallery.py --folder DIR` writes a page with all of them to play, with their numbers.
 To begin one of your own, copy the file and change it ([all keys](scenarios.md)).
 
 """
@@ -43,9 +46,8 @@ def page() -> str:
 
 def draw() -> None:
     """A small picture of each scenario's run."""
+    from gallery import write_gallery
     from PIL import Image
-
-    from nmm.gallery import write_gallery
 
     PICTURES.mkdir(exist_ok=True)
     for old in PICTURES.glob("*.png"):
@@ -60,7 +62,20 @@ def draw() -> None:
             few.save(PICTURES / f"{card.name}.png", optimize=True)
 
 
+def write_folder(folder: str, *only: str) -> bool:
+    """The gallery's folder; whether every scenario ran to its end."""
+    from gallery import write_gallery
+
+    made = write_gallery(Path(folder), only)
+    for card in made.cards:
+        print(f"{card.name}: {card.outcome}" + ("" if card.ran else f": {card.message}"))
+    print(f"open {made.index}")
+    return all(card.ran for card in made.cards)
+
+
 if __name__ == "__main__":
+    if sys.argv[1:2] == ["--folder"]:
+        sys.exit(0 if write_folder(*sys.argv[2:]) else 1)
     if "--page" not in sys.argv:
         draw()
     (HERE / "gallery.md").write_text(page(), encoding="utf-8")

@@ -8,4 +8,36 @@ import lazy_loader
 
 __version__ = "0.1.0"
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+#: Names that authors need, which were in front before.
+_EXTENDING = """
+    AddedJoint AnswerArrays Dimensions Evaluation Event Function Kernel Layout LimitReport LiveNumbers
+    Objective PiecewisePolynomial PinocchioModels Pivot Platform ProblemArrays Quantity Residuals
+    Resolver RollingJoint Rollouts Row Semantics Setup Shape Shapes Shown Stage State SteeredAxle
+    SteeringPivot Step Table Wheel WheelDescription WheelRate
+"""
+#: Names that were in front before, and where they are now.
+MOVED = {name: f"extending.{name}" for name in _EXTENDING.split()} | {
+    "Coordinates": "LinearCoordinates",
+    "Fixed": "FixedBase",
+    "Follower": "extending.MimicJoint",
+    "Mesh": "ConvexMesh",
+    "Plane": "HalfSpace",
+    "Postures": "extending.NamedPostures",
+    "Signal": "LiveTarget",
+    "Speed": "WheelSpeed",
+    "Spin": "WheelSpin",
+    "Spins": "WeightedSpins",
+    "Square": "QuadraticTerm",
+    "Swept": "extending.SweepResult",
+    "Turn": "SteadyTurn",
+    "Velocity": "VelocityOf",
+    "WeighedManipulability": "WeightedManipulability",
+}
+
+_loaded, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+
+def __getattr__(name: str) -> object:
+    if name in MOVED:
+        raise AttributeError(f"nmm.{name} is now nmm.{MOVED[name]}")
+    return _loaded(name)

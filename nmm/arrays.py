@@ -1,7 +1,5 @@
 """The arrays that users give: turned into float64, checked once, with errors that name them."""
 
-from __future__ import annotations
-
 import math
 from numbers import Integral
 from typing import TypeVar
@@ -10,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nmm.errors import InputError
-from nmm.words import quoted
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -23,9 +20,9 @@ def array(value: ArrayLike, name: str) -> Array:
     try:
         result = np.array(value, dtype=np.float64, order="C")
     except (TypeError, ValueError):
-        raise InputError(f"{name}: expected numbers, got {quoted(value)}") from None
+        raise InputError(where=name, expected="numbers", got=value) from None
     if not np.isfinite(result).all():
-        raise InputError(f"{name}: expected finite numbers, got {one_line(result)}")
+        raise InputError(where=name, expected="finite numbers", got=result)
     return result
 
 
@@ -35,58 +32,84 @@ def interpolated(times: Array | float, t: Array, values: Array) -> Array:
     return np.ascontiguousarray(columns.T).reshape(*np.shape(times), values.shape[1])
 
 
-def one_line(value: Array) -> str:
-    """An array for an error message."""
-    return " ".join(np.array2string(value, threshold=20).split())
+def infinite(value: ArrayLike, name: str, expected: str) -> Array:
+    """A float64 array of at most one axis as one of one axis; infinite numbers may be among them."""
+    try:
+        found = np.atleast_1d(np.array(value, dtype=np.float64))
+    except (TypeError, ValueError):
+        found = np.array([np.nan])
+    if found.ndim != 1 or np.any(np.isnan(found)):
+        raise InputError(where=name, expected=expected, got=value)
+    return found
 
 
-def vector(value: ArrayLike, length: int | None, name: str) -> Array:
-    """A finite float64 vector of `length` numbers (any length when None)."""
+def vector(value: ArrayLike, length: int | tuple[int, ...] | None, name: str) -> Array:
+    """A finite float64 vector of `length` numbers, or of one of several lengths (any when None)."""
     result = array(value, name)
-    if result.ndim != 1 or (length is not None and result.size != length):
-        expected = "a vector" if length is None else f"{length} numbers"
-        raise InputError(f"{name}: expected {expected}, got shape {result.shape}")
+    lengths = (length,) if isinstance(length, int) else length
+    if result.ndim != 1 or (lengths is not None and result.size not in lengths):
+        numbers = "a vector" if lengths is None else f"{' or '.join(map(str, lengths))} numbers"
+        raise InputError(where=name, expected=numbers, got=result)
     return result
 
 
-def scalar(value: ArrayLike, name: str) -> float:
-    """A finite number."""
-    if isinstance(value, float) and math.isfinite(value):
+def nonzero_vector(value: ArrayLike, length: int | None, name: str) -> Array:
+    result = vector(value, length, name)
+    if np.linalg.norm(result) == 0.0:
+        raise InputError(where=name, expected="a vector that is not zero", got=result)
+    return result
+
+
+def scalar(
+    value: ArrayLike,
+    name: str,
+    *,
+    above: float = -math.inf,
+    least: float = -math.inf,
+    below: float = math.inf,
+    most: float = math.inf,
+) -> float:
+    """A finite number within the bounds given."""
+    if not (isinstance(value, float) and math.isfinite(value)):
+        if isinstance(value, bool | np.bool_):
+            raise InputError(where=name, expected="a number", got=value)
+        result = array(value, name)
+        if result.ndim != 0:
+            raise InputError(where=name, expected="a number", got=result)
+        value = float(result)
+    if above < value < below and least <= value <= most:
         return float(value)
-    if isinstance(value, bool | np.bool_):
-        raise InputError(f"{name}: expected a number, got {value}")
-    result = array(value, name)
-    if result.ndim != 0:
-        raise InputError(f"{name}: expected a number, got shape {result.shape}")
-    return float(result)
+    bounds = {"above": above, "from": least, "below": below, "to": most}
+    said = [f"{word} {bound:g}" for word, bound in bounds.items() if math.isfinite(bound)]
+    joined = (" " if "to" in said[-1] else " and ").join(said)
+    raise InputError(where=name, expected=f"a number {joined}", got=float(value))
 
 
 def positive(value: ArrayLike, name: str) -> float:
-    """A finite number above zero."""
-    result = scalar(value, name)
-    if result <= 0.0:
-        raise InputError(f"{name}: expected a number above 0, got {result:g}")
-    return result
+    return scalar(value, name, above=0.0)
 
 
 def counted(value: object, name: str, least: int = 1) -> int:
     """A whole number, at least `least`; one that is written 2.0 is 2, as in a scenario."""
     whole = isinstance(value, Integral) or (isinstance(value, float) and value.is_integer())
     if not whole or isinstance(value, bool) or int(value) < least:  # type: ignore[call-overload]  # a number
-        expected = "above 0" if least == 1 else f"from {least}"
-        raise InputError(f"{name}: expected a whole number {expected}, got {quoted(value)}")
+        expected = f"a whole number {'above 0' if least == 1 else f'from {least}'}"
+        raise InputError(where=name, expected=expected, got=value)
     return int(value)  # type: ignore[call-overload]  # likewise
 
 
 def matrix(value: ArrayLike, shape: tuple[int, int], name: str) -> Array:
-    """A finite float64 matrix of the given shape."""
     result = array(value, name)
     if result.shape != shape:
-        raise InputError(f"{name}: expected a matrix of shape {shape}, got {result.shape}")
+        raise InputError(where=name, expected=f"a matrix of shape {shape}", got=result)
     return result
 
 
+def increasing(values: Array, name: str) -> None:
+    if np.any(np.diff(values) <= 0.0):
+        raise InputError(where=name, expected="numbers that increase", got=values)
+
+
 def unwritable(values: Numbers) -> Numbers:
-    """The very array, which nobody can change from now on."""
     values.flags.writeable = False
     return values

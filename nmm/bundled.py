@@ -1,7 +1,5 @@
 """The robots and scenarios that come with nmm, found by name from a checkout and from an installed wheel."""
 
-from __future__ import annotations
-
 import tomllib
 from functools import cache
 from pathlib import Path
@@ -12,37 +10,21 @@ _PACKAGE = Path(__file__).resolve().parent
 
 
 def bundled_robots() -> dict[str, Path]:
-    """The bundled robots: name (the file's name up to the first dot) to xacro file, sorted by name.
-
-    Raises
-    ------
-    NmmError : the installation has no such folder
-    """
+    """The bundled robots: name (the file's name up to the first dot) to xacro file, sorted by name."""
     return _files("robots", ".xacro")
 
 
 def bundled_scenarios() -> dict[str, Path]:
-    """The bundled scenarios: name (the file's name up to the first dot) to YAML file, sorted by name.
-
-    Raises
-    ------
-    NmmError : the installation has no such folder
-    """
+    """The bundled scenarios' YAML files by name."""
     return _files("scenarios", ".yaml")
 
 
 def bundled_sweeps() -> dict[str, Path]:
-    """The bundled sweeps of scenarios: name to YAML file, sorted by name.
-
-    Raises
-    ------
-    NmmError : the installation has no such folder
-    """
     return _files("scenarios/sweeps", ".yaml")
 
 
 def _files(folder: str, suffix: str) -> dict[str, Path]:
-    # Only the folder's own files: what lies deeper are parts that those include.
+    # Files in subfolders are parts that these include.
     paths = sorted(_folder(folder).glob(f"*{suffix}"))
     return {path.name.split(".", 1)[0]: path for path in paths if path.is_file()}
 
@@ -54,10 +36,10 @@ def _folder(name: str) -> Path:
     if installed.is_dir():
         return installed
     checkout = _PACKAGE.parent / name
-    # In site-packages, a folder `robots` beside nmm would be somebody else's.
+    # In site-packages, a folder `robots` beside nmm would belong to another project.
     if _is_our_project(_PACKAGE.parent / "pyproject.toml") and checkout.is_dir():
         return checkout
-    raise NmmError(f"this installation of nmm is incomplete: found neither {installed} nor {checkout}")
+    raise NmmError(f"found neither {installed} nor {checkout}", where="an incomplete installation")
 
 
 def _is_our_project(pyproject: Path) -> bool:

@@ -1,7 +1,5 @@
 """Work on many items shared out over the cores, by threads: for compiled code that does not hold the GIL."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -15,7 +13,6 @@ Work: TypeAlias = Callable[[int, int], None]
 
 
 def cores() -> int:
-    """How many cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -28,15 +25,9 @@ def over_cores(
 ) -> None:
     """Do pieces of `at_once` items, the last one shorter, in as many threads as there are cores.
 
-    This thread takes pieces, too, so that all are done whether or not others come to help. What is found must
-    not depend on the pieces. Ctrl-C ends it when the pieces under way are done.
-
-    Parameters
-    ----------
-    count : how many items
-    worker : called once in each thread: what does the pieces there, with memory that is this thread's alone
-    progress : called with the fraction begun, once for each piece in their order, from this thread
-    threads : how many at most, as many as there are cores when None
+    The calling thread works too and reports `progress`, the fraction begun, once per piece, in order. Results
+    must not depend on the pieces. Ctrl-C takes effect when the pieces under way are done. `worker` is called
+    once per thread and returns that thread's work, with memory of its own. `threads`: at most; None for all.
     """
     left = iter(range(0, count, at_once))  # next(left) is one step to all threads: none takes another's piece
     threads = min(cores() if threads is None else threads, -(-count // at_once))
@@ -57,7 +48,7 @@ def over_cores(
                     begun(first)
                 work(first, min(first + at_once, count))
         except BaseException:
-            for _ in left:  # nobody shall take it
+            for _ in left:  # no other thread takes it
                 pass
             raise
 

@@ -1,14 +1,20 @@
-"""Files that are read, replaced or locked: no device, no pipe, no more than is reasonable."""
+"""Files that are read, replaced or locked: no device, no pipe, no more than is reasonable; and written whole
+or not at all: in a hidden folder beside them, locked by one process.
 
-from __future__ import annotations
+The next writer removes what a killed one left. Where there are no locks, writers are not kept apart, and
+leftovers stay.
+"""
 
 import errno
 import os
 import stat
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
-from nmm.errors import InputError
+from nmm.errors import InputError, expect
 
 try:
     import fcntl
@@ -17,12 +23,7 @@ except ImportError:  # Windows
 
 
 def read_bytes(path: Path, most: int) -> bytes:
-    """The content of a file of at most so many bytes.
-
-    Raises
-    ------
-    OSError : it is not there, cannot be read, is no file (/dev/zero has no end), or is longer
-    """
+    """The content of a file of at most so many bytes; `OSError` also for a device (/dev/zero has no end)."""
     expect_file(path)
     with path.open("rb") as file:
         content = file.read(most + 1)
@@ -39,25 +40,16 @@ def expect_file(path: Path) -> None:
 
 
 def replaceable(path: Path) -> Path:
-    """The file that a new one may take the place of, through symbolic links, which stay.
-
-    Raises
-    ------
-    InputError : something stands there that is no file
-    """
+    """The file to replace, symbolic links followed; `InputError` where something there is no file."""
     target = Path(os.path.realpath(path))
-    if target.is_dir():
-        raise InputError(f"{path}: expected a file, this is a folder")
-    if target.is_symlink():
-        raise InputError(f"{path}: expected a file, this is a symbolic link that leads to itself")
-    if target.exists() and not target.is_file():
-        raise InputError(f"{path}: expected a file, this is a device or a pipe")
+    expect(not target.is_dir(), path, "a file, this is a folder")
+    expect(not target.is_symlink(), path, "a file, this is a symbolic link that leads to itself")
+    expect(target.is_file() or not target.exists(), path, "a file, this is a device or a pipe")
     return target
 
 
 def taken(lock: IO[bytes]) -> bool | None:
-    """Whether the lock, an open file, is this process's now, until it is closed; None where the system has
-    none."""
+    """Whether this process now holds the lock, until it is closed; None where the system has no locks."""
     if fcntl is None:
         return None
     try:
@@ -67,3 +59,112 @@ def taken(lock: IO[bytes]) -> bool | None:
     except OSError:
         return None
     return True
+
+
+def named_folder(text: str) -> tuple[str, str]:
+    """The name, "" without, and the folder of NAME=FOLDER or FOLDER."""
+    name, separator, folder = text.partition("=")
+    return (name, folder) if separator and "/" not in name else ("", text)
+
+
+#: Between two looks whether another process is through, s.
+AGAIN = 0.05
+#: How long one waits for another process that writes the same, s.
+PATIENCE = 30.0
+#: In the hidden folder: what is locked, and where the old folder waits where two cannot be exchanged.
+LOCK, OLD = "lock", "old"
+
+
+@contextmanager
+def writing(final: Path, patience: float) -> Iterator[Path]:
+    """This process's empty hidden folder; `InputError` if another holds it longer than `patience`, s."""
+    hidden = _hidden(final)
+    until = time.monotonic() + patience
+    try:
+        while (lock := _claimed(hidden)) is None:
+            if time.monotonic() > until:
+                raise busy(final)
+            time.sleep(AGAIN)
+        with lock:
+            _clear(lock, hidden, final)
+            yield hidden
+    finally:
+        try:
+            _leave(hidden, final)
+        except KeyboardInterrupt:  # an interrupted run leaves nothing, either
+            _leave(hidden, final)
+            raise
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """A temporary file that replaces `path`, synced, when the block succeeds; or `InputError` if locked."""
+    import tempfile  # here: `nmm --help` would pay
+
+    with writing(path, PATIENCE) as hidden, tempfile.TemporaryDirectory(dir=hidden) as folder:
+        temporary = Path(folder) / path.name
+        yield temporary
+        with temporary.open("rb") as file:
+            os.fsync(file.fileno())
+        temporary.replace(path)
+
+
+def at_work(final: Path) -> bool:
+    """Whether a process is writing what is to stand there; `OSError` where nothing can."""
+    try:
+        with (_hidden(final) / LOCK).open("rb") as lock:
+            return taken(lock) is False
+    except FileNotFoundError:
+        return False
+
+
+def busy(folder: Path) -> InputError:
+    """The error of a second writer."""
+    return InputError("another process is writing it; wait for its end, or name another folder", where=folder)
+
+
+def _hidden(final: Path) -> Path:
+    return final.parent / f".{final.name}.nmm-writing"
+
+
+def _claimed(hidden: Path) -> IO[bytes] | None:
+    """The lock, which is ours until it is closed; None while it is another process's."""
+    with suppress(FileExistsError):  # not `exist_ok`, which raises where its writer removes it in that moment
+        hidden.mkdir()
+    try:
+        lock = (hidden / LOCK).open("ab")
+    except FileNotFoundError:  # its writer has just ended
+        return None
+    try:
+        with suppress(FileNotFoundError):
+            if taken(lock) is not False and os.path.samestat(os.fstat(lock.fileno()), (hidden / LOCK).stat()):
+                return lock
+    except BaseException:  # an interrupt, whose traceback would keep it
+        lock.close()
+        raise
+    lock.close()
+    return None
+
+
+def _clear(lock: IO[bytes], hidden: Path, final: Path) -> None:
+    """Nothing of a writer that has ended stays but what it was about to replace, which is put back."""
+    import shutil  # here: `nmm --help` would pay
+
+    if not taken(lock):  # where there are no locks, another may be writing here
+        return
+    if (hidden / OLD).exists() and not final.exists():
+        (hidden / OLD).rename(final)
+    for left in hidden.iterdir():
+        if left.name != LOCK:
+            shutil.rmtree(left, ignore_errors=True)
+
+
+def _leave(hidden: Path, final: Path) -> None:
+    """The hidden folder goes, unless another process has it by now."""
+    with suppress(OSError):
+        lock = _claimed(hidden)
+        if lock is not None:
+            with lock:
+                _clear(lock, hidden, final)
+                (hidden / LOCK).unlink()
+                hidden.rmdir()

@@ -1,59 +1,36 @@
-"""Every kind of platform, task, reference, objective and resolver, registered here once, by name.
+"""Every kind of platform, task, reference, objective and resolver, registered once, by name.
 
-Scenario files with their keys and defaults, the command line's help, figures, documentation and the tests'
-grids read these lists. A line names the class; it is imported when it is first asked for, so that the names
-alone cost nothing.
+A class is imported when it is first asked for, so that the names alone cost nothing.
 """
 
-from __future__ import annotations
-
 import re
-from collections.abc import Iterator, MutableMapping
+from collections import UserDict
 from pkgutil import resolve_name
 from typing import Any
 
 from nmm.errors import expect_known
 
 
-class Kinds(MutableMapping[str, Any]):
-    """Classes by name, in the order in which they are listed for people.
-
-    Parameters
-    ----------
-    what : the word for one of them, as errors say it
-    classes : "package.module:Class" by name
-    """
+class Kinds(UserDict[str, Any]):
+    """Classes, "package.module:Class", by name in the order of listings; errors call one of them `what`."""
 
     def __init__(self, what: str, **classes: str) -> None:
+        super().__init__(classes)
         self.what = what
-        self._classes: dict[str, str | type] = dict(classes)
 
     def __getitem__(self, name: str) -> Any:
-        found = self._classes[name]
+        found = self.data[name]
         if isinstance(found, str):
-            found = self._classes[name] = resolve_name(found)
+            found = self.data[name] = resolve_name(found)
         return found
 
-    def __setitem__(self, name: str, kind: type) -> None:
-        self._classes[name] = kind
-
-    def __delitem__(self, name: str) -> None:
-        del self._classes[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._classes)
-
-    def __len__(self) -> int:
-        return len(self._classes)
-
     def named(self, name: str) -> Any:
-        """The class of that name; `InputError` lists the names."""
-        expect_known(self.what, name, self._classes)
+        expect_known(self.what, name, self.data)
         return self[name]
 
     def words(self, name: str) -> str:
         """What a class is called in a sentence: "reduced gradient"; the class is not imported."""
-        found = self._classes[name]
+        found = self.data[name]
         own = found.rpartition(":")[2] if isinstance(found, str) else found.__name__
         words = re.findall("[A-Z][a-z]*", own)
         return " ".join(word if word in NAMES else word.lower() for word in words)
@@ -65,27 +42,27 @@ NAMES = ("Jacobian",)
 PLATFORMS = Kinds(
     "platform",
     unicycle="nmm.platforms.unicycle:Unicycle",
-    differential="nmm.platforms.differential_drive:DifferentialDrive",
+    differential="nmm.platforms.unicycle:DifferentialDrive",
     skid_steer="nmm.platforms.skid_steer:SkidSteer",
     car="nmm.platforms.car:Car",
     front_drive_car="nmm.platforms.car:FrontDriveCar",
     tractor="nmm.platforms.tractor:Tractor",
     omnidirectional="nmm.platforms.omnidirectional:Omnidirectional",
-    mecanum="nmm.platforms.mecanum:Mecanum",
-    fixed="nmm.platforms.fixed:Fixed",
+    mecanum="nmm.platforms.omnidirectional:Mecanum",
+    fixed="nmm.platforms.omnidirectional:FixedBase",
     wheeled="nmm.platforms.wheeled.platform:WheeledPlatform",
 )
 TASKS = Kinds(
     "task",
     position="nmm.functions.tasks.position:Position",
-    orientation="nmm.functions.tasks.orientation:Orientation",
+    orientation="nmm.functions.tasks.pose:Orientation",
     pose="nmm.functions.tasks.pose:Pose",
     pointing="nmm.functions.tasks.pointing:Pointing",
-    heading="nmm.functions.tasks.heading:Heading",
-    distance="nmm.functions.tasks.distance:Distance",
-    center_of_mass="nmm.functions.tasks.center_of_mass:CenterOfMass",
-    coordinates="nmm.functions.tasks.coordinates:Coordinates",
-    posture="nmm.functions.tasks.posture:Posture",
+    heading="nmm.functions.tasks.pointing:Heading",
+    distance="nmm.functions.tasks.position:Distance",
+    center_of_mass="nmm.functions.tasks.position:CenterOfMass",
+    coordinates="nmm.functions.tasks.linear_coordinates:LinearCoordinates",
+    posture="nmm.functions.tasks.linear_coordinates:Posture",
 )
 REFERENCES = Kinds(
     "reference",
@@ -94,23 +71,23 @@ REFERENCES = Kinds(
     constant="nmm.functions.references.polynomial:Constant",
     polynomial="nmm.functions.references.polynomial:Polynomial",
     spline="nmm.functions.references.polynomial:Spline",
-    bearing="nmm.functions.references.bearing:Bearing",
+    bearing="nmm.functions.references.circle:Bearing",
     slerp="nmm.functions.references.orientation:Slerp",
-    turn="nmm.functions.references.orientation:Turn",
-    pose="nmm.functions.references.pose:PoseReference",
-    velocity="nmm.functions.references.velocity:Velocity",
+    turn="nmm.functions.references.orientation:SteadyTurn",
+    pose="nmm.functions.references.orientation:PoseReference",
+    velocity="nmm.functions.references.circle:VelocityOf",
 )
 OBJECTIVES = Kinds(
     "objective",
-    quadratic="nmm.functions.objectives.quadratic:Quadratic",
-    posture="nmm.functions.objectives.preferred_posture:PreferredPosture",
+    quadratic="nmm.functions.objectives.coordinates:Quadratic",
+    posture="nmm.functions.objectives.coordinates:PreferredPosture",
     alignment="nmm.functions.objectives.alignment:Alignment",
-    joint_range="nmm.functions.objectives.joint_range:JointRange",
-    limit_barrier="nmm.functions.objectives.limit_barrier:LimitBarrier",
+    joint_range="nmm.functions.objectives.coordinates:JointRange",
+    limit_barrier="nmm.functions.objectives.coordinates:LimitBarrier",
     manipulability="nmm.functions.objectives.manipulability:Manipulability",
-    weighed_manipulability="nmm.functions.objectives.manipulability:WeighedManipulability",
-    directional_manipulability="nmm.functions.objectives.directional_manipulability:DirectionalManipulability",
-    inverse_condition="nmm.functions.objectives.inverse_condition:InverseCondition",
+    weighted_manipulability="nmm.functions.objectives.manipulability:WeightedManipulability",
+    directional_manipulability="nmm.functions.objectives.manipulability:DirectionalManipulability",
+    inverse_condition="nmm.functions.objectives.manipulability:InverseCondition",
     potential_energy="nmm.functions.objectives.potential_energy:PotentialEnergy",
     clearance="nmm.functions.objectives.clearance:Clearance",
 )

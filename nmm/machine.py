@@ -1,6 +1,5 @@
-"""What computed a result: the versions and the machine, as every summary tells them."""
-
-from __future__ import annotations
+"""What computed a result: the versions and the machine, as every summary tells them; and how much memory
+there is, asked before it is filled."""
 
 import os
 import platform
@@ -10,12 +9,11 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
+from nmm.errors import InputError
+
 
 def made_with() -> dict[str, str | int]:
-    """Versions of nmm, Python, numpy, pinocchio and numba, the system, the processor and its cores.
-
-    Nothing that names a person, a machine or a place: no host, user or path.
-    """
+    """Versions of nmm, Python, numpy, pinocchio and numba, system and processor; no host, user or path."""
     return dict(_found())
 
 
@@ -40,7 +38,6 @@ def _found() -> tuple[tuple[str, str | int], ...]:
 
 
 def _processor() -> str:
-    """Its name; the architecture where the system does not tell one."""
     with suppress(OSError):
         if sys.platform == "darwin":
             asked = ["sysctl", "-n", "machdep.cpu.brand_string"]
@@ -51,3 +48,27 @@ def _processor() -> str:
             if name.strip() == "model name":
                 return value.strip()
     return platform.processor() or platform.machine()
+
+
+#: How much of the memory that is free may be filled.
+SHARE = 0.7
+
+
+def free_memory() -> float:
+    """Bytes that are free, or only a cache of files; as good as no bound where the system does not say."""
+    try:
+        with open("/proc/meminfo", encoding="ascii") as file:
+            for line in file:
+                name, _, rest = line.partition(":")
+                if name == "MemAvailable":
+                    return 1024.0 * float(rest.split()[0])
+        return float(os.sysconf("SC_AVPHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
+    except (ValueError, OSError, AttributeError):
+        return float("inf")
+
+
+def expect_memory(needed: float, what: str, instead: str) -> None:
+    """`InputError` for what needs more bytes than may be filled, with what may be done instead."""
+    free = free_memory()
+    if needed > SHARE * free:
+        raise InputError(f"{what} {needed / 1e9:.3g} GB, and {free / 1e9:.3g} GB are free; {instead}")

@@ -4,8 +4,6 @@
 `multiprocessing.Pool` waits for ever for a child that was killed; hence these few lines.
 """
 
-from __future__ import annotations
-
 import multiprocessing
 import signal
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -33,9 +31,7 @@ class Job(Protocol[Result]):
 
 @dataclass(frozen=True)
 class _Message:
-    """What a child says: "progress" with a fraction, "result", or "error" with an exception."""
-
-    kind: str
+    kind: str  #: of the content: "progress", a fraction; "result"; "error", an exception
     number: int
     content: Any
 
@@ -43,19 +39,11 @@ class _Message:
 def share_out(
     job: Job[Result], numbers: Sequence[int], processes: int, progress: Callable[[int, float], None]
 ) -> dict[int, Result]:
-    """job(number, report) for each number, over so many processes; in this one when that is 1.
+    """job(number, report) for each number, over several processes, or in this one when `processes` is 1.
 
-    Parameters
-    ----------
-    job : picklable, as are its results
-    numbers : the jobs
-    processes : at least 1
-    progress : called with a job's number and the fraction done of it
-
-    Raises
-    ------
-    RunError : a process ended without an answer
-    NmmError : what a job raised; the other jobs end with it
+    The job and its results are picklable; `progress` gets a job's number and the fraction done of it. An
+    `NmmError` or `OSError` of a job (a full disk) ends all of them; `RunError` where a process ended without
+    an answer.
     """
     return dict(as_done(job, numbers, processes, progress))
 
@@ -63,10 +51,7 @@ def share_out(
 def as_done(
     job: Job[Result], numbers: Sequence[int], processes: int, progress: Callable[[int, float], None]
 ) -> Generator[tuple[int, Result]]:
-    """The numbers with job(number, report), as `share_out`, one after the other as each is done.
-
-    The children end with the generator: whoever may stop early closes it (`contextlib.closing`).
-    """
+    """As `share_out`, each number with its result when done; closing the generator ends the children."""
     if processes == 1 or len(numbers) == 1:
         for number in numbers:
             yield number, job(number, partial(progress, number))
@@ -136,8 +121,7 @@ def _children(job: Job[Any], count: int) -> Iterator[dict[Connection, SpawnProce
 def _interrupts_wait() -> Iterator[None]:
     """Ctrl-C waits until the block has ended; processes started in it never hear of it.
 
-    A terminal sends it to them too, and they are to end when they are told. They inherit the mask, which
-    holds from their first instruction on; a handler of their own would come too late.
+    They inherit the signal mask from their first instruction on; a handler of their own would come too late.
     """
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
@@ -152,7 +136,7 @@ def _interrupts_wait() -> Iterator[None]:
 
 
 def _serve(connection: Connection, job: Job[Any]) -> None:
-    """In a child: do the jobs that come, until nobody asks any more."""
+    """In a child: do the jobs that come until the parent ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         while True:
@@ -168,5 +152,5 @@ def _answer(connection: Connection, job: Job[Any], number: int) -> _Message:
 
     try:
         return _Message("result", number, job(number, report))
-    except NmmError as error:
+    except (NmmError, OSError) as error:
         return _Message("error", number, error)

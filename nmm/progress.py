@@ -1,7 +1,5 @@
 """Progress: a function that is called with the fraction done, and shares of it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import TypeAlias
 

@@ -6,7 +6,7 @@ import twin
 
 from nmm.control.controller import Controller
 from nmm.functions.references import Bearing
-from nmm.functions.tasks import Coordinates, Heading, Position, Task
+from nmm.functions.tasks import Heading, LinearCoordinates, Position, Task
 from nmm.resolvers import ExtendedJacobian
 from nmm.robots.robot import Robot
 
@@ -15,7 +15,7 @@ TIP_3D = Task(Position("ee", "xyz"), [0.0, 0.0, 0.0])
 POINTING = (TIP, Task(Heading("link2"), 0.0))
 LINK_POINTING = (TIP, Task(Heading("link1"), Bearing(Position("link2", "xy"), twin.TARGET)))
 #: Two rows that take up the freedom of TIP: J_e is singular where d + l1 c1 = 0.
-HELD = (Task(Coordinates("q1"), 0.0), Task(Heading("link2"), 0.0))
+HELD = (Task(LinearCoordinates("q1"), 0.0), Task(Heading("link2"), 0.0))
 
 
 def extended(added: Task | tuple[Task, ...], robot: Robot) -> Controller:

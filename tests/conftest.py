@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import re
 import signal
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
-from expanding import expanded_once
+from expanding import expand, expanded_once
 from gripping import folding
 from site_pages import built
 from spatial_arms import load_tiago, load_ur5
 
-from nmm.robots.loading import description, load, xacro_file
+from nmm.robots.loading import description, load
 from nmm.robots.robot import Robot
 
 
@@ -21,6 +22,29 @@ def pytest_configure() -> None:
     """A shell's "&" has SIGINT ignored, by the commands, too, that the tests interrupt."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+#: Files of `pytest -m quick`: those that catch most faults in about a minute together.
+QUICK = re.findall(
+    r"\w+",
+    """
+    analysis_maps cli_robots collisions_distances controller controller_input controller_use
+    crossings damaged_folders errors findings findings_analysis findings_robot_file functions
+    idle_inputs judging lazy_call limits limits_input linear_algebra platform_fit platform_input
+    platforms quantities record_layout resolvers sampled samples scenario_keys scenario_spatial
+    session settling simulation skid_steer spatial_functions srdf step_size stepping storage
+    strangers_robots wall wheeled_description wheeled_platform
+    """,
+)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what `pytest -m quick` selects, and what has the fixture of a browser."""
+    for item in items:
+        if item.path.stem.removeprefix("test_") in QUICK:
+            item.add_marker("quick")
+        if "browser" in getattr(item, "fixturenames", ()):
+            item.add_marker("browser")
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -33,7 +57,7 @@ def _bundled_robots_are_expanded_once() -> Iterator[None]:
 @pytest.fixture
 def xacro_each_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """For tests of the loading itself."""
-    monkeypatch.setattr(description, "expand", xacro_file.expand)
+    monkeypatch.setattr(description, "expand", expand)
 
 
 @pytest.fixture(scope="session")

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from nmm.bundled import bundled_robots
+from nmm.robots.loading.description import expand
 from nmm.robots.loading.packages import Packages
-from nmm.robots.loading.xacro_file import expand
 
 Expanded = tuple[str, dict[str, str], tuple[str, ...]]
 

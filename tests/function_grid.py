@@ -31,11 +31,11 @@ from nmm.functions.objectives import (
     PotentialEnergy,
     PreferredPosture,
     Quadratic,
-    Square,
+    QuadraticTerm,
     Sum,
-    WeighedManipulability,
+    WeightedManipulability,
 )
-from nmm.functions.product import Product
+from nmm.functions.objectives.base import Product
 from nmm.functions.program import evaluate
 from nmm.functions.references import (
     Bearing,
@@ -43,21 +43,21 @@ from nmm.functions.references import (
     Circle,
     Constant,
     Line,
+    LiveTarget,
     PiecewisePolynomial,
     Polynomial,
     PoseReference,
-    Signal,
     Slerp,
     Spline,
-    Turn,
-    Velocity,
+    SteadyTurn,
+    VelocityOf,
 )
 from nmm.functions.tasks import (
     CallableFunction,
     CenterOfMass,
-    Coordinates,
     Distance,
     Heading,
+    LinearCoordinates,
     Orientation,
     Pointing,
     Pose,
@@ -137,8 +137,8 @@ def _tasks() -> Iterator[Entry]:
         robots = SPATIAL if vertical else BOTH
         yield Entry(f"heading of {direction} about {about}", Heading("ee", direction, about), robots)
     yield Entry("heading of link1", Heading("link1"))
-    yield Entry("coordinate", Coordinates("q2"))
-    yield Entry("combinations", Coordinates("y", {"theta": 1, "q1": 1, "q2": -2.5}, {"x": 3.0}))
+    yield Entry("coordinate", LinearCoordinates("q2"))
+    yield Entry("combinations", LinearCoordinates("y", {"theta": 1, "q1": 1, "q2": -2.5}, {"x": 3.0}))
     yield Entry("posture", Posture(), (*BOTH, *FOLDING))
     yield Entry("posture of two", Posture("q2", "x"))
     yield Entry("callable function", CallableFunction(_hand, ["a", "b"]))
@@ -192,10 +192,10 @@ def _references() -> Iterator[Entry]:
     yield Entry(
         "bearing of a callable", Bearing(CallableReference(_moving, 2, of_configuration=True), _TARGET)
     )
-    yield Entry("velocity of a circle", Velocity(Circle([2, -1, 0.5], 0.7, -1.3, 0.4, "yz")))
+    yield Entry("velocity of a circle", VelocityOf(Circle([2, -1, 0.5], 0.7, -1.3, 0.4, "yz")))
     for name, way in (("constant", Constant([1, 2])), ("line", Line([0, 1], [3, -1], 3.5))):
-        yield Entry(f"velocity of a {name}", Velocity(way))
-    yield Entry("velocity of a spline", Velocity(Spline(_BREAKS, _POINTS, 5)))
+        yield Entry(f"velocity of a {name}", VelocityOf(way))
+    yield Entry("velocity of a spline", VelocityOf(Spline(_BREAKS, _POINTS, 5)))
     yield Entry("callable of time", CallableReference(lambda t: [np.sin(3 * t), t**3], 2))
     yield Entry(
         "callable of time, rate",
@@ -209,10 +209,10 @@ def _references() -> Iterator[Entry]:
 
 
 def _signals() -> Iterator[Entry]:
-    moved = Signal([0.0, 0.0, 9.0])
+    moved = LiveTarget([0.0, 0.0, 9.0])
     moved.set([1.2, -0.7, 0.4], rate=[0.3, -0.2, 0.9], t=0.8)
-    turned = Signal([0.1, -0.4, 0.3], "rad")
-    yield Entry("signal", Signal([1.0, -2.0]))
+    turned = LiveTarget([0.1, -0.4, 0.3], "rad")
+    yield Entry("signal", LiveTarget([1.0, -2.0]))
     yield Entry("signal that moves on", moved)
     yield Entry("bearing of a signal", Bearing(moved, _TARGET))
     yield Entry("pointing at a signal", Pointing("ee", moved))
@@ -221,22 +221,23 @@ def _signals() -> Iterator[Entry]:
 
 
 def _pose_references() -> Iterator[Entry]:
-    yield Entry("turn", Turn([0.2, -0.3, 0.9], 0.4, [0.3, 0.1, -0.5]))
+    yield Entry("turn", SteadyTurn([0.2, -0.3, 0.9], 0.4, [0.3, 0.1, -0.5]))
     for profile in ("constant", "smooth"):
         yield Entry(f"slerp, {profile}", Slerp([0.1, -0.4, 0.3], [-1.2, 0.8, 1.1], 3.5, profile))
     circle = Circle([2, -1, 0.5], 0.7, -1.3, 0.4)
     yield Entry("pose at rest", PoseReference([1, 2, 3], [0.1, -0.2, 0.3]))
-    yield Entry("pose that moves", PoseReference(circle, Turn([0, 1, 1], 0.3)))
+    yield Entry("pose that moves", PoseReference(circle, SteadyTurn([0, 1, 1], 0.3)))
     yield Entry("pose of a frame", PoseReference(Position("link1"), Orientation("link1")))
     held = PoseReference([1, 2, 3], CallableReference(lambda t: [np.sin(t), 0.2, t / 9], 3, unit="rad"))
     yield Entry("pose of a callable", held)
 
 
 def _objectives() -> Iterator[Entry]:
-    h1 = Quadratic(Square({"theta": 1, "q1": 1, "q2": 1}, pi / 2), Square("q1", pi / 4))
+    h1 = Quadratic(QuadraticTerm({"theta": 1, "q1": 1, "q2": 1}, pi / 2), QuadraticTerm("q1", pi / 4))
     yield Entry("quadratic", h1)
     yield Entry(
-        "quadratic, weights", Quadratic(Square({"x": 1, "q2": -3}, 0.2, 4.0), Square("theta", -1, 0.1))
+        "quadratic, weights",
+        Quadratic(QuadraticTerm({"x": 1, "q2": -3}, 0.2, 4.0), QuadraticTerm("theta", -1, 0.1)),
     )
     yield Entry("joint range", JointRange(["q1", "q2"], [-1, -2], [2, 3]))
     for of, rows, robots in (
@@ -263,7 +264,9 @@ def _objectives() -> Iterator[Entry]:
     yield Entry("callable objective", CallableObjective(_height))
     yield Entry("callable objective, gradient", CallableObjective(_height, _height_gradient))
     yield Entry(
-        "sum", Sum((2.0, h1), (-0.5, Manipulability("ee", "xy")), (1.0, Coordinates("x"))), (*BOTH, *FOLDING)
+        "sum",
+        Sum((2.0, h1), (-0.5, Manipulability("ee", "xy")), (1.0, LinearCoordinates("x"))),
+        (*BOTH, *FOLDING),
     )
     yield Entry("sum of sums", Sum((3.0, h1 + CallableObjective(_height)), (-2.0, h1 - 0.5 * h1)))
     yield Entry("negative", -Manipulability("ee", "xy", "arm"))
@@ -272,10 +275,10 @@ def _objectives() -> Iterator[Entry]:
 
 def _of_the_jacobian() -> Iterator[Entry]:
     everywhere, heavy = (*BOTH, *FOLDING), {"platform": 4.0, "q1": 0.5}
-    turning = Velocity(Circle([0, 0], 2.0, 0.3, 0.4))
+    turning = VelocityOf(Circle([0, 0], 2.0, 0.3, 0.4))
     yield Entry("manipulability of the platform", Manipulability("ee", ("x", "rz"), "platform"), everywhere)
     yield Entry("manipulability, weights", Manipulability("ee", "xy", weights=heavy), everywhere)
-    yield Entry("manipulability, weighed", WeighedManipulability("ee", "xy", 0.3, heavy), everywhere)
+    yield Entry("manipulability, weighed", WeightedManipulability("ee", "xy", 0.3, heavy), everywhere)
     for of, rows, robots in (
         ("robot", "xy", everywhere),
         ("robot", ("x", "y", "rz"), everywhere),
@@ -301,9 +304,14 @@ def _of_coordinates() -> Iterator[Entry]:
     everywhere = (*BOTH, *FOLDING)
     line, spline = Line([0.2], [1.4], 3.5, "smooth"), Spline(_BREAKS, _POINTS[:, 0])
     circle = Circle([2, 2], 3, 0.8, 5 / 4 * pi)
-    bent = Quadratic(Square("q1", line, 2.0), Square({"theta": 1, "q2": -1}, 0.3), Square("x", spline))
+    bent = Quadratic(
+        QuadraticTerm("q1", line, 2.0), QuadraticTerm({"theta": 1, "q2": -1}, 0.3), QuadraticTerm("x", spline)
+    )
     yield Entry("quadratic, moving targets", bent, everywhere)
-    yield Entry("quadratic, targets of the robot", Quadratic(Square("q1", Heading("link2")), Square("q2", 1)))
+    yield Entry(
+        "quadratic, targets of the robot",
+        Quadratic(QuadraticTerm("q1", Heading("link2")), QuadraticTerm("q2", 1)),
+    )
     prefers = PreferredPosture({"q1": 0.4, "theta": line, "x": Constant(2.0)}, {"q1": 3.0})
     yield Entry("preferred posture", prefers, everywhere)
     yield Entry("barrier", LimitBarrier(["q1", "x"], [-7, -6], [8, 7], margin=0.2), everywhere)
@@ -313,7 +321,7 @@ def _of_coordinates() -> Iterator[Entry]:
         ("an angle", Alignment(0.4)),
         ("an angle that moves", Alignment(line, offset=0.3)),
         ("a direction", Alignment([-1.0, 2.0], of={"theta": 1, "q1": -2})),
-        ("a motion", Alignment(Velocity(circle), offset=pi)),
+        ("a motion", Alignment(VelocityOf(circle), offset=pi)),
         ("a direction of the robot", Alignment(Position("ee", "xyz"))),
         ("a bearing", Alignment(Bearing(circle, _TARGET))),
         ("a point", Alignment(at=[6.0, 2.0])),
@@ -351,7 +359,7 @@ KINDS = ("tasks", "references", "objectives")
 
 def modules() -> list[ModuleType]:
     """All modules of the mathematics."""
-    loose = ("control.equations", "functions.program", "functions.product", "functions.stacking")
+    loose = ("control.equations", "functions.program", "functions.function")
     loose += ("control.controller", "control.integrators")
     names = [f"nmm.{name}" for name in loose]
     for package in ("platforms", *(f"functions.{kind}" for kind in KINDS), "resolvers"):

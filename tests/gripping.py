@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import cache
 
 import nmm
-from nmm.robots.followers import Follower
+from nmm.robots.mimic_joints import MimicJoint
 from nmm.robots.robot import Robot
 
 DATA = "package://example-robot-data/robots/"
@@ -24,13 +24,13 @@ def panda(base: str = "") -> Robot:
 @cache
 def folding() -> Robot:
     """The bundled planar robot of three joints, of which the last follows the first."""
-    followers = (Follower("q3", "q1", -0.7, 0.2),)
-    return replace(nmm.load("unicycle_3r"), name="unicycle_3r_folding", followers=followers)
+    followers = (MimicJoint("q3", "q1", -0.7, 0.2),)
+    return replace(nmm.load("unicycle_3r"), name="unicycle_3r_folding", mimic_joints=followers)
 
 
 @cache
 def hitched() -> Robot:
     """An arm on a tractor, of which one joint follows a hitch of the platform and another the first joint."""
     robot = nmm.mount("trailer_base", "small_arm", at="arm_mount")
-    followers = (Follower("q3", "hitch1", 0.8, 0.1), Follower("q4", "q1", -1.5))
-    return replace(robot, followers=followers)
+    followers = (MimicJoint("q3", "hitch1", 0.8, 0.1), MimicJoint("q4", "q1", -1.5))
+    return replace(robot, mimic_joints=followers)

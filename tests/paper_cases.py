@@ -12,7 +12,7 @@ from numpy import pi
 from numpy.typing import NDArray
 
 from nmm.control.controller import Controller
-from nmm.functions.objectives import Objective, Quadratic, Square
+from nmm.functions.objectives import Objective, Quadratic, QuadraticTerm
 from nmm.functions.references import Bearing, Circle
 from nmm.functions.tasks import Heading, Position, Task
 from nmm.resolvers import ProjectedGradient, ReducedGradient, Resolver
@@ -43,10 +43,10 @@ class Case:
 
 CIRCLE = Circle([2, 2], 3, 0.08 * pi, 5 / 4 * pi)
 TIP = Task(Position("ee", "xy"), CIRCLE)
-H1 = Quadratic(Square({"theta": 1, "q1": 1, "q2": 1}, pi / 2), Square("q1", pi / 4))
-H2 = Quadratic(Square("q2", -pi / 2))
-H3 = Quadratic(Square({"theta": 1, "q1": 1, "q2": 1}))
-H4 = Quadratic(Square("q1"), Square("q3", -pi / 2))
+H1 = Quadratic(QuadraticTerm({"theta": 1, "q1": 1, "q2": 1}, pi / 2), QuadraticTerm("q1", pi / 4))
+H2 = Quadratic(QuadraticTerm("q2", -pi / 2))
+H3 = Quadratic(QuadraticTerm({"theta": 1, "q1": 1, "q2": 1}))
+H4 = Quadratic(QuadraticTerm("q1"), QuadraticTerm("q3", -pi / 2))
 
 CASES = (
     Case(

@@ -12,7 +12,7 @@ from wheeled_examples import EXAMPLES as WHEELED
 from nmm.platforms import (
     Car,
     DifferentialDrive,
-    Fixed,
+    FixedBase,
     FrontDriveCar,
     Mecanum,
     Omnidirectional,
@@ -59,7 +59,7 @@ EXAMPLES: dict[str, Platform] = {
     "omnidirectional": Omnidirectional(),
     "mecanum": Mecanum(0.05, 0.3, 0.2),
     "mecanum_wide": Mecanum(0.2, 0.5, 1.1),
-    "fixed": Fixed(),
+    "fixed": FixedBase(),
     **{f"wheeled, {name}": WHEELED[name] for name in REGULAR},
 }
 

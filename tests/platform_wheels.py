@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from nmm.platforms import Mecanum, Platform, SkidSteer, Tractor
 from nmm.platforms.car import Car, FrontDriveCar
-from nmm.platforms.differential_drive import DifferentialDrive
+from nmm.platforms.unicycle import DifferentialDrive
 
 Array = NDArray[np.float64]
 

@@ -114,7 +114,7 @@ def obstacle(
     rng: np.random.Generator, k: int, tip: Array, goal: Array, slowest: float, fastest: float
 ) -> nmm.Obstacle:
     """One on the way to the goal, which crosses it where it moves."""
-    shapes: list[Callable[[], nmm.Shape]] = [
+    shapes: list[Callable[[], nmm.extending.Shape]] = [
         lambda: nmm.Box(rng.uniform(0.1, 0.6, 3)),
         lambda: nmm.Sphere(rng.uniform(0.05, 0.3)),
         lambda: nmm.Cylinder(rng.uniform(0.05, 0.2), rng.uniform(0.2, 1.0)),
@@ -217,7 +217,7 @@ class Found(NamedTuple):
     told: float
     said: tuple[str, ...]
     outcome: str
-    message: str
+    why: list[str]
     without: float
     fastest: float
     seconds: float
@@ -234,7 +234,7 @@ class Found(NamedTuple):
     @property
     def classes(self) -> list[str]:
         """What it counts as."""
-        blocked = "blocked" in self.message
+        blocked = "blocked" in self.why
         return [
             "kept" if self.kept else ("UNTOLD" if self.untold else "said"),
             "reached" if self.outcome == "completed" else ("blocked" if blocked else self.outcome),
@@ -248,7 +248,7 @@ def outcome_of(one: Scene, duration: float = DURATION, *, without: bool = True) 
     """Run a scene, and look along it; the same without avoidance where that is asked for."""
     began = time.perf_counter()
     controller = one.controller(avoids=True)
-    setting = controller.setting
+    setting = controller.solver.scene
     assert setting is not None
     pairs = tuple((pair.first, pair.second) for pair in setting.queries.shapes.collisionPairs)
     run = one.run(controller, duration)
@@ -260,9 +260,9 @@ def outcome_of(one: Scene, duration: float = DURATION, *, without: bool = True) 
         least,
         pair,
         float(run.clearance_between.min()),
-        tuple(said for said in run.warnings if "could not be kept in" in said or "start is nearer" in said),
+        tuple(str(one) for one in run.findings if one.code in ("distance_not_kept", "start_too_near")),
         run.outcome.value,
-        run.message,
+        [one.code for one in run.verdict.reasons],
         np.inf if free is None else least_along(free, apart)[0],
         float(np.abs(run.u).max()),
         seconds,

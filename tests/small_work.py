@@ -64,6 +64,6 @@ def one_case() -> None:
         shutil.copytree(kept, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("result"))
         return pickle.loads((kept / "result").read_bytes())
 
-    compute, share_out = write._case, write.share_out
-    write._case = case
+    compute, share_out = write.run_case, write.share_out
+    write.run_case = case
     write.share_out = lambda work, items, jobs, advance: share_out(work, items[:1], 1, advance)

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from paper_cases import CIRCLE
 
 from nmm.analysis.formulas import SymbolicAnalysis, symbolic
-from nmm.analysis.singular.jacobians import Jacobians
-from nmm.analysis.singular.reached import stacked
+from nmm.analysis.singular.jacobians import Jacobians, stacked
 from nmm.functions.program import evaluate
 from nmm.functions.references import Bearing
 from nmm.functions.tasks import Heading, Position, Task

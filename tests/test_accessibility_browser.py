@@ -10,6 +10,7 @@ from typing import Literal
 
 import pytest
 from figure_examples import cut, run
+from gallery import write_gallery
 from playback_browser import browser as browser
 from playback_browser import empty_page as empty_page
 from playback_browser import watched
@@ -19,10 +20,7 @@ from short_scenario import MINIMAL
 
 import nmm
 from nmm.driving import ScenarioSetup, drive
-from nmm.gallery import write_gallery
 from nmm.playback import view, write_html
-
-pytestmark = pytest.mark.browser
 
 #: Each fault: how bad it is, which rule, and where.
 FAULTS = """axe.run().then(({ violations }) =>

@@ -11,8 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 from nmm import cores
-from nmm.analysis.maps.best import find_best_cells, find_better
 from nmm.analysis.maps.reach import Reach
+from nmm.analysis.maps.search import Grid, Layer
 from nmm.analysis.maps.workspace import workspace_map
 from nmm.analysis.singular.jacobians import Jacobians
 from nmm.functions.tasks import CallableFunction, Pose, Position
@@ -166,10 +166,11 @@ def test_the_best_offered_are_those_of_a_plain_loop(rng: np.random.Generator) ->
             if (central[i], signed[i]) >= (central[other], signed[other]):
                 best[int(cell)] = i
     expected = {i for c, i in best.items() if (central[i], signed[i]) > (centrals[c], values[c])}
-    better = np.empty(400, dtype=bool)
-    find_better(cells, central, signed, values, centrals, np.full(40, -1), better)
+    layer = Layer(Grid(np.zeros(2), 1.0, 8, 5), 1, 1.0)
+    layer.values[:], layer.central[:] = values, centrals
+    layer.offer(cells, central, signed, np.arange(400.0)[:, np.newaxis])
     # A value that is not in the middle never takes the place of one that is, nor does an equal one.
-    assert set(np.flatnonzero(better)) == expected
+    assert set(layer.q[np.isfinite(layer.q)].astype(int)) == expected
 
 
 def test_the_best_cell_of_a_block_is_that_of_a_plain_loop(rng: np.random.Generator) -> None:
@@ -178,8 +179,9 @@ def test_the_best_cell_of_a_block_is_that_of_a_plain_loop(rng: np.random.Generat
     values[rng.random(columns * rows) < 0.5] = -np.inf
     values[: 4 * columns].reshape(4, columns)[:, :4] = -np.inf  # a whole block
     grid = values.reshape(rows, columns)
-    chosen = np.empty(6, dtype=np.int64)
-    find_best_cells(values, columns, block, 3, chosen)
+    layer = Layer(Grid(np.zeros(2), 1.0, columns, rows), 1, 1.0)
+    layer.values[:] = values
+    chosen = dict(zip(*layer.best_of_blocks(block), strict=True))
     for k in range(6):
         row, column = k // 3 * block, k % 3 * block
         own = [
@@ -188,7 +190,7 @@ def test_the_best_cell_of_a_block_is_that_of_a_plain_loop(rng: np.random.Generat
             for c in range(column, min(column + block, columns))
             if np.isfinite(grid[r, c])
         ]
-        assert chosen[k] == (max(own)[1] if own else -1)
+        assert chosen.get(k, -1) == (max(own)[1] if own else -1)
 
 
 def test_ctrl_c_leaves_the_pieces_that_have_not_begun(monkeypatch: pytest.MonkeyPatch) -> None:

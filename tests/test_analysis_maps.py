@@ -13,7 +13,7 @@ from sliding_arm import sliding
 
 from nmm.analysis import analyse
 from nmm.analysis.maps.coordinates import singularity_map
-from nmm.analysis.maps.measures import MEASURES, Spectra
+from nmm.analysis.maps.measures import MEASURES, spectra_of
 from nmm.analysis.maps.singular_set import SingularSet
 from nmm.functions.tasks import Heading, Pose, Position
 from nmm.robots.configuration import Configuration
@@ -47,8 +47,11 @@ def all_points(those: SingularSet) -> Array:
 def test_measures_are_the_formulas_of_their_names(rng: np.random.Generator) -> None:
     J = rng.normal(size=(60, 3, 5))
     columns = {"platform": [0, 1], "arm": [2, 3, 4], "robot": [0, 1, 2, 3, 4]}
-    spectra = Spectra(J, columns)
-    found = {name: measure.of(spectra, "robot", 0.3) for name, measure in MEASURES.items()}
+    spectra = spectra_of(J, columns)
+    found = {
+        name: measure.of(0.3, *(spectra[part] for part in measure.parts or ("robot",)))
+        for name, measure in MEASURES.items()
+    }
     for k, own in enumerate(J):
         w = np.sqrt(np.linalg.det(own @ own.T))
         w_b = abs(np.linalg.det(own[:, 2:]))
@@ -67,9 +70,9 @@ def test_measures_of_a_flat_an_empty_and_an_undefined_J() -> None:
     J = np.zeros((3, 2, 3))
     J[0, 0, 0] = 2.0
     J[2] = np.nan
-    spectra = Spectra(J, {"platform": [], "arm": [1, 2], "robot": [0, 1, 2]})
+    spectra = spectra_of(J, {"platform": [], "arm": [1, 2], "robot": [0, 1, 2]})
     for name, measure in MEASURES.items():
-        values = measure.of(spectra, "robot", 0.5)
+        values = measure.of(0.5, *(spectra[part] for part in measure.parts or ("robot",)))
         assert np.isnan(values[2]) or name == "platform_manipulability"
         np.testing.assert_array_equal(values[:2], 1.0 if name == "eccentricity" else 0.0)
 

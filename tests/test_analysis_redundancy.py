@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from platform_grid import EXAMPLES, random_qp
 from robot_grid import built, frame_of, start
 
-from nmm.analysis.redundancy.null_space import readable_null_space
+from nmm.analysis.redundancy.null_fields import readable_null_space
 from nmm.analysis.redundancy.report import RedundancyReport, redundancy
 from nmm.analysis.singular.parts import null_space
 from nmm.control.controller import Controller

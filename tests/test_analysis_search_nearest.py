@@ -10,14 +10,15 @@ import twin
 from numpy import pi
 from numpy.typing import NDArray
 
-from nmm.analysis.search import find_singularities, nearest_singularity
 from nmm.analysis.search.family import values_text
-from nmm.cli.searching import search_command, show_nearest, show_search
+from nmm.analysis.search.many_starts import find_singularities
+from nmm.analysis.search.nearest import nearest_singularity
+from nmm.cli.singularities import search_command, show_nearest, show_search
 from nmm.cli.subjects import studied
 from nmm.functions.tasks import CallableFunction, Position
 from nmm.robots.loading import load
 from nmm.robots.robot import Robot
-from nmm.words import value_text
+from nmm.text_format import value_text
 
 Array = NDArray[np.float64]
 

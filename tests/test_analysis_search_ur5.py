@@ -13,7 +13,9 @@ from scipy.optimize import minimize
 from spatial_arms import load_ur5
 
 from nmm.analysis import analyse
-from nmm.analysis.search import SingularFamily, SingularitySearch, find_singularities, nearest_singularity
+from nmm.analysis.search.family import SingularFamily
+from nmm.analysis.search.many_starts import SingularitySearch, find_singularities
+from nmm.analysis.search.nearest import nearest_singularity
 from nmm.functions.tasks import Pose
 from nmm.robots.loading import load
 from nmm.robots.robot import Robot

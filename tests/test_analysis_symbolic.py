@@ -13,8 +13,8 @@ import twin
 from symbolic_checks import PAPER, TASKS, TIP, check_numbers, made, minors_of
 
 from nmm.analysis.formulas import symbolic
-from nmm.analysis.formulas.expressions import latex
-from nmm.analysis.formulas.text import latex_lines
+from nmm.analysis.formulas.expressions import shown
+from nmm.analysis.formulas.symbolic_analysis import latex_lines
 from nmm.errors import InputError
 from nmm.functions.tasks import Distance, Orientation, Pointing, Position
 from nmm.platforms import DifferentialDrive
@@ -166,7 +166,7 @@ def test_latex_can_be_typeset(name: str, task: str) -> None:
     """By Matplotlib, formula by formula; it knows neither align nor matrices."""
     analysis = made(name, task)[2]
     typeset(latex_lines(analysis))
-    typeset([("a", entry) for row in analysis.short_entries for entry in map(latex, row)])
+    typeset([("a", shown(entry).latex) for row in analysis.short_entries for entry in row])
     written = analysis.latex()
     assert written.count("{") == written.count("}")
     assert len(written) < 2500

@@ -34,7 +34,7 @@ def laid() -> dict[str, workloads.Workload]:
 def told(laid: dict[str, workloads.Workload], tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What the workers read, the robots' texts in files."""
     folder = tmp_path_factory.mktemp("workloads")
-    found = {name: one.told() for name, one in laid.items()}
+    found = {name: one.describe() for name, one in laid.items()}
     for name, one in found.items():
         for base, text in one["urdf"].items():
             path = folder / f"{name}_{base}.urdf"

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import paper_cases
 import pytest
+from findings import codes, the
 
 import nmm
 import nmm.functions.objectives
@@ -42,9 +43,9 @@ def test_the_papers_scenarios_are_the_papers(name: str, case: paper_cases.Case) 
 #: Through singularities, where the task (the first two) or the added one is damped on purpose, and what the
 #: run says of it: see test_damping_runs.py.
 DAMPED = {
-    "unicycle_3r_out_of_reach": "scales the rate on purpose",
-    "unicycle_3r_vertical_line": "scales the rate on purpose",
-    "unicycle_2r_algorithmic": "the added task was not done",
+    "unicycle_3r_out_of_reach": "inputs_unmet",
+    "unicycle_3r_vertical_line": "inputs_unmet",
+    "unicycle_2r_algorithmic": "added_task_missed",
 }
 #: The task gives way to what is in its way, or to limits where it begins anew, and is done at the end.
 GIVE_WAY = (
@@ -74,17 +75,17 @@ def test_every_bundled_scenario_runs_to_its_end(runs: dict[str, nmm.Trajectory])
         assert run.scenario["title"], name
         assert run.summary()["lateral_slip_max"] <= 1e-12, name
         if name in DAMPED:
-            assert DAMPED[name] in " ".join(run.warnings), name
+            assert DAMPED[name] in codes(run), name
         elif name in GIVE_WAY:
-            assert any("did not do all that the task asked" in one for one in run.warnings), name
+            assert {"inputs_unmet", "inputs_fell_short"} & codes(run), name
             assert run.error_norm[-1] < 1e-3, name
             continue
         else:
             # Links that are built close to each other are no fault of the run.
-            assert [one for one in run.warnings if not one.startswith("left out, as nearer")] == [], name
+            assert {one.code for line in run.verdict.warnings for one in line} <= {"distances_note"}, name
         # Feedback with K = 1 1/s: what is left of the initial error, and what the integrator adds.
         expected = run.error_norm[0] * np.exp(-run.t[-1])
-        if "task was" in DAMPED.get(name, "task was"):
+        if DAMPED.get(name) != "inputs_unmet":
             assert run.error_norm[-1] <= 1.1 * expected + (
                 1e-11 * (run.dt / 0.005) ** 4 if run.method == "rk4" else 1e-5
             ), name
@@ -171,8 +172,8 @@ def test_without_the_coupling_pursuit_steers_or_nothing(
     assert pursued.q[-1, pursued.robot.coordinate("theta")] == pytest.approx(theta[-1], abs=0.5)
     straight = uncoupled.override("steering", False).run()
     assert np.all(np.abs(straight.q[:, straight.robot.coordinate("steering")]) < 1e-9)
-    assert any("steering_rate" in warning for warning in straight.warnings)
-    assert not straight.complete or any("singular" in warning for warning in straight.warnings)
+    assert "steering_rate" in the(straight, "idle_inputs").values["inputs"]
+    assert not straight.complete or "nearly_singular" in codes(straight)
 
 
 @pytest.mark.parametrize("resolver", ["pg", "rg"])

@@ -14,12 +14,10 @@ import pytest
 from short_scenario import MINIMAL
 
 import nmm
-import nmm.cli.laps
+import nmm.cli.redundancy
 from nmm.analysis.redundancy.moving import self_motion
 from nmm.analysis.redundancy.report import redundancy as report_of
-from nmm.cli.laps import run_laps
-from nmm.cli.redundancy import laps, redundancy
-from nmm.cli.redundancy_tables import direction_of
+from nmm.cli.redundancy import direction_of, laps, redundancy
 from nmm.errors import InputError, SingularError
 from nmm.functions.tasks import Position
 
@@ -240,13 +238,9 @@ def test_laps_are_printed_and_written(capsys: Printed, round_path: Path, tmp_pat
 
 
 def test_settings_and_periods_reach_the_laps(round_path: Path, tmp_path: Path, capsys: Printed) -> None:
-    status = run_laps(
-        str(round_path),
-        ["pg"],
-        {"task.reference.rate": "2*pi", "dt": 0.02},
-        laps=1,
-        period=3.0,
-        out=tmp_path / "a",
+    settings = ["task.reference.rate=2*pi", "dt=0.02"]
+    status = laps(
+        str(round_path), resolvers="pg", settings=settings, number=1, period=3.0, out=tmp_path / "a"
     )
     assert status == 0
     run = nmm.Trajectory.load(tmp_path / "a" / "pg")
@@ -257,14 +251,14 @@ def test_settings_and_periods_reach_the_laps(round_path: Path, tmp_path: Path, c
 
 def test_the_folder_is_replaced_if_it_is_ours(round_path: Path, tmp_path: Path) -> None:
     folder = tmp_path / "laps"
-    for kinds in (["pg"], ["rg"]):
-        assert run_laps(str(round_path), kinds, {"dt": 0.05}, laps=1, period=None, out=folder) == 0
+    for kind in ("pg", "rg"):
+        assert laps(str(round_path), resolvers=kind, settings=["dt=0.05"], number=1, out=folder) == 0
     assert not (folder / "pg").exists()
     other = tmp_path / "other"
     other.mkdir()
     (other / "precious.txt").write_text("mine")
     with pytest.raises(InputError, match="exists and is not what this writes"):
-        run_laps(str(round_path), ["pg"], {}, laps=1, period=None, out=other)
+        laps(str(round_path), resolvers="pg", number=1, out=other)
     assert (other / "precious.txt").read_text() == "mine"
 
 
@@ -275,7 +269,7 @@ def test_laps_that_end_early_are_written_and_fail(tmp_path: Path, capsys: Printe
         "{kind: rg}", "{kind: ej, added_task: [{kind: position, frame: ee, axes: xy, reference: [1.2, 0.2]}]}"
     )
     path.write_text(text, encoding="utf-8")
-    assert run_laps(str(path), ["ej"], {}, laps=2, period=None, out=tmp_path / "out") == 1
+    assert laps(str(path), resolvers="ej", number=2, out=tmp_path / "out") == 1
     printed = capsys.readouterr()
     assert "ended in lap 1" in printed.err
     assert "nmm laps: EJ ended" in printed.err
@@ -293,9 +287,9 @@ def test_laps_that_end_in_the_middle_of_the_first_are_written(
         if fraction > 0.1:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(nmm.cli.laps, "progress", lambda label: nullcontext(ctrl_c))
+    monkeypatch.setattr(nmm.cli.redundancy, "progress", lambda label: nullcontext(ctrl_c))
     out = tmp_path / "out"
-    assert run_laps("unicycle_2r_position", ["rg"], {}, laps=2, period=None, out=out) == 1
+    assert laps("unicycle_2r_position", resolvers="rg", number=2, out=out) == 1
     assert "RG ended in lap 1" in capsys.readouterr().err
     lines = (out / "laps.csv").read_text(encoding="utf-8").splitlines()
     assert [line.split(",")[:2] for line in lines[1:]] == [["rg", "0"]]

@@ -22,8 +22,9 @@ from ports import MOST
 import nmm
 import nmm.cli.runs
 from nmm.cli.exit_status import status_of
-from nmm.cli.runs import run_scenario
-from nmm.runs.figure_options import FigureOptions
+from nmm.cli.playing import runs_in
+from nmm.cli.runs import run as run_scenario
+from nmm.figure_options import FigureOptions
 from nmm.tables import Table
 
 SHORT = ("--set", "duration=0.5")
@@ -74,9 +75,7 @@ def test_the_folder_is_written_though_nobody_reads_the_numbers(
 
     monkeypatch.setattr(nmm.cli.runs, "show_run", gone)
     with pytest.raises(BrokenPipeError):
-        run_scenario(
-            "unicycle_2r_position", None, {"duration": 0.5}, None, tmp_path / "here", html=False, play=False
-        )
+        run_scenario("unicycle_2r_position", settings=["duration=0.5"], out=tmp_path / "here")
     assert seen == [False]
     assert {"summary.json", "motion.png"} <= {path.name for path in (tmp_path / "here").iterdir()}
 
@@ -294,7 +293,7 @@ def test_compare_takes_settings_and_resolvers_of_ones_own(run: Command) -> None:
     runs = {name: nmm.Trajectory.load(folder / name) for name in names}
     assert list(json.loads((folder / "summary.json").read_text())["runs"]) == names
     assert [one.called for one in runs.values()] == called
-    assert [one.called for one in nmm.cli.runs.runs_in(folder)] == called
+    assert [one.called for one in runs_in(folder)] == called
     for name, alpha in (("pg-alpha-50", 50.0), ("rg-alpha-5", 5.0)):
         assert runs[name].scenario is not None
         assert runs[name].scenario["resolver"]["alpha"] == alpha

@@ -18,6 +18,7 @@ from numpy import pi
 from nmm import Scenario
 from nmm.analysis import analyse, analyse_along
 from nmm.cli.exit_status import status_of
+from nmm.findings import Finding
 from nmm.functions.tasks import Heading, Position
 from nmm.robots.loading import load
 from nmm.runs.trajectory import Trajectory
@@ -43,6 +44,21 @@ def switching(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def findings(run: Command, *arguments: str) -> dict[str, dict[str, Any]]:
+    """What `--json` says was found, by code."""
+    found = parsed(run(*arguments, "--json"))["findings"]
+    assert len({one["code"] for one in found}) == len(found)
+    return {one["code"]: one for one in found}
+
+
+def parsed(result: Result) -> Any:
+    def refuse(text: str) -> None:
+        raise AssertionError(f"{text} is no JSON")
+
+    assert (result.status, result.err) == (0, "")
+    return json.loads(result.out, parse_constant=refuse)
+
+
 # at a configuration
 
 
@@ -59,44 +75,49 @@ def test_the_numbers_are_those_of_the_analysis(run: Command) -> None:
         row = minors[f"Δ[{', '.join(name)}]"]
         assert printed(row["value"]) == pytest.approx(expected, rel=1e-3)
         assert printed(row["|Δ|/√(det J Jᵀ)"]) == pytest.approx(share, rel=1e-2)
-    squares, gram = map(float, re.findall(r"squares (\S+), det J Jᵀ (\S+)", result.out)[0])
-    assert squares == gram
-    assert gram == pytest.approx(np.linalg.det(report.J @ report.J.T), rel=1e-5)
-    strongest = report.inputs[int(np.argmax(np.abs(report.by_input.rates)))]
-    assert f"σ_min changes with {strongest} (σ_min {np.abs(report.by_input.rates).max():+.2g}" in (
-        result.out.replace("σ_min -", "σ_min +")
-    )
+    found = findings(run, *POSITION, "--at", "theta=pi/6", "--at", "q1=0.4", "--at", "q2=-1.1")
+    for finding in found.values():
+        assert finding["text"] in result.out
+    squares = found["minor_squares"]["values"]
+    assert squares["squares"] == pytest.approx(squares["gram"], rel=1e-12)
+    assert squares["gram"] == pytest.approx(np.linalg.det(report.J @ report.J.T), rel=1e-12)
+    rates = dict(zip(report.inputs, report.by_input.rates, strict=True))
+    strongest = max(rates, key=lambda name: abs(rates[name]))
+    assert found["sigma_changes"]["values"]["motions"][0] == [strongest, rates[strongest], "rad", 0]
 
 
 def test_what_the_platform_gives_back(run: Command) -> None:
-    result = run(*POSITION, "--at", "q1=pi/6", "--at", "theta=-pi/6")
-    assert "The platform gives back what the arm alone has lost: ee.x." in result.out
-    assert "RG: [q1, q2] is singular though J is not (algorithmic); best is [v, omega]" in result.out
+    found = findings(run, *POSITION, "--at", "q1=pi/6", "--at", "theta=-pi/6")
+    assert found["given_back"]["values"] == {"directions": ["ee.x"], "too_few": False}
+    rg = found["rg_algorithmic"]["values"]
+    assert (rg["singular"], rg["best"], rg["own"]) == ([["q1", "q2"]], ["v", "omega"], False)
     fixed = run(*POSITION, "--platform", "fixed", "--at", "q1=pi/6")
     assert [row["part"] for row in table(fixed, "part")] == ["arm"]
-    assert "Singular: J has rank 1 of 2. No input moves 0.87 ee.x + 0.5 ee.y." in fixed.out
-    assert "platform gives back" not in fixed.out
-    assert "Comes back with q2 (σ_min" in fixed.out
+    alone = findings(run, *POSITION, "--platform", "fixed", "--at", "q1=pi/6")
+    assert alone["rank_lost_here"]["values"] == {"rank": 1, "rows": 2, "lost": ["0.87 ee.x + 0.5 ee.y"]}
+    assert not {"given_back", "nothing_given_back"} & set(alone)
+    assert [name for name, *_ in alone["rank_restored"]["values"]["motions"]] == ["q2"]
 
 
 def test_a_singular_configuration_is_an_answer(run: Command) -> None:
     result = run(*POSITION, "--set", "d=0", "--at", "theta=pi/4", "--at", "q1=pi/2")
     report = analyse((load("unicycle_2r", arguments={"d": 0}), TIP), {"theta": pi / 4, "q1": pi / 2})
     expect_report(result, report)
-    assert "Singular: J has rank 1 of 2. No input moves 0.71 ee.x - 0.71 ee.y." in result.out
+    found = findings(run, *POSITION, "--set", "d=0", "--at", "theta=pi/4", "--at", "q1=pi/2")
+    assert found["rank_lost_here"]["values"]["lost"] == ["0.71 ee.x - 0.71 ee.y"]
     rates = report.by_input.rates
-    assert f"Comes back with q1 (σ_min {rates[2]:+.2g} per rad), q2 ({rates[3]:+.2g} per rad)." in result.out
-    assert "All 6 minors are 0" in result.out
-    assert "kinematic, J's own: RG fails with every partition" in result.out
-    vertical = run("unicycle_3r", "--task", "position")
-    assert vertical.status == 0
-    assert "Singular: J has rank 2 of 3. No input moves ee.z." in vertical.out
-    assert "The platform gives back what the arm alone has lost: ee.y." in vertical.out
+    motions = [["q1", rates[2], "rad", 1], ["q2", rates[3], "rad", 1]]
+    assert found["rank_restored"]["values"]["motions"] == motions
+    assert found["all_minors_zero"]["values"] == {"count": 6}
+    assert "rg_kinematic" in found
+    vertical = findings(run, "unicycle_3r", "--task", "position")
+    assert vertical["rank_lost_here"]["values"] == {"rank": 2, "rows": 3, "lost": ["ee.z"]}
+    assert vertical["given_back"]["values"]["directions"] == ["ee.y"]
 
 
-def test_only_what_the_wheels_do_not_admit(capsys: pytest.CaptureFixture[str]) -> None:
+def test_only_what_the_wheels_do_not_admit() -> None:
     """No task of the command line needs it: the report says it of a restoration that is made up."""
-    from nmm.cli.singularity_tables import show_report
+    from nmm.cli.singularity_report import described
     from nmm.cli.subjects import studied
 
     given = studied("unicycle_2r", tasks=["position"], at=["q1=pi/2"], settings=["d=0"])
@@ -107,10 +128,11 @@ def test_only_what_the_wheels_do_not_admit(capsys: pytest.CaptureFixture[str]) -
         by_input=replace(report.by_input, rates=np.zeros(4), regained=none),
         by_coordinate=replace(report.by_coordinate, rates=1.0 * sideways, regained=sideways),
     )
-    show_report(given, report, None, 0)
-    out = capsys.readouterr().out
-    assert "No input brings it back, to first order." in out
-    assert "A motion along y would, which the wheels do not admit." in out
+    found = {
+        item.code: item.values for item in described(given, report, None, 0) if isinstance(item, Finding)
+    }
+    assert "rank_not_restored" in found
+    assert found["restored_across"] == {"coordinates": ["y"]}
 
 
 def test_a_scenario_with_its_start_and_its_added_task(run: Command) -> None:
@@ -121,29 +143,33 @@ def test_a_scenario_with_its_start_and_its_added_task(run: Command) -> None:
     expect_report(start, report)
     extended = report.extended
     assert extended is not None
-    assert "singular values count lengths in L = 0.8 m" in start.out
-    assert f"det J_e = {extended.determinant:.4g}, rank 4 of 4" in start.out
-    assert f"= {extended.angle_measure:.3g}: 1 where the added task moves only" in start.out
-    singular = run(name, "--at", f"q1={float(np.arccos(-0.3 / 0.5))}")
-    assert singular.status == 0
-    assert "Nonsingular: J has rank 2." in singular.out
-    assert "J_e is singular though neither J nor the added task's J_y is." in singular.out
+    found = findings(run, name, "--length", "0.8")
+    assert found["sizes_in_length"]["values"] == {"length": 0.8}
+    matrix = found["ej_matrix"]["values"]
+    assert (matrix["determinant"], matrix["rank"], matrix["count"]) == (extended.determinant, 4, 4)
+    assert found["ej_angle"]["values"] == {"measure": extended.angle_measure}
+    singular = findings(run, name, "--at", f"q1={float(np.arccos(-0.3 / 0.5))}")
+    assert singular["nonsingular"]["values"]["rank"] == 2
+    assert "ej_algorithmic" in singular
 
 
 def test_rg_with_the_partitions_of_a_scenario(run: Command) -> None:
-    singular = run("unicycle_2r_switching", "--set", "resolver.partitions=[[v, q2]]", "--at", "q1=pi/2")
-    assert "RG, with the scenario's partitions: [v, q2] is singular, algorithmic" in singular.out
-    fine = run("unicycle_2r_switching", "--at", "q1=0.3")
-    assert "RG, with the scenario's partitions: no partition is singular here" in fine.out
-    other = run("unicycle_2r_switching", "--task", "heading:link1", "--at", "q1=0.3")
+    name = "unicycle_2r_switching"
+    singular = findings(run, name, "--set", "resolver.partitions=[[v, q2]]", "--at", "q1=pi/2")
+    assert singular["rg_exhausted"]["values"] == {"own": True, "singular": [["v", "q2"]], "count": 1}
+    fine = findings(run, name, "--at", "q1=0.3")
+    assert fine["rg_regular"]["values"]["own"] is True
+    other = run(name, "--task", "heading:link1", "--at", "q1=0.3")
     assert "task: link1.heading (rad)" in other.out
-    assert "scenario's partitions" not in other.out
+    of_rg = findings(run, name, "--task", "heading:link1", "--at", "q1=0.3")
+    assert [one["values"]["own"] for code, one in of_rg.items() if code.startswith("rg_")] == [False]
 
 
 def test_inputs_that_do_nothing_and_the_only_arm_by_its_name(run: Command) -> None:
     result = run("car_steered_by_the_null_space")
-    assert "do not move the task here: steering_rate, q5" in result.out
-    assert "0: every minor with steering_rate or q5; Δ[v, q2, q3]" in result.out
+    found = findings(run, "car_steered_by_the_null_space")
+    assert found["inputs_idle_here"]["values"] == {"inputs": ["steering_rate", "q5"]}
+    assert found["some_minors_zero"]["values"]["others"][0] == ["v", "q2", "q3"]
     assert [row["part"] for row in table(result, "part")] == ["platform", "arm (small_arm)", "robot"]
     scenario = Scenario.load("car_steered_by_the_null_space")
     report = analyse(scenario.controller(), scenario.parts.q0)
@@ -160,14 +186,15 @@ def test_which_minors(run: Command) -> None:
     )
     none = run(*POSITION, "--no-minors")
     assert "Δ[" not in none.out
-    assert "sum of the squares of all 6 minors" in none.out
+    assert findings(run, *POSITION, "--no-minors")["gram"]["values"]["count"] == 6
     many = run("tiago_pointing")
-    assert "they are not listed: --minors lists all, --minor v,omega,torso_lift_joint,arm_1_joint" in many.out
+    first = ["v", "omega", "torso_lift_joint", "arm_1_joint"]
+    assert findings(run, "tiago_pointing")["minors_not_listed"]["values"] == {"first": first}
     assert many.out.count("Δ[") == 0
     every = run("tiago_pointing", "--minors")
     # Two rows are the platform's own: only minors with v and omega are not 0, and two of eight joints.
     assert len(table(every, "value")) == 28
-    assert "0: 182 minors" in every.out
+    assert len(findings(run, "tiago_pointing", "--minors")["some_minors_zero"]["values"]["others"]) == 182
 
 
 def test_limits_are_told_but_do_not_hinder(run: Command) -> None:
@@ -180,14 +207,6 @@ def test_limits_are_told_but_do_not_hinder(run: Command) -> None:
 
 
 # for scripts
-
-
-def parsed(result: Result) -> Any:
-    def refuse(text: str) -> None:
-        raise AssertionError(f"{text} is no JSON")
-
-    assert (result.status, result.err) == (0, "")
-    return json.loads(result.out, parse_constant=refuse)
 
 
 def test_json_is_the_report(run: Command) -> None:
@@ -230,8 +249,6 @@ def test_along_a_run(run: Command, switching: Path) -> None:
         sigma = history.sigma_min[row["part"]]
         assert printed(row["smallest σ_min"]) == pytest.approx(sigma.min(), rel=1e-3, abs=1e-9)
         assert printed(row["at"]) == pytest.approx(history.t[sigma.argmin()])
-    assert "J has rank 2 at every sample" in result.out
-    assert "The arm alone does, down to 0 at 0 s: the platform makes up for it." in result.out
     crossings = table(result, "at")
     assert len(crossings) == len(history.crossings) > 5
     for row, crossing in zip(crossings, history.crossings, strict=True):
@@ -244,6 +261,9 @@ def test_along_a_run(run: Command, switching: Path) -> None:
     crossed = next(c.t for c in history.crossings if c.columns == ("v", "omega"))
     assert printed(used[0]["to"]) < crossed
     data = parsed(run(str(switching), "--json"))
+    found = {one["code"]: one["values"] for one in data["findings"]}
+    assert found["run_regular"]["rows"] == 2
+    assert found["arm_dips"] == {"sigma_min": 0.0, "t": 0.0}
     assert data["sigma_min"]["arm"] == history.sigma_min["arm"].tolist()
     assert [one["t"] for one in data["crossings"]] == [one.t for one in history.crossings]
 
@@ -257,7 +277,7 @@ def test_a_run_at_an_instant_and_with_another_task(run: Command, switching: Path
     assert "task: link2.heading (rad)" in other.out
     for task in ("heading:link2", "position:link2"):  # RG's partition was of another task
         assert "RG" not in run(str(switching), "--task", task).out.replace("run of RG", "")
-    assert "J has rank 1 at every sample" in other.out
+    assert findings(run, str(switching), "--task", "heading:link2")["run_regular"]["values"]["rows"] == 1
 
 
 def test_a_run_through_a_singularity(run: Command, tmp_path: Path) -> None:
@@ -267,18 +287,21 @@ def test_a_run_through_a_singularity(run: Command, tmp_path: Path) -> None:
     q = np.zeros((len(trajectory), 5))
     q[:, 3] = np.linspace(1.0, pi / 2, len(trajectory))
     replace(trajectory, q=q).save(tmp_path / "through", figures=False)
-    result = run("through")
-    assert "Singular at 1 of 11 samples, the first at 1 s: rank 1 of 2." in result.out
-    assert re.search(r"σ_min comes below \S+ at 1 s \(\S+, an end\)", result.out)
-    assert "the platform makes up" not in result.out
+    found = findings(run, "through")
+    expected = {"singular": 1, "samples": 11, "t": 1.0, "rank": 1, "rows": 2}
+    assert found["run_singular"]["values"] == expected
+    ((t, sigma, at_end),) = found["sigma_dips"]["values"]["dips"]
+    assert (t, at_end) == (1.0, True)
+    assert sigma < 1e-9
+    assert "arm_dips" not in found
 
 
 def test_a_run_of_ej(run: Command, tmp_path: Path) -> None:
     settings = {"dt": 0.05, "duration": 2}
     Scenario.load("unicycle_2r_extended_jacobian", settings).run().save(tmp_path / "ej", figures=False)
-    result = run("ej")
-    lowest = min(parsed(run("ej", "--json"))["extended_sigma_min"])
-    assert f"EJ: σ_min of J_e is at least {lowest:.4g}, at" in result.out
+    data = parsed(run("ej", "--json"))
+    (found,) = [one["values"] for one in data["findings"] if one["code"] == "ej_sigma"]
+    assert found["sigma_min"] == min(data["extended_sigma_min"])
 
 
 def test_minors_that_are_zero_throughout_have_no_crossings(run: Command, tmp_path: Path) -> None:
@@ -286,12 +309,14 @@ def test_minors_that_are_zero_throughout_have_no_crossings(run: Command, tmp_pat
     Scenario.load("car_steered_by_the_null_space", {"duration": 2}).run().save(
         tmp_path / "car", figures=False
     )
-    result = run("car")
-    assert "No minor changes its sign." in result.out
-    assert "0 on the whole motion: 26 minors" in result.out
+    found = findings(run, "car")
+    assert "no_crossing" in found
+    assert len(found["zero_throughout"]["values"]["minors"]) == 26
 
 
 # wrong input
+
+ROWS = "task: expected at most 4 rows, as many as inputs (v, omega, q1, q2), got 5"
 
 
 @pytest.mark.parametrize(
@@ -300,8 +325,8 @@ def test_minors_that_are_zero_throughout_have_no_crossings(run: Command, tmp_pat
         ([], "Missing argument 'SUBJECT'"),
         (["unicycle_2r"], "unicycle_2r is a robot: expected --task"),
         (["unicycle2r"], "unknown robot or scenario 'unicycle2r' (did you mean 'unicycle_2r'?)"),
-        ([*POSITION, "--task", "heading:link2", "--task", "posture"], "5 rows for 4 inputs"),
-        ([*POSITION, "--task", "heading:link2", "--task", "posture", "--symbolic"], "5 rows for 4 inputs"),
+        ([*POSITION, "--task", "heading:link2", "--task", "posture"], ROWS),
+        ([*POSITION, "--task", "heading:link2", "--task", "posture", "--symbolic"], ROWS),
         (["unicycle_2r", "--task", "position:hand"], "unknown frame 'hand'"),
         ([*POSITION, "--at", "q9=1"], "unknown coordinate 'q9'; available: x, y, theta, q1, q2"),
         ([*POSITION, "--minor", "v,q9"], "unknown input 'q9'; available: v, omega, q1, q2"),
@@ -317,11 +342,11 @@ def test_minors_that_are_zero_throughout_have_no_crossings(run: Command, tmp_pat
         ([*POSITION, "--part", "arm"], "--part: expected with --search or --nearest"),
         ([*POSITION, "--set", "e=1"], "unknown xacro argument 'e'"),
         (["unicycle_2r_position", "--platform", "fixed"], "--platform: of a robot's file"),
-        (["RUN", "--symbolic"], "--symbolic: expected a robot or a scenario"),
-        (["RUN", "--symbolic", "--time", "1"], "--symbolic: expected a robot or a scenario"),
+        (["RUN", "--symbolic"], "is a run; expected a robot or a scenario"),
+        (["RUN", "--symbolic", "--time", "1"], "is a run; expected a robot or a scenario"),
         (["RUN", "--at", "q1=0"], "--at:"),
         (["RUN", "--time", "99"], "--time: expected an instant of the run, 0 to 20 s, got 99"),
-        (["RUN", "--set", "dt=1"], "--set: expected a robot or a scenario"),
+        (["RUN", "--set", "dt=1"], "which is as it was; expected a robot or a scenario"),
         (["RUN", "--minor", "v,q9"], "unknown input 'q9'"),
     ],
     ids=lambda given: " ".join(given) if isinstance(given, list) else "",
@@ -371,7 +396,7 @@ def test_headings_too(run: Command) -> None:
     report = analyse((load("unicycle_2r"), (TIP, Heading("link2"))), {"q1": 1.0})
     expect_report(result, report)
     assert "task: ee.x, ee.y (m); link2.heading (rad)" in result.out
-    assert "singular values count 1 m as much as 1 rad" in result.out
+    assert "sizes_mixed" in findings(run, *POSITION, "--task", "heading:link2", "--at", "q1=1")
 
 
 def test_search_and_nearest_get_what_they_need(run: Command) -> None:

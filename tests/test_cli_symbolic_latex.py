@@ -11,7 +11,6 @@ from command_line import Result
 from typeset import check_environments, check_text
 
 from nmm.cli.exit_status import status_of
-from nmm.cli.mathematics import typeset
 
 Command = Callable[..., Result]
 
@@ -120,22 +119,3 @@ def test_all_that_symbolic_says(subject: tuple[str, ...], run: Command) -> None:
     for kind, digits in re.findall(r"\b([cs])_\{(\d+)\} = ", defined):
         angle = " + ".join(f"q{digit}" for digit in digits)
         assert f"{kind}{digits} = {'cos' if kind == 'c' else 'sin'}({angle})" in plain(defined)
-
-
-@pytest.mark.parametrize(
-    ("sentence", "names", "expected"),
-    [
-        ("J has rank 2 (Cauchy and Binet)", (), "$J$ has rank $2$ (Cauchy and Binet)"),
-        ("every minor has a factor where a = 0", ("a",), "every minor has a factor where $a = 0$"),
-        ("d = 0.3 m, m = 2 m", ("d", "m"), "$d = 0.3$ m, $m = 2$ m"),
-        ("(cos(q1) = 0 and d != 0) or s2 = 0.", ("q1", "d"),
-         r"($\cos(q_1) = 0$ and $d \neq 0$) or $s_{2} = 0$."),
-        ("|d| > l1 + l2", ("d", "l1", "l2"), "$|d| > l_1 + l_2$"),
-        ("s2 = 0 of length s2", ("s2",), "$s_2 = 0$ of length $s_2$"),
-        ("v (m/s); --search looks for it", ("v",), r"$v$ (m/s); \texttt{-{}-search} looks for it"),
-        ("my_arm & x.y, self-motion 50 %", ("x",), r"my\_arm \& x.y, self-motion $50$ \%"),
-        ("So [v, q1] serves RG", ("v", "q1"), "So $[v, q_1]$ serves RG"),
-    ],
-)  # fmt: skip
-def test_sentences_with_formulas(sentence: str, names: tuple[str, ...], expected: str) -> None:
-    assert typeset(sentence, names) == expected

@@ -5,9 +5,9 @@ import pinocchio as pin
 import pytest
 
 import nmm
-from nmm.collisions.pairs import sampled
+from nmm.collisions.pairs import random_configurations
 from nmm.collisions.rows import Rows, no_rows
-from nmm.kernels.memory import Memory, views
+from nmm.kernels.record_layout import Memory, views
 
 
 def rows_at(setting, t, q, most=60):
@@ -32,11 +32,11 @@ def planar():
 def test_a_sphere_and_a_box_are_as_far_apart_as_geometry_says(planar):
     """The caster is a sphere: its distance from a box is that of its centre, less its radius."""
     box = nmm.Obstacle(nmm.Box([0.4, 0.6, 0.8]), [1.0, 0.3, 0.5, 0.1, 0.2, 0.3], name="box")
-    setting = nmm.Collisions(0.01, self=False, obstacles=[box]).on(planar)
+    setting = nmm.Collisions(0.01, self_collisions=False, obstacles=[box]).on(planar)
     pair = next(k for k, names in enumerate(setting.names) if "caster" in names[0])
     shape = setting.queries.shapes.geometryObjects[int(setting.queries.scene.pairs[pair, 0])]
     data = planar.model.createData()
-    for q in sampled(planar, 20, seed=3):
+    for q in random_configurations(planar, 20, seed=3):
         pin.forwardKinematics(planar.model, data, q)
         center = data.oMi[shape.parentJoint].act(shape.placement).translation
         local = pin.SE3(box.placement(0.0)).actInv(center)
@@ -52,7 +52,7 @@ def test_no_pair_is_nearer_than_points_of_its_shapes(tiago):
     setting = nmm.Collisions(obstacles=[table]).on(tiago)
     scene, queries = setting.queries.scene, setting.queries
     every = range(len(setting.names))
-    for q in sampled(tiago, 5, seed=1):
+    for q in random_configurations(tiago, 5, seed=1):
         distances = queries.distances(0.0, q, every)
         for k, (i, j) in enumerate(scene.pairs.tolist()):
             clouds = []
@@ -67,10 +67,10 @@ def test_no_pair_is_nearer_than_points_of_its_shapes(tiago):
 
 
 def test_lower_bounds_are_below_the_distances(tiago):
-    plane = nmm.Obstacle(nmm.Plane([0.1, 0.2, 1.0]), [0.0, 0.0, -0.5], name="slope")
+    plane = nmm.Obstacle(nmm.HalfSpace([0.1, 0.2, 1.0]), [0.0, 0.0, -0.5], name="slope")
     ball = nmm.Obstacle(nmm.Sphere(0.3), [0.5, 0.5, 0.8], name="ball")
     setting = nmm.Collisions(obstacles=[plane, ball]).on(tiago)
-    for q in sampled(tiago, 20, seed=2):
+    for q in random_configurations(tiago, 20, seed=2):
         least, pair = setting.queries.nearest(0.0, q)
         bounds = setting.queries.scene.bounds.copy()
         distances = setting.queries.distances(0.0, q, range(len(setting.names)))
@@ -85,7 +85,7 @@ def test_gradients_are_the_differences_of_the_distances(tiago):
     box = nmm.Obstacle(nmm.Box([0.3, 0.3, 0.3]), [0.8, 0.2, 0.9, 0.3, 0.4, 0.5], name="box")
     setting = nmm.Collisions(obstacles=[box], band=0.3).on(tiago)
     h, errors = 1e-5, []
-    for q in sampled(tiago, 25, seed=4):
+    for q in random_configurations(tiago, 25, seed=4):
         rows, _ = rows_at(setting, 0.0, q)
         used = int(rows.used)
         pairs, first = np.unique(rows.pair[:used], return_index=True)
@@ -106,7 +106,7 @@ def test_an_obstacle_that_moves_changes_distances_at_its_rate(planar):
         motion=lambda t: [1.0 - 0.3 * t, 0.1 * t, 0.3, 0.0, 0.0, 0.7 * t],
         name="door",
     )
-    setting = nmm.Collisions(obstacles=[turning], self=False, band=1.0).on(planar)
+    setting = nmm.Collisions(obstacles=[turning], self_collisions=False, band=1.0).on(planar)
     q, t, h = planar.q({"q1": 0.4, "q2": 0.3}), 0.4, 1e-5
     rows, _ = rows_at(setting, t, q)
     pairs, first = np.unique(rows.pair[: int(rows.used)], return_index=True)
@@ -122,7 +122,7 @@ def test_parallel_faces_have_a_row_at_each_end():
     """A forearm that lies along a wall keeps both of its ends off: nearest points jump, rows stay."""
     robot = nmm.load("unicycle_3r")
     wall = nmm.Obstacle(nmm.Box([6.0, 0.1, 2.0]), [0.0, 0.45, 0.5], name="wall")
-    setting = nmm.Collisions(obstacles=[wall], self=False, distance=0.03, band=0.6).on(robot)
+    setting = nmm.Collisions(obstacles=[wall], self_collisions=False, distance=0.03, band=0.6).on(robot)
     away = setting.queries.nearest(0.0, robot.rest)[0]
     wall.move_to([0.0, 0.45 - away + 0.04, 0.5])
     for tilt in (-1e-7, 0.0, 1e-7):
@@ -136,7 +136,9 @@ def test_parallel_faces_have_a_row_at_each_end():
 
 
 def test_centres_that_coincide_have_a_direction(planar):
-    setting = nmm.Collisions(self=False, obstacles=[nmm.Obstacle(nmm.Sphere(0.05), name="ball")]).on(planar)
+    setting = nmm.Collisions(
+        self_collisions=False, obstacles=[nmm.Obstacle(nmm.Sphere(0.05), name="ball")]
+    ).on(planar)
     for link in ("caster", "link1"):
         pair = next(k for k, names in enumerate(setting.names) if link in names[0])
         q = planar.rest
@@ -151,7 +153,7 @@ def test_centres_that_coincide_have_a_direction(planar):
 
 def test_what_is_far_costs_no_query(planar):
     far = nmm.Obstacle(nmm.Box([1.0, 1.0, 1.0]), [9.0, 9.0, 0.5], name="far")
-    setting = nmm.Collisions(self=False, obstacles=[far]).on(planar)
+    setting = nmm.Collisions(self_collisions=False, obstacles=[far]).on(planar)
     rows, least = rows_at(setting, 0.0, planar.rest)
     assert int(rows.used) == 0
     assert least == np.inf
@@ -161,7 +163,7 @@ def test_what_is_far_costs_no_query(planar):
 def test_a_look_at_the_nearest_pair_leaves_the_rows_right(planar):
     """Asked for the nearest pair in between, rows are those of where the obstacle is by now."""
     ball = nmm.Obstacle(nmm.Sphere(0.1), [0.9, 0.0, 0.3], name="ball")
-    setting = nmm.Collisions(self=False, obstacles=[ball], band=0.5).on(planar)
+    setting = nmm.Collisions(self_collisions=False, obstacles=[ball], band=0.5).on(planar)
     setting.queries.nearest(0.0, planar.rest)
     ball.move_to([0.8, 0.0, 0.3])
     rows, least = rows_at(setting, 0.0, planar.rest)

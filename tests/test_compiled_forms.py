@@ -22,8 +22,8 @@ from nmm.control.equations import step
 from nmm.functions.function import Stage
 from nmm.functions.objectives import Sum
 from nmm.functions.program import Program, evaluate
-from nmm.functions.tasks import Coordinates, Task
-from nmm.functions.tasks.comparison import Comparison
+from nmm.functions.tasks import LinearCoordinates, Task
+from nmm.functions.tasks.task import Comparison
 from nmm.kernels.compiled import Kernel
 from nmm.kernels.records import At, Frames, Rows
 from nmm.resolvers import (
@@ -36,7 +36,7 @@ from nmm.resolvers import (
     Resolver,
 )
 from nmm.resolvers.answer import SINGULAR_J, SOLVED, unanswered
-from nmm.resolvers.limited import limit
+from nmm.resolvers.saturation import limit
 from nmm.robots.configuration import Configuration
 from nmm.robots.loading import load
 from nmm.robots.robot import CENTER_OF_MASS, Robot
@@ -244,7 +244,7 @@ def answers() -> dict[str, Array]:
     for case in CASES:
         robot = robots[case.robot]
         s = 2 if case.name == "case 1" else 3
-        added = Task(Coordinates(*("q1", "q2")[: robot.n_u - s]), np.zeros(robot.n_u - s))
+        added = Task(LinearCoordinates(*("q1", "q2")[: robot.n_u - s]), np.zeros(robot.n_u - s))
         controllers = {
             "rg": case.controller(robot, case.rg()),
             "automatic": case.controller(robot, ReducedGradient()),
@@ -316,7 +316,7 @@ def test_a_new_controller_compiles_nothing(robot_2r: Robot, robot_3r: Robot) -> 
     """Whatever is combined: the kernels are called through their addresses."""
     answers()
     before = {name: len(function.signatures) for name, function in dispatchers().items()}
-    mixed = [TIP, Task(Coordinates("q1"), [0.0])]
+    mixed = [TIP, Task(LinearCoordinates("q1"), [0.0])]
     Controller(robot_2r, mixed, ProjectedGradient(), CASES[2].objective)(0.0, np.ones(5))
     Controller(robot_3r, [TIP], ReducedGradient(), CASES[3].objective)(0.0, np.ones(6))
     assert {name: len(function.signatures) for name, function in dispatchers().items()} == before

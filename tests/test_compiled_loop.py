@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from findings import codes
 
 import nmm
 from nmm.control.step_size import StepSize
 from nmm.kernels.compiled import Kernel
-from nmm.runs import closed_loop, simulation
+from nmm.runs import closed_loop
 from nmm.runs.compiled_loop import CompiledLoop
 
 #: What a run promises to the last digits; a run of other quantities would not be the same run.
@@ -155,7 +156,7 @@ def test_limits_that_contradict_each_other_are_told_in_the_same_words() -> None:
         robot, task, nmm.ProjectedGradient(), limits=nmm.Limits(bounds=[height, other]), dt=0.01
     )
     flown, stepped = both(lambda: nmm.simulate(controller, {"q1": 0.5, "q2": 0.5}, 1.0, 0.01, "zoh"))
-    assert any("could not be kept" in warning for warning in flown.warnings)
+    assert "limit_contradicted" in codes(flown)
     same(flown, stepped)
 
 
@@ -163,7 +164,7 @@ def test_what_needs_python_is_not_compiled() -> None:
     robot = nmm.load("unicycle_2r")
     told = nmm.CallableFunction(lambda at: at.q[:2], ["a", "b"])
     controller = nmm.Controller(robot, nmm.Task(told, [1.0, 0.0], gain=1.0), nmm.ProjectedGradient())
-    assert not controller.compilable
+    assert not controller.solver.compiles_steps
     run = nmm.simulate(controller, {"q1": 0.5}, 1.0, 0.02)
     assert run.summary()["kinematics"] == "pinocchio"
     assert run.summary()["kinematics_off"] is None
@@ -176,7 +177,7 @@ def test_a_run_leaves_the_controller_to_pinocchio() -> None:
     nmm.simulate(used, q, 1.0, 0.01)
     used.reset()
     assert np.array_equal(used(0.0, q), new(0.0, q))
-    assert used.kinematics == "pinocchio"
+    assert used.given.kinematics == "pinocchio"
 
 
 def test_another_thread_is_refused_while_compiled_code_runs() -> None:
@@ -191,7 +192,7 @@ def test_another_thread_is_refused_while_compiled_code_runs() -> None:
             seen.append(str(error))
 
     thread = threading.Thread(target=meddle, name="other")
-    with controller.compiled():
+    with controller.solver.compiled():
         thread.start()
         thread.join()
     assert "called in thread other while a call is under way" in seen[0]
@@ -283,7 +284,7 @@ def test_retreats_are_python_s_and_what_is_between_them_is_compiled(
     retreat = nmm.Retreat(stalled=0.4, durations=(0.2, 0.3))
     controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), limits=limits, retreat=retreat)
     flown, stepped = both(lambda: nmm.simulate(controller, robot.rest, 8.0, 0.01, method))
-    assert any("backed off" in warning for warning in flown.warnings)
+    assert "backed_off" in codes(flown)
     assert len({first for first, reached, _ in flights if reached > first}) > 3
     assert sum(reached - first for first, reached, _ in flights) > 200
     same(flown, stepped)
@@ -295,7 +296,7 @@ def test_errors_looked_at_are_those_of_a_step(given: str) -> None:
     robot = nmm.load("unicycle_2r")
     task = nmm.Task(nmm.Position("ee", "xy"), nmm.Circle([2, 0], 1.0, rate=0.5), gain=2.0)
     resolver = nmm.ProjectedGradient(step="armijo" if given == "armijo" else "constant")
-    objective = nmm.Quadratic(nmm.Square("q1"), nmm.Square("q2"))
+    objective = nmm.Quadratic(nmm.QuadraticTerm("q1"), nmm.QuadraticTerm("q2"))
     more: dict[str, object] = {"dt": 0.01}
     if given == "retreat":
         more["retreat"] = nmm.Retreat()
@@ -304,7 +305,7 @@ def test_errors_looked_at_are_those_of_a_step(given: str) -> None:
     controller = nmm.Controller(robot, task, resolver, objective, **more)
     times = np.linspace(0.0, 1.0, 7)
     q = robot.q({"q1": 0.5, "q2": 0.5}) + 0.3 * np.random.default_rng(3).standard_normal((7, robot.n))
-    error, rate = controller.errors(times, q)
+    error, rate = controller.solver.errors(times, q)
     for k, t in enumerate(times.tolist()):
         step = controller.evaluate(t, q[k])
         np.testing.assert_allclose(error[k], step.error, atol=1e-12)
@@ -314,7 +315,9 @@ def test_errors_looked_at_are_those_of_a_step(given: str) -> None:
 def test_what_is_compiled_ahead_is_what_a_run_calls(monkeypatch: pytest.MonkeyPatch) -> None:
     """For arguments of other types it would be compiled again, while the run waits."""
     asked: list[Any] = []
-    monkeypatch.setattr(simulation, "compile_ahead", lambda *wanted: asked.extend(wanted))
+    monkeypatch.setattr(
+        "nmm.diagnosis.compile_ahead.compile_in_parallel", lambda *wanted: asked.extend(wanted)
+    )
     assert nmm.Scenario.load("unicycle_2r_position", {"duration": 1.0}).run().complete
     called = [(one.compiled, one.signature) if isinstance(one, Kernel) else one for one in asked]
     assert len(called) > 3

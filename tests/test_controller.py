@@ -12,9 +12,9 @@ from paper_cases import CASES, CIRCLE, TIP, Case
 from platform_grid import EXAMPLES, random_qp
 
 from nmm.control.controller import Controller
-from nmm.functions.objectives import Objective, Quadratic, Square
+from nmm.functions.objectives import Objective, Quadratic, QuadraticTerm
 from nmm.functions.references import Bearing, Circle, Constant, Line
-from nmm.functions.tasks import Coordinates, Heading, Position, Task
+from nmm.functions.tasks import Heading, LinearCoordinates, Position, Task
 from nmm.platforms import WheeledPlatform
 from nmm.resolvers import ExtendedJacobian, ProjectedGradient, ReducedGradient, Resolver, Status
 from nmm.robots.robot import Robot
@@ -121,7 +121,7 @@ def test_the_motion_is_the_twins(case: Case, method: str, robots: dict[str, Robo
 
 def test_extended_jacobian_does_both_tasks(robot_2r: Robot, rng: np.random.Generator) -> None:
     added = Task(
-        Coordinates("q2", {"theta": 1, "q1": 1, "q2": 1}), Line([0, 1], [1, -1], 9.0), gain=[2.0, 0.5]
+        LinearCoordinates("q2", {"theta": 1, "q1": 1, "q2": 1}), Line([0, 1], [1, -1], 9.0), gain=[2.0, 0.5]
     )
     controller = Controller(robot_2r, TIP, ExtendedJacobian(), added_task=added)
     for t in rng.uniform(0, 9, 50):
@@ -136,7 +136,7 @@ def test_extended_jacobian_does_both_tasks(robot_2r: Robot, rng: np.random.Gener
 
 def test_no_redundancy_left(robot_2r: Robot, rng: np.random.Generator) -> None:
     """Four rows, four inputs: one answer, by whatever method and for whatever objective."""
-    tasks = (TIP, Task(Heading("link2"), [0.3]), Task(Coordinates("q2"), [-1.0]))
+    tasks = (TIP, Task(Heading("link2"), [0.3]), Task(LinearCoordinates("q2"), [-1.0]))
     q = random_configuration(robot_2r, rng)
     J, rate, _ = twin.case_1(2.0, q)
     J = np.vstack([J, [0, 1, 1, 1], [0, 0, 0, 1]])
@@ -172,7 +172,7 @@ def test_each_task_of_a_stack_has_its_own_gain(robot_2r: Robot, rng: np.random.G
     stack = [
         Task(Heading("link2"), 0.3, 4.0),
         Task(Position("ee", "xy"), CIRCLE, matrix),
-        Task(Coordinates("q1"), 0.1, None),
+        Task(LinearCoordinates("q1"), 0.1, None),
     ]
     found = Controller(robot_2r, stack, ProjectedGradient()).evaluate(6.0, q)
     r_d, speed = twin.circle(6.0)
@@ -190,7 +190,9 @@ def test_angular_errors_are_wrapped_and_coordinates_are_not(turns: int, robot_2r
         q = np.array([0.0, 0.0, angle + 2 * pi * turns, 0.0, 0.0])
         wrapped = Controller(robot_2r, Task(Heading("link2"), targets), ProjectedGradient()).evaluate(0, q)
         assert wrapped.error[0] == pytest.approx(-angle, abs=1e-13)
-        plain = Controller(robot_2r, Task(Coordinates("theta"), targets), ProjectedGradient()).evaluate(0, q)
+        plain = Controller(robot_2r, Task(LinearCoordinates("theta"), targets), ProjectedGradient()).evaluate(
+            0, q
+        )
         assert plain.error[0] == -q[2]
     # Targets many turns away, and the branch point, of which the interval holds the upper end.
     for target, error in (
@@ -207,7 +209,10 @@ def test_angular_errors_are_wrapped_and_coordinates_are_not(turns: int, robot_2r
 
 def test_h_is_the_gradient_seen_by_the_inputs(robot_2r: Robot, rng: np.random.Generator) -> None:
     """A sum of objectives has the sum of their gradients, with the weights and signs."""
-    parts = {"a": Quadratic(Square("x", 0.3)), "b": Quadratic(Square({"theta": 1, "q2": -1}, 0.1, 3.0))}
+    parts = {
+        "a": Quadratic(QuadraticTerm("x", 0.3)),
+        "b": Quadratic(QuadraticTerm({"theta": 1, "q2": -1}, 0.1, 3.0)),
+    }
     sums: list[tuple[Objective, float, float]] = [
         (parts["a"] + parts["b"], 1.0, 1.0),
         (2.0 * parts["a"] - parts["b"], 2.0, -1.0),
@@ -235,12 +240,12 @@ def moved_case(case: Case, turn: float, shift: Array) -> tuple[tuple[Task, ...],
     tip = Task(Position("ee", "xy"), circle)
     match case.name:
         case "case 1":
-            return (tip,), Quadratic(Square(absolute, pi / 2 + turn), Square("q1", pi / 4))
+            return (tip,), Quadratic(QuadraticTerm(absolute, pi / 2 + turn), QuadraticTerm("q1", pi / 4))
         case "case 2":
             return (tip, Task(Heading("link2"), Bearing(circle, T))), case.objective
         case "case 3":
             pointing = Task(Heading("link1"), Bearing(Position("link2", "xy"), T))
-            return (tip, pointing), Quadratic(Square(absolute, turn))
+            return (tip, pointing), Quadratic(QuadraticTerm(absolute, turn))
         case _:
             circle = Circle([*center, 0.5], 3, 0.08 * pi, 5 / 4 * pi + turn)
             return (Task(Position("ee", "xyz"), circle),), case.objective

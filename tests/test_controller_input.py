@@ -7,16 +7,24 @@ from typing import Any
 
 import numpy as np
 import pytest
+from findings import refused
 from numpy import pi
 from numpy.typing import NDArray
 from paper_cases import CIRCLE, H1, TIP
 
 from nmm.control.controller import Controller
 from nmm.errors import InputError, NmmError, SingularError
-from nmm.functions.objectives import CallableObjective, JointRange, Manipulability, Quadratic, Square, Sum
+from nmm.functions.objectives import (
+    CallableObjective,
+    JointRange,
+    Manipulability,
+    Quadratic,
+    QuadraticTerm,
+    Sum,
+)
 from nmm.functions.program import evaluate
 from nmm.functions.references import Bearing, CallableReference, Circle, Constant, PiecewisePolynomial, Spline
-from nmm.functions.tasks import CallableFunction, Coordinates, Heading, Position, Task
+from nmm.functions.tasks import CallableFunction, Heading, LinearCoordinates, Position, Task
 from nmm.resolvers import (
     CallableResolver,
     ExtendedJacobian,
@@ -48,83 +56,113 @@ def with_callable(function: Any, **options: Any) -> Callable[[Robot], Any]:
     return lambda robot: Controller(robot, task, PG)(0.0, np.zeros(5))
 
 
-TOO_MANY = [TIP, Task(Heading("link1"), REST), Task(Coordinates("q1", "q2"), [0, 0])]
+TOO_MANY = [TIP, Task(Heading("link1"), REST), Task(LinearCoordinates("q1", "q2"), [0, 0])]
 REFUSED: list[tuple[Callable[[Robot], Any], str]] = [
-    (made(Task(Position("tool", "xy"), CIRCLE)), "unknown frame 'tool'.*available: .*ee"),
-    (made(Task(Position("e", "xy"), CIRCLE)), r"unknown frame 'e' \(did you mean 'ee'\?\)"),
-    (made(Task(Heading("universe"), REST)), "unknown frame 'universe'"),
-    (made(TIP, PG, Manipulability("hand", "xy")), "unknown frame 'hand'"),
-    (made(Task(Coordinates("q9"), REST)), "unknown coordinate 'q9'.*available: x, y, theta, q1, q2"),
-    (made(TIP, PG, Quadratic(Square({"q1": 1, "q8": 1}))), "unknown coordinate 'q8'"),
-    (made(TIP, PG, JointRange(["q7"])), "unknown coordinate 'q7'"),
-    (made(TIP, PG, JointRange()), "q1 of robot unicycle_2r has no limits"),
-    (made(TIP, PG, JointRange(["q1"], [1.0], [1.0])), "expected lower below upper for q1, got 1 and 1"),
-    (made(TIP, PG, JointRange(["q1"], [1.0, 2.0], [3.0, 4.0])), "joint range: lower: expected 1 numbers"),
-    (made(TIP, ReducedGradient(partitions=[("v", "w")])), "partitions: unknown input 'w'.*v, omega, q1, q2"),
-    (made(TIP, ProjectedGradient(weights={"x": 1.0})), "weights: unknown input or group 'x'.*v, omega, q1"),
-    (made(Task(Position("ee", "xyz"), CIRCLE)), "expected a reference with 3 components, got Circle with 2"),
-    (made(Task(Heading("link1"), CIRCLE)), "task link1.heading: .*with 1 components, got Circle with 2"),
-    (made(TOO_MANY), r"5 rows for 4 inputs \(v, omega, q1, q2\); expected at most 4"),
-    (made([]), "expected at least one row"),
-    (made(TIP, PG, added_task=Task(Coordinates("q1"), REST)), "added_task: resolver pg takes none"),
-    (made(TIP, EJ), "added_task: expected 2 rows .*got 0"),
-    (made(TIP, EJ, added_task=Task(Coordinates("q1"), REST)), "added_task: expected 2 rows .*got 1"),
-    (made(Task(Position("ee", "xy"), CIRCLE, 0.0)), "gain of task ee.x, ee.y: expected positive definite"),
-    (made(Task(Position("ee", "xy"), CIRCLE, [1, 2, 3])), "gain .*: expected a number, 2 numbers or a 2 x 2"),
-    (made(Task(Position("ee", "xy"), CIRCLE, [[1, 3], [0, 1]])), "gain .*: expected positive definite"),
-    (made(Task(Position("ee", "xy"), CIRCLE, [[1, np.nan], [0, 1]])), "gain .*: expected finite numbers"),
-    (made(Task(Heading("link1"), Bearing(Heading("link2"), [6, 2]))), "bearing: expected the point"),
-    (made(Task(Heading("link1"), Bearing(Position("ee", "x"), [6, 2]))), "bearing: expected the point"),
-    (made(TIP, PG, Manipulability("ee", ("x", "y", "rz"), "arm")), "3 rows with 2 inputs is always 0"),
-    (made(Task(H1 + H1, REST)), "sum of objectives"),
-    (called(np.zeros(4)), r"q: expected 5 numbers, got shape \(4,\).*x, y, theta, q1, q2"),
-    (called(np.zeros((5, 1))), r"q: expected 5 numbers, got shape \(5, 1\)"),
-    (called([0, 0, np.nan, 0, 0]), "q: expected finite numbers"),
-    (called(np.array([0, 0, np.nan, 0, 0])), "q: expected finite numbers"),
-    (called(np.full(5, np.nan), RG), "q: expected finite numbers"),
-    (called(np.array([0, np.inf, 0, 0, 0]), RG), "q: expected finite numbers"),
-    (called({"q1": 1, "q7": 2}), "unknown coordinate 'q7'"),
-    (called("home"), "q: expected numbers"),
-    (with_callable(lambda c: [1, 2, 3], names=["a"]), r"expected a value of shape \(1,\), got shape \(3,\)"),
-    (with_callable(lambda c: "far", names=["a"]), "expected a value of shape .*got 'far'"),
+    (made(Task(Position("tool", "xy"), CIRCLE)), {"where": "robot unicycle_2r", "got": "tool"}),
+    (made(Task(Position("e", "xy"), CIRCLE)), {"where": "robot unicycle_2r", "got": "e"}),
+    (made(Task(Heading("universe"), REST)), {"where": "robot unicycle_2r", "got": "universe"}),
+    (made(TIP, PG, Manipulability("hand", "xy")), {"where": "robot unicycle_2r", "got": "hand"}),
+    (made(Task(LinearCoordinates("q9"), REST)), {"where": "robot unicycle_2r", "got": "q9"}),
+    (
+        made(TIP, PG, Quadratic(QuadraticTerm({"q1": 1, "q8": 1}))),
+        {"where": "robot unicycle_2r", "got": "q8"},
+    ),
+    (made(TIP, PG, JointRange(["q7"])), {"where": "robot unicycle_2r", "got": "q7"}),
+    (made(TIP, PG, JointRange()), {"where": "joint range: q1"}),
+    (made(TIP, PG, JointRange(["q1"], [1.0], [1.0])), {"where": "joint range: q1"}),
+    (
+        made(TIP, PG, JointRange(["q1"], [1.0, 2.0], [3.0, 4.0])),
+        {"where": "joint range: lower", "got": [1.0, 2.0]},
+    ),
+    (made(TIP, ReducedGradient(partitions=[("v", "w")])), {"where": "partitions", "got": "w"}),
+    (made(TIP, ProjectedGradient(weights={"x": 1.0})), {"where": "weights", "got": "x"}),
+    (made(Task(Position("ee", "xyz"), CIRCLE)), {"where": "task ee.x, ee.y, ee.z", "got": 2}),
+    (made(Task(Heading("link1"), CIRCLE)), {"where": "task link1.heading", "got": 2}),
+    (made(TOO_MANY), {"where": "task", "got": 5}),
+    (made([]), {"where": "task"}),
+    (made(TIP, PG, added_task=Task(LinearCoordinates("q1"), REST)), {"where": "added_task"}),
+    (made(TIP, EJ), {"where": "added_task", "got": 0}),
+    (made(TIP, EJ, added_task=Task(LinearCoordinates("q1"), REST)), {"where": "added_task", "got": 1}),
+    (made(Task(Position("ee", "xy"), CIRCLE, 0.0)), {"where": "gain of task ee.x, ee.y", "got": 0.0}),
+    (
+        made(Task(Position("ee", "xy"), CIRCLE, [1, 2, 3])),
+        {"where": "gain of task ee.x, ee.y", "got": [1.0, 2.0, 3.0]},
+    ),
+    (
+        made(Task(Position("ee", "xy"), CIRCLE, [[1, 3], [0, 1]])),
+        {"where": "gain of task ee.x, ee.y", "got": [[1.0, 3.0], [0.0, 1.0]]},
+    ),
+    (
+        made(Task(Position("ee", "xy"), CIRCLE, [[1, np.nan], [0, 1]])),
+        {"where": "gain of task ee.x, ee.y", "got": [[1.0, np.nan], [0.0, 1.0]]},
+    ),
+    (
+        made(Task(Heading("link1"), Bearing(Heading("link2"), [6, 2]))),
+        {"where": "bearing", "got": ["link2.heading (rad)"]},
+    ),
+    (
+        made(Task(Heading("link1"), Bearing(Position("ee", "x"), [6, 2]))),
+        {"where": "bearing", "got": ["ee.x (m)"]},
+    ),
+    (
+        made(TIP, PG, Manipulability("ee", ("x", "y", "rz"), "arm")),
+        {"where": "manipulability of the arm", "got": ("x", "y", "rz")},
+    ),
+    (made(Task(H1 + H1, REST)), {"where": "sum of objectives"}),
+    (called(np.zeros(4)), {"where": "q", "got": np.zeros(4)}),
+    (called(np.zeros((5, 1))), {"where": "q", "got": np.zeros((5, 1))}),
+    (called([0, 0, np.nan, 0, 0]), {"where": "q"}),
+    (called(np.array([0, 0, np.nan, 0, 0])), {"where": "q"}),
+    (called(np.full(5, np.nan), RG), {"where": "q"}),
+    (called(np.array([0, np.inf, 0, 0, 0]), RG), {"where": "q"}),
+    (called({"q1": 1, "q7": 2}), {"where": "robot unicycle_2r", "got": "q7"}),
+    (called("home"), {"where": "q", "got": "home"}),
+    (
+        with_callable(lambda c: [1, 2, 3], names=["a"]),
+        {"got": [1.0, 2.0, 3.0]},
+    ),
+    (
+        with_callable(lambda c: "far", names=["a"]),
+        {"got": "far"},
+    ),
     (
         lambda robot: evaluate(
             CallableFunction(lambda c: c.q[:2], ["a", "b"], jacobian=lambda c: np.eye(5)[:, :2]),
             0.0,
             Configuration(robot, np.zeros(5)),
         ),
-        r"expected a Jacobian of shape \(2, 5\), got shape \(5, 2\)",
+        {"got": np.eye(5)[:, :2]},
     ),
-    (lambda _: CallableFunction(lambda c: 0, ["a", "b"], units=["m"]), "as many units and angular flags"),
-    (lambda _: CallableReference(lambda t: 0, 0), "dimension: expected at least 1"),
-    (lambda _: CallableReference(lambda t: 0, 1, jacobian=lambda t, c: 0), "of_configuration=True"),
-    (lambda _: Position("ee", "xx"), "axes: expected some of x, y, z, each once"),
-    (lambda _: Position("ee", ""), "axes: expected some of x, y, z"),
-    (lambda _: Heading("ee", "w"), "unknown direction 'w'"),
-    (lambda _: Heading("ee", [0, 0, 0]), "direction: expected a vector that is not zero"),
-    (lambda _: Heading("ee", about="w"), "unknown axis 'w'"),
-    (lambda _: Manipulability("ee", "xq"), "unknown manipulability row 'q'"),
-    (lambda _: Manipulability("ee", "xy", "leg"), "unknown manipulability of 'leg'"),
-    (lambda _: Quadratic(), "at least one term"),
-    (lambda _: Quadratic(Square("q1", 0.0, -1.0)), "weight: expected a number above 0"),
-    (lambda _: H1 * np.inf, "weight: expected finite"),
-    (lambda _: Circle([2, 2], 0.0, 1.0), "radius: expected a number above 0"),
-    (lambda _: Circle([2, 2], 1.0, 1.0, plane="yz"), "plane: expected xy, or yz or zx with a center of 3"),
-    (lambda _: PiecewisePolynomial([0, 1, 2], np.ones((4, 1, 3))), r"coefficients: expected shape .*, 2, "),
-    (lambda _: PiecewisePolynomial([0, 1], np.ones((4, 1))), r"coefficients: expected shape .*, 1, "),
-    (lambda _: PiecewisePolynomial([1, 0], np.ones((4, 1, 3))), "breaks: expected them to increase"),
-    (lambda _: Spline([0, 1, 1], [[0], [1], [2]]), "times: expected them to increase"),
-    (lambda _: Spline([0, 1], [[0], [1]], 4), "spline: expected degree 3, or 5"),
-    (lambda _: Spline([0, 1], [[0], [1]], 5, "natural"), "at least 3 for degree 5 with natural ends"),
-    (lambda _: Spline([0, 1], [[0], [1]], ends="periodic"), "expected the last to equal the first"),
-]  # fmt: skip
+    (lambda _: CallableFunction(lambda c: 0, ["a", "b"], units=["m"]), {"where": "callable function"}),
+    (lambda _: CallableReference(lambda t: 0, 0), {"where": "dimension", "got": 0}),
+    (lambda _: CallableReference(lambda t: 0, 1, jacobian=lambda t, c: 0), {"where": "of_configuration"}),
+    (lambda _: Position("ee", "xx"), {"where": "axes", "got": "xx"}),
+    (lambda _: Position("ee", ""), {"where": "axes", "got": ""}),
+    (lambda _: Heading("ee", "w"), {"where": "direction", "got": "w"}),
+    (lambda _: Heading("ee", [0, 0, 0]), {"where": "direction", "got": [0.0, 0.0, 0.0]}),
+    (lambda _: Heading("ee", about="w"), {"where": "about", "got": "w"}),
+    (lambda _: Manipulability("ee", "xq"), {"got": "q"}),
+    (lambda _: Manipulability("ee", "xy", "leg"), {"got": "leg"}),
+    (lambda _: Quadratic(), {"where": "quadratic objective"}),
+    (lambda _: Quadratic(QuadraticTerm("q1", 0.0, -1.0)), {"where": "term q1: weight", "got": -1.0}),
+    (lambda _: H1 * np.inf, {"where": "weight", "got": np.inf}),
+    (lambda _: Circle([2, 2], 0.0, 1.0), {"where": "radius", "got": 0.0}),
+    (lambda _: Circle([2, 2], 1.0, 1.0, plane="yz"), {"where": "plane", "got": "yz"}),
+    (lambda _: PiecewisePolynomial([0, 1, 2], np.ones((4, 1, 3))), {"where": "coefficients"}),
+    (lambda _: PiecewisePolynomial([0, 1], np.ones((4, 1))), {"where": "coefficients"}),
+    (lambda _: PiecewisePolynomial([1, 0], np.ones((4, 1, 3))), {"where": "breaks", "got": [1.0, 0.0]}),
+    (lambda _: Spline([0, 1, 1], [[0], [1], [2]]), {"where": "times", "got": [0.0, 1.0, 1.0]}),
+    (lambda _: Spline([0, 1], [[0], [1]], 4), {"where": "spline: degree", "got": (4, "rest")}),
+    (lambda _: Spline([0, 1], [[0], [1]], 5, "natural"), {"where": "points", "got": 2}),
+    (lambda _: Spline([0, 1], [[0], [1]], ends="periodic"), {"where": "points"}),
+]
 
 
-@pytest.mark.parametrize(("call", "message"), REFUSED, ids=[message for _, message in REFUSED])
+@pytest.mark.parametrize(("call", "fields"), REFUSED)
 def test_bad_input_is_refused_in_one_line(
-    call: Callable[[Robot], Any], message: str, robot_2r: Robot
+    call: Callable[[Robot], Any], fields: dict[str, Any], robot_2r: Robot
 ) -> None:
-    with pytest.raises(InputError, match=message) as caught:
+    with refused(**fields) as caught:
         call(robot_2r)
     assert "\n" not in str(caught.value)
 
@@ -164,7 +202,7 @@ def test_a_singular_configuration_is_an_error_with_the_time(kind: Resolver, plac
 
 
 def test_an_algorithmic_singularity_is_another_error(robot_2r: Robot) -> None:
-    ask_twice = [Task(Position("ee", "x"), [1.0]), Task(Coordinates("q1"), [0.0])]
+    ask_twice = [Task(Position("ee", "x"), [1.0]), Task(LinearCoordinates("q1"), [0.0])]
     controller = Controller(robot_2r, TIP, EJ, added_task=ask_twice)
     with pytest.raises(SingularError, match="extended Jacobian J_e is singular though J is not"):
         controller(0.0, np.zeros(5))
@@ -193,7 +231,7 @@ def test_what_is_undefined_is_an_error_too(kind: str, k: int, robot_2r: Robot) -
         "callable": CallableResolver(lambda problem: np.linalg.pinv(problem.J) @ problem.rate),
     }[kind]
     if kind == "ej":
-        more = {"added_task": Task(Coordinates(*("q1", "q2", "theta")[: 4 - s]), np.zeros(4 - s))}
+        more = {"added_task": Task(LinearCoordinates(*("q1", "q2", "theta")[: 4 - s]), np.zeros(4 - s))}
     controller = Controller(robot_2r, task, resolver, **more)
     with pytest.raises(SingularError, match=r"not finite|lost rank"):
         controller(0.0, np.zeros(5))
@@ -203,7 +241,7 @@ def test_what_is_undefined_is_an_error_too(kind: str, k: int, robot_2r: Robot) -
 @pytest.mark.parametrize("t", [np.nan, np.inf])
 def test_a_time_that_is_not_finite_is_named(t: float, robot_2r: Robot) -> None:
     circling = Task(Position("ee", "xy"), Circle([0.0, 0.0], 1.0, 0.2))
-    with pytest.raises(InputError, match=r"^t: "):
+    with refused("t"):
         Controller(robot_2r, circling, PG)(t, np.zeros(5))
 
 
@@ -227,33 +265,48 @@ def test_errors_have_one_root() -> None:
 
 
 @pytest.mark.parametrize(
-    ("build", "words"),
+    ("build", "fields"),
     [
-        (lambda robot: Controller(robot, [TIP], "pg"), "Resolver"),
-        (lambda robot: Controller("unicycle_2r", [TIP], ProjectedGradient()), "Robot"),
-        (lambda robot: Controller(robot, Position("ee", "xy"), ProjectedGradient()), "Task"),
-        (lambda robot: Controller(robot, [TIP], ProjectedGradient(), lambda q: 0.0), "Objective"),
-        (lambda robot: Controller(robot, [TIP], ProjectedGradient(), Position("ee")), "Objective"),
+        (lambda robot: Controller(robot, [TIP], "pg"), {"where": "controller", "got": "pg"}),
+        (
+            lambda robot: Controller("unicycle_2r", [TIP], ProjectedGradient()),
+            {"where": "controller", "got": "unicycle_2r"},
+        ),
+        (lambda robot: Controller(robot, Position("ee", "xy"), ProjectedGradient()), {"where": "task"}),
+        (lambda robot: Controller(robot, [TIP], ProjectedGradient(), lambda q: 0.0), {"where": "controller"}),
+        (
+            lambda robot: Controller(robot, [TIP], ProjectedGradient(), Position("ee")),
+            {"where": "controller"},
+        ),
         (
             lambda robot: Controller(robot, [TIP], ProjectedGradient(), Sum((1.0, Position("ee", "xy")))),
-            "one row",
+            {"where": "objective", "got": ["ee.x", "ee.y"]},
         ),
-        (lambda robot: Task("ee", [1, 2]), "function of the robot"),
-        (lambda robot: Quadratic(Square({})), "coordinate in every term"),
-        (lambda robot: H1 + 3, "objective to add"),
-        (lambda robot: 3 + H1, "objective to add"),
-        (lambda robot: Sum(), "at least one"),
-        (lambda robot: Controller(robot, [TIP], ProjectedGradient())(0.0, None), "None"),
-        (lambda robot: Controller(robot, [TIP], ProjectedGradient()).velocity(0.0, [0.0]), "5 numbers"),
-        (lambda robot: PiecewisePolynomial([1.0], np.zeros((2, 0, 1))), "at least 2"),
-        (lambda robot: PiecewisePolynomial([0.0, 1.0], np.zeros((0, 1, 1))), "order"),
-        (lambda robot: PiecewisePolynomial([1.0, 0.0], np.zeros((1, 1, 1))), "increase"),
+        (lambda robot: Task("ee", [1, 2]), {"where": "task", "got": "ee"}),
+        (lambda robot: Quadratic(QuadraticTerm({})), {"where": "quadratic objective", "got": None}),
+        (lambda robot: H1 + 3, {"where": "objective", "got": 3}),
+        (lambda robot: 3 + H1, {"where": "objective", "got": 3}),
+        (lambda robot: Sum(), {"where": "sum of objectives"}),
+        (lambda robot: Controller(robot, [TIP], ProjectedGradient())(0.0, None), {"where": "q", "got": None}),
+        (
+            lambda robot: Controller(robot, [TIP], ProjectedGradient()).velocity(0.0, [0.0]),
+            {"where": "q", "got": [0.0]},
+        ),
+        (lambda robot: PiecewisePolynomial([1.0], np.zeros((2, 0, 1))), {"where": "breaks", "got": 1}),
+        (
+            lambda robot: PiecewisePolynomial([0.0, 1.0], np.zeros((0, 1, 1))),
+            {"where": "coefficients", "got": np.zeros((0, 1, 1))},
+        ),
+        (
+            lambda robot: PiecewisePolynomial([1.0, 0.0], np.zeros((1, 1, 1))),
+            {"where": "breaks", "got": [1.0, 0.0]},
+        ),
     ],
 )
 def test_the_wrong_kind_of_thing_is_named(
-    robot_2r: Robot, build: Callable[[Robot], object], words: str
+    robot_2r: Robot, build: Callable[[Robot], object], fields: dict[str, Any]
 ) -> None:
-    with pytest.raises(InputError, match=words):
+    with refused(**fields):
         build(robot_2r)
 
 

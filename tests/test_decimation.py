@@ -12,8 +12,7 @@ import trimesh
 
 import nmm
 from nmm.arrays import Array
-from nmm.playback.decimation import Indices, decimated
-from nmm.playback.meshes import OFF, mesh_pieces
+from nmm.playback.meshes import OFF, Indices, decimated, mesh_pieces
 
 Mesh = tuple[Array, Indices]
 

@@ -20,16 +20,16 @@ from numpy.typing import NDArray
 from paper_cases import CASES, Case
 from platform_grid import EXAMPLES, random_qp
 
-from nmm.analysis.singular.reached import Reached
+from nmm.analysis.singular.jacobians import Reached
 from nmm.control.controller import Controller
 from nmm.functions.function import Function
-from nmm.functions.objectives import Clearance, Manipulability, Objective, Quadratic, Square, Sum
+from nmm.functions.objectives import Clearance, Manipulability, Objective, Quadratic, QuadraticTerm, Sum
 from nmm.functions.program import Program, evaluate
 from nmm.functions.pursuit import Pursuit
 from nmm.functions.references import CallableReference, Circle
-from nmm.functions.tasks import Coordinates, Position, Task
-from nmm.functions.tasks.comparison import Comparison
-from nmm.functions.tasks.frame_pose import PartsOfPose
+from nmm.functions.tasks import LinearCoordinates, Position, Task
+from nmm.functions.tasks.pose import PartsOfPose
+from nmm.functions.tasks.task import Comparison
 from nmm.kinds import OBJECTIVES, REFERENCES, TASKS
 from nmm.resolvers import ProjectedGradient
 from nmm.robots.configuration import Configuration
@@ -119,8 +119,8 @@ def test_J_bar_and_h_through_joints_that_follow(
     robot: Robot, of: Literal["robot", "arm"], rng: np.random.Generator
 ) -> None:
     """One that follows its arm's, and one that follows a coordinate of the platform, by which G changes."""
-    tasks = [Task(Position("ee", "xy"), Circle([2, 2], 3, 0.08), 1.0), Task(Coordinates("q3"), [0.4])]
-    bent = Quadratic(*(Square(name, 0.3) for name in robot.q_names[2:]))
+    tasks = [Task(Position("ee", "xy"), Circle([2, 2], 3, 0.08), 1.0), Task(LinearCoordinates("q3"), [0.4])]
+    bent = Quadratic(*(QuadraticTerm(name, 0.3) for name in robot.q_names[2:]))
     objective = 2.0 * Manipulability("ee", "xy", of) - bent
     controller = Controller(robot, tasks, ProjectedGradient(), objective)
     for _ in range(5):

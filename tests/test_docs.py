@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import os
 import re
 import shlex
 import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ import numpy as np
 import pytest
 import typer
 from derivatives import check_function
+from worked_examples import FILES, write_examples
 
 import nmm
 from nmm.bundled import bundled_scenarios
@@ -41,6 +44,30 @@ def script(name: str) -> Any:
 def test_the_page_of_scenario_keys_is_the_schemas() -> None:
     expected = (ROOT / "docs" / "scenarios.md").read_text(encoding="utf-8")
     assert script("make_scenario_keys").page() == expected, "run python docs/make_scenario_keys.py"
+
+
+def test_the_lists_that_follow_from_the_kinds_hold_them_all() -> None:
+    lists = script("make_kind_lists")
+    texts = {path: path.read_text(encoding="utf-8") for path in (lists.STUB, lists.INDEX)}
+    assert lists.stub(texts[lists.STUB]) == texts[lists.STUB], "run python docs/make_kind_lists.py"
+    assert lists.index(texts[lists.INDEX]) == texts[lists.INDEX], "run python docs/make_kind_lists.py"
+    for name, listed in lists.PAGES:
+        page = (lists.API / name).read_text(encoding="utf-8")
+        assert lists.reference(page, listed) == page, "run python docs/make_kind_lists.py"
+
+
+def test_a_new_kind_gets_its_lines_in_the_lists(monkeypatch: pytest.MonkeyPatch) -> None:
+    lists = script("make_kind_lists")
+    made = type("NewTask", (nmm.Heading,), {"__module__": "nmm.functions.tasks.new"})
+    monkeypatch.setitem(TASKS.data, "new", made)
+    stub = lists.STUB.read_text(encoding="utf-8")
+    line = "from .functions.tasks.new import NewTask as NewTask\n"
+    assert lists.stub(stub).replace(line, "") == stub
+    assert line + "from .platforms import Car as Car\n" in lists.stub(stub)
+    page = (lists.API / "task.md").read_text(encoding="utf-8")
+    entry = ".. autoclass:: nmm.NewTask\n"
+    assert lists.reference(page, TASKS).replace(entry, "") == page
+    assert ".. autoclass:: nmm.LinearCoordinates\n" + entry in lists.reference(page, TASKS)
 
 
 def test_the_gallery_is_that_of_the_scenarios() -> None:
@@ -75,16 +102,16 @@ def test_a_page_that_runs_prints_what_it_says(page: Path, tmp_path: Path) -> Non
 
 
 def commands(text: str) -> Iterator[list[str]]:
-    """The arguments of each line of nmm in a block of a page."""
+    """The arguments of each line of nmm in a block of a page, up to a pipe into another program."""
     blocks = re.findall(r"^```\w*\n(.*?)^```$", text, flags=re.DOTALL | re.MULTILINE)
     indented = re.findall(r"^ {4}(nmm .*)$", text, flags=re.MULTILINE)
     for line in "\n".join([*blocks, *indented]).splitlines():
         if found := re.match(r"(?:\$ )?nmm (?!check: |[\w-]+: )(.*?)(?:  .*| > \S+)?$", line):
-            yield shlex.split(found[1], comments=True)
+            yield list(takewhile("|".__ne__, shlex.split(found[1], comments=True)))
 
 
 #: What the README's commands take in the tests, to be done in seconds.
-SMALLER = {"sweep": "--samples 2 --jobs 1", "gallery": "--only unicycle_2r_position"}
+SMALLER = {"sweep": "--samples 2 --jobs 1"}
 
 
 def test_the_commands_of_the_readme_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -110,7 +137,6 @@ NOT_RUN = {
     "bad_arm.urdf": "the reader's own file",
     "view ": "waits for a browser: tests/test_view_task.py",
     "drive ": "waits for a browser: tests/test_driving.py",
-    "gallery ": "minutes: the README's test runs one scenario's, tests/test_gallery.py more",
     "--play": "waits for a browser: tests/test_bundled_scenarios.py runs the scenarios",
 }
 #: Pages whose commands are run elsewhere.
@@ -168,15 +194,12 @@ def test_the_readmes_python_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 def test_the_worked_examples_can_be_typed_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The page's own files: a task that has its derivatives, a resolver that says what it gives."""
-    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
-    slope, damped, used = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
-    for name, code in (("slope", slope), ("damped", damped), ("used", used)):
-        (tmp_path / f"{name}.py").write_text(code, encoding="utf-8")
+    write_examples(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
     try:
         used_names = vars(importlib.import_module("used"))
     finally:
-        for name in ("slope", "damped", "used"):
+        for name in FILES:
             sys.modules.pop(name, None)
     run, robot, task = (used_names[name] for name in ("run", "robot", "task"))
     for q in run.q[::100]:
@@ -186,6 +209,40 @@ def test_the_worked_examples_can_be_typed_in(tmp_path: Path, monkeypatch: pytest
     np.testing.assert_allclose(run.error[:, 0], run.error[0, 0] * decay, atol=2e-3)
     assert np.all(run.scale < 1.0)
     assert np.all(run.scale > 0.5)
+
+
+#: Tests that go over the registered kinds.
+GRIDS = [
+    "test_resolvers.py",
+    "test_resolver_style.py",
+    "test_robot_grid.py::test_every_robot_tracks[unicycle-small arm-position]",
+    "test_robot_grid.py::test_a_robot_that_comes_to_a_singularity_does_not_complete[car-small arm-pose]",
+    "test_derivatives.py::test_value_t_and_value_q[slope]",
+    "test_derivatives.py::test_the_grid_holds_every_function",
+    "test_scenario_keys.py::test_every_kind_can_be_asked_for",
+    "test_scenario_keys.py::test_every_parameter_is_documented",
+    *(
+        f"test_scenario.py::test_a_resolved_scenario_gives_the_same_run[{name}-{kind}]"
+        for name in ("unicycle_2r_position", "unicycle_3r_position")
+        for kind in ("damped", "transpose", "least")
+    ),
+    "test_scaffold.py::test_every_key_has_its_words",
+    "test_cli.py::test_help_lists_what_there_is",
+]
+
+
+def test_the_worked_examples_pass_the_grids_when_they_are_registered() -> None:
+    """No grid asks of a kind more than it declares, of the page's kinds and of a Jacobian transpose's."""
+    plugin = ("-p", "worked_examples", "-p", "no:cacheprovider")
+    found = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", *plugin, *(f"tests/{grid}" for grid in GRIDS)],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT / "tests")},
+        capture_output=True,
+        text=True,
+    )
+    assert found.returncode == 0, found.stdout[-4000:] + found.stderr[-1000:]
+    assert re.search(r"\b\d{3} passed", found.stdout)
 
 
 @pytest.mark.parametrize("page", DOCUMENTS)

@@ -15,10 +15,8 @@ from ports import MOST, served
 
 import nmm
 from nmm.driving import ScenarioSetup, drive
-from nmm.looks import RESOLVERS
+from nmm.resolver_style import resolver_styles
 from nmm.robots.configuration import Configuration
-
-pytestmark = pytest.mark.browser
 
 #: Where a point of a gizmo is in the window, px: its ball, or the tip of the arrow along an axis.
 WHERE = """([target, way, length]) => {
@@ -142,9 +140,9 @@ def test_what_is_chosen_changes_the_controller(window: Window, setup: ScenarioSe
         assert kinds.input_value() == "rg"
         assert page.evaluate("nmm.camera.following")
         assert page.locator("#follow").get_attribute("aria-pressed") == "true"
-        assert page.evaluate("nmm.runs[0].color") == RESOLVERS["rg"][0]
+        assert page.evaluate("nmm.runs[0].color") == resolver_styles()["rg"][0]
         kinds.select_option("pg")
-        page.wait_for_function(f"nmm.runs[0].color === '{RESOLVERS['pg'][0]}'")
+        page.wait_for_function(f"nmm.runs[0].color === '{resolver_styles()['pg'][0]}'")
         page.locator('input[data-key="limits"]').check()
         page.wait_for_function("document.getElementById('told').textContent.match(/^t = [\\d.]+ s/)")
         page.evaluate("document.activeElement.blur()")  # the space bar is the check box's own

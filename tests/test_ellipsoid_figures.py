@@ -12,8 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from nmm.analysis.singular.drawn_ellipsoids import drawn_ellipsoids, drawn_scale
-from nmm.analysis.singular.ellipsoids import ellipsoids_along
+from nmm.analysis.singular.ellipsoids import drawn_ellipsoids, drawn_scale, ellipsoids_along
 from nmm.arrays import Array
 from nmm.cli.exit_status import status_of
 from nmm.errors import InputError

@@ -15,10 +15,10 @@ from matplotlib.figure import Figure
 from nmm import figures
 from nmm.bundled import bundled_scenarios
 from nmm.errors import InputError
+from nmm.figure_options import WIDTHS, FigureOptions
 from nmm.figures.composed import write_run_figures
 from nmm.figures.motion import Scene
 from nmm.figures.views import ABOVE, SIDE, upright
-from nmm.runs.figure_options import WIDTHS, FigureOptions
 from nmm.scenario import Scenario
 
 ONE = "unicycle_2r_position"

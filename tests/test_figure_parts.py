@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from nmm import looks
+from nmm import resolver_style
 from nmm.figures import style
-from nmm.figures.hulls import hull
-from nmm.figures.silhouette import Silhouette
+from nmm.figures.silhouette import Silhouette, hull
 from nmm.robots.robot import Robot
 
 
@@ -71,6 +70,6 @@ def test_thinning_keeps_what_is_seen(rng: np.random.Generator) -> None:
 
 
 def test_looks_tell_runs_apart() -> None:
-    worn = looks.looks(["rg", "pg", "rg", "mine", "other"])
+    worn = resolver_style.looks(["rg", "pg", "rg", "mine", "other"])
     assert [look.name for look in worn] == ["RG", "PG", "RG (2)", "MINE", "OTHER"]
     assert len({(look.color, look.dashes) for look in worn}) == len(worn)

@@ -20,7 +20,7 @@ from nmm import figures
 from nmm.control.controller import Controller
 from nmm.errors import InputError
 from nmm.figures import style
-from nmm.functions.tasks import Coordinates, Heading, Position, Task
+from nmm.functions.tasks import Heading, LinearCoordinates, Position, Task
 from nmm.resolvers import ProjectedGradient
 from nmm.robots.loading import load
 from nmm.robots.robot import Robot
@@ -122,7 +122,7 @@ def test_run_without_position_task_and_objective(robot_2r: Robot, tmp_path: Path
 
 def test_run_with_as_many_rows_as_inputs(robot_2r: Robot) -> None:
     trajectory = bare_run(
-        robot_2r, Task(Position("ee", "xy"), [1.5, 0.2]), Task(Coordinates("q1", "q2"), [0.5, 0.1])
+        robot_2r, Task(Position("ee", "xy"), [1.5, 0.2]), Task(LinearCoordinates("q1", "q2"), [0.5, 0.1])
     )
     assert trajectory.complete
     for make in KINDS.values():

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from scipy.interpolate import PPoly
 
 from nmm.functions.function import Evaluation, Function
-from nmm.functions.objectives import JointRange, Manipulability, Quadratic, Square, Sum
+from nmm.functions.objectives import JointRange, Manipulability, Quadratic, QuadraticTerm, Sum
 from nmm.functions.program import evaluate
 from nmm.functions.references import Bearing, Circle, Constant, Line, PiecewisePolynomial, Polynomial, Spline
-from nmm.functions.tasks import Coordinates, Heading, Orientation, Pointing, Pose, Position
+from nmm.functions.tasks import Heading, LinearCoordinates, Orientation, Pointing, Pose, Position
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 
@@ -185,7 +185,7 @@ def test_what_is_shown_of_a_function_is_where_it_is(
 
 
 def test_coordinates(robot_2r: Robot) -> None:
-    task = Coordinates("q2", {"theta": 1, "q1": -2}, {"x": 0.5, "theta": 1})
+    task = LinearCoordinates("q2", {"theta": 1, "q1": -2}, {"x": 0.5, "theta": 1})
     found = evaluate(task, 0.0, Configuration(robot_2r, [1, 2, 30, 4, 5]))
     np.testing.assert_array_equal(found.value, [5.0, 22.0, 30.5])
     rows = task.rows(robot_2r)
@@ -196,14 +196,14 @@ def test_coordinates(robot_2r: Robot) -> None:
 
 def test_sums(robot_2r: Robot) -> None:
     configuration = Configuration(robot_2r, [1, 2, 30, 4, 5])
-    a, b = Quadratic(Square("q1")), Quadratic(Square("q2"))  # worth 8 and 12.5
+    a, b = Quadratic(QuadraticTerm("q1")), Quadratic(QuadraticTerm("q2"))  # worth 8 and 12.5
     for objective, worth in (
         (a + b, 20.5),
         (a - b, -4.5),
         (-a, -8.0),
         (2.0 * a - (a + b) * 3.0, -45.5),
         (Sum((2.0, a), (-1.0, b)), 3.5),
-        (Sum((2.0, Sum((3.0, a), (1.0, b))), (1.0, -(a + b)), (10.0, Coordinates("x"))), 62.5),
+        (Sum((2.0, Sum((3.0, a), (1.0, b))), (1.0, -(a + b)), (10.0, LinearCoordinates("x"))), 62.5),
     ):
         assert objective.value(configuration) == worth
 
@@ -211,7 +211,8 @@ def test_sums(robot_2r: Robot) -> None:
 def test_quadratic_and_joint_range(robot_2r: Robot) -> None:
     q = Configuration(robot_2r, [1, 2, 30, 4, 5])
     assert (
-        Quadratic(Square({"theta": 1, "q1": -2}, 20, 3.0), Square("q2", 4)).value(q) == 3 * 2.0**2 / 2 + 0.5
+        Quadratic(QuadraticTerm({"theta": 1, "q1": -2}, 20, 3.0), QuadraticTerm("q2", 4)).value(q)
+        == 3 * 2.0**2 / 2 + 0.5
     )
     middle, lower, upper = [0.5, 1.0], [-1.0, -3.0], [2.0, 5.0]
     objective = JointRange(["q1", "q2"], lower, upper)

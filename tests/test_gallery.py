@@ -1,38 +1,35 @@
-"""`nmm gallery`: its folder, its page, and what a scenario that cannot be run leaves."""
+"""The gallery that docs/ makes: its folder, its page, and what a scenario that cannot be run leaves."""
 
 from __future__ import annotations
 
 import html
 import json
-import shutil
 import signal
+import subprocess
+import sys
 from pathlib import Path
 
+import gallery
 import pytest
-from command_line import process
+from gallery import Card, Gallery, make_card, render, write_gallery
 from test_paper import Links
 
 import nmm
 from nmm.bundled import bundled_scenarios
 from nmm.cli.exit_status import status_of
 from nmm.errors import InputError, RunError
-from nmm.gallery import Gallery, card, write, write_gallery
-from nmm.gallery.card import Card, make_card
-from nmm.runs.table import rows
+from nmm.runs.table import summary_rows
 
 TWO = ("unicycle_2r_position", "unicycle_3r_out_of_reach")
 
 
 @pytest.fixture(scope="module")
-def gallery(tmp_path_factory: pytest.TempPathFactory) -> tuple[Gallery, list[float]]:
-    """Two scenarios, one of which misses its target on purpose, with what was said of the progress."""
-    fractions: list[float] = []
-    folder = tmp_path_factory.mktemp("out") / "gallery"
-    return write_gallery(folder, TWO, progress=fractions.append), fractions
+def made(tmp_path_factory: pytest.TempPathFactory) -> Gallery:
+    """Two scenarios, one of which misses its target on purpose."""
+    return write_gallery(tmp_path_factory.mktemp("out") / "gallery", TWO)
 
 
-def test_each_scenario_has_picture_page_numbers_and_file(gallery: tuple[Gallery, list[float]]) -> None:
-    made = gallery[0]
+def test_each_scenario_has_picture_page_numbers_and_file(made: Gallery) -> None:
     assert [one.name for one in made.cards] == [*TWO]
     assert {path.name for path in made.folder.iterdir()} == {"index.html", "gallery.json", "viewer.js", *TWO}
     for name in TWO:
@@ -44,24 +41,23 @@ def test_each_scenario_has_picture_page_numbers_and_file(gallery: tuple[Gallery,
         assert (own / f"{name}.yaml").read_bytes() == bundled_scenarios()[name].read_bytes()
 
 
-def test_numbers_are_those_of_the_scenarios_own_run(gallery: tuple[Gallery, list[float]]) -> None:
-    for one in gallery[0].cards:
+def test_numbers_are_those_of_the_scenarios_own_run(made: Gallery) -> None:
+    for one in made.cards:
         run = nmm.Scenario.load(one.name).run()
-        summary = json.loads((gallery[0].folder / one.name / "summary.json").read_text(encoding="utf-8"))
+        summary = json.loads((made.folder / one.name / "summary.json").read_text(encoding="utf-8"))
         assert summary == json.loads(json.dumps(run.summary()))
         numbers = dict(one.numbers)
         assert numbers["tracking ‖e‖"].startswith(f"RMS {summary['error_rms']:.3g}, ")
         assert numbers["smallest σ_min"] == f"{summary['sigma_min']:.3g}"
-        printed = dict(rows(run, run.summary()))
+        printed = dict(summary_rows(run, run.summary()))
         assert next(iter(numbers)) == "robot"
         assert all(printed[label] == value for label, value in one.numbers[1:])
         assert one.outcome == summary["outcome"]
 
 
 def test_the_page_refers_to_what_is_there_and_says_what_came_out(
-    gallery: tuple[Gallery, list[float]],
+    made: Gallery,
 ) -> None:
-    made = gallery[0]
     page = made.index.read_text(encoding="utf-8")
     for link in Links(page).found:
         assert (made.folder / link).exists(), link
@@ -76,18 +72,11 @@ def test_the_page_refers_to_what_is_there_and_says_what_came_out(
     assert missed.message.split(":")[0] in html.unescape(page)
 
 
-def test_pages_share_the_viewer(gallery: tuple[Gallery, list[float]]) -> None:
-    made = gallery[0]
+def test_pages_share_the_viewer(made: Gallery) -> None:
     page = (made.folder / TWO[0] / "playback.html").read_text(encoding="utf-8")
     assert '<script src="../viewer.js"></script>' in page
     assert (made.folder / "viewer.js").stat().st_size > 500_000
     assert len(page) < 1_000_000
-
-
-def test_progress_rises_to_the_end(gallery: tuple[Gallery, list[float]]) -> None:
-    fractions = gallery[1]
-    assert fractions == sorted(fractions)
-    assert fractions[-1] == 1.0
 
 
 def test_a_scenario_that_cannot_be_run_is_told_on_its_card(
@@ -96,11 +85,11 @@ def test_a_scenario_that_cannot_be_run_is_told_on_its_card(
     broken = tmp_path / "broken.yaml"
     broken.write_text("robot: no_such_robot\ntask: {kind: position}\n", encoding="utf-8")
     shown = bundled_scenarios() | {"broken": broken}
-    monkeypatch.setattr(card, "bundled_scenarios", lambda: shown)
+    monkeypatch.setattr(gallery, "bundled_scenarios", lambda: shown)
     monkeypatch.setattr(nmm.Scenario, "load", staticmethod(lambda name: refuse(name)))
-    made = make_card("broken", tmp_path / "broken")
-    assert (made.outcome, made.shown, made.ran, made.numbers) == ("refused", False, False, ())
-    page = write.render([made])
+    card = make_card("broken", tmp_path / "broken")
+    assert (card.outcome, card.shown, card.ran, card.numbers) == ("refused", False, False, ())
+    page = render([card])
     assert "Refused:</b> broken: no robot &lt;at all&gt;" in page
     assert 'href="broken/broken.yaml"' in page
     assert "playback.html" not in page
@@ -110,50 +99,47 @@ def refuse(name: str) -> None:
     raise RunError(f"{name}: no robot <at all>")
 
 
-def _quick(name: str, folder: Path, progress: object = None) -> Card:
-    folder.mkdir()
-    shutil.copyfile(bundled_scenarios()[name], folder / f"{name}.yaml")
-    ends = name != TWO[0]
-    return Card(name, name, "completed" if ends else "diverged", "" if ends else "it grew", (), False)
+def test_an_earlier_gallery_is_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def quick(name: str, folder: Path, progress: object = None) -> Card:
+        folder.mkdir()
+        return Card(name, name, "diverged", "it grew", (), False)
 
-
-def test_exit_status_and_replacing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(write, "make_card", _quick)
+    monkeypatch.setattr("gallery.make_card", quick)
     write_gallery(tmp_path / "g", TWO[1:], jobs=1)
     (tmp_path / "g" / "left over").write_text("old")
-    monkeypatch.chdir(tmp_path)
-    assert status_of(["gallery", "--only", TWO[0], "--out", "g"]) == 1
-    assert f"nmm gallery: {TWO[0]} diverged: it grew" in capsys.readouterr().err
+    made = write_gallery(tmp_path / "g", TWO[:1], jobs=1)
     assert {path.name for path in (tmp_path / "g").iterdir()} == {
         "index.html", "gallery.json", "viewer.js", TWO[0],
     }  # fmt: skip
-    assert status_of(["gallery", "--only", TWO[1], "--out", "g"]) == 0
+    content = json.loads((tmp_path / "g" / "gallery.json").read_text(encoding="utf-8"))
+    assert [one["outcome"] for one in content["scenarios"]] == [card.outcome for card in made.cards]
+    assert not made.cards[0].ran
 
 
-def test_wrong_names_and_folders_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_wrong_names_and_folders_are_refused(tmp_path: Path) -> None:
     out = tmp_path / "gallery"
-    assert status_of(["gallery", "--only", "unicycle_2r_positon", "--out", str(out)]) == 2
-    said = capsys.readouterr().err
-    assert "--only: unknown scenario 'unicycle_2r_positon' (did you mean 'unicycle_2r_position'?)" in said
-    assert status_of(["gallery", "--only", ",", "--out", str(out)]) == 2
+    with pytest.raises(InputError) as refused:
+        write_gallery(out, ["unicycle_2r_positon"])
+    assert (refused.value.where, refused.value.got) == ("only", "unicycle_2r_positon")
     assert not out.exists()
     out.mkdir()
     (out / "thesis.txt").write_text("mine")
-    assert status_of(["gallery", "--only", TWO[0], "--out", str(out)]) == 2
+    with pytest.raises(InputError):
+        write_gallery(out, TWO[:1])
     assert [path.name for path in out.iterdir()] == ["thesis.txt"]
-    with pytest.raises(InputError, match="only: unknown scenario 'no'"):
-        write_gallery(tmp_path / "other", ["no"])
-    with pytest.raises(InputError, match="jobs: expected at least 1, got 0"):
-        write_gallery(tmp_path / "other", jobs=0)
-    assert not (tmp_path / "other").exists()
+
+
+def test_there_is_no_such_command(capsys: pytest.CaptureFixture[str]) -> None:
+    assert status_of(["gallery"]) == 2
+    assert "No such command 'gallery'" in capsys.readouterr().err
 
 
 def test_ctrl_c_leaves_nothing(tmp_path: Path) -> None:
-    running = process(tmp_path, "gallery")
+    """Of the script that writes it, and of the processes that share the work."""
+    script = Path(gallery.__file__).parent.parent / "make_gallery.py"
+    running = subprocess.Popen([sys.executable, script, "--folder", "gallery"], cwd=tmp_path)
     while not list(tmp_path.glob(".gallery*/*/viewer.js")):
         assert running.poll() is None
     running.send_signal(signal.SIGINT)
-    assert running.wait(20.0) == 130
-    assert not (tmp_path / "gallery").exists()
+    assert running.wait(20.0) == -signal.SIGINT
+    assert list(tmp_path.iterdir()) == []

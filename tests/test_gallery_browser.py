@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import pytest
+from gallery import Gallery, write_gallery
 from playback_browser import Window
 from playback_browser import browser as browser
 from playback_browser import empty_page as empty_page
 from playback_browser import window as window
 from ports import served_folder
-
-from nmm.gallery import Gallery, write_gallery
-
-pytestmark = pytest.mark.browser
 
 
 @pytest.fixture(scope="module")

@@ -33,7 +33,7 @@ ROBOTS = (
 )
 
 
-def tasks(robot: nmm.Robot, frame: str) -> Iterator[list[nmm.Function]]:
+def tasks(robot: nmm.Robot, frame: str) -> Iterator[list[nmm.extending.Function]]:
     """Tasks of 1 to 6 rows, in metres, in radians and in both."""
     yield [nmm.Position(frame, "z")]
     yield [nmm.Position(frame, "x")]
@@ -85,7 +85,7 @@ def configurations(robot: nmm.Robot, rng: np.random.Generator, count: int) -> It
             yield special + 10.0 ** rng.uniform(-17, -1) * rng.normal(size=robot.n)
 
 
-def inverted(controller: nmm.Controller, step: nmm.Step) -> tuple[Array, Array]:
+def inverted(controller: nmm.Controller, step: nmm.extending.Step) -> tuple[Array, Array]:
     """The matrix that the resolver inverts, and its right-hand side, rows in their natural scales."""
     scales = row_scales(controller.rows, controller.robot)
     J, rate = step.J / scales[:, None], step.rate / scales
@@ -93,9 +93,9 @@ def inverted(controller: nmm.Controller, step: nmm.Step) -> tuple[Array, Array]:
         return J[:, step.partition], rate
     if controller.resolver.name == "pg":
         return J, rate
-    rows = controller.added_task.rows(controller.robot)
+    rows = controller.given.added_task.rows(controller.robot)
     own = row_scales(rows, controller.robot)
-    problem = controller._step.problem
+    problem = controller.solver.found.problem
     return (
         np.vstack([J, problem.added_J / own[:, None]]),
         np.concatenate([rate, problem.added_rate / own]),

@@ -7,11 +7,10 @@ import pytest
 
 import nmm
 from nmm.control.idle_inputs import _configurations
+from nmm.diagnosis.assessment import linearisation, linearisations
+from nmm.diagnosis.error_bound import SAFETY, Feedback, Samples, step_errors
 from nmm.robots.frame_path import FramePath
 from nmm.robots.robot import CENTER_OF_MASS
-from nmm.runs.feedback import Feedback
-from nmm.runs.promise import SAFETY, Samples, step_errors
-from nmm.runs.stability import linearisation, linearisations
 
 CASES = ("unicycle_2r_position", "tiago_tray", "unicycle_2r_switching")
 
@@ -51,7 +50,7 @@ def test_a_linearisation_beside_a_singular_matrix_is_no_number(robot_2r: nmm.Rob
 @pytest.mark.parametrize("name", CASES)
 def test_errors_of_many_samples_are_those_of_each(name: str) -> None:
     controller, times, q = around(name)
-    error, rate = controller.errors(times, q)
+    error, rate = controller.solver.errors(times, q)
     for k, t in enumerate(times):
         one = controller.evaluate(t, q[k])
         np.testing.assert_allclose(error[k], one.error, atol=1e-12)
@@ -60,7 +59,7 @@ def test_errors_of_many_samples_are_those_of_each(name: str) -> None:
 
 @pytest.mark.parametrize("order", [1, 2, 4])
 def test_the_error_of_a_step_is_its_formula(order: int) -> None:
-    """c ρ^(p-1) of nmm.runs.promise's head; where u jumps with the partition, its change before counts."""
+    """c ρ^(p-1) of error_bound's head; where u jumps with the partition, its change before counts."""
     rng = np.random.default_rng(order)
     N, s, m = 60, 2, 4
     t = np.cumsum(rng.uniform(0.005, 0.02, N))

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from numba import types
 
-from nmm import kept
+from nmm import disk_cache
 from nmm.arrays import Array
 from nmm.kernels import cache
 from nmm.kernels.compiled import compiled
@@ -80,7 +80,7 @@ def test_damage_heals(folder: Path, rng: np.random.Generator) -> None:
     damaged += [whole + b"x", whole[:32] + whole[:32] + whole[32:]]
     for content in damaged:
         file.write_bytes(content)
-        assert kept.read(file) is None
+        assert disk_cache.read(file) is None
     # To compile takes a while: some of each kind.
     for content in (damaged[0], damaged[5], damaged[7], damaged[12], damaged[-3], damaged[-1]):
         file.write_bytes(content)
@@ -93,7 +93,7 @@ def test_what_is_whole_but_of_no_use_is_compiled_anew(folder: Path) -> None:
     found_on_disk()
     (file,) = files(folder)
     for content in (b"", b"(S'another'\nS'key'\nt.", b"cnmm.no_such_module\nthing\n."):
-        kept.write(file, content)
+        disk_cache.write(file, content)
         assert not found_on_disk()
         assert found_on_disk()
 
@@ -114,9 +114,9 @@ def test_no_cache_is_told_once_and_costs_nothing_else(
     if kind == "file":
         folder.write_text("no folder")
     elif kind == "full":
-        monkeypatch.setattr(kept.os, "replace", refusal(errno.ENOSPC))
+        monkeypatch.setattr(disk_cache.os, "replace", refusal(errno.ENOSPC))
     else:
-        monkeypatch.setattr(kept.tempfile, "mkstemp", refusal(errno.EROFS))
+        monkeypatch.setattr(disk_cache.tempfile, "mkstemp", refusal(errno.EROFS))
     for _ in range(2):
         assert not found_on_disk()
     (record,) = caplog.records
@@ -137,22 +137,22 @@ def test_a_cache_that_can_only_be_read_is_read(
     folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     found_on_disk()
-    monkeypatch.setattr(kept.tempfile, "mkstemp", refusal(errno.EROFS))
+    monkeypatch.setattr(disk_cache.tempfile, "mkstemp", refusal(errno.EROFS))
     assert found_on_disk()
     assert not caplog.records
 
 
 def test_an_interrupted_write_leaves_what_was_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "sub" / "kept"
-    kept.write(file, b"before")
+    disk_cache.write(file, b"before")
 
     def interrupt(*arguments: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(kept.os, "replace", interrupt)
+    monkeypatch.setattr(disk_cache.os, "replace", interrupt)
     with pytest.raises(KeyboardInterrupt):
-        kept.write(file, b"after")
-    assert kept.read(file) == b"before"
+        disk_cache.write(file, b"after")
+    assert disk_cache.read(file) == b"before"
     assert files(tmp_path) == [file]
 
 
@@ -203,7 +203,8 @@ def test_processes_at_once_take_nothing_from_each_other(tmp_path: Path) -> None:
         assert process.stdin is not None
         process.stdin.write("\n")
         process.stdin.flush()
-    assert all(json.loads(process.communicate()[0]) > 0 for process in together)
+    compiled_here = [json.loads(process.communicate()[0]) for process in together]
+    assert sum(compiled_here) > 0  # on a busy machine one may come when the other has compiled all
     assert json.loads(start().communicate("\n")[0]) == 0
     assert not list((tmp_path / "cache").rglob("*.tmp"))
 

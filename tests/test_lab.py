@@ -28,15 +28,19 @@ STUDENTS = [name for name in NOTEBOOKS if "/" not in name]
 
 @contextlib.contextmanager
 def checks() -> Iterator[ModuleType]:
-    """The module `check` anew, as a kernel that has just started would import it."""
-    path = sys.path.copy()
+    """The module `check` anew, as in a kernel that has just started; what stood there comes back."""
+
+    def take_out() -> dict[str, ModuleType]:
+        return {name: sys.modules.pop(name) for name in list(sys.modules) if name.split(".")[0] == "check"}
+
+    path, before = sys.path.copy(), take_out()
     sys.path.insert(0, str(LAB))
     try:
         yield importlib.import_module("check")
     finally:
         sys.path[:] = path
-        for name in [name for name in sys.modules if name.split(".")[0] == "check"]:
-            del sys.modules[name]
+        take_out()
+        sys.modules.update(before)
 
 
 def printed_by_cells(notebook: str) -> list[tuple[str, str]]:

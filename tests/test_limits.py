@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from findings import refused, the
 from numpy.typing import ArrayLike, NDArray
 from urdf_parts import joint, link, robot, write
 
@@ -76,20 +78,22 @@ def test_a_motion_inside_its_limits_is_not_warned_about(limited: Robot) -> None:
 def test_a_motion_that_goes_outside_says_where_and_how_far(limited: Robot) -> None:
     fast = run(limited, [1.2, 0.0], 1.0, START)
     assert fast.complete
-    (said,) = fast.warnings
+    (beyond,) = fast.findings
     reached = np.abs(fast.u[:, 0]).max()
     assert reached > 0.4
-    assert said == f"inputs exceed their limits: v ({reached:.3g} m/s; at most 0.4)"
+    assert beyond.code == "inputs_beyond_limits"
+    assert beyond.values["inputs"] == [{"name": "v", "largest": reached, "unit": "m/s", "limit": 0.4}]
 
     aside = run(limited, [-0.5, -0.1], 6.0, START)
     outside = {
         name: np.flatnonzero(np.abs(q) > 1 + 2e-6)
         for name, q in zip(["q1", "q2"], aside.q.T[3:], strict=True)
     }
-    said = next(warning for warning in aside.warnings if warning.startswith("coordinates leave"))
-    assert any(first.size for first in outside.values())
-    for name, first in outside.items():
-        assert (f"{name} at {aside.t[first[0]]:.3g} s" in said) if first.size else (name not in said)
+    found = the(aside, "coordinates_beyond_limits").values["coordinates"]
+    assert {one["name"]: one["t"] for one in found} == {
+        name: aside.t[first[0]] for name, first in outside.items() if first.size
+    }
+    assert found
 
 
 def test_limits_of_a_platform_measured_in_the_file() -> None:
@@ -103,22 +107,24 @@ def test_limits_of_a_platform_measured_in_the_file() -> None:
 
 
 @pytest.mark.parametrize(
-    ("limits", "message"),
+    ("limits", "fields"),
     [
-        ({"w": 1.0}, r"limits of platform unicycle: unknown input 'w'; available: v, omega"),
-        ({"v": 0.0}, "limit of v: expected a number above 0, got 0"),
-        ({"v": "fast"}, "limit of v: expected numbers"),
+        ({"w": 1.0}, {"where": "limits of platform unicycle", "got": "w"}),
+        ({"v": 0.0}, {"where": "limit of v", "got": 0.0}),
+        ({"v": "fast"}, {"where": "limit of v", "got": "fast"}),
     ],
 )
-def test_wrong_limits_of_inputs(limits: dict[str, float], message: str) -> None:
-    with pytest.raises(nmm.InputError, match=message):
+def test_wrong_limits_of_inputs(limits: dict[str, float], fields: dict[str, Any]) -> None:
+    with refused(**fields):
         Unicycle(limits=limits)
 
 
 def test_limits_in_a_scenario(tmp_path: Path) -> None:
     steered = nmm.Scenario.load("car_steered_by_the_null_space", {"robot.platform.limits": {"v": 0.3}})
     assert steered.robot().u_limits[0] == 0.3
-    assert any("v (0.6" in warning for warning in steered.override("duration", 2).run().warnings)
+    (v, *_) = the(steered.override("duration", 2).run(), "inputs_beyond_limits").values["inputs"]
+    assert v["name"] == "v"
+    assert 0.6 <= v["largest"] < 0.7
 
 
 def test_a_scenario_names_the_key(tmp_path: Path, limited: Robot) -> None:
@@ -130,5 +136,6 @@ task: {{kind: position, frame: tip, axes: xy, reference: [1, 1]}}
 resolver: {{kind: pg}}
 """
     path = write(tmp_path / "outside.yaml", text)
-    with pytest.raises(nmm.ScenarioError, match=r"outside\.yaml:3: q0: .*q1 = 2 rad \(from -1 to 1\)"):
+    with refused("outside.yaml:3: q0: r", kind=nmm.ScenarioError, got={"q1": 2.0}) as caught:
         nmm.Scenario.load(path).controller()
+    assert "q1 = 2 rad (from -1 to 1)" in caught.value.what

@@ -80,9 +80,9 @@ def test_beside_a_singularity_limits_hold_and_the_task_is_scaled(
         assert found.status is Status.RELAXED
         target = np.linalg.lstsq(J, rate, rcond=None)[0]
         example = Example("near singular", J, np.eye(m), -u_upper, u_upper, target)
-        assert abs(found.scale[0] - largest_scale(example)) <= 1e-7
+        assert abs(found.nu[0] - largest_scale(example)) <= 1e-7
         assert np.all(np.abs(found.u) <= u_upper)
-        assert np.linalg.norm(J @ found.u - found.scale[0] * rate) <= 1e-9 * (1.0 + np.linalg.norm(rate))
+        assert np.linalg.norm(J @ found.u - found.nu[0] * rate) <= 1e-9 * (1.0 + np.linalg.norm(rate))
 
 
 def test_an_arm_that_is_all_but_straight_comes_away() -> None:

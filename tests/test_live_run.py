@@ -19,8 +19,8 @@ from ports import MOST, listening, wait_for
 
 import nmm
 from nmm.playback import LiveRun
-from nmm.playback.running import ALL, FPS, KEPT
-from nmm.playback.watching import AHEAD, Watching, counted
+from nmm.playback.running import ALL, KEPT
+from nmm.playback.session import AHEAD, FPS, Watching, counted
 from nmm.robots.configuration import Configuration
 from nmm.runs.trajectory import Trajectory
 
@@ -33,7 +33,7 @@ def scenario(name: str = "unicycle_3r_position", **settings: object) -> nmm.Scen
     return nmm.Scenario.load(name, {"duration": 1.0, **settings})
 
 
-def told(page: LivePage) -> tuple[list[str], np.ndarray, np.ndarray]:
+def read_curves(page: LivePage) -> tuple[list[str], np.ndarray, np.ndarray]:
     """The channels of a page, and the times and values of the samples that it was told."""
     curves = next(json.loads(line) for line in page.hello if '"type":"curves"' in line)
     names = list(curves["runs"][0]["columns"])
@@ -61,7 +61,7 @@ def test_pages_do_not_change_a_run_and_are_told_its_samples() -> None:
             same(made, alone)
             wait_for(lambda: bool(page.of("whole")))
             wait_for(lambda: bool(silent.of("whole")))
-        names, t, values = told(page)
+        names, t, values = read_curves(page)
         assert t[0] == 0.0
         assert t[-1] == made.t[-1]
         assert np.all(np.diff(t) > 0.0)
@@ -142,7 +142,7 @@ def test_a_page_that_comes_late_is_told_everything_so_far() -> None:
             wait_for(lambda: first.of("run")[-1]["whole"])  # then a page can be told all of it
             first.says(ALL)
             wait_for(lambda: bool(late.of("whole")) and bool(first.of("whole")))
-        np.testing.assert_array_equal(told(late)[1], told(first)[1])
+        np.testing.assert_array_equal(read_curves(late)[1], read_curves(first)[1])
         # One that comes after the end gets what `nmm play` shows.
         with LivePage(shown.url) as after:
             stage = next(json.loads(line) for line in after.hello if '"type":"stage"' in line)
@@ -184,7 +184,7 @@ def test_a_run_slower_than_its_own_time_is_waited_for() -> None:
         staying.join(timeout=MOST)
     words = [run["told"] for run in page.of("run")]
     assert any(re.fullmatch(r"waits for the computation, at 0\.\d+ times real time", text) for text in words)
-    np.testing.assert_array_equal(told(page)[1], made.t[np.searchsorted(made.t, told(page)[1])])
+    np.testing.assert_array_equal(read_curves(page)[1], made.t[np.searchsorted(made.t, read_curves(page)[1])])
 
 
 def test_tasks_that_come_and_go_have_curves_where_they_are_active() -> None:
@@ -194,7 +194,7 @@ def test_tasks_that_come_and_go_have_curves_where_they_are_active() -> None:
         wait_for(lambda: len(page.of("run")) > 4 and page.of("run")[-1]["whole"])
         page.says(ALL)
         wait_for(lambda: bool(page.of("whole")))
-        names, t, values = told(page)
+        names, t, values = read_curves(page)
     at = np.searchsorted(made.t, t)
     assert made.events
     for i, name in enumerate(made.r_names):

@@ -15,9 +15,7 @@ from playwright.sync_api import Browser, Page
 from ports import MOST, wait_for
 
 import nmm
-from nmm.playback.running import FPS
-
-pytestmark = pytest.mark.browser
+from nmm.playback.session import FPS
 
 DURATION = 6.0
 

@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from findings import refused
 
 import nmm
 from nmm.cli.exit_status import status_of
@@ -68,7 +69,7 @@ def test_a_run_keeps_what_made_it(tmp_path: Path) -> None:
     summary = json.loads(file.read_text(encoding="utf-8"))
     summary["made_with"] = [1]
     file.write_text(json.dumps(summary), encoding="utf-8")
-    with pytest.raises(nmm.InputError, match=r"summary\.json: made_with: "):
+    with refused("summary.json: made_with", got=[1]):
         nmm.Trajectory.load(folder)
     del summary["made_with"]  # as folders before had it
     file.write_text(json.dumps(summary), encoding="utf-8")

@@ -14,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 import trimesh
+from findings import assert_found, holds, of_code
 from spatial_arms import MOVING
 from spatial_arms import UR5 as POSED
 from urdf_parts import joint, link, robot, shape, write
@@ -84,7 +85,8 @@ def test_no_mesh_is_read_for_control(read: list[str], tmp_path: Path) -> None:
         nmm.PinocchioLayout(machine, "chain").configuration(machine.q())
         assert repr(machine)
     assert arm.shapes.collision_model.collisionPairs
-    assert any(note.startswith(f"{len(arm.shapes.collision_model.collisionPairs)} ") for note in arm.notes)
+    (note,) = of_code(arm.notes, "collision_pairs")
+    assert note.values["count"] == len(arm.shapes.collision_model.collisionPairs)
     controller = nmm.Controller(arm, nmm.Task(nmm.Position("tool0"), MOVING, 1.0), nmm.ProjectedGradient())
     q0 = arm.q(POSED)
     controller(0.0, q0)
@@ -293,24 +295,24 @@ def test_all_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     for _ in range(2):
         with pytest.raises(RobotError) as caught:
             _ = loaded.visual_model
-        message = str(caught.value)
-        for name in ("one.stl", "two.obj"):
-            assert f"link 'a': mesh {tmp_path / name} cannot be read: " in message
-        assert "good.stl" not in message
+        lost = [{"link": "a", "mesh": str(tmp_path / name)} for name in ("one.stl", "two.obj")]
+        assert_found(caught.value.findings, *(("mesh_unreadable", values) for values in lost))
     arm = nmm.mount("unicycle_2r", loaded, at="arm_base", prefix="second_")
-    with pytest.raises(RobotError, match=r"unicycle_2r with second: link 'second_a': mesh .*one\.stl cannot"):
+    with pytest.raises(RobotError) as caught:
         _ = arm.visual_model
+    assert caught.value.where == "unicycle_2r with second"
+    assert holds(caught.value.findings[0], "mesh_unreadable", link="second_a", mesh=str(tmp_path / "one.stl"))
     cube(tmp_path / "one.stl")
     trimesh.creation.box((1, 1, 1)).export(tmp_path / "two.obj")
     assert unread(loaded.visual_model) == 0
 
 
 def test_a_check_reads_the_meshes(tmp_path: Path) -> None:
-    from nmm.robots.loading.report import report
+    from nmm.robots.loading.report import file_report
 
     write(tmp_path / "junk.stl", "junk")
     path = meshed(tmp_path, "junk.stl")
-    (problem,) = report(path).problems
-    assert f"link 'a': mesh {tmp_path / 'junk.stl'} cannot be read" in problem.message
+    mesh = str(tmp_path / "junk.stl")
+    assert_found(file_report(path).problems, ("mesh_unreadable", {"link": "a", "mesh": mesh}))
     cube(tmp_path / "junk.stl")
-    assert report(path).problems == ()
+    assert file_report(path).problems == ()

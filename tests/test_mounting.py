@@ -7,17 +7,19 @@ import re
 from collections.abc import Mapping
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
 import pytest
+from findings import assert_found, carries, of_code, the
 from numpy.typing import NDArray
 from urdf_parts import inertial, joint, link, numbers, random_tree, robot, shape, write
 
 import nmm
 from nmm import RobotError, Scenario, ScenarioError
-from nmm.platforms import Fixed
+from nmm.platforms import FixedBase
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 
@@ -221,8 +223,8 @@ def test_names_are_kept_apart_without_being_asked(tmp_path: Path) -> None:
         "ur5_2_shoulder_pan_joint",
         "ur5_3_shoulder_pan_joint",
     ]
-    assert any("with the prefix ur5_2_" in note for note in twice.notes)
-    assert not any("prefix" in note for note in once.notes)
+    assert [one.values["prefix"] for one in of_code(twice.notes, "arm_mounted")] == ["", "ur5_2_"]
+    assert [one.values["prefix"] for one in of_code(once.notes, "arm_mounted")] == [""]
     assert (once.name, once.source) == ("rover with ur5", f"{base} + {UR5}")
     assert nmm.mount(base, UR5, name="mine").model.name == "mine"
     # "arm" is what all the joints are called together.
@@ -306,9 +308,8 @@ def test_pairs_are_those_of_bodies_apart(tmp_path: Path, rng: np.random.Generato
             if i != j and model.parents[i] != j and model.parents[j] != i:
                 expected.add(frozenset((one.name, two.name)))
         assert pair_names(loaded) == expected
-        assert any(note.startswith(f"{len(expected)} collision pairs") for note in loaded.notes) == bool(
-            expected
-        )
+        counts = [note.values["count"] for note in of_code(loaded.notes, "collision_pairs")]
+        assert counts == ([len(expected)] if expected else [])
 
 
 # ------------------------------------------------------------------------------------------ fixed base
@@ -318,7 +319,7 @@ def test_arm_on_a_fixed_base(tmp_path: Path, rng: np.random.Generator) -> None:
     """Without x, y and theta: q is the arm's, and its frames are where the file has them."""
     text = random_tree(rng, 6)
     path = write(tmp_path / "arm.urdf", text)
-    for platform in ("fixed", Fixed()):
+    for platform in ("fixed", FixedBase()):
         loaded = nmm.load(path, platform=platform)
         assert loaded.n == loaded.n_u == nmm.load(path).n - 3
         assert "theta" not in loaded.frames
@@ -339,10 +340,12 @@ def test_wheels_of_a_fixed_base(tmp_path: Path) -> None:
         assert held.q_names == ("mast_joint",)
         assert held.wheels == ()
         assert held.display_model.nq == 1
-        assert any("stand still: wheel_left_joint, wheel_right_joint" in note for note in held.notes)
+        (note,) = of_code(held.notes, "wheels_held")
+        assert note.values["names"] == wheels
     assert "wheel_left_joint" in nmm.load(path, platform="fixed", wheels=()).q_names
-    with pytest.raises(RobotError, match="joint 'mast_joint' is no wheel"):
+    with pytest.raises(RobotError) as caught:
         nmm.load(path, platform="fixed", wheels=["mast_joint"])
+    assert_found(caught.value.findings, ("no_wheel", {"name": "mast_joint", "why": "axis_not_level"}))
 
 
 def test_mounted_on_a_fixed_base(tmp_path: Path, rng: np.random.Generator) -> None:
@@ -354,10 +357,10 @@ def test_mounted_on_a_fixed_base(tmp_path: Path, rng: np.random.Generator) -> No
         platform="fixed",
     )
     assert table.n == 0
-    assert any("nothing moves" in note for note in table.notes)
+    assert of_code(table.notes, "nothing_moves")
     mounted = nmm.mount(nmm.mount(table, UR5, prefix="a_"), UR5, at="top", prefix="b_")
     assert mounted.n == mounted.n_u == 12
-    alone = nmm.load(UR5, platform=Fixed())
+    alone = nmm.load(UR5, platform=FixedBase())
     q = rng.uniform(-2, 2, 12)
     here = Configuration(mounted, q)
     for k, prefix in enumerate(("a_", "b_")):
@@ -373,84 +376,73 @@ def test_mounted_on_a_fixed_base(tmp_path: Path, rng: np.random.Generator) -> No
 # ------------------------------------------------------------------------------------------ bad input
 
 
-def refused(*arguments: object, **keywords: object) -> str:
+def refused(*arguments: object, **keywords: object) -> RobotError:
     with pytest.raises(RobotError) as caught:
         nmm.mount(*arguments, **keywords)  # type: ignore[arg-type]  # wrong on purpose
-    message = str(caught.value)
-    assert message.isprintable()
-    return message
+    assert str(caught.value).isprintable()
+    return caught.value
 
 
 def test_bad_mounting(tmp_path: Path) -> None:
     base = nmm.load(write(tmp_path / "base.urdf", base_text()))
     stiff = write(tmp_path / "stiff.urdf", robot(link("post"), attributes='name="post"'))
-    assert "post has no movable joint" in refused(base, stiff)
-    assert "elbow has no movable joint" in refused(
-        base,
-        nmm.load(
-            write(tmp_path / "e.urdf", robot(link("a"), link("b"), joint(), attributes='name="elbow"')),
-            lock={"j": 0.2},
-        ),
-    )
-    assert "at: rover: unknown frame 'tpo' (did you mean 'top'?)" in refused(base, UR5, at="tpo")
-    assert "unknown frame 3" in refused(base, UR5, at=3)
-    message = refused("unicycle_2r", UR5)
-    assert "at: which frame of unicycle_2r carries the arm? none is named mount, arm_mount, top" in message
-    assert "base_footprint" in message
+    assert refused(base, stiff).where == "post"
+    elbow = write(tmp_path / "e.urdf", robot(link("a"), link("b"), joint(), attributes='name="elbow"'))
+    assert refused(base, nmm.load(elbow, lock={"j": 0.2})).where == "elbow"
+    carries(refused(base, UR5, at="tpo"), "at: rover", got="tpo", available=("top",))
+    carries(refused(base, UR5, at=3), "at: rover", got=3)
+    carries(refused("unicycle_2r", UR5), "at", available=("base_footprint",))
     two = write(tmp_path / "two.urdf", base_text(link("mount") + joint("m", "deck", "mount", "fixed", "")))
-    assert "found mount, top" in refused(two, UR5)
-    assert "'nothing.urdf'" not in (message := refused(base, "nothing.urdf"))
-    assert "nothing.urdf: no such file" in message
-    assert "expected a robot's name" in refused(base, 5)
+    carries(refused(two, UR5), "at", available=("mount", "top"))
+    carries(refused(base, "nothing.urdf"), "nothing.urdf")
+    carries(refused(base, 5), got=5)
 
 
 def test_mounted_on_a_wheel(tmp_path: Path) -> None:
     base = write(tmp_path / "base.urdf", base_text())
-    assert "joint 'wheel_left_joint' is no wheel: another joint is below it" in refused(
-        base, UR5, at="wheel_left"
-    )
+    found = refused(base, UR5, at="wheel_left").findings
+    assert_found(found, ("no_wheel", {"name": "wheel_left_joint", "why": "joint_below"}))
 
 
 @pytest.mark.parametrize(
-    ("placement", "cause"),
+    ("placement", "part", "got"),
     [
-        ([1, 2, 3], "expected a pin.SE3, a matrix (4, 4) or (xyz, rpy), got shape (3,)"),
-        (np.eye(3), "got shape (3, 3)"),
-        (np.zeros((4, 4)), "expected a rotation and a position"),
-        (np.diag([1, 1, -1, 1]), "expected a rotation and a position"),
-        (((0, 0), (0, 0, 0)), "xyz: expected 3 numbers"),
-        (((0, 0, 0), (0, 0, np.nan)), "rpy: expected finite numbers"),
-        ("above", "expected numbers"),
+        ([1, 2, 3], "", [1, 2, 3]),
+        (np.eye(3), "", np.eye(3)),
+        (np.zeros((4, 4)), "", np.zeros((4, 4))),
+        (np.diag([1, 1, -1, 1]), "", np.diag([1, 1, -1, 1])),
+        (((0, 0), (0, 0, 0)), ": xyz", (0, 0)),
+        (((0, 0, 0), (0, 0, np.nan)), ": rpy", (0, 0, np.nan)),
+        ("above", "", "above"),
     ],
 )
-def test_placements_that_are_none(placement: object, cause: str, tmp_path: Path) -> None:
-    message = refused(write(tmp_path / "base.urdf", base_text()), UR5, placement=placement)
-    assert message.startswith("placement: ")
-    assert cause in message
+def test_placements_that_are_none(placement: object, part: str, got: object, tmp_path: Path) -> None:
+    error = refused(write(tmp_path / "base.urdf", base_text()), UR5, placement=placement)
+    assert error.where == f"placement{part}"
+    np.testing.assert_array_equal(error.got, got)
 
 
 def test_clashing_prefixes(tmp_path: Path) -> None:
     base = nmm.mount(write(tmp_path / "base.urdf", base_text()), UR5, prefix="left_")
-    message = refused(base, UR5, at="top", prefix="left_")
-    assert "prefix: " in message
-    assert "got 'left_'" in message
-    assert "left_base_link" in message
-    assert "and 21 more" in message
-    assert "prefix: expected text" in refused(base, UR5, at="top", prefix=3)
+    error = refused(base, UR5, at="top", prefix="left_")
+    carries(error, "prefix", got="left_")
+    assert "left_base_link" in error.what
+    assert "and 19 more" in error.what
+    carries(refused(base, UR5, at="top", prefix=3), "prefix", got=3)
     # A joint gives an input its name: it cannot be called as the platform's inputs are.
     text = robot(link("a"), link("b"), joint("v"))
     arm = write(tmp_path / "arm.urdf", text)
-    assert "both have v" in refused(base, arm, at="top", prefix="")
+    assert refused(base, arm, at="top", prefix="").what.endswith(" v")
     assert nmm.mount(base, arm, at="top").u_names[-1] == "r_v"
     # Links that end in the same name after the prefix.
     arm = write(tmp_path / "arm.urdf", robot(link("top"), link("b"), joint("j", "top")))
-    assert "both have top" in refused(base, arm, at="top", prefix="")
+    assert refused(base, arm, at="top", prefix="").what.endswith(" top")
 
 
 def test_robot_not_made_by_loading(robot_2r: Robot) -> None:
     bare = copy.copy(robot_2r)
     object.__setattr__(bare, "parts", None)
-    assert "was not made by nmm.load" in refused(bare, UR5, at="arm_base")
+    assert refused(bare, UR5, at="arm_base").where == bare.name
     alone = nmm.load("unicycle_2r", wheels=())
     object.__setattr__(alone, "parts", None)
     assert nmm.mount(alone, UR5, at="arm_base").n == alone.n + 6
@@ -528,60 +520,63 @@ def test_arms_in_a_scenario(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "cause"),
+    ("key", "value", "where", "fields"),
     [
-        ("robot.arms.0.xyz", "[1, 2]", r"set robot\.arms\.0\.xyz: expected 3 numbers"),
-        ("robot.arms.0.rpx", "0", r"set robot\.arms\.0\.rpx: unknown key 'rpx' \(did you mean 'rpy'"),
-        ("robot.arms.0.at", "tpo", r"set robot\.arms\.0\.at: rover: unknown frame 'tpo'"),
-        ("robot.arms.0.arm", "nothing", r"set robot\.arms\.0\.arm: unknown robot 'nothing'"),
-        ("robot.arms.0.arm", "{}", r"set robot\.arms\.0\.arm\.source: this key is missing"),
-        ("robot.arms.1.prefix", "l_", r"set robot\.arms\.1\.prefix: expected one that keeps names apart"),
-        (
-            "robot.arms.2.at",
-            "top",
-            r"set robot\.arms\.2\.at: robot\.arms is a list; expected an index|a list",
-        ),
-        ("robot.arms", "[]", r"set robot\.arms: expected at least 1"),
-        ("robot.xyz", "[0, 0, 0]", r"set robot\.xyz: expected it in the list of arms"),
-        ("robot.platform", "{kind: car}", r"set robot\.platform\.kind: unknown key 'kind'"),
-        ("robot", "{arm: small_arm}", r"set robot\.platform: this key is missing"),
+        ("robot.arms.0.xyz", "[1, 2]", "set robot.arms.0.xyz", {}),
+        ("robot.arms.0.rpx", "0", "set robot.arms.0.rpx", {"got": "rpx"}),
+        ("robot.arms.0.at", "tpo", "set robot.arms.0.at: rover", {"got": "tpo"}),
+        ("robot.arms.0.arm", "nothing", "set robot.arms.0.arm", {"got": "nothing"}),
+        ("robot.arms.0.arm", "{}", "set robot.arms.0.arm.source", {}),
+        ("robot.arms.1.prefix", "l_", "set robot.arms.1.prefix", {"got": "l_"}),
+        ("robot.arms.2.at", "top", "set robot.arms.2.at", {"got": "2"}),
+        ("robot.arms", "[]", "set robot.arms", {}),
+        ("robot.xyz", "[0, 0, 0]", "set robot.xyz", {}),
+        ("robot.platform", "{kind: car}", "set robot.platform.kind", {"got": "kind"}),
+        ("robot", "{arm: small_arm}", "set robot.platform", {}),
         (
             "robot.platform",
             "{source: robots/base.urdf, platform: {kind: unicycle, limits: {w: 1}}}",
-            r"set robot\.platform\.platform: limits of platform unicycle: unknown input 'w'",
+            "set robot.platform.platform: limits of platform unicycle",
+            {"got": "w"},
         ),
         (
             "robot.platform",
             "{source: robots/base.urdf, platform: {kind: unicycle, wheelbase: 1}}",
-            r"set robot\.platform\.platform\.wheelbase: unknown key 'wheelbase'; available: kind, limits",
+            "set robot.platform.platform.wheelbase",
+            {"got": "wheelbase"},
         ),
-        ("robot", "{source: unicycle_2r, platform: {wheelbase: 1}}", r"set robot\.platform\.kind: expected"),
+        ("robot", "{source: unicycle_2r, platform: {wheelbase: 1}}", "set robot.platform.kind", {}),
         (
             "robot",
             "{source: unicycle_2r, platform: {kind: tank}}",
-            r"robot\.platform\.kind: unknown platform",
+            "set robot.platform.kind",
+            {"got": "tank"},
         ),
         (
             "robot",
             "{source: unicycle_2r, platform: {kind: differential, radius: 0, track: 1}}",
-            r"robot\.platform\.radius: expected a number above 0",
+            "set robot.platform.radius",
+            {"got": 0.0},
         ),
         (
             "robot",
             "{source: unicycle_2r, platform: {kind: differential, radius: 1}}",
-            r"robot\.platform\.track: this key is missing",
+            "set robot.platform.track",
+            {},
         ),
-        ("robot", "{source: unicycle_2r, axle: [1]}", r"set robot\.axle: expected a frame, \[x, y\]"),
-        ("robot", "{source: unicycle_2r, axle: nowhere}", r"set robot: .*axle: unknown frame 'nowhere'"),
-        ("robot", "{source: unicycle_2r, lock: {q1: a}}", r"set robot\.lock\.q1: expected a number"),
+        ("robot", "{source: unicycle_2r, axle: [1]}", "set robot.axle", {}),
+        ("robot", "{source: unicycle_2r, axle: nowhere}", "set robot: unicycle_2r: axle", {"got": "nowhere"}),
+        ("robot", "{source: unicycle_2r, lock: {q1: a}}", "set robot.lock.q1", {"got": "a"}),
     ],
 )
-def test_bad_robots_of_scenarios(key: str, value: str, cause: str, tmp_path: Path) -> None:
+def test_bad_robots_of_scenarios(
+    key: str, value: str, where: str, fields: dict[str, object], tmp_path: Path
+) -> None:
     arms = f"[{{arm: '{UR5}', prefix: l_}}, {{arm: '{UR5}', at: top, prefix: r_}}]"
     text = f"{{platform: robots/base.urdf, arms: {arms}}}"
-    with pytest.raises(ScenarioError, match=cause) as caught:
+    with pytest.raises(ScenarioError) as caught:
         scenario(tmp_path, text).override(key, value.replace("robots/", f"{tmp_path}/robots/")).robot()
-    assert "\n" not in str(caught.value)
+    carries(caught.value, where, **fields)
 
 
 def test_axle_and_lock_of_a_scenario(tmp_path: Path) -> None:
@@ -609,7 +604,7 @@ def test_limits_beside_a_mount_are_the_platforms(tmp_path: Path) -> None:
     assert dict(zip(robot.u_names, robot.u_limits, strict=True))["v"] == 0.2
     free = scenario.run()
     assert np.abs(free.u[:, 0]).max() > 0.3
-    assert any("inputs exceed their limits: v" in warning for warning in free.warnings)
+    assert the(free, "inputs_beyond_limits").values["inputs"][0]["name"] == "v"
     kept = scenario.override("limits", True).run()
     assert np.abs(kept.u[:, 0]).max() <= 0.2 * (1 + 1e-9)
     # As resolved they are the platform's own, and it can be set by either path.
@@ -623,18 +618,19 @@ def test_limits_beside_a_mount_are_the_platforms(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("platform", "limits", "message"),
+    ("platform", "limits", "fields"),
     [
-        ("car_base", {"w": 1}, "unknown input 'w'; available: v, steering_rate"),
-        ("car_base", {"v": "fast"}, "robot.limits.v"),
-        ({"source": "car_base", "limits": {"v": 1}}, {"v": 2}, "robot.limits.v: expected once"),
+        ("car_base", {"w": 1}, {"got": "w", "available": ("v", "steering_rate")}),
+        ("car_base", {"v": "fast"}, {"where": "set robot.limits.v"}),
+        ({"source": "car_base", "limits": {"v": 1}}, {"v": 2}, {"where": "set robot.limits.v"}),
     ],
 )
 def test_limits_beside_a_mount_that_are_none(
-    platform: object, limits: dict[str, object], message: str, tmp_path: Path
+    platform: object, limits: dict[str, object], fields: dict[str, Any], tmp_path: Path
 ) -> None:
     path = tmp_path / "given.yaml"
     path.write_text(MOUNTED, encoding="utf-8")
     robot = {"platform": platform, "arm": "small_arm", "limits": limits}
-    with pytest.raises(ScenarioError, match=re.escape(message)):
+    with pytest.raises(ScenarioError) as caught:
         Scenario.load(path, {"robot": robot}).robot()
+    carries(caught.value, **fields)

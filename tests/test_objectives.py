@@ -44,7 +44,7 @@ def jacobian(here: nmm.Configuration, rows: str | tuple[str, ...]) -> Array:
     return picked
 
 
-def objectives(robot: nmm.Robot, rows: str) -> dict[str, nmm.Objective]:
+def objectives(robot: nmm.Robot, rows: str) -> dict[str, nmm.extending.Objective]:
     joints = robot.u_names[robot.platform.p :]
     n = len(joints)
     ramp = nmm.Line([0.2], [1.3], 3.0, "smooth")
@@ -52,12 +52,12 @@ def objectives(robot: nmm.Robot, rows: str) -> dict[str, nmm.Objective]:
         "condition": nmm.InverseCondition("ee", (*rows, "rz")),
         "condition of the arm": nmm.InverseCondition("ee", "xy", "arm", length=0.2),
         "directional": nmm.DirectionalManipulability("ee", [1.0, 0.5, -0.3][: len(rows)], rows),
-        "weighed": nmm.WeighedManipulability("ee", "xy", 0.4, {"platform": 3.0}),
+        "weighed": nmm.WeightedManipulability("ee", "xy", 0.4, {"platform": 3.0}),
         "barrier": nmm.LimitBarrier(joints, np.full(n, -7.0), np.full(n, 7.0), 0.1),
         "posture": nmm.PreferredPosture(dict.fromkeys((*joints, "theta"), 0.3)),
         "posture that moves": ramp * nmm.PreferredPosture({joints[0]: ramp, joints[1]: 0.2}),
         "energy": nmm.PotentialEnergy(),
-        "alignment": nmm.Alignment(nmm.Velocity(nmm.Circle([1, 2], 2.0, 0.7))),
+        "alignment": nmm.Alignment(nmm.VelocityOf(nmm.Circle([1, 2], 2.0, 0.7))),
         "alignment with a point": nmm.Alignment(at="ee"),
     }
 
@@ -78,7 +78,7 @@ def test_gradients_on_every_platform(name: str, rng: np.random.Generator) -> Non
     for objective in (
         nmm.InverseCondition(frame, ("x", "y", "rz"), weights={"platform": 2.0}),
         nmm.DirectionalManipulability(frame, [0.3, 1.0], "xy", "platform"),
-        nmm.WeighedManipulability(frame),
+        nmm.WeightedManipulability(frame),
         nmm.LimitBarrier(margin=0.1),
         nmm.PotentialEnergy(),
     ):
@@ -134,7 +134,7 @@ def test_the_condition_number_does_not_know_where_the_world_lies(name: str, rng:
     for alike in (
         nmm.InverseCondition("ee", rows),
         nmm.Manipulability("ee", rows),
-        nmm.WeighedManipulability("ee", rows if len(rows) == 2 else "xyz"),
+        nmm.WeightedManipulability("ee", rows if len(rows) == 2 else "xyz"),
     ):
         assert alike.value(elsewhere) == pytest.approx(alike.value(here), rel=1e-10)
         np.testing.assert_allclose(alike.gradient(elsewhere)[:3], 0.0, atol=1e-9)
@@ -168,7 +168,7 @@ def test_weights_of_one_change_nothing_and_heavy_inputs_count_for_less(
         assert same.value(here) == plain.value(here)
         np.testing.assert_array_equal(same.gradient(here), plain.gradient(here))
     for alpha, expected in ((0.0, plain.value(here)), (1.0, arm.value(here))):
-        assert nmm.WeighedManipulability("ee", rows, alpha).value(here) == expected
+        assert nmm.WeightedManipulability("ee", rows, alpha).value(here) == expected
     W = rng.uniform(0.2, 5.0, robot.n_u)
     volume = np.prod(np.linalg.svd(jacobian(here, rows) / np.sqrt(W), compute_uv=False))
     found = nmm.Manipulability("ee", rows, weights=W).value(here)
@@ -236,7 +236,7 @@ def test_a_preferred_posture_counts_no_turns_of_what_turns_freely(rng: np.random
                 expected = 2 * 2.5 * np.sin(difference / 2) ** 2 if wraps else 2.5 * difference**2 / 2
                 assert one.value(here) == pytest.approx(expected, rel=1e-9, abs=1e-12)
     several = nmm.PreferredPosture({"q1": 0.3, "q2": -0.2}, {"q2": 3.0})
-    squares = nmm.Quadratic(nmm.Square("q1", 0.3), nmm.Square("q2", -0.2, 3.0))
+    squares = nmm.Quadratic(nmm.QuadraticTerm("q1", 0.3), nmm.QuadraticTerm("q2", -0.2, 3.0))
     assert several.value(here) == squares.value(here)
 
 
@@ -267,22 +267,22 @@ def test_the_velocity_of_a_reference_is_its_rate(robot_2r: nmm.Robot) -> None:
         nmm.Constant([1, 2]),
     ):
         for t in (-0.5, 0.0, 0.7, 1.3, 2.9, 8.0):
-            found = nmm.evaluate(nmm.Velocity(way), t, here).value
+            found = nmm.evaluate(nmm.VelocityOf(way), t, here).value
             np.testing.assert_allclose(found, nmm.evaluate(way, t, here).value_t, atol=1e-12)
 
 
 def test_weights_that_change_scale_value_and_gradient(robot_2r: nmm.Robot, rng: np.random.Generator) -> None:
     here = configuration(robot_2r, rng)
     w, ramp = nmm.Manipulability("ee", "xy"), nmm.Line([0.0], [2.0], 4.0)
-    both = 3.0 * (ramp * w) - nmm.Quadratic(nmm.Square("q1"))
-    rest = -nmm.Quadratic(nmm.Square("q1"))
+    both = 3.0 * (ramp * w) - nmm.Quadratic(nmm.QuadraticTerm("q1"))
+    rest = -nmm.Quadratic(nmm.QuadraticTerm("q1"))
     for t, share in ((0.0, 0.0), (1.0, 0.5), (4.0, 2.0), (9.0, 2.0)):
         expected = 3.0 * share * w.value(here) + rest.value(here)
         assert both.value(here, t) == pytest.approx(expected, rel=1e-12)
         gradient = 3.0 * share * w.gradient(here) + rest.gradient(here)
         np.testing.assert_allclose(both.gradient(here, t), gradient, atol=1e-12)
     assert both.rate(here, 1.0) == pytest.approx(1.5 * w.value(here), rel=1e-12)
-    signal = nmm.Signal(0.5, "1")
+    signal = nmm.LiveTarget(0.5, "1")
     dimmed = signal * w
     assert dimmed.value(here) == pytest.approx(0.5 * w.value(here))
     signal.set(0.0)
@@ -301,11 +301,11 @@ def test_a_controller_descends_h_as_it_is_at_its_time(robot_3r: nmm.Robot, rng: 
         np.testing.assert_allclose(step.h, here.S.T @ objective.gradient(here, t), atol=1e-12)
 
 
-def posed(text: str) -> Callable[[Path], nmm.Objective | None]:
-    return lambda folder: scenario(folder, objective=text).controller().objective
+def posed(text: str) -> Callable[[Path], nmm.extending.Objective | None]:
+    return lambda folder: scenario(folder, objective=text).controller().given.objective
 
 
-SAID: list[tuple[str, nmm.Objective]] = [
+SAID: list[tuple[str, nmm.extending.Objective]] = [
     (
         "{kind: posture, posture: {q1: pi/4, theta: {kind: line, start: 0, end: 1, duration: 5}}, "
         "weights: {q1: 3}}",
@@ -316,15 +316,15 @@ SAID: list[tuple[str, nmm.Objective]] = [
     ("{kind: alignment, at: ee, of: {theta: 1, q1: 1}}", nmm.Alignment(at="ee", of={"theta": 1, "q1": 1})),
     (
         "{kind: alignment, along: {kind: velocity, of: {kind: circle, center: [0, 0], radius: 1, rate: 1}}}",
-        nmm.Alignment(nmm.Velocity(nmm.Circle([0, 0], 1, 1))),
+        nmm.Alignment(nmm.VelocityOf(nmm.Circle([0, 0], 1, 1))),
     ),
     (
         "{kind: limit_barrier, joints: [q1], lower: [-2], upper: [2], margin: 0.05}",
         nmm.LimitBarrier(["q1"], [-2], [2], 0.05),
     ),
     (
-        "{kind: weighed_manipulability, frame: ee, rows: xy, alpha: 0.2, weights: {platform: 4}}",
-        -nmm.WeighedManipulability("ee", "xy", 0.2, {"platform": 4}),
+        "{kind: weighted_manipulability, frame: ee, rows: xy, alpha: 0.2, weights: {platform: 4}}",
+        -nmm.WeightedManipulability("ee", "xy", 0.2, {"platform": 4}),
     ),
     (
         "{kind: directional_manipulability, frame: ee, rows: xy, direction: [1, -1], weight: 2}",
@@ -342,14 +342,14 @@ SAID: list[tuple[str, nmm.Objective]] = [
     (
         "{kind: quadratic, terms: [{of: q1, target: {kind: polynomial, coefficients: [[1], [2]], "
         "duration: 3}}]}",
-        nmm.Quadratic(nmm.Square("q1", nmm.Polynomial([[1], [2]], 3))),
+        nmm.Quadratic(nmm.QuadraticTerm("q1", nmm.Polynomial([[1], [2]], 3))),
     ),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("text", "expected"), SAID)
 def test_scenarios_say_the_same(
-    robot_2r: nmm.Robot, tmp_path: Path, text: str, expected: nmm.Objective
+    robot_2r: nmm.Robot, tmp_path: Path, text: str, expected: nmm.extending.Objective
 ) -> None:
     objective = posed(text)(tmp_path)
     assert objective is not None
@@ -359,7 +359,7 @@ def test_scenarios_say_the_same(
         assert np.array_equal(objective.gradient(here, t), expected.gradient(here, t))
 
 
-def made(objective: Callable[[], nmm.Objective]) -> Callable[[Path], object]:
+def made(objective: Callable[[], nmm.extending.Objective]) -> Callable[[Path], object]:
     return lambda _: objective().value(nmm.Configuration(loaded("unicycle_2r"), np.zeros(5)))
 
 
@@ -368,18 +368,18 @@ REFUSED: list[tuple[Callable[[Path], object], str]] = [
     (made(lambda: nmm.DirectionalManipulability("hand", [1, 0], "xy")), "unknown frame 'hand'"),
     (made(lambda: nmm.DirectionalManipulability("ee", [0, 0], "xy")), "direction: expected a vector that is"),
     (made(lambda: nmm.DirectionalManipulability("ee", [1, 0, 0], "xy")), "direction: expected 2 components"),
-    (made(lambda: nmm.InverseCondition("ee", "xyz", "arm")), "condition number of the arm: 3 rows with 2"),
-    (made(lambda: nmm.Manipulability("ee", "xyz", "platform")), "of the platform: 3 rows with 2 inputs"),
+    (made(lambda: nmm.InverseCondition("ee", "xyz", "arm")), "condition number of the arm: expected"),
+    (made(lambda: nmm.Manipulability("ee", "xyz", "platform")), "of the platform: expected at most 2 rows"),
     (made(lambda: nmm.InverseCondition("ee", "x")), "expected at least two"),
     (made(lambda: nmm.InverseCondition("ee", "xx")), "each once"),
     (made(lambda: nmm.InverseCondition("ee", "xy", length=0.0)), "length: expected a number above 0"),
     (made(lambda: nmm.Manipulability("ee", "xy", weights={"leg": 2.0})), "unknown input or group 'leg'"),
     (made(lambda: nmm.Manipulability("ee", "xy", weights={"arm": -1})), "weights: q1: expected a number"),
     (made(lambda: nmm.Manipulability("ee", "xy", weights=[1, 2])), "weights: expected 4 numbers"),
-    (made(lambda: nmm.WeighedManipulability("ee", "xy", 1.5)), "alpha: expected a number from 0 to 1"),
-    (made(nmm.LimitBarrier), "robot unicycle_2r has no coordinate with a lower and an upper limit"),
-    (made(lambda: nmm.LimitBarrier(["q1"])), "limit barrier: q1 of robot unicycle_2r has no limits"),
-    (made(lambda: nmm.LimitBarrier(["q1"], [1], [1])), "expected lower below upper for q1"),
+    (made(lambda: nmm.WeightedManipulability("ee", "xy", 1.5)), "alpha: expected a number from 0 to 1"),
+    (made(nmm.LimitBarrier), "limit barrier: unicycle_2r has no coordinate with two limits"),
+    (made(lambda: nmm.LimitBarrier(["q1"])), "limit barrier: q1: unicycle_2r has no limits"),
+    (made(lambda: nmm.LimitBarrier(["q1"], [1], [1])), "q1: expected lower below upper"),
     (made(lambda: nmm.LimitBarrier(margin=0.5)), "margin: expected a number above 0 and below 0.5"),
     (made(lambda: nmm.PreferredPosture({})), "posture: expected values of coordinates by name"),
     (made(lambda: nmm.PreferredPosture({"q9": 1.0})), "unknown coordinate 'q9'"),
@@ -397,18 +397,18 @@ REFUSED: list[tuple[Callable[[Path], object], str]] = [
     (made(lambda: nmm.PotentialEnergy([0, 0, 0])), "gravity: expected a vector that is not zero"),
     (made(lambda: nmm.Circle([0, 0], 1, 1) * nmm.PotentialEnergy()), "weight: expected a function of one"),
     (made(lambda: Sum((1.0, nmm.Position("ee")))), "expected terms of one row"),
-    (lambda _: nmm.Velocity(nmm.Position("ee")), "of: expected a circle, line, .*got Position"),
+    (lambda _: nmm.VelocityOf(nmm.Position("ee")), "of: expected a circle, line, "),
     (posed("{kind: posture, posture: {q1: [1, 2]}}"), "target of q1: expected one row"),
     (posed("{kind: posture, posture: {q1: fast}}"), "posture.q1.*expected a number"),
     (posed("{kind: potential_energy, weight: -1}"), "objective.weight: expected a number above 0"),
-    (posed("{kind: potential_energy, weight: heavy}"), "objective.weight: expected a number"),
+    (posed("{kind: potential_energy, weight: heavy}"), "objective.weight: .*expected a number"),
     (
         posed("{kind: potential_energy, weight: {kind: circle, center: [0, 0], radius: 0, rate: 1}}"),
         "objective.weight.radius: expected a number above 0",
     ),
     (
         posed("{kind: potential_energy, weight: {kind: circle, center: [0, 0], radius: 1, rate: 1}}"),
-        "objective.weight: .*expected a function of one row, got one with 2",
+        "objective.weight: .*expected a function of one row, got ",
     ),
     (
         posed("{kind: quadratic, terms: [{of: q1, target: {kind: heading, frame: hand}}]}"),

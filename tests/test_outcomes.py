@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
+from findings import codes, the, why
 from numpy import pi
 from robot_grid import DATA
 from scipy.linalg import expm
@@ -16,13 +17,12 @@ from urdf_parts import joint, link, write
 from urdf_parts import robot as urdf
 
 import nmm
-from nmm.control.lost_directions import in_world_axes, lost_directions
+from nmm.control.directions import in_world_axes, lost_directions
+from nmm.diagnosis.error_bound import Feedback, accumulated, decay, promised
+from nmm.diagnosis.jumps import chattering
 from nmm.resolvers import Answer, Problem, Status
 from nmm.robots.reach import joint_position, reach
 from nmm.robots.robot import Robot
-from nmm.runs.chattering import chattering
-from nmm.runs.feedback import Feedback
-from nmm.runs.promise import accumulated, decay, promised
 
 START = {"x": -1, "y": -1, "theta": pi}
 TIP = nmm.Task(nmm.Position("ee", "xy"), nmm.Circle([2, 2], 3, 0.08 * pi, 5 / 4 * pi))
@@ -44,7 +44,7 @@ def test_inputs_that_are_clipped_for_good_miss(robot_2r: Robot, tmp_path: Path) 
     run = nmm.simulate(nmm.Controller(robot_2r, TIP, clipped(0.3)), START, 2.0, 0.01)
     assert run.outcome is nmm.Outcome.MISSED
     assert not run.complete
-    assert "did not do all that the task asked" in run.message
+    assert "inputs_fell_short" in why(run)
     assert run.unmet.samples == len(run)
     assert run.unmet.largest == run.residual.max()
     numbers = json.loads((run.save(tmp_path / "run", figures=False) / "summary.json").read_text())
@@ -59,10 +59,9 @@ def test_inputs_that_are_clipped_at_the_start_are_told(robot_2r: Robot) -> None:
     """The error then follows later than promised, but ends where it was promised."""
     run = nmm.simulate(nmm.Controller(robot_2r, TIP, clipped(1.5)), START, 10.0, 0.01)
     assert run.complete, run.message
-    (unmet,) = (text for text in run.warnings if "J u differed" in text)
-    count = int(np.sum(run.residual > 1e-9))
-    assert f"in {count} samples" in unmet
-    assert f"{run.residual.max():.3g}" in unmet
+    unmet = the(run, "inputs_unmet").values
+    assert unmet["samples"] == np.sum(run.residual > 1e-9)
+    assert unmet["largest"] == run.residual.max()
     free = nmm.simulate(nmm.Controller(robot_2r, TIP, clipped(10.0)), START, 10.0, 0.01)
     assert free.complete
     assert free.warnings == ()
@@ -80,7 +79,7 @@ def test_a_rate_that_is_scaled_on_purpose_is_recorded(robot_2r: Robot) -> None:
     assert run.scale.shape == (len(run), 1)
     assert np.all(run.scale[run.residual > 1e-9] < 1.0)
     assert np.all(run.scale[run.residual <= 1e-9] == 1.0)
-    assert any(f"down to {run.scale.min():.3g} of it" in warning for warning in run.warnings)
+    assert the(run, "inputs_unmet").values["scale"] == run.scale.min()
     assert run.summary()["scale_min"] == run.scale.min() < 1.0
 
 
@@ -148,8 +147,7 @@ def test_a_run_whose_feedback_is_bounded_keeps_its_promise(
         return 0.7 * np.linalg.pinv(problem.J) @ problem.rate
 
     late = nmm.simulate(nmm.Controller(robot_2r, task, nmm.CallableResolver(slow)), START, 4.0, 0.01)
-    assert "the error left its gain's promise" in late.warnings[-1]
-    assert "did not do all that the task asked" in late.warnings[-1]
+    assert [one.code for one in late.verdict.warnings[-1]] == ["promise_left", "inputs_fell_short"]
 
 
 @pytest.mark.parametrize("method", ["euler", "midpoint", "rk4", "zoh", "adaptive"])
@@ -166,6 +164,8 @@ def test_what_a_motion_does_otherwise_is_no_honest_error(robot_2r: Robot) -> Non
     """Inputs that are wrong so that the error ends elsewhere, at any dt, though the residual says nothing."""
 
     class Liar(nmm.CallableResolver):
+        exact: ClassVar[bool] = False
+
         def finish(self, problem, dimensions, answer) -> None:  # type: ignore[no-untyped-def]
             super().finish(problem, dimensions, answer)
             answer.residual[()] = 0.0
@@ -176,22 +176,18 @@ def test_what_a_motion_does_otherwise_is_no_honest_error(robot_2r: Robot) -> Non
     for method, dt in (("rk4", 0.02), ("euler", 0.02), ("zoh", 0.005)):
         run = nmm.simulate(nmm.Controller(robot_2r, TIP, Liar(wrong)), START, 4.0, dt, method)
         assert run.outcome is nmm.Outcome.MISSED, (method, dt)
-        began, ended = run.error_norm[[0, -1]]
-        assert f": {began:.3g} at first, " in run.message
-        assert f"{ended:.3g} at the end (promised" in run.message
+        left = the(run, "promise_left").values
+        assert [left["initial"], left["errors"][-1]["error"]] == run.error_norm[[0, -1]].tolist()
 
 
 def test_the_worst_error_is_told_beside_the_last() -> None:
     """Of a run that went far off and came back only in part."""
     run = nmm.Scenario.load("unicycle_3r_out_of_reach", {"resolver.kind": "pg"}).run()
     assert run.outcome is nmm.Outcome.MISSED
-    told = re.findall(r"([\d.]+) at t = ([\d.]+) s \(promised", run.message)
-    assert len(told) == 1
-    size, t = map(float, told[0])
-    k = int(np.argmin(abs(run.t - t)))
-    assert run.error_norm[k] == pytest.approx(size, rel=5e-3)
-    assert f"{run.error_norm[-1]:.3g} at the end (promised" in run.message
-    assert size > 2.0 * run.error_norm[-1]
+    worst, last = the(run, "promise_left").values["errors"]
+    assert worst["error"] == run.error_norm[run.t == worst["t"]]
+    assert last["error"] == run.error_norm[-1]
+    assert worst["error"] > 2.0 * last["error"]
 
 
 def reference(function: Callable[[float], list[float]]) -> nmm.Task:
@@ -209,7 +205,7 @@ def test_a_target_that_jumps_restarts_the_promise(robot_2r: Robot) -> None:
 def test_a_rate_that_is_not_the_targets_is_told(robot_2r: Robot) -> None:
     task = reference(lambda t: [1.0 + 0.3 * np.sin(t), 0.5])
     run = nmm.simulate(nmm.Controller(robot_2r, task, nmm.ProjectedGradient()), {"q2": 0.7}, 2.0, 0.01)
-    assert any("otherwise than its rate says" in warning for warning in run.warnings)
+    assert "target_jumps" in codes(run)
 
 
 def test_a_target_that_moves_as_its_rate_says_is_not_blamed(robot_2r: Robot) -> None:
@@ -218,9 +214,8 @@ def test_a_target_that_moves_as_its_rate_says_is_not_blamed(robot_2r: Robot) -> 
     resolver = nmm.CallableResolver(lambda p: np.clip(np.linalg.pinv(p.J) @ p.rate, -1.0, 1.0))
     controller = nmm.Controller(robot_2r, nmm.Task(nmm.Position("ee", "xy"), circle, 1.0), resolver)
     run = nmm.simulate(controller, {"x": -1, "y": -1, "theta": np.pi}, 15.0, 0.02)
-    said = " ".join([run.message, *run.warnings])
-    assert "clipped" in said
-    assert "otherwise than its rate says" not in said
+    assert "inputs_fell_short" in codes(run)
+    assert "target_jumps" not in codes(run)
 
 
 # Chattering
@@ -234,9 +229,9 @@ def test_chattering_is_counted() -> None:
     jumpy[40:51, 1] += np.where(np.arange(11) % 2, 2.0, -2.0)
     found = chattering(t, jumpy, ("a", "b"))
     assert found is not None
-    assert (found.input, found.size) == ("b", pytest.approx(8.0, abs=2.1))
-    assert found.start == pytest.approx(0.4, abs=0.02)
-    assert found.end == pytest.approx(0.5, abs=0.02)
+    assert (found.values["input"], found.values["size"]) == ("b", pytest.approx(8.0, abs=2.1))
+    assert found.where["t"] == pytest.approx(0.4, abs=0.02)
+    assert found.values["end"] == pytest.approx(0.5, abs=0.02)
 
 
 # The reason
@@ -267,9 +262,7 @@ def test_a_scara_cannot_tilt_its_tool(tmp_path: Path) -> None:
         nmm.Controller(robot, nmm.Task(nmm.Pose(frame), goal), nmm.ProjectedGradient()), q, 1.0
     )
     assert run.outcome is nmm.Outcome.SINGULAR
-    assert f"tilt of {frame} about x" in run.message
-    assert f"tilt of {frame} about y" in run.message
-    assert "motion" not in run.message.split("no input gives:")[1]
+    assert set(the(run, "singular").values["lost"]) == {f"tilt of {frame} about {axis}" for axis in "xy"}
 
 
 def test_lost_directions_are_those_that_no_input_moves(rng: np.random.Generator) -> None:
@@ -326,13 +319,14 @@ def test_a_target_out_of_reach_is_said_to_be(axes: str) -> None:
     task = nmm.Task(nmm.Position(frame, axes), {"z": [1.6], "xyz": [1.0, 0.0, 1.6]}[axes])
     run = nmm.simulate(nmm.Controller(robot, task, nmm.ProjectedGradient()), arm, 3.0, 0.02, "euler")
     assert run.outcome is nmm.Outcome.MISSED
-    assert "out of reach" in run.message
-    assert "too large" not in run.message
+    assert why(run)[:2] == ["promise_left", "out_of_reach"]
+    assert "dt_too_long" not in codes(run)
     found = reach(robot, frame)
     assert found is not None
     height = 1.6 - joint_position(robot, robot.q(arm), found.joint)[2]
-    assert f"{height:.3g} m above {found.joint}" in run.message
-    assert f"add up to {found.length:.3g} m" in run.message
+    far = the(run, "out_of_reach").values
+    assert (far["away"], far["side"]) == (pytest.approx(height, rel=1e-9), "above")
+    assert (far["joint"], far["length"]) == (found.joint, found.length)
     assert height > found.length
 
 
@@ -344,14 +338,12 @@ def test_a_target_out_of_reach_is_said_to_be(axes: str) -> None:
 def test_advice_on_dt_holds(method: str, alpha: float) -> None:
     changes = {"resolver.alpha": alpha, "dt": 0.01, "method": method, "duration": 2}
     run = nmm.Scenario.load("unicycle_2r_position", changes).run()
-    said = " ".join([run.message, *run.warnings])
     assert not run.complete
-    found = re.search(r"dt below ([\d.e-]+) s", said)
-    assert found is not None, said
+    advised = the(run, "dt_too_long").values["tried"]["dt"]
     for share in (0.99, 0.5):
-        better = nmm.Scenario.load("unicycle_2r_position", changes | {"dt": share * float(found[1])}).run()
+        better = nmm.Scenario.load("unicycle_2r_position", changes | {"dt": share * advised}).run()
         assert better.complete, better.message
-        assert "alpha * dt" not in " ".join(better.warnings)
+        assert "dt_too_long" not in codes(better)
 
 
 def test_the_angle_of_an_error_wraps(robot_2r: Robot) -> None:

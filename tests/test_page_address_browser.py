@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
 from playback_browser import Window
 from playback_browser import browser as browser
 from playback_browser import empty_page as empty_page
@@ -12,11 +11,9 @@ from playwright.sync_api import Browser
 from ports import MOST
 
 from nmm.playback import LiveViewer
-from nmm.playback.page import socket_page
+from nmm.playback.html import socket_page
 from nmm.playback.server import PageServer
 from nmm.robots.robot import Robot
-
-pytestmark = pytest.mark.browser
 
 
 def test_a_page_by_the_name_of_this_machine_is_told_all_the_same(
@@ -53,7 +50,13 @@ def test_before_there_is_a_scene_there_is_no_run(window: Window) -> None:
         lambda host, token: socket_page("empty", host, token), ['{"type": "places", "transforms": []}']
     )
     try:
+        heard: list[object] = []
+        window.page.on(
+            "websocket", lambda socket: socket.on("framereceived", lambda frame: heard.append(frame))
+        )
         window.page.goto(server.url)
+        while not heard:  # a page that is closed while it connects complains
+            window.page.wait_for_timeout(20)
         assert window.page.evaluate("nmm.state()") == {"t": 0, "runs": []}
         window.page.evaluate("nmm.seek(1.5)")
         assert window.page.evaluate("nmm.state()") == {"t": 0, "runs": []}

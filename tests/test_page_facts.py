@@ -15,8 +15,7 @@ from playwright.sync_api import Page
 
 import nmm
 from nmm.playback import write_html
-from nmm.playback.channels import channels
-from nmm.playback.facts import MOST, events
+from nmm.playback.channels import MOST, channels, events
 from nmm.runs.trajectory import Outcome, Trajectory
 
 
@@ -36,7 +35,7 @@ def limited() -> Trajectory:
     return run("unicycle_2r_position", limits={"velocity": {"arm": 2.0}}, duration=5.0)
 
 
-def told(one: Trajectory, word: str) -> list[tuple[float, str]]:
+def find_events(one: Trajectory, word: str) -> list[tuple[float, str]]:
     return [(t, text) for t, text in events(one, channels(one)) if word in text]
 
 
@@ -44,7 +43,7 @@ def test_partitions_are_told_when_they_change(switching: Trajectory) -> None:
     columns = np.sort(switching.partition, axis=1)
     times = switching.t[1:][np.any(np.diff(columns, axis=0) != 0, axis=1)]
     assert len(times) == switching.switches > 0
-    found = told(switching, "partition ")
+    found = find_events(switching, "partition ")
     assert [t for t, _ in found] == times.tolist()
     before, after = found[0][1].removeprefix("partition ").split(" → ")
     assert before.split(", ")[:2] == after.split(", ")[:2] == ["v", "ω"]
@@ -57,30 +56,30 @@ def test_limits_are_told_when_they_are_reached(limited: Trajectory) -> None:
         at = np.abs(limited.u[:, i]) >= 2.0 - 1e-9
         first = float(limited.t[np.argmax(at)])
         side = "upper" if limited.u[np.argmax(at), i] > 0 else "lower"
-        assert told(limited, f"{name} reaches")[0] == (first, f"{name} reaches its {side} limit")
-    assert len(told(limited, "reaches")) < 6
+        assert find_events(limited, f"{name} reaches")[0] == (first, f"{name} reaches its {side} limit")
+    assert len(find_events(limited, "reaches")) < 6
 
 
 def test_tasks_settling_and_the_end(switching: Trajectory) -> None:
-    (settled,) = told(switching, "‖e‖ down to 2 %")
+    (settled,) = find_events(switching, "‖e‖ down to 2 %")
     norm = np.linalg.norm(switching.error, axis=1)
     inside = np.flatnonzero(norm > 0.02 * norm[0])[-1]
     assert switching.t[inside] <= settled[0] <= switching.t[inside + 1]
-    assert told(switching, "completed") == []  # the end of time is no event
+    assert find_events(switching, "completed") == []  # the end of time is no event
     going = run("unicycle_3r_sequence", duration=6.0)
     for event in going.events:
-        assert (event.t, f"{event.task} {event.what}: {event.why}") in told(going, event.task)
+        assert (event.t, f"{event.task} {event.what}: {event.why}") in find_events(going, event.task)
     bad = run("unicycle_2r_pointing", resolver__alpha=1000, duration=1.0)
     assert bad.outcome is not Outcome.COMPLETED
-    first, *more = bad.message.split("; ")
+    first, *more = bad.verdict.reasons
     assert more
-    assert told(bad, bad.outcome) == [(bad.t[-1], f"{bad.outcome}: {first}")]
+    assert find_events(bad, bad.outcome) == [(bad.t[-1], f"{bad.outcome}: {first}")]
 
 
 def test_a_page_holds_so_many_events_and_says_how_many_more(
     switching: Trajectory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("nmm.playback.facts.MOST", 1)
+    monkeypatch.setattr("nmm.playback.channels.MOST", 1)
     page = write_html([switching], tmp_path / "page.html").read_text(encoding="utf-8")
     line = next(line for line in page.splitlines() if line.startswith("{") and '"type":"facts"' in line)
     (one,) = json.loads(line)["runs"]
@@ -114,7 +113,7 @@ def test_the_numbers_are_those_of_the_runs(page: Page, switching: Trajectory, li
 
 @pytest.mark.browser
 def test_events_are_marked_and_lead_there(page: Page, switching: Trajectory) -> None:
-    (when, text), *_ = told(switching, "partition ")
+    (when, text), *_ = find_events(switching, "partition ")
     shown = page.evaluate("nmm.facts.events.map(({ time, text }) => [time, text])")
     assert [when, text] in shown
     assert [time for time, _ in shown] == sorted(time for time, _ in shown)

@@ -16,18 +16,16 @@ import numpy as np
 import pytest
 
 from nmm.errors import InputError, RunError
+from nmm.figure_options import FigureOptions
 from nmm.folders.run import is_run
 from nmm.machine import made_with
 from nmm.paper import PaperReport, write, write_paper
-from nmm.paper.cases import CASES
-from nmm.paper.claims import claims
-from nmm.paper.numbers import decay_rate, ripple, settling_time, smallest_determinant
-from nmm.paper.page import render
-from nmm.paper.results import CaseResult, Claim, Row
-from nmm.runs.figure_options import FigureOptions
+from nmm.paper.cases import CASES, CaseResult, Claim, Row
+from nmm.paper.claims import claims, decay_rate, ripple, settling_time, smallest_determinant
+from nmm.paper.write import render
 from nmm.runs.trajectory import Trajectory
 from nmm.scenario import Scenario
-from nmm.words import number_text
+from nmm.text_format import number_text
 
 Progress = Callable[[float], None]
 
@@ -168,7 +166,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
         progress(1.0)
         return result(number)
 
-    monkeypatch.setattr(write, "_case", case)
+    monkeypatch.setattr(write, "run_case", case)
 
 
 @pytest.mark.usefixtures("quick")
@@ -210,7 +208,7 @@ def test_a_failure_leaves_the_earlier_paper(tmp_path: Path, monkeypatch: pytest.
     def fails(number: int, progress: Progress, folder: Path, figures: FigureOptions) -> CaseResult:
         raise RunError(f"case {number} did not work")
 
-    monkeypatch.setattr(write, "_case", fails)
+    monkeypatch.setattr(write, "run_case", fails)
     with pytest.raises(RunError, match="case 1 did not work"):
         write_paper(folder, jobs=1)
     assert (folder / "index.html").read_bytes() == before

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from nmm.analysis.redundancy.laps import Repeatability, repeatability
 from nmm.control.controller import Controller
 from nmm.errors import InputError
-from nmm.functions.references import Bearing, Circle, Constant, Line, PoseReference, Spline, Turn
+from nmm.functions.references import Bearing, Circle, Constant, Line, PoseReference, Spline, SteadyTurn
 from nmm.functions.tasks import Heading, Orientation, Pose, Position, Task
 from nmm.resolvers import ProjectedGradient
 from nmm.robots.robot import Robot
@@ -43,7 +43,7 @@ def test_periods_of_circles_and_what_is_made_of_them(robot_2r: Robot) -> None:
 
 
 def test_a_period_is_asked_for_where_none_is_known(ur5: Robot) -> None:
-    turning = PoseReference([0.6, 0.1, 0.7], Turn([0, 0, 1], pi / 2, [pi, 0, 0]))
+    turning = PoseReference([0.6, 0.1, 0.7], SteadyTurn([0, 0, 1], pi / 2, [pi, 0, 0]))
     controllers = {"pg": Controller(ur5, Task(Pose("tool0"), turning), ProjectedGradient())}
     q0 = ur5.q(
         {"shoulder_lift_joint": -1.2, "elbow_joint": 1.5, "wrist_1_joint": -1.8, "wrist_2_joint": -1.4}
@@ -53,7 +53,7 @@ def test_a_period_is_asked_for_where_none_is_known(ur5: Robot) -> None:
     assert quick((controllers, q0), period=4.0, laps=2, dt=0.1).period == 4.0  # by half a turn it jumps
     with pytest.raises(InputError, match="not where it was 3 s before"):
         quick((controllers, q0), period=3.0)
-    only = {"pg": Controller(ur5, Task(Orientation("tool0"), Turn([0, 0, 1], pi)), ProjectedGradient())}
+    only = {"pg": Controller(ur5, Task(Orientation("tool0"), SteadyTurn([0, 0, 1], pi)), ProjectedGradient())}
     assert quick((only, q0), period=2.0, dt=0.1).period == 2.0
 
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 
 import pytest
+from findings import refused
 from numpy import pi
 
-from nmm.errors import InputError
 from nmm.platforms import (
     Car,
     DifferentialDrive,
-    Fixed,
+    FixedBase,
     FrontDriveCar,
     Layout,
     Mecanum,
@@ -37,10 +38,20 @@ def pivot(joint: str, x: float, y: float = 0.0, on: str = "theta", limit: float 
     return Pivot(joint, on, x, y, -limit, limit)
 
 
+@contextmanager
+def misfit(platform: str, message: str) -> Iterator[None]:
+    """The block raises the error of a `fit`: what is wrong, and, in brackets, the first parts found."""
+    with refused(f"robot: platform {platform}") as caught:
+        yield
+    what, _, found = message.removesuffix(")").partition("(found: ")
+    assert what.strip() in caught.value.what
+    assert found in ("; ".join(caught.value.got) or "none")
+
+
 LEFT, RIGHT = wheel("left", 0.0, 0.2), wheel("right", 0.0, -0.2)
 
 
-@pytest.mark.parametrize("kind", [Unicycle, Omnidirectional, Fixed])
+@pytest.mark.parametrize("kind", [Unicycle, Omnidirectional, FixedBase])
 def test_what_has_no_parameters_fits_every_file(kind: type[Platform]) -> None:
     for layout in (Layout("bare"), Layout("two", (), (LEFT, RIGHT))):
         assert type(kind.fit(layout)) is kind
@@ -85,8 +96,7 @@ DIFFERENTIAL_MISFITS = {
 @pytest.mark.parametrize("case", DIFFERENTIAL_MISFITS)
 def test_misfit_of_a_differential_drive(case: str) -> None:
     wheels, message = DIFFERENTIAL_MISFITS[case]
-    expected = "robot: platform differential expects two wheels of one radius that roll forward on an axle"
-    with pytest.raises(InputError, match=re.escape(expected) + ".*" + re.escape(message)):
+    with misfit("differential", message):
         DifferentialDrive.fit(Layout("robot", (), wheels))
 
 
@@ -125,7 +135,7 @@ CAR_MISFITS = {
 def test_misfit_of_a_car(case: str) -> None:
     layout, message = CAR_MISFITS[case]
     for kind in (Car, FrontDriveCar):
-        with pytest.raises(InputError, match=f"robot: platform {kind.name} expects .*" + re.escape(message)):
+        with misfit(kind.name, message):
             kind.fit(layout)
 
 
@@ -155,7 +165,7 @@ TRACTOR_MISFITS = {
     "two": (
         (*TRAILERS, pivot("hitch9", -0.5)),
         TRAILER_WHEELS,
-        "at most one hitch on each body; theta carries several (found: hitch1 at (-0.3, 0) m on theta; hitch",
+        "theta carries several (found: hitch1 at (-0.3, 0) m on theta; hitch",
     ),
     "aside": ((pivot("hitch", -0.3, 0.1),), (), "hitch is off the x axis (found: hitch at (-0.3, 0.1) m on"),
     "no wheels": (TRAILERS, TRAILER_WHEELS[:2], "the trailer on second_trailer has none (found: none)"),
@@ -167,7 +177,7 @@ TRACTOR_MISFITS = {
     "ahead": (
         TRAILERS[:1],
         (wheel("l1", 0.1, 0.0, on="hitch1"),),
-        "those on hitch1 are not behind it (found:",
+        "those on hitch1 are not behind it (found: l1",
     ),
     "across": (
         TRAILERS[:1],
@@ -185,7 +195,7 @@ TRACTOR_MISFITS = {
 @pytest.mark.parametrize("case", TRACTOR_MISFITS)
 def test_misfit_of_a_tractor(case: str) -> None:
     pivots, wheels, message = TRACTOR_MISFITS[case]
-    with pytest.raises(InputError, match="robot: platform tractor expects .*" + re.escape(message)):
+    with misfit("tractor", message):
         Tractor.fit(Layout("robot", pivots, wheels))
 
 
@@ -220,8 +230,7 @@ MECANUM_MISFITS = {
 @pytest.mark.parametrize("case", MECANUM_MISFITS)
 def test_misfit_of_mecanum(case: str) -> None:
     wheels, message = MECANUM_MISFITS[case]
-    expected = "robot: platform mecanum expects four wheels of one radius .*"
-    with pytest.raises(InputError, match=expected + re.escape(message)):
+    with misfit("mecanum", message):
         Mecanum.fit(Layout("robot", (), wheels))
 
 
@@ -251,7 +260,5 @@ SKID_STEER_MISFITS = {
 @pytest.mark.parametrize("case", SKID_STEER_MISFITS)
 def test_misfit_of_skid_steer(case: str) -> None:
     wheels, message = SKID_STEER_MISFITS[case]
-    with pytest.raises(
-        InputError, match="robot: platform skid_steer expects wheels of one radius .*" + re.escape(message)
-    ):
+    with misfit("skid_steer", message):
         SkidSteer.fit(Layout("robot", (), wheels))

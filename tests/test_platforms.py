@@ -20,7 +20,7 @@ from nmm.platforms import (
     PLATFORMS,
     Car,
     DifferentialDrive,
-    Fixed,
+    FixedBase,
     FrontDriveCar,
     Mecanum,
     Omnidirectional,
@@ -83,7 +83,7 @@ def test_copies_are_the_same_platform(name: str, rng: np.random.Generator) -> No
 ROLLING = [
     name
     for name, platform in EXAMPLES.items()
-    if not isinstance(platform, Omnidirectional | Fixed | WheeledPlatform | SkidSteer)
+    if not isinstance(platform, Omnidirectional | FixedBase | WheeledPlatform | SkidSteer)
 ]
 SKIDDING = [name for name, platform in EXAMPLES.items() if isinstance(platform, SkidSteer)]
 
@@ -354,7 +354,7 @@ def test_only_mecanum_wheels_have_rollers() -> None:
 
 
 def test_a_fixed_base_has_nothing_to_move() -> None:
-    base = Fixed()
+    base = FixedBase()
     assert (base.n_p, base.p) == (0, 0)
     assert base.G([]).shape == base.A([]).shape == base.G_dot([], []).shape == (0, 0)
     with pytest.raises(InputError, match=r"qp: expected 0 numbers"):

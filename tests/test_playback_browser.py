@@ -38,8 +38,6 @@ from nmm.playback.rolling import wheel_angles
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 
-pytestmark = pytest.mark.browser
-
 #: Box around the vertices below each visual, in the visual's own frame.
 BOXES = """() => {
   const found = {};

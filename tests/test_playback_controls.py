@@ -26,8 +26,6 @@ from nmm.playback import Motion
 from nmm.playback.rolling import wheel_angles
 from nmm.robots.robot import Robot
 
-pytestmark = pytest.mark.browser
-
 
 def test_the_keyboard_and_the_bar_play(small_robot: Robot, window: Window, tmp_path: Path) -> None:
     page = window.open(file_url([drive(small_robot, duration=8.0)], tmp_path))

@@ -15,8 +15,6 @@ from playback_robot import drive
 from nmm.rendering.encoder import find_ffmpeg
 from nmm.robots.robot import Robot
 
-pytestmark = pytest.mark.browser
-
 FILM = """async (told) => {
   const shares = [];
   const film = await nmm.record((share) => shares.push(share));

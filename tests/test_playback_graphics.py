@@ -17,8 +17,6 @@ from playwright.sync_api import Browser, Page
 
 from nmm.robots.robot import Robot
 
-pytestmark = pytest.mark.browser
-
 
 @pytest.fixture(scope="module")
 def opened(small_robot: Robot, tmp_path_factory: pytest.TempPathFactory) -> str:

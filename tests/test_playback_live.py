@@ -76,9 +76,9 @@ def test_wheels_roll_from_pose_to_pose(robot: Robot) -> None:
     with LiveViewer(robot, motion.q[0]) as viewer:
         for q in motion.q:
             viewer.display(q)
-        np.testing.assert_allclose(viewer._state[1], wheel_angles(motion)[-1], atol=1e-12)
+        np.testing.assert_allclose(viewer.shown.now[1], wheel_angles(motion)[-1], atol=1e-12)
         viewer.display(motion.q[0], [1.0, 2.0])
-        np.testing.assert_array_equal(viewer._state[1], [1.0, 2.0])
+        np.testing.assert_array_equal(viewer.shown.now[1], [1.0, 2.0])
         with pytest.raises(InputError, match="wheel_angles: expected 2 numbers"):
             viewer.display(motion.q[0], [1.0])
 

@@ -15,8 +15,8 @@ from playback_browser import empty_page as empty_page
 from playback_browser import window as window
 
 import nmm
-from nmm.collisions.recorded import Passed, described, made, shape_of
-from nmm.figures.obstacles import outlines
+from nmm.collisions.obstacle import Passed, obstacle_as_json, obstacle_from_json, shape_from_json
+from nmm.figures.motion import outlines
 from nmm.playback.obstacles import REACH
 from nmm.playback.scene import playback_scene
 from nmm.runs.clearance import ROUNDING, swept
@@ -34,7 +34,7 @@ def obstacles() -> list[nmm.Obstacle]:
         nmm.Obstacle(nmm.Sphere(0.1), motion=lambda t: [0.4 + 0.1 * t, -1.0, 0.5], name="ball"),
         nmm.Obstacle(nmm.Cylinder(0.1, 0.6), motion=crossing, name="roller"),
         nmm.Obstacle(nmm.Capsule(0.05, 0.4), [0.5, -1.5, 0.4], name="pill"),
-        nmm.Obstacle(nmm.Plane([0.0, -1.0, 0.0]), [0.0, 1.8, 0.0], name="wall"),
+        nmm.Obstacle(nmm.HalfSpace([0.0, -1.0, 0.0]), [0.0, 1.8, 0.0], name="wall"),
         nmm.Obstacle(nmm.Hull(WEDGE), [2.6, -0.9, 0.0], name="wedge"),
     ]
 
@@ -84,7 +84,7 @@ def test_a_folder_has_the_obstacles_where_they_were(run: nmm.Trajectory, tmp_pat
         for t in run.t[::50]:
             assert np.array_equal(read.placement(t), was.placement(t))
         assert read.placement(1.234) == pytest.approx(was.placement(1.234), abs=1e-5)
-        assert described(read.shape)[0] == described(was.shape)[0]
+        assert obstacle_as_json(read.shape)[0] == obstacle_as_json(was.shape)[0]
     hull = {one.name: one.shape for one in again.obstacles}["wedge"]
     assert isinstance(hull, nmm.Hull)
     assert np.unique(hull.points, axis=0).tolist() == np.unique(WEDGE[:4], axis=0).tolist()
@@ -106,11 +106,11 @@ def test_an_older_folder_has_its_scenarios_obstacles(tmp_path: Path) -> None:
         nmm.Sphere(0.3),
         nmm.Cylinder(0.1, 0.2),
         nmm.Capsule(0.1, 0.2),
-        nmm.Plane([0.0, 3.0, 4.0]),
+        nmm.HalfSpace([0.0, 3.0, 4.0]),
     ],
 )
-def test_a_shape_is_made_again_of_what_describes_it(shape: nmm.Shape) -> None:
-    assert shape_of(*described(shape)) == shape
+def test_a_shape_is_made_again_of_what_describes_it(shape: nmm.extending.Shape) -> None:
+    assert shape_from_json(*obstacle_as_json(shape)) == shape
 
 
 def test_what_is_set_from_outside_is_recorded_where_it_was() -> None:
@@ -124,7 +124,7 @@ def test_what_is_set_from_outside_is_recorded_where_it_was() -> None:
 
     clock = nmm.Obstacle(nmm.Sphere(0.01), motion=clockwork, velocity=lambda t: [0.0, 0.0, 0.0], name="clock")
     task = nmm.Task(nmm.Position("ee", "xy"), [1.2, 0.0], gain=1.0, speed=0.5)
-    collisions = nmm.Collisions(0.03, self=False, obstacles=[clock, ball])
+    collisions = nmm.Collisions(0.03, self_collisions=False, obstacles=[clock, ball])
     controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), collisions=collisions, dt=0.02)
     run = nmm.simulate(controller, {"q1": 0.3, "q2": 0.6}, 2.0, 0.02, "zoh")
     ball.move_to([50.0, 0.0, 0.0])  # what comes after the run changes nothing in it
@@ -153,7 +153,7 @@ def test_between_two_places_the_shortest_way_is_taken() -> None:
     assert middle[:3, :3] == pytest.approx(one.rotation @ pin.exp3(0.25 * turned))
     assert np.array_equal(passed(0.0), one.homogeneous)
     assert np.array_equal(passed(4.0), other.homogeneous)
-    assert not made(nmm.Sphere(1.0), "ball", np.array([0.0, 1.0]), one.homogeneous[None]).moves
+    assert not obstacle_from_json(nmm.Sphere(1.0), "ball", np.array([0.0, 1.0]), one.homogeneous[None]).moves
 
 
 # The page
@@ -211,11 +211,11 @@ def test_the_line_is_red_below_the_distance_asked(window: Window, tmp_path: Path
     """Without a guard: a ball that goes through the robot."""
     robot = nmm.load("unicycle_3r")
     ball = nmm.Obstacle(nmm.Sphere(0.1), motion=lambda t: [-0.2, 1.0 - 0.6 * t, 0.2], name="ball")
-    setting = nmm.Collisions(0.05, self=False, obstacles=[ball]).on(robot)
+    setting = nmm.Collisions(0.05, self_collisions=False, obstacles=[ball]).on(robot)
     t = np.linspace(0.0, 2.0, 101)
     q, u = np.tile(robot.q(), (101, 1)), np.zeros((101, robot.n_u))
     found = swept(setting, t, q, u, [setting.places(time) for time in t])
-    nearest = nmm.robots.bodies.Nearest(
+    nearest = nmm.robots.motion.Nearest(
         found.points, found.clearance, found.pairs, tuple(map(" and ".join, setting.names)), 0.05
     )
     page = window.open(file_url([nmm.playback.Motion(robot, t, q, u, nearest=nearest)], tmp_path))
@@ -238,7 +238,7 @@ def test_runs_that_are_compared_share_their_obstacles(
         run.robot,
         **shorter,
         label="RG",
-        bodies=tuple(nmm.robots.bodies.Body(one.name, one.geometry, one.places[:90]) for one in own.bodies),
+        bodies=tuple(nmm.robots.motion.Body(one.name, one.geometry, one.places[:90]) for one in own.bodies),
     )
     page = window.open(file_url([other, own], tmp_path))
     assert len(placed(window)) == len(run.obstacles)
@@ -270,13 +270,13 @@ def test_the_camera_holds_near_obstacles_and_not_the_far_ones(window: Window, tm
     def size(bodies: list[Any]) -> float:
         return float(playback_scene([moved(bodies)], title="")[0]["size"])
 
-    def body(shape: nmm.Shape, xyz: list[float]) -> Any:
+    def body(shape: nmm.extending.Shape, xyz: list[float]) -> Any:
         place = np.eye(4)
         place[:3, 3] = xyz
-        return nmm.robots.bodies.Body("thing", shape.geometry(), place[None])
+        return nmm.robots.motion.Body("thing", shape.geometry(), place[None])
 
     alone = size([])
-    assert size([body(nmm.Plane(), [0, 0, 0])]) == alone
+    assert size([body(nmm.HalfSpace(), [0, 0, 0])]) == alone
     assert size([body(nmm.Box([1, 1, 1]), [300.0, 0, 0])]) == alone
     near = body(nmm.Box([0.2, 0.2, 0.6]), [0.8, 0.6, 0.3])
     assert alone < size([near]) < 3.0 * alone

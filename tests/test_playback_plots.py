@@ -19,11 +19,9 @@ from playback_browser import window as window
 from playback_robot import drive, hand_built_robot
 from playwright.sync_api import Browser, Page
 
-from nmm.looks import RESOLVERS
 from nmm.playback import write_html
+from nmm.resolver_style import resolver_styles
 from nmm.runs.trajectory import Trajectory
-
-pytestmark = pytest.mark.browser
 
 NAMES = ("RG", "PG", "EJ")
 #: As it was opened.
@@ -218,7 +216,7 @@ def test_the_legend_hides_a_run_everywhere(plotted: Plotted) -> None:
       for (let k = 0; k < data.length; k += 4) count += wanted.every((c, i) => Math.abs(data[k + i] - c) < 6);
       return count;
     }"""
-    vermillion = RESOLVERS["pg"][0]
+    vermillion = resolver_styles()["pg"][0]
     assert page.evaluate(inked, vermillion) > 20
     for hidden in (True, False):
         page.locator("#legend button", has_text="PG").click()
@@ -479,7 +477,7 @@ def test_dark_and_light_follow_the_reader(plotted: Plotted) -> None:
     }"""
     colors = "nmm.runs.map((run) => run.color)"
     light = page.evaluate(colors)
-    assert light == [RESOLVERS[name.lower()][0] for name in NAMES]
+    assert light == [resolver_styles()[name.lower()][0] for name in NAMES]
     assert page.evaluate(ground) == 255
     page.emulate_media(color_scheme="dark")
     draw_frames(page)

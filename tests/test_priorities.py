@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from findings import refused
 from level_problems import Off, compared, problems
 
 import nmm
 from nmm.resolvers.answer import Status, unanswered
+from nmm.resolvers.base import State
 from nmm.resolvers.problem import Problem
-from nmm.resolvers.state import State
 
 RESOLVERS = {
     "pg": nmm.ProjectedGradient(alpha=0.5),
@@ -44,7 +45,7 @@ def test_a_level_below_changes_nothing_above(name: str) -> None:
             }
             answer = RESOLVERS[name].resolve(Problem(J, rate, problem.h, levels=levels[:kept], **limits))
             rates.append(J @ answer.u)
-            scaled += answer.scale[0] < 1.0
+            scaled += answer.nu[0] < 1.0
         first, second = levels[0], levels[0] + levels[1]
         np.testing.assert_allclose(rates[1][:first], rates[0], rtol=0, atol=1e-9)
         np.testing.assert_allclose(rates[2][:second], rates[1], rtol=0, atol=1e-9)
@@ -87,8 +88,8 @@ def test_levels_that_contradict_each_other_get_what_is_left(name: str) -> None:
         answer = RESOLVERS[name].resolve(problem)
         np.testing.assert_allclose(answer.u, in_turn(problem, -0.5 * h), rtol=0, atol=1e-9)
         assert answer.status is Status.RELAXED
-        assert answer.scale[0] == 1.0
-        assert np.all(answer.scale[1:] < 1.0)
+        assert answer.nu[0] == 1.0
+        assert np.all(answer.nu[1:] < 1.0)
 
 
 @pytest.mark.parametrize("name", ["pg", "dls"])
@@ -98,18 +99,18 @@ def test_levels_below_may_have_more_rows_than_there_are_inputs(name: str) -> Non
     answer = RESOLVERS[name].resolve(Problem(J, rate, h, levels=(3, 4)))
     np.testing.assert_allclose(J[:3] @ answer.u, rate[:3], rtol=0, atol=1e-9)
     np.testing.assert_allclose(answer.u, in_turn(Problem(J, rate, h, levels=(3, 4)), -0.5 * h), atol=1e-8)
-    with pytest.raises(nmm.InputError, match="first level: 6 rows for 5 inputs"):
+    with refused("task: first level", got=6):
         RESOLVERS[name].resolve(Problem(J, rate, h, levels=(6, 1)))
-    with pytest.raises(nmm.InputError, match="7 rows for 5 inputs"):
+    with refused("task", got=7):
         RESOLVERS["rg"].resolve(Problem(J, rate, h, levels=(3, 4)))
 
 
 @pytest.mark.parametrize("priority", [0, -1, 1.5, True])
 def test_a_priority_is_a_whole_number_above_0(priority: float) -> None:
     function = nmm.Position("ee", axes="xy")
-    with pytest.raises(nmm.InputError, match="priority: expected a whole number above 0"):
+    with refused("priority"):
         nmm.Task(function, nmm.Constant([1.0, 0.0]), priority=priority)  # type: ignore[arg-type]  # bad input
-    with pytest.raises(nmm.InputError, match="priority: expected a whole number above 0"):
+    with refused("priority"):
         nmm.Bound(function, upper=1.0, priority=priority)  # type: ignore[arg-type]  # bad input
 
 
@@ -146,7 +147,7 @@ def test_the_extended_jacobian_names_the_level_that_contradicts_and_damps_it() -
     robot = nmm.load("unicycle_3r")
     hand = nmm.Task(nmm.Position("ee"), [1.2, 0.3, 0.8], 1.0)
     far = nmm.Task(nmm.Distance("ee", [0, 0, 0]), [1.0], priority=2, name="far")
-    bend = nmm.Task(nmm.Coordinates("q2"), [0.5])
+    bend = nmm.Task(nmm.LinearCoordinates("q2"), [0.5])
     q = robot.q({"q1": 0.4, "q2": 0.6, "q3": 0.9})
     stops = nmm.Controller(robot, [hand, far], nmm.ExtendedJacobian(), added_task=bend)
     with pytest.raises(
@@ -163,7 +164,7 @@ def test_the_extended_jacobian_names_the_level_that_contradicts_and_damps_it() -
     np.testing.assert_allclose(step.J[:3] @ step.u, step.rate[:3], rtol=0, atol=1e-12)
     assert step.u[robot.input("q2")] == pytest.approx(0.5 - 0.6)
     # Where no level contradicts another it is J_e's answer, to the bit.
-    look = nmm.Task(nmm.Coordinates("q1"), [0.0], priority=2)
+    look = nmm.Task(nmm.LinearCoordinates("q1"), [0.0], priority=2)
     u = [
         nmm.Controller(robot, [hand, look], one, added_task=bend)(0.0, q) for one in (damped, stops.resolver)
     ]

@@ -40,6 +40,10 @@ def die(number: int, progress: Progress) -> int:
     return number
 
 
+def fill(number: int, progress: Progress) -> None:
+    Path("/dev/full").write_text("more than there is room for", encoding="utf-8")
+
+
 def nothing(number: int, fraction: float) -> None:
     """Takes a report of progress."""
 
@@ -67,6 +71,12 @@ def test_an_error_ends_the_other_processes() -> None:
     with pytest.raises(InputError, match="two: expected another number"):
         share_out(refuse, [1, 2], 2, nothing)
     assert time.monotonic() - began < 40.0
+
+
+def test_a_full_disk_is_the_callers_to_tell(capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(OSError, match="No space left"):
+        share_out(fill, [1, 2], 2, nothing)
+    assert capfd.readouterr() == ("", "")
 
 
 def test_a_process_that_dies_is_noticed() -> None:

@@ -18,9 +18,9 @@ from command_line import NMM
 import nmm
 from nmm.cli.exit_status import status_of
 from nmm.errors import InputError
+from nmm.files import writing
 from nmm.folders import whole
 from nmm.folders.whole import check_folder, has_format, replaced_folder, steady
-from nmm.writing import writing
 
 #: NMM_KILLS=30 kills each command so often; few do not.
 KILLS = int(os.environ.get("NMM_KILLS", "0"))
@@ -120,6 +120,23 @@ def test_a_second_writer_waits_for_the_first(tmp_path: Path) -> None:
     first.join()
     assert numbers(folder) == {'{"format": "ours", "number": 2}'}
     assert [path.name for path in tmp_path.iterdir()] == ["o"]
+
+
+def test_a_first_writer_that_ends_while_the_second_looks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its hidden folder was there, and is gone a moment later."""
+    mkdir, calls = os.mkdir, []
+
+    def there_first(path: str, mode: int = 0o777) -> None:
+        calls.append(path)
+        if len(calls) == 1:
+            raise FileExistsError(path)
+        mkdir(path, mode)
+
+    monkeypatch.setattr(os, "mkdir", there_first)
+    with writing(tmp_path / "o", 1.0) as hidden:
+        assert hidden.is_dir()
 
 
 @pytest.fixture

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 import twin
 from conditioned import with_condition
+from findings import refused
 from numpy.typing import NDArray
 from resolver_grid import every_resolver
 
 from nmm.errors import InputError
+from nmm.kinds import RESOLVERS
 from nmm.resolvers import (
-    RESOLVERS,
     Answer,
     CallableResolver,
     DampedLeastSquares,
@@ -61,9 +62,22 @@ def every() -> tuple[Resolver, ...]:
 
 
 def exact() -> tuple[Resolver, ...]:
-    """Those that do the task or say that they cannot: the one that damps does neither below its threshold,
-    where u would grow beyond bounds; what it does there is in test_damping.py."""
-    return tuple(resolver for resolver in every() if not isinstance(resolver, DampedLeastSquares))
+    """Those that declare that they do the task wherever J is regular, or say that they cannot."""
+    return tuple(resolver for resolver in every() if resolver.exact)
+
+
+def undamped() -> tuple[Resolver, ...]:
+    """Those, and the one that does the task above its threshold; what it does below is in test_damping.py."""
+    return *exact(), DampedLeastSquares(3.0)
+
+
+#: Of nmm itself: their formulas obey more laws than a resolver has to.
+OWN = (
+    ReducedGradient(3.0),
+    ProjectedGradient(3.0),
+    ExtendedJacobian(),
+    DampedLeastSquares(3.0),
+)
 
 
 def close(found: Array, expected: Array, tolerance: float = 1e-10) -> None:
@@ -76,7 +90,7 @@ def test_every_resolver_does_the_task(shape: tuple[int, int], rng: np.random.Gen
     for _ in range(20):
         problem = Example(shape, rng)
         weighted = ProjectedGradient(3.0, weights=rng.uniform(0.1, 10, problem.m))
-        for resolver in (*every(), weighted):
+        for resolver in (*undamped(), weighted):
             found = problem.given(resolver)
             if isinstance(resolver, DampedLeastSquares) and found.measure < resolver.threshold:
                 assert found.status is Status.RELAXED
@@ -91,6 +105,48 @@ def test_every_resolver_does_the_task(shape: tuple[int, int], rng: np.random.Gen
             np.testing.assert_allclose(problem.J @ found.u, problem.rate, rtol=0, atol=tolerance)
             true = np.linalg.norm(problem.J @ found.u - problem.rate)
             assert found.residual == pytest.approx(true, abs=tolerance * 1e-3)
+
+
+@each_shape
+def test_no_resolver_calls_solved_what_is_not(shape: tuple[int, int], rng: np.random.Generator) -> None:
+    """The residual is ‖J u - rate‖, whatever a resolver guarantees, and decides the status."""
+    for _ in range(20):
+        problem = Example(shape, rng)
+        lost = np.vstack([problem.J[:-1], np.zeros((1, problem.m))])
+        for resolver, J in itertools.product(every(), (problem.J, 1e-3 * problem.J, lost)):
+            found = problem.given(resolver, J=J)
+            if not found.status.usable:
+                assert np.all(np.isnan(found.u)), resolver.name
+                continue
+            true = np.linalg.norm(J @ found.u - problem.rate)
+            assert found.residual == pytest.approx(true, rel=1e-9, abs=1e-12 * (1 + np.abs(found.u).max()))
+            assert found.status is not Status.SOLVED or true <= 1e-9 * (1.0 + np.linalg.norm(problem.rate))
+            assert np.all(found.nu <= 1.0)
+            assert found.status is Status.RELAXED or np.all(found.nu == 1.0), resolver.name
+
+
+def test_a_resolver_declares_its_guarantee() -> None:
+    assert {name: kind.exact for name, kind in RESOLVERS.items() if kind in map(type, OWN)} == {
+        "rg": True, "pg": True, "ej": True, "dls": False,
+    }  # fmt: skip
+    assert not CallableResolver.exact  # it cannot know
+
+    class Renamed(ProjectedGradient):  # the same inputs
+        name = "renamed"
+
+    assert Renamed.exact
+    kernel, damped = ProjectedGradient.kernel, {"kernel": DampedLeastSquares.kernel}
+    for bases, own in (
+        ((Resolver,), {"kernel": kernel, "setup": ProjectedGradient.setup}),
+        ((Resolver,), {}),
+        ((Resolver,), {"kernel": kernel, "exact": "yes"}),
+        ((ProjectedGradient,), damped),  # what its base guarantees says nothing of it
+        ((ProjectedGradient,), {"finish": CallableResolver.finish}),
+    ):
+        with refused("resolver class Mine") as error:
+            type("Mine", bases, own)
+        assert "exact: ClassVar[bool] = True, or = False" in str(error.value)
+    assert not type("Mine", (ProjectedGradient,), damped | {"exact": False}).exact
 
 
 @each_shape
@@ -201,7 +257,7 @@ def test_extended_jacobian_is_numpys(shape: tuple[int, int], rng: np.random.Gene
 @pytest.mark.parametrize("s", [1, 2, 4, 6])
 def test_no_redundancy_left(s: int, rng: np.random.Generator) -> None:
     problem = Example((s, s), rng)
-    for resolver in every():
+    for resolver in undamped():
         close(
             problem.given(resolver).u,
             np.linalg.solve(problem.J, problem.rate),
@@ -240,7 +296,9 @@ def test_what_is_singular_is_told_apart(shape: tuple[int, int], rng: np.random.G
         np.vstack([problem.J[:-1], np.zeros((1, m))]),
         np.zeros(shape),
     ):
-        for resolver in (*exact(), *more):
+        for resolver in every():
+            assert problem.given(resolver, J=J).status is not Status.SOLVED, resolver.name
+        for resolver in (*OWN[:3], *more):
             found = problem.given(resolver, J=J)
             assert found.status is Status.SINGULAR_J, resolver.name
             assert found.singular
@@ -269,7 +327,7 @@ def test_invariances(shape: tuple[int, int], rng: np.random.Generator) -> None:
     order = rng.permutation(m)
     turn = np.linalg.qr(rng.normal(size=(m, m)))[0]
     D = np.diag(rng.uniform(0.3, 3.0, m))
-    for resolver in every():
+    for resolver in OWN:
         u = problem.given(resolver).u
         # The task may be written in other variables, and the inputs be listed in another order.
         close(problem.given(resolver, J=mix @ J, rate=mix @ rate).u, u)
@@ -287,10 +345,11 @@ def test_invariances(shape: tuple[int, int], rng: np.random.Generator) -> None:
 
 
 def test_resolvers_by_name() -> None:
-    assert list(RESOLVERS) == ["rg", "pg", "ej", "dls"]
+    assert [*RESOLVERS][:4] == ["rg", "pg", "ej", "dls"]
+    assert all(kind in RESOLVERS.values() for kind in map(type, OWN))
     assert all(kind.name == name for name, kind in RESOLVERS.items())
     assert RESOLVERS.words("ej") == "extended Jacobian"
-    with pytest.raises(InputError, match=r"unknown resolver 'eg'.*available: rg, pg, ej, dls"):
+    with refused(got="eg"):
         RESOLVERS.named("eg")
 
 
@@ -311,7 +370,7 @@ def test_callable_resolver(rng: np.random.Generator) -> None:
     assert problem.given(CallableResolver(least), J=np.zeros((2, 4))).status is Status.SINGULAR_J
     nowhere = CallableResolver(lambda problem: np.full(4, np.nan))
     assert problem.given(nowhere).status is Status.NOT_FINITE
-    with pytest.raises(InputError, match=r"expected u of shape \(4,\), got \(3,\)"):
+    with refused("callable resolver", got=[0.0, 0.0, 0.0]):
         problem.given(CallableResolver(lambda problem: np.zeros(3)))
 
 
@@ -363,5 +422,5 @@ def test_weights_spare_a_group(kind: type[Resolver], rng: np.random.Generator) -
 
 def test_weights_that_couple_inputs_are_for_pg(rng: np.random.Generator) -> None:
     problem = Example((2, 4), rng)
-    with pytest.raises(InputError, match=r"a number for each input .*couples inputs is for pg"):
+    with refused("weights"):
         problem.given(ReducedGradient(weights=np.eye(4) + 0.1))

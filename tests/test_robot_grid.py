@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 import pinocchio as pin
 import pytest
+from findings import codes
 from numpy.typing import NDArray
 from resolver_grid import every_resolver
 from robot_grid import ARMS, BASES, built, frame_of, start
@@ -37,12 +38,12 @@ def tasks(robot: Robot, frame: str, q0: Array, kind: str) -> nmm.Task:
     return nmm.Task(nmm.Pose(frame), reference, GAIN)
 
 
-def posture(robot: Robot, q0: Array) -> nmm.Objective:
+def posture(robot: Robot, q0: Array) -> nmm.extending.Objective:
     """Near the arm's configuration at the start; a steered platform steers to where its arm turns."""
     names = robot.q_names[robot.platform.n_p :]
-    squares = [nmm.Square(name, q0[robot.coordinate(name)]) for name in names]
+    squares = [nmm.QuadraticTerm(name, q0[robot.coordinate(name)]) for name in names]
     if "steering" in robot.q_names:
-        squares.append(nmm.Square({"steering": 1.0, names[0]: -1.0}, 0.0))
+        squares.append(nmm.QuadraticTerm({"steering": 1.0, names[0]: -1.0}, 0.0))
     return nmm.Quadratic(*squares)
 
 
@@ -53,13 +54,17 @@ def added_task(robot: Robot, task: nmm.Task, q0: Array) -> nmm.Task | None:
     if not free.shape[1]:
         return None
     picked = qr(free.T, pivoting=True)[2][: free.shape[1]]
-    return nmm.Task(nmm.Coordinates(*(robot.q_names[i] for i in picked)), q0[picked], GAIN)
+    return nmm.Task(nmm.LinearCoordinates(*(robot.q_names[i] for i in picked)), q0[picked], GAIN)
 
 
 RESOLVERS: dict[str, Resolver] = {
     **every_resolver(alpha=2.0),
     "pg, the platform spared": nmm.ProjectedGradient(2.0, weights={"platform": 5.0}),
 }
+
+
+#: Those that do the task: as they declare, or, below a threshold that these robots hardly reach, nearly.
+TRACKING = [name for name, one in RESOLVERS.items() if one.exact or isinstance(one, nmm.DampedLeastSquares)]
 
 
 #: Six rows for five joints and a base that adds one motion at first order, or little more: such an arm comes
@@ -86,7 +91,7 @@ def run_of(base: str, arm: str, kind: str, resolver: Resolver) -> nmm.Trajectory
     robot, frame = built(base, arm), frame_of(base, arm)
     q0 = robot.q(start(base, arm))
     task = tasks(robot, frame, q0, kind)
-    if isinstance(resolver, nmm.ExtendedJacobian):
+    if resolver.takes_added_task:
         held = added_task(robot, task, q0)
         controller = nmm.Controller(robot, task, resolver, added_task=held)
     else:
@@ -99,9 +104,13 @@ def test_every_robot_tracks(base: str, arm: str, kind: str) -> None:
     for name, resolver in RESOLVERS.items():
         run = run_of(base, arm, kind, resolver)
         where = f"{name}: {run.outcome} {run.message} error {run.error[-1]} {run.warnings}"
+        assert run.summary()["lateral_slip_max"] <= 1e-12, where
+        if name not in TRACKING:  # it may miss the task, and says so
+            assert np.abs(run.error[-1]).max() < 0.1 or not run.complete, where
+            assert run.residual.max() < 1e-9 or "inputs_unmet" in codes(run), where
+            continue
         assert run.complete, where
         assert np.abs(run.error[-1]).max() < 1e-3, where
-        assert run.summary()["lateral_slip_max"] <= 1e-12, where
         if (name, base, arm, kind) == DAMPED:
             continue
         # Feedback with K = 3 1/s takes the error away as it should: that of a pose in log coordinates.
@@ -135,17 +144,17 @@ def test_small_wheels_are_damped_where_sigma_is_below_the_threshold_alone() -> N
 @pytest.mark.parametrize(("base", "arm", "kind"), TIGHT)
 def test_a_robot_that_comes_to_a_singularity_does_not_complete(base: str, arm: str, kind: str) -> None:
     """With fixed steps it passes it between two samples; the error it then has is not called a success."""
-    for name, resolver in RESOLVERS.items():
-        run = run_of(base, arm, kind, resolver)
+    for name in TRACKING:
+        run = run_of(base, arm, kind, RESOLVERS[name])
         assert not run.complete, f"{name}: error {run.error[-1]} {run.warnings}"
-        said = " ".join([run.message, *run.warnings])
-        assert "singular" in said, f"{name}: {said}"
+        singular = {"singular", "nearly_singular", "near_singularity", "singularity_passed"}
+        assert singular & codes(run), f"{name}: {run.message} {run.warnings}"
 
 
 def test_fewer_inputs_than_rows_are_refused() -> None:
     robot = built("fixed", "small arm")
     task = tasks(robot, "ee", robot.q(start("fixed", "small arm")), "pose")
-    with pytest.raises(nmm.InputError, match=r"6 rows.*5 inputs"):
+    with pytest.raises(nmm.InputError, match=r"task: expected at most 5 rows, as many as inputs.*, got 6$"):
         nmm.Controller(robot, task, nmm.ProjectedGradient())
 
 

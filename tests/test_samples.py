@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from findings import every
 from wandering import beyond
 
 import nmm
@@ -16,7 +17,7 @@ Q0 = ROBOT.q({"q1": -1.0, "q2": 0.7, "q3": 0.5})
 DT, A = 0.02, 2.0
 
 
-def reaching(resolver: nmm.Resolver | None = None, **more: object) -> nmm.Controller:
+def reaching(resolver: nmm.extending.Resolver | None = None, **more: object) -> nmm.Controller:
     limits = nmm.Limits({"platform": 0.5, "arm": 0.8}, {"q2": [0.2, 0.9]}, acceleration=A)
     task = nmm.Task(nmm.Position("ee"), [1.0, 0.0, 9.0], gain=2.0)
     given = {"limits": limits, "dt": DT} | more
@@ -38,7 +39,7 @@ def test_accelerations_count_over_the_time_that_passed(method: str, duration: fl
     assert beyond(run.q[:, ROBOT.coordinate("q2")], np.array([0.2, 0.9])) <= 1e-11
     longer = nmm.simulate(reaching(), Q0, duration + DT, DT, method)
     np.testing.assert_array_equal(longer.u[: len(run) - 1], run.u[:-1])
-    assert float(controller.sample.elapsed) == controller.dt == DT
+    assert float(controller.solver.sample.elapsed) == controller.dt == DT
 
 
 def stages(controller: nmm.Controller, between: Callable[[], object]) -> list[np.ndarray]:
@@ -59,7 +60,7 @@ def test_a_look_between_a_call_and_its_stages_changes_neither(kind: str, step: s
     def controller() -> nmm.Controller:
         resolver = nmm.ProjectedGradient(alpha=200.0, step=step)
         retreat = nmm.Retreat(stalled=0.1, durations=[0.06])
-        return reaching(resolver, objective=nmm.Quadratic(nmm.Square("q3")), retreat=retreat)
+        return reaching(resolver, objective=nmm.Quadratic(nmm.QuadraticTerm("q3")), retreat=retreat)
 
     elsewhere = ROBOT.q({"x": 0.4, "theta": 2.0, "q1": 1.0, "q2": 0.3, "q3": -0.5})
     looked = controller()
@@ -86,9 +87,9 @@ def test_a_retreat_holds_at_its_samples_stages_and_is_counted_by_samples(limited
         count = sample.retreats
         for _ in range(3):
             np.testing.assert_array_equal(controller.velocity(k * DT, Q0), sample.q_dot)
-        assert controller.backing is not None
-        assert controller.backing.count == count
-        away += controller.backing.now
+        assert controller.solver.retreat_state is not None
+        assert controller.solver.retreat_state.count == count
+        away += controller.solver.retreat_state.now
     assert away == pytest.approx(0.2 / DT, abs=1)  # 10 waiting, 10 away, 10 waiting
 
 
@@ -131,10 +132,10 @@ def test_events_of_steps_that_are_taken_again_count_once(method: str) -> None:
     ]
     assert Doubtful.asked > 50
     np.testing.assert_array_equal(runs[1].u, runs[0].u)
-    events = [[said for said in run.warnings if "backed off" in said or "limit of" in said] for run in runs]
+    events = [[every(run, code) for code in ("backed_off", "limit_contradicted")] for run in runs]
     assert events[0] == events[1]
-    assert sum("backed off" in said for said in events[0]) == 1
-    counted = [said for said in events[0] if "could not be kept" in said]
-    assert counted
-    for said in counted:
-        assert int(said.split(" samples")[0].split()[-1]) <= len(runs[0])
+    backed_off, contradicted = events[0]
+    assert len(backed_off) == 1
+    assert contradicted
+    for one in contradicted:
+        assert one.values["samples"] <= len(runs[0])

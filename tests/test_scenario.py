@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import yaml
+from findings import refused
 from short_scenario import MINIMAL, scenario
 
 from nmm import Scenario, ScenarioError
@@ -69,46 +71,46 @@ def test_numbers_of_numpy_are_numbers() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    ("text", "fields"),
     [
-        ("", r"given\.yaml: expected a mapping \(key: value\), got nothing"),
-        ("- a\n- b", r"given\.yaml: expected a mapping"),
-        ("just text", r"given\.yaml: expected a mapping .* got 'just text'"),
-        ("q0: !!python/object/apply:os.system [ls]", r"given\.yaml:1: expected plain YAML, got the tag !!py"),
-        ("robot: a\ndt: !!float 1", r"given\.yaml:2: expected plain YAML, got the tag !!float"),
-        ("robot: a\ndt: !mine 1", r"given\.yaml:2: expected plain YAML, got the tag !mine"),
-        ("dt: 1\nq0: {}\ndt: 2", r"given\.yaml:3: dt: expected every key once"),
-        ("q0: {x: 1,\n x: 2}", r"given\.yaml:2: q0\.x: expected every key once"),
-        ("dt: 1\n---\ndt: 2", r"given\.yaml:2: expected one YAML document"),
-        ("dt: [1\nq0: {", r"given\.yaml:2: not valid YAML"),
-        ("dt:\n\t1", r"given\.yaml:2: not valid YAML"),
-        ("dt: *nobody", r"given\.yaml:1: not valid YAML: found undefined alias"),
-        ("dt: &a [*a]", r"given\.yaml:1: an alias"),
-        ("? [a, b]\n: 1", r"given\.yaml:1: expected a name as key"),
-        ("dt: " + "[" * 1200 + "]" * 1200, r"given\.yaml:1: not valid YAML: nested too deeply"),
-        ("dt: \x00", r"given\.yaml: not valid YAML"),
+        ("", {"where": "given.yaml", "got": None}),
+        ("- a\n- b", {"where": "given.yaml", "got": ['a', 'b']}),
+        ("just text", {"where": "given.yaml", "got": 'just text'}),
+        ("q0: !!python/object/apply:os.system [ls]", {"where": "given.yaml:1"}),
+        ("robot: a\ndt: !!float 1", {"where": "given.yaml:2"}),
+        ("robot: a\ndt: !mine 1", {"where": "given.yaml:2"}),
+        ("dt: 1\nq0: {}\ndt: 2", {"where": "given.yaml:3: dt"}),
+        ("q0: {x: 1,\n x: 2}", {"where": "given.yaml:2: q0.x"}),
+        ("dt: 1\n---\ndt: 2", {"where": "given.yaml:2"}),
+        ("dt: [1\nq0: {", {"where": "given.yaml:2"}),
+        ("dt:\n\t1", {"where": "given.yaml:2"}),
+        ("dt: *nobody", {"where": "given.yaml:1"}),
+        ("dt: &a [*a]", {"where": "given.yaml:1"}),
+        ("? [a, b]\n: 1", {"where": "given.yaml:1"}),
+        ("dt: " + "[" * 1200 + "]" * 1200, {"where": "given.yaml:1"}),
+        ("dt: \x00", {"where": "given.yaml"}),
         (
             "a: &a [x,x,x,x,x,x,x,x,x]\n"
             + "".join(
                 f"{b}: &{b} [{','.join([f'*{a}'] * 9)}]\n" for a, b in zip("abcdefg", "bcdefgh", strict=True)
             ),
-            r"given\.yaml:1: expected at most \d+ values",
+            {"where": "given.yaml:1"},
         ),
     ],
 )  # fmt: skip
-def test_yaml_is_read_strictly(text: str, message: str, tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match=message) as caught:
+def test_yaml_is_read_strictly(text: str, fields: dict[str, Any], tmp_path: Path) -> None:
+    with refused(**fields, kind=ScenarioError) as caught:
         scenario(tmp_path, text)
     assert "\n" not in str(caught.value)
 
 
 def test_a_file_that_is_not_text_or_not_there(tmp_path: Path) -> None:
     (tmp_path / "a.yaml").write_bytes(b"robot: \xff\xfe")
-    with pytest.raises(ScenarioError, match=r"a\.yaml: expected UTF-8 text"):
+    with refused("a.yaml", kind=ScenarioError):
         Scenario.load(tmp_path / "a.yaml")
-    with pytest.raises(ScenarioError, match=r"b\.yaml: cannot be read \(No such file"):
+    with refused("b.yaml", kind=ScenarioError):
         Scenario.load(tmp_path / "b.yaml")
-    with pytest.raises(ScenarioError, match=r"cannot be read \(Is a directory"):
+    with refused("test_a_file_that_is_not_text_o0", kind=ScenarioError):
         Scenario.load(tmp_path)
 
 
@@ -142,30 +144,30 @@ def test_settings_reach_every_level(tmp_path: Path) -> None:
 def test_settings_of_lists_count_from_zero() -> None:
     given = Scenario.load("unicycle_2r_pointing").override("task.1.gain", "7")
     assert [part.gain for part in given.parts.task] == [1.0, 7.0]
-    with pytest.raises(ScenarioError, match="task is a list; expected an index from 0 to 1, got '2'"):
+    with refused("unicycle_2r_pointing.yaml: set task.2.gain", got="2", kind=ScenarioError):
         given.override("task.2.gain", "7")
-    with pytest.raises(ScenarioError, match="task is a list; expected an index from 0 to 1, got 'gain'"):
+    with refused("unicycle_2r_pointing.yaml: set task.gain", got="gain", kind=ScenarioError):
         given.override("task.gain", "7")
 
 
 @pytest.mark.parametrize(
-    ("key", "message"),
+    ("key", "fields"),
     [
         (
             "resolver.alfa",
-            r"set resolver\.alfa: unknown key 'alfa' \(did you mean 'alpha'\?\); available: .*threshold",
+            {"where": "unicycle_2r_position.yaml: set resolver.alfa", "got": "alfa"},
         ),
         (
             "resolvr.alpha",
-            r"unknown key 'resolvr' \(did you mean 'resolver'\?\); available: name, title, robot",
+            {"where": "unicycle_2r_position.yaml: resolvr, with resolvr.alpha set", "got": "resolvr"},
         ),
-        ("dt.x", r"set dt\.x: dt is '0.005', which has no keys"),
-        ("a..b", r"set a\.\.b: expected a dotted key"),
-        ("", r"set : expected a dotted key"),
+        ("dt.x", {"where": "unicycle_2r_position.yaml: set dt.x"}),
+        ("a..b", {"where": "unicycle_2r_position.yaml: set a..b"}),
+        ("", {"where": "unicycle_2r_position.yaml: set "}),
     ],
 )
-def test_settings_that_lead_nowhere(key: str, message: str) -> None:
-    with pytest.raises(ScenarioError, match=message):
+def test_settings_that_lead_nowhere(key: str, fields: dict[str, Any]) -> None:
+    with refused(**fields, kind=ScenarioError):
         Scenario.load("unicycle_2r_position", {key: "5"})
 
 
@@ -196,8 +198,8 @@ def test_garbage_at_any_key_is_taken_or_refused_in_one_line(name: str) -> None:
             try:
                 given.override(key, value).controller()
             except ScenarioError as error:
-                text = str(error)
-                assert text.startswith(str(given.path)), (key, value)
+                where, text = error.where, str(error)
+                assert where.startswith(str(given.path)), (key, value)
                 assert "\n" not in text, (key, value)
 
 
@@ -217,9 +219,9 @@ def test_a_task_alone_is_the_first_of_a_list(tmp_path: Path) -> None:
     given = Scenario.load(str(file), {"task.0.gain": 4, "objective.0.terms.1.weight": 2})
     assert given.parts.task[0].gain == 4.0
     assert given.resolved()["objective"]["terms"][1]["weight"] == 2.0
-    with pytest.raises(ScenarioError, match=r"unknown key 'gian'.*available: .*gain"):
+    with refused("alone.yaml: set task.gian", got="gian", kind=ScenarioError):
         Scenario.load(str(file), {"task.0.gian": 4})
-    with pytest.raises(ScenarioError, match="unknown key '1'"):
+    with refused("alone.yaml:53: task.1, with task.1.gain set", got="1", kind=ScenarioError):
         Scenario.load(str(file), {"task.1.gain": 4})
 
 
@@ -236,7 +238,7 @@ def test_another_resolver_keeps_what_it_knows() -> None:
     knows = {"kind": "pg", "tolerance": 1e-10, "alpha": 4.0, "weights": None, "step": "constant"}
     assert pg.parts.resolver.model_dump() == knows
     assert given.with_resolver("ej").parts.resolver.kind == "ej"
-    with pytest.raises(ScenarioError, match=r"set resolver\.kind: unknown kind 'sqp'; available: rg, pg, ej"):
+    with refused("unicycle_2r_position.yaml: set resolver.kind", got="sqp", kind=ScenarioError):
         given.with_resolver("sqp")
 
 
@@ -263,7 +265,7 @@ def test_robot_files_are_relative_to_the_scenario(tmp_path: Path, monkeypatch: p
     assert given.resolved()["robot"]["source"] == str(robots / "arm.urdf")
     # A path that is set is relative to the working folder.
     assert scenario(tmp_path, text, robot="../robots/arm.urdf").robot().q_names[-1] == "q1"
-    with pytest.raises(ScenarioError, match=r"set robot: .*elsewhere/robots/arm\.urdf: no such file"):
+    with refused("elsewhere/robots/arm.urdf", kind=ScenarioError):
         scenario(tmp_path, text, robot="robots/arm.urdf").robot()
 
 
@@ -276,7 +278,7 @@ def test_settings_reach_below_a_robots_bare_name() -> None:
     assert steered.override("robot.platform.source", "omni_base").robot().platform.name == "mecanum"
     kind = Scenario.load("unicycle_2r_position", {"robot.platform": "unicycle"})
     assert kind.override("robot.platform.kind", "unicycle").robot().platform.name == "unicycle"
-    with pytest.raises(ScenarioError, match=r"set robot\.platform\.kind\.name: .*unicycle.*has no keys"):
+    with refused("unicycle_2r_position.yaml: set robot.platform.kind.name", kind=ScenarioError):
         kind.override("robot.platform.kind.name", 1)
 
 
@@ -293,7 +295,7 @@ WITH_AN_ADDED_TASK = ("position", "pointing", "link_pointing", "extended_jacobia
         (name, resolver)
         for name in bundled_scenarios()
         for resolver in RESOLVERS
-        if resolver != "ej" or name.partition("r_")[2] in WITH_AN_ADDED_TASK
+        if not RESOLVERS[resolver].takes_added_task or name.partition("r_")[2] in WITH_AN_ADDED_TASK
     ],
 )
 def test_a_resolved_scenario_gives_the_same_run(name: str, resolver: str, tmp_path: Path) -> None:

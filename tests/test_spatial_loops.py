@@ -12,11 +12,11 @@ from spatial_arms import MOVING, UR5, near, pose
 
 import nmm
 from nmm.functions.program import evaluate
-from nmm.functions.references import Circle, PoseReference, Turn, rotation_vector
+from nmm.functions.references import Circle, PoseReference, SteadyTurn, rotation_vector
 from nmm.functions.tasks import (
     CenterOfMass,
-    Coordinates,
     Distance,
+    LinearCoordinates,
     Orientation,
     Pointing,
     Pose,
@@ -51,7 +51,7 @@ def settled(robot: Robot, tasks: list[Task], q0: Array, duration: float) -> nmm.
 def circling(robot: Robot, q0: Array) -> Task:
     """A pose near that at q0, which turns about the vertical while it moves on a circle."""
     start = near(robot, q0, "tool0", np.array([0.2, -0.1, 0.15, 0.5, -0.7, 0.4]))
-    turn = Turn(start.rotation.T @ [0.0, 0.0, 1.0], 1.6, rotation_vector(matrix=start.rotation))
+    turn = SteadyTurn(start.rotation.T @ [0.0, 0.0, 1.0], 1.6, rotation_vector(matrix=start.rotation))
     circle = Circle(start.translation - [0.0, 0.3, 0.0], 0.3, 0.8, pi / 2)
     return Task(Pose("tool0"), PoseReference(circle, turn), GAIN)
 
@@ -150,7 +150,7 @@ def test_other_tasks_together(ur5: Robot) -> None:
     tasks = [
         Task(Distance("tool0", MOVING), 0.9, GAIN),
         Task(CenterOfMass("z"), Configuration(ur5, q0).center_of_mass()[0][2] + 0.05, GAIN),
-        Task(Coordinates({"wrist_1_joint": 1, "wrist_2_joint": -2}), 1.0, GAIN),
+        Task(LinearCoordinates({"wrist_1_joint": 1, "wrist_2_joint": -2}), 1.0, GAIN),
         Task(Posture("elbow_joint", "wrist_3_joint"), [1.2, 0.0], GAIN),
     ]
     run = settled(ur5, tasks, q0, 4.5)
@@ -177,7 +177,7 @@ def test_moving_the_world_moves_nothing_else(ur5: Robot, rng: np.random.Generato
             carried: pin.SE3, turned: float, target=target, axis=axis, center=center, point=point
         ) -> list[list[Task]]:
             T = carried * target
-            turn = Turn(axis, 0.7, rotation_vector(matrix=T.rotation))
+            turn = SteadyTurn(axis, 0.7, rotation_vector(matrix=T.rotation))
             circle = Circle(carried.act(center), 0.4, 0.9, 0.2 + turned)
             return [
                 [Task(Pose("tool0"), PoseReference(circle, turn), 2.0)],

@@ -13,7 +13,7 @@ from spatial_arms import MOVING, UR5, pose
 
 from nmm.functions.function import Evaluation, Function
 from nmm.functions.program import Program, evaluate
-from nmm.functions.references import PoseReference, Slerp, Turn, rotation_vector
+from nmm.functions.references import PoseReference, Slerp, SteadyTurn, rotation_vector
 from nmm.functions.tasks import (
     CenterOfMass,
     Distance,
@@ -24,7 +24,7 @@ from nmm.functions.tasks import (
     Posture,
     Task,
 )
-from nmm.functions.tasks.comparison import Comparison
+from nmm.functions.tasks.task import Comparison
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 
@@ -118,7 +118,7 @@ def error(task: Task, robot: Robot, t: float, q: Array) -> Evaluation:
 
 
 def compared(tip: str, other: str) -> list[Task]:
-    turn = Turn([0.3, -0.2, 0.9], 0.8, [0.4, 1.0, -0.6])
+    turn = SteadyTurn([0.3, -0.2, 0.9], 0.8, [0.4, 1.0, -0.6])
     slerp = Slerp([0.1, 0.2, 0.3], [-1.0, 1.5, 0.4], 4.0, "smooth")
     return [
         Task(Orientation(tip), [0.4, 1.0, -0.6]),

@@ -21,7 +21,7 @@ FAR_TOO_LARGE = (
     1e4  # α dt = 100; H's curvature is 1, and with a factor that the arm adds, at least 1 seen by u
 )
 TIP = nmm.Position("ee", "xyz")
-CALM = nmm.Quadratic(*(nmm.Square(name) for name in ("q1", "q2", "q3", "theta")))
+CALM = nmm.Quadratic(*(nmm.QuadraticTerm(name) for name in ("q1", "q2", "q3", "theta")))
 
 
 def holding(kind: str, alpha: float, step: str, limits: nmm.Limits | None = None) -> nmm.Controller:
@@ -36,7 +36,7 @@ def circling(kind: str, alpha: float, step: str, limits: nmm.Limits | None = Non
     return nmm.Controller(ROBOT, task, RESOLVERS[kind](alpha=alpha, step=step), CALM, limits=limits, dt=DT)
 
 
-def sampled(controller: nmm.Controller, steps: int, method: str = "euler") -> list[nmm.Step]:
+def sampled(controller: nmm.Controller, steps: int, method: str = "euler") -> list[nmm.extending.Step]:
     """The samples of a motion from Q0, without the judgement that a run ends with."""
     advance, q, found = integrator(method, ROBOT, 1e-9), Q0, []
     for k in range(steps):
@@ -72,7 +72,7 @@ def test_the_decrease_is_sufficient_along_the_samples_motion(kind: str, limits: 
     shortened = 0
     q = Q0.copy()
     for k in range(100):
-        rest.before[:] = controller.before
+        rest.solver.before[:] = controller.solver.before
         rest(k * DT, q)
         controller(k * DT, q)
         plain, step = rest.last(k * DT, q), controller.last(k * DT, q)
@@ -130,7 +130,7 @@ def test_a_spring_of_steering_is_descended_too() -> None:
     """A spring in the null space holds a car's hand ahead of its axle: H and the spring fall together."""
     car = nmm.mount("car_base", "small_arm", at="arm_mount")
     task = nmm.Task(nmm.Position("ee"), nmm.Circle([0, 0, 0.6], 2.5, 0.16), gain=1.0)
-    H = nmm.Quadratic(nmm.Square("q2", weight=0.1))
+    H = nmm.Quadratic(nmm.QuadraticTerm("q2", weight=0.1))
 
     def controller(alpha: float, step: str = "armijo") -> nmm.Controller:
         return nmm.Controller(car, task, nmm.ProjectedGradient(alpha, step=step), H, dt=DT)
@@ -171,14 +171,16 @@ def test_a_gradient_that_is_no_number_beyond_the_step_shortens_it() -> None:
 
 
 EJ = nmm.ExtendedJacobian
-ADDED = nmm.Task(nmm.Coordinates("q1", "q2"), [0.0, 0.0])
+ADDED = nmm.Task(nmm.LinearCoordinates("q1", "q2"), [0.0, 0.0])
 
 
-def bare(resolver: nmm.Resolver, objective: nmm.Objective | None = CALM, **more: object) -> nmm.Controller:
+def bare(
+    resolver: nmm.extending.Resolver, objective: nmm.extending.Objective | None = CALM, **more: object
+) -> nmm.Controller:
     return nmm.Controller(ROBOT, nmm.Task(TIP, [1.0, 0.0, 0.5]), resolver, objective, **more)  # type: ignore[arg-type]
 
 
-def stepping(resolver: nmm.Resolver) -> nmm.Resolver:
+def stepping(resolver: nmm.extending.Resolver) -> nmm.extending.Resolver:
     resolver.step = "armijo"
     return resolver
 
@@ -201,7 +203,7 @@ def stepping(resolver: nmm.Resolver) -> nmm.Resolver:
         (lambda: bare(nmm.ProjectedGradient(step="armijo")).evaluate(0.0, Q0), "dt: expected a number"),
         (
             lambda: nmm.simulate(bare(nmm.ProjectedGradient(step="armijo")), Q0, 1.0, DT, "adaptive"),
-            "a step by Armijo's rule are kept from sample to sample: expected rk4",
+            "a step by Armijo's rule are kept from sample to sample; expected rk4",
         ),
     ],
 )
@@ -259,7 +261,7 @@ def test_with_acceleration_limits_a_run_to_a_far_goal_starts_and_ends_softly(met
     q0 = ROBOT.q({"q1": 0.3, "q2": 0.7, "q3": 0.5})
     controller = nmm.Controller(ROBOT, task, nmm.ProjectedGradient(alpha=1.0), limits=limits)
     run = nmm.simulate(controller, q0, 30.0, dt, method, until=nmm.Goal())
-    assert "reached" in run.message
+    assert run.verdict.reasons[0].code == "reached"
     change = np.abs(np.diff(run.u, axis=0, prepend=0.0))
     assert change.max() <= A * dt + 1e-12
     assert change[0].max() == pytest.approx(A * dt)  # the limit is what holds it back

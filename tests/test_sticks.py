@@ -18,12 +18,12 @@ from urdf_parts import AXIS, joint, link, robot, shape, write
 
 import nmm
 from nmm.playback import Motion, view
-from nmm.playback.drawing import Drawing, DrawnRobot
-from nmm.playback.encoding import encode
+from nmm.playback.drawing import Drawing, encode
 from nmm.playback.extent import robot_boxes
 from nmm.playback.keyframes import keyframes
 from nmm.playback.rolling import Rolling
 from nmm.playback.scene import playback_scene
+from nmm.playback.shapes import DrawnRobot
 from nmm.playback.sticks import Appearance, appearance
 
 UR5 = "package://example-robot-data/robots/ur_description/urdf/ur5_robot.urdf"
@@ -249,7 +249,7 @@ def test_robots_with_shapes_are_drawn_as_before(source: str, monkeypatch: pytest
     commands = playback_scene([motion], title="", fps=10)
     shown = [command["path"] for command in commands if command["type"] == "object"]
     assert len({path.rsplit("/", 1)[0] for path in shown}) == robot.visual_model.ngeoms
-    for module in ("drawing", "extent"):
+    for module in ("shapes", "extent"):
         monkeypatch.setattr(f"nmm.playback.{module}.appearance", lambda robot: Appearance(robot.visual_model))
     before = playback_scene([motion], title="", fps=10)
     assert [encode(command) for command in commands] == [encode(command) for command in before]

@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from findings import codes, holds, of_code
 from numpy.typing import NDArray
 from urdf_parts import inertial, joint, link, robot, write
 
 import nmm
 from nmm.robots.configuration import Configuration
-from nmm.robots.slip import slipping_wheels
+from nmm.robots.loading.ground import slipping_wheels
 
 Array = NDArray[np.float64]
 
@@ -84,13 +85,15 @@ def test_wheels_that_the_platform_would_slide_are_named(tmp_path: Path) -> None:
     path = wheeled(tmp_path / "behind.urdf", x=-0.2, wheel="left")
     wrong = nmm.load(path)
     assert slipping_wheels(wrong) == {"left": pytest.approx(0.2), "right": pytest.approx(0.2)}
-    assert any("slide sideways under platform unicycle: left (0.2 m/s" in note for note in wrong.notes)
-    task = nmm.Task(nmm.Coordinates("theta"), nmm.Line([0.0], [0.5], 0.2))
+    (note,) = of_code(wrong.notes, "wheels_slide")
+    assert holds(note, "wheels_slide", platform="unicycle", several_axles=False)
+    assert note.values["speeds"] == slipping_wheels(wrong)
+    task = nmm.Task(nmm.LinearCoordinates("theta"), nmm.Line([0.0], [0.5], 0.2))
     run = nmm.simulate(nmm.Controller(wrong, task, nmm.ProjectedGradient()), {}, 0.2, 0.1)
-    assert any("slide sideways" in warning for warning in run.warnings)
+    assert "wheels_slide" in codes(run)
     right = nmm.load(path, axle=(-0.2, 0.0))
     assert slipping_wheels(right) == {}
-    assert not any("slide" in note for note in right.notes)
+    assert not of_code(right.notes, "wheels_slide")
     assert slipping_wheels(nmm.load(path, axle=(0.1, 0.0))) != {}
 
 
@@ -151,7 +154,7 @@ def test_names_are_strings() -> None:
 
 
 @pytest.mark.parametrize("function", [nmm.Position("tip", "xy"), nmm.CenterOfMass("xy")], ids=["tip", "mass"])
-def test_a_robot_of_one_joint(function: nmm.Function, tmp_path: Path) -> None:
+def test_a_robot_of_one_joint(function: nmm.extending.Function, tmp_path: Path) -> None:
     """For one coordinate Pinocchio's Jacobians are vectors."""
     parts = [link("base"), link("arm", inertial()), link("tip")]
     parts += [joint("q1", "base", "arm", body=UP), joint("end", "arm", "tip", "fixed", "")]

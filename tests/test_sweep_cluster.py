@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 from distributed import LocalCluster
+from findings import refused
 from short_scenario import MINIMAL
 
 import nmm
@@ -53,11 +54,10 @@ def test_a_worker_is_killed_and_the_table_is_the_local_one_bit_for_bit(
     assert tables[0] == tables[1]
 
 
-def refused(sweep: nmm.Sweep, folder: Path, address: str) -> str:
-    with pytest.raises(nmm.InputError) as caught:
+def refuses(sweep: nmm.Sweep, folder: Path, address: str, where: str = "", **fields: Any) -> None:
+    with refused(where or f"--scheduler {address}", **fields):
         sweep.run(folder, scheduler=address)
     assert not folder.exists()
-    return str(caught.value)
 
 
 def test_a_scheduler_that_does_not_answer(
@@ -69,13 +69,10 @@ def test_a_scheduler_that_does_not_answer(
         deaf.bind(("127.0.0.1", 0))
         deaf.listen()
         there = f"tcp://127.0.0.1:{deaf.getsockname()[1]}"
-        assert (
-            refused(sweep, tmp_path / "out", there)
-            == f"--scheduler {there}: no scheduler answers there within 1 s"
-        )
-    assert "no scheduler answers there within 1 s" in refused(sweep, tmp_path / "out", there)
-    assert "expected an address such as tcp://" in refused(sweep, tmp_path / "out", "my-cluster")
-    with pytest.raises(nmm.InputError, match="expected jobs or scheduler"):
+        refuses(sweep, tmp_path / "out", there, expected="")
+    refuses(sweep, tmp_path / "out", there, expected="")
+    refuses(sweep, tmp_path / "out", "my-cluster", "--scheduler", got="my-cluster")
+    with refused("jobs"):
         sweep.run(tmp_path / "out", jobs=2, scheduler=there)
 
 
@@ -83,14 +80,14 @@ def test_a_scheduler_without_workers(
     sweep: nmm.Sweep, tmp_path: Path, scheduler: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(cluster, "PATIENCE", 2.0)
-    assert "has no worker, and none came within 2 s" in refused(sweep, tmp_path / "out", scheduler)
+    refuses(sweep, tmp_path / "out", scheduler, expected="a worker within 2 s")
 
 
 @pytest.mark.parametrize(
     ("preload", "expected"),
     [
-        ("import sys\nsys.modules['nmm'] = None\n", "no nmm on worker tcp://"),
-        ("import nmm\nnmm.__version__ = '0.0.9'\n", "nmm 0.0.9 on tcp://"),
+        ("import sys\nsys.modules['nmm'] = None\n", f"nmm {nmm.__version__} on each"),
+        ("import nmm\nnmm.__version__ = '0.0.9'\n", f"{nmm.__version__} on each, as here"),
     ],
     ids=["no nmm", "another version"],
 )
@@ -102,9 +99,7 @@ def test_a_worker_with_another_nmm_or_none(
     command: list[Any] = [sys.executable, "-m", "distributed.cli.dask_worker", scheduler, *options]
     worker = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.DEVNULL)
     try:
-        told = refused(sweep, tmp_path / "out", scheduler)
+        refuses(sweep, tmp_path / "out", scheduler, expected=expected)
     finally:
         worker.kill()
         worker.wait()
-    assert expected in told
-    assert f"xpected nmm {nmm.__version__}" in told or f"expected {nmm.__version__} on each" in told

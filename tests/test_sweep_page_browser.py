@@ -11,11 +11,9 @@ from short_scenario import MINIMAL
 
 import nmm
 
-pytestmark = pytest.mark.browser
-
 
 @pytest.fixture(scope="module")
-def swept(tmp_path_factory: pytest.TempPathFactory) -> nmm.Swept:
+def swept(tmp_path_factory: pytest.TempPathFactory) -> nmm.extending.SweepResult:
     folder = tmp_path_factory.mktemp("sweep")
     (folder / "short.yaml").write_text(MINIMAL, encoding="utf-8")
     vary = {"q0.x": (-1, 1), "resolver.kind": ["pg", "rg"], "resolver.threshold": [0.01, 0.02]}
@@ -23,7 +21,7 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> nmm.Swept:
 
 
 @pytest.fixture
-def page(browser: Browser, swept: nmm.Swept) -> Iterator[Page]:
+def page(browser: Browser, swept: nmm.extending.SweepResult) -> Iterator[Page]:
     context = browser.new_context(viewport={"width": 1100, "height": 900})
     made = context.new_page()
     wrong: list[str] = []
@@ -42,7 +40,7 @@ def shown(page: Page) -> int:
     return int(page.inner_text("#count").split()[0])
 
 
-def test_filters_of_the_table_hold_everywhere(page: Page, swept: nmm.Swept) -> None:
+def test_filters_of_the_table_hold_everywhere(page: Page, swept: nmm.extending.SweepResult) -> None:
     rows = swept.table.to_pylist()
     assert shown(page) == 80
     page.fill("thead input[data-column='q0.x']", "0..0.5")
@@ -59,7 +57,7 @@ def test_filters_of_the_table_hold_everywhere(page: Page, swept: nmm.Swept) -> N
     assert shown(page) == 80
 
 
-def test_a_brush_filters_and_a_click_lets_it_go(page: Page, swept: nmm.Swept) -> None:
+def test_a_brush_filters_and_a_click_lets_it_go(page: Page, swept: nmm.extending.SweepResult) -> None:
     page.locator("#parallel").scroll_into_view_if_needed()
     box = page.locator("#parallel").bounding_box()
     assert box is not None
@@ -76,7 +74,9 @@ def test_a_brush_filters_and_a_click_lets_it_go(page: Page, swept: nmm.Swept) ->
     assert shown(page) == 80
 
 
-def test_a_click_opens_the_rollout_with_the_command_that_runs_it(page: Page, swept: nmm.Swept) -> None:
+def test_a_click_opens_the_rollout_with_the_command_that_runs_it(
+    page: Page, swept: nmm.extending.SweepResult
+) -> None:
     page.select_option("#y", "error_rms")
     x, y = page.evaluate("points.places[6]")
     page.locator("#points").click(position={"x": x, "y": y})

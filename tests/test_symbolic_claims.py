@@ -21,6 +21,7 @@ from __future__ import annotations
 import itertools
 from typing import Any
 
+import flint
 import numpy as np
 import pytest
 import sympy
@@ -29,10 +30,10 @@ from scipy.optimize import least_squares
 from symbolic_checks import PAPER, TASKS, made
 
 from nmm.analysis.formulas import SymbolicAnalysis, lower_bound, never_zero, singular_set, symbolic, vanishing
-from nmm.analysis.formulas.groebner import Basis, Undecided, Work
-from nmm.analysis.formulas.zeros import Zeros
+from nmm.analysis.formulas.zeros import Basis, Limits, Undecided, Zeros
 from nmm.errors import InputError
-from nmm.functions.tasks import Coordinates, Heading, Position
+from nmm.findings import Finding
+from nmm.functions.tasks import Heading, LinearCoordinates, Position
 from nmm.platforms import Omnidirectional
 from nmm.robots.loading import load
 
@@ -84,8 +85,8 @@ def test_no_singularity_with_d(robot: str, task: str, rng: np.random.Generator) 
     assert claim.proved
     assert not claim.families
     s = len(analysis.row_names)
-    rho = ", wherever rho != 0" if task == "link pointing" else ""  # it depends on q
-    assert claim.statement == f"J has rank {s} at every configuration, for all nonzero d{rho}"
+    rho = {"moving": ["rho"]} if task == "link pointing" else {}  # it depends on q
+    assert claim.statement == Finding("rank_full", {"rank": s, "nonzero": ["d"], **rho})
     # Whatever the lengths: where the minors are smallest, they are not all small.
     functions = analysis.functions()
     for lengths in ({}, {"l1": 0.4, "l2": 0.4}, {"d": -0.05, "l1": 0.9}):
@@ -99,7 +100,8 @@ def test_what_d_zero_does(robot: str, task: str, rng: np.random.Generator) -> No
     analysis = made(robot, task)[2]
     claim = singular_set(analysis, zero=["d"])
     assert claim.proved
-    assert "for d = 0 and all nonzero l" in claim.statement
+    assert claim.statement.values["gone"] == ["d"]
+    assert {name[0] for name in claim.statement.values["nonzero"]} == {"l"}
     expected = [{sympified(analysis, text) for text in family} for family in WITHOUT_D[robot, task]]
     for family in expected:
         assert any({sympy.expand(one) for one in found} == family for found in claim.families)
@@ -126,9 +128,8 @@ def test_the_3r_is_singular_when_vertical(rng: np.random.Generator) -> None:
     _, _, analysis = made("unicycle_3r", "spatial position")
     claim = singular_set(analysis)
     assert claim.proved
-    assert claim.statement == (
-        "J has rank 3 except exactly where sin(q2) = 0 and sin(q3) = 0, for all nonzero d, l2, l3"
-    )
+    values = {"rank": 3, "families": [["sin(q2)", "sin(q3)"]], "named": {}, "nonzero": ["d", "l2", "l3"]}
+    assert claim.statement == Finding("rank_except", values)
     assert set(claim.conditions) == {sympy.sin(analysis.symbols["q2"]), sympy.sin(analysis.symbols["q3"])}
     J = analysis.functions().J
     for q in rng.uniform(-np.pi, np.pi, (20, 6)):
@@ -142,13 +143,18 @@ def test_the_3r_is_singular_when_vertical(rng: np.random.Generator) -> None:
 
 def test_the_proof_goes_through_all_cases() -> None:
     claim = singular_set(made("unicycle_3r", "spatial position")[2])
-    assert claim.steps[0] == "Δ[v, omega, q2] = -Λ (d + Λ c1) is 0 where Λ = 0 or d + Λ c1 = 0"
-    assert "where Λ = 0, s23 = 0: every minor has a factor that is 0" in claim.steps
-    assert any(step.startswith("where d + Λ c1 = 0: ") and "is 0 nowhere" in step for step in claim.steps)
-    assert (
-        claim.steps[-1]
-        == "Λ = 0, s23 = 0 is the same as sin(q2) = 0, sin(q3) = 0 (each vanishes on the other)"
-    )
+    first = {
+        "minor": ("v", "omega", "q2"),
+        "form": "-Λ (d + Λ c1)",
+        "ways": ["Λ", "d + Λ c1"],
+        "excluded": [],
+    }
+    assert claim.steps[0] == Finding("case_split", first)
+    assert Finding("case_singular", {"given": ["Λ", "s23"]}) in claim.steps
+    splits = [step.values for step in claim.steps if step.code == "case_split"]
+    assert any(one.get("given") == ["d + Λ c1"] and not one["ways"] for one in splits)
+    simpler = {"family": ["Λ", "s23"], "simpler": ["sin(q2)", "sin(q3)"]}
+    assert claim.steps[-1] == Finding("same_set", simpler)
 
 
 def test_the_manipulators_alone() -> None:
@@ -164,35 +170,36 @@ def test_two_minors_differ_by_d(rng: np.random.Generator) -> None:
     robot, _, analysis = made("unicycle_2r")
     bound = lower_bound(analysis)
     assert bound.proved
-    assert bound.statement == "det J J^T >= d^2/2 at every configuration"
-    assert bound.steps[0] == "Δ[v, omega] - Δ[v, q1] = d, whatever q is"
+    assert bound.statement == Finding("gram_bound", {"bound": "d^2/2"})
+    difference = {"combination": "Δ[v, omega] - Δ[v, q1]", "constant": "d"}
+    assert bound.steps[0] == Finding("combination_constant", difference)
     J = analysis.functions().J(rng.uniform(-np.pi, np.pi, (4000, robot.n)))
     determinants = np.linalg.det(J @ np.swapaxes(J, 1, 2))
     assert determinants.min() >= 0.3**2 / 2
     assert determinants.min() < 2 * 0.3**2  # not idle
-    assert lower_bound(made("unicycle_2r", "pointing")[2]).steps[0] == "Δ[v, omega, q1] = d, whatever q is"
+    alone = lower_bound(made("unicycle_2r", "pointing")[2]).steps[0]
+    assert alone.values == {"combination": "Δ[v, omega, q1]", "constant": "d"}
     assert lower_bound(made("unicycle_3r", "spatial position")[2]) is None
     assert lower_bound(analysis.without("d")) is None
     anywhere = symbolic(load("unicycle_2r", platform=Omnidirectional()), TASKS["position"])
-    assert lower_bound(anywhere).statement == "det J J^T >= 1 at every configuration"
+    assert lower_bound(anywhere).statement.values == {"bound": "1"}
 
 
 def test_minors_that_never_vanish(rng: np.random.Generator) -> None:
     q = rng.uniform(-np.pi, np.pi, (4000, 6))
     expected = {
-        "position": {"Δ[v, omega] vanishes nowhere exactly when |d| > |l1| + |l2|"},
-        "pointing": {
-            "Δ[v, omega, q1] vanishes nowhere exactly when d != 0",
-            "Δ[v, omega, q2] vanishes nowhere exactly when |d| > |l1|",
-        },
-        "link heading": {"Δ[v, omega, q1] vanishes nowhere exactly when d != 0"},
-        "link pointing": {"Δ[v, omega, q1] vanishes nowhere when |rho| > |l2| and d != 0"},
-        "spatial position": set(),
+        "position": {"v, omega": ([("|d|", "|l1| + |l2|")], (), True)},
+        "pointing": {"v, omega, q1": ([], ("d",), True), "v, omega, q2": ([("|d|", "|l1|")], (), True)},
+        "link heading": {"v, omega, q1": ([], ("d",), True)},
+        "link pointing": {"v, omega, q1": ([("|rho|", "|l2|")], ("d",), False)},
+        "spatial position": {},
     }
     for robot, task in PAPER:
         analysis = made(robot, task)[2]
         bounds = never_zero(analysis)
-        assert {str(bound) for bound in bounds.values()} == expected[task]
+        found = {", ".join(columns): bound.finding().values for columns, bound in bounds.items()}
+        conditions = {name: (one["larger"], one["nonzero"], one["exact"]) for name, one in found.items()}
+        assert conditions == expected[task]
         if task == "link pointing":  # rho and g are no coordinates: nothing is said of where it vanishes
             continue
         # All others vanish somewhere whatever the lengths, and take both signs or are 0.
@@ -210,9 +217,11 @@ def test_minors_that_never_vanish(rng: np.random.Generator) -> None:
 
 def test_where_a_minor_vanishes_is_said() -> None:
     reasons = vanishing(made("unicycle_3r", "spatial position")[2])
-    assert reasons["v", "omega", "q1"] == "it is 0"
-    assert reasons["v", "omega", "q2"].startswith("its factor Λ has mean 0 over the joint angles")
-    assert reasons["v", "q2", "q3"] == "sin(q1) is a factor"
+    said = {minor: {**finding.values, "minor": minor} for minor, finding in reasons.items()}
+    zero, mean, wave = ("v", "omega", "q1"), ("v", "omega", "q2"), ("v", "q2", "q3")
+    assert said[zero] == {"minor": zero}
+    assert said[mean] == {"minor": mean, "factor": "Λ", "mean_zero": True}
+    assert said[wave] == {"minor": wave, "factor": "sin(q1)", "mean_zero": False}
 
 
 def test_what_the_statements_leave_out() -> None:
@@ -220,9 +229,9 @@ def test_what_the_statements_leave_out() -> None:
     car = symbolic(load("car_base"), Heading("arm_mount"))
     claim = singular_set(car)
     assert claim.families == ((sympy.sin(car.symbols["steering"]),),)
-    assert "where J exists (cos(steering) != 0)" in claim.statement
-    twice = symbolic(made("unicycle_2r")[0], [Coordinates("q1"), Coordinates({"q1": 2})])
-    assert singular_set(twice).statement == "J has rank below 2 everywhere"
+    assert claim.statement.values["exists"] == ["cos(steering)"]
+    twice = symbolic(made("unicycle_2r")[0], [LinearCoordinates("q1"), LinearCoordinates({"q1": 2})])
+    assert singular_set(twice).statement == Finding("rank_lost", {"rank": 2})
     with pytest.raises(InputError, match="unknown length 'e'"):
         singular_set(made("unicycle_2r")[2], zero=["e"])
     with pytest.raises(InputError, match="L = 0: J is divided by it"):
@@ -230,45 +239,58 @@ def test_what_the_statements_leave_out() -> None:
 
 
 def test_what_is_not_decided_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("nmm.analysis.formulas.zeros._ALL", 100)
-    monkeypatch.setattr("nmm.analysis.formulas.claims._BRIEF", 100)
+    monkeypatch.setattr("nmm.analysis.formulas.zeros._SET", Limits(2, 5, 100))
+    monkeypatch.setattr("nmm.analysis.formulas.claims._BRIEF", Limits(2, 5, 100))
     claim = singular_set(made("unicycle_3r", "spatial position")[2])
     assert not claim.proved
-    assert claim.statement.startswith("not decided: where J loses rank, as")
-    assert singular_set(made("unicycle_3r", "spatial position")[2], ["d"]).statement.startswith(
-        "not decided: where J loses rank for d = 0, as"
-    )
+    assert claim.statement == Finding("rank_undecided")
+    without = singular_set(made("unicycle_3r", "spatial position")[2], ["d"])
+    assert without.statement == Finding("rank_undecided", {"gone": ["d"]})
 
 
 def test_bases_are_sympys(rng: np.random.Generator) -> None:
     """Ideals of random polynomials; the same reduced basis."""
-    R, *variables = sympy.ring("a,b,c", sympy.QQ, "grevlex")
+    names, plenty = ["a", "b", "c"], Limits(1000, 1000, 10**6)
+    R, *_ = sympy.ring(names, sympy.QQ, "grevlex")
+    ring = flint.fmpz_mpoly_ctx.get(names, "degrevlex")
+    a, b, c = ring.gens()
     trivial = 0
     for size in range(30):
-        generators = []
+        generators, same = [], []
         for _ in range(2 + size % 3):
             terms = zip(rng.integers(0, 3, (3, 3)).tolist(), rng.integers(1, 4, 3).tolist(), strict=True)
-            generators.append(R.from_dict({tuple(exponents): R.domain(n) for exponents, n in terms}))
-        basis = Basis().with_more(generators, Work(10**6))
-        whole = sympy.polys.groebnertools.groebner(generators, R)
-        assert {led.polynomial for led in basis.members} == set(whole)
+            polynomial = {tuple(exponents): n for exponents, n in terms}
+            generators.append(ring.from_dict(polynomial))
+            same.append(R.from_dict({key: R.domain(n) for key, n in polynomial.items()}))
+        basis = Basis(ring).with_more(generators, plenty)
+        whole = sympy.polys.groebnertools.groebner(same, R)
+
+        def members(basis: Basis) -> set[Any]:
+            return {
+                R.from_dict({key: R.domain(int(n)) for key, n in one.terms()}).monic()
+                for one in basis.members
+            }
+
+        assert members(basis) == set(whole)
         assert basis.is_one == (whole == [1])
         trivial += basis.is_one
-        stepwise = Basis()
+        stepwise = Basis(ring)
         for generator in generators:
-            stepwise = stepwise.with_more([generator], Work(10**6))
-        assert {led.polynomial for led in stepwise.members} == set(whole)
-        assert basis.contains(generators[0] * variables[0] - generators[-1], Work(10**6))
+            stepwise = stepwise.with_more([generator], plenty)
+        assert members(stepwise) == set(whole)
+        assert basis.contains(generators[0] * a - generators[-1])
+        assert basis.is_one or not basis.contains(ring.constant(1))
     assert 0 < trivial < 30
     with pytest.raises(Undecided):
-        Basis().with_more([variables[0] ** 2 - variables[1], variables[0] * variables[2] - 1], Work(1))
+        Basis(ring).with_more([a**2 - b, a * c - 1], Limits(2, 1000, 10**6))
 
 
 def test_what_is_not_zero_is_divided_out() -> None:
-    _, a, b, _ = sympy.ring("a,b,c", sympy.QQ, "grevlex")
-    assert Basis((), [0]).with_more([a * b, a * (b - 1)], Work(1000)).is_one
-    assert not Basis().with_more([a * b, a * (b - 1)], Work(1000)).is_one
-    assert not Basis((), [2]).with_more([a * b, a * (b - 1)], Work(1000)).is_one
+    ring, plenty = flint.fmpz_mpoly_ctx.get(["a", "b", "c"], "degrevlex"), Limits(100, 100, 1000)
+    a, b, _ = ring.gens()
+    assert Basis(ring, nonzero=[0]).with_more([a * b, a * (b - 1)], plenty).is_one
+    assert not Basis(ring).with_more([a * b, a * (b - 1)], plenty).is_one
+    assert not Basis(ring, nonzero=[2]).with_more([a * b, a * (b - 1)], plenty).is_one
 
 
 def test_waves_are_combinations_of_as_few_angles_as_there_can_be() -> None:

@@ -14,19 +14,19 @@ from urdf_parts import robot as urdf
 
 import nmm
 from nmm.analysis.formulas import symbolic
+from nmm.analysis.formulas.derivation import traced_G
 from nmm.analysis.formulas.expansion import Ring
 from nmm.analysis.formulas.frames import Frames
 from nmm.analysis.formulas.geometry import Geometry
-from nmm.analysis.formulas.platform_columns import traced_G
 from nmm.analysis.formulas.quotient import Quotient, quotient
 from nmm.errors import InputError
 from nmm.functions.references import Bearing, Circle, PoseReference
 from nmm.functions.tasks import (
     CallableFunction,
     CenterOfMass,
-    Coordinates,
     Distance,
     Heading,
+    LinearCoordinates,
     Orientation,
     Pointing,
     Pose,
@@ -105,10 +105,10 @@ def test_a_platform_whose_formula_no_one_could_read_is_refused(tmp_path: Path) -
 
 
 TASKS: dict[str, tuple[str, Any]] = {
-    "linear": ("2r", Coordinates({"theta": 1, "q1": 0.5, "q2": -2}, "x")),
+    "linear": ("2r", LinearCoordinates({"theta": 1, "q1": 0.5, "q2": -2}, "x")),
     "posture": ("2r", Posture()),
     "seen from a link": ("2r", Position("ee", "xy", relative_to="link1")),
-    "follows a joint": ("2r", Task(Heading("link1"), Coordinates("q2"))),
+    "follows a joint": ("2r", Task(Heading("link1"), LinearCoordinates("q2"))),
     "bearing of the mass": ("2r", Task(Heading("link1"), Bearing(CenterOfMass(), [6.0, 2.0]))),
     "heading about x": ("3r", [Heading("ee", (0.6, -0.3, 0.7), "x"), Position("ee", "zx")]),
     "distance": ("3r", Distance("ee", [1.0, 2.0, 3.0])),
@@ -123,7 +123,7 @@ TASKS: dict[str, tuple[str, Any]] = {
     "pointing": ("2r", Pointing("ee", [6.0, 2.0, 1.0], "x")),
     "pointing backwards": ("2r", Pointing("ee", [6.0, 2.0, 1.0], [0.0, -1.0, 0.0])),
     "pointing at a frame": ("3r", Pointing("link1", "ee", "x")),
-    "bearing of coordinates": ("2r", Task(Heading("ee"), Bearing(Coordinates("x", "y"), [6.0, 2.0]))),
+    "bearing of coordinates": ("2r", Task(Heading("ee"), Bearing(LinearCoordinates("x", "y"), [6.0, 2.0]))),
     "pointing at the mass": ("2r", Pointing("ee", CenterOfMass(), "z")),
 }
 

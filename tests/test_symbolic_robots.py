@@ -18,6 +18,7 @@ from urdf_parts import robot as urdf
 
 import nmm
 from nmm.analysis.formulas import TooLarge, never_zero, singular_set, symbolic
+from nmm.findings import Finding
 from nmm.functions.tasks import CenterOfMass, Orientation, Pose, Position, Posture
 
 
@@ -48,7 +49,7 @@ def test_singularities_of_the_ur5_on_a_fixed_base_are_shoulder_elbow_and_wrist(
     shoulder = a2 * sympy.cos(q2) + a3 * sympy.cos(q2 + q3) - d5 * sympy.sin(q2 + q3 + q4)
     found = {sympy.expand(condition) for (condition,) in claim.families}
     assert found == {sympy.sin(q3), sympy.sin(q5), sympy.expand(shoulder)}
-    assert all("taken as" in note for note in analysis.notes)  # the file's quarter turns have ten digits
+    assert {note.code for note in analysis.notes} <= {"angle_rounded"}  # where the file's have ten digits
     check_numbers(robot, Pose("tool0"), analysis, rng.uniform(-3, 3, (3, 6)), 1e-9)
 
 
@@ -59,7 +60,7 @@ def test_wrist_of_the_ur5_has_one_minor_that_is_not_zero(rng: np.random.Generato
     assert "the other 19 are 0" in analysis.text()
     claim = singular_set(analysis)
     assert claim.proved
-    assert "exactly where sin(elbow_joint) = 0 or" in claim.statement
+    assert claim.statement.values["families"][0] == ["sin(elbow_joint)"]
     assert not analysis.notes
     check_numbers(robot, Position("wrist_1_link"), analysis, rng.uniform(-3, 3, (3, robot.n)))
 
@@ -172,8 +173,8 @@ def _forearm(folder: Path, tip: float, platform: str, joints: Sequence[str] = tu
 def test_a_sum_of_lengths_is_no_condition_on_the_configuration(tmp_path: Path) -> None:
     claim = singular_set(symbolic(_forearm(tmp_path, 0.1, "fixed"), Position("ee")))
     assert len(claim.families) == 2
-    assert claim.statement.endswith("for all nonzero x_elbow, x_roll, x_ee, x_roll + x_ee")
-    assert not any("x_roll + x_ee = 0" in step for step in claim.steps)
+    assert claim.statement.values["nonzero"] == ["x_elbow", "x_roll", "x_ee", "x_roll + x_ee"]
+    assert not any("x_roll + x_ee" in step.values.get("ways", ()) for step in claim.steps)
 
 
 @pytest.mark.parametrize("platform", ["fixed", "unicycle"])
@@ -186,10 +187,10 @@ def test_a_sum_of_lengths_is_zero_where_it_is_for_this_robot(
     analysis = symbolic(robot, Position("ee"))
     claim = singular_set(analysis)
     assert claim.proved
-    assert ("for x_roll + x_ee = 0" in claim.statement) == (tip < 0.0)
+    assert claim.statement.values.get("zero", []) == (["x_roll + x_ee"] if tip < 0.0 else [])
     J = analysis.functions().J
     expected = 2 if (tip, platform) == (-0.2, "fixed") else 3
-    assert claim.statement.startswith("J has rank below 3 everywhere") == (expected == 2)
+    assert (claim.statement.code == "rank_lost") == (expected == 2)
     anywhere = rng.uniform(-3, 3, (20, robot.n))
     assert (np.linalg.matrix_rank(J(anywhere), tol=1e-9) == expected).all()
     for family in claim.families:
@@ -202,13 +203,10 @@ def test_a_sum_of_lengths_is_zero_where_it_is_for_this_robot(
 def test_a_minor_that_is_a_sum_of_lengths(tip: float, tmp_path: Path) -> None:
     analysis = symbolic(_forearm(tmp_path, tip, "unicycle", ["roll"]), Position("ee", "xy"))
     claim, bound = singular_set(analysis), never_zero(analysis)["v", "omega"]
-    assert str(bound) == "Δ[v, omega] vanishes nowhere exactly when x_ee + x_roll != 0"
+    assert bound.finding().values["larger"] == [("x_ee + x_roll", None)]
     assert bound.holds(analysis.geometry) is (tip > 0.0)
-    assert claim.statement == (
-        "J has rank 2 at every configuration, for all nonzero x_roll + x_ee"
-        if tip > 0.0
-        else "J has rank below 2 everywhere, for x_roll + x_ee = 0"
-    )
+    code, key = ("rank_full", "nonzero") if tip > 0.0 else ("rank_lost", "zero")
+    assert claim.statement == Finding(code, {"rank": 2, key: ["x_roll + x_ee"]})
 
 
 def _zeros(analysis: Any, family: Any, rng: np.random.Generator) -> list[Any]:

@@ -14,13 +14,14 @@ from typing import Any
 
 import pytest
 from command_line import Result
+from findings import refused
 from typeset import check_text
 
 import nmm
 from nmm import latex
 from nmm.analysis.redundancy import repeatability
 from nmm.cli.exit_status import status_of
-from nmm.errors import InputError
+from nmm.runs.verdict import Verdict
 from nmm.tables import Quantity, Table, comparison_table, laps_table
 
 Command = Callable[..., Result]
@@ -133,11 +134,11 @@ def test_runs_that_fail_and_that_have_limits() -> None:
     assert not {"outcome", "scale_min", "clearance_min", "sliding_max"} & set(keys)
     both = {one.key: one for one in comparison_table([plain, replace(limited, label="a_b & c")]).quantities}
     assert both["scale_min"].values == (None, limited.summary()["scale_min"])
-    failed = replace(plain, outcome=nmm.Outcome.SINGULAR, label="J_e & [50 %]")
+    failed = replace(plain, verdict=Verdict(nmm.Outcome.SINGULAR), label="J_e & [50 %]")
     rows = tabular(comparison_table([plain, failed]).latex())
     assert rows[0] == ["", "RG", r"J\_e \& {[}50 \%{]}"]
     assert rows[1] == ["outcome", "completed", "singular"]
-    with pytest.raises(InputError, match="at least one run"):
+    with refused("comparison_table"):
         comparison_table([])
 
 
@@ -164,9 +165,9 @@ def test_files_by_their_suffix(tmp_path: Path) -> None:
     assert table.save(tmp_path / "t.csv").read_text() == "run,k [m^2]\na|b,nan\n"
     assert r"| k\* (m^2) | – |" in table.save(tmp_path / "t.md").read_text(encoding="utf-8")
     assert tabular(table.latex())[1] == ["$k$ (m$^{2}$)", "--"]
-    with pytest.raises(InputError, match=r"t\.pdf: expected a file that ends in \.tex, \.csv or \.md"):
+    with refused("t.pdf"):
         table.save(tmp_path / "t.pdf")
-    with pytest.raises(InputError, match=r"no/t\.csv: cannot be written"):
+    with refused("t.csv"):
         table.save(tmp_path / "no" / "t.csv")
 
 

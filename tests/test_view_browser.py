@@ -30,12 +30,10 @@ from ports import MOST, free_port, listening, served
 
 import nmm
 from nmm.playback import view
-from nmm.playback.asked import asked_for
 from nmm.playback.extent import corners
 from nmm.playback.rolling import Rolling
+from nmm.playback.viewer import asked_for
 from nmm.robots.robot import Robot
-
-pytestmark = pytest.mark.browser
 
 
 @pytest.fixture(scope="module", params=["hand-built", "unicycle_3r", "folding", "car_base"])

@@ -22,8 +22,8 @@ from ports import MOST, free_port, listening, wait_for
 import nmm
 from nmm.errors import InputError
 from nmm.playback import view
-from nmm.playback.asked import asked_for
 from nmm.playback.viewed_task import ViewedTask
+from nmm.playback.viewer import asked_for
 from nmm.robots.robot import Robot
 from nmm.scenario.short_task import short_task
 
@@ -114,7 +114,7 @@ def test_the_ellipsoid_is_the_image_of_the_unit_ball(robot: Robot) -> None:
     for _ in range(5):
         q = random_q(robot, rng)
         J = frame_jacobian(robot, frame, q)[:3]
-        told = shown.told(q)
+        told = shown.answer(q)
         nodes = {path.rsplit("/", 1)[1]: np.reshape(matrix, (4, 4)).T for path, matrix in told["ellipsoids"]}
         data = robot.model.createData()
         pin.framesForwardKinematics(robot.model, data, q)
@@ -152,7 +152,7 @@ def test_a_stretched_planar_arm_has_lost_the_radial_direction(tmp_path: Path) ->
     for angle in (0.0, 0.4, -2.0):
         radial = np.array([math.cos(angle), math.sin(angle), 0.0])
         for bend, state in ((0.0, "lost"), (np.pi, "lost"), (0.02, "near"), (1.2, "fine")):
-            told = shown.told(robot.q([angle, bend]))
+            told = shown.answer(robot.q([angle, bend]))
             assert told["state"] == state
             if state == "fine":
                 assert told["words"] == told["arrows"] == []
@@ -161,8 +161,8 @@ def test_a_stretched_planar_arm_has_lost_the_radial_direction(tmp_path: Path) ->
             assert arrow["kind"] == "moves"
             assert abs(np.dot(arrow["along"], radial)) == pytest.approx(1.0, abs=2e-3 if bend < 3.0 else 1e-9)
             assert told["parts"][0]["rank"] == (1 if state == "lost" else 2)
-    assert shown.told(robot.q())["words"] == ["motion of hand along x"]
-    assert shown.told(robot.q())["parts"][0]["condition"] is None
+    assert shown.answer(robot.q())["words"] == ["motion of hand along x"]
+    assert shown.answer(robot.q())["parts"][0]["condition"] is None
 
 
 def test_what_wheels_cannot_do_is_lost() -> None:
@@ -171,9 +171,9 @@ def test_what_wheels_cannot_do_is_lost() -> None:
         robot = nmm.load(source)
         frame = next(name for name in robot.frames if name.startswith("base"))
         shown = ViewedTask(robot, [nmm.Position(frame, "xy")], robot.rest)
-        told = shown.told(robot.rest)
+        told = shown.answer(robot.rest)
         assert [words.replace(frame, "base_link") for words in told["words"]] == lost
-        turned = shown.told(robot.q({"theta": np.pi / 2}))
+        turned = shown.answer(robot.q({"theta": np.pi / 2}))
         assert [words.replace(frame, "base_link") for words in turned["words"]] == [
             words.replace("along y", "along x") for words in lost
         ]
@@ -183,7 +183,7 @@ def test_turns_have_rings_and_tasks_without_a_frame_numbers_alone() -> None:
     robot = nmm.load(UR5, platform="fixed")
     frame = end_of(robot)
     shown = ViewedTask(robot, [nmm.Pose(frame)], robot.rest)
-    told = shown.told(robot.q({"elbow_joint": 1.0, "shoulder_lift_joint": -0.7}))  # the wrist is stretched
+    told = shown.answer(robot.q({"elbow_joint": 1.0, "shoulder_lift_joint": -0.7}))  # the wrist is stretched
     assert told["state"] == "lost"
     J = frame_jacobian(robot, frame, robot.q({"elbow_joint": 1.0, "shoulder_lift_joint": -0.7}))
     U = np.linalg.svd(J)[0][:, -1]
@@ -193,7 +193,7 @@ def test_turns_have_rings_and_tasks_without_a_frame_numbers_alone() -> None:
     assert {arrow["kind"] for arrow in told["arrows"]} <= {"moves", "turns"}
     assert any(arrow["kind"] == "turns" for arrow in told["arrows"])
     mobile = nmm.load("unicycle_3r")
-    told = ViewedTask(mobile, [nmm.Coordinates("q1", "q2")], mobile.rest).told(mobile.rest)
+    told = ViewedTask(mobile, [nmm.LinearCoordinates("q1", "q2")], mobile.rest).answer(mobile.rest)
     assert told["ellipsoids"] == told["arrows"] == []
     assert [part["rank"] for part in told["parts"]] == [2, 2]
 
@@ -208,10 +208,10 @@ def test_where_there_is_no_J_that_is_said() -> None:
     task = nmm.CallableFunction(root, ["root"])
     there, nowhere = robot.q({"q2": 1.0}), robot.q({"q2": -1.0})
     shown = ViewedTask(robot, [task], there)
-    told = shown.told(nowhere)
+    told = shown.answer(nowhere)
     assert told["problem"]
     assert told["parts"] == told["ellipsoids"] == told["arrows"] == []
-    assert shown.told(there)["problem"] == ""
+    assert shown.answer(there)["problem"] == ""
 
 
 HOSTILE = [

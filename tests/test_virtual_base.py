@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from findings import assert_found, of_code
 from urdf_parts import joint, link, robot, write
 
 import nmm
@@ -44,9 +45,9 @@ def test_a_base_of_endless_joints_is_the_platform(
     loaded = nmm.load(path)
     assert loaded.platform.name == platform
     assert loaded.q_names == ("x", "y", "theta", "q1")
-    (note,) = (note for note in loaded.notes if "a base of joints" in note)
-    assert f"{', '.join(f'base{i}' for i in range(len(joints)))} move the whole robot" in note
-    assert f"platform {platform}; platform fixed keeps them" in note
+    names = [f"base{i}" for i in range(len(joints))]
+    found = of_code(loaded.notes, "base_of_joints")
+    assert_found(found, ("base_of_joints", {"names": names, "platform": platform, "limits": {}}))
     assert nmm.load(path, platform="omnidirectional").q_names == ("x", "y", "theta", "q1")
     # The hand is where the file has it, and driving straight ahead moves it as the file's slide would.
     q = loaded.q({"x": 0.7, "q1": 0.4})
@@ -56,6 +57,34 @@ def test_a_base_of_endless_joints_is_the_platform(
     ahead = next(f"base{i}" for i, one in enumerate(joints) if one == AHEAD)
     there = nmm.Configuration(kept, kept.q({ahead: 0.7, "q1": 0.4})).placement("hand")
     np.testing.assert_allclose(at.homogeneous, there.homogeneous, atol=1e-12)
+
+
+@pytest.mark.parametrize("end", [0.6, 20.0])
+def test_two_slides_and_a_turn_are_a_base_whatever_their_limits(tmp_path: Path, end: float) -> None:
+    path = write(tmp_path / "fetch.urdf", based(AHEAD, ASIDE, TURN, end=end))
+    loaded = nmm.load(path)
+    assert (loaded.platform.name, loaded.q_names) == ("omnidirectional", ("x", "y", "theta", "q1"))
+    (found,) = of_code(loaded.notes, "base_of_joints")
+    assert found.values["limits"] == {f"base{i}": [-end, end] for i in range(3)}
+    draft = nmm.first_scenario(path, file=tmp_path / "first.yaml")
+    assert draft.trajectory.robot.q_names == loaded.q_names
+
+
+def test_the_first_scenario_keeps_a_base_of_joints(tmp_path: Path) -> None:
+    draft = nmm.first_scenario(write(tmp_path / "frankie.urdf", based(TURN, AHEAD)), file=tmp_path / "a.yaml")
+    robot_made = draft.trajectory.robot
+    assert (robot_made.platform.name, robot_made.q_names) == ("unicycle", ("x", "y", "theta", "q1"))
+    assert draft.chosen[0] == "platform: unicycle, by its base of joints"
+
+
+def test_slides_that_no_arm_has_are_told(tmp_path: Path) -> None:
+    """A hand that floats on x, y, z: a base in space, which no platform is."""
+    floating = based(AHEAD, ASIDE, ("prismatic", "0 0 1"), end=20.0)
+    loaded = nmm.load(write(tmp_path / "hand.urdf", floating))
+    rooms = {f"base{i}": 40.0 for i in range(3)}
+    assert_found(of_code(loaded.notes, "slides_long"), ("slides_long", {"rooms": rooms}))
+    held = nmm.load(tmp_path / "hand.urdf", lock=dict.fromkeys(rooms, 0.0))
+    assert not of_code(held.notes, "slides_long")
 
 
 def test_its_velocity_limits_are_those_of_v_and_omega(tmp_path: Path) -> None:
@@ -69,6 +98,7 @@ def test_its_velocity_limits_are_those_of_v_and_omega(tmp_path: Path) -> None:
     "text",
     [
         based(TURN, AHEAD, end=50.0),  # a gantry
+        based(AHEAD, ASIDE, TURN, end=0.4),  # a table
         based(AHEAD),  # a rail
         based(TURN),  # a waist
         based(AHEAD, TURN),
@@ -76,12 +106,12 @@ def test_its_velocity_limits_are_those_of_v_and_omega(tmp_path: Path) -> None:
         based(TURN, AHEAD, offset="0.2 0 0"),
         based(TURN, ("prismatic", "0 0 1")),
     ],
-    ids=["limits", "slide", "turn", "slide first", "aside", "apart", "upright"],
+    ids=["limits", "table", "slide", "turn", "slide first", "aside", "apart", "upright"],
 )
 def test_what_is_no_base_stays(tmp_path: Path, text: str) -> None:
     loaded = nmm.load(write(tmp_path / "arm.urdf", text))
     assert "base0" in loaded.q_names
-    assert not any("a base of joints" in note for note in loaded.notes)
+    assert not of_code(loaded.notes, "base_of_joints")
 
 
 @pytest.mark.parametrize(("kind", "axis"), [("planar", "0 0 1"), ("planar", "0 0 -1"), ("floating", "")])

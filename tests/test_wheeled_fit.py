@@ -10,7 +10,7 @@ from numpy import pi
 from wheeled_examples import AXLE, trailer
 
 from nmm.errors import InputError
-from nmm.platforms.layout import Layout, Pivot, RollingJoint
+from nmm.platforms.wheel_layout import Layout, Pivot, RollingJoint
 from nmm.platforms.wheeled.descriptions import CasterWheel, Hitch, SteeredWheel
 from nmm.platforms.wheeled.platform import WheeledPlatform
 
@@ -70,17 +70,33 @@ def test_a_steered_wheel_beside_and_behind_its_pivot() -> None:
 
 
 @pytest.mark.parametrize(
-    ("pivots", "wheels", "said"),
+    ("pivots", "wheels", "where", "said"),
     [
-        ((), (), "r: no wheels found"),
-        ((), (*REAR, rolling("fl", 1, 0.3)), "r: wheels rl, rr and fl are on different axles of one body"),
-        ((), (rolling("w", 0, 0, "elbow"),), "wheel w hangs on elbow, which is no upright joint"),
-        ((pivot("p", 0.5),), (rolling("w", 0, 0, "p"),), "wheel w is on the axis of p, so it is no caster"),
-        ((pivot("p", 0.5),), (rolling("w", -0.1, 0.05, "p"),), "wheel w is 0.05 m beside the axis of p"),
-        ((pivot("a", 0), pivot("b", 0, 0, "a")), (rolling("w", -0.1, 0, "b"),), "b of wheel w hangs on a"),
+        ((), (), "r", "no wheels found"),
+        ((), (*REAR, rolling("fl", 1, 0.3)), "r", "wheels rl, rr and fl are on different axles of one body"),
+        ((), (rolling("w", 0, 0, "elbow"),), "r: wheel w", "hangs on elbow, which is no upright joint"),
+        (
+            (pivot("p", 0.5),),
+            (rolling("w", 0, 0, "p"),),
+            "r: wheel w",
+            "it is on the axis of p, so it is no caster",
+        ),
+        (
+            (pivot("p", 0.5),),
+            (rolling("w", -0.1, 0.05, "p"),),
+            "r: wheel w",
+            "it is 0.05 m beside the axis of p",
+        ),
+        (
+            (pivot("a", 0), pivot("b", 0, 0, "a")),
+            (rolling("w", -0.1, 0, "b"),),
+            "r: wheel w",
+            "its pivot b hangs on a",
+        ),
     ],
 )
-def test_files_that_say_too_little(pivots: Any, wheels: Any, said: str) -> None:
+def test_files_that_say_too_little(pivots: Any, wheels: Any, where: str, said: str) -> None:
     with pytest.raises(InputError) as caught:
         WheeledPlatform.fit(Layout("r", pivots, wheels))
-    assert said in str(caught.value)
+    assert caught.value.where == where
+    assert caught.value.what.startswith(said)

@@ -28,7 +28,7 @@ from wheeled_examples import (
 from nmm.platforms import (
     Car,
     DifferentialDrive,
-    Fixed,
+    FixedBase,
     FrontDriveCar,
     Mecanum,
     Omnidirectional,
@@ -38,7 +38,7 @@ from nmm.platforms import (
     Unicycle,
 )
 from nmm.platforms.wheeled.descriptions import CasterWheel, Hitch, OmniWheel, SteeredWheel
-from nmm.platforms.wheeled.inputs import Speed, Spin, Spins
+from nmm.platforms.wheeled.inputs import WeightedSpins, WheelSpeed, WheelSpin
 from nmm.platforms.wheeled.platform import WheeledPlatform
 from nmm.robots.robot import Robot
 
@@ -179,18 +179,20 @@ def test_the_common_speed_is_the_root_mean_square_of_the_pivots(rng: np.random.G
 # The named platforms.
 
 
-def with_front(drive: str | Speed = "v") -> WheeledPlatform:
+def with_front(drive: str | WheelSpeed = "v") -> WheeledPlatform:
     return WheeledPlatform([*AXLE, FRONT], inputs=[drive, "steering_rate"])
 
 
 SAME: dict[str, tuple[WheeledPlatform, Platform]] = {
     "unicycle": (WheeledPlatform([*AXLE, CASTER]), Unicycle()),
     "differential drive": (
-        WheeledPlatform(AXLE, inputs=[Spin("rear_left", "omega_left"), Spin("rear_right", "omega_right")]),
+        WheeledPlatform(
+            AXLE, inputs=[WheelSpin("rear_left", "omega_left"), WheelSpin("rear_right", "omega_right")]
+        ),
         DifferentialDrive(0.1, 0.6),
     ),
     "car": (WheeledPlatform([*AXLE, FRONT]), Car(0.8)),
-    "front drive": (with_front(Speed("front", "v")), FrontDriveCar(0.8)),
+    "front drive": (with_front(WheelSpeed("front", "v")), FrontDriveCar(0.8)),
     "on-axle trailer": (
         WheeledPlatform([*AXLE, *trailer("t", "hitch1", 0.6)], [Hitch("hitch1", 0)]),
         Tractor([Trailer(0.6)]),
@@ -234,7 +236,7 @@ def test_the_controller_takes_it_like_the_named_one(robot_2r: Robot, rng: np.ran
 
 def test_fixed_wheels_that_do_not_agree_hold_the_platform_still(rng: np.random.Generator) -> None:
     stuck = EXAMPLES["stuck"]
-    assert (stuck.p, stuck.mobility, Fixed().p) == (0, 0, 0)
+    assert (stuck.p, stuck.mobility, FixedBase().p) == (0, 0, 0)
     assert stuck.G(rng.normal(size=3)).shape == (3, 0)
     assert all(rate == (0.0, 0.0) for rate in stuck.wheel_rates([1, 2, 3], []).values())
 
@@ -242,9 +244,9 @@ def test_fixed_wheels_that_do_not_agree_hold_the_platform_still(rng: np.random.G
 def test_other_inputs_of_one_platform_span_the_same_space(rng: np.random.Generator) -> None:
     qp = rng.uniform(-1, 1, 4)
     for drive in (
-        Speed("front"),
-        Spin("rear_left"),
-        Spins({"rear_left": 0.5, "rear_right": 0.5}, "w"),
+        WheelSpeed("front"),
+        WheelSpin("rear_left"),
+        WeightedSpins({"rear_left": 0.5, "rear_right": 0.5}, "w"),
         "omega",
     ):
         platform = WheeledPlatform([*AXLE, FRONT], inputs=[drive])

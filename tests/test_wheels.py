@@ -7,23 +7,24 @@ from collections.abc import Callable
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
+from findings import holds, of_code, refused
 from scipy.integrate import solve_ivp
 from urdf_parts import joint, link, robot, write
 
-from nmm.errors import InputError, RobotError
+from nmm.errors import RobotError
 from nmm.figures.silhouette import Silhouette
 from nmm.platforms import Omnidirectional, Unicycle
 from nmm.playback import LiveViewer, Motion, wheel_rates, write_html
-from nmm.playback.caster import caster_step
 from nmm.playback.keyframes import LARGEST_TURN, ghost_samples, keyframes
 from nmm.playback.placements import Placements, rolling_joints
-from nmm.playback.rolling import Rolling
+from nmm.playback.rolling import Rolling, caster_step
 from nmm.robots.loading import load
-from nmm.robots.loading.layout import measure_layout
+from nmm.robots.loading.measured_joints import measure_layout
 from nmm.robots.robot import Robot
 from nmm.robots.wheel import Wheel
 
@@ -308,9 +309,9 @@ def test_a_fixed_base_has_no_rolling_joints() -> None:
 
 def test_wrong_numbers_are_refused(base: Callable[[str], Robot]) -> None:
     robot = base("car_base")
-    with pytest.raises(InputError, match="u: expected"):
+    with refused("u"):
         wheel_rates(robot, robot.q(), [1.0])
-    with pytest.raises(InputError, match="angles: expected 6 numbers"):
+    with refused("angles"):
         wheel_rates(robot, robot.q(), [1.0, 0.0], [0.0])
 
 
@@ -418,7 +419,7 @@ def test_a_layout_measures_along_the_roots_axes(tmp_path: Path) -> None:
     assert math.remainder(found.heading, 2 * math.pi) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_a_layout_leaves_out_what_points_down_and_what_is_an_arm() -> None:
+def test_a_layout_counts_to_the_left_and_leaves_out_what_is_an_arm() -> None:
     text = robot(
         link("base"),
         turning("steering", "base", "0.5 0 0.1", DOWN),
@@ -426,23 +427,23 @@ def test_a_layout_leaves_out_what_points_down_and_what_is_an_arm() -> None:
         turning("elbow", "shoulder", "0.3 0 0", LEFT),
     )
     layout = measure_layout(pin.buildModelFromXML(text), (), None, "here")
-    assert layout.pivots == ()
+    assert [(p.joint, p.lower, p.upper) for p in layout.pivots] == [("steering_joint", -math.inf, math.inf)]
     assert layout.wheels == ()
 
 
 @pytest.mark.parametrize(
-    ("wheels", "message"),
+    ("wheels", "code"),
     [
-        ("wheel_joint", "expected a list of joint names"),
-        (["nothing"], "unknown wheel joint 'nothing'"),
-        (["arm_joint"], "'arm_joint' is no wheel: another joint is below it"),
-        (["up_joint"], "'up_joint' is no wheel: its axis is not level"),
-        ({"wheel_joint": 0.0}, "radius of wheel_joint"),
-        (["low_joint"], "radius of wheel 'low_joint' not found"),
-        (["far_joint"], "'far_joint' is no wheel: another joint is between it and the root link"),
+        ("wheel_joint", ""),
+        (["nothing"], ""),
+        (["arm_joint"], "no_wheel"),
+        (["up_joint"], "no_wheel"),
+        ({"wheel_joint": 0.0}, ""),
+        (["low_joint"], "radius_unknown"),
+        (["far_joint"], "no_wheel"),
     ],
 )
-def test_wheels_that_are_none_are_refused(tmp_path: Path, wheels: object, message: str) -> None:
+def test_wheels_that_are_none_are_refused(tmp_path: Path, wheels: Any, code: str) -> None:
     """By `load`, and by the layout that a platform is measured from."""
     text = robot(
         link("base"),
@@ -452,10 +453,19 @@ def test_wheels_that_are_none_are_refused(tmp_path: Path, wheels: object, messag
         turning("arm", "base", "0 0 1", LEFT),
         turning("far", "arm", "0.5 0 0", LEFT),
     )
-    with pytest.raises(RobotError, match=message):
-        load(write(tmp_path / "robot.urdf", text), platform=Unicycle(), wheels=wheels)  # type: ignore[arg-type]
-    with pytest.raises(RobotError, match=message):
-        measure_layout(pin.buildModelFromXML(text), (), wheels, "here")  # type: ignore[arg-type]
+    path = write(tmp_path / "robot.urdf", text)
+    for call in (
+        lambda: load(path, platform=Unicycle(), wheels=wheels),
+        lambda: measure_layout(pin.buildModelFromXML(text), (), wheels, "here"),
+    ):
+        with pytest.raises(RobotError) as caught:
+            call()
+        if code:
+            found = [(one.code, one.values["name"]) for one in caught.value.findings]
+            assert found == [(code, wheels[0])]
+        else:
+            given = [wheels, wheels[0]] if not isinstance(wheels, dict) else [0.0]
+            assert caught.value.got in given
 
 
 def test_a_swivel_with_something_else_on_it_stays(tmp_path: Path) -> None:
@@ -474,9 +484,9 @@ def test_a_swivel_with_something_else_on_it_stays(tmp_path: Path) -> None:
     loaded = load(path)
     assert loaded.wheels == ()
     assert {"wheel_joint", "turret_joint", "camera_joint"} <= set(loaded.q_names)
-    notes = " / ".join(loaded.notes)
-    assert "wheel_joint stays a coordinate in spite of its name: turret_joint, on which it would" in notes
-    assert "other_wheel_joint stays a coordinate in spite of its name: another joint is between" in notes
+    found = {note.values["name"]: note for note in of_code(loaded.notes, "not_a_wheel")}
+    assert holds(found["wheel_joint"], "not_a_wheel", why="swivel_carries_more", swivel="turret_joint")
+    assert holds(found["other_wheel_joint"], "not_a_wheel", why="joint_between")
     # Without its spring, the other one is a wheel on the body.
     (found,) = load(path, lock={"spring": 0.0}).wheels
     assert (found.joint, found.carrier, found.swivel) == ("other_wheel_joint", "theta", "")

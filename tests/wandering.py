@@ -42,8 +42,8 @@ def wanderer(name: str) -> tuple[nmm.Controller, np.ndarray]:
     frame, resolver = ROBOTS[name]
     scenario = nmm.Scenario.load(name)
     robot = scenario.robot()
-    task = nmm.Task(nmm.Position(frame), nmm.Signal([0.0, 0.0, 0.0]), gain=2.0)
-    objective = nmm.Quadratic(*(nmm.Square(name) for name in robot.u_names[robot.platform.p :]))
+    task = nmm.Task(nmm.Position(frame), nmm.LiveTarget([0.0, 0.0, 0.0]), gain=2.0)
+    objective = nmm.Quadratic(*(nmm.QuadraticTerm(name) for name in robot.u_names[robot.platform.p :]))
     limits = nmm.Limits({"platform": 1.0, "arm": 1.5}, acceleration={"platform": 2.0, "arm": 4.0})
     controller = nmm.Controller(robot, task, resolver, objective, limits=limits, dt=DT)
     return controller, robot.q(scenario.parts.q0)
@@ -54,7 +54,7 @@ def wander(
 ) -> Broken:
     """Follow a target that jumps at random: the `Signal` that the controller's task follows."""
     rng = np.random.default_rng(seed)
-    robot, kept = controller.robot, controller.kept
+    robot, kept = controller.robot, controller.solver.limits_on
     (task,) = controller.task
     signal = task.reference
     advance = integrator(method, robot, 1e-9)

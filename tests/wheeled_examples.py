@@ -18,7 +18,7 @@ from nmm.platforms.wheeled.descriptions import (
     SteeredWheel,
     WheelDescription,
 )
-from nmm.platforms.wheeled.inputs import CommonSpeed, Speed, Spin, Spins
+from nmm.platforms.wheeled.inputs import CommonSpeed, WeightedSpins, WheelSpeed, WheelSpin
 from nmm.platforms.wheeled.platform import WheeledPlatform
 
 Array = NDArray[np.float64]
@@ -44,7 +44,7 @@ def mecanum(radius: float, length: float, width: float) -> WheeledPlatform:
         wheels.append(OmniWheel(name, x, y, radius, roller=-pi / 4 if x * y > 0 else pi / 4))
     parts = {"drive": (1, 1, 1, 1), "strafe": (-1, 1, 1, -1), "turn": (-1, 1, -1, 1)}
     inputs = [
-        Spins({name: sign / 4 for name, sign in zip(CORNERS, signs, strict=True)}, part)
+        WeightedSpins({name: sign / 4 for name, sign in zip(CORNERS, signs, strict=True)}, part)
         for part, signs in parts.items()
     ]
     return WheeledPlatform(wheels, inputs=inputs)
@@ -73,9 +73,9 @@ TWO_STEERED = [
 EXAMPLES: dict[str, WheeledPlatform] = {
     "axle": WheeledPlatform([*AXLE, CASTER]),
     "oblique axle": WheeledPlatform([FixedWheel("wheel", -0.2, 0.3, 0.1, 0.7)]),
-    "wheel speeds": WheeledPlatform(AXLE, inputs=[Spin("rear_left"), Spin("rear_right")]),
+    "wheel speeds": WheeledPlatform(AXLE, inputs=[WheelSpin("rear_left"), WheelSpin("rear_right")]),
     "car": WheeledPlatform([*AXLE, FRONT]),
-    "front drive": WheeledPlatform([*AXLE, FRONT], inputs=[Speed("front", "v")]),
+    "front drive": WheeledPlatform([*AXLE, FRONT], inputs=[WheelSpeed("front", "v")]),
     "twin front wheels": WheeledPlatform(
         [*AXLE, *(SteeredWheel(f"f{s}", 0.8, 0, 0.1, joint="steering", offset=s * 0.05) for s in (1, -1))]
     ),
@@ -94,19 +94,19 @@ EXAMPLES: dict[str, WheeledPlatform] = {
     ),
     "hitch with nothing": WheeledPlatform(AXLE, [Hitch("h", 0.2)]),
     "omni": WheeledPlatform(TRIANGLE),
-    "omni by wheel speeds": WheeledPlatform(TRIANGLE, inputs=[Spin(f"o{k}") for k in range(3)]),
+    "omni by wheel speeds": WheeledPlatform(TRIANGLE, inputs=[WheelSpin(f"o{k}") for k in range(3)]),
     "mecanum": mecanum(0.05, 0.5, 0.4),
     "one steered": WheeledPlatform([SteeredWheel("wheel", 0.3, 0.1, 0.1, 0.2), CASTER]),
     "two steered": WheeledPlatform([*TWO_STEERED, CASTER]),
     "two steered, one drives": WheeledPlatform(
-        TWO_STEERED, inputs=["steer_a_rate", Spin("b"), "steer_b_rate"]
+        TWO_STEERED, inputs=["steer_a_rate", WheelSpin("b"), "steer_b_rate"]
     ),
     "four steered": WheeledPlatform(corners()),
     "two front wheels": WheeledPlatform([*AXLE, *corners()[:2]]),
     "driven casters": WheeledPlatform(corners(trail=0.04, offset=0.01)[:3]),
     "driven casters that steer": WheeledPlatform(
         corners(trail=0.2)[:3],
-        inputs=[Speed("front_left"), "steer_front_left_rate", "steer_rear_left_rate"],
+        inputs=[WheelSpeed("front_left"), "steer_front_left_rate", "steer_rear_left_rate"],
     ),
     "axles and a driven caster": WheeledPlatform(
         [*AXLE, *trailer("t", "h", 0.6), SteeredWheel("s", -0.9, 0, 0.1, joint="s", body="h", trail=-0.1)],

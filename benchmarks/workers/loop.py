@@ -153,7 +153,7 @@ class Worker:
     """Its followers by job, and where each is on its path."""
 
     def __init__(self, make: Callable[[Told, bool], Any], told: dict[str, Told]) -> None:
-        self.followers: dict[str, Any] = {}
+        self.mimic_joints: dict[str, Any] = {}
         self.counts: dict[str, int] = {}
         self.at: dict[str, int] = {}
         self.failed: dict[str, str] = {}
@@ -166,12 +166,16 @@ class Worker:
                     self.failed[job] = traceback.format_exc(limit=-1).strip().splitlines()[-1]
                     continue
                 if follower is not None:
-                    self.followers[job], self.counts[job], self.at[job] = follower, len(one["positions"]), 0
+                    self.mimic_joints[job], self.counts[job], self.at[job] = (
+                        follower,
+                        len(one["positions"]),
+                        0,
+                    )
 
     def answer(self, asked: dict[str, Any]) -> dict[str, Any]:
         """One turn."""
         job = asked["job"]
-        follower, count = self.followers[job], self.counts[job]
+        follower, count = self.mimic_joints[job], self.counts[job]
         if asked["do"] == "follow":
             follower.reset()
             path = [list(follower.q())]
@@ -216,7 +220,7 @@ def serve(make: Callable[[Told, str, bool], Any], names: tuple[str, ...]) -> Non
     worker = Worker(
         lambda told, limits: make(told, variant, limits), json.loads(Path(sys.argv[1]).read_text())
     )
-    tell({"versions": versions(names), "jobs": [*worker.followers], "failed": worker.failed})
+    tell({"versions": versions(names), "jobs": [*worker.mimic_joints], "failed": worker.failed})
     for line in sys.stdin:
         try:
             tell(worker.answer(json.loads(line)))

@@ -4,52 +4,78 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from math import degrees, isfinite
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any
 
+import typer
+
+from nmm.cli.groups import Loading, command
+from nmm.cli.options import ARGUMENT, ROBOT_HELP, arguments_of, option
 from nmm.cli.output import show_table, show_text
-from nmm.cli.subjects import scenario_with
-from nmm.errors import InputError
-from nmm.robots.coordinates import UNLIMITED
-from nmm.robots.wheel_rates import inputs_held_by, wheel_rates
+from nmm.errors import InputError, few
 
 if TYPE_CHECKING:
     from nmm.arrays import Array
     from nmm.control.controller import Controller
-    from nmm.control.steering import Steered
-    from nmm.robots.loading.provenance import Provenance
     from nmm.robots.robot import Robot
     from nmm.robots.wheel import Wheel
 
+#: More frames than these are listed in a table.
+_FRAMES_IN_A_LINE = 30
 
-def describe_robot(source: str | None, scenario: str | None, **loading: Any) -> None:
-    """Everything about a robot, or about a scenario's robot and task."""
+
+@command
+def info(
+    robot: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="ROBOT",
+            help=f"{ROBOT_HELP} Not needed with --scenario, which has one.",
+            show_default=False,
+        ),
+    ] = None,
+    *,
+    scenario: str | None = option(
+        "SCENARIO", "Show the redundancy for this scenario's task, and the inputs without effect on it."
+    ),
+    arguments: list[str] | None = ARGUMENT,
+    loading: Loading,
+) -> None:
+    """Describe a robot.
+
+    Coordinates, inputs and limits with their units, groups of inputs, frames that a task may speak of, the
+    platform with its parameters, wheels, the degree of redundancy for tasks of 2, 3 and 6 rows or for a
+    scenario's task, what loading did to the file, meshes and packages.
+
+    \b
+    nmm info unicycle_2r
+    nmm info my_robot.urdf --platform car --lock torso=0.2 --lock head=pi/6
+    nmm info my_robot.urdf --axle -0.1,0 --package-dir ~/ros/src
+    nmm info my_robot.urdf.xacro -a arm=true --package-dir my_robot_description=~/robots/mine
+    nmm info --scenario unicycle_3r_position
+    """
+    from nmm.control.idle_inputs import inputs_without_effect
+    from nmm.control.steering import Steering
     from nmm.robots.loading import load
 
-    if source is None and scenario is None:
-        raise InputError("expected ROBOT, a bundled name or a file, or --scenario SCENARIO, which has one")
-    if source is None and any(loading[key] for key in ("platform", "axle", "package_dirs", "srdf")):
-        raise InputError(
-            "--platform, --axle, --package-dir and --srdf are for ROBOT, a scenario says its own"
-        )
-    given: Robot | None = None
-    if source is not None:
-        given = load(source, **{"missing_meshes": "skip", **loading})
-    task = [("position in the plane", 2), ("position in space", 3), ("pose in space", 6)]
+    keywords, texts = loading.keywords(), arguments_of(arguments)
+    given = None
+    if robot is not None:
+        given = load(robot, arguments=texts, **{"missing_meshes": "skip", **keywords})
     without: Sequence[str] | None = None
-    steered: Steered | None
     if scenario is not None:
-        name, controller, q0 = _of_scenario(scenario, given, loading)
-        from nmm.control.idle_inputs import inputs_without_effect
-
-        given = controller.robot
-        task, without = [(name, len(controller.rows))], inputs_without_effect(controller, q0)
-        steered = controller.steered
-    robot = cast("Robot", given)  # there is a source, or a scenario
-    if scenario is None:
-        from nmm.control.steering import Steering
-
-        steered = Steering().on(robot, ())
-    _show(robot, task)
+        own = [*(keywords[key] for key in ("platform", "axle", "package_dirs", "srdf")), texts]
+        if given is None and any(own):
+            what = "they are for ROBOT, a scenario has its own"
+            raise InputError(what, where="--platform, --axle, --package-dir, --srdf, --set")
+        name, controller, q0 = _of_scenario(scenario, given, keywords)
+        without = inputs_without_effect(controller.solver, q0)
+        shown, tasks, steered = controller.robot, [(name, len(controller.rows))], controller.steered
+    elif given is not None:
+        tasks = [("position in the plane", 2), ("position in space", 3), ("pose in space", 6)]
+        shown, steered = given, Steering().on(given, ())
+    else:
+        raise InputError(expected="ROBOT, a bundled name or a file, or --scenario SCENARIO, which has one")
+    _show(shown, tasks)
     for name in without or ():
         if steered is None or name not in steered.inputs:
             show_text(f"{name} has no effect on the task: only the objective can use it")
@@ -57,11 +83,11 @@ def describe_robot(source: str | None, scenario: str | None, **loading: Any) -> 
         show_text(line)
     if without == ():
         show_text("every input moves the task")
-    _show_loading(robot)
+    _show_loading(shown)
 
 
 def _of_scenario(name: str, robot: Robot | None, loading: Mapping[str, Any]) -> tuple[str, Controller, Array]:
-    """A scenario's name, its controller (on another robot, if one is given), and its start."""
+    from nmm.cli.subjects import scenario_with
     from nmm.scenario import Scenario
     from nmm.scenario.keys import KeyedError
 
@@ -74,9 +100,7 @@ def _of_scenario(name: str, robot: Robot | None, loading: Mapping[str, Any]) -> 
             controller = scenario.parts.build(robot, scenario.absolute)
         except KeyedError as error:
             key = ".".join(map(str, error.place))
-            raise InputError(
-                f"scenario {name} does not fit robot {robot.name}: {key}: {error.text}"
-            ) from None
+            raise InputError(f"scenario {name} does not fit robot {robot.name}: {key}: {error}") from None
     try:
         q0 = controller.robot.q(scenario.parts.q0)
     except InputError:
@@ -85,6 +109,8 @@ def _of_scenario(name: str, robot: Robot | None, loading: Mapping[str, Any]) -> 
 
 
 def _show(robot: Robot, tasks: Sequence[tuple[str, int]]) -> None:
+    from nmm.robots.wheel_rates import wheel_rates
+
     show_text(f"{robot.name} ({robot.source}), {robot.platform.name} platform")
     show_text()
     show_table(
@@ -94,10 +120,15 @@ def _show(robot: Robot, tasks: Sequence[tuple[str, int]]) -> None:
     show_table(["input", "unit", "of", "limit"], _inputs(robot), numeric=["limit"])
     show_text()
     for name, inputs in robot.groups.items():
-        show_text(f"group {name}: {', '.join(inputs) or 'none'}")
+        show_text(f"group {name}: {few(inputs)}")
     for name, values in robot.postures.items():
-        show_text(f"posture {name}: {', '.join(f'{joint} {value:.4g}' for joint, value in values.items())}")
-    show_text(f"frames: {', '.join(robot.frames)}")
+        show_text(f"posture {name}: {few([f'{joint} {value:.4g}' for joint, value in values.items()])}")
+    if len(robot.frames) <= _FRAMES_IN_A_LINE:
+        show_text(f"frames: {', '.join(robot.frames)}")
+    else:
+        joints = {name: robot.model.frames[robot.frame_id(name)].parentJoint for name in robot.frames}
+        moved = [[name, str(robot.model.names[joint]) if joint else "-"] for name, joint in joints.items()]
+        show_table(["frame", "moved by"], moved)
     for name, value in robot.platform.described().items():
         show_text(f"platform {name}: {value}")
     show_text()
@@ -109,8 +140,11 @@ def _show(robot: Robot, tasks: Sequence[tuple[str, int]]) -> None:
             numeric=["radius"],
         )
         show_text()
-    columns = ["task", "rows", "static redundancy", "kinematic redundancy"]
-    show_table(columns, _redundancies(robot, tasks), numeric=columns[1:])
+    columns, rows = ["task", "rows", "static redundancy", "kinematic redundancy"], []
+    for name, s in tasks:
+        counts = robot.n_independent, robot.n_u
+        rows.append([name, str(s), *(str(count - s) if count >= s else "-" for count in counts)])
+    show_table(columns, rows, numeric=columns[1:])
 
 
 def _coordinates(robot: Robot) -> Iterator[list[str]]:
@@ -123,23 +157,22 @@ def _coordinates(robot: Robot) -> Iterator[list[str]]:
 
 
 def _inputs(robot: Robot) -> Iterator[list[str]]:
+    from nmm.robots.wheel_rates import inputs_held_by
+
     held = inputs_held_by(robot, [wheel.joint for wheel in robot.wheels if isfinite(wheel.velocity)])
     for i, (name, unit, limit) in enumerate(zip(robot.u_names, robot.u_units, robot.u_limits, strict=True)):
         of = "platform" if i < robot.platform.p else _arm(robot, name)
-        yield [
-            name,
-            unit,
-            of,
-            "by its wheels" if name in held and not isfinite(limit) else _limit(float(limit)),
-        ]
+        by_wheels = name in held and not isfinite(limit)
+        yield [name, unit, of, "by its wheels" if by_wheels else _limit(float(limit))]
 
 
 def _arm(robot: Robot, joint: str) -> str:
-    """The arm that a joint is part of."""
     return next((name for name, joints in robot.arms.items() if joint in joints), "arm")
 
 
 def _limit(value: float) -> str:
+    from nmm.robots.coordinates import UNLIMITED
+
     return f"{value + 0.0:.4g}" if isfinite(value) and abs(value) < UNLIMITED else "-"  # no -0
 
 
@@ -156,37 +189,26 @@ def _wheel(wheel: Wheel, *, kept: bool) -> list[str]:
     ]
 
 
-def _redundancies(robot: Robot, tasks: Sequence[tuple[str, int]]) -> Iterator[list[str]]:
-    for name, s in tasks:
-        counts = (robot.n_independent, robot.n_u)
-        yield [name, str(s), *(str(count - s) if count >= s else "-" for count in counts)]
-
-
 def _show_loading(robot: Robot) -> None:
-    """What loading found and did."""
-    from nmm.robots.loading.provenance import CHOSEN, provenance_of
+    from nmm.robots.loading.provenance import PLATFORM_SOURCES, provenance_of
 
     made = provenance_of(robot)
     lines = [f"note: {note}" for note in robot.notes]
-    if made.platform in CHOSEN:
-        lines.insert(0, f"platform: {robot.platform.name}, {CHOSEN[made.platform]}")
+    if made.platform in PLATFORM_SOURCES:
+        lines.insert(0, f"platform: {robot.platform.name}, {PLATFORM_SOURCES[made.platform]}")
     lines += [f"prefix of {arm}: {prefix}" for arm, prefix in made.prefixed.items()]
     lines += [f"SRDF: {file}" for file in robot.semantics.files]
-    lines += _files(made)
+    missing = [name for name, file in made.meshes.items() if file is None]
+    if made.meshes:
+        lines.append(f"meshes: {len(made.meshes) - len(missing)} of {len(made.meshes)} found")
+    if missing:
+        lines.append(f"meshes not found: {few(missing)}")
+    lines += [f"package {name}: {folder}" for name, folder in made.packages.items() if folder is not None]
+    lost = [name for name, folder in made.packages.items() if folder is None]
+    if lost:
+        looked = ", ".join(dict.fromkeys(map(str, made.searched)))  # whole: they are to be checked
+        lines.append(f"package not found: {few(lost)}; looked in {looked}")
     if lines:
         show_text()
     for line in lines:
         show_text(line)
-
-
-def _files(made: Provenance) -> Iterator[str]:
-    """Meshes and packages."""
-    missing = [name for name, file in made.meshes.items() if file is None]
-    if made.meshes:
-        yield f"meshes: {len(made.meshes) - len(missing)} of {len(made.meshes)} found"
-    yield from (f"mesh not found: {name}" for name in missing)
-    yield from (f"package {name}: {folder}" for name, folder in made.packages.items() if folder is not None)
-    lost = [name for name, folder in made.packages.items() if folder is None]
-    if lost:
-        looked = ", ".join(dict.fromkeys(map(str, made.searched)))
-        yield f"package not found: {', '.join(lost)}; looked in {looked}"

@@ -1,7 +1,5 @@
 """How a command line ends: every error becomes one line and an exit status, whatever the streams lead to."""
 
-from __future__ import annotations
-
 import errno
 import gc
 import os
@@ -13,23 +11,20 @@ import typer
 
 from nmm.cli.app import app
 from nmm.cli.interrupts import ignore_interrupts, raise_interrupts
-from nmm.cli.output import complain, tell_what_takes_long
+from nmm.cli.output import BAD_INPUT, FAILED, INTERRUPTED, OK, complain, tell_what_takes_long
 from nmm.errors import InputError, NmmError, RunError
 
 #: What typer raises for wrong usage: options that do not exist, arguments that are missing.
 _USAGE_ERROR: type[Exception] = typer.BadParameter.mro()[2]
 
-OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
-#: Their exit status tells how a run ended.
-TELLING = ("run", "compare", "laps", "paper", "sweep", "gallery")
+#: Commands whose exit status is that of a run.
+TELLING = ("run", "compare", "laps", "paper", "sweep")
 
 
 def status_of(arguments: Sequence[str]) -> int:
-    """Run the command line; every error that a user can cause is one line on standard error.
+    """Run the command line; every user error is one line on standard error.
 
-    Returns
-    -------
-    0; 1 for a run that failed; 2 for bad input; 130 for Ctrl-C where there is nothing to write
+    Returns 0; 1 for a failed run; 2 for bad input; 130 for Ctrl-C where there is nothing to write.
     """
     prefix = _called(arguments)
     try:
@@ -42,7 +37,7 @@ def status_of(arguments: Sequence[str]) -> int:
         return _complain(prefix, "interrupted", INTERRUPTED)
     except (BrokenPipeError, SystemExit):  # typer makes the latter of the former
         _discard_output()
-        if prefix.rpartition(" ")[2] not in TELLING:  # who reads no further has what he wanted
+        if prefix.rpartition(" ")[2] not in TELLING:  # the reader has seen enough
             return OK
         return _complain(prefix, "nobody reads the output any more; what is written is whole", FAILED)
     except InputError as error:
@@ -68,16 +63,8 @@ def status_of(arguments: Sequence[str]) -> int:
 
 
 def _called(arguments: Sequence[str]) -> str:
-    """What a line begins with: the command's name, where there is one."""
-    return f"nmm {arguments[0]}" if arguments and arguments[0] in _commands() else "nmm"
-
-
-def _commands() -> list[str]:
-    return [
-        command.name or command.callback.__name__
-        for command in app.registered_commands
-        if command.callback is not None
-    ]
+    names = [one.name or one.callback.__name__ for one in app.registered_commands if one.callback]
+    return f"nmm {arguments[0]}" if arguments and arguments[0] in names else "nmm"
 
 
 def _complain(prefix: str, text: str, status: int) -> int:
@@ -93,7 +80,7 @@ def _flush() -> None:
         raise
     except OSError as error:
         _discard_output()
-        raise RunError(f"the output cannot be written: {error.strerror}") from None
+        raise RunError(f"cannot be written: {error.strerror}", where="the output") from None
 
 
 def _discard_output() -> None:
@@ -111,7 +98,6 @@ def _open_streams() -> None:
 
 
 def main() -> NoReturn:
-    """Entry point of `nmm` and `python -m nmm`."""
     _open_streams()
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):

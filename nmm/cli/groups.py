@@ -7,60 +7,61 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass
 from functools import wraps
-from typing import TYPE_CHECKING, Any, get_type_hints
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+
+import typer
+from typer.models import ParameterInfo
 
 from nmm.cli.options import (
-    AtOption,
-    AxleOption,
-    EllipsoidScaleOption,
-    EllipsoidsOption,
-    FormatOption,
-    LockOption,
-    MissingMeshesOption,
-    NoOpenOption,
-    PackageOption,
-    PlatformOption,
-    PortOption,
-    SrdfOption,
-    SubjectArgument,
-    SubjectSetOption,
-    TaskOption,
-    WheelsOption,
-    WidthOption,
+    AT,
+    SUBJECT_SET,
     axle_of,
-    lock_of,
+    flag,
     names_of,
+    option,
+    task_option,
+    values_of,
     wheels_of,
 )
 from nmm.errors import InputError, expect_known
+from nmm.kinds import PLATFORMS
+from nmm.text_format import listed
 
 if TYPE_CHECKING:
-    from nmm.runs.ellipsoid_options import Wanted
-    from nmm.runs.figure_options import FigureOptions
+    from nmm.ellipsoid_options import Wanted
+    from nmm.figure_options import FigureOptions
 
 
 def command(function: Callable[..., int | None]) -> Callable[..., int | None]:
     """The function as typer takes it: options in the place of each parameter that is a group of them.
 
-    It is called with the options, too, from Python: `redundancy("unicycle_2r", task=["position"])`.
+    From Python it is called with the options: `redundancy("unicycle_2r", task=["position"])`.
     """
-    hints = get_type_hints(function, include_extras=True)
     groups: dict[str, type] = {}
     parameters: list[inspect.Parameter] = []
-    for name, parameter in inspect.signature(function).parameters.items():
-        hint = hints[name]
+    for name, parameter in _typed(function).items():
+        hint = parameter.annotation
         if is_dataclass(hint) and isinstance(hint, type):
             groups[name] = hint
-            parameters += _options(hint)
+            parameters += _typed(hint).values()
         else:
-            parameters.append(_option(parameter, hint))
-    signature = inspect.Signature(parameters)
+            parameters.append(parameter)
+    signature = inspect.Signature(
+        [
+            one.replace(kind=one.POSITIONAL_OR_KEYWORD if one.default is one.empty else one.KEYWORD_ONLY)
+            for one in parameters
+        ]
+    )
 
     @wraps(function)
     def whole(*arguments: Any, **options: Any) -> int | None:
         bound = signature.bind(*arguments, **options)
         bound.apply_defaults()
-        given = dict(bound.arguments)
+        given = {
+            name: value.default if isinstance(value, ParameterInfo) else value
+            for name, value in bound.arguments.items()
+        }
         made = {
             name: group(**{field.name: given.pop(field.name) for field in fields(group)})
             for name, group in groups.items()
@@ -73,31 +74,38 @@ def command(function: Callable[..., int | None]) -> Callable[..., int | None]:
     return whole
 
 
-def _options(group: type) -> list[inspect.Parameter]:
-    hints = get_type_hints(group, include_extras=True)
-    given = inspect.signature(group).parameters
-    return [_option(parameter, hints[name]) for name, parameter in given.items()]
-
-
-def _option(parameter: inspect.Parameter, hint: Any) -> inspect.Parameter:
-    """Positional where it has no default."""
-    required = parameter.default is parameter.empty
-    kind = parameter.POSITIONAL_OR_KEYWORD if required else parameter.KEYWORD_ONLY
-    return parameter.replace(kind=kind, annotation=hint)
+def _typed(made: Callable[..., Any]) -> dict[str, inspect.Parameter]:
+    hints = get_type_hints(made, include_extras=True)
+    return {
+        name: parameter.replace(annotation=hints[name])
+        for name, parameter in inspect.signature(made).parameters.items()
+    }
 
 
 @dataclass(frozen=True)
 class OfRobot:
     """What is made of a robot's joints and meshes, of a scenario's robot too."""
 
-    lock: LockOption = None
-    wheels: WheelsOption = None
-    missing_meshes: MissingMeshesOption = None
+    lock: list[str] | None = option(
+        "JOINT=VALUE",
+        "Fix a joint at a value, rad or m; arithmetic with pi will do. '*finger*=0' fixes all that "
+        "match. May be repeated.",
+    )
+    wheels: str | None = option(
+        "JOINT[=RADIUS],...",
+        "The joints that only roll, each with its radius in m or all without; none for no wheels.",
+        show="those named so",
+    )
+    missing_meshes: str | None = option(
+        "error|skip",
+        "What to do about meshes that are not there: refuse the robot, or leave their shapes out.",
+        show="the scenario's; skip to look at a robot, else error",
+    )
 
     def keywords(self) -> dict[str, Any]:
         """As `nmm.load` takes them, without those not given."""
         given = {
-            "lock": lock_of(self.lock) or None,
+            "lock": values_of(self.lock, "--lock", "JOINT=VALUE, as in torso=0.2") or None,
             "wheels": wheels_of(self.wheels),
             "missing_meshes": self.missing_meshes,
         }
@@ -106,15 +114,29 @@ class OfRobot:
 
 @dataclass(frozen=True)
 class Loading(OfRobot):
-    """How a robot's file is loaded."""
-
-    platform: PlatformOption = None
-    axle: AxleOption = None
-    package_dir: PackageOption = None
-    srdf: SrdfOption = None
+    platform: str | None = option(
+        "NAME",
+        f"How the base moves: {listed(list(PLATFORMS), 'or')}.",
+        show="what the file says, or a car or a unicycle, as its wheels steer",
+    )
+    axle: str | None = option(
+        "FRAME|X,Y",
+        "Where the platform's reference point is in the root link: a frame, or x and y in m.",
+        show="the root link's origin",
+    )
+    package_dir: list[Path] | None = option(
+        "[NAME=]DIR",
+        "A folder that is, or holds, the packages of package:// and $(find ...); NAME=DIR is that of one "
+        "package. May be repeated.",
+        "--package-dir",
+    )
+    srdf: str | None = option(
+        "FILE",
+        "An SRDF with named postures and groups.",
+        show="the one beside the robot's file, if there is one",
+    )
 
     def keywords(self) -> dict[str, Any]:
-        """As `nmm.load` takes them."""
         return super().keywords() | {
             "platform": self.platform,
             "axle": axle_of(self.axle),
@@ -125,62 +147,71 @@ class Loading(OfRobot):
 
 @dataclass(frozen=True)
 class Subject:
-    """What a command analyses, and where."""
-
-    subject: SubjectArgument
-    task: TaskOption = None
-    at: AtOption = None
-    settings: SubjectSetOption = None
+    subject: Annotated[
+        str,
+        typer.Argument(
+            metavar="SUBJECT",
+            help="A robot (a bundled name, a .urdf or .xacro file, package://PACKAGE/PATH) with --task; a "
+            "scenario; or a run's folder.",
+            show_default=False,
+        ),
+    ]
+    task: list[str] | None = task_option("the scenario's")
+    at: list[str] | None = AT
+    settings: list[str] | None = SUBJECT_SET
 
     def keywords(self) -> dict[str, Any]:
-        """All but the subject's name, as `nmm.cli.subjects.studied` takes them."""
         return {"tasks": self.task, "at": self.at, "settings": self.settings}
 
 
 @dataclass(frozen=True)
 class Browser:
-    """How a page is served."""
-
-    port: PortOption = None
-    no_open: NoOpenOption = False
+    port: int | None = option("N", "Port on this machine.", show="a free one")
+    no_open: bool = flag("--no-open", "Print the address, open no browser.")
 
     def keywords(self) -> dict[str, Any]:
-        """As `nmm.playback` takes them."""
         return {"port": self.port, "open_browser": not self.no_open}
 
     def refuse(self, needed: str) -> None:
         """`InputError` where something is asked of a page that only the option `needed` shows."""
         asked = ["--port"] * (self.port is not None) + ["--no-open"] * self.no_open
         if asked:
-            raise InputError(f"{asked[0]}: there is a page only with {needed}, which is not given")
+            raise InputError(f"there is a page only with {needed}, which is not given", where=asked[0])
 
 
 @dataclass(frozen=True)
 class Ellipsoids:
-    """Whether manipulability ellipsoids are drawn, and how large."""
-
-    ellipsoids: EllipsoidsOption = False
-    ellipsoid_scale: EllipsoidScaleOption = None
+    ellipsoids: bool = flag(
+        "--ellipsoids",
+        "Draw the manipulability ellipsoids: how fast the robot, and its arm alone, can move the "
+        "end-effector in each direction.",
+    )
+    ellipsoid_scale: float | None = option(
+        "M", "Draw the ellipsoids, with M metres for each m/s.", show="a readable one"
+    )
 
     def wanted(self) -> Wanted:
         """What they ask for; a scale alone asks for ellipsoids too; `InputError` for one not above zero."""
         if self.ellipsoid_scale is None:
             return self.ellipsoids
-        from nmm.runs.ellipsoid_options import EllipsoidOptions
+        from nmm.ellipsoid_options import EllipsoidOptions
 
         return EllipsoidOptions(scale=self.ellipsoid_scale)
 
 
 @dataclass(frozen=True)
 class Figures:
-    """As what figures are written, and how wide."""
-
-    format: FormatOption = "png"
-    width: WidthOption = None
+    format: str = option(
+        "KIND,KIND,...", "Formats of the figures: some of png, pdf, svg.", "--format", default="png"
+    )
+    width: str | None = option(
+        "IN",
+        "Width of the figures, in; or column (3.5 in) or page (7.16 in), as journals have them.",
+        show="as reads well on a screen",
+    )
 
     def options(self) -> FigureOptions:
-        """What they ask for; `InputError` for an unknown format or width."""
-        from nmm.runs.figure_options import FORMATS, FigureOptions
+        from nmm.figure_options import FORMATS, FigureOptions
 
         formats = tuple(dict.fromkeys(names_of(self.format, "--format")))
         for name in formats:

@@ -1,198 +1,48 @@
-"""Options that several commands have, and what their texts mean."""
+"""Options that several commands have, and how their texts are read: resolvers among them, a kind, a kind with
+settings of its own, or one in a Python file."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from nmm.errors import InputError
-from nmm.kinds import PLATFORMS, RESOLVERS, TASKS
-from nmm.words import listed, quoted
+from nmm.errors import InputError, NmmError, expect, no_such
+from nmm.kinds import RESOLVERS, TASKS
+from nmm.text_format import listed, split_outside_brackets
+
+if TYPE_CHECKING:
+    from nmm.resolvers.base import Resolver
+    from nmm.scenario import Scenario
 
 ROBOT_HELP = "A bundled name (see `nmm robots`), a .urdf or .xacro file, or package://PACKAGE/PATH."
 
-ScenarioArgument = Annotated[
-    str, typer.Argument(metavar="SCENARIO", help="A bundled name (see `nmm scenarios`) or a YAML file.")
-]
-SubjectArgument = Annotated[
-    str,
-    typer.Argument(
-        metavar="SUBJECT",
-        help="A robot (a bundled name, a .urdf or .xacro file, package://PACKAGE/PATH) with --task; a "
-        "scenario; or a run's folder.",
-        show_default=False,
-    ),
-]
-SetOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="KEY=VALUE",
-        help="Change a key of the scenario, by its dotted path; lists count from 0. Numbers may be "
-        "arithmetic with pi, lists and mappings are written as in YAML. May be repeated.",
-    ),
-]
-ArgumentOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set", "-a", metavar="ARG=VALUE", help="Set an argument of a xacro file. May be repeated."
-    ),
-]
-PlatformOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="NAME",
-        help=f"How the base moves: {listed(list(PLATFORMS), 'or')}.",
-        show_default="what the file says, or a car or a unicycle, as its wheels steer",
-    ),
-]
-LockOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="JOINT=VALUE",
-        help="Fix a joint at a value, rad or m; arithmetic with pi will do. '*finger*=0' fixes all that "
-        "match. May be repeated.",
-    ),
-]
-WheelsOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="JOINT[=RADIUS],...",
-        help="The joints that only roll, each with its radius in m or all without; none for no wheels.",
-        show_default="those named so",
-    ),
-]
-MissingMeshesOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="error|skip",
-        help="What to do about meshes that are not there: refuse the robot, or leave their shapes out.",
-        show_default="the scenario's; skip to look at a robot, else error",
-    ),
-]
-AxleOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="FRAME|X,Y",
-        help="Where the platform's reference point is in the root link: a frame, or x and y in m.",
-        show_default="the root link's origin",
-    ),
-]
-ArmOption = Annotated[
-    str | None,
-    typer.Option(metavar="ARM", help="A file or bundled name of an arm, to be mounted on the robot."),
-]
-_TASK_HELP = (
-    f"The task, of KIND {listed(list(TASKS), 'or')}: position:ee:xy, pose, coordinates:q1,q2; or "
-    "a mapping as in a scenario, '{kind: pointing, frame: ee, at: [2, 0, 1]}'. Without FRAME the end of "
-    "the arm. May be repeated: tasks stand above each other."
-)
-TaskOption = Annotated[
-    list[str] | None,
-    typer.Option("--task", metavar="KIND[:FRAME[:AXES]]", help=_TASK_HELP, show_default="the scenario's"),
-]
-ViewedTaskOption = Annotated[
-    list[str] | None,
-    typer.Option("--task", metavar="KIND[:FRAME[:AXES]]", help=_TASK_HELP, show_default="none"),
-]
-AtOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--at",
-        metavar="COORDINATE=VALUE",
-        help="Where, m or rad; arithmetic with pi will do; posture=NAME: one of the SRDF's. May be repeated.",
-        show_default="a scenario's start; 0, or the nearest within the limits",
-    ),
-]
-SubjectSetOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="KEY=VALUE",
-        help="Set an argument of a robot's xacro file (d=0), or a key of a scenario "
-        "(robot.arguments.d=0). May be repeated.",
-    ),
-]
-PackageOption = Annotated[
-    list[Path] | None,
-    typer.Option(
-        "--package-dir",
-        metavar="DIR",
-        help="A folder that is, or holds, the packages of package:// and $(find ...). May be repeated.",
-    ),
-]
-SrdfOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="FILE",
-        help="An SRDF with named postures and groups.",
-        show_default="the one beside the robot's file, if there is one",
-    ),
-]
-PortOption = Annotated[
-    int | None, typer.Option(metavar="N", help="Port on this machine.", show_default="a free one")
-]
-NoOpenOption = Annotated[bool, typer.Option("--no-open", help="Print the address, open no browser.")]
-ResolverOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="|".join(RESOLVERS),
-        help=f"Resolve the redundancy with the "
-        f"{listed([f'{RESOLVERS.words(name)} ({name})' for name in RESOLVERS], 'or')}, "
-        "with those of the scenario's settings that it knows; or as in --resolvers of `nmm compare`.",
-    ),
-]
-ResolversOption = Annotated[
-    str,
-    typer.Option(metavar="KIND,KIND,...", help=f"The resolvers: some of {', '.join(RESOLVERS)}."),
-]
-LengthOption = Annotated[
-    float | None,
-    typer.Option(
-        metavar="M",
-        help="Characteristic length: so many m count as 1 rad; such as the arm's reach.",
-        show_default="1",
-    ),
-]
-EllipsoidsOption = Annotated[
-    bool,
-    typer.Option(
-        "--ellipsoids",
-        help="Draw the manipulability ellipsoids: how fast the robot, and its arm alone, can move the "
-        "end-effector in each direction.",
-    ),
-]
-EllipsoidScaleOption = Annotated[
-    float | None,
-    typer.Option(
-        metavar="M",
-        help="Draw the ellipsoids, with M metres for each m/s.",
-        show_default="a readable one",
-    ),
-]
-FormatOption = Annotated[
-    str,
-    typer.Option("--format", metavar="KIND,KIND,...", help="Formats of the figures: some of png, pdf, svg."),
-]
-WidthOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="IN",
-        help="Width of the figures, in; or column (3.5 in) or page (7.16 in), as journals have them.",
-        show_default="as reads well on a screen",
-    ),
-]
-LimitsOption = Annotated[
-    bool | None,
-    typer.Option(
-        "--limits/--no-limits",
-        help="Keep the robot's own limits where the scenario says none, or keep none at all.",
-        show_default="as the scenario says",
-    ),
-]
+
+def option(metavar: str, text: str, *names: str, default: Any = None, show: str | bool = True) -> Any:
+    """An option with a value, and its help; `show` is what the help gives as its default."""
+    return typer.Option(default, *names, metavar=metavar, help=text, show_default=show)
+
+
+def flag(name: str, text: str, default: bool | None = False, show: str | bool = True) -> Any:
+    """An option that is given or not, or in both forms (--limits/--no-limits)."""
+    return typer.Option(default, name, help=text, show_default=show)
+
+
+def task_option(show: str) -> Any:
+    """The `--task` of a command; `show` says which task stands where none is given."""
+    return option(
+        "KIND[:FRAME[:AXES]]",
+        f"The task, of KIND {listed(list(TASKS), 'or')}: position:ee:xy, pose, coordinates:q1,q2; or "
+        "a mapping as in a scenario, '{kind: pointing, frame: ee, at: [2, 0, 1]}'. Without FRAME the end of "
+        "the arm. May be repeated: tasks stand above each other.",
+        "--task",
+        show=show,
+    )
 
 
 def out_option(default: str) -> Any:
@@ -205,46 +55,90 @@ def out_option(default: str) -> Any:
     )
 
 
+ScenarioArgument = Annotated[
+    str, typer.Argument(metavar="SCENARIO", help="A bundled name (see `nmm scenarios`) or a YAML file.")
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Change a key of the scenario, by its dotted path; lists count from 0. Numbers may be "
+        "arithmetic with pi, lists and mappings are written as in YAML. May be repeated.",
+    ),
+]
+ResolversOption = Annotated[
+    str,
+    typer.Option(metavar="KIND,KIND,...", help=f"The resolvers: some of {', '.join(RESOLVERS)}."),
+]
+#: Kept here: `nmm --help` imports no table.
+_FORMS = ("latex", "csv", "markdown")
+TableOption = Annotated[
+    str | None,
+    typer.Option(
+        "--table",
+        metavar="|".join(_FORMS),
+        help="Print the numbers as a paper takes them, with units, and nothing else on standard output.",
+        show_default="a table for the terminal",
+    ),
+]
+#: `--set` of a robot's file, and of a file or a scenario.
+ARGUMENT = option("ARG=VALUE", "Set an argument of a xacro file. May be repeated.", "--set", "-a")
+SUBJECT_SET = option(
+    "KEY=VALUE",
+    "Set an argument of a robot's xacro file (d=0), or a key of a scenario "
+    "(robot.arguments.d=0). May be repeated.",
+    "--set",
+)
+ARM = option("ARM", "A file or bundled name of an arm, to be mounted on the robot.")
+AT = option(
+    "COORDINATE=VALUE",
+    "Where, m or rad; arithmetic with pi will do; posture=NAME: one of the SRDF's. May be repeated.",
+    "--at",
+    show="a scenario's start; 0, or the nearest within the limits",
+)
+LENGTH = option("M", "Characteristic length: so many m count as 1 rad; such as the arm's reach.", show="1")
+LIMITS = flag(
+    "--limits/--no-limits",
+    "Keep the robot's own limits where the scenario says none, or keep none at all.",
+    default=None,
+    show="as the scenario says",
+)
+
+
 def names_of(given: str, option: str, expected: str = "names with commas between them") -> list[str]:
-    """Names with commas between them; `InputError` where there is none."""
     names = [name.strip() for name in given.split(",") if name.strip()]
-    if not names:
-        raise InputError(f"{option}: expected {expected}, got {given!r}")
+    expect(names, option, expected, given)
     return names
 
 
+def form_of(given: str | None) -> str | None:
+    expect(given is None or given in _FORMS, "--table", listed(list(_FORMS), "or"), given)
+    return given
+
+
 def settings_of(given: Sequence[str] | None) -> dict[str, object]:
-    """The `--set` options of a scenario: values by dotted key."""
     return dict(_pairs(given, "--set", "KEY=VALUE, as in resolver.alpha=5"))
 
 
 def arguments_of(given: Sequence[str] | None) -> dict[str, object]:
-    """The `--set` options of a robot's file: xacro arguments by name."""
     return dict(_pairs(given, "--set", "ARG=VALUE, as in d=0.5"))
 
 
-def lock_of(given: Sequence[str] | None) -> dict[str, float]:
-    """The `--lock` options: values (rad or m) by joint."""
-    return values_of(given, "--lock", "JOINT=VALUE, as in torso=0.2")
-
-
-def values_of(given: Sequence[str] | None, option: str, expected: str) -> dict[str, float]:
-    """Numbers by name, of an option NAME=VALUE that may be repeated; arithmetic with pi will do.
-
-    Raises
-    ------
-    InputError : no NAME=VALUE, not a number, or a name given twice
-    """
+def values_of(
+    given: Sequence[str] | None, option: str, expected: str, read: Callable[[str], Any] | None = None
+) -> dict[str, Any]:
+    """Values of a repeatable option NAME=VALUE by name, numbers unless `read` is given; or `InputError`."""
     from nmm.scenario.numbers import evaluate
 
-    values: dict[str, float] = {}
+    values: dict[str, Any] = {}
     for name, text in _pairs(given, option, expected):
         if name in values:
-            raise InputError(f"{option}: {name} is given twice")
+            raise InputError(f"{name} is given twice", where=option)
         try:
-            values[name] = evaluate(text)
-        except ValueError as error:
-            raise InputError(f"{option}: {name}: {error}") from None
+            values[name] = (read or evaluate)(text)
+        except InputError as error:
+            raise error.at(f"{option}: {name}") from None
     return values
 
 
@@ -264,23 +158,113 @@ def axle_of(given: str | None) -> str | list[float] | None:
     """The `--axle` option: a frame, or x, y (and z), m."""
     if given is None or ("," not in given and any(letter.isalpha() for letter in given)):
         return given
-    if "," not in given:
-        raise InputError(
-            f"--axle: expected a frame, or X,Y (or X,Y,Z) in m with commas between, got {quoted(given)}"
-        )
+    expect("," in given, "--axle", "a frame, or X,Y (or X,Y,Z) in m with commas between", given)
     from nmm.scenario.numbers import evaluate
 
     try:
         return [evaluate(part) for part in given.strip("([ ])").split(",")]
-    except ValueError as error:
-        raise InputError(f"--axle: expected a frame or X,Y in m, got {given!r}: {error}") from None
+    except InputError as error:
+        raise InputError(error.what, where="--axle", expected="a frame or X,Y in m", got=given) from None
 
 
 def _pairs(given: Sequence[str] | None, option: str, expected: str) -> list[tuple[str, str]]:
     pairs = []
     for text in given or ():
         key, equals, value = text.partition("=")
-        if not equals or not key.strip():
-            raise InputError(f"{option}: expected {expected}, got {quoted(text)}")
+        expect(equals and key.strip(), option, expected, text)
         pairs.append((key.strip(), value))
     return pairs
+
+
+EXPECTED = (
+    "kinds with commas between them, with settings or a Python file's, as in rg,pg:alpha=50,laws.py:law"
+)
+
+
+@dataclass(frozen=True)
+class Chosen:
+    text: str  #: as it was given
+    kind: str  #: rg, pg, ...; "own" for a Python file's
+    settings: tuple[tuple[str, str], ...] = ()  #: of its own, by key, as text
+    own: Resolver | None = None  #: the file's
+
+    @property
+    def label(self) -> str:
+        from nmm.resolver_style import pretty
+
+        if self.own is not None:
+            return Path(self.text).name
+        own = [f"{pretty(key)}={value}" for key, value in self.settings]
+        return " ".join([self.kind.upper(), *own]) if own else ""
+
+    def scenario(self, scenario: Scenario) -> Scenario:
+        """The scenario with this resolver, which keeps those keys that the kind knows."""
+        if self.own is not None:
+            file, _, name = self.text.rpartition(":")
+            return scenario.with_resolver(self.own, f"{Path(file).resolve()}:{name}")
+        settings = {f"resolver.{key}": value for key, value in self.settings}
+        return scenario.with_resolver(self.kind).with_settings(settings)
+
+
+def chosen(text: str, option: str) -> Chosen:
+    """One resolver; `InputError` for a text that names none, and for a file without it."""
+    kind, *rest = split_outside_brackets(text, ":")
+    if kind.endswith(".py"):
+        expect(len(rest) == 1 and rest[0], option, "FILE.py:NAME", text)
+        return Chosen(f"{kind}:{rest[0]}", "own", own=_from_file(Path(kind), rest[0], option))
+    settings = []
+    for setting in rest:
+        key, equals, value = (part.strip() for part in setting.partition("="))
+        expect(key and equals and value, option, "KIND:KEY=VALUE, as in pg:alpha=50", text)
+        settings.append((key, value))
+    return Chosen(text, kind, tuple(settings))
+
+
+def named(given: str, option: str, expected: str = EXPECTED) -> list[str]:
+    """As they are given; `InputError` for none, and for one that is given twice."""
+    texts = [text for text in split_outside_brackets(given, ",") if text]
+    expect(texts, option, expected, given)
+    for k, text in enumerate(texts):
+        if text in texts[:k]:
+            raise _twice(option, text, text)
+    return texts
+
+
+def check_different(resolvers: Sequence[Chosen], scenarios: Sequence[Scenario], option: str) -> None:
+    """`InputError` for two that come to the same settings."""
+    found: list[dict[str, Any]] = [scenario.parts.resolver.explicit() for scenario in scenarios]
+    for k, one in enumerate(found):
+        if one in found[:k]:
+            raise _twice(option, resolvers[found.index(one)].text, resolvers[k].text)
+
+
+def _twice(option: str, first: str, second: str) -> InputError:
+    what = f"{first} is given twice" if first == second else f"{first} and {second} are the same here"
+    return InputError(what, where=option, expected="resolvers or settings that differ, as in rg,rg:alpha=5")
+
+
+def _from_file(file: Path, name: str, option: str) -> Resolver:
+    """A `Resolver`, a class of such, or a function problem -> u of a Python file, which is run."""
+    from nmm.resolvers import CallableResolver, Resolver
+
+    where = f"{option}: {file}"
+    spec = spec_from_file_location(f"nmm_own_{file.stem}", file)
+    if spec is None or spec.loader is None or not file.is_file():
+        raise InputError(where=where, expected="a Python file, there is none")
+    module = module_from_spec(spec)
+    sys.modules[module.__name__] = module  # dataclasses look for theirs there
+    try:
+        spec.loader.exec_module(module)
+        names = [key for key, value in vars(module).items() if callable(value) and not key.startswith("_")]
+        if name not in vars(module):
+            raise no_such("name", name, names)
+        found = getattr(module, name)
+        made = found() if isinstance(found, type) and issubclass(found, Resolver) else found
+    except NmmError as error:
+        raise error.at(where, InputError) from None
+    except Exception as error:  # whatever someone's file does
+        raise InputError(f"{type(error).__name__}: {error}", where=where) from error
+    if isinstance(made, Resolver):
+        return made
+    expect(callable(made), f"{where}: {name}", "a function problem -> u or a Resolver", made)
+    return CallableResolver(made)

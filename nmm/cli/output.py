@@ -6,16 +6,22 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, NoReturn
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
 
-from nmm.words import one_line, printable
+from nmm.text_format import one_line, printable
 
 if TYPE_CHECKING:
     from rich.console import Console, JustifyMethod
+    from rich.progress import Progress, ProgressColumn
 
+    from nmm.tables import Table as PaperTable
+
+#: Exit statuses.
+OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 #: A pipe has no width of its own: lines end where the text does.
 WIDTH_OF_A_PIPE = 500
-#: Of a message, and of a word in it (a path, or a value that somebody gave), characters.
+#: Of a message, and of a word in it (a path, or a value), characters.
 LONGEST, LONGEST_WORD = 4000, 500
 
 
@@ -59,8 +65,16 @@ def show_table(
         out.print(line.rstrip(), soft_wrap=True)
 
 
+def print_table(table: PaperTable, form: str, folder: Path) -> None:
+    """The table alone on standard output, as a paper takes it; on standard error where the rest is."""
+    from nmm.tables import FORMS
+
+    sys.stdout.write(FORMS[form](table))
+    sys.stdout.flush()
+    print(f"files in  {readable(str(folder))}", file=sys.stderr)
+
+
 def show_text(text: str = "") -> None:
-    """Print text that wraps on a terminal."""
     out = console()
     out.print(_shown(text), soft_wrap=not out.is_terminal)
 
@@ -71,7 +85,7 @@ def _shown(text: str) -> str:
 
 
 def tell_what_takes_long() -> None:
-    """Show on a terminal what nmm's log says of work that takes long; in a pipe, warnings alone come."""
+    """Show nmm's log of slow work on a terminal; a pipe gets warnings alone."""
     if sys.stderr is None or not sys.stderr.isatty():
         return
     import logging
@@ -91,13 +105,12 @@ def readable(text: str) -> str:
 
 
 def warn(text: str) -> None:
-    """One line on standard error."""
     print(f"warning: {readable(text)}", file=sys.stderr)
 
 
 def complain(prefix: str, text: str) -> None:
     """One line on standard error: why the exit status is not 0."""
-    with suppress(OSError):  # of a full disk: the exit status says it still
+    with suppress(OSError):  # a full disk; the exit status remains
         print(f"{prefix}: {readable(text)}", file=sys.stderr, flush=True)
 
 
@@ -107,17 +120,16 @@ def progress(label: str) -> Iterator[Callable[[float], None] | None]:
     if not sys.stderr.isatty():
         yield None
         return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import TaskProgressColumn, TimeRemainingColumn
 
-    bar = Progress(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-        transient=True,
-    )
-    with bar:
+    with bar_of(TaskProgressColumn(), TimeRemainingColumn()) as bar:
         task = bar.add_task(label, total=1.0)
         yield lambda fraction: bar.update(task, completed=fraction)
+
+
+def bar_of(*columns: ProgressColumn, **options: Any) -> Progress:
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn
+
+    label = TextColumn("{task.description}", markup=False)
+    return Progress(label, BarColumn(), *columns, console=Console(stderr=True), transient=True, **options)

@@ -1,213 +1,235 @@
-"""run, compare, paper and play."""
+"""run, compare and paper: what a scenario does, written and told."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from nmm.cli.chosen_resolvers import Chosen, check_different
+import typer
+
+from nmm.cli.groups import Browser, Ellipsoids, Figures, OfRobot, command
 from nmm.cli.interrupts import shielded
-from nmm.cli.output import complain, progress, show_table
-from nmm.cli.paper_table import print_table
-from nmm.cli.report import describe, show_run
-from nmm.cli.subjects import scenario_with
+from nmm.cli.options import (
+    LIMITS,
+    Chosen,
+    ResolversOption,
+    ScenarioArgument,
+    SetOption,
+    TableOption,
+    check_different,
+    chosen,
+    flag,
+    form_of,
+    named,
+    option,
+    out_option,
+    settings_of,
+)
+from nmm.cli.output import FAILED, OK, complain, print_table, progress, show_table, warn
 from nmm.errors import InputError
-from nmm.folders import comparison
-from nmm.folders.run import is_run
-from nmm.folders.run import save as save_run
-from nmm.folders.whole import check_folder, steady
-from nmm.runs.figure_options import PLAIN, FigureOptions
-from nmm.scenario import Scenario
+from nmm.kinds import RESOLVERS
+from nmm.text_format import listed
 
 if TYPE_CHECKING:
     from nmm.control.controller import Controller
-    from nmm.paper import PaperReport
     from nmm.playback import LiveRun
-    from nmm.runs.ellipsoid_options import Wanted
     from nmm.runs.recording import Recorder
     from nmm.runs.trajectory import Trajectory
+    from nmm.scenario import Scenario
 
-OK, FAILED = 0, 1
 
-
-def run_scenario(
-    name: str,
-    resolver: Chosen | None,
-    settings: Mapping[str, object],
-    limits: bool | None,
-    out: Path | None,
+@command
+def run(
+    scenario: ScenarioArgument,
     *,
-    html: bool,
-    play: bool,
-    port: int | None = None,
-    open_browser: bool = True,
-    ellipsoids: Wanted = False,
-    figures: FigureOptions = PLAIN,
-    of_robot: Mapping[str, Any] = MappingProxyType({}),
+    resolver: str | None = option(
+        "|".join(RESOLVERS),
+        f"Resolve the redundancy with the "
+        f"{listed([f'{RESOLVERS.words(name)} ({name})' for name in RESOLVERS], 'or')}, "
+        "with those of the scenario's settings that it knows; or as in --resolvers of `nmm compare`.",
+    ),
+    settings: SetOption = None,
+    limits: bool | None = LIMITS,
+    of_robot: OfRobot,
+    out: Annotated[Path | None, out_option("runs/<scenario>-<resolver>")] = None,
+    html: bool = flag("--html", "Write playback.html too: the motion in 3D, one file, works offline."),
+    play: bool = flag(
+        "--play", "Show the motion in the browser as it is computed, then play it; Ctrl-C ends it."
+    ),
+    browser: Browser,
+    ellipsoids: Ellipsoids,
+    figures: Figures,
 ) -> int:
-    """Run a scenario, in a page that shows it meanwhile if wanted; write its folder, print its table."""
-    scenario = _load(name, resolver, settings, limits, of_robot)
-    label = "" if resolver is None else resolver.label
-    called = label or scenario.parts.resolver.kind.upper()
-    folder = out or Path("runs") / f"{scenario.name}-{comparison.folder_name(called)}"
+    """Run a scenario and write what happened.
+
+    \b
+    nmm run unicycle_2r_position --resolver pg
+    nmm run unicycle_2r_position --set dt=0.001 --set resolver.alpha=5
+    nmm run unicycle_2r_position --set task.0.reference.radius=2 --set robot.arguments.d=0.5
+    nmm run unicycle_3r_spline --set 'q0={x: 0.2, q2: pi/3}' --html --out here
+    nmm run unicycle_3r_position --ellipsoids --html
+    nmm run unicycle_2r_position --format png,pdf --width column
+
+    The folder holds trajectory.npz and trajectory.csv (times, coordinates, inputs, errors, objective),
+    summary.json (the numbers of the table), scenario.yaml (every key, to be run again) and figures as PNG,
+    with --ellipsoids ellipses.png among them.
+    Ctrl-C ends the run and writes the part that was computed, marked incomplete.
+    """
+    from nmm.folders.comparison import folder_name
+    from nmm.folders.run import is_run
+    from nmm.folders.whole import check_folder
+
+    if not play:
+        browser.refuse("--play")
+    one = None if resolver is None else chosen(resolver, "--resolver")
+    changed, shown_ellipsoids = settings_of(settings), ellipsoids.wanted()
+    drawn = figures.options()
+    made = _load(scenario, one, changed, limits, of_robot)
+    label = "" if one is None else one.label
+    called = label or made.parts.resolver.kind.upper()
+    folder = out or Path("runs") / f"{made.name}-{folder_name(called)}"
     check_folder(folder, is_run)
-    controller = scenario.controller()  # complains before there is a progress bar
-    title = f"{scenario.title or scenario.name}, {called}"
-    with _shown(scenario, controller, title, port, open_browser) if play else nullcontext() as page:
-        trajectory = _run(scenario, controller, None if page is None else page.watch, label)
+    controller = made.controller()  # complains before there is a progress bar
+    shown: AbstractContextManager[LiveRun | None] = nullcontext()
+    if play:
+        from nmm.playback import LiveRun
+
+        title = f"{made.title or made.name}, {called}"
+        shown = LiveRun(controller, made.parts.q0, made.parts.duration, title=title, **browser.keywords())
+    with shown as page:
+        trajectory = _run(made, controller, None if page is None else page.watch, label)
         with shielded() as asked_to_end:
-            _tell_and_save(trajectory, folder, html=html, ellipsoids=ellipsoids, figures=figures)
+            _tell_and_save(trajectory, folder, html=html, ellipsoids=shown_ellipsoids, figures=drawn)
         status = _status("nmm run", [trajectory], folder)
         ends = asked_to_end.is_set() or trajectory.outcome == "interrupted"
         if page is not None and len(trajectory) and not ends:
-            page.stay(trajectory, ellipsoids=ellipsoids)
+            page.stay(trajectory, ellipsoids=shown_ellipsoids)
     return status
 
 
-def _shown(
-    scenario: Scenario, controller: Controller, title: str, port: int | None, open_browser: bool
-) -> AbstractContextManager[LiveRun]:
-    """A page for a run that is about to begin."""
-    from nmm.playback import LiveRun
-
-    parts = scenario.parts
-    return LiveRun(controller, parts.q0, parts.duration, title=title, port=port, open_browser=open_browser)
+def _always_written(wanted: bool) -> None:
+    if wanted:
+        raise InputError("`nmm compare` always writes playback.html, with all runs in it", where="--html")
 
 
-def _tell_and_save(trajectory: Trajectory, folder: Path, **asked: Any) -> None:
-    """The numbers first: nobody has to wait for figures to see them."""
-    width = 0
-    gone: OSError | None = None
-
-    def tell(numbers: dict[str, Any]) -> None:
-        nonlocal width, gone
-        try:
-            width = show_run(trajectory, numbers)
-        except OSError as error:  # their reader has gone (`nmm run … | head -3`): the folder is written still
-            gone = error
-
-    save_run(trajectory, folder, tell=tell, **asked)
-    if gone is not None:
-        raise gone
-    show_table(["", ""], [["files in".ljust(width), str(folder)]])
-
-
-def compare_resolvers(
-    name: str,
-    resolvers: Sequence[Chosen],
-    settings: Mapping[str, object],
-    limits: bool | None,
-    out: Path | None,
+@command
+def compare(
+    scenario: ScenarioArgument,
     *,
-    ellipsoids: Wanted = False,
-    figures: FigureOptions = PLAIN,
-    of_robot: Mapping[str, Any] = MappingProxyType({}),
-    form: str | None = None,
+    resolvers: ResolversOption = "rg,pg",
+    settings: SetOption = None,
+    limits: bool | None = LIMITS,
+    of_robot: OfRobot,
+    out: Annotated[Path | None, out_option("runs/<scenario>-compare")] = None,
+    html: Annotated[bool, typer.Option("--html", hidden=True, callback=_always_written)] = False,
+    table: TableOption = None,
+    ellipsoids: Ellipsoids,
+    figures: Figures,
 ) -> int:
-    """Run a scenario with several resolvers, or settings of one; write and print how they compare.
+    """Run a scenario with several resolvers, or with one at several settings.
 
-    form : of the table, for a paper; a terminal's when not given
+    One table, one figure, one playback.
+
+    \b
+    nmm compare unicycle_2r_position
+    nmm compare unicycle_2r_pointing --resolvers rg,pg,ej --set resolver.alpha=5
+    nmm compare unicycle_2r_position --resolvers rg,rg:alpha=5,pg:alpha=50
+    nmm compare unicycle_2r_position --table latex > table.tex
+    nmm compare unicycle_2r_position --resolvers rg,my_laws.py:law
+
+    The folder holds comparison.png, playback.html (all robots in one scene), summary.json and, for each
+    resolver, a folder with its run.
     """
-    from nmm.runs.timing import step_time
+    from nmm.folders import comparison
+    from nmm.folders.whole import check_folder
+    from nmm.runs.table import step_time
 
-    scenarios = [_load(name, one, settings, limits, of_robot) for one in resolvers]
-    check_different(resolvers, scenarios, "--resolvers")
-    folder = out or Path("runs") / f"{scenarios[0].name}-compare"
+    several = [chosen(text, "--resolvers") for text in named(resolvers, "--resolvers")]
+    changed = settings_of(settings)
+    drawn: dict[str, Any] = {"ellipsoids": ellipsoids.wanted(), "figures": figures.options()}
+    form = form_of(table)
+    scenarios = [_load(scenario, one, changed, limits, of_robot) for one in several]
+    check_different(several, scenarios, "--resolvers")
+    name = scenarios[0].name
+    folder = out or Path("runs") / f"{name}-compare"
     check_folder(folder, comparison.is_comparison)
     # What is wrong with the last one shows before the first one runs.
-    controllers = [scenario.controller() for scenario in scenarios]
+    controllers = [made.controller() for made in scenarios]
     trajectories: list[Trajectory] = []
-    for scenario, controller, one in zip(scenarios, controllers, resolvers, strict=True):
-        trajectories.append(_run(scenario, controller, label=one.label))
+    for made, controller, one in zip(scenarios, controllers, several, strict=True):
+        trajectories.append(_run(made, controller, label=one.label))
         if trajectories[-1].outcome == "interrupted":
             break
     with shielded():
-        comparison.save(trajectories, folder, scenarios[0].name, ellipsoids=ellipsoids, figures=figures)
-    table = [dict(describe(trajectory, trajectory.summary())) for trajectory in trajectories]
+        comparison.save(trajectories, folder, name, **drawn)
+    columns = [dict(describe(trajectory, trajectory.summary())) for trajectory in trajectories]
     if form is not None:
         from nmm.tables import comparison_table
 
         print_table(comparison_table(trajectories), form, folder)
         return _status("nmm compare", trajectories, folder)
-    for column, scenario, trajectory in zip(table, scenarios, trajectories, strict=False):
+    for column, made, trajectory in zip(columns, scenarios, trajectories, strict=False):
         if len(trajectory):
-            controller = scenario.controller()
+            controller = made.controller()
             controller.dt = trajectory.dt
             column["a control step"] = f"{1e6 * step_time(controller, trajectory):.3g} µs here"
-    labels = list(dict.fromkeys(label for column in table for label in column))
+    labels = list(dict.fromkeys(label for column in columns for label in column))
     show_table(
         ["", *(trajectory.called for trajectory in trajectories)],
-        [[label, *(column.get(label, "") for column in table)] for label in labels],
-        title=f"{scenarios[0].name}: {scenarios[0].title}",
+        [[label, *(column.get(label, "") for column in columns)] for label in labels],
+        title=f"{name}: {scenarios[0].title}",
     )
     show_table(["", ""], [["files in", str(folder)]])
     return _status("nmm compare", trajectories, folder)
 
 
-def write_the_paper(folder: Path, figures: FigureOptions = PLAIN, form: str | None = None) -> int:
-    """The paper's cases and figures; 0 when every claim holds.
+@command
+def paper(
+    *,
+    out: Path = option("DIR", "Where to write, as for `nmm run`.", default=Path("paper")),
+    table: TableOption = None,
+    figures: Figures,
+) -> int:
+    """Redo the paper's cases and figures.
 
-    form : of a table with the numbers of the runs, for a paper; the claims are printed when not given
+    Section VI: the four cases with RG and PG, figures 3 to 10, and the numbers that the paper claims.
+    Open index.html in the folder: it shows all of it, with the motions to play. Takes less than a minute.
     """
     from nmm.paper import write_paper
 
+    drawn, form = figures.options(), form_of(table)
     with progress("the paper's four cases") as report:
-        paper = write_paper(folder, progress=report, figures=figures)
+        made = write_paper(out, progress=report, figures=drawn)
     if form is not None:
-        print_table(paper.table(), form, folder)
-        return _paper_status(paper)
-    show_table(
-        ["case", "what the paper claims", "holds"],
-        [
-            [str(case.number), claim.statement, "yes" if claim.holds else "NO"]
-            for case in paper.cases
-            for claim in case.claims
-        ],
-    )
-    show_table(["", ""], [["open", str(paper.index)]])
-    return _paper_status(paper)
-
-
-def _paper_status(paper: PaperReport) -> int:
-    if not paper.holds:
-        complain("nmm paper", f"a claim does not hold; what came out is in {paper.index}")
-    return OK if paper.holds else FAILED
-
-
-def play_folder(folder: Path, port: int | None, *, open_browser: bool, ellipsoids: Wanted = False) -> None:
-    """Play a run, or the runs of a comparison in one scene."""
-    from nmm.playback import play
-
-    play(runs_in(folder), port=port, open_browser=open_browser, ellipsoids=ellipsoids)
-
-
-def runs_in(folder: Path) -> list[Trajectory]:
-    """The run of a folder, or those of a comparison, that have samples; `InputError` for none."""
-    from nmm.runs.trajectory import Trajectory
-
-    def read() -> list[Trajectory]:
-        folders = comparison.runs_of(folder) if comparison.is_comparison(folder) else [folder]
-        return [trajectory for trajectory in (Trajectory.load(path) for path in folders) if len(trajectory)]
-
-    runs = steady(folder, read)
-    if not runs:
-        raise InputError(f"{folder}: expected a run with at least one sample")
-    return runs
+        print_table(made.table(), form, out)
+    else:
+        show_table(
+            ["case", "what the paper claims", "holds"],
+            [
+                [str(case.number), claim.statement, "yes" if claim.holds else "NO"]
+                for case in made.cases
+                for claim in case.claims
+            ],
+        )
+        show_table(["", ""], [["open", str(made.index)]])
+    if not made.holds:
+        complain("nmm paper", f"a claim does not hold; what came out is in {made.index}")
+    return OK if made.holds else FAILED
 
 
 def _load(
-    name: str,
-    resolver: Chosen | None,
-    settings: Mapping[str, object],
-    limits: bool | None,
-    of_robot: Mapping[str, Any],
+    name: str, resolver: Chosen | None, settings: Mapping[str, object], limits: bool | None, of_robot: OfRobot
 ) -> Scenario:
+    from nmm.cli.subjects import scenario_with
+    from nmm.scenario import Scenario
+
+    keywords = of_robot.keywords()
     kind = {} if resolver is None or resolver.own is not None else {"resolver.kind": resolver.kind}
-    scenario = scenario_with(Scenario.load(name, kind | dict(settings)), of_robot)
+    scenario = scenario_with(Scenario.load(name, kind | dict(settings)), keywords)
     if resolver is not None:
         scenario = resolver.scenario(scenario)
     if limits is None or limits is (scenario.parts.limits is not None):
@@ -221,8 +243,55 @@ def _run(
     watch: Callable[[Recorder], None] | None = None,
     label: str = "",
 ) -> Trajectory:
+    from nmm.findings import Finding
+    from nmm.runs.verdict import Outcome, Verdict
+
     with progress(f"{scenario.name}, {label or scenario.parts.resolver.kind.upper()}") as report:
-        return replace(scenario.run(report, controller, watch), label=label)
+        trajectory = replace(scenario.run(report, controller, watch), label=label)
+        try:
+            _ = trajectory.findings  # a shorter dt is tried here, where Ctrl-C still ends it
+        except KeyboardInterrupt:
+            found = Finding("interrupted_judging")
+            return replace(trajectory, verdict=Verdict(Outcome.INTERRUPTED, (found,)))
+        return trajectory
+
+
+def _tell_and_save(trajectory: Trajectory, folder: Path, **asked: Any) -> None:
+    from nmm.folders.run import save
+
+    width = 0
+    gone: OSError | None = None
+
+    def tell(numbers: dict[str, Any]) -> None:
+        nonlocal width, gone
+        try:
+            width = show_run(trajectory, numbers)
+        except OSError as error:  # their reader has gone (`nmm run … | head -3`): the folder is written still
+            gone = error
+
+    save(trajectory, folder, tell=tell, **asked)
+    if gone is not None:
+        raise gone
+    show_table(["", ""], [["files in".ljust(width), str(folder)]])
+
+
+def show_run(trajectory: Trajectory, numbers: dict[str, Any]) -> int:
+    """Print the table of a run, from its summary, and its warnings; returns the width of its first column."""
+    scenario = trajectory.scenario or {}
+    title = f"{scenario.get('name', '')}: {scenario.get('title', '')}".strip(": ")
+    lines = describe(trajectory, numbers)
+    show_table(["", ""], lines, title=title)
+    sys.stdout.flush()
+    return max(len(label) for label, _ in lines)
+
+
+def describe(trajectory: Trajectory, numbers: dict[str, Any]) -> list[tuple[str, str]]:
+    """Labels and values of a run's summary; its warnings go to standard error."""
+    from nmm.runs.table import summary_rows
+
+    for warning in numbers["warnings"]:
+        warn(f"{trajectory.called}: {warning}")
+    return list(summary_rows(trajectory, numbers))
 
 
 def _status(command: str, trajectories: Sequence[Trajectory], folder: Path) -> int:

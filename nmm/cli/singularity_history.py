@@ -1,20 +1,23 @@
-"""The numbers of a singularity analysis along a run, as tables and sentences."""
+"""What `nmm singularities` shows of a run: tables, findings, and the same for scripts."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nmm.analysis.singular.algorithmic import volume
-from nmm.analysis.singular.along import SingularityHistory
-from nmm.analysis.singular.instants import Crossing, Dip
-from nmm.analysis.singular.minors import determinants, minor_name
+from nmm.analysis.singular.along import Dip, SingularityHistory
+from nmm.analysis.singular.jacobians import stacked
+from nmm.analysis.singular.minors import determinants
 from nmm.arrays import Array
-from nmm.cli.output import show_table
-from nmm.cli.singularity_words import block, header, named_or_counted, number, say, sizes_note, without_twins
+from nmm.cli.document import Item, Table, fields, number, rounded
+from nmm.cli.singularity_report import header, sizes, subject_data, without_twins
+from nmm.findings import Finding
+from nmm.findings.singularities import named_or_counted
+from nmm.latex import block, minor_name
 from nmm.runs.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -26,164 +29,131 @@ ALWAYS_ZERO = 1e-9
 MOST = 40
 
 
-def show_history(
+def described(
     given: Studied, run: Trajectory, history: SingularityHistory, length: float | None, left_out: int
-) -> None:
-    """Print a history; `left_out` minors are not in it because they are many."""
-    from nmm.analysis.singular.reached import stacked
-
-    rows = stacked(given.task).rows(given.robot)
-    for line in header(given):
-        say(line)
+) -> Iterator[Item]:
+    yield from header(given)
     span = f"{run.t[0]:g} to {run.t[-1]:g} s" if len(run) > 1 else f"{run.t[0]:g} s"
-    say(f"along a run of {run.resolver.upper()}, {span} in {len(run)} samples ({run.outcome})")
-    note = sizes_note([*(row.unit for row in rows), *given.robot.u_units], length)
-    if note:
-        say(note)
-    say()
-    _show_parts(given, history)
-    for line in _verdict(history):
-        say(line)
+    yield f"along a run of {run.resolver.upper()}, {span} in {len(run)} samples ({run.outcome})"
+    rows = stacked(given.task).rows(given.robot)
+    yield from sizes([*(row.unit for row in rows), *given.robot.u_units], length)
+    yield ""
+    yield _parts(given, history)
+    yield ""
+    yield from _verdict(history)
     of_rg = given.controller is not None and bool(np.all(run.partition >= 0))  # for this very task
     if of_rg:
-        say()
-        _show_partitions(run, history)
+        yield ""
+        yield from _partitions(run, history)
     if len(history.minors):
-        say()
-        _show_crossings(run if of_rg else None, history)
+        yield ""
+        yield from _crossings(run if of_rg else None, history)
     if left_out:
-        say()
-        named = ",".join(history.inputs[: len(history.rows)])
-        say(f"{left_out} minors are not looked at: --minors does, --minor {named} looks at this one")
+        yield ""
+        first = history.inputs[: len(history.rows)]
+        yield Finding("minors_not_followed", {"count": left_out, "first": first})
     if history.extended_sigma_min is not None:
-        say()
-        for line in _extended(history, history.extended_sigma_min):
-            say(line)
+        yield ""
+        yield from _extended(history, history.extended_sigma_min)
 
 
-def _show_parts(given: Studied, history: SingularityHistory) -> None:
+def history_data(given: Studied, history: SingularityHistory) -> dict[str, Any]:
+    return {
+        **subject_data(given),
+        **fields(history, "rows inputs t rank condition"),
+        "sigma_min": dict(history.sigma_min),
+        "extended_sigma_min": history.extended_sigma_min,
+        "minors": {", ".join(name): values for name, values in history.minors.items()},
+        "threshold": history.threshold,
+        "crossings": [fields(crossing, "t columns sign") for crossing in history.crossings],
+        "dips": [fields(dip, "t value at_end") for dip in history.dips],
+        "extended_dips": [fields(dip, "t value at_end") for dip in history.extended_dips],
+    }
+
+
+def _parts(given: Studied, history: SingularityHistory) -> Table:
     groups = {**given.robot.groups, "robot": given.robot.u_names}
     largest = float(history.singular_values.max())
     rows = []
     for key, label in without_twins([(name, groups[name]) for name in history.sigma_min]):
         sigma = history.sigma_min[key]
-        rows.append(
-            [
-                label,
-                named_or_counted(groups[key], "inputs"),
-                number(sigma.min(), largest),
-                f"{history.t[sigma.argmin()]:g} s",
-                number(sigma.max(), largest),
-            ]
-        )
-    show_table(
-        ["part", "inputs", "smallest σ_min", "at", "largest σ_min"],
-        rows,
-        numeric=["smallest σ_min", "at", "largest σ_min"],
-    )
-    say()
+        inputs, at = named_or_counted(groups[key], "inputs"), f"{history.t[sigma.argmin()]:g} s"
+        rows.append([label, inputs, number(sigma.min(), largest), at, number(sigma.max(), largest)])
+    columns = ["part", "inputs", "smallest σ_min", "at", "largest σ_min"]
+    return Table(columns, rows, columns[2:])
 
 
-def _verdict(history: SingularityHistory) -> Iterator[str]:
-    """Rank, condition, low minima of σ_min, and what the platform does for the arm."""
-    s, whole = len(history.rows), history.sigma_min["robot"]
+def _verdict(history: SingularityHistory) -> Iterator[Finding]:
+    s, whole, t = len(history.rows), history.sigma_min["robot"], history.t
     singular = np.flatnonzero(history.rank < s)
     if len(singular):
-        yield (
-            f"Singular at {len(singular)} of {len(history.t)} samples, the first at "
-            f"{history.t[singular[0]]:g} s: rank {history.rank[singular].min()} of {s}."
-        )
+        counts = {"singular": len(singular), "samples": len(t), "t": float(t[singular[0]])}
+        yield Finding("run_singular", {**counts, "rank": int(history.rank[singular].min()), "rows": s})
     else:
         worst = int(history.condition.argmax())
-        yield (
-            f"J has rank {s} at every sample; its condition is at most {number(history.condition[worst])}, "
-            f"at {history.t[worst]:g} s."
-        )
+        condition = float(history.condition[worst])
+        yield Finding("run_regular", {"rows": s, "condition": condition, "t": float(t[worst])})
     if history.dips:
-        yield f"σ_min comes below {history.threshold:.3g} at {_dips(history.dips)}."
+        yield Finding("sigma_dips", {"threshold": history.threshold, **_dips(history.dips)})
     else:
-        yield f"σ_min never comes below {history.threshold:.3g}."
-    if "arm" in history.sigma_min and history.sigma_min["arm"].min() < history.threshold <= whole.min():
-        arm = history.sigma_min["arm"]
-        lowest = f"{number(arm.min(), float(history.singular_values.max()))} at {history.t[arm.argmin()]:g} s"
-        yield f"The arm alone does, down to {lowest}: the platform makes up for it."
+        yield Finding("sigma_stays", {"threshold": history.threshold})
+    arm = history.sigma_min.get("arm")
+    if arm is not None and arm.min() < history.threshold <= whole.min():
+        lowest = rounded(arm.min(), float(history.singular_values.max()))
+        yield Finding("arm_dips", {"sigma_min": lowest, "t": float(t[arm.argmin()])})
 
 
-def _dips(dips: Sequence[Dip]) -> str:
-    parts = [f"{dip.t:.4g} s ({dip.value:.2g}{', an end' if dip.at_end else ''})" for dip in dips[:MOST]]
-    more = len(dips) - len(parts)
-    return ", ".join(parts) + (f" and {more} more times" if more else "")
+def _dips(dips: Sequence[Dip]) -> dict[str, Any]:
+    """The first ones as (s, σ_min, whether at an end), and how many more."""
+    shown = [(dip.t, dip.value, dip.at_end) for dip in dips[:MOST]]
+    return {"dips": shown, "more": len(dips) - len(shown)}
 
 
-def _show_partitions(run: Trajectory, history: SingularityHistory) -> None:
+def _partitions(run: Trajectory, history: SingularityHistory) -> Iterator[Item]:
     """When RG used which partition, and how near to singular it was."""
     used = run.partition
     starts = [0, *(np.flatnonzero(np.any(np.diff(used, axis=0) != 0, axis=1)) + 1), len(used)]
     rows = []
     for first, end in list(pairwise(starts))[:MOST]:
-        share = _shares(history, used[first])[first:end]
+        J = history.J[first:end]
+        whole, found = volume(J), np.abs(determinants(J, np.array([used[first]])))[:, 0]
+        share = np.divide(found, whole, out=np.zeros_like(found), where=whole > 0.0)  # 0 where J lost rank
         lowest = int(share.argmin())
-        rows.append(
-            [
-                f"{run.t[first]:g} s",
-                f"{run.t[end - 1]:g} s",
-                f"{share[lowest]:.3g}",
-                f"{run.t[first + lowest]:g} s",
-                block([history.inputs[j] for j in used[first]]),
-            ]
-        )
-    columns = ["from", "to", "smallest |det Ja|/√(det J Jᵀ)", "at", "RG's partition"]
-    show_table(columns, rows, numeric=columns[:4])
+        begins, ends, at = (f"{run.t[k]:g} s" for k in (first, end - 1, first + lowest))
+        columns = block([history.inputs[j] for j in used[first]])
+        rows.append([begins, ends, f"{share[lowest]:.3g}", at, columns])
+    names = ["from", "to", "smallest |det Ja|/√(det J Jᵀ)", "at", "RG's partition"]
+    yield Table(names, rows, names[:4])
     if len(starts) - 1 > MOST:
-        say(f"and {len(starts) - 1 - MOST} more changes")
+        yield Finding("more_partition_changes", {"count": len(starts) - 1 - MOST})
 
 
-def _shares(history: SingularityHistory, columns: Array) -> Array:
-    """|det Ja| / sqrt(det J Jᵀ) of one partition, (N,); 0 where J lost rank."""
-    whole = volume(history.J)
-    found = np.abs(determinants(history.J, np.array([columns])))[:, 0]
-    return np.divide(found, whole, out=np.zeros_like(found), where=whole > 0.0)
-
-
-def _show_crossings(run: Trajectory | None, history: SingularityHistory) -> None:
-    """Changes of sign; with the partition then in use, of a run of RG."""
-    dead = {
-        name
-        for name, ratio in zip(history.minors.names, history.ratios.max(axis=0), strict=True)
-        if ratio <= ALWAYS_ZERO
-    }
+def _crossings(run: Trajectory | None, history: SingularityHistory) -> Iterator[Item]:
+    ratios = zip(history.minors.names, history.ratios.max(axis=0), strict=True)
+    dead = {name for name, ratio in ratios if ratio <= ALWAYS_ZERO}
     crossings = [crossing for crossing in history.crossings if crossing.columns not in dead]
     if crossings:
-        rows = [
-            [
-                f"{crossing.t:.4g} s",
-                "+" if crossing.sign > 0 else "-",
-                minor_name(crossing.columns),
-                *([_used(run, crossing)] if run is not None else []),
-            ]
-            for crossing in crossings
-        ]
+        rows = []
+        for one in crossings:
+            used = []
+            if run is not None:
+                names = [run.robot.u_names[j] for j in run.partition[one.before]]
+                used.append("this one" if set(names) == set(one.columns) else block(names))
+            rows.append([f"{one.t:.4g} s", "+" if one.sign > 0 else "-", minor_name(one.columns), *used])
         columns = ["at", "to", "minor that changes its sign", *(["RG uses"] if run is not None else [])]
-        show_table(columns, rows[:MOST], numeric=["at"])
+        yield Table(columns, rows[:MOST], ["at"])
         if len(rows) > MOST:
-            say(f"and {len(rows) - MOST} more: --json has all, --minor chooses")
+            yield Finding("more_crossings", {"count": len(rows) - MOST})
     else:
-        say("No minor changes its sign.")
+        yield Finding("no_crossing")
     if dead:
-        names = [minor_name(name) for name in sorted(dead)]
-        say(f"0 on the whole motion: {named_or_counted(names, 'minors')}")
+        yield Finding("zero_throughout", {"minors": sorted(dead)})
 
 
-def _used(run: Trajectory, crossing: Crossing) -> str:
-    """RG's partition at a crossing, or that it is this very one."""
-    names = [run.robot.u_names[j] for j in run.partition[crossing.before]]
-    return "this one" if set(names) == set(crossing.columns) else block(names)
-
-
-def _extended(history: SingularityHistory, sigma: Array) -> Iterator[str]:
+def _extended(history: SingularityHistory, sigma: Array) -> Iterator[Finding]:
     lowest = int(sigma.argmin())
-    yield f"EJ: σ_min of J_e is at least {number(float(sigma[lowest]))}, at {history.t[lowest]:g} s."
+    yield Finding("ej_sigma", {"sigma_min": float(sigma[lowest]), "t": float(history.t[lowest])})
     if history.extended_dips:
-        yield f"It comes below {history.threshold:.3g} at {_dips(history.extended_dips)}."
+        yield Finding("ej_dips", {"threshold": history.threshold, **_dips(history.extended_dips)})
         if not history.dips:
-            yield "J's does not: these are algorithmic, EJ's own."
+            yield Finding("ej_algorithmic_dips")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from nmm.arrays import Array, interpolated, scalar
 from nmm.cli.options import arguments_of, settings_of, values_of
 from nmm.cli.output import warn
-from nmm.errors import InputError, unknown
+from nmm.errors import InputError, expect, no_such
 
 if TYPE_CHECKING:
     from nmm.analysis.singular.jacobians import Subject
@@ -21,48 +21,23 @@ if TYPE_CHECKING:
     from nmm.runs.trajectory import Trajectory
     from nmm.scenario import Scenario
 
-#: Options by the arguments of `nmm.load`.
-_OPTIONS = {
-    "platform": "--platform",
-    "lock": "--lock",
-    "wheels": "--wheels",
-    "missing_meshes": "--missing-meshes",
-    "axle": "--axle",
-    "package_dirs": "--package-dir",
-    "srdf": "--srdf",
-}
-#: Those that a scenario's robot takes, too.
+#: The arguments of `nmm.load` that a scenario's robot takes, too.
 _OF_SCENARIO = ("lock", "wheels", "missing_meshes")
 
 
 @dataclass(frozen=True, eq=False)
 class Studied:
-    """What a command analyses.
-
-    Attributes
-    ----------
-    name : the robot's or the scenario's
-    robot : the robot
-    task : its task; a bare function where no target was said
-    controller : the scenario's, with its resolver and added task; None for a robot, or with another task
-    q (n,) : where; the scenario's start, the run's, or the configuration nearest to zero
-    t : s
-    trajectory : the run, for a run's folder
-    scenario : the scenario, or the run's
-    """
-
-    name: str
+    name: str  #: the robot's or the scenario's
     robot: Robot
-    task: Stack | tuple[Task | Function, ...]
-    controller: Controller | None
-    q: Array
-    t: float = 0.0
-    trajectory: Trajectory | None = None
-    scenario: Scenario | None = None
+    task: Stack | tuple[Task | Function, ...]  #: functions where no target was given
+    controller: Controller | None  #: None for a robot, and for a scenario with another task
+    q: Array  #: (n,): the scenario's start, the run's, or the configuration nearest to zero
+    t: float = 0.0  #: s
+    trajectory: Trajectory | None = None  #: of a run's folder
+    scenario: Scenario | None = None  #: also that of a run
 
     @property
     def subject(self) -> Subject:
-        """As `nmm.analysis` takes it."""
         return self.controller if self.controller is not None else (self.robot, self.task)
 
 
@@ -73,33 +48,22 @@ def studied(
     at: Sequence[str] | None = None,
     t: float | None = None,
     settings: Sequence[str] | None = None,
-    usual_task: str = "",
-    decide: bool = True,
+    to_drive: bool = False,
     **loading: Any,
 ) -> Studied:
     """What SOURCE means: a run's folder, a scenario by name or as YAML file, or else a robot.
 
-    Parameters
-    ----------
-    tasks : texts of `--task`; those of the scenario when there are none
-    at : COORDINATE=VALUE of `--at`, m and rad
-    t : s; 0, or the run's first instant. Of a run, q is where it was then
-    settings : `--set`, of the robot's xacro arguments or of the scenario's keys
-    usual_task : a robot's, where there is no other; none when empty
-    decide : where tasks come and go, whether to look at those active there and tell the others
-    loading : platform, lock, axle, package_dirs of `nmm.load`; a robot's only
-
-    Raises
-    ------
-    InputError : nothing of that name, options that do not fit it, a robot without a task
+    `tasks`, `at` and `settings` are texts of `--task`, `--at` and `--set`. `t` is 0, or the run's first
+    instant, when not given, s. `loading` : arguments of `nmm.load`. Where tasks come and go, those active
+    there are looked at and the others told; not `to_drive`, for which a robot's task may be left out, too.
     """
     from nmm.scenario.short_task import short_task
 
     run, scenario, loaded = opened(source, settings, loading)
     own = None if scenario is None else scenario.controller()
     robot = loaded if own is None else own.robot
-    if own is None and usual_task:
-        tasks = tasks or (usual_task,)
+    if own is None and to_drive:
+        tasks = tasks or ("position",)
     given = tuple(short_task(text, robot) for text in tasks or ())
     if not given and own is None:
         what = "a robot" if run is None else "a run without a scenario"
@@ -107,30 +71,31 @@ def studied(
             f"{source} is {what}: expected --task, as in --task position, --task position:FRAME:xy, "
             "--task pose:FRAME (may be repeated)"
         )
-    q = _start(robot, run, scenario) if t is None or run is None else _then(run, t)
+    now = t if t is not None else 0.0 if run is None else float(run.t[0])
+    if run is not None:
+        first, last = run.t[0], run.t[-1]
+        expect(first <= now <= last, "--time", f"an instant of the run, {first:g} to {last:g} s", now)
+        q = interpolated(now, run.t, run.q)
+    else:
+        q = robot.rest if scenario is None else robot.q(scenario.parts.q0)
     q = configuration_at(robot, q, at, loading.get("lock") or {})
-    first = 0.0 if run is None or not len(run) else float(run.t[0])
-    if not given and own is not None and decide:
-        _decide(own, first if t is None else t, q)
+    if not given and own is not None and not to_drive:
+        _decide(own, now, q)
     return Studied(
         name=robot.name if scenario is None else scenario.name,
         robot=robot,
         task=given if given or own is None else own.task,
         controller=None if given else own,
         q=q,
-        t=first if t is None else t,
+        t=now,
         trajectory=run,
         scenario=scenario,
     )
 
 
 def scenario_with(scenario: Scenario, loading: Mapping[str, Any]) -> Scenario:
-    """The scenario with `lock`, `wheels` and `missing_meshes` of `nmm.load` for its robot, where given.
-
-    Raises
-    ------
-    InputError : its robot is mounted from several
-    """
+    """The scenario with `lock`, `wheels` and `missing_meshes` of `nmm.load` for its robot, where given;
+    `InputError` where its robot is mounted from several."""
     from nmm.scenario.robot import RobotPart
 
     robot, given = scenario.parts.robot, {key: loading[key] for key in _OF_SCENARIO if key in loading}
@@ -138,12 +103,17 @@ def scenario_with(scenario: Scenario, loading: Mapping[str, Any]) -> Scenario:
         return scenario
     if not isinstance(robot, RobotPart):
         raise InputError(
-            f"{', '.join(_OPTIONS[key] for key in given)}: the robot of {scenario.name} is mounted from "
-            "several: say of which, as in --set robot.arm.lock.JOINT=VALUE"
+            f"the robot of {scenario.name} is mounted from several: say of which, as in --set "
+            "robot.arm.lock.JOINT=VALUE",
+            where=_options(given),
         )
     if "lock" in given:
         given["lock"] = {**robot.lock, **given["lock"]}
     return scenario.with_settings({f"robot.{key}": value for key, value in given.items()})
+
+
+def _options(keys: Iterable[str]) -> str:
+    return ", ".join(f"--{key}".replace("_", "-").replace("dirs", "dir") for key in keys)
 
 
 def configuration_at(robot: Robot, q: Array, at: Sequence[str] | None, locked: Mapping[str, float]) -> Array:
@@ -151,7 +121,7 @@ def configuration_at(robot: Robot, q: Array, at: Sequence[str] | None, locked: M
     q = q.copy()
     for name, value in coordinates_at(robot, at).items():
         if name in locked:
-            raise InputError(f"--at: {name} is locked, and no coordinate then")
+            raise InputError(f"{name} is locked, and no coordinate then", where="--at")
         q[robot.coordinate(name)] = scalar(value, f"--at: {name}")
     return q
 
@@ -169,25 +139,24 @@ def coordinates_at(robot: Robot, at: Sequence[str] | None) -> dict[str, float]:
 
 def _decide(controller: Controller, t: float, q: Array) -> None:
     """Of tasks that come and go, those active at t (s) and q (n,) are looked at; the others are told."""
-    from nmm.control.sequenced import SequencedController
-    from nmm.words import listed
+    from nmm.text_format import listed
 
-    if not isinstance(controller, SequencedController):
+    schedule = controller.schedule
+    if schedule is None:
         return
-    controller.changes(t, q)
+    schedule.changes(t, q)
     controller.switch()
-    names, active = controller.sequence.names, controller.moment.active
-    off = [name for name, on in zip(names, active, strict=True) if not on]
+    names, active = schedule.sequence.names, schedule.moment.active
+    seen, off = (
+        [one for one, on in zip(names, active, strict=True) if bool(on) is wanted] for wanted in (True, False)
+    )
     if off:
-        seen = listed([name for name, on in zip(names, active, strict=True) if on]) or "no task"
-        warn(
-            f"tasks come and go: this is about {seen}, active there at t = {t:g} s, "
-            f"and not about {listed(off)}"
-        )
+        here = listed(seen) or "no task"
+        what = f"this is about {here}, active there at t = {t:g} s, and not about {listed(off)}"
+        warn(f"tasks come and go: {what}")
 
 
 def is_scenario(source: str) -> bool:
-    """Whether SOURCE is a scenario's name or a YAML file."""
     from nmm.bundled import bundled_scenarios
     from nmm.scenario.scenario import SUFFIXES
 
@@ -202,6 +171,7 @@ def opened(
     from nmm.robots.loading import load
     from nmm.runs.trajectory import Trajectory
     from nmm.scenario import Scenario
+    from nmm.scenario.keys import older_names
 
     path = Path(source).expanduser()
     of_scenario = is_scenario(source)
@@ -211,24 +181,25 @@ def opened(
     elif not of_scenario:
         if source not in bundled_robots() and not path.suffix and "/" not in source:
             names = [*bundled_robots(), *bundled_scenarios()]
-            raise InputError(unknown("robot or scenario", source, names) + "; or give a path")
+            raise InputError(f"{no_such('robot or scenario', source, names)}; or give a path")
         return None, None, load(source, arguments=arguments_of(settings), **loading)
     allowed = _OF_SCENARIO if of_scenario else ()
-    wrong = [_OPTIONS[key] for key, value in loading.items() if value and key not in allowed]
+    wrong = [key for key, value in loading.items() if value and key not in allowed]
     if wrong:
-        raise InputError(f"{', '.join(wrong)}: of a robot's file; {source} has a robot of its own")
+        raise InputError(f"of a robot's file; {source} has a robot of its own", where=_options(wrong))
     if of_scenario:
         scenario = scenario_with(Scenario.load(source, settings_of(settings)), loading)
         for warning in scenario.warnings:
             warn(warning)
         return None, scenario, scenario.robot()
     if settings:
-        raise InputError(f"--set: expected a robot or a scenario; {source} is a run, which is as it was")
+        what = f"{source} is a run, which is as it was"
+        raise InputError(what, where="--set", expected="a robot or a scenario")
     run = Trajectory.load(path)
-    if not len(run):
-        raise InputError(f"{source}: expected a run with at least one sample")
+    expect(len(run), source, "a run with at least one sample")
     file = path / "scenario.yaml"
-    return run, Scenario.load(file) if file.exists() else None, run.robot
+    with older_names():
+        return run, Scenario.load(file) if file.exists() else None, run.robot
 
 
 def _check_folder(source: str, path: Path) -> None:
@@ -239,19 +210,4 @@ def _check_folder(source: str, path: Path) -> None:
         return
     inside = sorted(folder.name for folder in path.iterdir() if folder.is_dir() and is_run(folder))
     what = f"another folder, which holds the runs {', '.join(inside)}" if inside else "another folder"
-    raise InputError(f"{source}: expected a robot, a scenario or a run's folder, this is {what}")
-
-
-def _then(run: Trajectory, t: float) -> Array:
-    """q (n,) of a run at an instant, linear between its samples."""
-    if not run.t[0] <= t <= run.t[-1]:
-        raise InputError(
-            f"--time: expected an instant of the run, {run.t[0]:g} to {run.t[-1]:g} s, got {t:g}"
-        )
-    return interpolated(t, run.t, run.q)
-
-
-def _start(robot: Robot, run: Trajectory | None, scenario: Scenario | None) -> Array:
-    if run is not None:
-        return run.q[0].copy()
-    return robot.rest.copy() if scenario is None else robot.q(scenario.parts.q0)
+    raise InputError(where=source, expected=f"a robot, a scenario or a run's folder, this is {what}")

@@ -11,15 +11,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from nmm.cli.options import SetOption, settings_of
-from nmm.cli.output import complain, show_table
-from nmm.errors import InputError
+from nmm.cli.options import SetOption, option, settings_of
+from nmm.cli.output import FAILED, OK, bar_of, complain, show_table
+from nmm.errors import InputError, expect, no_such
 
 if TYPE_CHECKING:
+    from nmm.sweeps.result import SweepResult
     from nmm.sweeps.sweep import Sweep
-    from nmm.sweeps.swept import Swept
 
-OK, FAILED = 0, 1
 #: Times between two steps of the bar by which the time left is estimated, s.
 WINDOW = 300.0
 
@@ -34,54 +33,35 @@ def sweep(
         ),
     ],
     *,
-    vary: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="KEY=LO:HI[:N]|A,B,...",
-            help="What varies: a key by its dotted path, as for --set, over a range that is sampled; over N "
-            "values at equal distances; or over values that are listed. May be repeated.",
-        ),
-    ] = None,
-    samples: Annotated[
-        str | None,
-        typer.Option(
-            metavar="N", help="Points of the ranges; each is run with every combination of what is listed."
-        ),
-    ] = None,
-    sampler: Annotated[
-        str | None,
-        typer.Option(
-            metavar="grid|sobol|lhs|random",
-            help="How ranges are sampled; grid where every key has its values.",
-            show_default="sobol, or grid",
-        ),
-    ] = None,
-    seed: Annotated[str | None, typer.Option(metavar="S", help="Of the sampler.", show_default="0")] = None,
+    vary: list[str] | None = option(
+        "KEY=LO:HI[:N]|A,B,...",
+        "What varies: a key by its dotted path, as for --set, over a range that is sampled; over N "
+        "values at equal distances; or over values that are listed. May be repeated.",
+    ),
+    samples: str | None = option(
+        "N", "Points of the ranges; each is run with every combination of what is listed."
+    ),
+    sampler: str | None = option(
+        "grid|sobol|lhs|random",
+        "How ranges are sampled; grid where every key has its values.",
+        show="sobol, or grid",
+    ),
+    seed: str | None = option("S", "Of the sampler.", show="0"),
     settings: SetOption = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="DIR",
-            help="Where to write. A sweep that was begun there goes on; a folder of another one is refused.",
-            show_default="runs/<scenario>-sweep",
-        ),
-    ] = None,
-    keep: Annotated[
-        str | None,
-        typer.Option(
-            metavar="trajectories|playback",
-            help="Keep each rollout's run folder, or with playback.html too.",
-            show_default="rows only",
-        ),
-    ] = None,
-    jobs: Annotated[
-        int | None,
-        typer.Option(metavar="N", help="Rollouts at a time on this machine.", show_default="one a core"),
-    ] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(metavar="tcp://HOST:PORT", help="Let the workers of this Dask cluster compute instead."),
-    ] = None,
+    out: Path | None = option(
+        "DIR",
+        "Where to write. A sweep that was begun there goes on; a folder of another one is refused.",
+        show="runs/<scenario>-sweep",
+    ),
+    keep: str | None = option(
+        "trajectories|playback",
+        "Keep each rollout's run folder, or with playback.html too.",
+        show="rows only",
+    ),
+    jobs: int | None = option("N", "Rollouts at a time on this machine.", show="one a core"),
+    scheduler: str | None = option(
+        "tcp://HOST:PORT", "Let the workers of this Dask cluster compute instead."
+    ),
 ) -> int:
     """Run a scenario many times, over ranges of its keys.
 
@@ -98,113 +78,80 @@ def sweep(
     coordinates and a table that filters, offline. Ctrl-C, or worse, ends it: the same command goes on where
     it was. Needs `pip install "nmm[sweep]"`.
     """
-    made = _sweep(scenario, vary, samples, sampler, seed, settings_of(settings), keep)
+    asked = {"samples": samples, "sampler": sampler, "seed": seed, "keep": keep}
+    given = {name: value for name, value in asked.items() if value is not None}
+    made = _sweep(scenario, vary or (), settings_of(settings), given)
     folder = out or Path("runs") / f"{made.definition.name}-sweep"
-    with _progress(made) as report:
+    total, done = made.definition.rows, 0
+    with _progress(made) as show:
+
+        def report(fraction: float) -> None:
+            nonlocal done
+            done = round(fraction * total)
+            show(done)
+
         try:
             swept = made.run(folder, jobs=jobs, scheduler=scheduler, progress=report)
         except KeyboardInterrupt:
-            share = f"{report.rows} of {made.definition.rows} rollouts are" if report.rows else "nothing is"
+            share = f"{done} of {total} rollouts are" if done else "nothing is"
             complain("nmm sweep", f"interrupted: {share} in {folder}; the same command goes on there")
             return FAILED
     _show(swept)
     return OK
 
 
-def _sweep(
-    name: str,
-    vary: Sequence[str] | None,
-    samples: str | None,
-    sampler: str | None,
-    seed: str | None,
-    settings: dict[str, object],
-    keep: str | None,
-) -> Sweep:
-    """The sweep of a scenario, or one that a file says, with what the options change in it."""
+def _sweep(name: str, vary: Sequence[str], settings: dict[str, object], given: dict[str, Any]) -> Sweep:
     from nmm.bundled import bundled_scenarios, bundled_sweeps
-    from nmm.errors import unknown
     from nmm.scenario.scenario import SUFFIXES
-    from nmm.sweeps.files import is_sweep_file, read_sweep
-    from nmm.sweeps.sweep import Sweep
-    from nmm.sweeps.varied import parsed
+    from nmm.sweeps.definition import parsed
+    from nmm.sweeps.sweep import Sweep, is_sweep_file, read_sweep
 
-    given: dict[str, Any] = {"samples": samples, "sampler": sampler, "seed": seed, "keep": keep}
-    given = {option: value for option, value in given.items() if value is not None}
     varying: dict[str, object] = {}
-    for text in vary or ():
+    for text in vary:
         key = parsed(text).key
         if key in varying:
-            raise InputError(f"--vary: {key} is given twice")
+            raise InputError(f"{key} is given twice", where="--vary")
         varying[key] = text.partition("=")[2].strip()
     if is_sweep_file(name):
         said = read_sweep(name)
-        return Sweep(
-            **{
-                **said,
-                **given,
-                "vary": {**said["vary"], **varying},
-                "settings": {**said.get("settings", {}), **settings},
-            }
-        )
+        changed = {"vary": said["vary"] | varying, "settings": said.get("settings", {}) | settings}
+        return Sweep(**{**said, **given, **changed})
     known = {**bundled_scenarios(), **bundled_sweeps()}
     path = Path(name)
     if name not in known and path.suffix not in SUFFIXES and not path.is_file() and len(path.parts) < 2:
-        raise InputError(unknown("scenario or sweep", name, known))
-    if not varying:
-        raise InputError("--vary: expected at least one key to vary, as in --vary q0.x=-1:1")
+        raise no_such("scenario or sweep", name, known)
+    expect(varying, "--vary", "at least one key to vary, as in --vary q0.x=-1:1")
     return Sweep(name, varying, settings=settings, **given)
 
 
-class _Report:
-    """How far a sweep is, in rollouts; on a terminal shown with the time left."""
-
-    def __init__(self, total: int, show: Callable[[int], None] | None) -> None:
-        self.rows, self._total, self._show = 0, total, show
-
-    def __call__(self, fraction: float) -> None:
-        self.rows = round(fraction * self._total)
-        if self._show is not None:
-            self._show(self.rows)
-
-
 @contextmanager
-def _progress(made: Sweep) -> Iterator[_Report]:
-    total = made.definition.rows
+def _progress(made: Sweep) -> Iterator[Callable[[int], None]]:
+    """A function that shows how many rollouts are done, with the time left; nothing without a terminal."""
     if not sys.stderr.isatty():
-        yield _Report(total, None)
+        yield lambda rows: None
         return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
-    bar = Progress(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[speed]}"),
-        TimeRemainingColumn(elapsed_when_finished=True),
-        console=Console(stderr=True),
-        transient=True,
-        speed_estimate_period=WINDOW,
-    )
-    with bar:
+    speed, left = TextColumn("{task.fields[speed]}"), TimeRemainingColumn(elapsed_when_finished=True)
+    with bar_of(MofNCompleteColumn(), speed, left, speed_estimate_period=WINDOW) as bar:
         task: Any = None
         began = first = 0.0
 
         def show(rows: int) -> None:
             nonlocal task, began, first
             if task is None:  # rows of an earlier start took none of this one's time
+                total = made.definition.rows
                 task = bar.add_task(made.definition.name, total=total, completed=rows, speed="")
                 began, first = time.monotonic(), rows
             passed = time.monotonic() - began
-            speed = f"{(rows - first) / passed:.3g} a second" if rows > first and passed > 0.0 else ""
-            bar.update(task, completed=rows, speed=speed)
+            told = f"{(rows - first) / passed:.3g} a second" if rows > first and passed > 0.0 else ""
+            bar.update(task, completed=rows, speed=told)
 
-        yield _Report(total, show)
+        yield show
 
 
-def _show(swept: Swept) -> None:
-    """Print how many ended how, quantities from least to largest, and the listed values beside each other."""
-    from nmm.sweeps.told import compared, spreads
+def _show(swept: SweepResult) -> None:
+    from nmm.sweeps.result import compared, spreads
 
     definition = swept.definition
     rows = definition.rows
@@ -217,7 +164,7 @@ def _show(swept: Swept) -> None:
         title=title,
         numeric=["rollouts", "share"],
     )
-    numbers = [[one.name, *(f"{value:.4g}" for value in one[1:])] for one in spreads(swept)]
+    numbers = [[name, *(f"{value:.4g}" for value in values)] for name, *values in spreads(swept)]
     if numbers:
         show_table(["", "least", "median", "largest"], numbers, numeric=["least", "median", "largest"])
     beside = compared(swept)

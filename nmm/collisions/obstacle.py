@@ -1,21 +1,26 @@
-"""An obstacle: a shape in the world that stands, moves along a path, or is set from outside."""
+"""Obstacles: shapes in the world that stand, move along a path, or are set from outside; and in a record."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
+from itertools import pairwise
 from typing import Any, TypeAlias
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, array, scalar, vector
-from nmm.collisions.shapes import Shape
-from nmm.errors import InputError, NmmError, RunError
-from nmm.words import one_line
+from nmm.arrays import Array, array, vector
+from nmm.collisions.shapes import Box, Capsule, ConvexMesh, Cylinder, HalfSpace, Hull, Shape, Sphere
+from nmm.errors import InputError, NmmError, RunError, expect, expect_kind, expect_known
+from nmm.text_format import one_line
 
 #: Where a shape is: (3,) its origin, (6,) origin and rotation vector, or (4, 4); m, rad, world axes.
 Placement: TypeAlias = ArrayLike
+KINDS: Mapping[str, type[Shape]] = {
+    kind.__name__.lower(): kind for kind in (Box, Sphere, Cylinder, Capsule, HalfSpace, Hull)
+}
 #: Step of the differences that give a path's velocity, s.
 STEP = 1e-6
 
@@ -53,22 +58,19 @@ class Obstacle:
         name: str = "",
         velocity: Callable[[float], ArrayLike] | None = None,
     ) -> None:
-        if not isinstance(shape, Shape):
-            raise InputError(f"obstacle: expected a shape (Box, Sphere, ...), got {shape!r}")
+        expect_kind(shape, Shape, "obstacle", "a shape (Box, Sphere, ...)")
         self.shape = shape
         self.name = name or type(shape).__name__.lower()
         self.motion = motion
+        where = f"obstacle {self.name}"
         if motion is not None and not callable(motion):
-            raise InputError(
-                f"obstacle {self.name}: motion: expected a Python function of t that returns a placement, as "
-                f"in lambda t: [0.1 * t, 0, 0.3], got {motion!r}"
-            )
+            expected = "a Python function of t that returns a placement, as in lambda t: [0.1 * t, 0, 0.3]"
+            raise InputError(where=f"{where}: motion", expected=expected, got=motion)
         if motion is not None and placement is not None:
-            raise InputError(f"obstacle {self.name}: expected a placement or a motion, got both")
+            raise InputError("both", where=where, expected="a placement or a motion")
         if velocity is not None and (motion is None or not callable(velocity)):
-            raise InputError(
-                f"obstacle {self.name}: velocity: expected a function of t, with motion, got {velocity!r}"
-            )
+            expected = "a function of t, with motion"
+            raise InputError(where=f"{where}: velocity", expected=expected, got=velocity)
         self._velocity = velocity
         standing = (0.0, 0.0, 0.0) if placement is None else placement
         self._placement = self._checked(standing if motion is None else self._moved(motion, 0.0, InputError))
@@ -101,7 +103,7 @@ class Obstacle:
         InputError : it moves along a path; no such numbers
         """
         if self.motion is not None:
-            raise InputError(f"obstacle {self.name}: it moves along a path and cannot be set")
+            raise InputError("it moves along a path and cannot be set", where=f"obstacle {self.name}")
         found = self._checked(placement)
         self._twist = np.zeros(6) if velocity is None else self._six(velocity)
         self._placement = found
@@ -119,9 +121,8 @@ class Obstacle:
         except NmmError:
             raise
         except Exception as error:  # a user's function may raise anything
-            raise kind(
-                f"obstacle {self.name}: motion({t:g}) raised {type(error).__name__}: {one_line(str(error))}"
-            ) from error
+            what = f"motion({t:g}) raised {type(error).__name__}: {one_line(str(error))}"
+            raise kind(f"obstacle {self.name}: {what}") from error
 
     def twist(self, t: float) -> Array:
         """Velocity of its origin over its angular velocity at t, (6,), m/s and rad/s, world axes."""
@@ -134,13 +135,11 @@ class Obstacle:
         return np.concatenate([ahead.translation - behind.translation, turned]) / (2.0 * STEP)
 
     def _six(self, velocity: ArrayLike) -> Array:
-        given = vector(velocity, None, f"obstacle {self.name}: velocity")
-        if given.size not in (3, 6):
-            raise InputError(f"obstacle {self.name}: velocity: expected 3 or 6 numbers, got {given.size}")
+        given = vector(velocity, (3, 6), f"obstacle {self.name}: velocity")
         return np.concatenate([given, np.zeros(6 - given.size)])
 
     def _checked(self, placement: Placement) -> Any:
-        # What a motion usually returns: it is asked along the way ahead, many times a sample.
+        # What a motion usually returns: the look-ahead calls it many times per sample.
         if isinstance(placement, np.ndarray) and placement.dtype == np.float64 and placement.shape == (6,):
             six: Array = placement
             if six.dot(six) < np.inf:
@@ -149,21 +148,91 @@ class Obstacle:
         given = array(placement, name)
         if given.shape == (4, 4):
             rotation = given[:3, :3]
-            if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-6 or np.linalg.det(rotation) < 0.0:
-                raise InputError(f"{name}: expected a rotation in the upper left of the matrix")
-            if np.abs(given[3] - (0.0, 0.0, 0.0, 1.0)).max() > 1e-6:
-                raise InputError(f"{name}: expected 0, 0, 0, 1 in the last row of the matrix, got {given[3]}")
+            off = np.inf if np.linalg.det(rotation) < 0.0 else np.abs(rotation @ rotation.T - np.eye(3)).max()
+            expect(off <= 1e-6, name, "a rotation in the upper left of the matrix")
+            far = np.abs(given[3] - (0.0, 0.0, 0.0, 1.0)).max()
+            expect(far <= 1e-6, name, "0, 0, 0, 1 in the last row", given[3])
             return pin.SE3(rotation, given[:3, 3])
         if given.shape == (3,):
             return pin.SE3(np.eye(3), given)
         if given.shape == (6,):
             return pin.SE3(pin.exp3(given[3:]), given[:3])
-        raise InputError(f"{name}: expected 3 or 6 numbers or a (4, 4) matrix, got shape {given.shape}")
+        raise InputError(where=name, expected="3 or 6 numbers or a (4, 4) matrix", got=given)
 
 
-def checked_distance(value: ArrayLike, name: str) -> float:
-    """A distance, m, from 0."""
-    distance = scalar(value, name)
-    if distance < 0.0:
-        raise InputError(f"{name}: expected a number from 0, got {distance:g}")
-    return distance
+class Passed:
+    """Recorded placements (K, 4, 4), m, at t (K,), s, interpolated by the shortest motion between two."""
+
+    def __init__(self, t: Array, obstacle_places: Array) -> None:
+        self._t, self._places = t, obstacle_places
+
+    def __call__(self, t: float) -> Array:
+        """The placement (4, 4) at t, s; before the first and after the last time that one."""
+        k = int(np.searchsorted(self._t, t))
+        if k < len(self._t) and self._t[k] == t:
+            return self._places[k]
+        if k in (0, len(self._t)):
+            return self._places[min(k, len(self._t) - 1)]
+        share = (t - self._t[k - 1]) / (self._t[k] - self._t[k - 1])
+        before, after = (pin.SE3(place) for place in self._places[k - 1 : k + 1])
+        turned = before.rotation @ pin.exp3(share * pin.log3(before.rotation.T @ after.rotation))
+        moved = (1.0 - share) * before.translation + share * after.translation
+        place: Array = pin.SE3(turned, moved).homogeneous
+        return place
+
+
+def as_passed(obstacle: Obstacle, t: Array, obstacle_places: Sequence[Any]) -> Obstacle:
+    """An obstacle as recorded, which nothing sets any more; its placements (`Obstacle.at`) at t (N,), s."""
+    if obstacle.moves or not len(t):
+        return obstacle
+    first = obstacle_places[0]
+    stands = all(place is first or place == first for place in obstacle_places)
+    seen = np.array([place.homogeneous for place in ([first] if stands else obstacle_places)])
+    return obstacle_from_json(obstacle.shape, obstacle.name, t, seen)
+
+
+def obstacle_from_json(shape: Shape, name: str, t: Array, placements: Array) -> Obstacle:
+    """An obstacle that was at `placements` (N, 4, 4) at t (N,), s, or stands at `placements` (1, 4, 4)."""
+    if len(placements) == 1:
+        return Obstacle(shape, placements[0], name=name)
+    return Obstacle(shape, motion=Passed(t, placements), name=name)
+
+
+def obstacle_places(obstacle: Obstacle, t: Array) -> Array:
+    """Where an obstacle is at t (N,), s: (N, 4, 4), or (1, 4, 4) of one that stands."""
+    times = t if obstacle.moves and len(t) else [0.0]
+    return np.array([obstacle.placement(float(time)) for time in times])
+
+
+def shifts(obstacles: Sequence[Obstacle], t: Array) -> Array:
+    """The most that a point of an obstacle moves between samples t (N,), s: (N - 1,), m."""
+    found = np.zeros(max(len(t) - 1, 0))
+    for one in obstacles:
+        if not one.moves:
+            continue
+        geometry = one.shape.geometry()
+        geometry.computeLocalAABB()
+        size = float(np.linalg.norm(geometry.aabb_center)) + float(geometry.aabb_radius)
+        at = [one.at(float(time)) for time in t]
+        for k, (before, after) in enumerate(pairwise(at)):
+            turned = float(np.linalg.norm(pin.log3(before.rotation.T @ after.rotation)))
+            way = float(np.linalg.norm(after.translation - before.translation))
+            found[k] = max(found[k], way + (turned * size if turned else 0.0))
+    return found
+
+
+def obstacle_as_json(shape: Shape) -> tuple[dict[str, Any], Array]:
+    """A shape in plain data, and the points (N, 3) of a hull, so that a mesh's file is no longer needed."""
+    if isinstance(shape, ConvexMesh | Hull):
+        return {"kind": "hull"}, np.array(shape.geometry().points()).reshape(-1, 3)
+    found = {one.name: getattr(shape, one.name) for one in fields(shape)}  # type: ignore[arg-type]  # all are dataclasses
+    return {"kind": type(shape).__name__.lower(), **found}, np.zeros((0, 3))
+
+
+def shape_from_json(data: Mapping[str, Any], points: Array) -> Shape:
+    """The shape that `obstacle_as_json` described; `InputError` or `TypeError` for what it cannot have."""
+    expect_known("kind", data.get("kind"), KINDS)
+    given = {key: value for key, value in data.items() if key != "kind"}
+    if data["kind"] == "hull":
+        given["points"] = points
+    return KINDS[data["kind"]](**given)

@@ -1,7 +1,6 @@
-"""Distances of one robot at (t, q): measured, read, and written as rows where a control step reads them."""
+"""Distances of one robot at (t, q), measured and written as rows for a control step."""
 
-from __future__ import annotations
-
+import ctypes
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -13,76 +12,37 @@ import pinocchio as pin
 from numba import types
 
 from nmm.arrays import Array, Integers
-from nmm.collisions.near import Scene, find_near
+from nmm.collisions.broad_phase import PairArrays, find_near
 from nmm.collisions.obstacle import Obstacle
-from nmm.collisions.results import placement_view, result_view
 from nmm.collisions.rows import Rows, write_row, write_rows
+from nmm.errors import NmmError
 from nmm.kernels.compiled import checked_by_caller, compiled
-from nmm.kernels.memory import Blocks, Memory, views
+from nmm.kernels.record_layout import BLOCKS, Blocks, Memory, views
+from nmm.robots.joint_table import placement_rows
 from nmm.robots.robot import Robot
 
 #: Of Coal's queries: with its default, 1e-6, gradients err by up to 9e-3; a finer second one diverges.
 GJK_TOLERANCE, EPA_TOLERANCE = 1e-8, 1e-6
-_FLAT, _INTEGERS, _STRIDED = types.float64[::1], types.int64[::1], types.float64[:, :]
-_FIND = types.int64(_INTEGERS, _FLAT, _STRIDED)
-_ROWS = types.float64(
-    *(_INTEGERS, _FLAT, _STRIDED, _STRIDED, _STRIDED),
-    *(_INTEGERS, _FLAT, types.int64),
-)
+_STRIDED = types.float64[:, :]
+_FIND = types.int64(*BLOCKS.types, _STRIDED)
+_ROW = types.void(BLOCKS, _STRIDED, _STRIDED, BLOCKS, types.int64, types.int64)
+_ROWS = types.float64(BLOCKS, _STRIDED, _STRIDED, _STRIDED, BLOCKS, types.int64)
 
 
 @compiled
-def _find(integers: Integers, floats: Array, places: Array) -> int:
-    return find_near(views(Scene, integers, floats, 0), places)
-
-
-@compiled
-def _rows(
-    integers: Integers,
-    floats: Array,
-    results: Array,
-    places: Array,
-    J: Array,
-    row_integers: Integers,
-    row_floats: Array,
-    place: int,
-) -> float:
-    rows = views(Rows, row_integers, row_floats, place)
-    return write_rows(views(Scene, integers, floats, 0), results, places, J, rows)
-
-
-@compiled
-def _row(
-    integers: Integers,
-    floats: Array,
-    places: Array,
-    J: Array,
-    row_integers: Integers,
-    row_floats: Array,
-    place: int,
-    slot: int,
-) -> None:
-    rows = views(Rows, row_integers, row_floats, place)
-    write_row(views(Scene, integers, floats, 0), J, places, rows, slot)
+def _row(blocks: Blocks, places: Array, J: Array, row_blocks: Blocks, place: int, slot: int) -> None:
+    scene = views(PairArrays, blocks.integers, blocks.floats, 0)
+    write_row(scene, J, places, views(Rows, row_blocks.integers, row_blocks.floats, place), slot)
 
 
 class Queries:
-    """A robot's shapes and obstacles, with one configuration at which they were looked at.
+    """A robot's shapes and obstacles, placed at one configuration at a time.
 
-    Parameters
-    ----------
-    robot : the robot
-    shapes : the robot's shapes, then the obstacles', with the pairs to keep apart
-    obstacles : those of the last shapes, in order; half-spaces come last
-    band, faces : see `near.Scene`
-
-    Attributes
-    ----------
+    shapes : the robot's, then the obstacles' in order, half-spaces last; with the pairs to keep apart
+    band, faces, blocks, scene : see `PairArrays`: its blocks in memory, and its views
     least : the least distance among near pairs in the last `update`, m; infinite where none is near
-    blocks, scene : a `near.Scene` in memory, and as views
     moving : obstacles with the numbers of their shapes
-    results (P, 10) : [d, n, p1, p2] of each pair, as of when it was measured last
-    """
+    results (P, 10) : [d, n, p1, p2] of each pair when last measured"""
 
     def __init__(
         self,
@@ -98,26 +58,32 @@ class Queries:
         self.found = found = pin.GeometryData(shapes)
         for shape in shapes.geometryObjects:
             shape.geometry.computeLocalAABB()
+        # By default Coal starts from the previous result, and normals then depend on the history by 3e-3. A
+        # start from the shapes' bounding volumes takes 0.92 times as long and halves the error.
         for request in found.distanceRequests:
-            _exact(request)
-        self.results = result_view(robot.model, shapes, found)
-        self.places = placement_view(found)
+            request.gjk_tolerance, request.epa_tolerance = GJK_TOLERANCE, EPA_TOLERANCE
+            request.gjk_initial_guess = coal.GJKInitialGuess.BoundingVolumeGuess
+            with warnings.catch_warnings():  # deprecated, but still read
+                warnings.simplefilter("ignore", DeprecationWarning)
+                request.enable_cached_gjk_guess = False
+        self.results = _result_view(robot.model, shapes, found)
+        self.places = placement_rows(found.oMg)
         for k in range(len(shapes.collisionPairs)):
             found.deactivateCollisionPair(k)
         memory = Memory()
         memory.add(_scene(robot, shapes, obstacles, band, faces))
         self.blocks: Blocks = memory.blocks()
-        self.scene = views(Scene, *self.blocks, 0)
+        self.scene = views(PairArrays, *self.blocks, 0)
         pin.computeJointJacobians(self._model, self._data, pin.neutral(self._model))
         self.J = np.asarray(self._data.J).reshape(6, robot.n, order="F").T
         self.least = np.inf
         self.moving = [(i, one) for i, one in enumerate(obstacles, self._own)]
         self._seen: dict[int, Any] = {}
-        self._find = checked_by_caller(_find, _FIND)
-        self._rows = checked_by_caller(_rows, _ROWS)
+        self._find = checked_by_caller(find_near, _FIND)
+        self._row = checked_by_caller(_row, _ROW)
+        self._rows = checked_by_caller(write_rows, _ROWS)
 
     def place(self, t: float, q: Array) -> None:
-        """Put all shapes where they are at t, s, and q (n,)."""
         pin.computeJointJacobians(self._model, self._data, q)
         for i, obstacle in self.moving:
             now = obstacle.at(t)
@@ -129,7 +95,7 @@ class Queries:
 
     @contextmanager
     def among(self, obstacles: Sequence[Obstacle]) -> Iterator[None]:
-        """In the block the obstacles are where these are, one each, in order: as a record has them."""
+        """In the block, the obstacles are where these (one each, in order) are, as in a record."""
         own = self.moving
         self.moving = [(i, one) for (i, _), one in zip(own, obstacles, strict=True)]
         try:
@@ -138,13 +104,12 @@ class Queries:
             self.moving = own
 
     def measure(self, t: float, q: Array) -> None:
-        """Find the pairs that are near, and their distances."""
         self.place(t, q)
         self._choose()
         pin.computeDistances(self.shapes, self.found)
 
     def _choose(self) -> None:
-        """Which pairs are near where the shapes are, told to Pinocchio too."""
+        """Find which pairs are near where the shapes are, for Pinocchio too."""
         changed, active, found = self.scene.changed, self.scene.active, self.found
         for k in changed[: self._find(*self.blocks, self.places)].tolist():
             if active[k]:
@@ -155,19 +120,13 @@ class Queries:
     def update(self, t: float, q: Array, integers: Integers, floats: Array, place: int) -> None:
         """Measure, and write the rows of near pairs where a record `Rows` lies in the blocks."""
         self.measure(t, q)
-        self._where = integers, floats, place
-        self.least = self._rows(*self.blocks, self.results, self.places, self.J, integers, floats, place)
+        self._where = Blocks(integers, floats), place
+        self.least = self._rows(self.blocks, self.results, self.places, self.J, *self._where)
 
     def carry(
         self, pair: int, here: tuple[float, Array], there: tuple[float, Array], rows: Rows, slot: int
     ) -> None:
-        """Write a row for the points of a pair that are nearest elsewhere: where they are here.
-
-        Parameters
-        ----------
-        here, there : t, s, and q (n,)
-        rows : what lies in the blocks of the last `update`
-        """
+        """Write a row of the last `update` for a pair's points nearest `there`, (t, q), placed as `here`."""
         self.distances(*there, [pair])
         found, ends = self.results[pair, 1:].copy(), self.scene.pairs[pair].tolist()
         points = found[3:].reshape(2, 3)
@@ -177,7 +136,7 @@ class Queries:
             rows.points[slot, 3 * k : 3 * k + 3] = self.found.oMg[i].act(point)
         rows.points[slot, 6:] = found[:3]
         rows.pair[slot] = pair
-        _row(*self.blocks, self.places, self.J, *self._where, slot)
+        self._row(self.blocks, self.places, self.J, *self._where, slot)
 
     def distances(self, t: float, q: Array, pairs: Sequence[int]) -> Array:
         """Of some pairs at (t, q), (len(pairs),), m."""
@@ -191,29 +150,21 @@ class Queries:
         i, j = (int(one) for one in self.scene.pairs[pair])
         if j < self._own:
             return False
-        place = self.found.oMg[i].act(self.scene.boxes[i, :3])
-        here, there = (
-            coal.Transform3s(),
-            coal.Transform3s(self.found.oMg[j].rotation, self.found.oMg[j].translation),
-        )
-        here.setTranslation(place)
-        point, request, result = coal.Sphere(1e-6), coal.DistanceRequest(), coal.DistanceResult()
-        return bool(
-            coal.distance(point, here, self.shapes.geometryObjects[j].geometry, there, request, result) < 0.0
-        )
+        here = coal.Transform3s(np.eye(3), self.found.oMg[i].act(self.scene.boxes[i, :3]))
+        there = coal.Transform3s(self.found.oMg[j].rotation, self.found.oMg[j].translation)
+        point, geometry = coal.Sphere(1e-6), self.shapes.geometryObjects[j].geometry
+        d = coal.distance(point, here, geometry, there, coal.DistanceRequest(), coal.DistanceResult())
+        return bool(d < 0.0)
 
     def nearest(self, t: float, q: Array) -> tuple[float, int]:
-        """The least distance of all pairs at (t, q), m, and its pair; infinite and -1 where there is none.
-
-        Pairs are measured from the least lower bound on, until that is beyond what was found.
-        """
+        """The least distance of all pairs at (t, q), m, and its pair; infinity and -1 without pairs."""
         self.place(t, q)
         self._choose()
         least, nearest = np.inf, -1
         bounds = self.scene.bounds
         for k in np.argsort(bounds, kind="stable").tolist():
             if bounds[k] > least:
-                break
+                break  # no other pair is nearer than its bound
             pin.computeDistance(self.shapes, self.found, k)
             d = float(self.results[k, 0])
             if d < least:
@@ -221,22 +172,27 @@ class Queries:
         return least, nearest
 
 
-def _exact(request: Any) -> None:
-    """Have queries answer finely, and by where the shapes are alone.
-
-    By itself Coal begins with what the query before found: normals then differ by 3e-3 with the history.
-    The volumes around the shapes are a better beginning (0.92 times as long, half the error).
-    """
-    request.gjk_tolerance, request.epa_tolerance = GJK_TOLERANCE, EPA_TOLERANCE
-    request.gjk_initial_guess = coal.GJKInitialGuess.BoundingVolumeGuess
-    with warnings.catch_warnings():  # the flag is to go, it says; as long as it is there, it counts
-        warnings.simplefilter("ignore", DeprecationWarning)
-        request.enable_cached_gjk_guess = False
+def _result_view(model: pin.Model, shapes: pin.GeometryModel, found: pin.GeometryData) -> Array:
+    """(P, 10) = [d, n, p1, p2] of every pair's last query, m, world axes: a view of Coal's own memory, where
+    they must be contiguous; else `NmmError`."""
+    results = found.distanceResults
+    if not len(results):
+        return np.zeros((0, 10))
+    pin.computeDistances(model, model.createData(), shapes, found, pin.neutral(model))
+    start, end = (int(results[k].normal.ctypes.data) - 8 for k in (0, len(results) - 1))
+    stride = (end - start) // (len(results) - 1) if len(results) > 1 else 80
+    numbers = np.ctypeslib.as_array((ctypes.c_double * ((end + 80 - start) // 8)).from_address(start))
+    rows = np.lib.stride_tricks.as_strided(numbers, (len(results), 10), (stride, 8))
+    for row, one in zip(rows, results, strict=True):
+        said = [one.min_distance, *one.normal, *one.getNearestPoint1(), *one.getNearestPoint2()]
+        if not np.array_equal(row, said, equal_nan=True):
+            raise NmmError("this version of Coal keeps distances in another way than nmm expects")
+    return rows
 
 
 def _scene(
     robot: Robot, shapes: pin.GeometryModel, obstacles: Sequence[Obstacle], band: float, faces: float
-) -> Scene:
+) -> PairArrays:
     objects = shapes.geometryObjects
     own, count, n = len(objects) - len(obstacles), len(objects), robot.n
     supports = np.zeros((count, n))
@@ -249,10 +205,10 @@ def _scene(
         boxes[i] = _box(shape.geometry)
         points, rounding[i] = _corners(shape.geometry)
         corners.append(points)
-    pairs = np.array([[pair.first, pair.second] for pair in shapes.collisionPairs], dtype=np.int64)
-    pairs = pairs.reshape(-1, 2)
+    listed = [(pair.first, pair.second) for pair in shapes.collisionPairs]
+    pairs, P = np.array(listed, dtype=np.int64).reshape(-1, 2), len(listed)
     planes = [i for i in range(own, count) if isinstance(objects[i].geometry, coal.Halfspace)]
-    return Scene(
+    return PairArrays(
         band=np.array(band),
         faces=np.array(faces),
         pairs=pairs,
@@ -264,12 +220,12 @@ def _scene(
         first_corner=np.cumsum([0, *(len(points) for points in corners)], dtype=np.int64),
         corners=np.concatenate([*corners, np.zeros((0, 3))]),
         rounding=rounding,
-        active=np.zeros(len(pairs), dtype=np.int64),
-        changed=np.zeros(len(pairs), dtype=np.int64),
-        bounds=np.zeros(len(pairs)),
-        risky=np.zeros(len(pairs), dtype=np.int64),
-        watched=np.zeros(len(pairs), dtype=np.int64),
-        kept=np.zeros(len(pairs)),
+        active=np.zeros(P, dtype=np.int64),
+        changed=np.zeros(P, dtype=np.int64),
+        bounds=np.zeros(P),
+        risky=np.zeros(P, dtype=np.int64),
+        watched=np.zeros(P, dtype=np.int64),
+        kept=np.zeros(P),
     )
 
 

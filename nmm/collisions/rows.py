@@ -1,10 +1,7 @@
-"""Distances as rows, compiled: d, ∂d/∂q = n·(Jp2 - Jp1) and ∂d/∂t of the pairs that are near.
+"""Distances as rows, compiled: d, ∂d/∂q = n·(Jp2 - Jp1) and ∂d/∂t of near pairs.
 
-One row a pair at its nearest points; where faces or edges lie nearly parallel, more of them at the ends of
-what they have in common: nearest points jump from one end to the other, their rows stay.
-"""
-
-from __future__ import annotations
+Where faces or edges are nearly parallel, nearest points jump between the ends of their common part; rows at
+these ends do not."""
 
 import math
 from typing import NamedTuple
@@ -12,22 +9,30 @@ from typing import NamedTuple
 import numpy as np
 
 from nmm.arrays import Array
-from nmm.collisions.near import Scene, to_world
-from nmm.kernels.compiled import compiled, scratch
-from nmm.kernels.memory import IntegerCell, IntegerVector, Matrix, Vector
+from nmm.collisions.broad_phase import PairArrays, to_world
+from nmm.kernels.compiled import clear, compiled, scratch
+from nmm.kernels.record_layout import (
+    Blocks,
+    IntegerCell,
+    SampledIntegerCell,
+    SampledIntegerVector,
+    SampledMatrix,
+    SampledVector,
+    views,
+)
+from nmm.kernels.rotations import cross3
 
-#: Corners belong to a face or an edge that lies along the other shape where they are behind its plane by no
-#: more than this share of their way from the nearest point, and this length more, m, and not deeper
-#: than the last.
+#: A corner belongs to a face or an edge along the other shape if it is behind that plane by at most this
+#: share of its distance from the nearest point plus this length, m, and by at most the third number.
 SLOPE, ROUNDED, DEEPEST = 0.2, 1e-3, 0.05
-#: Points nearer to the nearest point than this, m, tell nothing new; a common part is widened by as much.
+#: Points nearer to the nearest point than this, m, are left out; a common part is widened by as much.
 APART = 5e-3
-#: A face is taken as its extent in so many directions.
+#: A face is represented by its extent in this many directions.
 COUNT = 24
 DIRECTIONS = np.array(
     [[math.cos(2.0 * math.pi * k / COUNT), math.sin(2.0 * math.pi * k / COUNT)] for k in range(COUNT)]
 )
-#: Corners of a face that are looked at.
+#: At most this many corners of a face are used.
 CORNERS = 16
 
 
@@ -38,21 +43,18 @@ class Rows(NamedTuple):
     points (K, 9) : the nearest points of both shapes and the normal from the first to the second, world, m
     """
 
-    used: IntegerCell
+    used: SampledIntegerCell
     most: IntegerCell
-    pair: IntegerVector
-    d: Vector
-    d_q: Matrix
-    d_t: Vector
-    points: Matrix
+    pair: SampledIntegerVector
+    d: SampledVector
+    d_q: SampledMatrix
+    d_t: SampledVector
+    points: SampledMatrix
 
 
 @compiled
-def write_row(scene: Scene, J: Array, places: Array, rows: Rows, slot: int) -> None:
-    """d, d_q and d_t of the row whose pair and points are there.
-
-    J (n, 6) : the joints' twists about the world's origin
-    """
+def write_row(scene: PairArrays, J: Array, places: Array, rows: Rows, slot: int) -> None:
+    """d, d_q and d_t of a row whose pair and points are there; J (n, 6) : twists about the world's origin."""
     i, j = scene.pairs[rows.pair[slot], 0], scene.pairs[rows.pair[slot], 1]
     x = rows.points[slot]
     n0, n1, n2 = x[6], x[7], x[8]
@@ -62,7 +64,7 @@ def write_row(scene: Scene, J: Array, places: Array, rows: Rows, slot: int) -> N
     b0, b1, b2 = x[4] * n2 - x[5] * n1, x[5] * n0 - x[3] * n2, x[3] * n1 - x[4] * n0
     for c in range(J.shape[0]):
         total = 0.0
-        # What carries both shapes changes nothing: their points differ along n alone.
+        # A coordinate that carries both shapes has no effect: their points differ only along n.
         if scene.apart[rows.pair[slot], c] > 0.0:
             along = n0 * J[c, 0] + n1 * J[c, 1] + n2 * J[c, 2]
             if scene.supports[j, c] > 0.0:
@@ -89,9 +91,8 @@ def write_row(scene: Scene, J: Array, places: Array, rows: Rows, slot: int) -> N
 
 
 @compiled
-def set_points(scene: Scene, results: Array, places: Array, pair: int, x: Array) -> None:
-    """x (9,): nearest points and normal of a pair; where Coal found no normal, the way between the
-    middles of their boxes stands for it."""
+def set_points(scene: PairArrays, results: Array, places: Array, pair: int, x: Array) -> None:
+    """x (9,): nearest points and normal of a pair; without Coal's normal, along their boxes' centres."""
     for k in range(3):
         x[k], x[3 + k], x[6 + k] = results[pair, 4 + k], results[pair, 7 + k], results[pair, 1 + k]
     size = x[6] * x[6] + x[7] * x[7] + x[8] * x[8]
@@ -118,8 +119,12 @@ def set_points(scene: Scene, results: Array, places: Array, pair: int, x: Array)
 
 
 @compiled
-def write_rows(scene: Scene, results: Array, places: Array, J: Array, rows: Rows) -> float:
-    """Rows of the pairs that are near; returns the least distance among them, or infinity."""
+def write_rows(
+    blocks: Blocks, results: Array, places: Array, J: Array, row_blocks: Blocks, place: int
+) -> float:
+    """Write the rows of near pairs; returns their least distance, or infinity."""
+    scene = views(PairArrays, blocks.integers, blocks.floats, 0)
+    rows = views(Rows, row_blocks.integers, row_blocks.floats, place)
     most = rows.most[()]
     used = 0
     least = math.inf
@@ -133,7 +138,7 @@ def write_rows(scene: Scene, results: Array, places: Array, J: Array, rows: Rows
         scene.bounds[pair] = d
         least = min(least, d)
         slot = used
-        if used == most:  # the farthest goes
+        if used == most:  # replaces the farthest
             slot = 0
             for k in range(most):
                 if results[rows.pair[k], 0] > results[rows.pair[slot], 0]:
@@ -157,13 +162,10 @@ def write_rows(scene: Scene, results: Array, places: Array, J: Array, rows: Rows
 
 @compiled
 def facing(
-    scene: Scene, places: Array, shape: int, x: Array, side: int, e: Array, deepest: float, found: Array
+    scene: PairArrays, places: Array, shape: int, x: Array, side: int, e: Array, deepest: float, found: Array
 ) -> int:
-    """Write the corners of a shape that lie along the other one; returns how many.
-
-    found (CORNERS, 4) : where they are in e (2, 3) about the nearest point, how far behind it, m, and how far
-        away in e, squared
-    """
+    """Write the corners of a shape that lie along the other one, and return their count.
+    found (CORNERS, 4) : place in e (2, 3) about the nearest point, m behind it, distance in e squared"""
     sign = 1.0 if side == 0 else -1.0
     count = 0
     to, local = scratch(3), scratch((3, 3))  # the nearest point from the shape's origin; n and e in its axes
@@ -192,7 +194,7 @@ def facing(
         if square < APART * APART or (depth > ROUNDED and (depth - ROUNDED) ** 2 > SLOPE * SLOPE * square):
             continue
         slot = count
-        if count == CORNERS:  # the one nearest to the middle goes
+        if count == CORNERS:  # replaces the one nearest to the middle
             slot = 0
             for k in range(CORNERS):
                 if found[k, 3] < found[slot, 3]:
@@ -206,8 +208,8 @@ def facing(
 
 
 @compiled
-def add_faces(scene: Scene, places: Array, J: Array, rows: Rows, slot: int, used: int) -> int:
-    """Rows at the ends of what two faces or edges have in common; returns how many rows there are then."""
+def add_faces(scene: PairArrays, places: Array, J: Array, rows: Rows, slot: int, used: int) -> int:
+    """Add rows at the ends of the common part of two faces or edges; returns the number of rows then."""
     pair = rows.pair[slot]
     i, j = scene.pairs[pair, 0], scene.pairs[pair, 1]
     x = rows.points[slot]
@@ -221,9 +223,7 @@ def add_faces(scene: Scene, places: Array, J: Array, rows: Rows, slot: int, used
     size = math.sqrt(1.0 - x[6 + least] * x[6 + least])
     for k in range(3):
         e[0, k] = (e[0, k] - x[6 + least] * x[6 + k]) / size
-    e[1, 0] = x[7] * e[0, 2] - x[8] * e[0, 1]
-    e[1, 1] = x[8] * e[0, 0] - x[6] * e[0, 2]
-    e[1, 2] = x[6] * e[0, 1] - x[7] * e[0, 0]
+    cross3(x[6:], e[0], e[1])
     one, two = scratch((CORNERS, 4)), scratch((CORNERS, 4))
     plane = j >= scene.planes[()]
     first = facing(scene, places, i, x, 0, e, DEEPEST, one)
@@ -238,8 +238,7 @@ def add_faces(scene: Scene, places: Array, J: Array, rows: Rows, slot: int, used
                 reach = max(reach, DIRECTIONS[k, 0] * corners[a, 0] + DIRECTIONS[k, 1] * corners[a, 1])
             inverse[side, k] = 1.0 / (reach + APART)
     best = scratch((4, 4))
-    for k in range(4):
-        best[k, 0] = 0.0
+    clear(best)
     for side in range(2):
         corners = one if side == 0 else two
         for a in range(first if side == 0 else second):

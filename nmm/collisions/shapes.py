@@ -1,19 +1,31 @@
-"""The shapes of obstacles: lengths in m, axes of their own placement."""
+"""The shapes of obstacles: lengths in m, axes of their own placement. Hulls of meshes are cached on disk."""
 
 from __future__ import annotations
 
+import hashlib
+import io
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import coal
 import numpy as np
+import platformdirs
 
-from nmm.arrays import Array, array, positive, vector
-from nmm.collisions.hulls import hull, hull_of_file
-from nmm.errors import InputError
+from nmm import disk_cache
+from nmm.arrays import Array, Integers, array, nonzero_vector, positive, vector
+from nmm.errors import InputError, expect
+from nmm.robots.meshes import mesh_of
+from nmm.text_format import one_line
+
+#: A hull is flat where its volume is below this share of its longest edge cubed.
+FLAT = 1e-9
+#: Coal counts a corner's neighbours in a byte.
+MOST_NEIGHBORS = 255
 
 
 class Shape(ABC):
@@ -21,7 +33,7 @@ class Shape(ABC):
 
     Examples
     --------
-    >>> isinstance(nmm.Sphere(0.2), nmm.Shape), nmm.Sphere(0.2).geometry().radius
+    >>> isinstance(nmm.Sphere(0.2), nmm.extending.Shape), nmm.Sphere(0.2).geometry().radius
     (True, 0.2)
     """
 
@@ -45,8 +57,7 @@ class Box(Shape):
 
     def __post_init__(self) -> None:
         size = vector(self.size, 3, "box: size")
-        if np.any(size <= 0.0):
-            raise InputError(f"box: size: expected three lengths above 0, got {list(self.size)}")
+        expect(np.all(size > 0.0), "box: size", "three lengths above 0", list(self.size))
         object.__setattr__(self, "size", tuple(size.tolist()))
 
     def geometry(self) -> Any:
@@ -116,12 +127,12 @@ class Capsule(Round):
 
 
 @dataclass(frozen=True)
-class Plane(Shape):
+class HalfSpace(Shape):
     """A half-space: everything below the plane through the origin, whose `normal` (3,) points out of it.
 
     Examples
     --------
-    >>> wall = nmm.Obstacle(nmm.Plane([-1, 0, 0]), [3.0, 0.0, 0.0], name="everything beyond x = 3 m")
+    >>> wall = nmm.Obstacle(nmm.HalfSpace([-1, 0, 0]), [3.0, 0.0, 0.0], name="everything beyond x = 3 m")
     >>> wall.at(0.0).translation
     array([3., 0., 0.])
     """
@@ -129,25 +140,22 @@ class Plane(Shape):
     normal: Sequence[float] = (0.0, 0.0, 1.0)
 
     def __post_init__(self) -> None:
-        normal = vector(self.normal, 3, "plane: normal")
-        length = float(np.linalg.norm(normal))
-        if length == 0.0:
-            raise InputError("plane: normal: expected a direction, got 0, 0, 0")
-        object.__setattr__(self, "normal", tuple((normal / length).tolist()))
+        normal = nonzero_vector(self.normal, 3, "plane: normal")
+        object.__setattr__(self, "normal", tuple((normal / np.linalg.norm(normal)).tolist()))
 
     def geometry(self) -> Any:
         return coal.Halfspace(np.array(self.normal), 0.0)
 
 
 @dataclass(frozen=True)
-class Mesh(Shape):
+class ConvexMesh(Shape):
     """The convex hull of a mesh file (STL, DAE, OBJ, PLY), its axes stretched by `scale` (3,).
 
     Examples
     --------
     >>> import trimesh
     >>> _ = trimesh.creation.icosphere(radius=0.5).export("stone.stl")
-    >>> nmm.Obstacle(nmm.Mesh("stone.stl", scale=(1, 1, 0.5)), [2.0, 0.0, 0.0], name="stone").name
+    >>> nmm.Obstacle(nmm.ConvexMesh("stone.stl", scale=(1, 1, 0.5)), [2.0, 0.0, 0.0], name="stone").name
     'stone'
     """
 
@@ -159,7 +167,17 @@ class Mesh(Shape):
         self.geometry()
 
     def geometry(self) -> Any:
-        return hull_of_file(Path(self.file), np.array(self.scale))
+        file, where = Path(self.file), f"mesh: {self.file}"
+        expect(file.is_file(), "mesh", "a file", str(file))
+        try:
+            mesh = mesh_of(str(file), np.array(self.scale))
+        except (OSError, ValueError, RuntimeError) as error:
+            said = one_line(str(error)).rpartition("message: ")[2]  # before it, where in Coal's source
+            raise InputError(f"cannot be read: {said}", where=where) from None
+        try:
+            return hull(np.array(mesh.vertices()).reshape(-1, 3))
+        except InputError as error:
+            raise error.at(where) from None
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,10 +195,62 @@ class Hull(Shape):
 
     def __post_init__(self) -> None:
         points = array(self.points, "hull: points")
-        if points.ndim != 2 or points.shape[1] != 3:
-            raise InputError(f"hull: points: expected shape (N, 3), got {points.shape}")
+        expect(points.ndim == 2 and points.shape[1] == 3, "hull: points", "shape (N, 3)", points)
         object.__setattr__(self, "points", points)
         self.geometry()
 
     def geometry(self) -> Any:
         return hull(self.points)
+
+
+def hull(points: Array) -> Any:
+    """The convex hull of points (N, 3), m, as Coal's convex shape; `InputError` where it has no volume."""
+    points = np.ascontiguousarray(np.unique(points, axis=0))
+    return _hull(points.tobytes())
+
+
+@lru_cache(maxsize=256)
+def _hull(data: bytes) -> Any:
+    points = np.frombuffer(data).reshape(-1, 3)
+    corners, faces = _kept(hashlib.sha256(data).hexdigest()[:24], points)
+    mesh, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    mesh.extend([*corners])
+    triangles.extend([coal.Triangle(*face) for face in faces.tolist()])
+    return coal.Convex(mesh, triangles)
+
+
+def _kept(name: str, points: Array) -> tuple[Array, Integers]:
+    """Corners (V, 3) and triangles (F, 3) of the hull, from the cache if they are there."""
+    path = Path(platformdirs.user_cache_dir("nmm")) / "hulls" / f"{name}.convex"
+    data = disk_cache.read(path)
+    if data is not None:
+        with np.load(io.BytesIO(data)) as file:
+            return file["corners"], file["faces"]
+    corners, faces = _made(points)
+    made = io.BytesIO()
+    np.savez(made, corners=corners, faces=faces)
+    with suppress(OSError):  # without a cache it is only slower
+        disk_cache.write(path, made.getvalue())
+    return corners, faces
+
+
+def _made(points: Array) -> tuple[Array, Integers]:
+    from scipy.spatial import ConvexHull, QhullError  # here: half a second that most need not pay
+
+    size = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
+    try:
+        found = ConvexHull(points)
+        if np.bincount(found.simplices.ravel()).max() > MOST_NEIGHBORS:
+            found = ConvexHull(points, qhull_options="QJ")  # moved by rounding, a flat side is no fan
+    except (QhullError, ValueError):
+        found = None
+    if found is None or found.volume <= FLAT * size**3:
+        raise InputError(f"its {len(points)} points enclose no volume")
+    number = np.empty(len(points), dtype=np.int64)
+    number[found.vertices] = np.arange(len(found.vertices))
+    corners, faces = found.points[found.vertices], number[found.simplices]
+    # Qhull's triangles have either orientation; Coal expects outward normals.
+    a, b, c = (corners[faces[:, k]] for k in range(3))
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), found.equations[:, :3]) < 0.0
+    faces[inward] = faces[inward][:, ::-1]
+    return np.ascontiguousarray(corners), faces

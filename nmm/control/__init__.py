@@ -1,1 +1,1 @@
-"""J u = rate and h from functions, then u: the object that users call."""
+"""From functions to J u = rate and h, and from these to u: the controllers that users call."""

@@ -1,24 +1,30 @@
-"""What limits and distances add to a control step: their bounds and rows, for the resolver.
+"""The bounds and rows with which limits and distances enter a control step.
 
-A step calls this code by its address, so that it is compiled only where something is limited.
+A step calls this code by its address, so it is compiled only where something is limited.
 """
-
-from __future__ import annotations
 
 import math
 
 from nmm.arrays import Array, Integers
-from nmm.control.bounds import OFF, SAMPLE, bound_inputs, function_bounds, wheel_rows
-from nmm.control.clearance_rows import bound_unlimited, clearance_bounds
+from nmm.control.bounds import (
+    OFF,
+    SAMPLE,
+    bound_inputs,
+    bound_unlimited,
+    clearance_bounds,
+    function_bounds,
+    wheel_rows,
+)
 from nmm.control.equations import BOUNDS, ControlStep, times_S
 from nmm.functions.program import BESIDE, LaidOut
-from nmm.kernels.compiled import kernel, scratch
-from nmm.kernels.memory import views
+from nmm.kernels.compiled import clear, kernel, scratch
+from nmm.kernels.linear_algebra import copied
+from nmm.kernels.record_layout import views
 
 
 @kernel(BOUNDS)
 def write_limits(q: Array, integers: Integers, floats: Array) -> None:
-    """Bounds of inputs, wheels and functions, with their rows; a stage keeps its sample's bounds."""
+    """Bounds and rows of inputs, wheels and functions; at a stage the sample's bounds stay."""
     b = views(LaidOut, integers, floats, 0).buffers
     e = views(ControlStep, integers, floats, BESIDE)
     limits, problem = e.limits, e.problem
@@ -40,7 +46,7 @@ def write_limits(q: Array, integers: Integers, floats: Array) -> None:
 
 @kernel(BOUNDS)
 def write_clearance(q: Array, integers: Integers, floats: Array) -> None:
-    """Rows and bounds of distances; a stage keeps its sample's bounds and gradients, S is its own."""
+    """Rows and bounds of distances; a stage keeps its sample's bounds and gradients, but has its own S."""
     b = views(LaidOut, integers, floats, 0).buffers
     e = views(ControlStep, integers, floats, BESIDE)
     count, n = e.near.d_q.shape
@@ -50,12 +56,10 @@ def write_clearance(q: Array, integers: Integers, floats: Array) -> None:
     for k in range(count):
         row = e.problem.limit_rows[e.clearance.first[()] + k]
         if k < e.near.used[()]:
-            for j in range(n):
-                gradient[0, j] = e.near.d_q[k, j]
+            copied(e.near.d_q[k], gradient[0])
             times_S(gradient, 0, b.G, e.arm, row)
         elif e.limits.mode[()] == SAMPLE:
-            for j in range(row.shape[0]):
-                row[j] = 0.0
+            clear(row)
     if e.limits.mode[()] == SAMPLE:
         bound_unlimited(e.limits, e.problem)
         clearance_bounds(e.clearance, e.near, e.limits.acceleration, e.problem)

@@ -1,42 +1,56 @@
-"""What limits leave the inputs for one sample: bounds in discrete time, which never contradict each other.
+"""Bounds of the inputs for one sample, from limits and distances, in discrete time.
 
-With room = distance to a limit of position, Δt the sample, a = A Δt, D = room / Δt, the fastest approach from
-which braking at A still stops in time, sampled, is
+Bounds of the inputs never contradict each other. With room the distance to a position limit, Δt the sample,
+a = A Δt and D = room / Δt, the fastest sampled approach from which braking at A still stops in time is
 
-    u <= D / N + a (N - 1) / 2,  N = max(1, ⌈(√(1 + 8 D / a) - 1) / 2⌉),
+    u <= D / N + a (N - 1) / 2,  N = max(1, ⌈(√(1 + 8 D / a) - 1) / 2⌉).
 
-which is exact: obeyed at one sample, it can be obeyed at the next with |Δu| <= a, whatever is chosen below
-it. Beyond the limit (D < 0) the way back is at a stated speed. These bounds are taken at a sample and hold
-until the next: what an integrator averages over its stages is within them, too.
+It is exact: if it holds at one sample, it can hold at the next with |Δu| <= a, whatever smaller u is chosen.
+Beyond the limit (D < 0) the coordinate returns at a given speed. Bounds hold from one sample to the next, so
+the average over an integrator's stages obeys them, too. Distances are kept by velocity dampers with room to
+brake: n·J S u >= -speed - ∂d/∂t.
 """
-
-from __future__ import annotations
 
 import math
 from typing import NamedTuple
 
 from nmm.arrays import Array
-from nmm.kernels.compiled import compiled
-from nmm.kernels.memory import Cell, IntegerCell, IntegerVector, Matrix, Vector
+from nmm.collisions.rows import Rows
+from nmm.kernels.compiled import clear, compiled
+from nmm.kernels.record_layout import (
+    Cell,
+    IntegerCell,
+    IntegerVector,
+    Matrix,
+    SampledCell,
+    SampledIntegerCell,
+    SampledIntegerVector,
+    SampledVector,
+    Vector,
+)
 from nmm.resolvers.problem_arrays import LOWER, UPPER, ProblemArrays
 from nmm.robots.wheel_rates import rolling
 
-#: What `LimitNumbers.mode` says of a step: a sample's, an integrator's stage after it, one without limits.
+#: `LimitNumbers.mode`: a step at a sample, at an integrator's stage after it, or without limits.
 SAMPLE, STAGE, OFF = 0, 1, 2
-#: As its direction turns, a row's braking is counted on with this share of what the accelerations give.
+#: The share of the inputs' acceleration that a row's braking relies on, as the row's direction turns.
 COUNTED_ON = 0.25
+#: Bounds, and inputs at them, are alike to this share of an input's largest change.
+ROUNDING = 1e-6
+#: The farthest that an input of unlimited velocity moves in a sample, m or rad.
+FARTHEST = 0.1
 
 
 class LimitNumbers(NamedTuple):
-    """Limits of m inputs, w wheels and f functions; infinite where there is none.
+    """Limits of m inputs, w wheels and f functions; infinite for none.
 
     slowest, fastest, acceleration (m,) : of the inputs
-    coordinate (m,) : the coordinate whose rate an input is, -1 where none; low, high (m,) : its limits
-    recovery () : speed of the way back from beyond a limit, m/s or rad/s
-    wheels (w, 9) : how they turn (`nmm.robots.wheel_rates`); spin (w,) : their largest rates, rad/s
-    rows (f,) : of the program; row_low, row_high (f,) : limits of these values; braking (f,) : counted on for
-        them, not a number where it is a share of what the inputs' accelerations give
-    elapsed () : time since the inputs before, s
+    coordinate (m,) : the coordinate whose rate an input is, -1 for none; low, high (m,) : its limits
+    recovery () : speed of the return from beyond a limit, m/s or rad/s
+    wheels (w, 9) : see `nmm.robots.wheel_rates`; spin (w,) : the wheels' largest rates, rad/s
+    rows (f,) : of the program; row_low, row_high (f,) : limits of these values
+    braking (f,) : deceleration of these values; NaN for a share of the inputs' accelerations
+    elapsed () : time since the previous inputs, s; NaN for the problem's dt
     mode () : SAMPLE, STAGE or OFF
     """
 
@@ -53,14 +67,14 @@ class LimitNumbers(NamedTuple):
     row_low: Vector
     row_high: Vector
     braking: Vector
-    elapsed: Cell
+    elapsed: SampledCell
     mode: IntegerCell
 
 
 @compiled
 def approach(room: float, dt: float, acceleration: float, recovery: float) -> float:
-    """The largest speed towards a limit that is `room` ahead; negative where it is behind."""
-    if math.isinf(room):  # no limit, and perhaps no dt either
+    """The largest speed towards a limit `room` ahead; negative beyond the limit."""
+    if math.isinf(room):  # no limit; dt may be unknown
         return room
     D = room / dt
     if D < 0.0:
@@ -76,8 +90,11 @@ def approach(room: float, dt: float, acceleration: float, recovery: float) -> fl
 
 @compiled
 def bound_inputs(limits: LimitNumbers, q: Array, problem: ProblemArrays) -> None:
-    """Bounds of the inputs at q: position wins over velocity, and acceleration over both."""
+    """Bounds of the inputs at q: position takes precedence over velocity, and acceleration over both."""
     dt = problem.dt[()]
+    elapsed = limits.elapsed[()]
+    if math.isnan(elapsed):
+        elapsed = dt
     for j in range(limits.slowest.shape[0]):
         lower, upper = limits.slowest[j], limits.fastest[j]
         A = limits.acceleration[j]
@@ -86,14 +103,14 @@ def bound_inputs(limits: LimitNumbers, q: Array, problem: ProblemArrays) -> None
         if i >= 0:
             high = approach(limits.high[j] - q[i], dt, A, limits.recovery[()])
             low = -approach(q[i] - limits.low[j], dt, A, limits.recovery[()])
-            # The way back is no faster than the velocities allow, nor than can be braked at the other end.
+            # The return obeys the velocity limits, and is slow enough to brake at the opposite limit.
             if high < 0.0:
                 high = max(high, min(lower, 0.0), low)
             if low > 0.0:
                 low = min(low, max(upper, 0.0), high)
             lower, upper = min(max(lower, low), high), max(min(upper, high), low)
         if not math.isinf(A):
-            change = A * limits.elapsed[()]
+            change = A * elapsed
             least, most = problem.before[j] - change, problem.before[j] + change
             if least > upper:
                 lower, upper = least, least
@@ -107,13 +124,26 @@ def bound_inputs(limits: LimitNumbers, q: Array, problem: ProblemArrays) -> None
 
 
 @compiled
+def gathers_speed(limits: LimitNumbers, problem: ProblemArrays, u: Array, count: int) -> bool:
+    """Whether one of the first `count` inputs speeds up, held back by its limit of acceleration alone: then
+    its bounds are twice the largest change apart."""
+    for j in range(count):
+        change = limits.acceleration[j] * problem.dt[()]
+        lower, upper = problem.u_lower[j], problem.u_upper[j]
+        alone = not math.isinf(change) and upper - lower >= 2.0 * change * (1.0 - ROUNDING)
+        fastest = upper if u[j] > 0.0 else -lower
+        if alone and abs(u[j]) >= fastest - ROUNDING * change:
+            return True
+    return False
+
+
+@compiled
 def wheel_rows(limits: LimitNumbers, q: Array, G: Array, problem: ProblemArrays) -> None:
-    """The wheels' rolling rates, rad/s, as rows on the inputs; their bounds stay."""
+    """The rows that give the wheels' rolling rates, rad/s; their bounds are constant."""
     for i in range(limits.spin.shape[0]):
         steer = int(limits.wheels[i, 4])
         along, across, turn, steered = rolling(limits.wheels[i], q[2], q[steer] if steer >= 0 else 0.0)
-        for j in range(problem.u_lower.shape[0]):
-            problem.limit_rows[i, j] = 0.0
+        clear(problem.limit_rows[i])
         for j in range(G.shape[1]):
             rate = along * G[0, j] + across * G[1, j] + turn * G[2, j]
             if steer >= 0:
@@ -124,18 +154,80 @@ def wheel_rows(limits: LimitNumbers, q: Array, G: Array, problem: ProblemArrays)
 
 
 @compiled
+def counted_on(braking: float, row: Array, acceleration: Array) -> float:
+    """The deceleration of a row's value (m,) to rely on: as given, or a share of what the inputs' give."""
+    if not math.isnan(braking):
+        return braking
+    total = 0.0
+    for j in range(row.shape[0]):
+        if row[j] != 0.0:
+            total += COUNTED_ON * abs(row[j]) * acceleration[j]
+    return total
+
+
+@compiled
 def function_bounds(limits: LimitNumbers, value: Array, value_t: Array, problem: ProblemArrays) -> None:
-    """Bounds of the functions' rates, whose rows on the inputs are there: dampers with room to brake."""
+    """Bounds of the functions' rates: dampers with room to brake."""
     dt = problem.dt[()]
     w = limits.spin.shape[0]
     for i in range(limits.rows.shape[0]):
         row = limits.rows[i]
-        braking = limits.braking[i]
-        if math.isnan(braking):
-            braking = 0.0
-            for j in range(limits.slowest.shape[0]):
-                if problem.limit_rows[w + i, j] != 0.0:
-                    braking += COUNTED_ON * abs(problem.limit_rows[w + i, j]) * limits.acceleration[j]
+        braking = counted_on(limits.braking[i], problem.limit_rows[w + i], limits.acceleration)
         recovery = limits.recovery[()]
         problem.upper[w + i] = approach(limits.row_high[i] - value[row], dt, braking, recovery) - value_t[row]
         problem.lower[w + i] = -approach(value[row] - limits.row_low[i], dt, braking, recovery) - value_t[row]
+
+
+class Clearance(NamedTuple):
+    """How distances are kept.
+
+    first () : the first of their rows among those of the limits
+    distance () : the distance to keep, m; margin () : what rows keep beyond it, m
+    gain () : 1/s, d falls at most at this times the room left; recovery () : speed of the return, m/s
+    braking () : deceleration, m/s²; NaN for a share of the inputs' accelerations
+    least (K,) : a rate that a row has to keep instead, m/s; -inf for none
+    held (), counts (4,) : `held` and `counts` of `nmm.control.safety_filter`
+    """
+
+    first: IntegerCell
+    distance: Cell
+    margin: Cell
+    gain: Cell
+    recovery: Cell
+    braking: Cell
+    least: SampledVector
+    held: SampledIntegerCell
+    counts: SampledIntegerVector
+
+
+@compiled
+def bound_unlimited(limits: LimitNumbers, problem: ProblemArrays) -> None:
+    """Bound inputs of unlimited velocity: rows that leave hardly a direction would make them arbitrarily
+    large, and so the motion to be checked for collisions."""
+    most = FARTHEST / problem.dt[()]
+    for j in range(limits.slowest.shape[0]):
+        if math.isinf(limits.fastest[j]):
+            problem.u_upper[j] = max(min(problem.u_upper[j], most), problem.u_lower[j])
+        if math.isinf(limits.slowest[j]):
+            problem.u_lower[j] = min(max(problem.u_lower[j], -most), problem.u_upper[j])
+
+
+@compiled
+def clearance_bounds(keep: Clearance, near: Rows, acceleration: Array, problem: ProblemArrays) -> None:
+    dt = problem.dt[()]
+    for k in range(near.d.shape[0]):
+        row = keep.first[()] + k
+        problem.lower[row], problem.upper[row] = -math.inf, math.inf
+        if k >= near.used[()]:
+            continue
+        if keep.least[k] > -math.inf:
+            problem.lower[row] = keep.least[k] - near.d_t[k]
+            continue
+        braking = counted_on(keep.braking[()], problem.limit_rows[row], acceleration)
+        room = near.d[k] - keep.distance[()]
+        speed = keep.gain[()] * (room - keep.margin[()])  # within the margin the return may be slow
+        if room < 0.0:
+            speed = approach(room, dt, braking, float(keep.recovery[()]))
+        elif speed > 0.0:
+            speed = min(speed, approach(room, dt, braking, float(keep.recovery[()])))
+        problem.lower[row] = -speed - near.d_t[k]

@@ -1,48 +1,65 @@
-"""Which distances a controller keeps: between the robot's own shapes, and from obstacles."""
+"""Which distances a controller keeps: between the robot's own shapes, and to obstacles."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from nmm.arrays import counted, positive
-from nmm.collisions.obstacle import Obstacle, checked_distance
-from nmm.collisions.robot_shapes import CAPSULES, HULLS
-from nmm.collisions.setting import Setting, set_up
-from nmm.errors import InputError, expect_known
+from nmm.arrays import counted, positive, scalar
+from nmm.collisions.obstacle import Obstacle
+from nmm.collisions.pairs import CAPSULES, HULLS
+from nmm.collisions.scene import Scene, set_up
+from nmm.errors import InputError, expect_kind, expect_known
 from nmm.robots.robot import Robot
 
-#: Pairs are looked at from this far beyond the distance to keep, m.
+#: Pairs within the distance to keep plus this are considered, m.
 BAND = 0.2
 
 
+def _refuses_self(cls: type[Collisions]) -> type[Collisions]:
+    """Make the constructor refuse the former name of `self_collisions`."""
+    init = cls.__init__
+
+    @wraps(init)
+    def checked(collisions: Collisions, /, *given: Any, **named: Any) -> None:
+        if "self" in named:
+            raise InputError("it is called self_collisions now", where="collisions: self")
+        init(collisions, *given, **named)
+
+    cls.__init__ = checked  # type: ignore[method-assign, assignment]  # same signature
+    return cls
+
+
+@_refuses_self
 @dataclass(frozen=True)
 class Collisions:
-    """Distances that a controller never lets fall below a number.
+    """Distances that a controller keeps from falling below a number.
 
     Parameters
     ----------
-    distance : to keep, m, from 0
-    self : whether the robot keeps off itself, too
-    obstacles : what it keeps off, `Obstacle`s
+    distance : to keep, m, at least 0
+    self_collisions : whether the robot also avoids itself
+    obstacles : what it avoids, `Obstacle`s
     ignore : pairs of names (links, shapes, obstacles) that are not kept apart
-    srdf : a file of MoveIt's whose disabled pairs are left out, too, or True for the robot's own (see
-        `nmm.load`); those that do touch are told
+    srdf : a MoveIt file whose disabled pairs are ignored, too, or True for the robot's own (see `nmm.load`);
+        disabled pairs that do touch are reported
     shapes : what stands for the robot's meshes, "hulls" or "capsules"
-    band : pairs nearer than this have rows, m; `distance` and 0.2 m more when not given
-    gain : 1/s, a distance falls no faster than this times what is left of it
-    recovery : speed of the way back where a distance is below, m/s
-    braking : deceleration of a distance to count on, m/s²; None for a quarter of what the inputs'
+    band : pairs nearer than this have rows, m; `distance` plus 0.2 m when not given
+    gain : 1/s, a distance falls at most at this times what is left of it
+    recovery : speed at which a distance below the minimum is restored, m/s
+    braking : deceleration of a distance to rely on, m/s²; None for a quarter of what the inputs'
         accelerations give
-    rows : the most distances that are kept at a time, the nearest ones
+    rows : the largest number of distances kept at a time, the smallest ones
 
     Raises
     ------
-    InputError : a negative distance, no obstacles, two of one name, a band that is not beyond the distance,
-        obstacles in the place of `self`
+    InputError : a negative distance, an obstacle of another kind, two of one name, a band not beyond the
+        distance, obstacles in the place of `self_collisions`
 
     Examples
     --------
@@ -57,7 +74,7 @@ class Collisions:
     """
 
     distance: float = 0.03
-    self: bool = True
+    self_collisions: bool = True
     obstacles: Sequence[Obstacle] = ()
     ignore: Sequence[tuple[str, str]] = ()
     srdf: str | Path | bool | None = None
@@ -68,49 +85,48 @@ class Collisions:
     braking: float | None = None
     rows: int = 40
 
-    def __post_init__(this) -> None:  # self is a field
-        if not isinstance(
-            this.self, bool
-        ):  # or obstacles, given by position, would be what nothing keeps off
+    def __post_init__(self) -> None:
+        if not isinstance(self.self_collisions, bool):  # obstacles given as a positional argument
             raise InputError(
-                f"collisions: self: expected True or False, got {this.self!r}; obstacles go by their name, "
-                "Collisions(0.03, obstacles=[...])"
+                "obstacles go by their name, Collisions(0.03, obstacles=[...])",
+                where="collisions: self_collisions",
+                expected="True or False",
+                got=self.self_collisions,
             )
-        given = (this.obstacles,) if isinstance(this.obstacles, Obstacle) else tuple(this.obstacles)
+        given = (self.obstacles,) if isinstance(self.obstacles, Obstacle) else tuple(self.obstacles)
         for one in given:
-            if not isinstance(one, Obstacle):
-                raise InputError(f"collisions: obstacles: expected an Obstacle, got {one!r}")
+            expect_kind(one, Obstacle, "collisions: obstacles", "an Obstacle")
         names = [one.name for one in given]
         for name in names:
             if names.count(name) > 1:
-                raise InputError(f"collisions: obstacles: expected a name each, got {name!r} twice")
-        distance = checked_distance(this.distance, "collisions: distance")
-        band = distance + BAND if this.band is None else positive(this.band, "collisions: band")
+                raise InputError(where="collisions: obstacles", expected="a name each", got=name)
+        distance = scalar(self.distance, "collisions: distance", least=0.0)
+        band = distance + BAND if self.band is None else positive(self.band, "collisions: band")
         if band <= distance:
-            raise InputError(f"collisions: band: expected more than the distance, {distance:g}, got {band:g}")
-        expect_known("shapes", this.shapes, (HULLS, CAPSULES), "collisions")
+            raise InputError(where="collisions: band", expected=f"above distance, {distance:g}", got=band)
+        expect_known("shapes", self.shapes, (HULLS, CAPSULES), "collisions")
         checked = {
             "obstacles": given,
             "distance": distance,
             "band": band,
-            "ignore": tuple(this.ignore),
-            "gain": positive(this.gain, "collisions: gain"),
-            "recovery": positive(this.recovery, "collisions: recovery"),
-            "braking": None if this.braking is None else positive(this.braking, "collisions: braking"),
-            "rows": counted(this.rows, "collisions: rows"),
+            "ignore": tuple(self.ignore),
+            "gain": positive(self.gain, "collisions: gain"),
+            "recovery": positive(self.recovery, "collisions: recovery"),
+            "braking": None if self.braking is None else positive(self.braking, "collisions: braking"),
+            "rows": counted(self.rows, "collisions: rows"),
         }
         for name, value in checked.items():
-            object.__setattr__(this, name, value)
+            object.__setattr__(self, name, value)
 
-    def on(this, robot: Robot) -> Setting:
-        """These distances on one robot; `InputError` names what it does not have."""
+    def on(self, robot: Robot) -> Scene:
+        """These distances on one robot; `InputError` for names that it lacks."""
         return set_up(
             robot,
-            this.obstacles,
-            own=this.self,
-            distance=this.distance,
-            band=float(this.band or np.inf),
-            ignore=this.ignore,
-            srdf=this.srdf,
-            meshes=this.shapes,
+            self.obstacles,
+            own=self.self_collisions,
+            distance=self.distance,
+            band=float(self.band or np.inf),
+            ignore=self.ignore,
+            srdf=self.srdf,
+            meshes=self.shapes,
         )

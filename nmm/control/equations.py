@@ -1,7 +1,6 @@
-"""The compiled control step: from functions to J_bar u = rate and h, from these to u and q_dot.
+"""The compiled control step: functions give J_bar u = rate and h, these give u and q_dot.
 
-This is where the multiplication by S happens, once for all: J_bar = (∂f/∂q - ∂g/∂q) S,
-h = Sᵀ ∂H/∂q, q_dot = S u (paper, eqs. 2, 6 and 13), S = blkdiag(G, C).
+J_bar = (∂f/∂q - ∂g/∂q) S, h = Sᵀ ∂H/∂q, q_dot = S u (paper, eqs. 2, 6 and 13), S = blkdiag(G, C).
 """
 
 from __future__ import annotations
@@ -13,30 +12,39 @@ from numba import types
 
 from nmm.arrays import Array, Integers
 from nmm.collisions.rows import Rows
-from nmm.control.bounds import SAMPLE, LimitNumbers
-from nmm.control.clearance_rows import Clearance
+from nmm.control.bounds import SAMPLE, Clearance, LimitNumbers, gathers_speed
+from nmm.control.period_monitor import PeriodNumbers
+from nmm.control.retreat import RetreatNumbers, stalls
 from nmm.control.steering import SteeringNumbers, steer
-from nmm.functions.program import BESIDE, Buffers, LaidOut, run
+from nmm.functions.program import BESIDE, Buffers, LaidOut, run_program
 from nmm.kernels.compiled import caller, compiled, kernel, scratch
-from nmm.kernels.followers import add_to_leaders, move_followers
-from nmm.kernels.linear_algebra import residual_norm
-from nmm.kernels.memory import Cell, IntegerMatrix, IntegerVector, Matrix, Vector, views
+from nmm.kernels.linear_algebra import dot, residual_norm
+from nmm.kernels.record_layout import (
+    Cell,
+    IntegerMatrix,
+    IntegerVector,
+    Matrix,
+    SampledIntegerVector,
+    SampledVector,
+    Vector,
+    views,
+)
+from nmm.kernels.velocity_map import to_coordinates, to_inputs
 from nmm.resolvers.answer import NOT_FINITE, RELAXED, SOLVED, AnswerArrays
 from nmm.resolvers.base import call_resolver
+from nmm.resolvers.limit_check import keep_limits
 from nmm.resolvers.problem_arrays import ProblemArrays
-from nmm.resolvers.within import keep_limits, times
 
 
 class TaskRows(NamedTuple):
-    """The rows of a stack of tasks, s of them.
+    """The s rows of a stack of tasks.
 
-    rows (s, 3) : [row of f, row of g, row of e] among the program's; the row of e is PLAIN or WRAPPED where
-        e = g - f, which then is not computed elsewhere
+    rows (s, 3) : the program's rows of f, g and e; for e, PLAIN or WRAPPED where no function computes it
     gain (s, s) : K
-    speed (s,), braking (s,) : ‖K e‖ <= speed, ‖K e‖² <= 2 braking ‖e‖ over the rows of a group
-    group (s,) : which group each row is in
-    full (s,) : ∂g/∂t + K e without that bound
-    r, r_d, error (s,) : value, desired value and error, which a step writes
+    speed, braking (s,) : ‖K e‖ <= speed, ‖K e‖² <= 2 braking ‖e‖ over the rows of a group
+    group (s,) : the group of each row
+    full (s,) : ∂g/∂t + K e without these bounds
+    r, r_d, error (s,) : value, desired value and error, written by a step
     """
 
     rows: IntegerMatrix
@@ -51,32 +59,33 @@ class TaskRows(NamedTuple):
 
 
 class Arm(NamedTuple):
-    """C of S = blkdiag(G, C): the identity, with a row of its own for every coordinate that follows another.
+    """C of S = blkdiag(G, C): the identity, with a further row for each mimic joint.
 
     moved (m - p,) : the coordinate that input p + j moves
-    followers (4 k,) : see `nmm.kernels.followers`
+    mimic_joints (4 k,) : see `nmm.kernels.velocity_map`
     """
 
     moved: IntegerVector
-    followers: Vector
+    mimic_joints: Vector
 
 
 class ControlStep(NamedTuple):
-    """What a step reads and writes beside its program's functions; its place in memory is `BESIDE`.
+    """What a step reads and writes besides its program's functions; its place in memory is `BESIDE`.
 
     near, clearance : distances that are kept, and how
     task, added : the task, and the added task of the extended Jacobian
     arm : what its inputs move
-    terms, weights : rows of the objective's terms, and what they count
+    terms, weights : rows of the objective's terms, and their weights
     H () : the objective
-    problem, answer : what the resolver gets and gives
-    limits : from which the problem's come
-    steering : what sets the steering inputs that the task does not feel
-    resolver, numbers, options, state : its kernel, what that reads, and what it remembers
+    problem, answer : the resolver's input and output
+    limits : from which the problem's limits are computed
+    steering : the law for steering inputs that do not affect the task
+    resolver, numbers, options, state : its kernel, what that reads (α included), and what it remembers
+    scale (levels,) : λ, the share of each level's rate that was given
     q_dot (n,) : S u
-    step : where the code of `step` begins, for loops, which hold no copy of it
-    limits_code, clearance_code : where that of `write_limits` and `write_clearance` begins; 0 where there
-        are none
+    retreat, period : the retreat from a stalled error, and the times of calls
+    step : address of `step`, for compiled loops, which contain no copy of it
+    limits_code, clearance_code : addresses of `write_limits` and `write_clearance`; 0 where not used
     """
 
     near: Rows
@@ -91,67 +100,54 @@ class ControlStep(NamedTuple):
     limits: LimitNumbers
     steering: SteeringNumbers
     resolver: int
-    numbers: Vector
+    numbers: SampledVector
     options: IntegerVector
-    state: IntegerVector
+    state: SampledIntegerVector
     answer: AnswerArrays
-    q_dot: Vector
+    scale: SampledVector
+    q_dot: SampledVector
+    retreat: RetreatNumbers
+    period: PeriodNumbers
     step: int
     limits_code: int
     clearance_code: int
 
 
-#: A step's arguments and what it returns.
+#: The signature of `step`.
 STEP = types.float64(types.float64, types.float64[::1], types.int64[::1], types.float64[::1])
 
 call_step = caller(STEP)
 
-#: What writes bounds for the resolver: q, and the blocks.
+#: The signature of kernels that write bounds for the resolver: q, and the blocks.
 BOUNDS = types.void(types.float64[::1], types.int64[::1], types.float64[::1])
 
 call_bounds = caller(BOUNDS)
 
-#: `resolve`'s.
+#: The signature of `resolve`.
 ANSWER = types.float64(types.float64[::1], types.int64[::1], types.float64[::1])
 
-#: Instead of the row of an error that is computed: the error is r_d - r; an angle's, wrapped.
+#: In place of the row of a computed error: the error is r_d - r; that of an angle is wrapped.
 PLAIN, WRAPPED = -1, -2
 
 
 @compiled
 def times_S(rows: Array, row: int, G: Array, C: Arm, out: Array) -> None:
-    """out = rows[row] S: a derivative in the coordinates, seen by the inputs.
-
-    In place: what followers add to their leaders stays in rows[row].
-    """
-    n_p, p = G.shape
-    add_to_leaders(rows, row, C.followers)
-    for j in range(p):
-        out[j] = 0.0
-        for i in range(n_p):
-            out[j] += rows[row, i] * G[i, j]
-    for j in range(C.moved.shape[0]):
-        out[p + j] = rows[row, C.moved[j]]
+    """out = rows[row] S: a derivative by the coordinates becomes one by the inputs. Changes rows[row], as
+    mimic joints' contributions are added to the joints that drive them."""
+    to_inputs(rows, row, G, G.shape[1], C.moved, C.mimic_joints, out)
 
 
 @compiled
 def drive(u: Array, G: Array, C: Arm, q_dot: Array) -> None:
     """q_dot = S u."""
-    n_p, p = G.shape
-    for i in range(n_p):
-        q_dot[i] = 0.0
-        for j in range(p):
-            q_dot[i] += G[i, j] * u[j]
-    for j in range(C.moved.shape[0]):
-        q_dot[C.moved[j]] = u[p + j]
-    move_followers(q_dot, C.followers)
+    to_coordinates(u, G, G.shape[1], C.moved, C.mimic_joints, q_dot)
 
 
 @compiled
 def write_equation(task: TaskRows, b: Buffers, C: Arm, J: Array, rate: Array) -> None:
     """rate = ∂g/∂t + K e, J_bar = (∂f/∂q - ∂g/∂q) S.
 
-    Where an error is computed, rate = ∂e/∂t + K e and J_bar = -∂e/∂q S: the same equation for any e.
+    For a computed error, rate = ∂e/∂t + K e and J_bar = -∂e/∂q S: the same equation for any e.
     """
     s = task.r.shape[0]
     n = b.value_q.shape[1]
@@ -173,7 +169,7 @@ def write_equation(task: TaskRows, b: Buffers, C: Arm, J: Array, rate: Array) ->
             error = math.pi - (math.pi - error) % (2.0 * math.pi)
         task.error[i] = error
         rate[i] = b.value_t[g] - b.value_t[f]
-        for j in range(n):  # in place: f's derivative is not read again
+        for j in range(n):  # in place, as f's derivative is not read again
             b.value_q[f, j] -= b.value_q[g, j]
         times_S(b.value_q, f, b.G, C, J[i])
     feedback = scratch(s)
@@ -198,11 +194,11 @@ def write_equation(task: TaskRows, b: Buffers, C: Arm, J: Array, rate: Array) ->
 
 
 @compiled
-def told(task: TaskRows, problem: ProblemArrays, answer: AnswerArrays) -> None:
-    """The scale of each level as its share of the rate: 1 - ‖rate - J u‖ / ‖rate‖, rows in their scales.
+def write_shares(task: TaskRows, problem: ProblemArrays, answer: AnswerArrays, scale: Array) -> None:
+    """scale (levels,): λ, the share of each level's rate, 1 - ‖rate - J u‖ / ‖rate‖, rows in their scales.
 
-    That is λ where rest is allowed. Where it is not, λ counts from inputs that may do most of the task. The
-    rate is all of it: where feedback was bounded, that was on purpose.
+    It equals the answer's ν where rest is within the limits; otherwise ν is relative to inputs that may
+    already do most of the task. The rate includes all feedback, also where the task bounds it.
     """
     first = 0
     bounded = False
@@ -213,12 +209,13 @@ def told(task: TaskRows, problem: ProblemArrays, answer: AnswerArrays) -> None:
         for i in range(first, problem.ends[level]):
             weight = 1.0 / problem.row_scales[i]
             asked += (weight * task.full[i]) ** 2
-            missed += (weight * (task.full[i] - times(problem.J, i, answer.u))) ** 2
+            missed += (weight * (task.full[i] - dot(problem.J[i], answer.u))) ** 2
             less = less or task.full[i] != problem.rate[i]
         first = problem.ends[level]
         bounded = bounded or less
-        if less or answer.scale[level] < 1.0:
-            answer.scale[level] = max(0.0, 1.0 - math.sqrt(missed / asked)) if asked > 0.0 else 0.0
+        scale[level] = 1.0
+        if less or answer.nu[level] < 1.0:
+            scale[level] = max(0.0, 1.0 - math.sqrt(missed / asked)) if asked > 0.0 else 0.0
     if bounded:
         answer.residual[()], _ = residual_norm(problem.J, answer.u, task.full)
         if answer.status[()] == SOLVED:
@@ -227,11 +224,11 @@ def told(task: TaskRows, problem: ProblemArrays, answer: AnswerArrays) -> None:
 
 @compiled
 def finish(q: Array, integers: Integers, floats: Array) -> None:
-    """From the resolver's inputs to the robot's: limits, the steering that the task does not feel, q_dot."""
+    """From the resolver's inputs to the robot's: limits, the steering law, q_dot."""
     b = views(LaidOut, integers, floats, 0).buffers
     e = views(ControlStep, integers, floats, BESIDE)
     keep_limits(e.problem, e.answer)
-    told(e.task, e.problem, e.answer)
+    write_shares(e.task, e.problem, e.answer, e.scale)
     if e.steering.on[()] == 1:
         steer(e.steering, q, b.value, b.G, e.problem, e.answer.u)
     if e.limits.mode[()] == SAMPLE:
@@ -242,16 +239,16 @@ def finish(q: Array, integers: Integers, floats: Array) -> None:
 
 @compiled
 def resolve(q: Array, integers: Integers, floats: Array) -> float:
-    """The resolver's inputs for the equations that are there, within limits. Returns its status."""
+    """The resolver's inputs, within limits, for the equations in memory; returns its status."""
     e = views(ControlStep, integers, floats, BESIDE)
     if e.clearance_code != 0:
         call_bounds(e.clearance_code, q, integers, floats)
     answer = e.answer
     for j in range(answer.u.shape[0]):
-        answer.u[j] = math.nan  # what a resolver that finds no solution leaves behind
+        answer.u[j] = math.nan  # stays where the resolver finds no solution
     answer.status[()] = NOT_FINITE
-    for level in range(answer.scale.shape[0]):
-        answer.scale[level] = 1.0
+    for level in range(answer.nu.shape[0]):
+        answer.nu[level] = 1.0
     answer.residual[()] = math.nan
     answer.measure[()] = math.nan
     answer.side[()] = 0.0
@@ -263,11 +260,8 @@ def resolve(q: Array, integers: Integers, floats: Array) -> float:
 
 @kernel(STEP)
 def step(t: float, q: Array, integers: Integers, floats: Array) -> float:
-    """One control step: functions, equations, gradient, inputs. Returns the resolver's status.
-
-    Pinocchio's part is in memory already.
-    """
-    run(t, q, integers, floats)
+    """One control step: functions (except Pinocchio's), equations, gradient, inputs; returns the status."""
+    run_program(t, q, integers, floats)
     b = views(LaidOut, integers, floats, 0).buffers
     e = views(ControlStep, integers, floats, BESIDE)
     problem = e.problem
@@ -291,3 +285,13 @@ def step(t: float, q: Array, integers: Integers, floats: Array) -> float:
     if e.limits_code != 0:
         call_bounds(e.limits_code, q, integers, floats)
     return resolve(q, integers, floats)
+
+
+@compiled
+def watch_error(integers: Integers, floats: Array) -> bool:
+    e = views(ControlStep, integers, floats, BESIDE)
+    if e.retreat.durations.shape[0] == 0:
+        return False
+    platform = views(LaidOut, integers, floats, 0).buffers.G.shape[1]
+    speeds_up = gathers_speed(e.limits, e.problem, e.answer.u, platform)
+    return bool(stalls(e.retreat, e.task.error, e.problem.dt[()], speeds_up))

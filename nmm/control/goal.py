@@ -1,20 +1,23 @@
-"""When a held target is reached: tolerances of a task's error."""
+"""When a constant target is reached: tolerances of a task's error."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 
-from nmm.arrays import Array, positive
+import numpy as np
+
+from nmm.arrays import Array, Integers, positive
 from nmm.functions.function import Row
+from nmm.kernels.compiled import inlined
 
 
 class Goal:
-    """Reached where the error's norm over rows of one unit is within its tolerance.
+    """Reached where the error's norm over the rows of each unit is within its tolerance.
 
     Parameters
     ----------
-    m, rad : tolerances of rows in metres and of rows in radians; rows of other units are not looked at
+    m, rad : tolerances of rows in metres and of rows in radians; rows of other units are ignored
 
     Examples
     --------
@@ -32,14 +35,32 @@ class Goal:
 
     def reached(self, error: Array, rows: Sequence[Row]) -> bool:
         """Whether an error (s,) is within the tolerances."""
-        metres, radians = sizes(error, [row.unit for row in rows])
+        metres, radians = error_sizes(error, [row.unit for row in rows])
         return metres <= self.m and radians <= self.rad
 
 
-def sizes(error: Array, units: Sequence[str]) -> tuple[float, float]:
-    """The error's norms over rows in metres and over rows in radians."""
-    squares = {"m": 0.0, "rad": 0.0}
-    for value, unit in zip(error.tolist(), units, strict=True):
-        if unit in squares:
-            squares[unit] += value * value
-    return math.sqrt(squares["m"]), math.sqrt(squares["rad"])
+#: Codes of units.
+METRES, RADIANS, ANOTHER = 0, 1, -1
+
+
+def unit_codes(units: Sequence[str]) -> Integers:
+    """The units of rows (s,) as codes for `norms`."""
+    codes = {"m": METRES, "rad": RADIANS}
+    return np.array([codes.get(unit, ANOTHER) for unit in units], dtype=np.int64)
+
+
+@inlined
+def norms(error: Array, units: Integers) -> tuple[float, float]:
+    """The error's norms over rows in metres and over rows in radians; units (s,) of `unit_codes`."""
+    metres, radians = 0.0, 0.0
+    for i in range(error.shape[0]):
+        if units[i] == METRES:
+            metres += error[i] * error[i]
+        elif units[i] == RADIANS:
+            radians += error[i] * error[i]
+    return math.sqrt(metres), math.sqrt(radians)
+
+
+def error_sizes(error: Array, units: Sequence[str]) -> tuple[float, float]:
+    """`norms` for units by name."""
+    return norms(error, unit_codes(units))

@@ -1,118 +1,102 @@
 """Integration of the closed loop q_dot = S(q) u(t, q) from one sample to the next.
 
-Methods are data: an explicit Runge-Kutta method is its tableau and its stability polynomial.
+An explicit Runge-Kutta method is given by its tableau and its stability polynomial.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from nmm.arrays import Array
-from nmm.errors import InputError, RunError, unknown
+from nmm.errors import RunError, expect_known
 from nmm.kernels.compiled import allocating
-from nmm.robots.held import Held
 from nmm.robots.robot import Robot
+from nmm.robots.zero_order_hold import HeldInputs
 
 Velocity = Callable[[float, Array], Array]
 
 
-class Integrator(Protocol):
-    """Takes one sample of the closed loop to the next."""
+class Integrator(ABC):
+    """Takes one sample of the closed loop to the next.
 
-    @property
-    def order(self) -> int:
-        """The error of a step dt is of the order dt^(order + 1)."""
+    Attributes
+    ----------
+    order : the error of a step dt is of order dt^(order + 1)
+    tolerance : bound on the error of an adaptive step, m and rad; 0 for constant steps
+    stability : coefficients c of the stability polynomial R(z) = Σ c_k z^k, lowest first; () if steps adapt
+    """
 
-    @property
-    def tolerance(self) -> float:
-        """What the error of a step is kept below where steps adapt, m and rad; 0 where they do not."""
+    order: int
+    tolerance = 0.0
+    stability: tuple[float, ...] = ()
 
-    @property
-    def stability(self) -> tuple[float, ...]:
-        """Coefficients c of the stability polynomial R(z) = Σ c_k z^k, lowest first; () if steps adapt."""
-
+    @abstractmethod
     def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
         """q at t + dt, from q, q_dot and u at t."""
 
 
 @allocating
 def combined(q: Array, dt: float, weights: Array, slopes: Array) -> Array:
-    """q + dt Σ weights[k] slopes[k]; the slopes are summed first, so that q is rounded once."""
-    ahead = np.empty_like(q)
+    """q + dt Σ weights[k] slopes[k]; the slopes are summed first, so q is rounded once."""
+    q_next = np.empty_like(q)
     for i in range(q.shape[0]):
         total = 0.0
         for k in range(weights.shape[0]):
             total += weights[k] * slopes[k, i]
-        ahead[i] = q[i] + dt * total
-    return ahead
+        q_next[i] = q[i] + dt * total
+    return q_next
 
 
-class RungeKutta:
-    """An explicit method: order, nodes c, rows of the matrix A, weights b, stability polynomial."""
-
-    tolerance = 0.0
+class RungeKutta(Integrator):
+    """An explicit method: order, nodes c (s,), the matrix A (s, s), weights b (s,), stability polynomial."""
 
     def __init__(
-        self,
-        order: int,
-        nodes: tuple[float, ...],
-        matrix: tuple[tuple[float, ...], ...],
-        weights: tuple[float, ...],
-        stability: tuple[float, ...],
+        self, order: int, nodes: ArrayLike, matrix: ArrayLike, weights: ArrayLike, stability: Sequence[float]
     ) -> None:
-        self.order = order
-        self.stability = stability
-        self._stages = [(node, np.array(row)) for node, row in zip(nodes, matrix, strict=True)]
-        self._weights = np.array(weights)
-
-    @property
-    def tableau(self) -> tuple[Array, Array, Array]:
-        """Nodes (s,), the matrix (s, s) and weights (s,), the stage at the beginning included."""
-        s = self._weights.size
-        A = np.zeros((s, s))
-        for k, (_, row) in enumerate(self._stages, start=1):
-            A[k, : row.size] = row
-        return np.array([0.0, *(node for node, _ in self._stages)]), A, self._weights
+        self.order, self.stability = order, tuple(stability)
+        self.tableau: tuple[Array, Array, Array] = np.array(nodes), np.array(matrix), np.array(weights)
+        c, A, self._weights = self.tableau
+        self._stages = [(k, float(c[k]), A[k, :k].copy()) for k in range(1, c.size)]
 
     def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
         slopes = np.empty((self._weights.size, q.size))
         slopes[0] = q_dot
-        for k, (node, row) in enumerate(self._stages, start=1):
+        for k, node, row in self._stages:
             slopes[k] = velocity(t + node * dt, combined(q, dt, row, slopes))
-        ahead: Array = combined(q, dt, self._weights, slopes)
-        return ahead
+        q_next: Array = combined(q, dt, self._weights, slopes)
+        return q_next
 
 
-EULER = RungeKutta(1, (), (), (1.0,), (1.0, 1.0))
-MIDPOINT = RungeKutta(2, (0.5,), ((0.5,),), (0.0, 1.0), (1.0, 1.0, 1 / 2))
+EULER = RungeKutta(1, [0.0], [[0.0]], [1.0], (1.0, 1.0))
+MIDPOINT = RungeKutta(2, [0.0, 0.5], [[0.0, 0.0], [0.5, 0.0]], [0.0, 1.0], (1.0, 1.0, 1 / 2))
 RK4 = RungeKutta(
     4,
-    (0.5, 0.5, 1.0),
-    ((0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)),
-    (1 / 6, 1 / 3, 1 / 3, 1 / 6),
+    [0.0, 0.5, 0.5, 1.0],
+    [[0.0, 0.0, 0.0, 0.0], [0.5, 0.0, 0.0, 0.0], [0.0, 0.5, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]],
+    [1 / 6, 1 / 3, 1 / 3, 1 / 6],
     (1.0, 1.0, 1 / 2, 1 / 6, 1 / 24),
 )
 
 
-#: Adaptive steps from a sample to the next; fast motions take a few.
+#: Limit on adaptive steps between two samples; even fast motions need only a few.
 MOST_STEPS = 20_000
 
 
-class Adaptive:
-    """SciPy's DOP853 between the samples, with a step that keeps the local error below `tolerance`."""
+class Adaptive(Integrator):
+    """SciPy's DOP853 between the samples, with the local error of a step below `tolerance`."""
 
     order = 8
-    stability: tuple[float, ...] = ()
 
     def __init__(self, tolerance: float) -> None:
         self.tolerance = tolerance
 
     def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
-        from scipy.integrate import DOP853  # here: a quarter of a second that other methods need not pay
+        from scipy.integrate import DOP853  # here, as the import takes a quarter of a second
 
         solver = DOP853(
             velocity, t, q, t + dt, rtol=max(self.tolerance, 1e-13), atol=self.tolerance, first_step=dt
@@ -121,56 +105,49 @@ class Adaptive:
         while solver.status == "running":
             if taken == MOST_STEPS:
                 raise RunError(
-                    f"at t = {solver.t:g} s: {MOST_STEPS} adaptive steps did not lead from t = {t:g} s to "
-                    f"the next sample at {t + dt:g} s: gains are too high, or the tolerance is too small or "
-                    "dt too large for method adaptive"
+                    f"{MOST_STEPS} adaptive steps did not lead from t = {t:g} s to the next sample at "
+                    f"{t + dt:g} s: gains are too high, or the tolerance is too small or dt too large for "
+                    "method adaptive",
+                    where=f"at t = {solver.t:g} s",
                 )
             taken += 1
             message = solver.step()
             if solver.status == "failed":
                 raise RunError(
-                    f"at t = {solver.t:g} s: {message.rstrip('.')}: the inputs change without bound "
-                    "there, as near a singular configuration"
+                    f"{message.rstrip('.')}: the inputs change without bound there, as near a singular "
+                    "configuration",
+                    where=f"at t = {solver.t:g} s",
                 )
-        ahead: Array = solver.y
-        return ahead
+        q_next: Array = solver.y
+        return q_next
 
 
-class ZeroOrderHold:
-    """The inputs stay constant over dt, as on a robot with a sampled controller; the arm's part is exact."""
+class ZeroOrderHold(Integrator):
+    """Constant inputs over dt, as on a robot with a sampled controller; the arm's motion is exact."""
 
-    order, tolerance = 1, 0.0
-    stability: tuple[float, ...] = (1.0, 1.0)
+    order, stability = 1, (1.0, 1.0)
 
     def __init__(self, robot: Robot) -> None:
-        self._held = Held(robot)
+        self._held = HeldInputs(robot)
 
     def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
         return self._held(q, u, dt)
 
 
 @dataclass(frozen=True)
-class Around:
-    """What changes the steps of another integrator, and is of its order and stability."""
+class Around(Integrator):
+    """An integrator that modifies another one's steps and has its order and stability."""
 
     integrator: Integrator
 
-    @property
-    def order(self) -> int:
-        return self.integrator.order
-
-    @property
-    def tolerance(self) -> float:
-        return self.integrator.tolerance
-
-    @property
-    def stability(self) -> tuple[float, ...]:
-        return self.integrator.stability
+    def __post_init__(self) -> None:
+        for name in ("order", "tolerance", "stability"):
+            object.__setattr__(self, name, getattr(self.integrator, name))
 
 
 @dataclass(frozen=True)
-class Followed(Around):
-    """An integrator after which the joints that follow others are where these have them, to the digit."""
+class WithMimicJoints(Around):
+    """An integrator that sets mimic joints exactly after each step."""
 
     robot: Robot
 
@@ -183,16 +160,12 @@ METHODS = ("rk4", "midpoint", "euler", "zoh", "adaptive")
 
 def integrator(method: str, robot: Robot, tolerance: float) -> Integrator:
     """The integrator of that name; `InputError` lists the names."""
-    found = _integrator(method, robot, tolerance)
-    return Followed(found, robot) if robot.followers else found
-
-
-def _integrator(method: str, robot: Robot, tolerance: float) -> Integrator:
-    fixed = {"rk4": RK4, "midpoint": MIDPOINT, "euler": EULER}
-    if method in fixed:
-        return fixed[method]
+    expect_known("method", method, METHODS)
+    found: Integrator
     if method == "zoh":
-        return ZeroOrderHold(robot)
-    if method == "adaptive":
-        return Adaptive(tolerance)
-    raise InputError(unknown("method", method, METHODS))
+        found = ZeroOrderHold(robot)
+    elif method == "adaptive":
+        found = Adaptive(tolerance)
+    else:
+        found = {"rk4": RK4, "midpoint": MIDPOINT, "euler": EULER}[method]
+    return WithMimicJoints(found, robot) if robot.mimic_joints else found

@@ -7,15 +7,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, counted, positive
-from nmm.errors import InputError
+from nmm.arrays import counted, infinite, positive
+from nmm.errors import InputError, expect, expect_kind, few
 from nmm.functions.function import Function
 from nmm.robots.robot import Robot
 
 
 class Kept(NamedTuple):
-    """A limited quantity: its name, its unit, and its limits."""
-
     name: str
     unit: str
     lower: float
@@ -25,19 +23,19 @@ class Kept(NamedTuple):
 class Bound:
     """lower <= c(t, q) <= upper for the values of a function: a corridor, a height, a distance.
 
-    Kept as a damper: c may approach a limit no faster than it can be slowed down to it. On wheels c's
-    direction turns, so that it cannot always be kept with the other limits: then it is broken as little as
-    can be, and the run says so.
+    It is kept as a damper: c approaches a limit no faster than it can be braked. On wheels the direction of c
+    turns, so this may contradict the other limits: then it is violated as little as possible, and the run
+    reports it.
 
     Parameters
     ----------
     function : c(t, q), a task's function, a frame's position, ...
     lower, upper : (rows,) or a number for all, in the units of the rows; infinite for none
-    braking : deceleration to count on, units of the rows per s²; None for a quarter of what the accelerations
-        of the inputs give where the robot is
+    braking : deceleration to rely on, units of the rows per s²; None for a quarter of what the accelerations
+        of the inputs give in the current configuration
     name : for messages; the function's rows when not given
     priority : None for a limit that is kept before any task; 1, 2, ... for one that is kept if possible: as
-        far as tasks of a lower number leave it, before those of this number and higher ones
+        far as tasks of a lower number allow, before those of this number and higher ones
 
     Raises
     ------
@@ -63,22 +61,21 @@ class Bound:
         name: str = "",
         priority: int | None = None,
     ) -> None:
-        if not isinstance(function, Function):
-            raise InputError(f"bound: expected a function, got {function!r}")
+        expect_kind(function, Function, "bound", "a function")
         self.function = function
-        self.lower = _numbers(lower, "lower")
-        self.upper = _numbers(upper, "upper")
+        self.lower = infinite(lower, "bound: lower", "numbers (infinite for none)")
+        self.upper = infinite(upper, "bound: upper", "numbers (infinite for none)")
         self.braking = None if braking is None else positive(braking, "braking")
         self.name = name
         self.priority = None if priority is None else counted(priority, "priority")
-        given = f"lower {_said(self.lower)} and upper {_said(self.upper)}"
-        if not (np.isfinite(self.lower).any() or np.isfinite(self.upper).any()):
-            raise InputError(f"{self._who}: expected lower, upper or both, got {given}")
+        given = (self.lower, self.upper)
+        bounded = np.isfinite(self.lower).any() or np.isfinite(self.upper).any()
+        expect(bounded, self._who, "lower, upper or both", given)
         if self.lower.size in (1, self.upper.size) or self.upper.size == 1:
             if np.any(self.lower > self.upper):
-                raise InputError(f"{self._who}: lower {_said(self.lower)} is above upper {_said(self.upper)}")
+                raise InputError(where=self._who, expected="lower below upper", got=given)
         else:
-            raise InputError(f"{self._who}: expected as many of lower as of upper, got {given}")
+            raise InputError(where=self._who, expected="as many numbers in lower as in upper", got=given)
 
     @property
     def _who(self) -> str:
@@ -91,8 +88,9 @@ class Bound:
             lower, upper = (np.broadcast_to(ends, (len(rows),)) for ends in (self.lower, self.upper))
         except ValueError:
             raise InputError(
-                f"{self._who}: expected a number or {len(rows)} ({', '.join(row.name for row in rows)}), "
-                f"got lower {_said(self.lower)} and upper {_said(self.upper)}"
+                where=self._who,
+                expected=f"a number or {len(rows)} ({few([row.name for row in rows])})",
+                got=(self.lower, self.upper),
             ) from None
         return [
             Kept(
@@ -101,19 +99,3 @@ class Bound:
             )
             for i, row in enumerate(rows)
         ]
-
-
-def _numbers(value: ArrayLike, name: str) -> Array:
-    try:
-        found = np.atleast_1d(np.array(value, dtype=np.float64))
-    except (TypeError, ValueError):
-        found = np.array([np.nan])
-    if found.ndim != 1 or np.any(np.isnan(found)):
-        raise InputError(f"bound: {name}: expected numbers (infinite for none), got {value!r}")
-    return found
-
-
-def _said(numbers: Array) -> str:
-    """A number, or [numbers]."""
-    said = ", ".join(f"{number:g}" for number in numbers)
-    return said if numbers.size == 1 else f"[{said}]"

@@ -1,4 +1,4 @@
-"""Limits that a controller keeps: of inputs, of coordinates, of wheels and of any function's values."""
+"""Limits that a controller keeps: of inputs, coordinates, wheels and any function's values."""
 
 from __future__ import annotations
 
@@ -10,37 +10,36 @@ import numpy as np
 from nmm.arrays import Array, positive
 from nmm.control.bounds import SAMPLE, LimitNumbers
 from nmm.control.limited_function import Bound, Kept
-from nmm.errors import InputError, expect_known
-from nmm.functions.tasks.coordinates import Coordinates
+from nmm.errors import InputError, expect_kind, expect_known, one_or_several
+from nmm.functions.tasks.linear_coordinates import LinearCoordinates
 from nmm.robots.coordinates import UNLIMITED
 from nmm.robots.robot import Robot
 from nmm.robots.wheel_rates import wheel_rates
 
 #: A number for both signs, or [lower, upper].
 Range: TypeAlias = float | Sequence[float]
-#: What the robot's file says (True), nothing (False), or that with other numbers for some names.
+#: The limits of the robot's file (True), none (False), or the file's with other numbers for some names.
 Named: TypeAlias = bool | Mapping[str, Range]
 
-#: Speed of the way back from beyond a limit, m/s or rad/s.
+#: Speed of the return from beyond a limit, m/s or rad/s.
 RECOVERY = 0.1
 
 
 class Limits:
-    """Which limits a controller keeps: where nothing is given, the robot's own of velocity and position.
+    """The limits that a controller keeps; by default the robot's own limits of velocity and position.
 
     Parameters
     ----------
     velocity : of inputs: True for the robot's, False for none, or numbers for inputs, groups ("platform",
-        "arm") or joints that follow others, in place of the robot's: a number for both signs or
-        [lower, upper]; m/s, rad/s
+        "arm") or mimic joints, in place of the robot's: a number for both signs or [lower, upper]; m/s, rad/s
     position : of coordinates, in the same way: [lower, upper]; m, rad
     acceleration : of inputs: None for none, a number for all, or numbers for inputs or groups; m/s², rad/s²
     wheels : largest rolling rates, rad/s: numbers by joint in place of the robot's, or one for all wheels
-        that are no casters; None for the robot's own, which velocity=False leaves out
+        except casters; None for the robot's own, unless velocity=False
     bounds : limits of functions
-    recovery : speed at which a coordinate beyond its limit comes back, m/s or rad/s
+    recovery : speed at which a coordinate returns from beyond its limit, m/s or rad/s
 
-    Limits of position and acceleration are kept from sample to sample: they need the controller's dt.
+    Limits of position and acceleration are kept from sample to sample, so they need the controller's dt.
 
     Raises
     ------
@@ -70,14 +69,11 @@ class Limits:
         self.position = _named(position, "position")
         self.acceleration = _sizes(acceleration, "acceleration")
         self.wheels = _sizes(wheels, "wheels")
-        given = (bounds,) if isinstance(bounds, Bound) else bounds
-        if not isinstance(given, Sequence) or not all(isinstance(bound, Bound) for bound in given):
-            raise InputError(f"bounds: expected a Bound, or several, got {bounds!r}")
-        self.bounds: tuple[Bound, ...] = tuple(given)
+        self.bounds: tuple[Bound, ...] = one_or_several(bounds, Bound, "bounds", "a Bound, or several")
         self.recovery = positive(recovery, "recovery")
 
     def on(self, robot: Robot) -> LimitsOn:
-        """These limits as numbers for one robot; `InputError` names what it does not have."""
+        """These limits as numbers for one robot; `InputError` for names that it lacks."""
         return LimitsOn(self, robot)
 
 
@@ -88,8 +84,8 @@ class LimitsOn:
     ----------
     inputs (m, 2), coordinates (n, 2) : lower and upper limits; infinite for none
     accelerations (m,) : largest change of inputs per second
-    functions : whose values are limited; `braking` (f,) of their components
-    row_limits, rows : the limits that are rows on the inputs, and their names: wheels, then functions'
+    functions : whose values are limited; braking (f,) : of their components
+    row_limits, rows : the limits that are rows on the inputs, and their names: first wheels, then functions'
         components
     priorities : of these, None for those that are kept before any task
     needs_dt : whether there are limits that are kept from sample to sample
@@ -103,7 +99,7 @@ class LimitsOn:
         self._moved = robot.rate_coordinates
         wheels, self._wheels, self._spin = _wheel_limits(limits, robot)
         held = [
-            Bound(Coordinates(robot.q_names[i]), *self.coordinates[i])
+            Bound(LinearCoordinates(robot.q_names[i]), *self.coordinates[i])
             for i in robot.following.independent
             if i not in self._moved and np.any(np.isfinite(self.coordinates[i]))
         ]
@@ -128,7 +124,7 @@ class LimitsOn:
         )
 
     def numbers(self, first_rows: Sequence[int], robot: Robot) -> LimitNumbers:
-        """The record that a control step reads; first_rows: where the functions' rows are in the program."""
+        """The record that a control step reads; first_rows: the program's first row of each function."""
         rows = [
             first + i
             for first, function in zip(first_rows, self.functions, strict=True)
@@ -150,19 +146,20 @@ def _velocities(given: Named, robot: Robot) -> Array:
     largest = robot.u_limits
     limits = np.column_stack([-largest, largest]) if given is not False else _none(robot.n_u)
     if isinstance(given, Mapping):
-        followers = {one.joint: one for one in robot.followers}
-        for name, inputs in _inputs(given, robot, "velocity", [*followers]):
+        mimic_joints = {one.joint: one for one in robot.mimic_joints}
+        for name, inputs in _inputs(given, robot, "velocity", [*mimic_joints]):
             lower, upper = _ends(given[name], f"velocity: {name}", symmetric=True)
-            if name not in followers:
+            if name not in mimic_joints:
                 limits[inputs] = lower, upper
-            elif followers[name].multiplier:
+            elif mimic_joints[name].multiplier:
                 (j,) = inputs
-                ends = np.sort(np.array([lower, upper]) / followers[name].multiplier)
+                ends = np.sort(np.array([lower, upper]) / mimic_joints[name].multiplier)
                 limits[j] = max(limits[j, 0], ends[0]), min(limits[j, 1], ends[1])
                 if limits[j, 0] > limits[j, 1]:
                     raise InputError(
-                        f"velocity: {name}: [{lower:g}, {upper:g}] leaves {robot.u_names[j]}, which it "
-                        "follows, no velocity within its own limits"
+                        f"[{lower:g}, {upper:g}] leaves {robot.u_names[j]}, which it follows, no velocity "
+                        "within its own limits",
+                        where=f"velocity: {name}",
                     )
     return limits
 
@@ -176,7 +173,7 @@ def _positions(given: Named, robot: Robot) -> Array:
             try:
                 i = robot.independent(name)
             except InputError as error:
-                raise InputError(f"position: {error}") from None
+                raise error.at("position") from None
             limits[i] = _ends(value, f"position: {name}", symmetric=False)
     limits[np.abs(limits) >= UNLIMITED] *= np.inf
     return np.asarray(limits)
@@ -192,10 +189,10 @@ def _per_input(given: float | Mapping[str, float] | None, robot: Robot, what: st
 
 
 def _inputs(
-    given: Mapping[str, object], robot: Robot, what: str, followers: Sequence[str] = ()
+    given: Mapping[str, object], robot: Robot, what: str, mimic_joints: Sequence[str] = ()
 ) -> list[tuple[str, list[int]]]:
-    """The inputs of each name: groups, then inputs, then joints that follow: the last word counts."""
-    leaders = {one.joint: one.leader for one in robot.followers if one.joint in followers}
+    """The inputs of each name: groups first, then inputs, then mimic joints, so that later ones override."""
+    leaders = {one.joint: one.leader for one in robot.mimic_joints if one.joint in mimic_joints}
     known = [*robot.groups, *robot.u_names, *leaders]
     for name in given:
         robot.expect_unlocked(name)
@@ -211,7 +208,7 @@ def _wheel_limits(limits: Limits, robot: Robot) -> tuple[tuple[str, ...], Array,
     given = limits.wheels
     names, rows = wheel_rates(robot)
     if given is not None and not names:
-        raise InputError(f"wheels: robot {robot.name} has no wheels on its main body whose rates are known")
+        raise InputError(f"{robot.name} has none on its main body whose rates are known", where="wheels")
     own = {wheel.joint: wheel.velocity for wheel in robot.wheels}
     speeds = np.array([np.inf if limits.velocity is False else own[name] for name in names])
     if isinstance(given, Mapping):
@@ -229,7 +226,7 @@ def _none(count: int) -> Array:
 
 
 def _ends(value: Range, name: str, *, symmetric: bool) -> tuple[float, float]:
-    """[lower, upper], or ±number where one number stands for both signs."""
+    """[lower, upper], or ±number for one number."""
     try:
         ends = np.array(value, dtype=np.float64)
     except (TypeError, ValueError):
@@ -238,17 +235,16 @@ def _ends(value: Range, name: str, *, symmetric: bool) -> tuple[float, float]:
         return -float(ends), float(ends)
     if ends.shape != (2,) or np.any(np.isnan(ends)):
         wanted = "a number above 0 or [lower, upper]" if symmetric else "[lower, upper]"
-        raise InputError(f"{name}: expected {wanted}, got {value!r}")
+        raise InputError(where=name, expected=wanted, got=value)
     if ends[0] > ends[1]:
-        raise InputError(f"{name}: lower {ends[0]:g} is above upper {ends[1]:g}")
+        raise InputError(where=name, expected="lower below upper", got=ends)
     return float(ends[0]), float(ends[1])
 
 
 def _named(value: Named, name: str) -> Named:
     if isinstance(value, bool):
         return value
-    if not isinstance(value, Mapping):
-        raise InputError(f"{name}: expected true, false, or numbers by name, got {value!r}")
+    expect_kind(value, Mapping, name, "true, false, or numbers by name")
     for key, item in value.items():
         _ends(item, f"{name}: {key}", symmetric=name == "velocity")
     return dict(value)
@@ -258,7 +254,7 @@ def _sizes(value: float | Mapping[str, float] | None, name: str) -> float | Mapp
     if value is None:
         return None
     if isinstance(value, bool):
-        raise InputError(f"{name}: expected a number, or numbers by name, got {value}")
+        raise InputError(where=name, expected="a number, or numbers by name", got=value)
     if isinstance(value, Mapping):
         return {key: positive(item, f"{name}: {key}") for key, item in value.items()}
     return positive(value, name)

@@ -1,45 +1,57 @@
-"""A way out of a local minimum: when the error stalls, back off for a while, then start again.
+"""A way out of a local minimum: when the error stalls, back off for a while, then try again.
 
-Joints at their stops leave too few columns for what is left of the task, and no input within the limits
-makes the error smaller. The way out is not downhill: so the task is dropped for a while, joints go towards
-their home and the platform goes backwards, turning to one side and to the other by turns, limits kept all
-along.
+Where joints at their limits leave too few columns for the rest of the task, no inputs within the limits
+reduce the error. So for a while joints move towards their home, and the platform does of the task what it can
+alone, or, each third time, drives backwards, turning to either side by turns; all within the limits.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, positive
-from nmm.control.goal import Goal, sizes
+from nmm.arrays import Array, positive, scalar
+from nmm.control.goal import METRES, Goal, norms, unit_codes
 from nmm.errors import InputError
 from nmm.functions.function import Row
+from nmm.kernels.compiled import compiled
+from nmm.kernels.record_layout import Cell, IntegerVector, SampledCell, SampledIntegerCell, Vector
+from nmm.resolvers.problem_arrays import ProblemArrays
 from nmm.robots.robot import Robot
 
-#: What 1 rad of error counts, in robot's reaches.
+#: The weight of 1 rad of error, in robot's reaches.
 RADIAN = 0.3
+#: The platform drives backwards in each of so many retreats.
+BACKWARDS = 3
+#: The square of the damping of a platform that does the task alone, rows in their scales.
+DAMPING = 1e-3
+#: From 1 to 3.5 s, evenly spread, no two alike: retreats of the same lengths can repeat for ever.
+GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
+DURATIONS = tuple(1.0 + 2.5 * (k * GOLDEN % 1.0) for k in range(500))
 
 
 class Retreat:
-    """An event of a controller that has to reach a target, not to track a path.
+    """What a controller that has to reach a target does when its error stalls.
 
     Parameters
     ----------
-    stalled : s; where the error has not fallen by the share `progress` in that time, the robot backs off
+    stalled : s; where the error has not fallen by the share `progress` in that time, the robot backs off;
+        while the platform gathers speed as fast as its limits of acceleration allow, none passes
     progress : share, between 0 and 1
-    durations : s, how long it does so the first time, the second, ...; the last holds for all later ones;
-        or one number for all
-    posture : where joints go meanwhile, (n,) or by name; None for the middle of their limits, or rest
-    speed, turn : of the platform, m/s and rad/s
-    gain : 1/s, of the joints on their way
-    goal : within its tolerances nothing stalls
+    durations : s, of the first retreat, the second, ...; the last holds for all later ones; or one for all;
+        None for 1 to 3.5, no two alike
+    posture : where joints move meanwhile, (n,) or by name; None for the middle of their limits, or rest
+    speed, turn : of the platform where it drives backwards, m/s and rad/s
+    gain : 1/s, of the joints' motion to the posture
+    goal : within its tolerances nothing counts as stalled
 
     Raises
     ------
-    InputError : numbers that are not above 0, no durations, a progress of 1 or more, a goal that is none
+    InputError : numbers that are not above 0, no durations, a progress of 1 or more, a goal of another kind
 
     Examples
     --------
@@ -55,7 +67,7 @@ class Retreat:
         self,
         stalled: float = 0.5,
         progress: float = 0.03,
-        durations: Sequence[float] | float = (1.0, 1.5, 2.0),
+        durations: Sequence[float] | float | None = None,
         posture: ArrayLike | Mapping[str, float] | None = None,
         speed: float = 0.5,
         turn: float = 1.0,
@@ -63,121 +75,133 @@ class Retreat:
         goal: Goal | None = None,
     ) -> None:
         self.stalled = positive(stalled, "retreat: stalled")
-        self.progress = positive(progress, "retreat: progress")
-        if self.progress >= 1.0:
-            raise InputError(f"retreat: progress: expected below 1, got {self.progress:g}")
-        self.durations = tuple(
-            positive(duration, "retreat: durations") for duration in np.ravel(np.asarray(durations)).tolist()
-        )
+        self.progress = scalar(progress, "retreat: progress", above=0.0, below=1.0)
+        given = np.ravel(np.asarray(DURATIONS if durations is None else durations)).tolist()
+        self.durations = tuple(positive(duration, "retreat: durations") for duration in given)
         if not self.durations:
-            raise InputError("retreat: durations: expected at least one, got none")
+            raise InputError(where="retreat: durations", expected="at least one", got=None)
         self.posture = posture
         self.speed = positive(speed, "retreat: speed")
         self.turn = positive(turn, "retreat: turn")
         self.gain = positive(gain, "retreat: gain")
         if goal is not None and not isinstance(goal, Goal):
-            raise InputError(f"retreat: goal: expected a Goal, got {goal!r}")
+            raise InputError(where="retreat: goal", expected="a Goal", got=goal)
         self.goal = Goal() if goal is None else goal
 
-    def on(self, robot: Robot, rows: Sequence[Row]) -> Backing:
-        """Its state for one robot and one task."""
-        return Backing(self, robot, rows)
 
+class RetreatNumbers(NamedTuple):
+    """A retreat's parameters and state, as a step reads them.
 
-class Backing:
-    """What a controller remembers of its retreats.
-
-    Attributes
-    ----------
-    count : retreats so far
-    left : s, how long the one under way lasts; 0 where there is none
-    now : whether the sample is a retreat's
+    units (s,) : of the task's rows (`unit_codes`)
+    durations (d,) : s; (0,) without a retreat
+    reach () : the robot's, m; metres (), radians () : the goal's tolerances
+    retreats () : so far; now () : whether the sample belongs to one
+    left () : remaining time of the current one, s, else 0
+    best () : the smallest error since the last one; waited () : how long it has not fallen, s
     """
 
-    def __init__(self, retreat: Retreat, robot: Robot, rows: Sequence[Row]) -> None:
-        self._retreat, self._robot = retreat, robot
-        self._units = [row.unit for row in rows]
-        self._home = self._posture()
-        self.reset()
+    units: IntegerVector
+    stalled: Cell
+    progress: Cell
+    durations: Vector
+    reach: Cell
+    metres: Cell
+    radians: Cell
+    retreats: SampledIntegerCell
+    now: SampledIntegerCell
+    left: SampledCell
+    best: SampledCell
+    waited: SampledCell
 
-    def _posture(self) -> Array:
-        robot, posture = self._robot, self._retreat.posture
-        if posture is not None:
-            return robot.q(posture)
-        middle = robot.rest
-        ranged = robot.limited.all(axis=1)
-        middle[ranged] = robot.q_limits[ranged].mean(axis=1)
-        return robot.following.placed(middle)
 
-    def reset(self) -> None:
-        """Forget: nothing has stalled yet."""
-        self.count = 0
-        self.left = 0.0
-        self.now = False
-        self._best = np.inf
-        self._waited = 0.0
+def retreat_numbers(retreat: Retreat | None, robot: Robot, rows: Sequence[Row]) -> RetreatNumbers:
+    given = retreat or Retreat()
+    return RetreatNumbers(
+        units=unit_codes([row.unit for row in rows]),
+        stalled=np.array(given.stalled),
+        progress=np.array(given.progress),
+        durations=np.array(given.durations if retreat else ()),
+        reach=np.array(robot.reach if retreat else 0.0),
+        metres=np.array(given.goal.m),
+        radians=np.array(given.goal.rad),
+        retreats=np.array(0),
+        now=np.array(0),
+        left=np.array(0.0),
+        best=np.array(np.inf),
+        waited=np.array(0.0),
+    )
 
-    def snapshot(self) -> tuple[float, ...]:
-        """What is remembered, for `restore`."""
-        return self.count, self.now, self.left, self._best, self._waited
 
-    def restore(self, snapshot: tuple[float, ...]) -> None:
-        """Remember what was remembered then."""
-        count, now, self.left, self._best, self._waited = snapshot
-        self.count, self.now = int(count), bool(now)
-
-    def watch(self, error: Array, dt: float) -> None:
-        """See whether the next dt is a retreat's, given the error (s,) now."""
-        self.now = self._stalls(error, dt)
-
-    def pass_over(self, errors: Array, dt: float) -> int:
-        """`watch` samples with errors (N, s) one after the other, up to the first that is a retreat's.
-
-        Returns how many there are before it.
-        """
-        for k, error in enumerate(errors):
-            self.watch(error, dt)
-            if self.now:
-                return k
-        return len(errors)
-
-    def quiet(self, errors: Array, dt: float) -> int:
-        """What `pass_over` finds, while nothing is remembered of it."""
-        before = self.snapshot()
-        try:
-            return self.pass_over(errors, dt)
-        finally:
-            self.restore(before)
-
-    def _stalls(self, error: Array, dt: float) -> bool:
-        retreat = self._retreat
-        if self.left > 1e-9:
-            self.left -= dt
-            return True
-        self.left = 0.0
-        metres, radians = sizes(error, self._units)
-        size = metres / self._robot.reach + RADIAN * radians
-        there = metres <= retreat.goal.m and radians <= retreat.goal.rad
-        if size < (1.0 - retreat.progress) * self._best or there:
-            self._best, self._waited = size, 0.0
-            return False
-        self._waited += dt
-        if self._waited < retreat.stalled:
-            return False
-        self.left = retreat.durations[min(self.count, len(retreat.durations) - 1)] - dt
-        self.count += 1
-        self._best, self._waited = np.inf, 0.0
+@compiled
+def stalls(r: RetreatNumbers, error: Array, dt: float, speeds_up: bool) -> bool:
+    """Whether the next dt belongs to a retreat, given the error (s,) now, and whether the platform gathers
+    speed, which is no stalling."""
+    r.now[()] = 1
+    if r.left[()] > 1e-9:
+        r.left[()] -= dt
         return True
+    r.left[()] = 0.0
+    metres, radians = norms(error, r.units)
+    size = metres / r.reach[()] + RADIAN * radians
+    there = metres <= r.metres[()] and radians <= r.radians[()]
+    if size < (1.0 - r.progress[()]) * r.best[()] or there:
+        r.now[()], r.best[()], r.waited[()] = 0, size, 0.0
+        return False
+    if not speeds_up:
+        r.waited[()] += dt
+    if r.waited[()] < r.stalled[()]:
+        r.now[()] = 0
+        return False
+    r.left[()] = r.durations[min(r.retreats[()], r.durations.shape[0] - 1)] - dt
+    r.retreats[()] += 1
+    r.best[()], r.waited[()] = math.inf, 0.0
+    return True
 
-    def inputs(self, q: Array, G: Array) -> Array:
-        """What the retreat asks of the inputs (m,) at q, before limits."""
+
+class RetreatState:
+    """The retreats of one controller, with `numbers` in its memory."""
+
+    def __init__(self, retreat: Retreat, robot: Robot, numbers: RetreatNumbers) -> None:
+        self._retreat, self._robot, self._numbers = retreat, robot, numbers
+        middle, ranged = robot.rest, robot.limited.all(axis=1)
+        middle[ranged] = robot.q_limits[ranged].mean(axis=1)
+        given = retreat.posture
+        self._home = robot.following.placed(middle) if given is None else robot.q(given)
+
+    @property
+    def count(self) -> int:
+        return int(self._numbers.retreats)
+
+    @property
+    def now(self) -> bool:
+        return bool(self._numbers.now)
+
+    def take_over(self, other: RetreatState) -> None:
+        """Continue another controller's retreat, without its history of the error."""
+        mine, theirs = self._numbers, other._numbers
+        mine.retreats[()], mine.now[()], mine.left[()] = theirs.retreats, theirs.now, theirs.left
+        mine.best[()], mine.waited[()] = np.inf, 0.0
+
+    def inputs(self, q: Array, G: Array, problem: ProblemArrays) -> Array:
         robot, retreat = self._robot, self._retreat
         p = robot.platform.p
         u = np.zeros(robot.n_u)
         u[p:] = retreat.gain * (self._home - q)[robot.arm_coordinates]
-        if p and robot.platform.n_p >= 3:
+        if self.count % BACKWARDS:
+            u[:p] = self._task_alone(problem, p)
+        elif p and robot.platform.n_p >= 3:
             c, s = np.cos(q[2]), np.sin(q[2])
             twist = np.vstack([c * G[0] + s * G[1], c * G[1] - s * G[0], G[2]])
             side = 1.0 if self.count % 2 else -1.0
             u[:p] = np.linalg.lstsq(twist, [-retreat.speed, 0.0, side * retreat.turn], rcond=None)[0]
         return u
+
+    def _task_alone(self, problem: ProblemArrays, p: int) -> Array:
+        """Inputs (p,) of the platform that do the first level as far as they can without the arm: its rows in
+        metres, or all where there are none; it stands where the task has no value."""
+        first = np.arange(problem.ends[0])
+        metres = first[self._numbers.units[first] == METRES]
+        rows = metres if metres.size else first
+        J = problem.J[rows, :p] / problem.row_scales[rows, np.newaxis]
+        rate = problem.rate[rows] / problem.row_scales[rows]
+        return np.nan_to_num(np.linalg.solve(J.T @ J + DAMPING * np.eye(p), J.T @ rate))

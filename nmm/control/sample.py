@@ -1,79 +1,66 @@
-"""What a controller's call leaves for the stages of its sample and for the next call."""
+"""What a call leaves for its sample's stages and the next call, as one snapshot: all fields of sampled kinds
+(`kernels/record_layout.py`). As they are never named here or in compiled code, new fields are included.
 
-from __future__ import annotations
+`evaluate`, `errors`, `without_limits` and an integrator's stages restore it; a step that is repeated, and a
+compiled loop that stops, return to their sample's; a run, and each of many rollouts, begins with `reset`.
+"""
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import NamedTuple
+from typing import TypeAlias
 
 from nmm.arrays import Array, Integers
 from nmm.control.bounds import LimitNumbers
-from nmm.control.retreat import Backing
-from nmm.control.step_size import StepSize
-from nmm.resolvers.problem_arrays import ProblemArrays
+from nmm.control.equations import ControlStep
+from nmm.kernels.record_layout import Blocks, sampled
 
-
-class Snapshot(NamedTuple):
-    """Copies: arrays, α's share, the retreat's."""
-
-    arrays: tuple[Array | Integers, ...]
-    share: float
-    backing: tuple[float, ...]
+#: Copies of the integers and floats that a sample changes.
+Snapshot: TypeAlias = tuple[Integers, Array]
 
 
 class SampleState:
-    """Bounds, the inputs before, the step size, a retreat; what the resolver remembers is its own `State`.
+    """What the last call of one controller left; to be constructed before the first call."""
 
-    Parameters
-    ----------
-    problem, limits : the controller's, in memory
-    step_size, backing : its own, None for none
-    rows : of distances, in memory
-
-    Attributes
-    ----------
-    elapsed () : time since the call before, s, over which accelerations count; whoever sets the controller's
-        dt sets it, too
-    """
-
-    def __init__(
-        self,
-        problem: ProblemArrays,
-        limits: LimitNumbers,
-        step_size: StepSize | None,
-        backing: Backing | None,
-        rows: Sequence[Array | Integers] = (),
-    ) -> None:
-        bounds = (problem.u_lower, problem.u_upper, problem.lower, problem.upper)
-        self._arrays = (*bounds, problem.stops, problem.before, problem.active, *rows)
-        self._mode = limits.mode
-        self.elapsed = limits.elapsed
-        self._step_size, self._backing = step_size, backing
+    def __init__(self, blocks: Blocks, step: ControlStep) -> None:
+        self._integers, self._floats = sampled(*blocks)
+        self._limits: LimitNumbers = step.limits
+        self._active, self._dt = step.problem.active, step.problem.dt
+        self._new = self.snapshot()
 
     def snapshot(self) -> Snapshot:
-        """A copy, for `restore`."""
-        return Snapshot(
-            tuple(one.copy() for one in self._arrays),
-            1.0 if self._step_size is None else self._step_size.share,
-            () if self._backing is None else self._backing.snapshot(),
-        )
+        return self._integers.copy(), self._floats.copy()
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Be as it was then."""
-        for one, before in zip(self._arrays, snapshot.arrays, strict=True):
-            one[...] = before
-        if self._step_size is not None:
-            self._step_size.share = snapshot.share
-        if self._backing is not None:
-            self._backing.restore(snapshot.backing)
+        self._integers[:], self._floats[:] = snapshot
+
+    def reset(self) -> None:
+        """Restore the state before the first call."""
+        self.restore(self._new)
+
+    def end_stages(self, snapshot: Snapshot) -> None:
+        """`restore` after an integrator's stages, except the active bounds, where the next search begins."""
+        active = self._active.copy()
+        self.restore(snapshot)
+        self._active[:] = active
+
+    @property
+    def elapsed(self) -> float:
+        """Time over which accelerations count, s: the controller's dt unless set."""
+        elapsed = float(self._limits.elapsed)
+        return float(self._dt) if math.isnan(elapsed) else elapsed
+
+    @elapsed.setter
+    def elapsed(self, elapsed: float | None) -> None:
+        self._limits.elapsed[()] = math.nan if elapsed is None else elapsed
 
     @contextmanager
     def aside(self, mode: int | None = None) -> Iterator[None]:
-        """What the block asks of the controller leaves no trace here; `mode` of limits, the usual one."""
-        usual, snapshot = int(self._mode), self.snapshot()
-        self._mode[()] = usual if mode is None else mode
+        """Restore the state after the block; meanwhile `mode` of limits, the current one by default."""
+        usual, snapshot = int(self._limits.mode), self.snapshot()
+        self._limits.mode[()] = usual if mode is None else mode
         try:
             yield
         finally:
-            self._mode[()] = usual
+            self._limits.mode[()] = usual
             self.restore(snapshot)

@@ -1,28 +1,27 @@
-"""Which tasks are active: decided at samples by the tasks' conditions, held in between."""
+"""Which tasks are active: decided at samples by the tasks' conditions, constant in between."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from collections.abc import Sequence as Several
 from typing import NamedTuple
 
 import numpy as np
 
 from nmm.arrays import Array
+from nmm.control.compiled_conditions import LOOK, WATCH, conditions, look, watch
 from nmm.control.task_rows import task_functions
-from nmm.control.watching import SAME, WATCH, conditions, watch
-from nmm.errors import InputError, expect_known
-from nmm.functions.function import Evaluation, Row
+from nmm.errors import InputError, expect, expect_known
+from nmm.findings import Finding
 from nmm.functions.program import COMPILED, Program
 from nmm.functions.tasks.conditions import After, Between, Condition, While
-from nmm.functions.tasks.task import Stack, Task
+from nmm.functions.tasks.task import Stack
 from nmm.kernels.compiled import checked_by_caller
 from nmm.robots.robot import Robot
 
 
 class Event(NamedTuple):
-    """A task began or ended: t, s; the task's name; "begins" or "ends"; why, in words.
+    """A task began or ended: t, s; the task's name; "begins" or "ends"; the reason, in words.
 
     Examples
     --------
@@ -41,13 +40,13 @@ class Event(NamedTuple):
 
 
 class Moment(NamedTuple):
-    """What is known after a sample at t, s.
+    """The state after a sample at t, s.
 
     active : whether each task is
-    memory : a number a condition, in the tasks' order: of While, 1 where it holds; of After, the time since
-        which the error has been within its tolerance, not a number where it is not, -inf once it held
+    memory : one number per condition, in the tasks' order: 1 where it holds, else 0; for After, the time
+        since which the error has been within its tolerance, NaN while it is not, -inf once the condition held
     begun, over : whether each task was ever active, and whether it has ended for good
-    events : what changed at this sample
+    events : the changes at this sample
     """
 
     t: float
@@ -64,11 +63,11 @@ class Sequence:
     Attributes
     ----------
     tasks, names : all tasks, by priority
-    start : before the first sample
+    start : the moment before the first sample
 
     Raises
     ------
-    InputError : two tasks of one name, an `After` of a task that is not there, or that waits for itself
+    InputError : two tasks of one name, an `After` of a task that does not exist, or that waits for itself
     """
 
     def __init__(self, stack: Stack, robot: Robot) -> None:
@@ -77,7 +76,7 @@ class Sequence:
         named = [task.name for task in stack if task.name]
         for name in named:
             if named.count(name) > 1:
-                raise InputError(f"name: expected another name for each task, got {name} twice")
+                raise InputError(where="name", expected="another name for each task", got=name)
         self._conditions = [(i, one) for i, task in enumerate(stack) for one in task.when]
         for i, one in self._conditions:
             if isinstance(one, After):
@@ -85,9 +84,8 @@ class Sequence:
             if isinstance(one, While):
                 _check_rows(one, robot, f"task {self.names[i]}: when: while")
         self._refuse_circles()
-        self._after = {
-            one.task: self.names.index(one.task) for _, one in self._conditions if isinstance(one, After)
-        }
+        afters = [one for _, one in self._conditions if isinstance(one, After)]
+        self._after = {one.task: self.names.index(one.task) for one in afters}
         for i, one in self._conditions:
             if isinstance(one, After):
                 units = sorted({row.unit for row in self.tasks[self._after[one.task]].rows(robot)})
@@ -95,27 +93,13 @@ class Sequence:
                     if unit:
                         expect_known("unit", unit, units, f"task {self.names[i]}: when: after: within")
         self._robot = robot
-        watched = [self.tasks[i] for i in self._after.values()]
+        watched = {name: (i, self.tasks[i]) for name, i in self._after.items()}
+        waited_for = Stack(tuple(task for _, task in watched.values()))
         functions = [one.function for _, one in self._conditions if isinstance(one, While)]
-        # Compiled, so that samples passed over and those looked at one by one are judged by the same digits.
-        self._program = Program(robot, [*task_functions(Stack(tuple(watched))), *functions], COMPILED)
+        # Compiled, so that `pass_over` and `next` agree to the last digit.
+        self._program = Program(robot, [*task_functions(waited_for), *functions], COMPILED)
         self._program.lay_out()
-        self._evaluates = bool(watched or functions)
-        first = self._program.first_rows
-        begins = {name: first[3 * k : 3 * k + 3] for k, name in enumerate(self._after)}
-        self._rows = {name: self.tasks[i].rows(robot) for name, i in self._after.items()}
-        self._table = conditions(
-            self._conditions,
-            [
-                (i := self._after[one.task], self.tasks[i], self._rows[one.task], begins[one.task])
-                for _, one in self._conditions
-                if isinstance(one, After)
-            ],
-            [
-                (begin, len(function.rows(robot)))
-                for begin, function in zip(first[3 * len(watched) :], functions, strict=True)
-            ],
-        )
+        self._table = conditions(self._conditions, watched, robot, self._program.first_rows)
         none = (False,) * len(self.tasks)
         memory = tuple(math.nan if isinstance(one, After) else 0.0 for _, one in self._conditions)
         self.start = Moment(-math.inf, none, memory, none, none)
@@ -128,8 +112,8 @@ class Sequence:
 
         def follow(name: str, way: list[str]) -> None:
             if name in way:
-                circle = " after ".join([*way[way.index(name) :], name])
-                raise InputError(f"task {name}: when: after: tasks wait for each other: {circle}")
+                circle = [*way[way.index(name) :], name]
+                raise InputError("they wait for each other", where=f"task {name}: when: after", got=circle)
             for other in waits[name]:
                 follow(other, [*way, name])
 
@@ -137,12 +121,12 @@ class Sequence:
             follow(name, [])
 
     def pass_over(self, before: Moment, times: Array, q: Array) -> tuple[int, list[Moment]]:
-        """How many samples at times (N,), s, and q (N, n) have the same tasks active as the one before.
+        """How many samples at times (N,), s, and q (N, n) have the same active tasks as the one before.
 
         Returns
         -------
-        that number; what is known after each of the last two of them, and before them. Where users' Python
-        functions are among the conditions, 0
+        that number, 0 where conditions use users' Python functions; the moments after each of the last two of
+        these samples, and before them
         """
         if self._program.calls_python:
             return 0, [before]
@@ -159,18 +143,13 @@ class Sequence:
         return count, known[-2:]
 
     def next(self, before: Moment, t: float, q: Array) -> Moment:
-        """What is known after a sample at t, s, and q (n,), given what was known before it."""
-        found = self._program.evaluate(t, q) if self._evaluates else []
-        errors = {
-            name: _error(self.tasks[i], found[3 * k : 3 * k + 3], self._rows[name])
-            for k, (name, i) in enumerate(self._after.items())
-        }
-        values = iter(found[3 * len(self._after) :])
-        memory = tuple(
-            self._remembered(one, was, before, t, errors, values)
-            for (_, one), was in zip(self._conditions, before.memory, strict=True)
-        )
-        holds = [self._holds(one, now, t) for (_, one), now in zip(self._conditions, memory, strict=True)]
+        """The moment after a sample at t, s, and q (n,), from the one before it."""
+        q, room = np.array(q, dtype=np.float64), np.empty(len(self._conditions))
+        self._program.prepare(t, q)
+        known = self._table, np.array(before.active), np.array(before.memory)
+        checked_by_caller(look, LOOK)(t, q, *self._program.blocks, *known, room)
+        memory = (*room.tolist(),)
+        holds = self._held(memory)
         wanted = [
             not before.over[i]
             and all(held for (j, _), held in zip(self._conditions, holds, strict=True) if i == j)
@@ -192,7 +171,7 @@ class Sequence:
                 changed = [
                     self._words(one, now)
                     for (j, one), held, earlier in zip(
-                        self._conditions, holds, self._held(before), strict=True
+                        self._conditions, holds, self._held(before.memory), strict=True
                     )
                     if i == j and held == now and (held != earlier or math.isinf(before.t))
                 ]
@@ -205,61 +184,22 @@ class Sequence:
         """The tasks that have not begun yet."""
         return [name for name, begun in zip(self.names, moment.begun, strict=True) if not begun]
 
-    def never_began(self, moment: Moment) -> list[str]:
-        """A sentence for each task whose conditions never held together, with those that do not now."""
-        sentences = []
+    def never_began(self, moment: Moment) -> list[Finding]:
+        """The tasks whose conditions never held together, with the conditions that do not hold now."""
+        found = []
         for i, name in enumerate(self.names):
             if not moment.begun[i]:
                 missing = [
                     self._words(one, now=False)
-                    for (j, one), held in zip(self._conditions, self._held(moment), strict=True)
+                    for (j, one), held in zip(self._conditions, self._held(moment.memory), strict=True)
                     if i == j and not held
                 ]
-                why = ", ".join(missing) or "its conditions did not hold at one time"
-                sentences.append(f"task {name} never began: at the end of the run, {why}")
-        return sentences
+                found.append(Finding("task_never_began", {"task": name, "missing": missing}))
+        return found
 
-    def _held(self, moment: Moment) -> list[bool]:
-        return [
-            self._holds(one, now, moment.t)
-            for (_, one), now in zip(self._conditions, moment.memory, strict=True)
-        ]
-
-    def _remembered(
-        self,
-        one: Condition,
-        was: float,
-        before: Moment,
-        t: float,
-        errors: dict[str, Array],
-        values: Iterator[Evaluation],
-    ) -> float:
-        if isinstance(one, While):
-            value = next(values).value
-            wider = one.margin if was else 0.0
-            return float(np.all((one.lower - wider <= value) & (value <= one.upper + wider)))
-        if isinstance(one, After):
-            if was == -math.inf:
-                return was
-            i = self._after[one.task]
-            if not before.active[i] or not self._within(one, errors[one.task]):
-                return math.nan
-            since = t if math.isnan(was) else was
-            return -math.inf if t - since >= one.hold - SAME else since
-        return 0.0
-
-    def _within(self, one: After, error: Array) -> bool:
-        squares: dict[str, float] = {}
-        for row, value in zip(self._rows[one.task], error.tolist(), strict=True):
-            squares[row.unit] = squares.get(row.unit, 0.0) + value * value
-        tolerances = {unit: one.within.get(unit, one.within.get("", math.inf)) for unit in squares}
-        return all(math.sqrt(squares[unit]) <= tolerances[unit] for unit in squares)
-
-    @staticmethod
-    def _holds(one: Condition, memory: float, t: float) -> bool:
-        if isinstance(one, Between):
-            return one.start - SAME <= t < one.end - SAME
-        return memory == 1.0 if isinstance(one, While) else memory == -math.inf
+    def _held(self, memory: Several[float]) -> list[bool]:
+        pairs = zip(self._conditions, memory, strict=True)
+        return [now == (-math.inf if isinstance(one, After) else 1.0) for (_, one), now in pairs]
 
     def _words(self, one: Condition, now: bool) -> str:
         if isinstance(one, Between):
@@ -279,18 +219,59 @@ class Sequence:
         return f"{one.task} {'stayed' if now else 'did not stay'} within {sizes} for {one.hold:g} s"
 
 
+class Schedule:
+    """What a `Sequence` decided up to the last sample.
+
+    Attributes
+    ----------
+    tasks : all tasks, active or not
+    sequence : their conditions
+    moment : the decision at the last sample
+    events : those since the last `reset`
+    """
+
+    def __init__(self, tasks: Stack, robot: Robot) -> None:
+        self.tasks = tasks
+        self.sequence = Sequence(tasks, robot)
+        self.reset()
+
+    def reset(self) -> None:
+        """Return to the state before the first sample."""
+        self.moment = self._pending = self.sequence.start
+        self.events: list[Event] = []
+
+    def changes(self, t: float, q: Array) -> bool:
+        """Whether a sample at t, s, and q (n,) changes the active tasks; the last answer at a time counts."""
+        if t > self._pending.t:
+            self._commit()
+        self._pending = self.sequence.next(self.moment, t, q)
+        return self._pending.active != self.moment.active
+
+    def stays(self, times: Array, q: Array) -> int:
+        """How many samples at times (N,), s, and q (N, n) have the same active tasks as the one before:
+        `changes` for each in turn, up to the first change."""
+        if len(times) and times[0] > self._pending.t:
+            self._commit()
+        count, known = self.sequence.pass_over(self.moment, times, q)
+        if count:
+            self.moment, self._pending = known
+        while count < len(times) and not self.changes(float(times[count]), q[count]):
+            count += 1
+        return count
+
+    def _commit(self) -> None:
+        self.moment = self._pending
+        self.events += self.moment.events
+        self._pending = self.moment._replace(events=())
+
+    def settle(self) -> Moment:
+        """Adopt the decision at the last sample."""
+        if self._pending.t > self.moment.t:
+            self._commit()
+        return self.moment
+
+
 def _check_rows(one: While, robot: Robot, where: str) -> None:
     rows = len(one.function.rows(robot))
     for name, bound in (("lower", one.lower), ("upper", one.upper)):
-        if len(bound) not in (1, rows):
-            raise InputError(f"{where}: {name}: expected a number, or {rows}, one a row, got {len(bound)}")
-
-
-def _error(task: Task, found: Several[Evaluation], rows: Several[Row]) -> Array:
-    """The error (s,) of a task: computed, or the difference, wrapped where a row is an angle."""
-    value, target, compared = (one.value for one in found)
-    if task.function.comparison is not None:
-        return compared
-    error = target - value
-    angular = np.array([row.angular for row in rows], dtype=bool)
-    return np.where(angular, np.pi - (np.pi - error) % (2.0 * np.pi), error)
+        expect(len(bound) in (1, rows), f"{where}: {name}", f"a number, or {rows}, one a row", len(bound))

@@ -1,13 +1,13 @@
-"""What steers a platform where no task feels that it steers: pursuit of the robot's own hand.
+"""A steering law for platforms whose steering does not affect the task: pursuit of the end-effector.
 
-At first order a task does not feel the steering rate of a car: its column of J is zero. Left alone, the car
-drives straight on. So its steering angle δ goes to δ* = atan2(2 L sin β, l), the angle with which the car
-would drive on a circle through the robot's hand, l away in the direction β, both forwards and backwards:
+At first order a car's steering rate does not affect a task: its column of J is zero. Without a law the car
+drives straight on. So its steering angle δ converges to δ* = atan2(2 L sin β, l), with which the car would
+drive, forwards or backwards, on a circle through the end-effector at distance l in direction β:
 
-    δ_dot = -k (δ - δ*),  δ* within the stops,
+    δ_dot = -k (δ - δ*),  δ* within the joint limits,
 
-whatever the resolver would do with that input, which moves nothing of the task; within the limits of the
-input. In the null space, a spring holds the hand ahead of the axle: α h gains k1 ∂(½ β²)/∂u.
+within the limits of that input, replacing the resolver's value, which does not move the task. In the null
+space, a spring keeps the end-effector ahead of the axle: α h gains k1 ∂(½ β²)/∂u.
 """
 
 from __future__ import annotations
@@ -19,28 +19,26 @@ from typing import NamedTuple
 import numpy as np
 
 from nmm.arrays import Array, positive, scalar
-from nmm.errors import InputError
 from nmm.functions.pursuit import Pursuit
 from nmm.functions.tasks.task import Task
 from nmm.kernels.compiled import compiled
-from nmm.kernels.memory import Cell, IntegerCell, IntegerVector, Vector
+from nmm.kernels.linear_algebra import dot
+from nmm.kernels.record_layout import Cell, IntegerCell, IntegerVector, Vector
 from nmm.platforms.base import Platform
 from nmm.platforms.steering import SteeringPivot
 from nmm.resolvers.problem_arrays import ProblemArrays
-from nmm.resolvers.within import times
-from nmm.robots.loading.tips import first_tip
-from nmm.robots.reach import reach
+from nmm.robots.reach import first_tip, reach
 from nmm.robots.robot import Robot
 
 
 class SteeringNumbers(NamedTuple):
-    """What a step needs to steer; k pivots.
+    """What a step needs to steer k pivots.
 
-    on () : 1 where it steers
+    on () : 1 where the law is in force
     row () : the first of the k + 1 rows of the `Pursuit` in the program
     coordinates, inputs (k,) : the pivots' angles, and the inputs that set their rates
     gain () : k, 1/s
-    spring () : what ∂(½ β²)/∂u counts in h
+    spring () : the weight of ∂(½ β²)/∂u in h
     """
 
     on: IntegerCell
@@ -55,7 +53,7 @@ class SteeringNumbers(NamedTuple):
 def steer(
     steering: SteeringNumbers, q: Array, value: Vector, G: Array, problem: ProblemArrays, u: Array
 ) -> None:
-    """Set the steering inputs in u (m,): the pivots' angles go to their c* = `value`, within the limits."""
+    """Steering inputs in u (m,) with which the pivots' angles converge to c* = `value`, within the limits."""
     for i in range(steering.inputs.shape[0]):
         j, c = steering.inputs[i], steering.coordinates[i]
         if math.isnan(u[j]):  # no solution
@@ -65,27 +63,27 @@ def steer(
             if other != j:
                 rate -= G[c, other] * u[other]
         wanted = rate / G[c, j]
-        # Rows hold with the resolver's value of this input: what they leave of it is never empty.
+        # Rows hold with the resolver's value of this input, so the range that they allow is never empty.
         for row in range(problem.lower.shape[0]):
             slope = problem.limit_rows[row, j]
             if slope != 0.0:
-                rest = times(problem.limit_rows, row, u) - slope * u[j]
+                rest = dot(problem.limit_rows[row], u) - slope * u[j]
                 ends = (problem.lower[row] - rest) / slope, (problem.upper[row] - rest) / slope
                 wanted = min(max(wanted, min(ends[0], ends[1], u[j])), max(ends[0], ends[1], u[j]))
         u[j] = min(max(wanted, problem.u_lower[j]), problem.u_upper[j])
 
 
 class Steering:
-    """The law for steering inputs that a task does not feel (`platforms.base.Platform.steered_axle`).
+    """The law for steering inputs that do not affect a task (`platforms.base.Platform.steered_axle`).
 
-    It is in force where neither the task nor the added task nor the objective moves any of these inputs, the
-    task moves the platform in another way, and the hand is on an arm that the steered body carries.
+    It is in force where none of these inputs affects the task, the added task or the objective, the task
+    moves the platform by other inputs, and the steered body carries the arm with the end-effector.
 
     Parameters
     ----------
-    gain : k, with which a steering angle goes to where it should be, 1/s
-    spring : k1, with which the null space turns the hand ahead of the axle, 1/s (α of the resolver times its
-        weight; the weight where it has no α); 0 for none
+    gain : k, with which a steering angle converges, 1/s
+    spring : k1, with which the null space turns the end-effector ahead of the axle, 1/s (α of the resolver
+        times its weight; the weight where it has no α); 0 for none
 
     Raises
     ------
@@ -110,13 +108,11 @@ class Steering:
 
     def __init__(self, gain: float = 5.0, spring: float = 2.0) -> None:
         self.gain = positive(gain, "gain")
-        self.spring = scalar(spring, "spring")
-        if self.spring < 0.0:
-            raise InputError(f"spring: expected a number from 0, got {self.spring:g}")
+        self.spring = scalar(spring, "spring", least=0.0)
 
     def on(self, robot: Robot, task: Iterable[Task] = ()) -> Steered | None:
-        """The law on a robot with tasks, whichever inputs they move; None where nothing steers a body."""
-        if type(robot.platform).steered_axle is Platform.steered_axle:  # never: spare the look at all frames
+        """The law on a robot with tasks, whichever inputs they use; None where nothing steers a body."""
+        if type(robot.platform).steered_axle is Platform.steered_axle:  # spares searching all frames
             return None
         hands = [one.function.shown().positions for one in task]
         for hand in [*hands, first_tip(robot)]:
@@ -129,13 +125,13 @@ class Steering:
 
 
 class Steered:
-    """The law of `steering` on a robot: who pursues what, and how tightly it can turn.
+    """The law of `steering` on one robot.
 
     Attributes
     ----------
     pursuit : the pursuit
     pivots : what is steered
-    inputs : their inputs' names
+    inputs : names of their inputs
     """
 
     def __init__(self, steering: Steering, robot: Robot, pursuit: Pursuit) -> None:
@@ -153,7 +149,7 @@ class Steered:
         )
 
     def numbers(self, row: int, alpha: float) -> SteeringNumbers:
-        """For a step whose program has the pursuit at `row`; it does not steer yet."""
+        """The record of a step whose program has the pursuit at `row`; the law is not yet in force."""
         robot = self.robot
         return SteeringNumbers(
             on=np.array(0),
@@ -166,18 +162,18 @@ class Steered:
 
     @property
     def least_radius(self) -> float:
-        """The smallest circle of the axle's middle, m."""
+        """The radius of the smallest circle of the axle's midpoint, m."""
         return self.pursuit.axle.least_radius(self.pursuit.limits(self.robot))
 
     def described(self) -> tuple[str, ...]:
-        """The law in words, then what geometry forbids, if it does."""
+        """The law in words, then what geometry rules out, if anything."""
         law, names = self.steering, ", ".join(self.inputs)
         said = (
             f"{names}: no task feels {'it' if len(self.inputs) == 1 else 'them'}; pursuit of "
             f"{self.pursuit.hand} steers, gain {law.gain:g} 1/s, spring {law.spring:g} 1/s",
         )
         arm, radius = reach(self.robot, self.pursuit.hand), self.least_radius
-        if arm is None or not np.isfinite(arm.length):  # as far as it likes
+        if arm is None or not np.isfinite(arm.length):  # unlimited reach
             return said
         ratio = f"least turning radius {radius:.3g} m, {radius / arm.length:.2g} times the arm's reach"
         if radius <= arm.length:
@@ -189,14 +185,14 @@ class Steered:
         )
 
 
-#: Where nothing steers.
+#: Without a law.
 NOTHING = SteeringNumbers(
     np.array(0), np.array(0), np.zeros(0, int), np.zeros(0, int), np.array(0.0), np.array(0.0)
 )
 
 
 def _body(robot: Robot, hand: str) -> str | None:
-    """The platform's coordinate that turns the body whose arm carries the hand; None where no arm does."""
+    """The platform's coordinate that turns the body whose arm carries the end-effector; None for none."""
     model = robot.model
     chain = [
         model.joints[j].idx_q for j in model.supports[model.frames[robot.frame_id(hand)].parentJoint] if j > 0

@@ -1,22 +1,29 @@
-"""What a controller found in one call."""
+"""The result of one call of a controller."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
 
 from nmm.arrays import Array, Integers
+from nmm.control.quantities import QUANTITIES, Record
+from nmm.errors import expect_known
 from nmm.resolvers.answer import Status
+from nmm.robots.robot import Robot
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """Everything that a controller found at (t, q): copies, in the units of the task's rows.
+    """All quantities of a controller at (t, q): copies, in the units of the task's rows.
 
     r, r_d, error, rate (s,), J (s, m) of J_bar u = rate; objective H and gradient h (m,);
     u (m,), q_dot = S u (n,); status, scale (levels,), residual ‖J u - rate‖, measure, excess: see `Answer`;
-    partition (s,) the columns of Ja, -1 where there is none; retreats so far; step_size, the share of α that
-    was taken; added_residual, how far the added task's rows are from their rate, 0 where rounding hides it;
-    side, the sign of det J_e where the extended Jacobian inverted it, else 0.
+    partition (s,) the columns of Ja, -1 for none; retreats so far; step_size, the share of α used;
+    added_residual, of the added task's rows, 0 where rounding hides it;
+    side, the sign of det J_e where the extended Jacobian inverted it, else 0;
+    more, further recorded quantities by name: `step[name]` is any of them.
 
     Examples
     --------
@@ -48,3 +55,22 @@ class Step:
     step_size: float = 1.0
     added_residual: float = 0.0
     side: int = 0
+
+    robot: Robot = field(kw_only=True, repr=False)
+    more: dict[str, Any] = field(default_factory=dict, kw_only=True, repr=False)
+
+    @property
+    def by_name(self) -> dict[str, Any]:
+        """All that it has."""
+        return {**vars(self), **self.more}
+
+    def __getitem__(self, name: str) -> Any:
+        """A recorded quantity of this sample by name, computed where it needs no other samples."""
+        own = self.by_name
+        known = {one.name: one.of for one in QUANTITIES.values() if one.name in own or one.of}
+        expect_known("quantity", name, known)
+        of = known[name]
+        if name in own or of is None:
+            return own[name]
+        alone = {each: np.asarray(own[each])[np.newaxis] for each in known if each in own}
+        return of(Record(self.robot, alone))[0]

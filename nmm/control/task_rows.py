@@ -1,4 +1,4 @@
-"""Tasks as a control step reads them: where their rows are in a program, gains, bounds of the approach."""
+"""Tasks as a control step reads them: their rows in a program, gains, bounds of the approach."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ import numpy as np
 from nmm.arrays import Array, Integers
 from nmm.control.equations import PLAIN, WRAPPED, TaskRows
 from nmm.functions.function import Function, Row
-from nmm.functions.tasks.comparison import Comparison
-from nmm.functions.tasks.task import Stack, Task
+from nmm.functions.tasks.task import Comparison, Stack, Task
 from nmm.robots.robot import Robot
 
 
 def task_functions(stack: Stack) -> list[Function]:
-    """What a program evaluates for these tasks: f, g and e of each."""
+    """f, g and e of each task."""
     return [function for task in stack for function in (task.function, task.reference, Comparison(task))]
 
 
@@ -24,7 +23,7 @@ def gain_rows(stack: Stack, robot: Robot) -> tuple[Array, Array, Array, Integers
     blocks = [task.gain_matrix(robot) for task in stack]
     K = np.zeros((sum(map(len, blocks)),) * 2)
     first = 0
-    for block in blocks:  # SciPy's block_diag would be all that loads its linear algebra
+    for block in blocks:  # block_diag would load SciPy's linear algebra for this alone
         after = first + len(block)
         K[first:after, first:after] = block
         first = after
@@ -35,12 +34,9 @@ def gain_rows(stack: Stack, robot: Robot) -> tuple[Array, Array, Array, Integers
 
 
 def task_rows(stack: Stack, robot: Robot, first: Sequence[int]) -> TaskRows:
-    """A stack with its block-diagonal gain, and room for what a step finds.
-
-    first : where the rows of its `task_functions` begin in the program
-    """
+    """A stack's rows, with zeros for what a step writes; first: where each of `task_functions` begins."""
     listed = [
-        (first[3 * i] + j, first[3 * i + 1] + j, _error_row(task, first[3 * i + 2], j, row))
+        (first[3 * i] + j, first[3 * i + 1] + j, error_row(task, first[3 * i + 2] + j, row))
         for i, task in enumerate(stack)
         for j, row in enumerate(task.rows(robot))
     ]
@@ -49,7 +45,8 @@ def task_rows(stack: Stack, robot: Robot, first: Sequence[int]) -> TaskRows:
     return TaskRows(table, K, speed, braking, group, *np.zeros((4, len(table))))
 
 
-def _error_row(task: Task, computed: int, component: int, row: Row) -> int:
+def error_row(task: Task, computed: int, row: Row) -> int:
+    """The program's row of a component's error: that of a computed one, else PLAIN or WRAPPED."""
     if task.function.comparison is not None:
-        return computed + component
+        return computed
     return WRAPPED if row.angular else PLAIN

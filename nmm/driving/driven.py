@@ -1,9 +1,9 @@
-"""A robot that follows targets which somebody moves, under a controller that somebody changes."""
-
-from __future__ import annotations
+"""A robot that follows targets with a controller that may change at any time, and why it misses them."""
 
 import math
+from collections import deque
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,31 +11,26 @@ from nmm.arrays import Array
 from nmm.collisions.obstacle import Obstacle
 from nmm.control.controller import Controller
 from nmm.control.step import Step
-from nmm.driving.choices import Choice, named
-from nmm.driving.reaching import Reaching
-from nmm.driving.setups import DriveSetup, Settings
+from nmm.diagnosis.reasons import out_of_reach, stretched
+from nmm.driving.setups import Choice, DriveSetup, Settings, named
 from nmm.driving.targets import aimed, targets_of
-from nmm.errors import InputError, NmmError
-from nmm.playback.rolling import Rolling
+from nmm.errors import NmmError, expect
+from nmm.playback.rolling import RolledRobot
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import CENTER_OF_MASS
 
-#: Where a robot goes that is farther away than this, m, its loop has diverged.
+#: A robot farther away than this, m, has diverged.
 LOST = 1e4
+#: An error is stuck if it falls by less than both of these, m or rad and a share of itself, in this time, s.
+LONG, FALL, SHARE = 1.0, 1e-3, 0.01
+#: A smaller error is near enough, m or rad.
+NEAR = 5e-3
 
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """The robot at an instant.
-
-    Attributes
-    ----------
-    t : s since the beginning
-    step : all that the controller found
-    sigma_min : smallest singular value of J
-    at : (targets, 3) where in the world the tasks' frames are, m; not numbers for tasks without one
-    against : why it does not get to its targets; "" where nothing is known
-    """
+    """The robot at t, s since the beginning: the controller's step, σ_min of J, the tasks' frames (targets,
+    3), m in the world, NaN for tasks without one, and what keeps it from its targets ("" if nothing does)."""
 
     t: float
     step: Step
@@ -44,25 +39,49 @@ class Look:
     against: str
 
 
+class Reaching:
+    def __init__(self) -> None:
+        self._target = np.zeros(0)
+        self._norms: deque[tuple[float, float]] = deque()
+
+    def words(self, controller: Controller, t: float, step: Step, target: Array) -> str:
+        """Why the robot, at t, s, does not get to the tasks' target (s,): its arm is too short, or the error
+        stands; "" where nothing is known. An earlier t than before is a new beginning."""
+        norm = float(np.linalg.norm(step.error))
+        if not np.array_equal(target, self._target) or (self._norms and t < self._norms[-1][0]):
+            self._target, self._norms = target, deque()
+        if not self._norms or t > self._norms[-1][0]:  # it may be paused
+            self._norms.append((t, norm))
+        while len(self._norms) > 1 and self._norms[1][0] <= t - LONG:
+            self._norms.popleft()
+        far = out_of_reach(controller, step.q, target)
+        if far is not None:
+            return str(far)
+        before, at_first = self._norms[0]
+        if t - before < LONG or norm < NEAR or at_first - norm >= max(FALL, SHARE * norm):
+            return ""
+        stands = f"the error does not fall: ‖e‖ stays at {norm:.3g}"
+        if step.scale.min(initial=1.0) < 1.0:
+            kept = "limits and distances" if controller.solver.scene is not None else "limits"
+            return f"{stands}; {kept} leave {float(step.scale.min()):.2g} of the task's rate"
+        seen = stretched(controller, step.q, step.J) if np.all(np.isfinite(step.J)) else None
+        return stands if seen is None else f"{stands}; {seen}"
+
+
+class Made(NamedTuple):
+    settings: Settings
+    controller: Controller
+    choices: list[Choice]
+
+
 class Driven:
-    """The robot, its time and its controller. One thread moves it.
-
-    Parameters
-    ----------
-    setup : what is driven
-
-    Attributes
-    ----------
-    t, q, wheels : s; (n,); the wheels' angles (W,), rad
-    targets : one of each task
-    choices : what may be changed, with the present values
-    trouble : why it stands still; "" while it moves
-    """
+    """The robot, its time t, s, and its controller; used by one thread. `shown` is the robot at the last
+    look, with its wheels; `choices` has what may be changed and the present values; `trouble` is why it
+    stands still, "" while it moves."""
 
     def __init__(self, setup: DriveSetup) -> None:
         self.setup = setup
         self.robot = setup.robot
-        self._rolling = Rolling(self.robot)
         self._settings: Settings = {}
         first = setup.controller({})
         self.targets = targets_of(first, setup.q0, at_robot=setup.at_robot)
@@ -71,81 +90,68 @@ class Driven:
         self._reaching = Reaching()
         self.choices = setup.choices({})
         self.trouble = ""
+        self.shown = RolledRobot(self.robot, setup.q0)
         self._stand()
 
     @property
     def has_objective(self) -> bool:
-        """Whether there is an H."""
-        return self._controller.objective is not None
+        return self._controller.given.objective is not None
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
-        """What it keeps off, besides itself."""
-        collisions = self._controller.collisions
+        collisions = self._controller.given.collisions
         return () if collisions is None else tuple(collisions.obstacles)
 
     def _stand(self) -> None:
         self.t, self.q = 0.0, self.setup.q0.copy()
-        self._seen, self.wheels = self.q, self._rolling.settled(self.q)
+        self.shown.stand(self.q)
         self._controller.reset()
         self.trouble = ""
 
     def restart(self) -> None:
-        """Back to the beginning, targets, too; what was chosen stays."""
+        """Return to the beginning, targets too; what was chosen stays."""
         for target, value in zip(self.targets, self._began, strict=True):
             target.signal.set(value)
         self._stand()
 
     def aim(self, task: int, value: Array) -> None:
-        """Put a task's target at `value` (s,); one that stood still tries again.
-
-        Raises
-        ------
-        InputError : no such task, another number of numbers
-        """
-        if task >= len(self.targets):
-            raise InputError(f"task: expected a number below {len(self.targets)}, got {task}")
+        """Aim a task at `value` (s,), which ends a standstill; `InputError` for no such task or length."""
+        expect(task < len(self.targets), "task", f"a number below {len(self.targets)}", task)
         self.targets[task].signal.set(value)
         self.trouble = ""
 
-    def with_choice(self, key: str, value: object) -> tuple[Settings, Controller, list[Choice]]:
-        """What `use` takes for a choice: made apart, because it may take longer than a step.
-
-        Raises
-        ------
-        InputError, NmmError : no such choice or value; what does not go together
-        """
-        chosen = named(self.choices, key).checked(value)
-        settings = {**self._settings, key: chosen}
+    def with_choice(self, key: str, value: object) -> Made:
+        """A controller with that choice, for `use`; made apart, as it may take longer than a step. `NmmError`
+        for an unknown choice or value, or ones that do not go together."""
+        settings = {**self._settings, key: named(self.choices, key).checked(value)}
         controller = aimed(self.setup.controller(settings), self.targets)
-        return settings, controller, self.setup.choices(settings)
+        return Made(settings, controller, self.setup.choices(settings))
 
-    def use(self, made: tuple[Settings, Controller, list[Choice]]) -> None:
-        """Go on with another controller, from the inputs of this one."""
-        before = self._controller.before.copy()
+    def use(self, made: Made) -> None:
+        """Go on with another controller, from this one's inputs."""
+        before = self._controller.solver.before.copy()
         self._settings, self._controller, self.choices = made
-        self._controller.before[:] = before
+        self._controller.solver.before[:] = before
         self.trouble = ""
 
     def step(self) -> bool:
-        """One step of the controller's dt; whether it moved. What goes wrong is `trouble`."""
+        """One step of the controller's dt; whether it moved. An error becomes `trouble`."""
         if self.trouble:
             return False
         try:
-            ahead, _ = self._controller.step(self.t, self.q, self.setup.dt)
+            q_next, _ = self._controller.step(self.t, self.q, self.setup.dt)
         except NmmError as error:
             self.trouble = str(error)
             return False
-        if not np.all(np.isfinite(ahead)) or np.abs(ahead[: min(2, len(ahead))]).max(initial=0.0) > LOST:
+        if not np.all(np.isfinite(q_next)) or np.abs(q_next[: min(2, len(q_next))]).max(initial=0.0) > LOST:
             self.trouble = f"diverged at t = {self.t:g} s: try smaller gains, or begin again"
             return False
-        self.t, self.q = self.t + self.setup.dt, ahead
+        self.t, self.q = self.t + self.setup.dt, q_next
         return True
 
     def look(self) -> Look:
-        """Where it is and what its controller finds there; its wheels have rolled since the last look."""
-        self.wheels = self._rolling.angles(np.array([self._seen, self.q]), start=self.wheels)[-1]
-        self._seen = self.q
+        """The present place and what the controller finds there; wheels have rolled since the last look."""
+        self.shown.roll(self.q[np.newaxis])
         step = self._controller.evaluate(self.t, self.q)
         here = Configuration(self.robot, self.q)
         at = np.full((len(self.targets), 3), np.nan)

@@ -1,84 +1,54 @@
-"""What a page may say to the program: few kinds of messages, checked to the last number."""
+"""The messages of a page that drives a robot, strictly checked."""
 
-from __future__ import annotations
+from typing import Annotated, Literal
 
-import json
-from dataclasses import dataclass
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass
 
-from nmm.errors import InputError, expect_known
+from nmm.errors import InputError
 
-#: A target farther away than this, m or rad, is nobody's wish.
+#: Targets are at most this far away, m or rad.
 FAR = 1e4
 #: The longest message, bytes.
 LONGEST = 2048
-ORDERS = ("pause", "go", "restart")
+
+_STRICT = ConfigDict(strict=True, extra="forbid")
+_Place = Annotated[float, Field(ge=-FAR, le=FAR)]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=_STRICT)
 class Aim:
-    """Put the target of task number `task` at `value` (s numbers)."""
+    """Put the target of task number `task` at `value` (s,)."""
 
-    task: int
-    value: tuple[float, ...]
+    task: Annotated[int, Field(ge=0, lt=1000)]
+    value: Annotated[tuple[_Place, ...], Field(min_length=1, max_length=100)]
+    type: Literal["aim"] = "aim"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=_STRICT)
 class Pick:
-    """Choose `value` for `key`."""
-
     key: str
     value: str | bool | float
+    type: Literal["pick"] = "pick"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=_STRICT)
 class Order:
-    """Pause, go on, or begin again."""
-
-    what: str
+    what: Literal["pause", "go", "restart"]
+    type: Literal["order"] = "order"
 
 
 Message = Aim | Pick | Order
+_MESSAGES: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator="type")])
 
 
 def parsed(text: str | bytes) -> Message:
-    """What a message says.
-
-    Raises
-    ------
-    InputError : anything that no page of ours sends
-    """
+    """A page's message; `InputError` for anything that our pages do not send."""
     if len(text) > LONGEST:
-        raise InputError(f"message: expected at most {LONGEST} bytes, got {len(text)}")
+        raise InputError(where="message", expected=f"at most {LONGEST} bytes", got=len(text))
     try:
-        data = json.loads(text)
-    except (ValueError, RecursionError):
-        raise InputError("message: expected JSON") from None
-    if not isinstance(data, dict):
-        raise InputError("message: expected a mapping")
-    kind = data.get("type")
-    if kind == "aim" and data.keys() == {"type", "task", "value"}:
-        return _aim(data["task"], data["value"])
-    if kind == "pick" and data.keys() == {"type", "key", "value"}:
-        return _pick(data["key"], data["value"])
-    if kind == "order" and data.keys() == {"type", "what"}:
-        expect_known("what", str(data["what"])[:20], ORDERS, "message")
-        return Order(str(data["what"]))
-    raise InputError("message: expected type aim, pick or order, with its keys")
-
-
-def _aim(task: object, value: object) -> Aim:
-    if isinstance(task, bool) or not isinstance(task, int) or not 0 <= task < 1000:
-        raise InputError("message: task: expected a task's number")
-    if not isinstance(value, list) or not 0 < len(value) <= 100 or not all(_is_place(x) for x in value):
-        raise InputError(f"message: value: expected numbers from {-FAR:g} to {FAR:g}")
-    return Aim(task, tuple(float(x) for x in value))
-
-
-def _is_place(x: object) -> bool:
-    return isinstance(x, int | float) and not isinstance(x, bool) and abs(x) <= FAR
-
-
-def _pick(key: object, value: object) -> Pick:
-    if not isinstance(key, str) or not isinstance(value, str | bool | int | float):
-        raise InputError("message: expected a key and a word, a number, or true or false")
-    return Pick(key, value)
+        return _MESSAGES.validate_json(text)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        place = " ".join(map(str, first["loc"]))
+        raise InputError(first["msg"], where=f"message {place}".rstrip()) from None

@@ -1,4 +1,4 @@
-"""The loop in real time, between the messages of the pages and their pictures."""
+"""The loop in real time, between the pages' messages and their pictures."""
 
 from __future__ import annotations
 
@@ -6,42 +6,31 @@ import math
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Future
 from contextlib import suppress
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from nmm.driving.choices import Choice, named
-from nmm.driving.driven import Driven, Look
-from nmm.driving.making import Making
-from nmm.driving.messages import FAR, Aim, Order, Pick, parsed
-from nmm.driving.plotted import channels, numbers, values
-from nmm.driving.setups import DriveSetup
+from nmm.driving.driven import Driven, Look, Made
+from nmm.driving.messages import FAR, Aim, Message, Pick, parsed
+from nmm.driving.setups import Choice, DriveSetup, named
 from nmm.errors import InputError, NmmError
-from nmm.looks import looks
-from nmm.playback.channels import Channels
-from nmm.playback.curves import draw_curves
-from nmm.playback.drawing import Drawing
-from nmm.playback.encoding import encode
-from nmm.playback.live import serve
-from nmm.playback.page import socket_page
-from nmm.playback.scene import live_scene
-from nmm.playback.server import PageServer, Visitor
-from nmm.playback.surroundings import Surroundings
+from nmm.playback.channels import live_channels
+from nmm.playback.drawing import Drawing, encode
+from nmm.playback.server import Visitor
+from nmm.playback.session import FPS, RobotSession
+from nmm.resolver_style import looks
+from nmm.runs.components import Axes
 
-SCRIPTS = ("drive_gizmo.js", "drive.js")
-STYLES = ("drive.css",)
-#: Pictures a second.
-FPS = 30.0
-#: A loop that is later than this, s, lets the time go that it has lost.
-LATE = 0.25
-#: Samples that a page which comes late is told, at FPS.
+#: Samples that a new page gets, at FPS.
 KEPT = int(30 * FPS)
 #: Messages that wait for the loop at most; more are dropped.
 WAITING = 256
-#: How long a notice is told, s.
-TOLD = 5.0
+#: How long a notice is shown, s.
+NOTICE = 5.0
 
 
 def drive(
@@ -53,8 +42,8 @@ def drive(
 ) -> None:
     """Let a robot follow targets that are dragged in a browser; returns at Ctrl-C or when `stop` is set.
 
-    The address is printed. Only this machine can reach it; the program listens to pages that it sent itself,
-    and to nothing that they would not say. All pages show and move the same robot.
+    The address is printed. Only this machine can reach it, and only pages that this program has sent may send
+    messages, which are checked. All pages show and move the same robot.
 
     Parameters
     ----------
@@ -65,7 +54,7 @@ def drive(
 
     Raises
     ------
-    InputError : the port is taken, not allowed or not a port; a scenario that nobody can drive
+    InputError : the port is taken, not allowed or not a port; a scenario that cannot be driven
 
     Examples
     --------
@@ -76,123 +65,100 @@ def drive(
     >>> nmm.driving.drive(setup, open_browser=False, stop=ended)
     Driving at http://127.0.0.1:.../ (Ctrl-C ends it)
     """
-    session = Session(Driven(setup))
-    server = PageServer(
-        lambda host, token: socket_page(setup.name, host, token, scripts=SCRIPTS, styles=STYLES),
-        [encode(command) for command in session.commands],
-        lambda: Visitor(session.follow(), session.receive),
-        port=port,
-    )
-    ended = stop or threading.Event()
-    loop = threading.Thread(target=session.run, args=(server.changed, ended), name="nmm drive", daemon=True)
-    loop.start()
-    try:
-        serve(server, "Driving", [setup.robot], open_browser=open_browser, stop=ended)
-    finally:
-        ended.set()
-        loop.join(timeout=5.0)
+    session = DriveSession(Driven(setup), port=port)
+    session.serve("Driving", [setup.robot], open_browser=open_browser, stop=stop)
 
 
-class Session:
-    """A robot that is driven, what pages have said, and what they are told.
+class DriveSession(RobotSession):
+    """A driven robot, its pages' messages and their pictures. Three threads meet here: the loop, the server
+    (`receive`, `follow`), and one that makes a controller. They share what is written in one go: a deque, and
+    references to values that never change."""
 
-    Three threads meet here: the loop (`run`), the server (`receive`, and what `follow` makes), and one that
-    makes a controller. They share what is written in one go: a deque, and references to values that nobody
-    changes.
-
-    Attributes
-    ----------
-    commands : of a page that has just come
-    """
-
-    def __init__(self, driven: Driven) -> None:
+    def __init__(self, driven: Driven, *, port: int | None = None) -> None:
         self._driven = driven
         self._look = look = driven.look()
-        self._waiting: deque[Aim | Pick | Order] = deque(maxlen=WAITING)
+        self._waiting: deque[Message] = deque(maxlen=WAITING)
         self._samples: deque[tuple[int, list[float | None]]] = deque(maxlen=KEPT)
         self._picks: dict[str, object] = {}
-        self._making: Making | None = None
+        self._making: Future[Made] | None = None
         self._paused = False
-        self._lost = 0
         self._notice, self._until = "", 0.0
         self._count = 0
         self._choices: tuple[int, list[Choice]] = (0, driven.choices)
-        robot = driven.robot
-        commands, self._drawn = live_scene(
-            robot, driven.q, driven.wheels, title=driven.setup.name, room=float(robot.reach)
-        )
-        self._surroundings = Surroundings(driven.obstacles, robot, driven.q, driven.wheels)
-        drawing = Drawing()
-        self._surroundings.draw(drawing, 2.0 * float(robot.reach))
-        draw_curves(
-            drawing, [Channels(np.zeros(0), 0, channels(driven))], looks([_kind(driven.choices)]), 0.0
-        )
+        self._picture: tuple[list[str], dict[str, Any]] | None = None
         targets = Drawing()
         targets.add(
             "targets",
-            targets=[target.told() for target in driven.targets],
+            targets=[target.for_page() for target in driven.targets],
             values=[target.signal.value.tolist() for target in driven.targets],
             at=[numbers(at) for at in look.at],
-            reach=float(robot.reach),
+            reach=float(driven.robot.reach),
             far=FAR,
         )
-        # The last command of a scene says that it has come.
-        self.commands = [*commands[:-1], *drawing.commands, commands[-1], *targets.commands]
+        names, units = zip(*(row for target in driven.targets for row in target.rows), strict=True)
+        hidden = {"residual"} if driven.has_objective else {"residual", "objective"}
+        self._curves, channels = live_channels(Axes(driven.robot, names, units, 1), hidden)
+        super().__init__(
+            driven.shown,
+            driven.setup.name,
+            lambda: Visitor(self.follow(), self.receive),
+            obstacles=driven.obstacles,
+            channels=channels,
+            look=looks([_kind(driven.choices)])[0],
+            further=targets.commands,
+            scripts=("drive_gizmo.js", "drive.js"),
+            styles=("drive.css",),
+            port=port,
+        )
         self._publish(look)
+        self.begin(self._run, "nmm drive")
 
     def receive(self, text: str | bytes) -> bool:
-        """A page's message; what no page of ours says is left aside. The loop answers: never at once."""
+        """Queue a page's message for the loop, ignoring invalid ones. False: there is no answer."""
         with suppress(InputError):
             self._waiting.append(parsed(text))
         return False
 
     def follow(self) -> Callable[[], str]:
-        """For a page that has come: what is new to it, as lines."""
         seen, version = -1, -1
 
         def latest() -> str:
             nonlocal seen, version
+            if self._picture is None:  # the page came before the first picture
+                return ""
             lines = []
             number, choices = self._choices
             if number != version:
-                version = number
-                told, (worn,) = [choice.told() for choice in choices], looks([_kind(choices)])
-                lines.append(encode({"type": "choices", "choices": told, "color": worn.color}))
-            *placed, picture = self._picture
+                version, color = number, looks([_kind(choices)])[0].color
+                listed = [asdict(choice) for choice in choices]
+                lines.append(encode({"type": "choices", "choices": listed, "color": color}))
+            placed, picture = self._picture
             fresh = [sample for count, sample in tuple(self._samples) if count > seen]
             seen = self._samples[-1][0] if self._samples else seen
-            lines += [encode(command) for command in placed]
-            return "\n".join([*lines, encode({**picture, "samples": fresh})])
+            return "\n".join([*lines, *placed, encode({**picture, "samples": fresh})])
 
         return latest
 
-    def run(self, changed: Callable[[], None], stop: threading.Event) -> None:
-        """Move in real time and tell `changed` of each picture, until `stop` is set."""
-        clock = time.monotonic()
-        while not stop.is_set():
+    def _run(self) -> None:
+        driven, dt, owed = self._driven, self._driven.setup.dt, 0.0
+        while not self.ended.is_set():
             self._attend()
-            now = time.monotonic()
-            if self._paused or self._driven.trouble:
-                clock = now
-            if now - clock > LATE:
-                self._lost += math.ceil((now - clock) * FPS) - 1
-                clock = now - 1.0 / FPS
-            dt = self._driven.setup.dt
-            while clock + dt <= now and self._driven.step():
-                clock += dt
+            passed = self.clock.passed()
+            owed = 0.0 if self._paused or driven.trouble else owed + passed
+            while owed >= dt and driven.step():
+                owed -= dt
             try:
-                self._look = self._driven.look()
+                self._look = driven.look()
             except NmmError as error:  # a user's function may raise
-                self._driven.trouble = str(error)
+                driven.trouble = str(error)
             self._publish(self._look)
             try:
-                changed()
+                self.changed()
             except NmmError:  # the server has been closed
                 return
-            stop.wait(max(0.0, 1.0 / FPS - (time.monotonic() - now)))
+            self.clock.rest(self.ended)
 
     def _attend(self) -> None:
-        """Do what pages have said."""
         while self._waiting:
             message = self._waiting.popleft()
             try:
@@ -206,41 +172,50 @@ class Session:
                     self._paused = message.what == "pause"
             except InputError:
                 continue  # no page of ours has that task
-        if self._making is not None and self._making.done:
-            self._take(self._making)
+        if self._making is not None and self._making.done():
+            try:
+                self._driven.use(self._making.result())
+            except Exception as error:  # an NmmError says what is wrong; a user's function may raise anything
+                wrong = str(error) if isinstance(error, NmmError) else f"{type(error).__name__}: {error}"
+                self._notice, self._until = wrong, time.monotonic() + NOTICE
             self._making = None
+            # A page whose choice was refused shows the present one again.
+            self._choices = (self._choices[0] + 1, self._driven.choices)
         if self._picks and self._making is None:
             key = next(iter(self._picks))
-            self._making = Making(self._driven, key, self._picks.pop(key))
-
-    def _take(self, making: Making) -> None:
-        if making.made is not None:
-            self._driven.use(making.made)
-        else:
-            self._notice, self._until = making.wrong, time.monotonic() + TOLD
-        # A page whose wish was not met shows what is.
-        self._choices = (self._choices[0] + 1, self._driven.choices)
+            self._making = Future()
+            given = self._driven, key, self._picks.pop(key), self._making
+            threading.Thread(target=_make, args=given, daemon=True).start()
 
     def _publish(self, look: Look) -> None:
-        """What pages are told from now on."""
         driven = self._driven
         self._count += 1
         if not self._samples or self._samples[-1][1][0] != look.t:
-            self._samples.append((self._count, [look.t, *values(driven, look)]))
-        told, wrong = self._told(look)
+            self._samples.append((self._count, [look.t, *self._values(look)]))
+        text, wrong = self._state(look)
         picture: dict[str, Any] = {
             "type": "drive",
             "t": look.t,
             "targets": [target.signal.value.tolist() for target in driven.targets],
             "at": [numbers(at) for at in look.at],
             "paused": self._paused,
-            "told": told,
+            "told": text,
             "wrong": wrong,
         }
-        self._picture = self._surroundings.moved(look.t), self._drawn.pose(driven.q, driven.wheels), picture
+        self._picture = self.placed(look.t), picture
 
-    def _told(self, look: Look) -> tuple[str, bool]:
-        """What a page says of the state, and whether that is bad news."""
+    def _values(self, look: Look) -> list[float | None]:
+        step = look.step
+        known: dict[str, Iterable[float]] = {
+            "error_norm": [float(np.linalg.norm(step.error))],
+            "error": step.error,
+            "objective": [step.objective],
+            "sigma_min": [look.sigma_min],
+            "scale": [step.scale.min(initial=1.0)],
+        }
+        return numbers([*(x for one in self._curves for x in known[one.name]), *step.u, *step.q])
+
+    def _state(self, look: Look) -> tuple[str, bool]:
         if self._driven.trouble:
             return "; ".join(filter(None, [f"Stands still: {self._driven.trouble}", look.against])), True
         if time.monotonic() < self._until:
@@ -250,11 +225,28 @@ class Session:
         parts = [f"t = {look.t:.1f} s"]
         if self._making is not None:
             parts.append("another controller is being made")
-        if self._lost:
-            parts.append(f"{self._lost} pictures late")
+        if self.clock.lost:
+            parts.append(f"{self.clock.lost} pictures late")
         return ", ".join(parts), False
 
 
+def _make(driven: Driven, key: str, value: object, making: Future[Made]) -> None:
+    """A controller for a choice, in a thread: a resolver new to this machine has to be compiled."""
+    try:
+        made = driven.with_choice(key, value)
+        with suppress(NmmError):  # the loop meets it again, and reports it
+            made.controller.step(driven.t, driven.q, driven.setup.dt)  # the first call compiles
+        made.controller.reset()
+        making.set_result(made)
+    except Exception as error:  # the loop reports it
+        making.set_exception(error)
+
+
+def numbers(values: Iterable[float]) -> list[float | None]:
+    """JSON's numbers are finite; None for all others."""
+    return [float(value) if math.isfinite(value) else None for value in values]
+
+
 def _kind(choices: Sequence[Choice]) -> str:
-    """The resolver's, whose colour the curves have."""
+    """The kind of the resolver, whose colour the curves have."""
     return str(named(choices, "resolver.kind").value)

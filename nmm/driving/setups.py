@@ -1,11 +1,13 @@
-"""Controllers for what a driver chose: of a scenario, or of a robot with tasks."""
+"""What a page may change while the robot moves, and controllers for it, of a scenario or a robot."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,9 +15,8 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array
 from nmm.control.controller import Controller
 from nmm.control.limits import Limits
-from nmm.driving.choices import Choice, number
 from nmm.driving.targets import title_of
-from nmm.errors import InputError, NmmError
+from nmm.errors import InputError, NmmError, expect, expect_kind, expect_known
 from nmm.functions.function import Function
 from nmm.functions.tasks.task import Stack, Task
 from nmm.kinds import RESOLVERS
@@ -24,21 +25,76 @@ from nmm.robots.robot import Robot
 from nmm.scenario import Scenario
 from nmm.scenario.resolvers import RESOLVER_PARTS
 
-#: The headings of the page's controls.
 RESOLVER, GAINS, WEIGHTS = "Resolver", "Gains", "Weights of the inputs"
 
 Settings = Mapping[str, str | bool | float]
 
 
+@dataclass(frozen=True)
+class Choice:
+    """One control of the page.
+
+    Attributes
+    ----------
+    key : of the scenario, as `--set` takes it
+    text : what people call it
+    group : under which heading it stands
+    value : the present one: a word of `options`, True or False, or a number from `least` to `most`
+    unit : of a number
+
+    Examples
+    --------
+    >>> choice = nmm.driving.Choice("task.gain", "gain", "task", 2.0, least=0.0, most=10.0, unit="1/s")
+    >>> choice.checked(3)
+    3.0
+    """
+
+    key: str
+    text: str
+    group: str
+    value: str | bool | float
+    options: tuple[str, ...] = ()
+    least: float = 0.0
+    most: float = 0.0
+    unit: str = ""
+
+    def checked(self, value: object) -> str | bool | float:
+        """The value, of this choice's kind; `InputError` for another kind, or one out of range."""
+        if isinstance(self.value, bool):
+            expect_kind(value, bool, self.key, "true or false")
+            return bool(value)
+        if isinstance(self.value, str):
+            expect_known(self.key, str(value)[:40], self.options, "drive")
+            return str(value)
+        if not _is_number(value):
+            raise InputError(where=self.key, expected="a number", got=value)
+        expect(self.least <= value <= self.most, self.key, f"a number from {self.least:g} to {self.most:g}")
+        return float(value)
+
+
+def _is_number(value: object) -> TypeGuard[float]:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def number(key: str, text: str, group: str, first: float, value: float, unit: str = "") -> Choice:
+    """A number above zero: two decades about its first value, extended to the present one."""
+    least, most = min(first / 20.0, value), max(first * 20.0, value)
+    return Choice(key, text, group, float(value), (), least, most, unit)
+
+
+def named(choices: Sequence[Choice], key: str) -> Choice:
+    """The choice with that key, or `InputError`."""
+    known = {choice.key: choice for choice in choices}
+    expect_known("choice", key[:80], known, "drive")
+    return known[key]
+
+
 class DriveSetup(ABC):
-    """What is driven.
+    """What is driven: a robot from q0 (n,), m and rad, in steps of dt, s.
 
     Attributes
     ----------
     name : the scenario's or the robot's
-    robot : the robot
-    q0 : (n,) where it begins, m and rad
-    dt : the controller's, s
     at_robot : whether targets begin where the robot is, not where references are
 
     Examples
@@ -85,15 +141,16 @@ class ScenarioSetup(DriveSetup):
 
     def __init__(self, scenario: Scenario, q0: ArrayLike | None = None) -> None:
         self.scenario = scenario
+        self._firsts: dict[str, float] = {}
         self.name = scenario.title or scenario.name
         self.robot = scenario.robot()
         self.q0, self.dt = self.robot.q(scenario.parts.q0 if q0 is None else q0), scenario.parts.dt
-        for part in scenario.parts.task:
-            if part.when:
-                raise InputError(
-                    f"{scenario.name}: has tasks that come and go (when), which nobody can drive; expected a "
-                    "scenario whose tasks are always there"
-                )
+        if any(part.when for part in scenario.parts.task):
+            raise InputError(
+                "has tasks that come and go (when), which cannot be driven",
+                where=scenario.name,
+                expected="a scenario whose tasks are always there",
+            )
 
     def controller(self, settings: Settings) -> Controller:
         controller = self._with(settings).controller()
@@ -103,43 +160,28 @@ class ScenarioSetup(DriveSetup):
     def choices(self, settings: Settings) -> list[Choice]:
         parts = self._with(settings).parts
         kind = parts.resolver.kind
-        # Which of them the scenario can do with shows when one is chosen: to try takes as long as to load.
+        # Whether the scenario works with a resolver shows when it is chosen: trying takes as long as loading.
         found = [Choice("resolver.kind", "method", RESOLVER, kind, tuple(RESOLVERS))]
         resolver = parts.resolver.model_dump()
         alpha = resolver.get("alpha")
-        if isinstance(alpha, float | int) and not isinstance(alpha, bool) and alpha > 0.0:
-            first = self._first("resolver.alpha", float(alpha))
-            found.append(_now(number("resolver.alpha", "step α along −∇H", RESOLVER, first), alpha))
+        if _is_number(alpha) and alpha > 0.0:
+            found.append(self._number("resolver.alpha", "step α along −∇H", RESOLVER, alpha))
         found.append(Choice("limits", "keep the limits", RESOLVER, parts.limits is not None))
         for i, task in enumerate(parts.task):
             gain = task.model_dump().get("gain")
-            if isinstance(gain, float | int) and not isinstance(gain, bool):
-                key, words = f"task.{i}.gain", f"K of {self._task_names[i]}"
-                found.append(_now(number(key, words, GAINS, self._first(key, float(gain)), "1/s"), gain))
-        if "weights" in resolver:
-            found += self._weights(resolver["weights"])
+            if _is_number(gain):
+                text = f"K of {self._task_names[i]}"
+                found.append(self._number(f"task.{i}.gain", text, GAINS, gain, "1/s"))
+        weights = resolver.get("weights") or {}
+        # Weights of groups are not one number per input.
+        if "weights" in resolver and isinstance(weights, Mapping) and set(weights) <= set(self.robot.u_names):
+            for name in self.robot.u_names:
+                found.append(self._number(f"resolver.weights.{name}", name, WEIGHTS, weights.get(name, 1.0)))
         return found
 
-    def _weights(self, given: Any) -> list[Choice]:
-        if given is not None and not isinstance(given, Mapping):
-            return []
-        now = given or {}
-        if not set(now) <= set(self.robot.u_names):
-            return []  # of groups: not one number an input
-        found = []
-        for name in self.robot.u_names:
-            value = now.get(name, 1.0)
-            key = f"resolver.weights.{name}"
-            found.append(_now(number(key, name, WEIGHTS, self._first(key, float(value))), float(value)))
-        return found
-
-    def _first(self, key: str, value: float) -> float:
-        """A number's value when it was first asked for: a slider's ends stay where they are."""
-        return self._firsts.setdefault(key, value)
-
-    @cached_property
-    def _firsts(self) -> dict[str, float]:
-        return {}
+    def _number(self, key: str, text: str, group: str, value: float, unit: str = "") -> Choice:
+        """A number whose range is about its first value, so that a slider's ends stay where they are."""
+        return number(key, text, group, self._firsts.setdefault(key, float(value)), float(value), unit)
 
     @cached_property
     def _task_names(self) -> list[str]:
@@ -156,10 +198,7 @@ class ScenarioSetup(DriveSetup):
                 continue
             if key.startswith("resolver.weights."):
                 weights[rest.partition(".")[2]] = value
-            elif key == "limits":
-                if value != (self.scenario.parts.limits is not None):
-                    chosen[key] = value
-            else:
+            elif key != "limits" or value != (self.scenario.parts.limits is not None):
                 chosen[key] = value
         if weights:
             given = self.scenario.parts.resolver.model_dump().get("weights") or {}
@@ -187,7 +226,9 @@ class RobotSetup(DriveSetup):
 
     def __init__(self, robot: Robot, tasks: Sequence[Task | Function], q0: Array) -> None:
         self.robot, self.q0, self.name = robot, q0, robot.name
-        self._tasks = [task if isinstance(task, Task) else _held(task, robot) for task in tasks]
+        self._tasks = [
+            task if isinstance(task, Task) else Task(task, np.zeros(len(task.rows(robot)))) for task in tasks
+        ]
 
     def controller(self, settings: Settings) -> Controller:
         tasks = [
@@ -204,30 +245,15 @@ class RobotSetup(DriveSetup):
         found.append(Choice("limits", "keep the limits", RESOLVER, bool(settings.get("limits", True))))
         for i, task in enumerate(Stack(tuple(self._tasks))):
             key = f"task.{i}.gain"
-            gain = number(key, f"K of {title_of(task, self.robot)}", GAINS, 2.0, "1/s")
-            found.append(_now(gain, float(settings.get(key, 2.0))))
+            text, value = f"K of {title_of(task, self.robot)}", float(settings.get(key, 2.0))
+            found.append(number(key, text, GAINS, 2.0, value, "1/s"))
         return found
 
     @cached_property
     def _kinds(self) -> tuple[str, ...]:
-        return tuple(kind for kind in RESOLVERS if self._does(kind))
-
-    def _does(self, kind: str) -> bool:
-        try:
-            self.controller({"resolver.kind": kind})
-        except (NmmError, TypeError):
-            return False
-        return True
-
-
-def _held(function: Function, robot: Robot) -> Task:
-    return Task(function, np.zeros(len(function.rows(robot))))
-
-
-def _now(choice: Choice, value: float) -> Choice:
-    """The choice with its present value, which a scenario's file may have anywhere."""
-    value = float(value)
-    return Choice(
-        choice.key, choice.text, choice.group, value, (),
-        min(choice.least, value), max(choice.most, value), choice.unit,
-    )  # fmt: skip
+        found = []
+        for kind in RESOLVERS:
+            with suppress(NmmError, TypeError):
+                self.controller({"resolver.kind": kind})
+                found.append(kind)
+        return tuple(found)

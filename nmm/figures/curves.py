@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from nmm import looks
+from nmm import resolver_style
 from nmm.arrays import Array
+from nmm.control.quantities import QUANTITIES
 from nmm.figures import style
+from nmm.runs.components import components
 from nmm.runs.trajectory import Trajectory
 
-#: Errors below this fraction of the largest are rounding, and say nothing of the rate of decay.
+#: Errors below this fraction of the largest are rounding, and are left out of the fit.
 _FLOOR = 1e-9
-#: Two panels stand beside each other in a figure that is at least so wide, in.
+#: Two panels stand beside each other in a figure that is at least this wide, in.
 _ROOM_FOR_TWO = 4.5
 _SIGMA = "smallest singular value of J_bar"
 #: As wide as the legend of the error's norm is, with its guide.
@@ -42,22 +45,15 @@ def errors(trajectory: Trajectory, gain: float | None = None, *, width: float = 
     'log'
     """
     kinds = style.groups(trajectory.r_units)
-    legends = [_error_names(trajectory, rows) for rows in kinds.values()]
+    names = [one.text for one in components(trajectory, QUANTITIES["error"])]
+    legends = [[names[row] for row in rows] for rows in kinds.values()]
     made, panels = style.stack([1.15] * len(kinds) + [1.5], [*legends, _NORM_AND_GUIDE], width)
-    for axes, (unit, rows) in zip(panels, kinds.items(), strict=False):
-        draw_components(axes, trajectory, rows, unit)
+    for axes, (unit, rows), texts in zip(panels, kinds.items(), legends, strict=False):
+        style.columns(axes, trajectory.t, trajectory.error[:, rows], texts, zero=True)
+        draw_events(axes, trajectory, named=False)
+        style.finish(axes, trajectory.t, f"error [{unit}]", named=False)
     draw_error_norm(panels[-1], trajectory, gain)
     return style.aligned(made)
-
-
-def draw_components(axes: Axes, trajectory: Trajectory, rows: Sequence[int], unit: str) -> None:
-    """Components of the task error that share a unit."""
-    for k, (row, name) in enumerate(zip(rows, _error_names(trajectory, rows), strict=True)):
-        color, dashes = looks.CYCLE[k % 7], looks.DASHES[k % 4]
-        style.curve(axes, trajectory.t, trajectory.error[:, row], name, color, dashes)
-    axes.axhline(0.0, color=style.GREY, linewidth=0.7, zorder=1)
-    draw_events(axes, trajectory, named=False)
-    _finish(axes, trajectory, f"error [{unit}]", named=False)
 
 
 def draw_events(axes: Axes, trajectory: Trajectory, *, named: bool) -> None:
@@ -66,39 +62,26 @@ def draw_events(axes: Axes, trajectory: Trajectory, *, named: bool) -> None:
     for event in trajectory.events:
         if event.t > trajectory.t[0]:
             at.setdefault(event.t, []).append(f"{event.task} {event.what}")
-    for t, said in at.items():
-        dashes = "--" if any(one.endswith("begins") for one in said) else ":"
+    for t, texts in at.items():
+        dashes = "--" if any(one.endswith("begins") for one in texts) else ":"
         axes.axvline(t, color=style.GREY, linestyle=dashes, linewidth=1.0, zorder=1)
         if named:
             axes.annotate(
-                f"{', '.join(said)} ",
-                (t, 0.02),
-                xycoords=("data", "axes fraction"),
-                rotation=90,
-                ha="right",
-                va="bottom",
-                fontsize=style.SMALL,
-                color=style.GREY,
-            )
+                f"{', '.join(texts)} ", (t, 0.02), xycoords=("data", "axes fraction"), rotation=90,
+                ha="right", va="bottom", fontsize=style.SMALL, color=style.GREY,
+            )  # fmt: skip
 
 
-def _error_names(trajectory: Trajectory, rows: Sequence[int]) -> list[str]:
-    return [f"e of {trajectory.r_names[row]}" for row in rows]
-
-
-def draw_error_norm(
-    axes: Axes, trajectory: Trajectory, gain: float | None = None, *, named: bool = True
-) -> None:
+def draw_error_norm(axes: Axes, trajectory: Trajectory, gain: float | None = None) -> None:
     """‖e‖ on a logarithmic scale, with exp(-K t) for the gain given, or the rate fitted."""
     t, norm = trajectory.t, trajectory.error_norm
-    unit = style.units(trajectory.r_units)
-    positive = norm[np.isfinite(norm) & (norm > 0.0)]
-    style.label(axes, y=f"‖e‖ {unit}")
-    style.time_axis(axes, t, named=named)
+    style.label(axes, y=f"‖e‖ {style.units(trajectory.r_units)}")
+    style.time_axis(axes, t)
+    positive = style.positive([norm])
     if not positive.size:
         style.note(axes, "the error is zero throughout")
         return
-    style.curve(axes, t, np.where(norm > 0.0, norm, np.nan), "‖e‖", looks.BLUE)
+    style.curve(axes, t, np.where(norm > 0.0, norm, np.nan), "‖e‖", resolver_style.BLUE)
     lowest, highest = max(float(positive.min()), 1e-16), float(positive.max())
     gain = _stated_gain(trajectory) if gain is None else gain
     rate = fitted_rate(t, norm) if gain is None else gain
@@ -107,18 +90,17 @@ def draw_error_norm(
         guide = norm[0] * np.exp(-rate * (t - t[0]))
         seen = guide >= lowest * 0.5
         name = f"‖e(0)‖ exp(−K t), K = {rate:.4g} 1/s{' (fitted)' if gain is None else ''}"
-        axes.plot(t[seen], guide[seen], ":", color=looks.BLACK, linewidth=1.8, label=name)
+        axes.plot(t[seen], guide[seen], ":", color=resolver_style.BLACK, linewidth=1.8, label=name)
     style.log_axis(axes, lowest, highest)
     style.legend(axes)
 
 
 def _stated_gain(trajectory: Trajectory) -> float | None:
-    """The gain K that all tasks of the run's scenario share, 1/s; None where it says no such number."""
+    """The gain K that all tasks of the run's scenario share, 1/s; None where there is no such number."""
     tasks = (trajectory.scenario or {}).get("task", [])
     gains = [task.get("gain") for task in (tasks if isinstance(tasks, list) else [tasks])]
-    if not gains or not isinstance(gains[0], int | float) or any(gain != gains[0] for gain in gains):
-        return None
-    return float(gains[0])
+    stated = bool(gains) and isinstance(gains[0], int | float) and gains.count(gains[0]) == len(gains)
+    return float(gains[0]) if stated else None
 
 
 def fitted_rate(t: Array, values: Array) -> float | None:
@@ -141,28 +123,19 @@ def tracking(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
     >>> [axes.get_ylabel() for axes in nmm.figures.tracking(run).axes]
     ['ee.x [m]', 'ee.y [m]', 'ee.z [m]']
     """
-    count = len(trajectory.r_names)
-    legends = [[name, "reference"] for name in trajectory.r_names]
-    made, panels = style.stack([1.1] * count, legends, width)
-    for row, axes in enumerate(panels):
-        name = trajectory.r_names[row]
-        color = looks.CYCLE[row % 7]
-        style.curve(axes, trajectory.t, _unwrapped(trajectory, row), name, color)
-        reference = _unwrapped(trajectory, row, reference=True)
-        style.curve(axes, trajectory.t, reference, "reference", looks.BLACK, "--")
+    t, names = trajectory.t, trajectory.r_names
+    made, panels = style.stack([1.1] * len(names), [[name, "reference"] for name in names], width)
+    for row, (axes, name, unit) in enumerate(zip(panels, names, trajectory.r_units, strict=True)):
+        target: Array = trajectory.r_d[:, row]
+        if unit == "rad":  # without the jumps of 2π that an angle's display would make
+            known = ~np.isnan(target)  # the reference of a task that comes and goes has gaps
+            target = target.copy()
+            target[known] = np.unwrap(target[known])
+        style.curve(axes, t, target - trajectory.error[:, row], name, resolver_style.CYCLE[row % 7])
+        style.curve(axes, t, target, "reference", resolver_style.BLACK, "--")
         axes.lines[-1].set_linewidth(1.0)
-        _finish(axes, trajectory, f"{name} [{trajectory.r_units[row]}]", named=row == count - 1)
+        style.finish(axes, t, f"{name} [{unit}]", named=row == len(names) - 1)
     return style.aligned(made)
-
-
-def _unwrapped(trajectory: Trajectory, row: int, *, reference: bool = False) -> Array:
-    """A component without the jumps of 2π that an angle's display would make."""
-    target: Array = trajectory.r_d[:, row]
-    if trajectory.r_units[row] == "rad":
-        known = ~np.isnan(target)  # a task that comes and goes has none meanwhile
-        target = target.copy()
-        target[known] = np.unwrap(target[known])
-    return target if reference else target - trajectory.error[:, row]
 
 
 def inputs(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
@@ -181,32 +154,29 @@ def inputs(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
     >>> len(nmm.figures.inputs(run).axes)
     4
     """
-    parts = list(input_parts(trajectory).values())
+    parts = input_parts(trajectory)
     across = width - style.LEFT - style.RIGHT
     legends = [style.legend_rows(input_names(trajectory, columns), across) for columns in parts]
     heights = [1.45] * len(parts)
     total = style.BOTTOM + style.column_height(heights, legends)
     made = style.figure(width, total)
     transient = _transient(trajectory) if width >= _ROOM_FOR_TWO else None
-    edge = width - style.RIGHT
-    split = style.LEFT if transient is None else 0.5 * width
-    panels = style.column(made, heights, legends, split, edge, total)
     start, end = float(trajectory.t[0]), float(trajectory.t[-1])
-    for k, (axes, columns) in enumerate(zip(panels, parts, strict=True)):
-        named = k == len(parts) - 1
-        draw_inputs(axes, trajectory, columns, named=named, since=start if transient is None else transient)
-        if transient is None:
-            style.legend(axes)
+    split, since = (style.LEFT, start) if transient is None else (0.5 * width, transient)
+    panels = style.column(made, heights, legends, split, width - style.RIGHT, total)
+    for axes, columns in zip(panels, parts, strict=True):
+        draw_inputs(axes, trajectory, columns, named=columns is parts[-1], since=since)
     if transient is None:
+        for axes in panels:
+            style.legend(axes)
         return style.aligned(made)
     lefts = style.column(made, heights, legends, style.LEFT, split - 0.55, total)
-    for k, (left, right, columns) in enumerate(zip(lefts, panels, parts, strict=True)):
-        draw_inputs(left, trajectory, columns, named=k == len(parts) - 1, until=transient)
+    for left, right, columns in zip(lefts, panels, parts, strict=True):
+        draw_inputs(left, trajectory, columns, named=columns is parts[-1], until=transient)
         left.set_xlim(start, transient)
         left.xaxis.set_major_locator(MaxNLocator(nbins=4))
         style.legend(left, across)
-        right.set_xlim(transient, end)
-        right.set_ylabel("")
+        right.set(xlim=(transient, end), ylabel="")
     return style.aligned(made)
 
 
@@ -222,12 +192,10 @@ def _transient(trajectory: Trajectory) -> float | None:
     return float(np.ceil(2.0 * t[above[-1]]) / 2.0) if above.size else None
 
 
-def input_parts(trajectory: Trajectory) -> dict[str, list[int]]:
-    """Columns of u of the platform and of the arm."""
-    robot = trajectory.robot
-    p = robot.platform.p
-    parts = {"platform": list(range(p)), "arm": list(range(p, robot.n_u))}
-    return {name: columns for name, columns in parts.items() if columns}
+def input_parts(trajectory: Trajectory) -> list[list[int]]:
+    """Columns of u of the platform and of the arm, where there are any."""
+    p = trajectory.robot.platform.p
+    return [part for part in (list(range(p)), list(range(p, trajectory.robot.n_u))) if part]
 
 
 def draw_inputs(
@@ -239,35 +207,25 @@ def draw_inputs(
     since: float = -np.inf,
     until: float = np.inf,
 ) -> None:
-    """Some of the inputs over time, between two times, s."""
-    robot = trajectory.robot
-    seen = (trajectory.t >= since) & (trajectory.t <= until)
-    for k, (column, name) in enumerate(zip(columns, input_names(trajectory, columns), strict=True)):
-        color, dashes = looks.CYCLE[k % 7], looks.DASHES[k % 4]
-        style.curve(axes, trajectory.t[seen], trajectory.u[seen, column], name, color, dashes)
-    axes.axhline(0.0, color=style.GREY, linewidth=0.7, zorder=1)
+    robot, t = trajectory.robot, trajectory.t
+    seen = (t >= since) & (t <= until)
+    style.columns(axes, t[seen], trajectory.u[seen][:, columns], input_names(trajectory, columns), zero=True)
     part = "arm" if columns[0] >= robot.platform.p else "platform"
     style.label(axes, y=f"{part} {style.units(robot.u_units[c] for c in columns)}")
     style.value_axis(axes)
-    style.time_axis(axes, trajectory.t, named=named)
+    style.time_axis(axes, t, named=named)
 
 
 def input_names(trajectory: Trajectory, columns: Sequence[int]) -> list[str]:
-    """What a legend calls some of the inputs: with their units where these differ."""
-    robot = trajectory.robot
-    kinds = {robot.u_units[column] for column in columns}
-    names = [input_symbol(trajectory, column) for column in columns]
-    if len(kinds) == 1:
-        return names
-    return [f"{name} [{robot.u_units[column]}]" for name, column in zip(names, columns, strict=True)]
-
-
-def input_symbol(trajectory: Trajectory, column: int) -> str:
-    """An input as the paper writes it: v, ω; the rate of a joint q1 with a dot above its q."""
-    robot = trajectory.robot
-    name = looks.pretty(robot.u_names[column])
-    is_rate = column >= robot.platform.p and len(name) == 2 and name[0] == "q"
-    return f"{name[0]}\u0307{name[1]}" if is_rate else name
+    """Legend entries, as the paper writes inputs: v, ω, the rate of q1 with a dot; with units that differ."""
+    robot, names = trajectory.robot, []
+    several = len({robot.u_units[column] for column in columns}) > 1
+    for column in columns:
+        name = resolver_style.pretty(robot.u_names[column])
+        if column >= robot.platform.p and len(name) == 2 and name[0] == "q":
+            name = f"{name[0]}\u0307{name[1]}"
+        names.append(f"{name} [{robot.u_units[column]}]" if several else name)
+    return names
 
 
 def coordinates(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
@@ -286,15 +244,11 @@ def coordinates(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
         for part, first, kinds in (("platform", 0, robot.q_units[:n_p]), ("arm", n_p, robot.q_units[n_p:]))
         for unit, columns in style.groups(kinds).items()
     ]
-    legends = [[looks.pretty(robot.q_names[column]) for column in columns] for _, _, columns in parts]
+    legends = [[resolver_style.pretty(robot.q_names[k]) for k in columns] for _, _, columns in parts]
     made, panels = style.stack([1.2] * len(parts), legends, width)
-    for index, (axes, (part, unit, columns)) in enumerate(zip(panels, parts, strict=True)):
-        for k, column in enumerate(columns):
-            name = looks.pretty(robot.q_names[column])
-            style.curve(
-                axes, trajectory.t, trajectory.q[:, column], name, looks.CYCLE[k % 7], looks.DASHES[k % 4]
-            )
-        _finish(axes, trajectory, f"{part} [{unit}]", named=index == len(parts) - 1)
+    for axes, (part, unit, columns), names in zip(panels, parts, legends, strict=True):
+        style.columns(axes, trajectory.t, trajectory.q[:, columns], names)
+        style.finish(axes, trajectory.t, f"{part} [{unit}]", named=axes is panels[-1])
     return style.aligned(made)
 
 
@@ -310,7 +264,7 @@ def singular_values(trajectory: Trajectory, *, width: float = style.PAGE) -> Fig
     'σ_min'
     """
     partitioned = bool(np.any(trajectory.partition >= 0))
-    names = [_SIGMA, *["switch of partition"] * bool(_switched(trajectory))]
+    names = [_SIGMA, *["switch of partition"] * bool(trajectory.switched)]
     heights, legends = ([1.7, 0.28], [names, []]) if partitioned else ([1.7], [names])
     made, panels = style.stack(heights, legends, width)
     draw_singular_value(panels[0], trajectory, named=not partitioned)
@@ -320,48 +274,28 @@ def singular_values(trajectory: Trajectory, *, width: float = style.PAGE) -> Fig
 
 
 def draw_singular_value(axes: Axes, trajectory: Trajectory, *, named: bool = True) -> None:
-    """The smallest singular value of J_bar over time, RG's switches of partition marked."""
-    style.curve(axes, trajectory.t, trajectory.sigma_min, _SIGMA, looks.BLUE)
-    for k, sample in enumerate(_switched(trajectory)):
-        name = "switch of partition" if k == 0 else None
-        axes.axvline(trajectory.t[sample], color=looks.VERMILLION, linestyle="--", linewidth=1.0, label=name)
-    _finish(axes, trajectory, "σ_min", named=named)
+    """σ_min of J_bar over time, with RG's switches of partition."""
+    style.curve(axes, trajectory.t, trajectory.sigma_min, _SIGMA, resolver_style.BLUE)
+    dashed: Any = {"color": resolver_style.VERMILLION, "linestyle": "--", "linewidth": 1.0}
+    for k, sample in enumerate(trajectory.switched):
+        axes.axvline(trajectory.t[sample], label=None if k else "switch of partition", **dashed)
+    style.finish(axes, trajectory.t, "σ_min", named=named)
     axes.set_ylim(bottom=0.0)
-
-
-def _switched(trajectory: Trajectory) -> list[int]:
-    """The samples from which another partition is in use."""
-    changes = np.any(np.diff(trajectory.partition, axis=0) != 0, axis=1)
-    return [int(k) + 1 for k in np.flatnonzero(changes)]
 
 
 def _draw_partition(axes: Axes, trajectory: Trajectory) -> None:
     """Which inputs are basic (Ja), as a band over time."""
     t = trajectory.t
     colors: dict[tuple[int, ...], str] = {}
-    for first, last in pairwise([0, *_switched(trajectory), len(t) - 1]):
+    for first, last in pairwise([0, *trajectory.switched, len(t) - 1]):
         columns = tuple(sorted(int(c) for c in trajectory.partition[first]))
-        names = ", ".join(looks.pretty(trajectory.robot.u_names[c]) for c in columns if c >= 0)
-        color = colors.setdefault(columns, looks.CYCLE[len(colors) % 7])
+        names = ", ".join(resolver_style.pretty(trajectory.robot.u_names[c]) for c in columns if c >= 0)
+        color = colors.setdefault(columns, resolver_style.CYCLE[len(colors) % 7])
         axes.axvspan(t[first], t[last], color=color, alpha=0.25, linewidth=0)
         if t[last] - t[first] > 0.15 * (t[-1] - t[0]):
-            axes.text(
-                0.5 * (t[first] + t[last]),
-                0.5,
-                names or "none: damped",
-                ha="center",
-                va="center",
-                fontsize=style.SMALL,
-            )
-    axes.set_ylim(0.0, 1.0)
-    axes.set_yticks([])
+            middle, text = 0.5 * (t[first] + t[last]), names or "none: damped"
+            axes.text(middle, 0.5, text, ha="center", va="center", fontsize=style.SMALL)
+    axes.set(ylim=(0.0, 1.0), yticks=[])
     axes.grid(False)
     style.label(axes, y="Ja")
     style.time_axis(axes, t)
-
-
-def _finish(axes: Axes, trajectory: Trajectory, y: str, *, named: bool = True) -> None:
-    style.label(axes, y=y)
-    style.value_axis(axes)
-    style.time_axis(axes, trajectory.t, named=named)
-    style.legend(axes)

@@ -1,28 +1,27 @@
 """Maps of measures over two coordinates or a plane, with the singular sets drawn over them."""
 
-from __future__ import annotations
-
 import re
 import textwrap
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
 
-from nmm import looks
-from nmm.analysis.maps.extremes import EVERYWHERE
+from nmm import resolver_style
 from nmm.analysis.maps.measures import MEASURES
-from nmm.analysis.maps.result import Map
+from nmm.analysis.maps.result import EVERYWHERE, Map
+from nmm.analysis.maps.singular_set import SingularSet
 from nmm.arrays import Array
 from nmm.errors import expect_known
 from nmm.figures import style
-from nmm.figures.files import save
-from nmm.figures.map_sets import draw_sets
-from nmm.words import fraction_of_pi
+from nmm.figures.style import save
+from nmm.text_format import fraction_of_pi
 
 #: Even steps of the value are even steps to the eye, also to colour-blind ones.
 COLORS = "viridis"
@@ -32,23 +31,18 @@ LINE = 0.155
 #: Most coordinates that the title names one by one.
 MOST_NAMED = 6
 WORST = "worst posture"
+#: Tolerance for thinning lines, as a share of the map's side: a tenth of a pixel.
+THIN = 1.5e-4
+#: More points than this fill a region and are drawn as small dots, with the map visible between them.
+MANY = 60
 
 
 def map_figure(
     drawn: Map, measure: str | None = None, path: str | Path | None = None, *, width: float | None = None
 ) -> Figure:
-    """The figure of a measure: over two coordinates one map; of a workspace the best and the worst beside it.
-
-    Parameters
-    ----------
-    measure : the map's first one when not given
-    path : of a file to write, too (`nmm.figures.save`)
-    width : of the figure, in; when not given, so that a map's longest side is 3.5 in
-
-    Raises
-    ------
-    InputError : the map has no such measure
-    """
+    """One map over two coordinates, or a workspace's best and worst; `measure`: the first by default; `path`:
+    a file to write, too; `width`, in: by default for a longest side of 3.5. InputError for an unknown
+    measure."""
     measure = next(iter(drawn.values)) if measure is None else measure
     expect_known("measure", measure, drawn.values, "map")
     layers = {"": drawn.values[measure]}
@@ -71,13 +65,21 @@ def map_figure(
         axes = style.place(made, style.LEFT + k * step, style.BOTTOM, across, height)
         image = _draw_values(axes, drawn, values, bounds)
         if name:
-            axes.set_title(name, fontsize=style.SMALL, color=looks.BLACK, pad=3)
-        draw_sets(axes, drawn)
+            axes.set_title(name, fontsize=style.SMALL, color=resolver_style.BLACK, pad=3)
+        # The arm's singular set below, dashed; what is left of it above, solid.
+        if drawn.arm_singular is not None:
+            _draw_set(axes, drawn, drawn.arm_singular, "arm alone", "white")
+        own = "robot" if drawn.arm_singular is not None else drawn.about.part
+        _draw_set(axes, drawn, drawn.singular, own, resolver_style.VERMILLION)
         _dress(axes, drawn, named=k == 0)
     place = (total - BAR_ROOM - BAR, style.BOTTOM, BAR, height)
     size = made.get_size_inches()
     bar = made.colorbar(image, cax=made.add_axes((np.array(place) / np.tile(size, 2)).tolist()))
-    _dress_bar(bar.ax, drawn, measure)
+    unit = drawn.about.units[measure]
+    style.label(bar.ax, y=subscripted(MEASURES[measure].symbol) + (f" [{unit}]" if unit else ""))
+    style.ticks(bar.ax)
+    style.value_axis(bar.ax, bins=6)
+    bar.ax.spines[:].set_visible(False)
     _write_title(made, lines)
     if legend:
         style.legend(made.axes[0], np.inf, lift=0.2 if len(layers) > 1 else 0.0)
@@ -87,18 +89,17 @@ def map_figure(
 
 
 def _even(drawn: Map, measure: str, layer: str, values: Array) -> Array:
-    """The values; those of a constant map without the rounding, which a colour scale would blow up."""
+    """The values; a constant map's single value, as a colour scale would enlarge its rounding."""
     smallest = drawn.extremes(measure, worst=layer == WORST)["smallest"]
     return np.where(np.isnan(values), np.nan, smallest.value) if smallest.on == EVERYWHERE else values
 
 
 def _size(drawn: Map) -> tuple[float, float]:
-    """Of the map, in: square where the axes have different units or are angles; else as it is."""
-    spans = [float(axis[-1] - axis[0]) for axis in drawn.axes]
+    """The map's size, in: square where the axes have different units or are angles, else to scale."""
     if set(drawn.units) != {"m"}:
         return SIDE, SIDE
-    largest = max(spans)
-    return (max(SIDE * spans[0] / largest, 1.2), max(SIDE * spans[1] / largest, 1.2))
+    x, y = (float(axis[-1] - axis[0]) for axis in drawn.axes)
+    return max(SIDE * x / max(x, y), 1.2), max(SIDE * y / max(x, y), 1.2)
 
 
 def _bounds(layers: Iterable[Array]) -> tuple[float, float]:
@@ -114,35 +115,26 @@ def _bounds(layers: Iterable[Array]) -> tuple[float, float]:
 
 
 def _draw_values(axes: Axes, drawn: Map, values: Array, bounds: tuple[float, float]) -> AxesImage:
-    """The values as an image, each cell around its sample."""
     half = [0.5 * float(axis[1] - axis[0]) for axis in drawn.axes]
     (left, right), (bottom, top) = (
         (float(axis[0]) - h, float(axis[-1]) + h) for axis, h in zip(drawn.axes, half, strict=True)
     )
     image = axes.imshow(
-        np.ma.masked_invalid(values),
-        origin="lower",
-        extent=(left, right, bottom, top),
-        aspect="auto",
-        interpolation="nearest",
-        cmap=COLORS,
-        vmin=bounds[0],
-        vmax=bounds[1],
-    )
-    inset = 0.0 if drawn.kind == "workspace" else 1.0
-    axes.set_xlim(left + inset * half[0], right - inset * half[0])
-    axes.set_ylim(bottom + inset * half[1], top - inset * half[1])
+        np.ma.masked_invalid(values), origin="lower", extent=(left, right, bottom, top), aspect="auto",
+        interpolation="nearest", cmap=COLORS, vmin=bounds[0], vmax=bounds[1],
+    )  # fmt: skip
+    x, y = (0.0, 0.0) if drawn.kind == "workspace" else half
+    axes.set(xlim=(left + x, right - x), ylim=(bottom + y, top - y))
     return image
 
 
 def _dress(axes: Axes, drawn: Map, *, named: bool) -> None:
     axes.grid(False)
-    for axis, name, unit, values in zip(
-        (axes.xaxis, axes.yaxis), drawn.names, drawn.units, drawn.axes, strict=True
-    ):
-        text = f"{drawn.frame} {name} [m]" if drawn.kind == "workspace" else f"{looks.pretty(name)} [{unit}]"
+    both = (axes.xaxis, axes.yaxis)
+    for axis, name, unit, values in zip(both, drawn.names, drawn.units, drawn.axes, strict=True):
+        called = f"{drawn.frame} {name}" if drawn.kind == "workspace" else resolver_style.pretty(name)
         if axis is axes.xaxis or named:
-            axis.set_label_text(text, fontsize=style.TEXT, color=looks.BLACK)
+            axis.set_label_text(f"{called} [{unit}]", fontsize=style.TEXT, color=resolver_style.BLACK)
         span = float(values[-1] - values[0])
         if unit == "rad" and span >= np.pi / 2:
             # The coarsest of π/2, π/4, ... with at least three ticks.
@@ -150,26 +142,15 @@ def _dress(axes: Axes, drawn: Map, *, named: bool) -> None:
             if span > 4.0 * np.pi:
                 part = float(np.ceil(span / (4.0 * np.pi))) * 2.0
             axis.set_major_locator(MultipleLocator(part * np.pi / 2))
-            axis.set_major_formatter(FuncFormatter(lambda value, _: _in_pi(value)))
+            axis.set_major_formatter(FuncFormatter(_in_pi))
         else:
             axis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 2.5, 5, 10]))
             axis.set_major_formatter(style.plain())
 
 
-def _in_pi(value: float) -> str:
+def _in_pi(value: float, _: int | None) -> str:
     """An angle of a tick as a multiple of π: −π/2, 0, 3π/4."""
     return fraction_of_pi(value, (1, 2, 4, 8, 16)).replace("-", "−")
-
-
-def _dress_bar(axes: Axes, drawn: Map, measure: str) -> None:
-    unit = drawn.about.units[measure]
-    text = subscripted(MEASURES[measure].symbol) + (f" [{unit}]" if unit else "")
-    axes.set_ylabel(text, fontsize=style.TEXT, color=looks.BLACK, labelpad=4)
-    axes.tick_params(labelsize=style.SMALL, color=style.GREY, labelcolor=looks.BLACK, width=0.7, length=3)
-    axes.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 2.5, 5, 10]))
-    axes.yaxis.set_major_formatter(style.plain())
-    for spine in axes.spines.values():
-        spine.set_visible(False)
 
 
 def subscripted(symbol: str) -> str:
@@ -178,9 +159,9 @@ def subscripted(symbol: str) -> str:
 
 
 def _title(drawn: Map, measure: str, width: float) -> list[tuple[str, bool]]:
-    """Lines of text, each with whether it is the headline."""
+    """Lines of the title, and whether each is the headline."""
     about = drawn.about
-    whose = "" if about.part == "robot" or not MEASURES[measure].on_part else f", {about.part} alone"
+    whose = "" if about.part == "robot" or MEASURES[measure].parts else f", {about.part} alone"
     notes = [f"{subscripted(MEASURES[measure].about)}{whose}"]
     if measure == "weighted":
         notes.append(f"α = {about.alpha:g}")
@@ -188,21 +169,18 @@ def _title(drawn: Map, measure: str, width: float) -> list[tuple[str, bool]]:
         notes.append(about.sizes)
     if about.weights:
         notes.append("weights " + ", ".join(f"{name} {value:g}" for name, value in about.weights.items()))
-    lines = [(f"{about.robot}: {', '.join(about.task)}", True)]
-    texts = ["; ".join(notes), _held(drawn)]
-    for text in texts:
-        lines += [(line, False) for line in textwrap.wrap(text, int((width - 0.4) / 0.062))]
-    return lines
+    across = int((width - 0.4) / 0.062)
+    texts = [line for text in ("; ".join(notes), _held(drawn)) for line in textwrap.wrap(text, across)]
+    return [(f"{about.robot}: {', '.join(about.task)}", True), *((line, False) for line in texts)]
 
 
 def _held(drawn: Map) -> str:
-    """What the map holds still."""
     held = drawn.held
     units = dict(zip(drawn.about.q_names, drawn.about.q_units, strict=True))
     moved = {name: value for name, value in held.items() if abs(value) > 1e-12}
     named = moved if len(held) > MOST_NAMED else held
     texts = [
-        f"{looks.pretty(name)} = {style.number(round(value, 4))} {units[name]}"
+        f"{resolver_style.pretty(name)} = {style.number(round(value, 4))} {units[name]}"
         for name, value in named.items()
     ]
     if len(named) < len(held):
@@ -214,15 +192,59 @@ def _held(drawn: Map) -> str:
 
 
 def _write_title(made: Figure, lines: list[tuple[str, bool]]) -> None:
-    height = float(made.get_size_inches()[1])
-    left = 0.2 / float(made.get_size_inches()[0])
+    width, height = made.get_size_inches().tolist()
+    head: dict[str, Any] = {"fontsize": style.TEXT, "fontweight": "bold", "color": resolver_style.BLACK}
+    plain: dict[str, Any] = {"fontsize": style.SMALL, "fontweight": "normal", "color": style.GREY}
     for k, (text, headline) in enumerate(lines):
-        made.text(
-            left,
-            1.0 - (0.1 + LINE * k) / height,
-            text,
-            fontsize=style.TEXT if headline else style.SMALL,
-            fontweight="bold" if headline else "normal",
-            color=looks.BLACK if headline else style.GREY,
-            va="top",
-        )
+        y = 1.0 - (0.1 + LINE * k) / height
+        made.text(0.2 / width, y, text, va="top", **(head if headline else plain))
+
+
+def _draw_set(axes: Axes, drawn: Map, those: SingularSet, name: str, color: str) -> None:
+    """Lines and points with an edge that shows them on any colour; one legend entry, which says if none."""
+    white = color == "white"
+    edge = resolver_style.BLACK if white else "white"
+    width = 1.1 if white else 1.8
+    halo = [withStroke(linewidth=width + 1.2, foreground=edge)]
+    label = f"{name} singular" + (f": {those.text()}" if those.empty or those.everywhere else "")
+    spans = np.array([float(np.ptp(axis)) for axis in drawn.axes])
+    for line in those.lines:
+        # Unsnapped: line and halo would go to different pixels.
+        axes.plot(
+            *thinned(line, spans * THIN).T, "--" if white else "-", color=color, linewidth=width, label=label,
+            path_effects=halo, clip_on=False, snap=False,
+        )  # fmt: skip
+        label = "_"
+    if len(those.points):
+        many = len(those.points) > MANY
+        size = 2.3 if many else 2.5 if white else 6.5
+        axes.plot(
+            *those.points.T, "o" if white or many else "X", linestyle="none", color=color, markersize=size,
+            markeredgecolor=resolver_style.BLACK if white or many else "white",
+            markeredgewidth=0.5 if many else 0.7, label=label, clip_on=False,
+        )  # fmt: skip
+    elif not those.lines:
+        axes.plot([], [], " ", label=label)
+
+
+def thinned(line: Array, tolerance: Array) -> Array:
+    """The points of a line (k, 2) that its shape needs within a tolerance (2,) (Douglas and Peucker,
+    1973)."""
+    points = line / tolerance
+    kept = np.zeros(len(line), dtype=bool)
+    kept[[0, -1]] = True
+    pieces = [(0, len(line) - 1)]
+    while pieces:
+        first, last = pieces.pop()
+        if last - first < 2:
+            continue
+        chord, offsets = points[last] - points[first], points[first + 1 : last] - points[first]
+        # To the piece of the straight line: a closed curve's chord is a point.
+        share = np.clip(offsets @ chord / max(float(chord @ chord), 1e-300), 0.0, 1.0)
+        apart = np.linalg.norm(offsets - share[:, np.newaxis] * chord, axis=1)
+        farthest = int(np.argmax(apart))
+        if apart[farthest] > 1.0:
+            middle = first + 1 + farthest
+            kept[middle] = True
+            pieces += [(first, middle), (middle, last)]
+    return np.asarray(line[kept])

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from nmm import looks
+from nmm import resolver_style
 from nmm.arrays import Array
-from nmm.errors import InputError
+from nmm.errors import expect
 from nmm.figures import style
-from nmm.figures.hulls import hull
-from nmm.figures.obstacles import FAINTEST, OBSTACLE, OBSTACLE_TEXT, outlines, with_the_nearest
-from nmm.figures.silhouette import Pose, Silhouette
+from nmm.figures.silhouette import Ink, Pose, Silhouette, hull, outline_points
 from nmm.figures.time_labels import SIZE, Ground, Place, Subject, places
 from nmm.figures.views import ABOVE, View, Viewed, page, upright
 from nmm.playback.placements import base_position
@@ -23,11 +22,25 @@ from nmm.runs.trajectory import Trajectory
 
 #: Sizes of the marks at the path's ends and of a target, pt.
 _END, _TARGET = 6.0, 12.0
-#: When no instants are given: at most so many, at least so many, a platform's length apart.
+#: When no instants are given: at most and at least this many, a platform's length apart.
 MOST, LEAST = 11, 4
 #: A run whose arm rises or falls by more than this is drawn from the side too, m.
 _RISES = 0.01
-_PATH_COLOR, _BODY, _EDGE, _ARM = looks.BLUE, "#B9C0CA", "#3F4652", looks.VERMILLION
+_PATH_COLOR, _BODY, _EDGE, _ARM = resolver_style.BLUE, "#B9C0CA", "#3F4652", resolver_style.VERMILLION
+
+OBSTACLE, OBSTACLE_TEXT = resolver_style.ORANGE, "#7A5200"
+#: Strength of the earliest drawing; the last has 1.
+FAINTEST = 0.4
+#: Obstacles that move by less between two drawings are at rest, m.
+RESTS = 1e-3
+
+
+class Outline(NamedTuple):
+    """An obstacle: the hull of points (k, 3), a strength, and first and last time, s (None if it rests)."""
+
+    points: Array
+    strength: float
+    times: tuple[float, float] | None
 
 
 def stroboscopic(
@@ -61,18 +74,13 @@ def stroboscopic(
 
 
 class Scene(Viewed):
-    """What is drawn of a run: the robot's poses, its paths, its marks."""
-
     def __init__(self, trajectory: Trajectory, instants: ArrayLike | int | None = None) -> None:
-        if not len(trajectory):
-            raise InputError("figure of the motion: expected a run with at least one sample, got none")
-        self.trajectory = trajectory
+        (self.trajectory,) = style.sampled([trajectory], "the motion")
         silhouette = Silhouette(trajectory.robot, trajectory.frame)
+        count = _how_many(trajectory, silhouette) if instants is None else instants
+        wanted = _instants(trajectory.t, count)
         if instants is None:
-            wanted = _instants(trajectory.t, _how_many(trajectory, silhouette))
             wanted = with_the_nearest(trajectory, wanted)
-        else:
-            wanted = _instants(trajectory.t, instants)
         samples = np.unique(np.searchsorted(trajectory.t, wanted - 1e-9).clip(0, len(trajectory) - 1))
         self.times = trajectory.t[samples]
         self.poses: list[Pose] = [silhouette.at(trajectory.q[k]) for k in samples]
@@ -86,7 +94,6 @@ class Scene(Viewed):
 
     @property
     def names(self) -> list[str]:
-        """The entries of its legend."""
         names = ["desired path"] if "desired" in self.lines else []
         names += [self._path_name, "start", "end", *["obstacle"] * bool(self.outlines)]
         return names if not len(self.trajectory.marks) else [*names, "target"]
@@ -96,13 +103,11 @@ class Scene(Viewed):
         return f"path of {self.trajectory.frame}" if self.trajectory.frame else "path of the platform"
 
     def points(self, view: View, width: float) -> list[Array]:
-        """Robots, paths, targets, and the times beside them."""
         return [*self._drawn(view), *(place.corners for place in self.times_at(view, width))]
 
     def _drawn(self, view: View) -> list[Array]:
-        points = [*(pose.points() for pose in self.poses), *self.lines.values()]
-        points += [outline.points for outline in self.outlines]
-        return [view.of(part) for part in [*points, self.trajectory.marks]]
+        robots, bodies = (pose.points() for pose in self.poses), (one.points for one in self.outlines)
+        return [view.of(part) for part in (*robots, *self.lines.values(), *bodies, self.trajectory.marks)]
 
     def times_at(self, view: View, width: float) -> list[Place]:
         """Where the times stand in a drawing `width` in wide: the robots', then the obstacles'."""
@@ -127,55 +132,46 @@ class Scene(Viewed):
 
     def _shown(self, view: View, scale: float) -> tuple[list[Subject], Ground]:
         """What times belong to, and all that is drawn, at about so many m for each inch."""
-        robots = [edge for pose in self.poses for edge in [*pose.bodies(view), *pose.tyres(view)]]
+        robots = [edge for pose in self.poses for edges in pose.outlines(view) for edge in edges]
         links = [view.of(ends) for pose in self.poses for ends in pose.links]
         solid = [hull(view.of(outline.points)) for outline in self.outlines]
         paths = [view.of(line) for line in self.lines.values()]
         mains = [hull(view.of(pose.main)) for pose in self.poses]
-        subjects = [Subject(_seconds(float(t)), edge) for t, edge in zip(self.times, mains, strict=True)]
-        subjects += [
-            Subject(_span(*outline.times), edge)
-            for outline, edge in zip(self.outlines, solid, strict=True)
-            if outline.times is not None
-        ]
+        texts = [_seconds(float(t)) for t in self.times]
+        texts += [_span(*outline.times) if outline.times else "" for outline in self.outlines]
+        named = zip(texts, [*mains, *solid], strict=True)
+        subjects = [Subject(text, edge) for text, edge in named if text]
         ends, targets = view.of(self.lines["path"][[0, -1]]), view.of(self.trajectory.marks)
         marks = [*_around(ends, _END, scale), *_around(targets, _TARGET, scale)]
         return subjects, Ground([*paths, *links, *marks], [*robots, *solid], scale)
 
     def draw(self, axes: Axes, view: View) -> None:
-        """Draw the scene as it is seen in a view."""
         trajectory = self.trajectory
         self.dress(axes, view)
-        strengths = np.linspace(FAINTEST, 1.0, len(self.poses)) if len(self.poses) > 1 else [1.0]
-        for k, (pose, strength) in enumerate(zip(self.poses, strengths, strict=True)):
+        for k, (pose, strength) in enumerate(zip(self.poses, _strengths(len(self.poses)), strict=True)):
             # From the side the robots of a round path stand behind each other: every second one is enough.
-            if view != ABOVE and len(self.poses) > 6 and (len(self.poses) - 1 - k) % 2:
-                continue
-            _draw_pose(axes, pose, view, float(strength), k / len(self.poses))
+            if view == ABOVE or len(self.poses) <= 6 or (len(self.poses) - 1 - k) % 2 == 0:
+                pose.draw(axes, view, _ink(strength, k / len(self.poses)))
         for k, outline in enumerate(self.outlines):
             shade, edge = _faded(OBSTACLE, outline.strength), hull(view.of(outline.points))
             axes.fill(
-                *edge.T, facecolor=(*shade, 0.25), edgecolor=shade, linewidth=1.0,
-                zorder=2.5, label=None if k else "obstacle",
+                *edge.T, facecolor=(*shade, 0.25), edgecolor=shade, linewidth=1.0, zorder=2.5,
+                label=None if k else "obstacle",
             )  # fmt: skip
         self._draw_times(axes, view)
         if "desired" in self.lines:
             axes.plot(
-                *view.of(self.lines["desired"]).T, "--", color=looks.BLACK, linewidth=1.1,
+                *view.of(self.lines["desired"]).T, "--", color=resolver_style.BLACK, linewidth=1.1,
                 dashes=(4, 2.5), label="desired path", zorder=5.2,
             )  # fmt: skip
         path = view.of(self.lines["path"])
         axes.plot(*path.T, color=_PATH_COLOR, linewidth=1.5, label=self._path_name, zorder=5.1)
-        for point, marker, text in ((path[0], "o", "start"), (path[-1], "s", "end")):
-            axes.plot(
-                *point, marker, color=looks.GREEN if text == "start" else looks.PINK,
-                markersize=_END, markeredgecolor="white", markeredgewidth=0.8, label=text,
-                linestyle="none", zorder=6,
-            )  # fmt: skip
+        style.mark_ends(axes, path, _END)
         if len(trajectory.marks):
             axes.plot(
-                *view.of(trajectory.marks).T, "*", color=looks.ORANGE, markersize=_TARGET,
-                markeredgecolor=looks.BLACK, markeredgewidth=0.7, label="target", linestyle="none", zorder=6,
+                *view.of(trajectory.marks).T, "*", color=resolver_style.ORANGE, markersize=_TARGET,
+                markeredgecolor=resolver_style.BLACK, markeredgewidth=0.7,
+                label="target", linestyle="none", zorder=6,
             )  # fmt: skip
 
     def _draw_times(self, axes: Axes, view: View) -> None:
@@ -184,18 +180,46 @@ class Scene(Viewed):
         texts = [*map(_seconds, self.times.tolist()), *of_obstacles]
         for k, (place, text) in enumerate(zip(self.times_at(view, width), texts, strict=False)):
             color = style.GREY if k < len(self.times) else OBSTACLE_TEXT
-            axes.text(
-                float(place.middle[0]),
-                float(place.middle[1]),
-                text,
-                color=color,
-                fontsize=SIZE,
-                ha="center",
-                va="center",
-                zorder=7,
-            )
+            x, y = place.middle.tolist()
+            axes.text(x, y, text, color=color, fontsize=SIZE, ha="center", va="center", zorder=7)
             if place.foot is not None:
                 axes.plot(*np.array([place.foot, place.end]).T, color=color, linewidth=0.5, zorder=6.5)
+
+
+def outlines(trajectory: Trajectory, times: Array) -> list[Outline]:
+    """The obstacles, those that move at each of the times, once where they rest; half-spaces have none."""
+    found: list[Outline] = []
+    for obstacle in trajectory.obstacles:
+        points = outline_points(obstacle.shape.geometry())
+        if points is None:
+            continue
+        at = times if obstacle.moves else times[-1:]
+        own: list[Outline] = []
+        for t, strength in zip(at.tolist(), _strengths(len(at)), strict=True):
+            place = obstacle.placement(t)
+            moved = points @ place[:3, :3].T + place[:3, 3]
+            before = own[-1] if own else None
+            if before and before.times and np.allclose(before.points, moved, rtol=0.0, atol=RESTS):
+                own[-1] = Outline(moved, strength, (before.times[0], t))
+            else:
+                own.append(Outline(moved, strength, (t, t) if obstacle.moves else None))
+        found += own
+    return found
+
+
+def _strengths(count: int) -> list[float]:
+    return np.linspace(FAINTEST, 1.0, count).tolist() if count > 1 else [1.0]
+
+
+def with_the_nearest(trajectory: Trajectory, times: Array) -> Array:
+    """The times, the closest one moved to the instant of least clearance, which even spacing may miss."""
+    d = trajectory.clearance
+    if not trajectory.obstacles or len(d) != len(trajectory) or len(times) < 3 or not np.isfinite(d).any():
+        return times
+    nearest = float(trajectory.t[int(np.argmin(d))])
+    inner = times[1:-1]
+    inner[int(np.argmin(np.abs(inner - nearest)))] = nearest
+    return np.sort(times)
 
 
 def _around(points: Array, size: float, scale: float) -> list[Array]:
@@ -217,9 +241,8 @@ def _how_many(trajectory: Trajectory, silhouette: Silhouette) -> int:
     """So many instants that the platform moves by about its length from one to the next."""
     body = np.vstack(silhouette.at(trajectory.q[0]).body)[:, :2]
     length = float(np.linalg.norm(body.max(axis=0) - body.min(axis=0)))
-    driven = float(
-        np.linalg.norm(np.diff(base_position(trajectory.robot, trajectory.q), axis=0), axis=1).sum()
-    )
+    steps = np.diff(base_position(trajectory.robot, trajectory.q), axis=0)
+    driven = float(np.linalg.norm(steps, axis=1).sum())
     if not np.isfinite(driven):
         return LEAST
     return int(np.clip(1 + driven // (1.1 * length), LEAST, MOST)) if len(trajectory) > 1 else 1
@@ -227,28 +250,27 @@ def _how_many(trajectory: Trajectory, silhouette: Silhouette) -> int:
 
 def _instants(t: Array, instants: ArrayLike | int) -> Array:
     if isinstance(instants, int):
-        if instants < 1:
-            raise InputError(f"instants: expected at least 1, got {instants}")
+        expect(instants >= 1, "instants", "at least 1", instants)
         return np.linspace(t[0], t[-1], instants) if instants > 1 else t[-1:]
     times = np.atleast_1d(np.asarray(instants, dtype=np.float64))
-    if times.size == 0 or not np.all((times >= t[0] - 1e-9) & (times <= t[-1] + 1e-9)):
-        raise InputError(f"instants: expected times from {t[0]:g} s to {t[-1]:g} s, got {instants}")
+    within = (times >= t[0] - 1e-9) & (times <= t[-1] + 1e-9)
+    expect(times.size and np.all(within), "instants", f"times from {t[0]:g} s to {t[-1]:g} s", instants)
     return np.sort(times)
 
 
 def _lines(trajectory: Trajectory) -> dict[str, Array]:
     """The paths to draw, (k, 3) each, with few enough points."""
-    every = max(1, len(trajectory) // 1500)
-    kept = np.unique([*range(0, len(trajectory), every), len(trajectory) - 1])
     if trajectory.path is None:
-        x_y = base_position(trajectory.robot, trajectory.q[kept])
-        return {"path": np.column_stack([x_y, np.zeros(len(kept))])}
-    lines = {"path": trajectory.path[kept]}
-    desired = trajectory.moving
-    if desired is not None:
-        thinned = np.unique([*range(0, len(desired), max(1, len(desired) // 1500)), len(desired) - 1])
-        lines["desired"] = desired[thinned]
-    return lines
+        x_y = _few(base_position(trajectory.robot, trajectory.q))
+        return {"path": np.column_stack([x_y, np.zeros(len(x_y))])}
+    desired = {} if trajectory.moving is None else {"desired": _few(trajectory.moving)}
+    return {"path": _few(trajectory.path), **desired}
+
+
+def _few(points: Array) -> Array:
+    """About 1500 of the points, including both ends."""
+    last = len(points) - 1
+    return points[np.unique([*range(0, len(points), max(1, len(points) // 1500)), last])]
 
 
 def _faded(color: str, strength: float) -> tuple[float, float, float]:
@@ -257,29 +279,10 @@ def _faded(color: str, strength: float) -> tuple[float, float, float]:
     return red, green, blue
 
 
-def _draw_pose(axes: Axes, pose: Pose, view: View, strength: float, later: float) -> None:
-    """One drawing of the robot: above the earlier ones (`later` in [0, 1)), all arms above all platforms."""
-    edge, body = _faded(_EDGE, strength), _faded(_BODY, strength)
-    zorder = 3.0 + later
-    shapes = pose.bodies(view)
-    # Edges of all shapes first, faces above them: what stays visible is the edge of their union.
-    axes.add_collection(
-        PolyCollection(shapes, facecolors="none", edgecolors=[edge], linewidths=1.6, zorder=zorder),
-        autolim=False,
-    )
-    axes.add_collection(PolyCollection(shapes, facecolors=[body], linewidths=0, zorder=zorder), autolim=False)
-    marks = [*pose.tyres(view)]
-    if view == ABOVE and len(pose.heading):
-        marks.append(view.of(pose.heading))
-    axes.add_collection(PolyCollection(marks, facecolors=[edge], linewidths=0, zorder=zorder), autolim=False)
-    zorder = 4.0 + later
-    lines = [view.of(ends) for ends in pose.links]
-    for color, width in ((edge, 4.0), (_faded(_ARM, strength), 2.6)):
-        drawn = LineCollection(lines, colors=[color], linewidths=width, capstyle="round", zorder=zorder)
-        axes.add_collection(drawn, autolim=False)
-    joints, tips = view.of(pose.joints), view.of(pose.tip)
-    axes.plot(
-        joints[:, 0], joints[:, 1], "o", markersize=4.2, color="white", markeredgecolor=edge,
-        markeredgewidth=1.1, zorder=zorder, linestyle="none",
+def _ink(strength: float, later: float) -> Ink:
+    """The ink of a pose drawn over the earlier ones (`later` in [0, 1)), all arms over all platforms."""
+    edge, body, arm = (_faded(color, strength) for color in (_EDGE, _BODY, _ARM))
+    return Ink(
+        edge, body, ((edge, 4.0), (arm, 2.6)), outline=1.6, joint=4.2, rim=1.1, tip=3.0,
+        heading=True, zorder=3.0 + later, lift=1.0,
     )  # fmt: skip
-    axes.plot(tips[:, 0], tips[:, 1], "o", markersize=3.0, color=edge, zorder=zorder, linestyle="none")

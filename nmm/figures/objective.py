@@ -9,9 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from nmm import looks
+from nmm import resolver_style
 from nmm.arrays import Array
-from nmm.errors import InputError
 from nmm.figures import style
 from nmm.runs.trajectory import Trajectory
 
@@ -50,9 +49,7 @@ def objective_comparison(
     >>> figure.axes[0].get_ylabel()
     'H(q)'
     """
-    runs = [run for run in trajectories if len(run)]
-    if not runs:
-        raise InputError("figure of the objective: expected a run with at least one sample, got none")
+    runs = style.sampled(trajectories, "the objective")
     logarithmic = _can_be_logarithmic(runs)
     heights = [1.9, 1.4] if logarithmic else [2.1]
     made, panels = style.stack(heights, [[run.called for run in runs], []][: len(heights)], width)
@@ -67,7 +64,6 @@ def objective_comparison(
 
 
 def has_objective(trajectories: Sequence[Trajectory]) -> bool:
-    """Whether any run had something to minimise."""
     return any(len(run) and bool(np.any(run.objective != 0.0)) for run in trajectories)
 
 
@@ -84,24 +80,22 @@ def draw_objective(
     positive = H[H > 0.0]
     lowest = max(float(positive.min()), _FLOOR * float(positive.max())) if logarithmic else 0.0
     end = 10.0 ** style.decades(lowest, float(positive.max()))[0] if logarithmic else -np.inf
-    for k, (run, look) in enumerate(
-        zip(runs, looks.looks_of_labels([run.called for run in runs]), strict=True)
-    ):
-        style.curve(axes, run.t, np.maximum(run.objective, end), *look, below=len(runs) - 1 - k)
+    worn = resolver_style.looks_of_labels([run.called for run in runs])
+    style.compared(axes, worn, [run.t for run in runs], [np.maximum(run.objective, end) for run in runs])
     style.label(axes, y=symbol)
-    style.time_axis(axes, _longest(runs), named=named)
-    if not logarithmic:
+    style.time_axis(axes, longest(runs), named=named)
+    if logarithmic:
+        style.log_axis(axes, lowest, float(positive.max()), below=bool(H.min() < end))
+    else:
         style.value_axis(axes)
-        return
-    style.log_axis(axes, lowest, float(positive.max()), below=bool(H.min() < end))
 
 
-def draw_best_objective(axes: Axes, runs: Sequence[Trajectory], symbol: str = "H(q)") -> None:
+def draw_best_objective(axes: Axes, runs: Sequence[Trajectory]) -> None:
     """H in one panel: logarithmic where it stays above zero."""
     if has_objective(runs):
-        draw_objective(axes, runs, symbol, logarithmic=_can_be_logarithmic(runs))
+        draw_objective(axes, runs, logarithmic=_can_be_logarithmic(runs))
     else:
-        style.time_axis(axes, _longest(runs))
+        style.time_axis(axes, longest(runs))
         style.note(axes, "no objective")
 
 
@@ -116,13 +110,14 @@ def _can_be_logarithmic(runs: Sequence[Trajectory]) -> bool:
     return bool(H.size and H.min() >= 0.0 and H.max() > 10.0 * float(np.median(H)))
 
 
-def _longest(runs: Sequence[Trajectory]) -> Array:
+def longest(runs: Sequence[Trajectory]) -> Array:
+    """The times of the run that ends last."""
     return max((run.t for run in runs), key=lambda t: float(t[-1]))
 
 
 def _transient(runs: Sequence[Trajectory]) -> tuple[float, float]:
     """From the start until a while after the slowest run has done 98 % of its way."""
-    start, end = float(runs[0].t[0]), float(_longest(runs)[-1])
+    start, end = float(runs[0].t[0]), float(longest(runs)[-1])
     settled = start
     for run in runs:
         fallen = run.objective - np.min(run.objective)
@@ -135,7 +130,7 @@ def _transient(runs: Sequence[Trajectory]) -> tuple[float, float]:
 
 def _inset_is_free(axes: Axes, runs: Sequence[Trajectory], last: float) -> bool:
     """Whether an inset is of use, and lies over no curve."""
-    t = _longest(runs)
+    t = longest(runs)
     low, high = axes.get_ylim()
     edge = low + (_INSET[1] - 0.12) * (high - low)
     begins = float(t[0]) + (_INSET[0] - 0.08) * float(t[-1] - t[0])
@@ -144,18 +139,14 @@ def _inset_is_free(axes: Axes, runs: Sequence[Trajectory], last: float) -> bool:
 
 
 def _draw_inset(axes: Axes, runs: Sequence[Trajectory], first: float, last: float) -> None:
-    """The initial transient, in the empty upper right of the axes."""
     inset = axes.inset_axes(_INSET)
-    for k, (run, look) in enumerate(
-        zip(runs, looks.looks_of_labels([run.called for run in runs]), strict=True)
-    ):
-        seen = (run.t >= first - 1e-9) & (run.t <= last + 1e-9)
-        style.curve(
-            inset, run.t[seen], run.objective[seen], None, look.color, look.dashes, below=len(runs) - 1 - k
-        )
+    worn = resolver_style.looks_of_labels([run.called for run in runs])
+    seen = [(run.t >= first - 1e-9) & (run.t <= last + 1e-9) for run in runs]
+    times = [run.t[there] for run, there in zip(runs, seen, strict=True)]
+    style.compared(inset, worn, times, [run.objective[there] for run, there in zip(runs, seen, strict=True)])
     style.dress(inset, size=style.SMALL - 1.0)
     inset.set_xlim(first, last)
     style.value_axis(inset)
     inset.xaxis.set_major_locator(MaxNLocator(nbins=6))
     inset.xaxis.set_major_formatter(style.plain())
-    inset.set_title("initial transient, t [s]", fontsize=style.SMALL - 1.0, pad=3, color=looks.BLACK)
+    inset.set_title("initial transient, t [s]", fontsize=style.SMALL - 1.0, pad=3, color=resolver_style.BLACK)

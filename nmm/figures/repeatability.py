@@ -1,16 +1,14 @@
 """Laps round a closed path: how far the posture drifts in each, and where the platform drives."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from nmm import looks
+from nmm import resolver_style
 from nmm.analysis.redundancy.laps import Laps, Repeatability
 from nmm.arrays import Array
-from nmm.errors import InputError
+from nmm.errors import expect
 from nmm.figures import style
 
 #: Drifts below this are drawn here: rounding, and exact zeros, which a logarithmic axis has not.
@@ -19,28 +17,15 @@ LOWEST = 1e-16
 DRIFT, PATHS = 1.9, 4.6
 #: Drifts that differ by less than this factor are drawn on a linear scale.
 MUCH = 30.0
-#: Most points of a lap's path.
 POINTS = 1500
 
 
 def laps(found: Repeatability, *, width: float = style.PAGE) -> Figure:
-    """Drift of the posture in each lap, logarithmic; below it the platforms' paths from above.
-
-    Full turns of joints without limits are no drift. Without a platform that moves there is one panel.
-
-    Parameters
-    ----------
-    found : laps of one resolver or several
-    width : of the figure, in
-
-    Raises
-    ------
-    InputError : no lap was finished
-    """
+    """Drift of the posture in each lap, logarithmic; below it the platforms' paths, if any, from above. Full
+    turns of joints without limits are no drift. InputError if no lap was finished."""
     runs = [one for one in found.laps if len(one.distance)]
-    if not runs:
-        raise InputError("figure of laps: expected at least one lap, got none")
-    worn = looks.looks([one.name for one in runs])
+    expect(runs, "figure of laps", "at least one lap")
+    worn = resolver_style.looks([one.name for one in runs])
     if len(worn) == 1:
         worn = [worn[0]._replace(dashes="-")]
     across = width - style.LEFT - style.RIGHT
@@ -59,13 +44,12 @@ def laps(found: Repeatability, *, width: float = style.PAGE) -> Figure:
     return style.aligned(made)
 
 
-def _draw_drift(axes: Axes, runs: list[Laps], worn: list[looks.Look]) -> None:
-    every = np.concatenate([np.maximum(one.distance, LOWEST) for one in runs])
-    longest = max(len(one.distance) for one in runs)
-    for k, (one, look) in enumerate(zip(runs, worn, strict=True)):
-        numbers = np.arange(1, len(one.distance) + 1)
+def _draw_drift(axes: Axes, runs: list[Laps], worn: list[resolver_style.Look]) -> None:
+    drifts = [np.maximum(one.distance, LOWEST) for one in runs]
+    every, longest = np.concatenate(drifts), max(map(len, drifts))
+    for k, (drift, look) in enumerate(zip(drifts, worn, strict=True)):
         axes.plot(
-            numbers, np.maximum(one.distance, LOWEST), look.dashes, color=look.color, linewidth=style.WIDTH,
+            np.arange(1, len(drift) + 1), drift, look.dashes, color=look.color, linewidth=style.WIDTH,
             marker="osD^v"[k % 5], markersize=4.5, markerfacecolor="white" if k % 2 else look.color,
             label=look.name,
         )  # fmt: skip
@@ -80,39 +64,34 @@ def _draw_drift(axes: Axes, runs: list[Laps], worn: list[looks.Look]) -> None:
     style.legend(axes)
 
 
-def _draw_paths(axes: Axes, runs: list[Laps], worn: list[looks.Look], width: float) -> None:
+def _draw_paths(axes: Axes, runs: list[Laps], worn: list[resolver_style.Look], width: float) -> None:
     """All laps thin, the last one thick, the laps' ends as dots; a legend `width` in wide."""
     axes.set_aspect("equal", adjustable="box")
     names = iter(_path_names(runs, worn))
     desired = _desired(runs[0])
     if desired is not None:
-        axes.plot(desired[:, 0], desired[:, 1], ":", color=looks.BLACK, linewidth=1.1, label=next(names))
+        axes.plot(*desired.T, ":", color=resolver_style.BLACK, linewidth=1.1, label=next(names))
     for one, look in zip(runs, worn, strict=True):
         path, samples = _path(one), _samples(one)
         every = max(1, samples // POINTS)
-        axes.plot(path[::every, 0], path[::every, 1], look.dashes, color=look.color, linewidth=0.7, alpha=0.6)
-        last = path[len(path) - 1 - samples :][::every]
-        axes.plot(
-            last[:, 0], last[:, 1], look.dashes, color=look.color, linewidth=1.9, label=next(names)
-        )  # fmt: skip
-        axes.plot(one.q[:, 0], one.q[:, 1], "o", color=look.color, markersize=3.5, linestyle="none")
-    low, high = _limits(runs)
-    axes.set_xlim(low[0], high[0])
-    axes.set_ylim(low[1], high[1])
+        last = path[len(path) - 1 - samples :]
+        axes.plot(*path[::every].T, look.dashes, color=look.color, linewidth=0.7, alpha=0.6)
+        axes.plot(*last[::every].T, look.dashes, color=look.color, linewidth=1.9, label=next(names))
+        axes.plot(*one.q[:, :2].T, "o", color=look.color, markersize=3.5, linestyle="none")
+    (left, low), (right, high) = _limits(runs)
+    axes.set(xlim=(left, right), ylim=(low, high))
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(nbins=8, steps=[1, 2, 5, 10]))
     style.label(axes, x="x [m]", y="y [m]")
     style.legend(axes, width)
 
 
-def _path_names(runs: list[Laps], worn: list[looks.Look]) -> list[str]:
-    """The legend of the paths."""
+def _path_names(runs: list[Laps], worn: list[resolver_style.Look]) -> list[str]:
     desired = [f"desired path of {runs[0].trajectory.frame}"] if _desired(runs[0]) is not None else []
     return [*desired, *(f"platform, {look.name}, last lap thick" for look in worn)]
 
 
 def _samples(one: Laps) -> int:
-    """How many samples a lap has."""
     return round(one.period / one.trajectory.dt)
 
 
@@ -129,8 +108,8 @@ def _desired(one: Laps) -> Array | None:
 
 def _limits(runs: list[Laps]) -> tuple[Array, Array]:
     """Lower and upper limits of x and y that hold all paths, m."""
-    desired = _desired(runs[0])
-    points = np.vstack([*(_path(one) for one in runs), *([] if desired is None else [desired])])
+    paths = [*map(_path, runs), _desired(runs[0])]
+    points = np.vstack([path for path in paths if path is not None])
     low, high = points.min(axis=0), points.max(axis=0)
     size = max(float((high - low).max()), 0.1)
     # No view gets narrower than half the other side.

@@ -1,13 +1,14 @@
-"""The house style: colours, sizes, axes. Set on every artist, so that no global state is touched.
-
-Matplotlib's rcParams are one per process; a library that changes them changes its user's figures,
-and two threads that change them change each other's. Nothing here reads or writes them.
-"""
+"""The house style: colours, sizes, axes; set on every artist, because rcParams are global to a process. And
+figures as files: PNG, and PDF and SVG, whose text is text."""
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
 
+import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -15,7 +16,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
 from nmm.arrays import Array
-from nmm.looks import BLACK
+from nmm.errors import InputError, expect
+from nmm.figure_options import FORMATS, FigureOptions
+from nmm.resolver_style import BLACK, CYCLE, DASHES, GREEN, PINK, Look
+from nmm.runs.trajectory import Trajectory
+from nmm.text_format import listed, superscript
 
 GREY, LIGHT = "#6B7280", "#E5E7EB"
 DPI = 180
@@ -27,8 +32,6 @@ PAGE, LEFT, RIGHT, BOTTOM = 5.2, 0.8, 0.2, 0.46
 TICK, CHARACTER, NUMBERS = 0.16, 0.64 * SMALL / 72.0, 0.46
 #: Height above a panel for a legend of one row, and for each row more, in.
 GAP, ROW = 0.34, 0.16
-
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def figure(width: float, height: float) -> Figure:
@@ -46,8 +49,7 @@ def place(
     rectangle = (left / total[0], bottom / total[1], width / total[0], height / total[1])
     axes = made.add_axes(rectangle, sharex=share)
     dress(axes)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
+    axes.spines[["top", "right"]].set_visible(False)
     return axes
 
 
@@ -55,14 +57,15 @@ def dress(axes: Axes, size: float = SMALL) -> None:
     """Grid, ticks and frame of the house style; `size` of the ticks' numbers, pt."""
     axes.set_axisbelow(True)
     axes.grid(True, color=LIGHT, linewidth=0.7)
+    ticks(axes, size)
+    axes.spines[:].set(color=GREY, linewidth=0.7)
+
+
+def ticks(axes: Axes, size: float = SMALL) -> None:
     axes.tick_params(labelsize=size, color=GREY, labelcolor=BLACK, width=0.7, length=3)
-    for spine in axes.spines.values():
-        spine.set_color(GREY)
-        spine.set_linewidth(0.7)
 
 
 def inches(axes: Axes) -> tuple[float, float]:
-    """Width and height of axes, in."""
     room = axes.get_window_extent()
     return float(room.width) / DPI, float(room.height) / DPI
 
@@ -70,14 +73,8 @@ def inches(axes: Axes) -> tuple[float, float]:
 def column(
     made: Figure, heights: Sequence[float], legends: Sequence[int], left: float, right: float, top: float
 ) -> list[Axes]:
-    """Panels one above the other that share their x axis, the first on top.
-
-    Parameters
-    ----------
-    heights : of the panels, in
-    legends : how many rows of legend stand above each panel
-    left, right, top : where the column is, in, from the figure's left and lower edges
-    """
+    """Panels of these heights above each other, with one x axis and rows of legend above each; left, right,
+    top from the figure's left and lower edges; all in inches."""
     panels: list[Axes] = []
     for height, rows in zip(heights, legends, strict=True):
         top -= room(rows) + height
@@ -124,7 +121,6 @@ def legend_rows(names: Sequence[str], width: float) -> int:
 
 
 def label(axes: Axes, *, x: str = "", y: str = "") -> None:
-    """Axis labels, with units."""
     if x:
         axes.set_xlabel(x, fontsize=TEXT, color=BLACK, labelpad=3)
     if y:
@@ -150,7 +146,6 @@ def aligned(made: Figure) -> Figure:
 
 
 def time_axis(axes: Axes, t: Array, *, named: bool = True) -> None:
-    """Time from the first to the last sample, s."""
     if len(t) > 1:
         axes.set_xlim(float(t[0]), float(t[-1]))
     axes.xaxis.set_major_locator(MaxNLocator(nbins=10, steps=[1, 2, 5, 10]))
@@ -159,23 +154,20 @@ def time_axis(axes: Axes, t: Array, *, named: bool = True) -> None:
         label(axes, x="time t [s]")
 
 
-def value_axis(axes: Axes) -> None:
-    """About five plain ticks on the y axis."""
-    axes.yaxis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 2.5, 5, 10]))
+def value_axis(axes: Axes, bins: int = 5) -> None:
+    axes.yaxis.set_major_locator(MaxNLocator(nbins=bins, steps=[1, 2, 2.5, 5, 10]))
     axes.yaxis.set_major_formatter(plain())
 
 
 def decades(lowest: float, highest: float) -> tuple[int, int]:
-    """The powers of ten, two at least, between which [lowest, highest] lies, both above 0."""
+    """The powers of ten, at least two, around [lowest, highest], both above 0."""
     low, high = int(np.floor(np.log10(lowest))), int(np.ceil(np.log10(highest)))
     return low, max(high, low + 1)
 
 
 def log_axis(axes: Axes, lowest: float, highest: float, *, below: bool = False) -> None:
-    """A logarithmic y axis over whole decades that hold [lowest, highest], both above 0.
-
-    below : whether its lowest power of ten stands for all that is less, and 0
-    """
+    """A logarithmic y axis over whole decades that hold [lowest, highest], both above 0; with `below`, its
+    lowest tick also stands for smaller values and 0."""
     low, high = decades(lowest, highest)
 
     def text(value: float, _: int | None) -> str:
@@ -192,7 +184,7 @@ def log_axis(axes: Axes, lowest: float, highest: float, *, below: bool = False) 
 
 
 def plain() -> FuncFormatter:
-    """Plain numbers at the ticks. A formatter belongs to one axis."""
+    """Plain numbers at the ticks; each axis needs a formatter of its own."""
     return FuncFormatter(lambda value, _: number(value))
 
 
@@ -202,13 +194,13 @@ def number(value: float) -> str:
         return f"{value:.6g}".replace("-", "−")
     mantissa, exponent = f"{value:.2e}".split("e")
     short = mantissa.rstrip("0").rstrip(".").replace("-", "−")
-    decade = f"10{str(int(exponent)).translate(_SUPERSCRIPTS)}"
+    decade = f"10{superscript(int(exponent))}"
     return decade if short == "1" else f"{short}·{decade}"
 
 
 def power(value: float) -> str:
     """A decade: 10⁻³."""
-    return f"10{str(round(np.log10(value))).translate(_SUPERSCRIPTS)}" if value > 0.0 else ""
+    return f"10{superscript(round(np.log10(value)))}" if value > 0.0 else ""
 
 
 def legend(axes: Axes, width: float | None = None, *, lift: float = 0.0) -> None:
@@ -219,34 +211,20 @@ def legend(axes: Axes, width: float | None = None, *, lift: float = 0.0) -> None
     across, height = inches(axes)
     width = across if width is None else width
     axes.legend(
-        handles,
-        names,
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0 + lift / height),
-        ncols=legend_columns(names, width),
-        frameon=False,
-        fontsize=SMALL,
-        labelcolor=BLACK,
-        borderaxespad=0.25,
-        borderpad=0.0,
-        handlelength=1.9,
-        handletextpad=0.5,
-        columnspacing=1.4,
-        labelspacing=0.25,
-    )
+        handles, names, loc="lower left", bbox_to_anchor=(0.0, 1.0 + lift / height), frameon=False,
+        ncols=legend_columns(names, width), fontsize=SMALL, labelcolor=BLACK, borderaxespad=0.25,
+        borderpad=0.0, handlelength=1.9, handletextpad=0.5, columnspacing=1.4, labelspacing=0.25,
+    )  # fmt: skip
 
 
 def units(names: Iterable[str]) -> str:
-    """The units of an axis that several quantities share: "[m/s, rad/s]"."""
+    """The units of an axis of several quantities: "[m/s, rad/s]"."""
     return f"[{', '.join(dict.fromkeys(names))}]"
 
 
 def groups(kinds: Sequence[str]) -> dict[str, list[int]]:
     """Indices by unit, in order of appearance."""
-    found: dict[str, list[int]] = {}
-    for index, kind in enumerate(kinds):
-        found.setdefault(kind, []).append(index)
-    return found
+    return {kind: [i for i, one in enumerate(kinds) if one == kind] for kind in dict.fromkeys(kinds)}
 
 
 def thin(t: Array, y: Array, most: int = 1200) -> tuple[Array, Array]:
@@ -268,16 +246,97 @@ def thin(t: Array, y: Array, most: int = 1200) -> tuple[Array, Array]:
 def curve(
     axes: Axes, t: Array, y: Array, name: str | None, color: str, dashes: str = "-", below: int = 0
 ) -> None:
-    """One curve over time, drawn with no more points than can be seen.
-
-    `below` counts those that are drawn over it: it is wider, and seen where it runs as they do.
-    """
-    x, values = thin(t, y)
+    """A curve over time, thinned; wider if others are drawn over it (`below`), to stay visible."""
     width = WIDTH + WIDER * below
-    axes.plot(x, values, dashes, color=color, linewidth=width, label=name, solid_joinstyle="round")
+    axes.plot(*thin(t, y), dashes, color=color, linewidth=width, label=name, solid_joinstyle="round")
+
+
+def compared(axes: Axes, worn: Sequence[Look], times: Sequence[Array], values: Sequence[Array]) -> None:
+    """A curve for each run in its look, the later ones over the earlier."""
+    for k, (look, t, y) in enumerate(zip(worn, times, values, strict=True)):
+        curve(axes, t, y, *look, below=len(worn) - 1 - k)
+
+
+def columns(axes: Axes, t: Array, values: Array, names: Sequence[str], *, zero: bool = False) -> None:
+    """The columns of values (N, k), each with its own colour and dashes, and a line at zero if asked."""
+    for k, (values_k, name) in enumerate(zip(values.T, names, strict=True)):
+        curve(axes, t, values_k, name, CYCLE[k % 7], DASHES[k % 4])
+    if zero:
+        axes.axhline(0.0, color=GREY, linewidth=0.7, zorder=1)
+
+
+def finish(axes: Axes, t: Array, y: str, *, named: bool = True, ticks: bool = True) -> None:
+    label(axes, y=y)
+    if ticks:
+        value_axis(axes)
+    time_axis(axes, t, named=named)
+    legend(axes)
+
+
+def sampled(trajectories: Sequence[Trajectory], what: str) -> list[Trajectory]:
+    """The runs that have samples; InputError if none has."""
+    runs = [run for run in trajectories if len(run)]
+    expect(runs, f"figure of {what}", "a run with at least one sample")
+    return runs
+
+
+def positive(curves: Sequence[Array]) -> Array:
+    return np.concatenate([values[np.isfinite(values) & (values > 0.0)] for values in curves])
+
+
+def mark_ends(axes: Axes, path: Array, size: float) -> None:
+    """Marks of that size, pt, at the start and the end of a path (k, 2)."""
+    for point, marker, color, name in ((path[0], "o", GREEN, "start"), (path[-1], "s", PINK, "end")):
+        axes.plot(
+            *point, marker, color=color, markersize=size, markeredgecolor="white", markeredgewidth=0.8,
+            label=name, linestyle="none", zorder=6,
+        )  # fmt: skip
 
 
 def note(axes: Axes, text: str) -> None:
-    """A sentence in the middle of axes that have nothing to show."""
     axes.yaxis.set_major_locator(NullLocator())
     axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", fontsize=TEXT, color=GREY)
+
+
+#: What Matplotlib reads of its global state while it writes: whole fonts (Type 3 is refused by publishers),
+#: text that can be searched and edited, the same file from the same figure. Nothing else here depends on it.
+_VECTOR: Any = {"pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "nmm"}
+_WRITING = threading.Lock()
+_OPTIONS: dict[str, dict[str, Any]] = {
+    # Level 3 costs half the time of zlib's default and a few per cent of size.
+    "png": {"dpi": DPI, "pil_kwargs": {"compress_level": 3}},
+    "pdf": {"metadata": {"CreationDate": None}},
+    "svg": {"metadata": {"Date": None}},
+}
+
+
+def save(made: Figure, path: str | Path) -> Path:
+    """Write a figure; the file's suffix says as what: .png, .pdf or .svg.
+
+    Raises
+    ------
+    InputError : another suffix, a file that cannot be written
+
+    Examples
+    --------
+    >>> run = nmm.Scenario.load("unicycle_2r_position").run()
+    >>> nmm.figures.save(nmm.figures.stroboscopic(run), "motion.pdf").name
+    'motion.pdf'
+    """
+    path = Path(path)
+    kind = path.suffix.lower().removeprefix(".")
+    suffixes = listed([f".{name}" for name in FORMATS], "or")
+    expect(kind in FORMATS, str(path), f"a file that ends in {suffixes}")
+    try:
+        if kind == "png":
+            made.savefig(path, **_OPTIONS[kind])
+        else:
+            with _WRITING, matplotlib.rc_context(_VECTOR):
+                made.savefig(path, **_OPTIONS[kind])
+    except OSError as error:
+        raise InputError(f"cannot be written: {error.strerror}", where=str(path)) from None
+    return path
+
+
+def save_as(made: Figure, folder: Path, name: str, options: FigureOptions) -> list[Path]:
+    return [save(made, folder / f"{name}.{kind}") for kind in options.formats]

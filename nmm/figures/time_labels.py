@@ -22,8 +22,6 @@ _DIRECTIONS, _DISTANCES, _FARTHEST = 40, 24, 2.0
 
 
 class Subject(NamedTuple):
-    """What a time is written at: its text, and its outline (k, 2), m."""
-
     text: str
     outline: Array
 
@@ -37,12 +35,12 @@ class Place(NamedTuple):
 
     @property
     def corners(self) -> Array:
-        """Of the text's box, (4, 2) m."""
+        """The text box's corners, (4, 2) m."""
         return self.middle + self.half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
 
     @property
     def end(self) -> Array:
-        """Where its line reaches the box, (2,) m; only where it has a line."""
+        """Where its line reaches the box, (2,) m."""
         way = np.zeros(2) if self.foot is None else self.foot - self.middle
         reach = np.max(np.abs(way) / self.half)
         end: Array = self.middle + way / max(float(reach), 1.0)
@@ -50,13 +48,8 @@ class Place(NamedTuple):
 
 
 def places(subjects: Sequence[Subject], ground: Ground, scale: float) -> list[Place]:
-    """Where each text stands, near its subject, clear of everything drawn and of the texts before it.
-
-    Parameters
-    ----------
-    ground : what is drawn
-    scale : m for each inch of the page
-    """
+    """Places near the subjects, clear of the drawing (`ground`) and of each other; `scale`: m per page
+    inch."""
     pad, cell = _PAD * scale, ground.cell
     leads = np.zeros((0, 2))
     angles = np.linspace(0.0, 2.0 * np.pi, _DIRECTIONS, endpoint=False)
@@ -121,18 +114,8 @@ def _clear(middles: Array, half: Array, texts: Sequence[Place], leads: Array) ->
 
 
 class Ground:
-    """The squares of a drawing and of the room around it, some with something in them.
-
-    Parameters
-    ----------
-    lines : what is drawn, (k, 2) each, m; single points are lines of one
-    shapes : convex outlines (k, 2) of what is filled, m, counter-clockwise
-    scale : m for each inch of the page, more or less
-
-    Attributes
-    ----------
-    low, high : its corners, (2,) m; cell : a square's side, m
-    """
+    """The occupied cells, of side `cell`, m, of a grid from low to high (2,), m, around lines (k, 2) and
+    convex, counter-clockwise outlines (k, 2), m; `scale` is about the m per inch."""
 
     def __init__(self, lines: Sequence[Array], shapes: Sequence[Array], scale: float) -> None:
         self.cell = 0.25 * _LINE * scale
@@ -149,7 +132,6 @@ class Ground:
         self._sums[1:, 1:] = self._taken.cumsum(axis=0).cumsum(axis=1)
 
     def _fill(self, outline: Array) -> None:
-        """Something is within a convex outline."""
         if len(outline) < 3:
             return
         first = ((outline.min(axis=0) - self.low) // self.cell).astype(int)
@@ -161,7 +143,7 @@ class Ground:
         self._taken[first[0] : last[0], first[1] : last[1]] |= (left >= 0.0).all(axis=2)
 
     def free(self, middles: Array, half: Array) -> Flags:
-        """Which of the boxes around `middles` (P, 2) hold nothing, (P,)."""
+        """Which of the boxes around `middles` (P, 2) are empty, (P,)."""
         last = np.array(self._taken.shape)
         a = (((middles - half - self.low) // self.cell).astype(int)).clip(0, last)
         b = (((middles + half - self.low) // self.cell).astype(int) + 1).clip(0, last)

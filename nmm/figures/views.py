@@ -1,8 +1,7 @@
-"""Scenes seen along a direction: from above and, where there is something to see, from the side."""
-
-from __future__ import annotations
+"""Scenes seen from above and, where that shows something, from the side; among them the paths of runs."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,8 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from nmm import resolver_style
 from nmm.arrays import Array
 from nmm.figures import style
+from nmm.playback.placements import base_position
+from nmm.runs.trajectory import Trajectory
 
 #: Room for the x axis' label between two views, in, and between two ticks.
 _BETWEEN, _TICKS = 0.2, 0.25
@@ -20,17 +22,16 @@ _MARGIN = 0.04
 #: A way is along an axis of the world within this angle, rad; one that is wider than this share of its length
 #: has no direction.
 _ALONG, _WIDE = np.radians(15.0), 0.4
+#: Paths that rise or fall by more than this are drawn from the side too, m.
+_RISES = 0.01
+#: The least height of a drawing is twice this share of its width.
+_FLAT = 0.1
+_TARGET, _DESIRED = 12.0, "#C3C8D0"
 
 
 @dataclass(frozen=True)
 class View:
-    """Which directions of the world a drawing shows.
-
-    Attributes
-    ----------
-    across, up : of length 1, across the page and up the page, in world axes
-    labels : of the axes
-    """
+    """Which directions of the world a drawing shows: across the page and up the page, of length 1."""
 
     across: tuple[float, float, float]
     up: tuple[float, float, float]
@@ -38,11 +39,10 @@ class View:
 
     @property
     def rows(self) -> Array:
-        """Both directions, (2, 3)."""
         return np.array([self.across, self.up])
 
     def of(self, points: Array) -> Array:
-        """Points (..., 3) of the world as they are seen, (..., 2), m."""
+        """Points (..., 3) of the world projected into the view, (..., 2), m."""
         seen: Array = points @ self.rows.T
         return seen
 
@@ -52,10 +52,7 @@ SIDE = View((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), ("x [m]", "z [m]"))
 
 
 def upright(path: Array) -> View:
-    """The upright plane in which a path (k, 3) lies most nearly; that of x and z where it has no direction.
-
-    Across is x or y where the path is nearly along one of them.
-    """
+    """The vertical plane that fits a path (k, 3) best, x-z or y-z if near; x-z without a direction."""
     ground = path[np.isfinite(path).all(axis=1), :2]
     if len(ground) < 2:
         return SIDE
@@ -76,13 +73,7 @@ def upright(path: Array) -> View:
 
 
 class Viewed(ABC):
-    """What is drawn in one or two views to the same scale across.
-
-    Attributes
-    ----------
-    views : those in which there is something to see, the one from above first
-    on_the_ground : whether a view from the side reaches down to it
-    """
+    """A scene in one or two views with a common scale across, the one from above first."""
 
     views: tuple[View, ...]
     on_the_ground = True
@@ -114,7 +105,6 @@ class Viewed(ABC):
         return [(float(a) - margin, float(b) + margin) for a, b in zip(low, high, strict=True)]
 
     def height(self, view: View, width: float) -> float:
-        """How high a view is that has this width, in."""
         (left, right), (low, high) = self.limits(view, width)
         return width * (high - low) / (right - left)
 
@@ -122,33 +112,106 @@ class Viewed(ABC):
         """Name the axes, a metre as long up the page as across it, and let them hold everything."""
         style.label(axes, x=view.labels[0], y=view.labels[1])
         axes.set_aspect("equal", adjustable="box")
-        width, height = style.inches(axes)
-        horizontal, vertical = self.limits(view, width)
-        axes.set_xlim(*horizontal)
-        axes.set_ylim(*vertical)
-        for axis, room in ((axes.xaxis, width), (axes.yaxis, height)):
-            most = int(np.clip(room / _TICKS, 3, 9))
+        room = style.inches(axes)
+        horizontal, vertical = self.limits(view, room[0])
+        axes.set(xlim=horizontal, ylim=vertical)
+        for axis, inches in zip((axes.xaxis, axes.yaxis), room, strict=True):
+            most = int(np.clip(inches / _TICKS, 3, 9))
             axis.set_major_locator(MaxNLocator(nbins=most, steps=[1, 2, 5, 10]))
 
 
 def page(scene: Viewed, width: float, above: float = 0.0) -> Figure:
-    """A figure of a scene's views one above the other, its legend above the first.
-
-    Parameters
-    ----------
-    width : of the figure, in
-    above : room left free above the legend, in
-    """
+    """A figure `width` in wide of the views above each other; `above` in are left free above the legend."""
     across = width - style.LEFT - style.RIGHT
     heights = [scene.height(view, across) for view in scene.views]
     legends = [style.legend_rows(scene.names, across), *[1] * (len(heights) - 1)]
     top = style.BOTTOM + style.column_height(heights, legends) + _BETWEEN * (len(heights) - 1)
     made = style.figure(width, top + above)
-    for index, (view, height, rows) in enumerate(zip(scene.views, heights, legends, strict=True)):
-        top -= style.room(rows) + height
-        axes = style.place(made, style.LEFT, top, across, height)
+    draw_views(made, scene, across, top, between=_BETWEEN)
+    return style.aligned(made)
+
+
+def draw_views(
+    made: Figure,
+    scene: Viewed,
+    width: float,
+    top: float,
+    *,
+    bottom: float = -np.inf,
+    tallest: float = np.inf,
+    between: float = style.BOTTOM,
+) -> float:
+    """Draw the views that fit, downwards, the legend above the first; returns the top of the room left. All
+    lengths in inches; no view is wider than `width` or taller than `tallest`."""
+    for index, view in enumerate(scene.views):
+        tall = scene.height(view, width)
+        height = min(tall, tallest)
+        if index and top - style.GAP - height < bottom - 1e-6:
+            break
+        top -= style.room(1 if index else style.legend_rows(scene.names, width)) + height
+        axes = style.place(made, style.LEFT, top, width * height / tall, height)
         scene.draw(axes, view)
         if index == 0:
-            style.legend(axes)
-        top -= _BETWEEN
-    return style.aligned(made)
+            style.legend(axes, width)
+        top -= between
+    return top
+
+
+class Paths(Viewed):
+    """The frames' and the platforms' paths of runs, each with a look, what is desired, and targets."""
+
+    on_the_ground = False
+
+    def __init__(self, runs: Sequence[Trajectory], worn: Sequence[resolver_style.Look]) -> None:
+        self._worn = worn
+        self._desired, self._held = runs[0].moving, runs[0].held
+        self._frames = [run.frame for run in runs]
+        self._paths = [run.path for run in runs]
+        self._floors = [_on_the_floor(run) for run in runs]
+        risen = [path for path in (*self._paths, self._desired) if path is not None]
+        rises = any(float(np.ptp(path[:, 2])) > _RISES for path in risen)
+        self.views = (ABOVE, upright(risen[-1])) if rises else (ABOVE,)
+
+    @property
+    def names(self) -> list[str]:
+        names = ["target"] * bool(len(self._held)) + ["desired path"] * (self._desired is not None)
+        for i, (name, *_) in enumerate(self._worn):
+            names += [f"{name}: {self._frames[i]}"] * (self._paths[i] is not None)
+            names += [f"{name}: platform"] * (self._floors[i] is not None)
+        return names
+
+    def points(self, view: View, width: float) -> list[Array]:
+        floors = self._floors if view == ABOVE else []
+        parts = [self._held, self._desired, *self._paths, *floors]
+        found = np.vstack([view.of(part) for part in parts if part is not None and len(part)])
+        low, high = np.nanmin(found, axis=0), np.nanmax(found, axis=0)
+        middle, half = 0.5 * (low + high), max(0.05, _FLAT * float(np.max(high - low)))
+        return [found, np.array([middle - half, middle + half])]
+
+    def draw(self, axes: Axes, view: View) -> None:
+        self.dress(axes, view)
+        if len(self._held):
+            axes.plot(
+                *view.of(self._held).T, "*", color=resolver_style.ORANGE, markersize=_TARGET,
+                markeredgecolor=resolver_style.BLACK, label="target", linestyle="none", zorder=6,
+            )  # fmt: skip
+        if self._desired is not None:
+            axes.plot(*view.of(self._desired).T, color=_DESIRED, linewidth=5.0, label="desired path")
+        for i, (name, color, dashes) in enumerate(self._worn):
+            # The later ones are thinner: those below are seen where they run the same way.
+            below = len(self._worn) - 1 - i
+            for path, whose, thick in (
+                (self._paths[i], self._frames[i], 1.5 + style.WIDER * below),
+                (self._floors[i], "platform", 0.8 + 0.5 * below),
+            ):
+                if path is not None and (whose != "platform" or view == ABOVE):
+                    axes.plot(
+                        *view.of(path).T, dashes, color=color, linewidth=thick, label=f"{name}: {whose}"
+                    )
+
+
+def _on_the_floor(run: Trajectory) -> Array | None:
+    """Where the platform has been (N, 3); None for an arm on the ground."""
+    if not run.robot.platform.n_p:
+        return None
+    return np.column_stack([base_position(run.robot, run.q), np.zeros(len(run))])

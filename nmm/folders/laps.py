@@ -1,54 +1,35 @@
-"""The folder of laps round a closed path: a run a resolver, and what came of each lap."""
+"""The folder of laps round a closed path: a run for each resolver, and each lap's drift."""
 
 from __future__ import annotations
 
 import csv
-import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nmm.folders.whole import has_format, replaced_folder
-from nmm.machine import made_with
-from nmm.runs.figure_options import PLAIN, FigureOptions
+from nmm.figure_options import PLAIN, FigureOptions
+from nmm.folders.whole import FolderKind, replaced_folder
 
 if TYPE_CHECKING:
     from nmm.analysis.redundancy.laps import Repeatability
 
-#: Marks a folder of laps.
-FORMAT = "nmm laps 1"
-
-
-def is_laps(folder: Path) -> bool:
-    """Whether a folder holds laps that nmm wrote."""
-    return has_format(folder / "summary.json", FORMAT)
+is_laps = FolderKind("nmm laps 1")
 
 
 def save(found: Repeatability, folder: str | Path, *, figures: FigureOptions = PLAIN) -> Path:
-    """Write each run's folder, summary.json, laps.csv and laps.png.
-
-    Parameters
-    ----------
-    folder : a new folder, or one of laps, which is replaced
-    figures : formats and width of the figure
-
-    Raises
-    ------
-    InputError : the folder exists and is not one of laps, or cannot be written
-    """
+    """Write each run's folder, summary.json, laps.csv and laps.png, replacing a folder of laps; InputError
+    for one of anything else, or one that cannot be written."""
     with replaced_folder(folder, is_laps) as temporary:
         for one in found.laps:
             one.trajectory.save(temporary / one.name, figures=False)
-        (temporary / "summary.json").write_text(
-            json.dumps(_summary(found), indent=2) + "\n", encoding="utf-8"
-        )
+        is_laps.write(temporary, _summary(found), ensure_ascii=True)
         with (temporary / "laps.csv").open("w", newline="", encoding="utf-8") as file:
             csv.writer(file, lineterminator="\n").writerows(_lines(found))
         if any(len(one.distance) for one in found.laps):
-            from nmm.figures.files import save_as
             from nmm.figures.repeatability import laps
+            from nmm.figures.style import save_as
 
             save_as(laps(found, **figures.across()), temporary, "laps", figures)
     return Path(folder)
@@ -56,14 +37,13 @@ def save(found: Repeatability, folder: str | Path, *, figures: FigureOptions = P
 
 def _summary(found: Repeatability) -> dict[str, Any]:
     return {
-        "format": FORMAT,
-        "made_with": made_with(),
         "complete": found.complete,
         "period": found.period,
-        "transient": found.transient,
+        "transient": str(found.transient),
         "laps": {
             one.name: {
-                "verdict": one.verdict,
+                "verdict": str(one.verdict),
+                "finding": one.verdict.as_json(),
                 "closes": one.closes,
                 "converges": one.converges,
                 "factor": one.factor,
@@ -82,20 +62,13 @@ def _summary(found: Repeatability) -> dict[str, Any]:
 
 
 def _lines(found: Repeatability) -> Iterator[list[object]]:
-    """q at each lap's end, its drift, and the rest, under a line of names."""
     names = found.laps[0].robot.q_names if found.laps else ()
     yield [
         "resolver", "lap", *names, *(f"drift_{name}" for name in names), "posture_drift", "displacement",
         "task_error",
     ]  # fmt: skip
     for one in found.laps:
-        blank = [""] * (len(names) + 2)
-        for k, q in enumerate(one.q):
-            change: Sequence[object] = blank
-            if k:
-                change = [
-                    *one.drift[k - 1].tolist(),
-                    float(one.distance[k - 1]),
-                    float(one.displacement[k - 1]),
-                ]
-            yield [one.name, k, *q.tolist(), *change, float(one.errors[k])]
+        changes = np.column_stack([one.drift, one.distance, one.displacement]).tolist()
+        ends = zip(one.q.tolist(), [[""] * (len(names) + 2), *changes], one.errors.tolist(), strict=False)
+        for k, (q, change, error) in enumerate(ends):  # none where the first lap could not begin
+            yield [one.name, k, *q, *change, error]

@@ -1,52 +1,35 @@
-"""A map's folder: its arrays, what was computed in plain data, and a figure a measure."""
+"""A map's folder: its arrays, map.json and a figure for each measure."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nmm.analysis.maps.extremes import EVERYWHERE, Extreme
 from nmm.analysis.maps.measures import MEASURES
+from nmm.analysis.maps.result import EVERYWHERE, Extreme
 from nmm.arrays import Array, Integers
-from nmm.folders.whole import has_format, replaced_folder
+from nmm.figure_options import PLAIN, FigureOptions
+from nmm.folders.whole import FolderKind, replaced_folder
 from nmm.machine import made_with
-from nmm.runs.figure_options import PLAIN, FigureOptions
 
 if TYPE_CHECKING:
     from nmm.analysis.maps.result import Map
     from nmm.analysis.maps.singular_set import SingularSet
 
-#: Marks a folder of a map.
-FORMAT = "nmm map 1"
-
-
-def is_map(folder: Path) -> bool:
-    """Whether a folder holds a map that nmm wrote."""
-    return has_format(folder / "map.json", FORMAT)
+is_map = FolderKind("nmm map 1", "map.json")
 
 
 def save(made: Map, folder: str | Path, *, figures: FigureOptions = PLAIN) -> Path:
-    """Write map.npz, map.json and a figure a measure.
-
-    Parameters
-    ----------
-    folder : a new folder, or one of a map, which is replaced
-    figures : their formats and width
-
-    Raises
-    ------
-    InputError : the folder exists and is not a map's, or cannot be written
-    """
+    """Write map.npz, map.json and a figure for each measure, replacing a map's folder; InputError for one of
+    anything else, or one that cannot be written."""
     with replaced_folder(folder, is_map) as temporary:
         np.savez_compressed(temporary / "map.npz", **_arrays(made))  # type: ignore[arg-type]  # arrays by name
-        text = json.dumps(summary(made), indent=2, ensure_ascii=False)
-        (temporary / "map.json").write_text(text + "\n", encoding="utf-8")
-        from nmm.figures.files import save_as
+        is_map.write(temporary, summary(made))
         from nmm.figures.maps import map_figure
+        from nmm.figures.style import save_as
 
         for measure in made.values:
             save_as(map_figure(made, measure, **figures.across()), temporary, measure, figures)
@@ -54,10 +37,9 @@ def save(made: Map, folder: str | Path, *, figures: FigureOptions = PLAIN) -> Pa
 
 
 def summary(made: Map) -> dict[str, Any]:
-    """What was computed, in plain data."""
     about = made.about
     return {
-        "format": FORMAT,
+        "format": is_map.format,
         "made_with": made_with(),
         "kind": made.kind,
         "robot": about.robot,
@@ -68,13 +50,7 @@ def summary(made: Map) -> dict[str, Any]:
         "weights": dict(about.weights),
         "sizes": about.sizes,
         "axes": [
-            {
-                "name": name,
-                "unit": unit,
-                "from": float(axis[0]),
-                "to": float(axis[-1]),
-                "samples": len(axis),
-            }
+            {"name": name, "unit": unit, "from": float(axis[0]), "to": float(axis[-1]), "samples": len(axis)}
             for name, unit, axis in zip(made.names, made.units, made.axes, strict=True)
         ],
         "held": made.held,
@@ -96,15 +72,9 @@ def summary(made: Map) -> dict[str, Any]:
 
 
 def _arrays(made: Map) -> dict[str, Array | Integers]:
-    """As map.npz holds them. Lines follow one another, a row of NaN between them."""
-    found: dict[str, Any] = {
-        "axis_0": made.axes[0],
-        "axis_1": made.axes[1],
-        "rank": made.rank,
-        "q": made.q,
-        "q_names": np.array(made.about.q_names),
-    }
-    found |= made.values
+    """The arrays of map.npz; consecutive lines are separated by a row of NaN."""
+    first: dict[str, Any] = {f"axis_{i}": axis for i, axis in enumerate(made.axes)}
+    found = {**first, "rank": made.rank, "q": made.q, "q_names": np.array(made.about.q_names), **made.values}
     for prefix, layer in (("worst", made.worst), ("best_q", made.best_q), ("worst_q", made.worst_q)):
         found |= {f"{prefix}_{name}": values for name, values in layer.items()}
     for prefix, those in (("singular", made.singular), ("arm_singular", made.arm_singular)):
@@ -115,7 +85,7 @@ def _arrays(made: Map) -> dict[str, Array | Integers]:
 
 
 def _joined(lines: tuple[Array, ...]) -> Array:
-    """Curves (k, 2) as one, a row of NaN after each."""
+    """Curves (k, 2) in one array, with a row of NaN after each."""
     gap = np.full((1, 2), np.nan)
     return np.vstack([piece for line in lines for piece in (line, gap)]) if lines else np.zeros((0, 2))
 
@@ -126,7 +96,7 @@ def _found(those: SingularSet) -> dict[str, Any]:
 
 
 def _ends(found: Mapping[str, Extreme]) -> dict[str, Any]:
-    """Extremes in plain data; "on" says whether a cell has the value or a singular set between cells."""
+    """Extremes in plain data; "on" says whether a cell or a singular set between cells has the value."""
     return {
         end: {
             "value": _plain(value),

@@ -1,51 +1,61 @@
-"""A folder written whole or not at all, which replaces only what is of the same kind.
+"""A folder written whole or not at all, which replaces only a folder of the same kind.
 
-What there is of the new one lies in a hidden folder (`nmm.writing`). The new one then changes places with the
-old one in one step: whoever looks sees the old or the new.
-
-Where the system cannot exchange two folders (Windows, some network file systems), the old one is moved into
-the hidden folder for the moment until the new one stands; of a writer that was killed in that moment, the
-next one moves it back first.
+It is written in a hidden folder (`nmm.files`), then exchanged atomically. Where the system cannot do that
+(Windows, some network file systems), the old folder is moved aside meanwhile; if the writer is killed in that
+moment, the next writer moves it back.
 """
 
-from __future__ import annotations
-
+import ctypes
+import errno
 import json
 import os
-from collections.abc import Callable, Iterator
+import sys
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from nmm.errors import InputError
-from nmm.files import read_bytes
-from nmm.folders.exchange import exchanged
-from nmm.writing import OLD, PATIENCE, at_work, busy, writing
+from nmm.files import OLD, PATIENCE, at_work, busy, read_bytes, writing
+from nmm.machine import made_with
 
 Read = TypeVar("Read")
 
-#: A folder's JSON is not longer than that, bytes.
+#: Largest JSON file of a folder, bytes.
 MOST = 200_000_000
-#: How often a folder that is replaced meanwhile is read anew.
+#: Most attempts to read a folder that is being replaced.
 MOST_READINGS = 20
+#: `AT_FDCWD` and `RENAME_EXCHANGE` of Linux (rename(2)), `RENAME_SWAP` of macOS (renamex_np(2)).
+_HERE, _EXCHANGE, _SWAP = -100, 2, 2
+#: What a kernel or a file system says that cannot do it: NFS and some of FUSE's, Linux before 3.15.
+_CANNOT = (errno.EINVAL, errno.ENOSYS, errno.ENOTSUP)
+
+
+@dataclass(frozen=True)
+class FolderKind:
+    """A kind of folder; calling it checks the format in a folder's JSON file."""
+
+    format: str
+    file: str = "summary.json"
+
+    def __call__(self, folder: Path) -> bool:
+        return has_format(folder / self.file, self.format)
+
+    def write(self, folder: Path, content: Mapping[str, Any], *, ensure_ascii: bool = False) -> None:
+        """Write the JSON file: the format, what made it unless `content` says so, and the content."""
+        told = {"format": self.format, "made_with": made_with(), **content}
+        text = json.dumps(told, indent=2, ensure_ascii=ensure_ascii)
+        (folder / self.file).write_text(text + "\n", encoding="utf-8")
 
 
 @contextmanager
 def replaced_folder(
     folder: str | Path, is_ours: Callable[[Path], bool], patience: float = PATIENCE
 ) -> Iterator[Path]:
-    """A temporary folder that takes the place of `folder` when the block ends without an error.
-
-    Parameters
-    ----------
-    folder : a new or an empty folder, or one of ours; of a symbolic link, the folder that it leads to
-    is_ours : whether a folder is one that may be replaced
-    patience : how long to wait for another process that writes it, s
-
-    Raises
-    ------
-    InputError : `folder` exists and is not one of ours, cannot be written, or another process is writing it
-    """
+    """A temporary folder that replaces `folder` (new, empty or ours; or a symbolic link's target) if the
+    block succeeds. InputError if it is not ours, cannot be written, or is still being written by another
+    process after `patience` s."""
     import shutil  # here, both: `nmm --help` would pay
     import tempfile
 
@@ -65,11 +75,10 @@ def replaced_folder(
     except BrokenPipeError:  # of what the block prints
         raise
     except OSError as error:
-        raise InputError(f"{folder}: cannot be written: {error.strerror or error}") from None
+        raise InputError(f"cannot be written: {error.strerror or error}", where=folder) from None
 
 
 def _put(temporary: Path, final: Path, old: Path) -> None:
-    """The folder that is written takes the place of the one that stands there, if any."""
     if not final.exists():
         temporary.rename(final)
     elif not exchanged(temporary, final):
@@ -84,8 +93,29 @@ def _put(temporary: Path, final: Path, old: Path) -> None:
         shutil.rmtree(old, ignore_errors=True)
 
 
+def exchanged(one: Path, other: Path) -> bool:
+    """Exchange two folders atomically; False if the system cannot, OSError if it fails otherwise."""
+    if sys.platform not in ("linux", "darwin"):
+        return False
+    library = ctypes.CDLL(None, use_errno=True)
+    names = os.fsencode(one), os.fsencode(other)
+    try:
+        if sys.platform == "linux":
+            failed = library.renameat2(_HERE, names[0], _HERE, names[1], ctypes.c_uint(_EXCHANGE))
+        else:
+            failed = library.renamex_np(*names, ctypes.c_uint(_SWAP))
+    except AttributeError:  # a C library without it
+        return False
+    if not failed:
+        return True
+    number = ctypes.get_errno()
+    if number in _CANNOT:
+        return False
+    raise OSError(number, os.strerror(number), str(one), None, str(other))
+
+
 def steady(folder: Path, read: Callable[[], Read]) -> Read:
-    """What `read` finds in a folder that may be replaced meanwhile: all of the old one, or of the new."""
+    """What `read` finds in a folder that may be replaced meanwhile: all old or all new."""
     for _ in range(MOST_READINGS):
         before = _identity(folder)
         try:
@@ -96,42 +126,42 @@ def steady(folder: Path, read: Callable[[], Read]) -> Read:
             continue
         if _identity(folder) == before:
             return found
-    raise InputError(f"{folder}: is being replaced again and again; read it when that has ended")
+    raise InputError("is being replaced again and again; read it when that has ended", where=folder)
 
 
 def check_replaceable(folder: str | Path, is_ours: Callable[[Path], bool]) -> None:
-    """`InputError` when `folder` exists, holds something, and is not one of ours."""
+    """InputError if `folder` is neither new, empty nor ours."""
     final = Path(folder)
     try:
         if final.is_dir() and (not any(final.iterdir()) or is_ours(final)):
             return
         exists = final.exists() or final.is_symlink()
     except OSError as error:
-        raise InputError(f"{folder}: cannot be written: {error.strerror}") from None
+        raise InputError(f"cannot be written: {error.strerror}", where=folder) from None
     if exists:
         raise InputError(
-            f"{final}: exists and is not what this writes; expected a new or an empty folder, or one that "
-            "this wrote before"
+            "exists and is not what this writes",
+            where=final,
+            expected="a new or an empty folder, or one that this wrote before",
         )
 
 
 def check_folder(folder: Path, is_ours: Callable[[Path], bool]) -> None:
-    """`InputError` for a folder that must not, or cannot, be written now: before anything is computed."""
+    """InputError, before any computation, if a folder cannot or must not be written."""
     check_replaceable(folder, is_ours)
     parent = folder.absolute().parent
     while not os.path.lexists(parent):
         parent = parent.parent
     if not parent.is_dir() or not os.access(parent, os.W_OK | os.X_OK):
-        raise InputError(f"{folder}: cannot be written: {parent} is not a folder where you may write")
+        raise InputError(f"cannot be written: {parent} is not a folder where you may write", where=folder)
     try:
         if at_work(Path(os.path.realpath(folder))):
             raise busy(folder)
     except OSError as error:  # a name that is too long
-        raise InputError(f"{folder}: cannot be written: {error.strerror}") from None
+        raise InputError(f"cannot be written: {error.strerror}", where=folder) from None
 
 
 def has_format(file: Path, expected: str) -> bool:
-    """Whether a JSON file of ours says that its folder is of that format."""
     try:
         content = json.loads(read_bytes(file, MOST))
     except (OSError, ValueError, RecursionError):
@@ -140,7 +170,7 @@ def has_format(file: Path, expected: str) -> bool:
 
 
 def _identity(folder: Path) -> tuple[int, int] | None:
-    """Which folder stands there, and as of when; None where there is none."""
+    """A folder's identity and change time, if it exists."""
     try:
         found = folder.stat()
     except OSError:

@@ -1,24 +1,22 @@
-"""Differentiable functions of time and configuration, phi(t, q): what tasks, references and
-objectives are made of.
-
-A task's f(q), a reference's g(t, q) and an objective's H(q) are one kind of thing: a vector, its
-partial derivative in time and its Jacobian in the coordinates. Each says which rows it has and
-which kernels compute them; how they are run is `program.py`'s business.
-"""
+"""Differentiable functions φ(t, q): f(q) of a task, g(t, q) of a reference, H(q) of an objective."""
 
 from __future__ import annotations
 
+import weakref
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from threading import Lock
 from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
 from nmm.arrays import Array
-from nmm.functions.live import LiveNumbers
-from nmm.kernels.compiled import Kernel
+from nmm.errors import expect
+from nmm.kernels.compiled import Kernel, clear, kernel
+from nmm.kernels.linear_algebra import copied
+from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 
@@ -28,10 +26,10 @@ class Row(NamedTuple):
 
     Attributes
     ----------
-    name, unit : for people, and to tell metres from radians
+    name, unit : "ee.x", "m"
     angular : whether it is an angle whose differences wrap
-    scale : its natural size in its unit, against which ranks are judged; None for the robot's reach in
-        metres, and 1 in any other unit
+    scale : its natural size in its unit, by which a loss of rank is judged; None for the robot's reach in m,
+        and 1 in any other unit
 
     Examples
     --------
@@ -47,12 +45,16 @@ class Row(NamedTuple):
 
 
 def natural_size(unit: str, robot: Robot) -> float:
-    """What counts as 1 of a unit on a robot: its reach for metres, 1 of anything else."""
+    """The natural size of a unit on a robot: its reach for m, 1 for any other."""
     return robot.reach if unit == "m" else 1.0
 
 
+def named(rows: Sequence[Row]) -> list[str]:
+    return [f"{row.name} ({row.unit})" for row in rows]
+
+
 def row_scales(rows: Sequence[Row], robot: Robot) -> Array:
-    """The natural size of each row in its unit, (s,): what a lost rank is measured by."""
+    """The natural size of each row in its unit, (s,), by which a loss of rank is judged."""
     return np.array([natural_size(row.unit, robot) if row.scale is None else row.scale for row in rows])
 
 
@@ -64,7 +66,7 @@ class Evaluation(NamedTuple):
     >>> robot = nmm.load("unicycle_2r")
     >>> here = nmm.Configuration(robot, robot.q({"q2": 0.5}))
     >>> found = nmm.evaluate(nmm.Position("ee", "xy"), 0.0, here)
-    >>> isinstance(found, nmm.Evaluation), found.value.shape, found.value_q.shape
+    >>> isinstance(found, nmm.extending.Evaluation), found.value.shape, found.value_q.shape
     (True, (2,), (2, 5))
     """
 
@@ -76,6 +78,48 @@ class Evaluation(NamedTuple):
 Callback = Callable[[float, Configuration], Evaluation]
 
 
+class LiveNumbers:
+    """Numbers of a stage that are set from outside: `set` writes them wherever compiled code reads them.
+    Readers are held by weak references; copies and pickles have the numbers, not the readers.
+
+    Attributes
+    ----------
+    numbers : their present values; replaced as a whole, never written into
+
+    Examples
+    --------
+    >>> live, read = nmm.extending.LiveNumbers(np.array([1.0, 2.0])), np.zeros(2)
+    >>> live.read_by(read)
+    >>> live.set(np.array([3.0, 4.0]))
+    >>> read
+    array([3., 4.])
+    """
+
+    def __init__(self, numbers: Array) -> None:
+        self.numbers = numbers
+        self._readers: list[weakref.ref[Array]] = []
+        self._lock = Lock()
+
+    def read_by(self, block: Array) -> None:
+        """Write them to `block` now and whenever they are set, as long as something else holds it."""
+        with self._lock:
+            self._readers = [reader for reader in self._readers if reader() is not None]
+            self._readers.append(weakref.ref(block))
+            block[:] = self.numbers
+
+    def set(self, numbers: Array) -> None:
+        """As many other numbers, for every program from its next step on."""
+        with self._lock:
+            self.numbers = numbers
+            for reader in self._readers:
+                block = reader()
+                if block is not None:
+                    block[:] = numbers  # at once: numpy holds the interpreter's lock meanwhile
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return LiveNumbers, (self.numbers.copy(),)
+
+
 @dataclass(frozen=True, eq=False)
 class Stage:
     """A kernel with what it reads. The stages of a function run in order on the same rows.
@@ -84,18 +128,18 @@ class Stage:
     ----------
     kernel : of signature `records.FUNCTION`
     rows : how many rows it reads or writes
-    before : how many of the rows that come before the function's own it sees too, above them
+    before : how many rows before the function's own it reads too
     frames : names of the frames whose placement and Jacobian it reads
     numbers : the numbers that it reads
     hessians : whether it reads the frames' kinematic Hessians
     callback : a user's Python function, run before the kernels; its results are the numbers
-    live : what sets the numbers from outside, between two steps
+    live : sets the numbers from outside, between two steps
 
     Examples
     --------
     >>> robot = nmm.load("unicycle_2r")
     >>> (stage,) = nmm.Position("ee", "xy").stages(robot)
-    >>> isinstance(stage, nmm.Stage), stage.rows, stage.frames
+    >>> isinstance(stage, nmm.extending.Stage), stage.rows, stage.frames
     (True, 2, ('ee',))
     """
 
@@ -110,19 +154,19 @@ class Stage:
 
 
 class Shown(NamedTuple):
-    """What a function is about, for those who draw a run.
+    """What figures and playback draw of a function.
 
     Attributes
     ----------
-    positions : the frame whose origin it puts somewhere in the world
-    axes : the world axes ("x", "y", "z") along which it does, each with the row that holds it, in m
+    positions : the frame whose origin it positions in the world
+    axes : the world axes ("x", "y", "z") of that position, each with its row, m
     turns : the frame that it turns
     looks_at : the fixed point that it looks at, (2,) or (3,), m, world axes
 
     Examples
     --------
     >>> shown = nmm.Position("ee", "xy").shown()
-    >>> isinstance(shown, nmm.Shown), shown.positions, dict(shown.axes)
+    >>> isinstance(shown, nmm.extending.Shown), shown.positions, dict(shown.axes)
     (True, 'ee', {'x': 0, 'y': 1})
     """
 
@@ -133,23 +177,20 @@ class Shown(NamedTuple):
 
 
 class Function(ABC):
-    """phi(t, q). To add one, write in a file of its own a kernel and a subclass that implements:
-
-    1. `rows(robot)`: names, units and angularity of the components; raises `InputError` for
-       what the robot does not have;
-    2. `stages(robot)`: the kernels that compute value, time derivative and Jacobian.
-
-    Where it moves a frame or looks at a point, `shown()` says so, for figures and playback.
+    """φ(t, q). A new function is a kernel and a subclass with two methods: `rows(robot)` returns the
+    components' names and units, and raises `InputError` for what the robot lacks; `stages(robot)` returns the
+    kernels that compute value, time derivative and Jacobian. One that moves a frame or looks at a point
+    overrides `shown()`.
 
     `comparison` is for values that cannot be subtracted (orientations, poses): a kernel of signature
-    `records.FUNCTION` that sees the rows [value, target, error], s of each, with their derivatives, and
-    writes those of the error. Without it the error is target - value, wrapped where a row is an angle.
+    `records.FUNCTION` that reads the rows [value, target, error], s of each, and writes the error and its
+    derivatives. Without it the error is target - value, wrapped where a row is an angle.
 
     Examples
     --------
     >>> robot = nmm.load("unicycle_2r")
     >>> heading = nmm.Heading("ee")
-    >>> isinstance(heading, nmm.Function), heading.rows(robot)[0].unit
+    >>> isinstance(heading, nmm.extending.Function), heading.rows(robot)[0].unit
     (True, 'rad')
     """
 
@@ -164,5 +205,48 @@ class Function(ABC):
         """The kernels that compute them, in order."""
 
     def shown(self) -> Shown:
-        """What figures and playback draw of it; nothing unless it says so."""
+        """What figures and playback draw of it; nothing by default."""
         return Shown()
+
+
+def only_row(function: Function, robot: Robot, where: str, expected: str) -> Row:
+    """The row of a function that has one; `InputError` where it has several."""
+    rows = function.rows(robot)
+    expect(len(rows) == 1, where, expected, [row.name for row in rows])
+    return rows[0]
+
+
+@kernel(FUNCTION)
+def move_rows(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
+    """Moves the rows from `source` to `target`, then clears the first rows; numbers = [source, target, number
+    of rows, number of first rows to clear]."""
+    source, target, count = int(numbers[0]), int(numbers[1]), int(numbers[2])
+    for moved in range(count):
+        i = moved if target < source else count - 1 - moved  # so that none is overwritten before it is read
+        rows.value[target + i] = rows.value[source + i]
+        rows.value_t[target + i] = rows.value_t[source + i]
+        copied(rows.value_q[source + i], rows.value_q[target + i])
+    for i in range(int(numbers[3])):
+        rows.value[i] = 0.0
+        rows.value_t[i] = 0.0
+        clear(rows.value_q[i])
+
+
+def stacked(functions: Sequence[Function], robot: Robot) -> tuple[Stage, ...]:
+    """Stages that leave the functions' rows one below the other, for the stage after them."""
+    stages: tuple[Stage, ...] = ()
+    count = 0
+    # The last first: what is there is moved out of the way of the next, which begins on clean rows.
+    for function in reversed(functions):
+        own, rows = function.stages(robot), len(function.rows(robot))
+        if count:
+            used, aside = max(stage.rows for stage in stages), max(stage.rows for stage in own)
+            away = Stage(move_rows, max(used, aside + count), (), np.array([0.0, aside, count, aside]))
+            stages = (*stages, away, *own)
+            if aside != rows:
+                back = np.array([aside, rows, count, 0.0], dtype=float)
+                stages = (*stages, Stage(move_rows, aside + count, (), back))
+        else:
+            stages = own
+        count += rows
+    return stages

@@ -13,7 +13,8 @@ from nmm.arrays import Array, Integers
 from nmm.functions.function import Callback, Evaluation, Function, Stage
 from nmm.kernels.compiled import call_platform, clear, compiled, view
 from nmm.kernels.kinematics import Kinematics, place_frames
-from nmm.kernels.memory import (
+from nmm.kernels.record_layout import (
+    BLOCKS,
     Blocks,
     IntegerCell,
     IntegerVector,
@@ -32,12 +33,8 @@ from nmm.robots.robot import CENTER_OF_MASS, Robot
 
 
 class Buffers(NamedTuple):
-    """What the kernels read and write.
-
-    placements (k, 3, 4), jacobians (k, 6, n), hessians (k or 0, 6, n, n): kinematics of k frames
-    G (n_p, p), G_q (n_p, p, n_p): the platform's velocity map and its derivatives
-    value (rows,), value_t (rows,), value_q (rows, n): the functions, one below the other
-    """
+    """Kernels read k frames' placements (k, 3, 4), jacobians (k, 6, n) and hessians (k or 0, 6, n, n), G
+    (n_p, p) and G_q (n_p, p, n_p); and write value and value_t (rows,) and value_q (rows, n)."""
 
     placements: Matrices
     jacobians: Matrices
@@ -50,11 +47,8 @@ class Buffers(NamedTuple):
 
 
 class LaidOut(NamedTuple):
-    """A program in memory; it is the first record there.
-
-    kinematics () : where its record `Kinematics` is; 0 while Pinocchio computes them before the program runs
-    stages : where the records of the stages (`LaidOutStage`) are, in the order in which they run
-    """
+    """A program in memory, the first record there. `kinematics` () is where its record `Kinematics` is, or 0
+    while Pinocchio computes them before the program runs; `stages` is where each `LaidOutStage` is."""
 
     buffers: Buffers
     kinematics: IntegerCell
@@ -73,7 +67,7 @@ class LaidOutStage(NamedTuple):
     numbers: Vector
 
 
-#: Who computes the kinematics of a program's frames.
+#: What computes the kinematics of a program's frames.
 PINOCCHIO, COMPILED = "pinocchio", "compiled"
 
 #: Where a caller's own record begins (see `Program.lay_out`).
@@ -81,15 +75,13 @@ BESIDE = header_length(LaidOut)
 
 
 def nothing(t: float, q: Array) -> None:
-    """What is to be done before a program runs whose kinematics are compiled, without users' functions."""
+    """Prepares a program that needs nothing: compiled kinematics, no users' functions."""
 
 
 @compiled
-def run(t: float, q: Array, integers: Integers, floats: Array) -> None:
-    """Evaluate the platform and every stage at (t, q), into the program's buffers.
-
-    The kinematics of the frames are there already, unless they are compiled.
-    """
+def run_program(t: float, q: Array, integers: Integers, floats: Array) -> None:
+    """Evaluate the platform and every stage at (t, q), into the program's buffers; the kinematics of the
+    frames are there already, unless they are compiled."""
     program = views(LaidOut, integers, floats, 0)
     b = program.buffers
     n = q.shape[0]
@@ -116,24 +108,13 @@ def run(t: float, q: Array, integers: Integers, floats: Array) -> None:
         call_function(stage.kernel, at, frames, stage.numbers, rows)
 
 
-PLACE = types.void(
-    *(types.int64[::1], types.float64[::1], types.int64, types.float64[::1]),
-    *(types.float64[:, :, ::1], types.float64[:, :, ::1], types.float64[:, :, :, ::1]),
-)
+_TABLES, _TENSORS = types.float64[:, :, ::1], types.float64[:, :, :, ::1]
+PLACE = types.void(BLOCKS, types.int64, types.float64[::1], _TABLES, _TABLES, _TENSORS)
 
 
 @compiled
-def place(
-    integers: Integers,
-    floats: Array,
-    table: int,
-    q: Array,
-    placements: Array,
-    jacobians: Array,
-    hessians: Array,
-) -> None:
-    """The compiled kinematics alone."""
-    here = views(Kinematics, integers, floats, table)
+def place(blocks: Blocks, table: int, q: Array, placements: Array, jacobians: Array, hessians: Array) -> None:
+    here = views(Kinematics, blocks.integers, blocks.floats, table)
     place_frames(here.joints, here.frames, q, placements, jacobians, hessians)
 
 
@@ -142,17 +123,15 @@ class Program:
 
     Parameters
     ----------
-    kinematics : who computes them: PINOCCHIO in `prepare`, or `nmm.kernels.kinematics` in `run`, COMPILED
+    kinematics : PINOCCHIO, in `prepare`, or COMPILED, by `nmm.kernels.kinematics` in `run_program`
 
     Attributes
     ----------
     first_rows : where the rows of each function begin in `buffers.value`
-    blocks : what `run` takes, made by `lay_out`
-    buffers : what it reads and writes, as views
+    blocks, buffers : what `run_program` takes, made by `lay_out`, and what it reads and writes, as views
     calls_python : whether users' Python functions are among them
-    costs : what makes such functions dear, a sentence each
-    prepare : prepare(t, q) does Pinocchio's part at q and the users' Python functions at (t, q); `nothing`
-        where there is neither
+    costs : what makes such functions slow, a sentence each
+    prepare : (t, q) -> None, Pinocchio's part at q and the users' Python functions, or `nothing`
     """
 
     blocks: Blocks
@@ -166,18 +145,16 @@ class Program:
         self._compiled = kinematics == COMPILED
         self.first_rows: list[int] = []
         self._lengths = [len(function.rows(robot)) for function in functions]
-        self._frames: list[str] = []
         self._stages: list[tuple[Stage, int]] = []
         self._rows = 0
         for function in functions:
             stages = function.stages(robot)
             self.first_rows.append(self._rows)
             self._stages += [(stage, self._rows) for stage in stages]
-            self._frames += [frame for stage in stages for frame in stage.frames]
             self._rows += max((stage.rows for stage in stages), default=0)
-            for stage in stages:
-                _ = stage.kernel.address  # now, while others may be compiling the step (`kernels/ahead`)
-        self._frames = list(dict.fromkeys(self._frames))
+            for stage in stages:  # now, while others may be compiling the step (`kernels/parallel_compile`)
+                _ = stage.kernel.address
+        self._frames = tuple(dict.fromkeys(frame for stage, _ in self._stages for frame in stage.frames))
 
     def lay_out(self, beside: tuple[Any, ...] | None = None) -> None:
         """Allocate, with a record of the caller's, whose place is `BESIDE`."""
@@ -188,26 +165,13 @@ class Program:
         first = BESIDE + (0 if beside is None else header_length(type(beside)))
         places = first + length * np.arange(len(self._stages))
         table = first + length * len(self._stages)
-        buffers = Buffers(
-            np.zeros((k, 3, 4)),
-            np.zeros((k, 6, n)),
-            np.zeros((with_hessians, 6, n, n)),
-            np.zeros((n_p, p)),
-            np.zeros((n_p, p, n_p)),
-            np.zeros(rows),
-            np.zeros(rows),
-            np.zeros((rows, n)),
-        )
+        shapes: list[tuple[int, ...]] = [(k, 3, 4), (k, 6, n), (with_hessians, 6, n, n)]
+        shapes += [(n_p, p), (n_p, p, n_p), (rows,), (rows,), (rows, n)]
+        buffers = Buffers(*(np.zeros(shape) for shape in shapes))
+        kinematics = np.array(table if self._compiled else 0, dtype=np.int64)
         memory = Memory()
-        memory.add(
-            LaidOut(
-                buffers,
-                np.array(table if self._compiled else 0, dtype=np.int64),
-                platform.velocity_map.address,
-                platform.parameters,
-                places,
-            )
-        )
+        kernel, numbers = platform.velocity_map.address, platform.parameters
+        memory.add(LaidOut(buffers, kinematics, kernel, numbers, places))
         if beside is not None:
             memory.add(beside)
         for stage, row in self._stages:
@@ -220,32 +184,22 @@ class Program:
         laid = views(LaidOut, *self.blocks, 0)
         self._kinematics, self._table = laid.kinematics, table
         self.buffers = found = laid.buffers
-        self.prepare = update = (
-            nothing
-            if self._compiled
-            else kinematics_updater(
-                robot, tuple(self._frames), found.placements, found.jacobians, found.hessians
-            )
-        )
-        stages = [stage for stage, _ in self._stages]
+        update = nothing if self._compiled else kinematics_updater(robot, self._frames, *found[:3])
         self._numbers = [views(LaidOutStage, *self.blocks, int(place)).numbers for place in places]
-        for stage, block in zip(stages, self._numbers, strict=True):
+        callbacks = []
+        for (stage, _), block in zip(self._stages, self._numbers, strict=True):
             if stage.live is not None:
                 stage.live.read_by(block)
-        callbacks = [
-            (stage.callback, block)
-            for stage, block in zip(stages, self._numbers, strict=True)
-            if stage.callback is not None
-        ]
+            if stage.callback is not None:
+                callbacks.append((stage.callback, block))
         self.calls_python = bool(callbacks)
         said = (getattr(callback, "costs", "") for callback, _ in callbacks)
         self.costs = tuple(dict.fromkeys(sentence for sentence in said if sentence))
-        if callbacks:
-            self.prepare = _with_callbacks(robot, update, callbacks)
+        self.prepare = _with_callbacks(robot, update, callbacks) if callbacks else update
 
     @contextmanager
     def compiled_kinematics(self) -> Iterator[None]:
-        """In the block `run` computes the kinematics, whoever does otherwise; nothing has to be prepared."""
+        """In the block `run_program` computes the kinematics itself; nothing has to be prepared."""
         usual = int(self._kinematics)
         self._kinematics[()] = self._table
         try:
@@ -257,34 +211,30 @@ class Program:
         """The most by which Pinocchio's kinematics and the compiled ones differ at q (N, n), m and rad."""
         robot, b = self.robot, self.buffers
         theirs, ours = ([np.zeros_like(one) for one in b[:3]] for _ in range(2))
-        update = kinematics_updater(robot, tuple(self._frames), *theirs)
+        update = kinematics_updater(robot, self._frames, *theirs)
         off = 0.0
         for q in configurations:
             update(0.0, q)
-            place(*self.blocks, self._table, q, *ours)
-            off = max(
-                off, *(float(np.abs(a - z).max(initial=0.0)) for a, z in zip(theirs, ours, strict=True))
-            )
+            place(self.blocks, self._table, q, *ours)
+            pairs = zip(theirs, ours, strict=True)
+            off = max(off, *(float(np.abs(a - z).max(initial=0.0)) for a, z in pairs))
         return off
 
     def evaluate(self, t: float, q: Array) -> list[Evaluation]:
         """Every function's value, time derivative and Jacobian at (t, q), as copies."""
         q = np.array(q, dtype=np.float64)
         self.prepare(t, q)
-        run(float(t), q, *self.blocks)
-        b = self.buffers
+        run_program(float(t), q, *self.blocks)
+        *_, value, value_t, value_q = self.buffers
         return [
-            Evaluation(b.value[a:z].copy(), b.value_t[a:z].copy(), b.value_q[a:z].copy())
-            for a, z in (
-                (first, first + length) for first, length in zip(self.first_rows, self._lengths, strict=True)
-            )
+            Evaluation(*(part[first : first + length].copy() for part in (value, value_t, value_q)))
+            for first, length in zip(self.first_rows, self._lengths, strict=True)
         ]
 
 
 def evaluate(function: Function, t: float, configuration: Configuration) -> Evaluation:
-    """phi (s,), ∂phi/∂t (s,) and ∂phi/∂q (s, n) at time t, s, and a configuration, in the units of its rows.
-
-    It is laid out for this one call; a loop over many configurations holds a `Program` or a controller.
+    """φ (s,), ∂φ/∂t (s,) and ∂φ/∂q (s, n) at time t, s, and a configuration, in the units of its rows. For
+    many configurations, lay out one `Program` or use a controller.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Pursuit: how an axle must be steered to lead its middle, on a circle, to the robot's own hand."""
+"""Pursuit: how an axle is steered so that its middle moves, on a circle, towards the end-effector."""
 
 from __future__ import annotations
 
@@ -21,11 +21,9 @@ AXLE, PIVOT = 4, 6
 def pursuit(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     """The angles c* of the pivots (values alone) and ½ β², with the azimuth β's gradient.
 
-    The hand is at l (cos β, sin β) from the axle's middle; the circle that leaves there along the axle's
-    direction and meets the hand has the curvature κ = 2 sin β / l, and takes a pivot at (x, y) into the
-    direction (1 - κ y, κ x). For a car: tan δ* = 2 L sin β / l. The main body's placement is in q, another's
-    is the second frame's.
-    """
+    The end-effector is at l (cos β, sin β) from the axle's middle. The circle from there along the axle's
+    direction to it has κ = 2 sin β / l and gives a pivot at (x, y) the direction (1 - κ y, κ x); a car has
+    tan δ* = 2 L sin β / l. The second frame is the body's, unless it is the main one (in q)."""
     hand, main = frames.slots[0], frames.slots.shape[0] == 1
     body = hand if main else frames.slots[1]
     b_x, b_y = at.q[0], at.q[1]
@@ -64,16 +62,9 @@ def pursuit(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
 
 
 class Pursuit(Function):
-    """The angles c* to which an axle is steered so that it leads to `hand`, and ½ β² of the hand's azimuth.
-
-    c* is within the pivot's limits and its `widest`: a c that goes towards it stays there.
-
-    Parameters
-    ----------
-    hand : the frame that is pursued
-    body : the coordinate that turns the body with the axle, and its joint's frame
-    axle : the axle and what steers it
-    """
+    """The angles c* that steer an axle towards the frame `hand` (usually the end-effector), and ½ β² of its
+    azimuth β; c* is within the pivot's limits and `widest`: a c that moves towards it stays there. `body` is
+    the coordinate that turns the body with the axle, and its joint's frame."""
 
     def __init__(self, hand: str, body: str, axle: SteeredAxle) -> None:
         self.hand = hand

@@ -1,1 +1,1 @@
-"""Compiled code: kernels and how they are called, packed arrays, small linear algebra, rotations."""
+"""Compiled code: kernels and their calls, packed records, small linear algebra, rotations."""

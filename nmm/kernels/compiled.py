@@ -1,57 +1,54 @@
-"""Kernels: plain functions on arrays that run as they stand and, fused by numba, in a 1 kHz loop.
+"""Kernels: plain functions on arrays that run as they are or, compiled by numba, in a 1 kHz loop.
 
-A *kernel* is a module-level function with one of the signatures below, written in the subset of
-Python that numba compiles. The decorator compiles it (cached on disk) and notes its address, so
-that a compiled program can call whatever kernels a user combined, as a C program calls through
-function pointers: no code is generated, no combination is compiled anew, and a new kernel is one
-new function in one new file.
-
-The same function runs as it stands: `Kernel.plain` is the undecorated function, and a program run
-in plain Python (`NUMBA_DISABLE_JIT=1`, or `program.py_func`) calls the plain kernels.
+A *kernel* is a module-level function of a given signature in the subset of Python that numba compiles. The
+decorator compiles it (cached on disk) and records its address, by which compiled programs call whatever
+kernels a user combined: no code is generated, and no combination is compiled anew. `Kernel.plain` is the
+undecorated function, for programs in plain Python (`NUMBA_DISABLE_JIT=1`, or `program.py_func`).
 """
 
 from __future__ import annotations
 
 import functools
+import logging
 import math
+import multiprocessing
+import sys
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cached_property
 from typing import Any
 
 import numba
 import numpy as np
+from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.core.dispatcher import Dispatcher
-from numba.core.errors import TypingError
-from numba.extending import intrinsic, lower_builtin, overload, type_callable
+from numba.extending import intrinsic, is_jitted, lower_builtin, overload, type_callable
 
-from nmm.kernels.cache import KernelCache
-from nmm.kernels.parts import KernelDispatcher
+from nmm.kernels import numba_internals
+from nmm.kernels.cache import KernelCache, cache_folder
+
+if numba_internals.missing is None:
+    from nmm.kernels.parts import KernelDispatcher
 
 Plain = Callable[..., Any]
 
-
-_vector = types.float64[::1]
-_matrix = types.float64[:, ::1]
-_stack = types.float64[:, :, ::1]
-
 #: qp_dot = G(qp) up: (qp, parameters, G, G_q) with G_q[i, j, k] = dG[i, j] / dqp[k]
-PLATFORM = types.void(_vector, _vector, _matrix, _stack)
+PLATFORM = types.void(types.float64[::1], types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1])
 
 
 class Kernel:
-    """A function in its two forms: `plain` Python, and `compiled`, which calling the kernel calls.
+    """A function in two forms: `plain` Python, and `compiled`, which is used when the kernel is called.
 
-    It is compiled (or its compiled form read from the cache) when first called or when its
-    `address` is first asked for: a run pays for the kernels that it uses.
+    It is compiled, or read from the cache, when it is first called or its `address` is first requested: a run
+    pays only for the kernels that it uses.
 
     Examples
     --------
     >>> kernel = nmm.Unicycle().velocity_map
     >>> G, G_q = np.zeros((3, 2)), np.zeros((3, 2, 3))
     >>> kernel(np.zeros(3), np.zeros(0), G, G_q)
-    >>> isinstance(kernel, nmm.Kernel), G[0].tolist(), callable(kernel.plain)
+    >>> isinstance(kernel, nmm.extending.Kernel), G[0].tolist(), callable(kernel.plain)
     (True, [1.0, 0.0], True)
     """
 
@@ -64,24 +61,27 @@ class Kernel:
 
     @cached_property
     def compiled(self) -> Any:
-        """The compiled form; with numba's bookkeeping of arrays only if the kernel makes some of its own."""
+        """The compiled form; it counts references to arrays only if the kernel creates some."""
         made = compiled(self.plain)
-        if isinstance(made, Dispatcher):
+        if is_jitted(made):
             try:
                 made.compile(self.signature.args)
-            except TypingError:
+            except numba.TypingError:
                 made = allocating(self.plain)
                 made.compile(self.signature.args)
         return made
 
     @cached_property
     def address(self) -> int:
-        """Where the machine code of the compiled form begins: what compiled programs call it by."""
-        if isinstance(self.compiled, Dispatcher):
+        """The address of its machine code, by which compiled programs call it."""
+        if not is_jitted(self.compiled):  # NUMBA_DISABLE_JIT=1
+            address = id(self.plain)
+        elif problem() is None:
             result = self.compiled.overloads[self.signature.args]
             address = int(result.library.get_pointer_to_function(result.fndesc.llvm_func_name))
-        else:  # NUMBA_DISABLE_JIT=1: run as it stands
-            address = id(self.plain)
+        else:
+            made = functools.partial(numba.cfunc, self.signature, error_model="numpy")
+            address = int(_kept_by_numba(made, self.plain).address)
         _plain_by_address[address] = self.plain
         return address
 
@@ -89,57 +89,86 @@ class Kernel:
 _plain_by_address: dict[int, Plain] = {}
 
 
-def compiled(
-    function: Callable[..., Any],
-    allocates: bool = False,
-    nogil: bool = False,
-    vectorized: bool = False,
-    forceinline: bool = False,
-) -> Any:
+def compiled(function: Callable[..., Any], **options: bool) -> Any:
     """`numba.njit` with nmm's options and nmm's cache folder; `.py_func` is the plain function.
 
-    Divisions by zero give inf and nan as in numpy (`error_model`): a singular matrix is a case
-    that the resolvers report, not an exception out of compiled code. Arrays are neither made (but see
-    `scratch`) nor returned: counting references to them would take half of a control step.
-
-    vectorized : for innermost loops that run over many alike; those over three or seven numbers lose by it
-    forceinline : callers take in its instructions, with what is constant there
+    Divisions by zero give inf and nan as in numpy (`error_model`): resolvers report a singular matrix;
+    compiled code raises no exception. Arrays are neither created (but see `scratch`) nor returned, as
+    counting references to them would take half of a control step. The options are those below.
     """
     if numba.config.DISABLE_JIT:
         return function
-    options = {"nopython": True, "error_model": "numpy", "_nrt": allocates, "nogil": nogil}
-    if forceinline:
-        options["forceinline"] = True
-    made = KernelDispatcher(function, options, vectorized)
-    made._cache = KernelCache(function)  # as `enable_caching` does with numba's own
+    if problem() is not None:
+        nogil = options.get("nogil", False)
+        return _kept_by_numba(functools.partial(numba.njit, error_model="numpy", nogil=nogil), function)
+    return _whole_with_parts(function, **options)
+
+
+def _whole_with_parts(
+    function: Plain, allocates: bool = False, vectorized: bool = False, **options: bool
+) -> Any:
+    """A function both whole, as `njit` makes it, and as a part of its callers."""
+    given = {"nopython": True, "error_model": "numpy", "_nrt": allocates, **options}
+    made = KernelDispatcher(function, given, vectorized)
+    made._cache = KernelCache(function)  # in place of `enable_caching`
     return made
 
 
-#: Decorator for functions that make or return arrays.
+def _kept_by_numba(decorator: Callable[..., Any], function: Plain) -> Any:
+    """A function made by numba's own decorator, cached in nmm's folder where that is writable."""
+    before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(cache_folder())
+    try:
+        return decorator(cache=True)(function)
+    except RuntimeError:  # it cannot be cached
+        return decorator()(function)
+    finally:
+        numba.config.CACHE_DIR = before
+
+
+@functools.cache
+def problem() -> str | None:
+    """What differs from the expected numba internals, or None; logged once, tested once for each cache
+    folder.
+    """
+    works = cache_folder() / f"works_{sys.implementation.cache_tag}"
+    if numba_internals.missing is None and not works.is_dir():
+        numba_internals.missing = numba_internals.tried(_whole_with_parts, caller)
+        if numba_internals.missing is None:
+            with suppress(OSError):  # then it is tested again
+                works.mkdir(parents=True)
+    found = numba_internals.missing
+    if found is not None and multiprocessing.parent_process() is None:
+        logging.getLogger("nmm").warning(
+            "numba %s: %s; nmm compiles by numba's njit alone: the same numbers, later and more slowly",
+            numba.__version__,
+            found,
+        )
+    return found
+
+
+#: Decorator for functions that create or return arrays.
 allocating = functools.partial(compiled, allocates=True)
 
-#: Decorator for functions that run for so long that other threads should, too.
+#: Decorator for long-running functions, beside which other threads should run.
 compiled_without_gil = functools.partial(compiled, nogil=True)
 
-#: Decorator for such functions whose innermost loops run over many matrices side by side.
+#: Decorator for such functions with innermost loops over many matrices; short loops would become slower.
 vectorized_without_gil = functools.partial(compiled_without_gil, vectorized=True)
 
-#: Decorator for functions that are written into each caller, for its constants.
+#: Decorator for functions inlined into each caller, where some arguments are constant.
 inlined_in_callers = functools.partial(compiled, forceinline=True)
 
-#: Decorator for helpers of compiled functions that stay plain Python when called from Python.
+#: Decorator for helpers of compiled functions that are plain Python when called from Python.
 inlined = numba.extending.register_jitable
 
 
 def checked_by_caller(function: Any, signature: Any) -> Callable[..., Any]:
-    """A compiled function for arguments of one signature, which it no longer looks at: a third of a µs less.
-
-    An argument of another type is read as if it were of this one, or crashes.
-    """
-    if not isinstance(function, Dispatcher):
-        return function  # NUMBA_DISABLE_JIT=1: as it stands
+    """A compiled function that skips the check of its arguments, which saves a third of a µs; arguments that
+    do not have this signature are misread or crash the process."""
+    if not is_jitted(function):
+        return function  # NUMBA_DISABLE_JIT=1
     function.compile(signature.args)
-    return function.overloads[signature.args].entry_point
+    return function if problem() is not None else function.overloads[signature.args].entry_point
 
 
 def kernel(signature: Any) -> Callable[[Plain], Kernel]:
@@ -154,40 +183,35 @@ def kernel(signature: Any) -> Callable[[Plain], Kernel]:
 def view(memory: Any, first: int, shape: tuple[int, ...]) -> Any:
     """A view of contiguous `memory` from its element `first` on, of the given shape.
 
-    Compiled, it is a pointer, a shape and strides, and no more: no bounds are checked and no
-    references counted, which slices and `reshape` do, at half the cost of a control step. Whoever
-    calls the compiled code holds the memory while it runs.
+    Compiled, it is just a pointer, a shape and strides: slices and `reshape` would also check bounds and
+    count references, at half the cost of a control step. The caller of compiled code holds the memory
+    meanwhile.
     """
     return memory.reshape(-1)[first : first + math.prod(shape)].reshape(shape)
 
 
 def generated_in_callers(function: Any, type_of: Any, generate: Any, *kinds: tuple[Any, ...]) -> None:
-    """Give a plain function a compiled form that is no function: instructions written where it is called.
-
-    What a function called would hand back is then possible: room on the caller's stack, arrays that nobody
-    owns. `type_of` maps the arguments' types to a type or a signature, `kinds` are those it is for.
-    """
+    """Give a plain function a compiled form, generated in its callers, that may return memory on their stack;
+    type_of maps the arguments' types to a type or a signature, kinds are the types for which it is made."""
     type_callable(function)(lambda context: type_of)
     for arguments in kinds:
         lower_builtin(function, *arguments)(generate)
 
 
 def scratch(extents: Any) -> Any:
-    """Room for numbers that a kernel needs while it runs: `np.empty(extents)`, on the stack when compiled.
+    """Memory for a kernel while it runs: `np.empty(extents)`, on the stack when compiled.
 
-    Extents are an integer or a tuple. To be called outside of loops; neither returned nor kept.
+    extents is an integer or a tuple. Call it outside loops; the array must be neither returned nor kept.
     """
     return np.empty(extents)
 
 
 def integer_scratch(extent: int) -> Any:
-    """`scratch` for as many integers."""
+    """`scratch` for integers."""
     return np.empty(extent, dtype=np.int64)
 
 
 def _on_the_stack(function: Callable[..., Any], number: Any) -> None:
-    """Register the compiled form of `scratch`."""
-
     def type_of(extents: Any) -> Any:
         return types.Array(number, getattr(extents, "count", 1), "C")
 
@@ -206,7 +230,7 @@ _on_the_stack(integer_scratch, types.int64)
 
 
 def array_at(context: Any, builder: Any, kind: Any, data: Any, extents: Any) -> Any:
-    """For intrinsics: the contiguous array at a pointer; no references are counted."""
+    """For intrinsics: the contiguous array at a pointer, without reference counting."""
     itemsize = context.get_constant(types.intp, context.get_abi_sizeof(context.get_data_type(kind.dtype)))
     strides: list[Any] = []
     stride = itemsize
@@ -219,8 +243,8 @@ def array_at(context: Any, builder: Any, kind: Any, data: Any, extents: Any) -> 
 
 
 def _type_of_view(memory: Any, first: Any, shape: Any) -> Any:
-    result = types.Array(memory.dtype, len(shape), "C")
-    return result(memory, types.int64, types.UniTuple(types.int64, len(shape)))
+    extents = types.UniTuple(types.int64, len(shape))
+    return types.Array(memory.dtype, len(shape), "C")(memory, types.int64, extents)
 
 
 def _generate_view(context: Any, builder: Any, signature: Any, values: Any) -> Any:
@@ -234,7 +258,7 @@ generated_in_callers(view, _type_of_view, _generate_view, (types.Array, types.in
 
 @inlined
 def clear(array: Any) -> None:
-    """Zeros everywhere."""
+    """Set all elements to zero."""
     numbers = view(array, 0, (array.size,))
     for i in range(array.size):
         numbers[i] = 0.0
@@ -250,10 +274,13 @@ def caller(signature: Any) -> Callable[..., Any]:
     @intrinsic
     def through_pointer(context: Any, address: Any, arguments: Any) -> Any:
         def generate(context: Any, builder: Any, signature_here: Any, values: Any) -> Any:
-            convention = context.call_conv
+            convention, unpacked = context.call_conv, cgutils.unpack_tuple(builder, values[1])
+            if numba_internals.missing is not None:  # the calling convention of `numba.cfunc`
+                kinds = [context.get_value_type(kind) for kind in signature.args]
+                pointer_type = ir.FunctionType(context.get_value_type(returned), kinds).as_pointer()
+                return builder.call(builder.inttoptr(values[0], pointer_type), unpacked)
             pointer_type = convention.get_function_type(returned, signature.args).as_pointer()
             function = builder.inttoptr(values[0], pointer_type)
-            unpacked = cgutils.unpack_tuple(builder, values[1])
             status, result = convention.call_function(builder, function, returned, signature.args, unpacked)
             with cgutils.if_unlikely(builder, status.is_error):
                 convention.return_status_propagate(builder, status)

@@ -1,27 +1,24 @@
-"""A robot's kinematics, compiled: joints, frames, their Jacobians and Hessians, the centre of mass.
+"""A robot's compiled kinematics: joints, frames, their Jacobians and Hessians, the centre of mass.
 
-It is what Pinocchio computes (`nmm.robots.configuration`), for loops that cannot wait for calls from Python.
-World axes (LOCAL_WORLD_ALIGNED). Every joint's axes are turned so that it turns about its own z: one form
-for all of them.
+The same results as Pinocchio's (`nmm.robots.configuration`), for loops without calls from Python, in world
+axes (LOCAL_WORLD_ALIGNED). Each joint's axes are oriented so that it turns about its own z.
 """
-
-from __future__ import annotations
 
 import math
 from typing import NamedTuple
 
 from nmm.arrays import Array
-from nmm.kernels.compiled import compiled, scratch
-from nmm.kernels.memory import IntegerVector, Matrix, Vector
+from nmm.kernels.compiled import clear, compiled, scratch
+from nmm.kernels.record_layout import IntegerVector, Matrix, Vector
 
 
 class Joints(NamedTuple):
-    """J joints of one number each, parents before children; joint 0 is the world, which stands.
+    """J joints of one coordinate each, parents before children; joint 0 is the world.
 
-    parent (J,), coordinate (J,) : the joint before it, and which of q moves it
-    placement (J, 12) : in its parent's axes where its number is 0: R column by column, then p, m
-    turns (J,) : 1 where its number turns it about its z, in rad, 0 where it does not
-    slide (J, 3) : by how much its number moves it, in its own axes, 1 or m/rad
+    parent (J,), coordinate (J,) : the preceding joint, and the index in q
+    placement (J, 12) : in its parent's axes at coordinate 0: R column by column, then p, m
+    turns (J,) : 1 where it turns about its z, rad, else 0
+    slide (J, 3) : displacement per unit of the coordinate, in its own axes, 1 or m/rad
     """
 
     parent: IntegerVector
@@ -34,12 +31,9 @@ class Joints(NamedTuple):
 class FrameTable(NamedTuple):
     """K frames of a program.
 
-    carrier (K,), placement (K, 12) : the joint that carries a frame, and where it is in its axes; the
-        centre of mass is carried by joint -1
-    first (K + 1,), chain (...) : the joints that move a frame, from the world on:
-        chain[first[k]:first[k + 1]]
-    masses (J, 4) : of what each joint carries its mass, kg, and its centre in the joint's axes, m; of the
-        world what stands
+    carrier (K,), placement (K, 12) : the joint that carries a frame (-1: centre of mass), and its place there
+    first (K + 1,), chain (...) : chain[first[k]:first[k + 1]] are the joints that move a frame, root first
+    masses (J, 4) : mass carried by each joint, kg, its centre in the joint's axes, m; world: the fixed parts
     """
 
     carrier: IntegerVector
@@ -89,20 +83,17 @@ def place_joints(joints: Joints, q: Array, out: Array) -> None:
 
 @compiled
 def axes(joints: Joints, places: Array, out: Array) -> None:
-    """out (J, 6): of each joint the velocity of its origin, and its angular velocity, for a rate of 1."""
+    """out (J, 6): each joint's linear velocity at its origin and angular velocity, at rate 1."""
     for i in range(1, joints.parent.shape[0]):
+        x, y, z = joints.slide[i, 0], joints.slide[i, 1], joints.slide[i, 2]
         for a in range(3):
-            out[i, a] = (
-                places[i, a] * joints.slide[i, 0]
-                + places[i, 3 + a] * joints.slide[i, 1]
-                + places[i, 6 + a] * joints.slide[i, 2]
-            )
+            out[i, a] = places[i, a] * x + places[i, 3 + a] * y + places[i, 6 + a] * z
             out[i, 3 + a] = joints.turns[i] * places[i, 6 + a]
 
 
 @compiled
 def moved(places: Array, twists: Array, i: int, x: float, y: float, z: float, out: Array) -> None:
-    """out[:3]: the velocity of the point (x, y, z) for a rate 1 of joint i."""
+    """out[:3]: the velocity of the point (x, y, z) at rate 1 of joint i."""
     x, y, z = x - places[i, 9], y - places[i, 10], z - places[i, 11]
     a, b, c = twists[i, 3], twists[i, 4], twists[i, 5]
     out[0] = twists[i, 0] + b * z - c * y
@@ -116,7 +107,7 @@ def place_frames(
 ) -> None:
     """placements (K, 3, 4) = [R | p], jacobians (K, 6, n) and, if there are any, hessians (K, 6, n, n).
 
-    Of the last two only what can be other than 0 is written.
+    Of the last two only entries that can be nonzero are written.
     """
     count = joints.parent.shape[0]
     places, twists, here, v = scratch((count, 12)), scratch((count, 6)), scratch((1, 12)), scratch(3)
@@ -145,14 +136,13 @@ def place_frames(
 
 @compiled
 def differentiate(joints: Joints, chain: Array, first: int, last: int, J: Array, H: Array) -> None:
-    """H (6, n, n) = dJ[:, j] / dq[k]: what is before a joint turns it, what is after it moves the point."""
+    """H (6, n, n) = dJ[:, j] / dq[k]: joints before a joint turn it, those after it move the point."""
     for c in range(first, last):
         j = joints.coordinate[chain[c]]
         for d in range(first, last):
             k = joints.coordinate[chain[d]]
-            one, two = (
-                (j, k) if d > c else (k, j)
-            )  # the one nearer to the world turns the other one's velocity
+            # The joint nearer to the world turns the other one's velocity.
+            one, two = (j, k) if d > c else (k, j)
             for a in range(3):
                 x, y = (a + 1) % 3, (a + 2) % 3
                 H[a, j, k] = J[3 + x, one] * J[y, two] - J[3 + y, one] * J[x, two]
@@ -163,9 +153,9 @@ def differentiate(joints: Joints, chain: Array, first: int, last: int, J: Array,
 def center_of_mass(
     joints: Joints, frames: FrameTable, places: Array, twists: Array, placement: Array, J: Array
 ) -> None:
-    """The centre of mass and its Jacobian's upper rows, as of a frame with the world's axes."""
+    """The centre of mass and the upper rows of its Jacobian, for a frame with the world's axes."""
     count = joints.parent.shape[0]
-    sums, v = scratch((count, 4)), scratch(3)  # of each joint and what it carries: mass times centre, mass
+    sums, v = scratch((count, 4)), scratch(3)  # for each joint with all that it carries: mass * centre, mass
     for i in range(count):
         m = frames.masses[i, 0]
         for a in range(3):
@@ -180,8 +170,7 @@ def center_of_mass(
     total = sums[0, 3]
     for i in range(1, count):
         m = sums[i, 3]
-        for a in range(3):
-            v[a] = 0.0
+        clear(v)
         if m > 0.0:
             moved(places, twists, i, sums[i, 0] / m, sums[i, 1] / m, sums[i, 2] / m, v)
         for a in range(3):

@@ -1,53 +1,76 @@
-"""Small dense linear algebra as plain loops: at a dozen rows they beat a call into LAPACK, and fuse.
+"""Small dense linear algebra as plain loops: for a dozen rows these are faster than LAPACK calls, and fuse.
 
-Two decompositions serve every resolver: orthonormal rows (J = Pᵀ L Q, the transpose of a pivoted
-QR), from which come minimum-norm solutions, projections, rank and det J Jᵀ; and Gaussian
-elimination with partial pivoting for square systems.
+Three decompositions serve every resolver: orthonormal rows (J = Pᵀ L Q, the transpose of a pivoted QR), for
+minimum-norm solutions, projections, rank and det J Jᵀ; Gaussian elimination with partial pivoting for square
+systems; and singular values and vectors by one-sided Jacobi, the most accurate method for small ones.
 """
-
-from __future__ import annotations
 
 import math
 
 import numpy as np
 
 from nmm.arrays import Array
-from nmm.kernels.compiled import compiled, scratch
+from nmm.kernels.compiled import clear, compiled, scratch
 
 EPSILON = float(np.finfo(float).eps)
+#: Sweeps end when no pair of rows is rotated, always before this many.
+MOST_SWEEPS = 40
+
+
+@compiled
+def copied(one: Array, other: Array) -> None:
+    for i in range(other.shape[0]):
+        other[i] = one[i]
+
+
+@compiled
+def dot(a: Array, b: Array) -> float:
+    total = 0.0
+    for i in range(a.shape[0]):
+        total += a[i] * b[i]
+    return total
+
+
+@compiled
+def less(value: float, a: Array, b: Array) -> float:
+    """value - a · b, subtracted term by term."""
+    for i in range(a.shape[0]):
+        value -= a[i] * b[i]
+    return value
+
+
+@compiled
+def add(x: Array, share: float, d: Array) -> None:
+    for i in range(x.shape[0]):
+        x[i] += share * d[i]
+
+
+@compiled
+def norm(x: Array) -> float:
+    return math.sqrt(dot(x, x))
 
 
 @compiled
 def orthonormal_rows(J: Array, row_scales: Array, order: Array, L: Array, Q: Array) -> float:
-    """J[order] = L Q, L lower triangular with L[i, i] > 0, Q Qᵀ = I. Returns how regular J is.
+    """J[order] = L Q, L (s, s) lower triangular, L[i, i] > 0, Q (s, m), Q Qᵀ = I. Returns how regular J is.
 
-    Gram-Schmidt on the rows, the largest remainder first, twice over so that Q is orthonormal to
-    machine precision whatever J's condition. Rows are compared in their scales: the pivots L[i, i] /
-    row_scales[order[i]] fall, and the last of them, over the first if that is above 1, is returned. It is
-    0 for a J without full row rank (to machine precision), and about σ_min of the scaled J where its
-    largest singular value is below 1, or 1 / cond.
-    J (s, m), row_scales (s,), order (s,) integers, L (s, s), Q (s, m).
+    Gram-Schmidt on the rows, largest remainder first, done twice so that Q is orthonormal to machine
+    precision. The pivots, L[i, i] / row_scales[order[i]], decrease; the last over max(1, the first) is
+    returned: 0 without full row rank, else about σ_min of the scaled J, or 1 / cond where its σ_max is above
+    1.
     """
     s, m = J.shape
-    first = 0.0
-    last = 0.0
+    first, last = 0.0, 0.0
+    clear(L)
     for i in range(s):
         order[i] = i
-        for j in range(m):
-            Q[i, j] = J[i, j]
-        for j in range(s):
-            L[i, j] = 0.0
+        copied(J[i], Q[i])
     for i in range(s):
-        largest = -1.0
-        pivot = i
+        pivot, largest = i, -1.0
         for k in range(i, s):
-            square = 0.0
-            for j in range(m):
-                square += Q[k, j] * Q[k, j]
-            square /= row_scales[order[k]] * row_scales[order[k]]
+            square = dot(Q[k], Q[k]) / (row_scales[order[k]] * row_scales[order[k]])
             if square > largest:
-                largest = square
-                pivot = k
+                pivot, largest = k, square
         if pivot != i:
             order[i], order[pivot] = order[pivot], order[i]
             for j in range(m):
@@ -55,66 +78,59 @@ def orthonormal_rows(J: Array, row_scales: Array, order: Array, L: Array, Q: Arr
             for j in range(i):
                 L[i, j], L[pivot, j] = L[pivot, j], L[i, j]
         for k in range(i):  # the second pass
-            overlap = 0.0
-            for j in range(m):
-                overlap += Q[i, j] * Q[k, j]
+            overlap = dot(Q[i], Q[k])
             L[i, k] += overlap
-            for j in range(m):
-                Q[i, j] -= overlap * Q[k, j]
-        norm = 0.0
-        for j in range(m):
-            norm += Q[i, j] * Q[i, j]
-        norm = math.sqrt(norm)
-        L[i, i] = norm
-        last = norm / row_scales[order[i]]
+            add(Q[i], -overlap, Q[k])
+        length = norm(Q[i])
+        L[i, i] = length
+        last = length / row_scales[order[i]]
         if i == 0:
             first = last
-        if last <= 1e-15 * first or norm == 0.0:
+        if last <= 1e-15 * first or length == 0.0:
             return 0.0
         for j in range(m):
-            Q[i, j] /= norm
+            Q[i, j] /= length
         for k in range(i + 1, s):
-            overlap = 0.0
-            for j in range(m):
-                overlap += Q[k, j] * Q[i, j]
-            L[k, i] = overlap
-            for j in range(m):
-                Q[k, j] -= overlap * Q[i, j]
+            L[k, i] = dot(Q[k], Q[i])
+            add(Q[k], -L[k, i], Q[i])
     return last / max(1.0, first)
 
 
 @compiled
-def project_out(A: Array, row: int, Q: Array, count: int) -> None:
-    """A[row] less its parts along the first `count` rows of Q, which are orthonormal; in place."""
+def times(A: Array, x: Array, out: Array) -> None:
+    for i in range(out.shape[0]):
+        out[i] = dot(A[i], x)
+
+
+@compiled
+def project_out(x: Array, Q: Array, count: int) -> None:
+    """x minus its components along the first `count` rows of Q, which are orthonormal; in place."""
     for k in range(count):
-        overlap = 0.0
-        for j in range(A.shape[1]):
-            overlap += A[row, j] * Q[k, j]
-        for j in range(A.shape[1]):
-            A[row, j] -= overlap * Q[k, j]
+        add(x, -dot(x, Q[k]), Q[k])
+
+
+@compiled
+def times_matrix(A: Array, T: Array, product: Array) -> None:
+    """product = A T; A itself where T is (0, 0), which means the identity."""
+    for i in range(A.shape[0]):
+        if T.shape[0] == 0:
+            copied(A[i], product[i])
+            continue
+        clear(product[i])
+        for k in range(T.shape[0]):
+            add(product[i], A[i, k], T[k])
 
 
 @compiled
 def closest_solution(rate: Array, u0: Array, order: Array, L: Array, Q: Array, u: Array) -> None:
-    """The solution of J u = rate closest to u0, J⁺ rate + (I - J⁺ J) u0, from `orthonormal_rows`.
-
-    u = u0 + Qᵀ (y - Q u0) with L y = rate[order].
-    """
-    s, m = Q.shape
+    """The solution of J u = rate closest to u0: u0 + Qᵀ (y - Q u0), L y = rate[order]."""
+    s = Q.shape[0]
     y = scratch(s)
-    for j in range(m):
-        u[j] = u0[j]
+    copied(u0, u)
     for i in range(s):
-        y[i] = rate[order[i]]
-        for j in range(i):
-            y[i] -= L[i, j] * y[j]
-        y[i] /= L[i, i]
+        y[i] = less(rate[order[i]], L[i, :i], y) / L[i, i]
     for i in range(s):
-        missing = y[i]
-        for j in range(m):
-            missing -= Q[i, j] * u0[j]
-        for j in range(m):
-            u[j] += missing * Q[i, j]
+        add(u, less(y[i], Q[i], u0), Q[i])
 
 
 @compiled
@@ -133,14 +149,12 @@ def pseudoinverse_transposed(order: Array, L: Array, Q: Array, X: Array) -> None
 def eliminate(M: Array, row_scales: Array) -> tuple[float, float]:
     """Solve A X = B in place: M = [A B], shape (s, s + k), becomes [*, X].
 
-    Gaussian elimination with partial pivoting, rows compared in their scales. Returns det A, and how
-    regular A is: its smallest pivot in its row's scale, over the largest if that is above 1; when a pivot
-    is zero both are 0 and there is no solution. row_scales (s,) is put into the pivots' order.
+    Gaussian elimination with partial pivoting, rows compared in their scales. Returns det A, and how regular
+    A is: its smallest pivot in its row's scale, over the largest if that is above 1; a zero pivot gives 0 for
+    both, and no solution. row_scales (s,) is permuted to the order of the pivots.
     """
     s, width = M.shape
-    determinant = 1.0
-    smallest = math.inf
-    largest = 0.0
+    determinant, smallest, largest = 1.0, math.inf, 0.0
     for i in range(s):
         pivot = i
         for row in range(i + 1, s):
@@ -149,8 +163,7 @@ def eliminate(M: Array, row_scales: Array) -> tuple[float, float]:
         size = abs(M[pivot, i]) / row_scales[pivot]
         if size == 0.0:
             return 0.0, 0.0
-        smallest = min(smallest, size)
-        largest = max(largest, size)
+        smallest, largest = min(smallest, size), max(largest, size)
         if pivot != i:
             determinant = -determinant
             row_scales[i], row_scales[pivot] = row_scales[pivot], row_scales[i]
@@ -174,16 +187,14 @@ def eliminate(M: Array, row_scales: Array) -> tuple[float, float]:
 
 @compiled
 def residual_norm(J: Array, u: Array, rate: Array) -> tuple[float, float]:
-    """‖J u - rate‖, the certificate of a resolver's answer, and how much of it rounding can hide.
+    """‖J u - rate‖, which certifies a resolver's answer, and how much of it rounding can hide.
 
-    The second number is the machine's precision times the norm of |J| |u| + |rate|: with a large u the
-    residual computed here may be zero by chance.
+    The second number is the machine's precision times the norm of |J| |u| + |rate|: for a large u the
+    computed residual may be zero by chance.
     """
-    square = 0.0
-    size = 0.0
+    square, size = 0.0, 0.0
     for i in range(J.shape[0]):
-        difference = -rate[i]
-        weight = abs(rate[i])
+        difference, weight = -rate[i], abs(rate[i])
         for j in range(J.shape[1]):
             product = J[i, j] * u[j]
             difference += product
@@ -191,3 +202,56 @@ def residual_norm(J: Array, u: Array, rate: Array) -> tuple[float, float]:
         square += difference * difference
         size += weight * weight
     return math.sqrt(square), EPSILON * math.sqrt(size)
+
+
+@compiled
+def singular_rows(A: Array, R: Array) -> tuple[float, float]:
+    """Turn the rows of A (s, m) into σ_i v_iᵀ, in place; R (s, s) becomes the rotation, its rows u_iᵀ.
+
+    So A = Σ u_i σ_i v_iᵀ, in no particular order. Returns the least and the largest σ. Works for every rank;
+    a matrix that is not finite gives no useful result. Source: Hestenes 1958; Demmel and Veselić 1992 on
+    accuracy.
+    """
+    s = A.shape[0]
+    clear(R)
+    for i in range(s):
+        R[i, i] = 1.0
+    for _ in range(MOST_SWEEPS):
+        turned = False
+        for i in range(s - 1):
+            for k in range(i + 1, s):
+                turned = orthogonalised(A, R, i, k) or turned
+        if not turned:
+            break
+    least, largest = math.inf, 0.0
+    for i in range(s):
+        length = norm(A[i])
+        least, largest = min(least, length), max(largest, length)
+    return least, largest
+
+
+@compiled
+def orthogonalised(A: Array, R: Array, i: int, k: int) -> bool:
+    """Rotate rows i and k until they are orthogonal; returns whether that was needed."""
+    one, other, product = 0.0, 0.0, 0.0
+    for j in range(A.shape[1]):
+        one += A[i, j] * A[i, j]
+        other += A[k, j] * A[k, j]
+        product += A[i, j] * A[k, j]
+    if not abs(product) > EPSILON * math.sqrt(one) * math.sqrt(other):
+        return False
+    zeta = (other - one) / (2.0 * product)
+    tangent = (1.0 if zeta >= 0.0 else -1.0) / (abs(zeta) + math.hypot(1.0, zeta))
+    cosine = 1.0 / math.hypot(1.0, tangent)
+    sine = cosine * tangent
+    turn(A, i, k, cosine, sine)
+    turn(R, i, k, cosine, sine)
+    return True
+
+
+@compiled
+def turn(A: Array, i: int, k: int, cosine: float, sine: float) -> None:
+    for j in range(A.shape[1]):
+        one, other = A[i, j], A[k, j]
+        A[i, j] = cosine * one - sine * other
+        A[k, j] = sine * one + cosine * other

@@ -1,35 +1,22 @@
-"""Compiled functions that other compiled functions call: parts of them, without machine code of their own.
+"""Compiled functions as parts of other compiled functions, without machine code of their own.
 
-numba makes machine code of each function that a compiled one calls, with a door for Python and one for C,
-though the caller takes in the function's instructions and optimises all of them again. Of a control step's
-hundred functions Python calls three, and compiling for nobody took most of a first run.
+numba makes machine code for each function that a compiled one calls, although the caller links in its
+instructions and optimises them again. Python calls three of a control step's hundred functions; compiling
+unused machine code of the others took most of a first run.
 """
-
-from __future__ import annotations
 
 import gc
 from typing import Any
 
-from numba._dynfunc import make_function
-from numba.core import compiler, types
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler_machinery import register_pass
-from numba.core.environment import lookup_environment
-from numba.core.registry import CPUDispatcher
-from numba.core.typed_passes import NativeLowering
-from numba.core.untyped_passes import (
-    FindLiterallyCalls,
-    InlineInlinables,
-    LiteralPropagationSubPipelinePass,
-    LiteralUnroll,
-    WithLifting,
-)
+from numba import types
+
+from nmm.kernels import numba_internals as internals
 
 _NO_DOORS = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
-class _PartLibrary(JITCodeLibrary):
-    """Instructions to be linked into those of callers, which optimise them and make machine code."""
+class _PartLibrary(internals.JITCodeLibrary):
+    """Instructions for callers to link in, optimise and compile."""
 
     def finalize(self) -> None:
         self._raise_if_finalized()
@@ -40,32 +27,20 @@ class _PartLibrary(JITCodeLibrary):
         self._finalized = True
 
 
-class _WholeLibrary(JITCodeLibrary):
-    """A function and its parts, optimised at once, for loops that run over three or seven numbers.
-
-    Vectorised, these take as long or, for TIAGo's seven joints, a tenth longer, and longer to compile.
-    """
+class _WholeLibrary(internals.JITCodeLibrary):
+    """A function and its parts, optimised at once, without vectorisation, which slows down short loops."""
 
     vectorized = False
 
     def _optimize_final_module(self) -> None:
-        manager, builder = self._codegen._module_pass_manager(
-            loop_vectorize=self.vectorized, slp_vectorize=False
-        )
+        passes = {"loop_vectorize": self.vectorized, "slp_vectorize": False}
+        manager, builder = self._codegen._module_pass_manager(**passes)
         with self._recorded_timings.record("nmm's module passes", builder):
             manager.run(self._final_module, builder)
 
 
-class _VectorLibrary(_WholeLibrary):
-    """A function whose innermost loops run over many alike, side by side."""
-
-    vectorized = True
-
-
-@register_pass(mutates_CFG=True, analysis_only=False)
-class _PartLowering(NativeLowering):
-    """Lowering into a `_PartLibrary`."""
-
+@internals.register_pass(mutates_CFG=True, analysis_only=False)
+class _PartLowering(internals.NativeLowering):
     _name = "nmm_part_lowering"
 
     def run_pass(self, state: Any) -> bool:
@@ -74,58 +49,59 @@ class _PartLowering(NativeLowering):
         super().run_pass(state)
         result = state["cr"]
         name = result.fndesc.qualname
-        # What numba knows the part by; nobody calls it.
-        entry = make_function(result.fndesc.lookup_module(), name, name, 0, result.env, (state.library,))
+        # numba refers to the part by this entry, which is never called.
+        module, parts = result.fndesc.lookup_module(), (state.library,)
+        entry = internals.make_function(module, name, name, 0, result.env, parts)
         state.targetctx.insert_user_function(entry, result.fndesc, [state.library])
         state.reload_init.extend(state.library._reload_init)
         state["cr"] = result._replace(cfunc=entry)
         return True
 
 
-@register_pass(mutates_CFG=True, analysis_only=False)
-class _WholeLowering(NativeLowering):
-    """Lowering of a function with its parts."""
-
+@internals.register_pass(mutates_CFG=True, analysis_only=False)
+class _WholeLowering(internals.NativeLowering):
     _name = "nmm_whole_lowering"
-    _library = _WholeLibrary
+    _vectorized = False
 
     def run_pass(self, state: Any) -> bool:
-        state.library = self._library(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library = _WholeLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.vectorized = self._vectorized
         state.library.enable_object_caching()
         super().run_pass(state)
         for one in state.library._final_module.global_variables:
-            environment = lookup_environment(one.name) if one.name.startswith("_ZN08NumbaEnv") else None
-            if environment is not None:
-                state.library.codegen.set_env(one.name, environment)
+            if one.name.startswith("_ZN08NumbaEnv"):
+                environment = internals.lookup_environment(one.name)
+                if environment is not None:
+                    state.library.codegen.set_env(one.name, environment)
         return True
 
 
-@register_pass(mutates_CFG=True, analysis_only=False)
+@internals.register_pass(mutates_CFG=True, analysis_only=False)
 class _VectorLowering(_WholeLowering):
-    """The same, vectorised."""
+    """The same with vectorisation, for long innermost loops."""
 
     _name = "nmm_vector_lowering"
-    _library = _VectorLibrary
+    _vectorized = True
 
 
-#: What kernels are not written in (`with`, `literal_unroll`, functions inlined by their source); each pass
-#: goes over the whole function, and numba examines it anew after each.
+#: Passes for features that kernels do not use (`with`, `literal_unroll`, inlining by source); each would
+#: process the whole function, and numba would analyse it again.
 _NOT_NEEDED = {
-    WithLifting,
-    InlineInlinables,
-    FindLiterallyCalls,
-    LiteralUnroll,
-    LiteralPropagationSubPipelinePass,
+    internals.WithLifting,
+    internals.InlineInlinables,
+    internals.FindLiterallyCalls,
+    internals.LiteralUnroll,
+    internals.LiteralPropagationSubPipelinePass,
 }
 
 
-class _Flags(compiler.Flags):
-    """numba's flags, compared by what was set: it compares all of them, one by one, at each operator."""
+class _Flags(internals.compiler.Flags):
+    """numba's flags, compared by what was set; numba compares all of them, one by one, at each operator."""
 
-    _SAME = hash(compiler.Flags())  # as numba's own, which do not hash what is set
+    _SAME = hash(internals.compiler.Flags())  # as numba's own hash ignores what is set
 
     def __eq__(self, other: object) -> bool:
-        if not isinstance(other, compiler.Flags):
+        if not isinstance(other, internals.compiler.Flags):
             return NotImplemented
         return bool(self._values == other._values or self.values() == other.values())
 
@@ -133,48 +109,37 @@ class _Flags(compiler.Flags):
         return self._SAME
 
 
-class _Compiler(compiler.CompilerBase):
-    lowering: type[NativeLowering]
+def _compiler(lowering: type[internals.NativeLowering]) -> type[internals.compiler.CompilerBase]:
+    class Compiler(internals.compiler.CompilerBase):
+        def define_pipelines(self) -> list[Any]:
+            passes = internals.compiler.DefaultPassBuilder.define_nopython_pipeline(self.state)
+            passes.passes = [
+                (lowering if which is internals.NativeLowering else which, reason)
+                for which, reason in passes.passes
+                if which not in _NOT_NEEDED
+            ]
+            return [passes]
 
-    def define_pipelines(self) -> list[Any]:
-        passes = compiler.DefaultPassBuilder.define_nopython_pipeline(self.state)
-        passes.passes = [
-            (self.lowering if which is NativeLowering else which, told)
-            for which, told in passes.passes
-            if which not in _NOT_NEEDED
-        ]
-        return [passes]
-
-
-class _PartCompiler(_Compiler):
-    lowering = _PartLowering
+    return Compiler
 
 
-class _WholeCompiler(_Compiler):
-    lowering = _WholeLowering
+_PART, _WHOLE, _VECTORS = map(_compiler, (_PartLowering, _WholeLowering, _VectorLowering))
 
 
-class _VectorCompiler(_Compiler):
-    lowering = _VectorLowering
-
-
-class KernelDispatcher(CPUDispatcher):
-    """A function's machine code for Python, and its instructions for compiled functions that call it."""
+class KernelDispatcher(internals.CPUDispatcher):
+    """A function's machine code for Python, and its instructions for compiled callers."""
 
     def __init__(self, function: Any, options: dict[str, Any], vectorized: bool = False) -> None:
-        super().__init__(
-            function,
-            targetoptions=dict(options),
-            pipeline_class=_VectorCompiler if vectorized else _WholeCompiler,
-        )
-        self._part = CPUDispatcher(
-            function, targetoptions={**options, **_NO_DOORS}, pipeline_class=_PartCompiler
+        whole = _VECTORS if vectorized else _WHOLE
+        super().__init__(function, targetoptions=dict(options), pipeline_class=whole)
+        self._part = internals.CPUDispatcher(
+            function, targetoptions={**options, **_NO_DOORS}, pipeline_class=_PART
         )
         for dispatcher in (self, self._part):
             dispatcher._compiler._customize_flags = _Flags
 
     def compile(self, sig: Any) -> Any:
-        """numba's, without looks for garbage: what it makes is in use until it is through. A ninth less."""
+        """numba's, without garbage collection, which would find nothing: a ninth faster."""
         collects = gc.isenabled()
         gc.disable()
         try:

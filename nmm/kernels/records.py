@@ -1,4 +1,4 @@
-"""What a function's kernel gets: records of what it reads and of what it writes.
+"""The records that a function's kernel reads and writes.
 
     @kernel(FUNCTION)
     def height(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
@@ -7,7 +7,7 @@
         for k in range(at.q.shape[0]):
             rows.value_q[0, k] = frames.jacobians[frame, 2, k]
 
-A quantity that kernels come to need becomes a field here and in `program.py`, and touches no kernel.
+A new quantity for kernels becomes a field here and in `program.py`; existing kernels do not change.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from typing import NamedTuple
 from numba import types
 
 from nmm.kernels.compiled import caller
-from nmm.kernels.memory import IntegerVector, Matrices, Matrix, Tensors, Vector, record_type
+from nmm.kernels.record_layout import IntegerVector, Matrices, Matrix, Tensors, Vector, record_type
 
 
 class At(NamedTuple):
-    """Where: time t (s), coordinates q (n,), m and rad, and the platform there.
+    """Time t (s), coordinates q (n,), m and rad, and the platform there.
 
     G (n_p, p) : its velocity map, qp_dot = G up
     G_q (n_p, p, n_p) : dG[i, j] / dqp[k]
@@ -34,12 +34,12 @@ class At(NamedTuple):
 
 
 class Frames(NamedTuple):
-    """Kinematics at q, world axes: frame k of those that the stage names is number slots[k] of all.
+    """Kinematics at q, world axes; frame k of those that the stage names has index slots[k].
 
     slots : (frames of the stage,)
     placements : (..., 3, 4) = [R | p], m
     jacobians : (..., 6, n), linear over angular velocity
-    hessians : (..., 6, n, n), dJ[i, j] / dq[k]; there are none unless some stage asks for them
+    hessians : (..., 6, n, n), dJ[i, j] / dq[k]; empty unless some stage requests them
     """
 
     slots: IntegerVector
@@ -51,7 +51,7 @@ class Frames(NamedTuple):
 class Rows(NamedTuple):
     """The stage's rows of y = phi(t, q): value (rows,), value_t (rows,) = ∂y/∂t, value_q (rows, n) = ∂y/∂q.
 
-    The first stage of a function finds zeros, the next what those before it wrote.
+    They are zero before the first stage of a function; each later one finds what those before it wrote.
     """
 
     value: Vector

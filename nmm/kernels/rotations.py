@@ -1,14 +1,11 @@
 """Rotations by their rotation vectors: exponential, logarithm and their derivatives, as plain loops.
 
 A rotation vector φ (rad) is a unit axis times an angle; R = exp(φ^), φ^ the cross product with φ as a matrix.
-The left Jacobian J(φ) says how R turns when φ changes: in the axes in which R maps its vectors,
-ω = J(φ) φ_dot; in the turning body's own axes ω = J(φ)ᵀ φ_dot, J(φ)ᵀ = J(-φ) being the right Jacobian.
-(J. Solà, J. Deray, D. Atchuthan, A micro Lie theory for state estimation in robotics, 2018, eqs. 131 to 146.)
-
-Matrices R are the first three columns of an array, so that a placement [R | p] is one too.
+The left Jacobian J(φ) gives the angular velocity ω = J(φ) φ_dot in the axes to which R maps; in the body's
+own axes ω = J(φ)ᵀ φ_dot, with J(φ)ᵀ = J(-φ) the right Jacobian. (J. Solà, J. Deray, D. Atchuthan, A micro Lie
+theory for state estimation in robotics, 2018, eqs. 131 to 146.) R is the first three columns of an array, so
+a placement [R | p] serves, too.
 """
-
-from __future__ import annotations
 
 import math
 
@@ -26,7 +23,6 @@ _COTANGENT = (
 
 @compiled
 def cross3(a: Array, b: Array, out: Array) -> None:
-    """out = a × b."""
     out[0] = a[1] * b[2] - a[2] * b[1]
     out[1] = a[2] * b[0] - a[0] * b[2]
     out[2] = a[0] * b[1] - a[1] * b[0]
@@ -34,21 +30,18 @@ def cross3(a: Array, b: Array, out: Array) -> None:
 
 @compiled
 def times3(A: Array, x: Array, out: Array) -> None:
-    """out = A x."""
     for i in range(3):
         out[i] = A[i, 0] * x[0] + A[i, 1] * x[1] + A[i, 2] * x[2]
 
 
 @compiled
 def transposed_times3(A: Array, x: Array, out: Array) -> None:
-    """out = Aᵀ x."""
     for i in range(3):
         out[i] = A[0, i] * x[0] + A[1, i] * x[1] + A[2, i] * x[2]
 
 
 @compiled
 def compose3(A: Array, B: Array, out: Array) -> None:
-    """out = A B."""
     for i in range(3):
         for j in range(3):
             out[i, j] = A[i, 0] * B[0, j] + A[i, 1] * B[1, j] + A[i, 2] * B[2, j]
@@ -95,39 +88,27 @@ def exp3(phi: Array, R: Array) -> None:
 
 @compiled
 def log3(R: Array, phi: Array) -> None:
-    """The φ with R = exp(φ^) and |φ| <= π; at π exactly φ and -φ are the same rotation, and one is given.
+    """The φ with R = exp(φ^) and |φ| <= π; at exactly π it is either of φ and -φ.
 
-    By way of the unit quaternion, its largest component first (S. W. Shepperd, 1978): as good near 0 and
-    near π as between them.
+    By the unit quaternion, largest component first (S. W. Shepperd, 1978): equally accurate everywhere.
     """
     trace = R[0, 0] + R[1, 1] + R[2, 2]
     if trace >= max(R[0, 0], R[1, 1], R[2, 2]):
-        w = 1.0 + trace
-        x = R[2, 1] - R[1, 2]
-        y = R[0, 2] - R[2, 0]
-        z = R[1, 0] - R[0, 1]
+        w, x, y, z = 1.0 + trace, R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
     elif R[0, 0] >= max(R[1, 1], R[2, 2]):
-        w = R[2, 1] - R[1, 2]
-        x = 1.0 + 2.0 * R[0, 0] - trace
-        y = R[0, 1] + R[1, 0]
-        z = R[0, 2] + R[2, 0]
+        w, x = R[2, 1] - R[1, 2], 1.0 + 2.0 * R[0, 0] - trace
+        y, z = R[0, 1] + R[1, 0], R[0, 2] + R[2, 0]
     elif R[1, 1] >= R[2, 2]:
-        w = R[0, 2] - R[2, 0]
-        x = R[0, 1] + R[1, 0]
-        y = 1.0 + 2.0 * R[1, 1] - trace
-        z = R[1, 2] + R[2, 1]
+        w, y = R[0, 2] - R[2, 0], 1.0 + 2.0 * R[1, 1] - trace
+        x, z = R[0, 1] + R[1, 0], R[1, 2] + R[2, 1]
     else:
-        w = R[1, 0] - R[0, 1]
-        x = R[0, 2] + R[2, 0]
-        y = R[1, 2] + R[2, 1]
-        z = 1.0 + 2.0 * R[2, 2] - trace
+        w, z = R[1, 0] - R[0, 1], 1.0 + 2.0 * R[2, 2] - trace
+        x, y = R[0, 2] + R[2, 0], R[1, 2] + R[2, 1]
     if w < 0.0:
         w, x, y, z = -w, -x, -y, -z
     sine = math.sqrt(x * x + y * y + z * z)
     factor = 2.0 * math.atan2(sine, w) / sine if sine != 0.0 else 0.0
-    phi[0] = factor * x
-    phi[1] = factor * y
-    phi[2] = factor * z
+    phi[0], phi[1], phi[2] = factor * x, factor * y, factor * z
 
 
 @compiled
@@ -148,8 +129,7 @@ def left_jacobian3(phi: Array, J: Array) -> None:
 def inverse_factor(square: float) -> tuple[float, float]:
     """c = (1 - θ/2 cot θ/2)/θ² and c'(θ)/θ, from θ²; θ below 2π."""
     if square < 1.0:
-        c = 0.0
-        slope = 0.0
+        c, slope = 0.0, 0.0
         for k in range(len(_COTANGENT) - 1, -1, -1):
             slope = slope * square + c
             c = c * square + _COTANGENT[k]
@@ -171,10 +151,7 @@ def left_jacobian_inverse3(phi: Array, J: Array) -> None:
 
 @compiled
 def log6(R: Array, p: Array, e: Array) -> None:
-    """e = [v, w] with exp6(e) = (R, p): the constant body velocity that leads there in unit time.
-
-    w = log3(R), p = J(w) v. Linear (m) over angular (rad).
-    """
+    """e = [v, w] (m, rad) with exp6(e) = (R, p), the body velocity that leads there in 1 s: p = J(w) v."""
     J = scratch((3, 3))
     log3(R, e[3:])
     left_jacobian_inverse3(e[3:], J)
@@ -183,7 +160,7 @@ def log6(R: Array, p: Array, e: Array) -> None:
 
 @compiled
 def log6_jacobian(e: Array, p: Array, A: Array, B: Array) -> None:
-    """The derivative of log6 in the moving body's velocity [ν, ω], in its own axes: [[A, B], [0, A]].
+    """The derivative of log6 by the moving body's velocity [ν, ω], in its own axes: [[A, B], [0, A]].
 
     e = [v, w] = log6(R, p): v_dot = A ν + B ω, w_dot = A ω, when R_dot = R ω^, p_dot = R ν. A is the inverse
     right Jacobian of w; B = D A with D = ∂(J(w)⁻¹ p)/∂w at constant p. This is the inverse of the right
@@ -196,14 +173,9 @@ def log6_jacobian(e: Array, p: Array, A: Array, B: Array) -> None:
         for j in range(3):
             A[i, j] = J[j, i]
     c, slope = inverse_factor(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
-    wp = scratch(3)
-    wwp = scratch(3)
+    wp, wwp, u, up, wup, uwp = scratch(3), scratch(3), scratch(3), scratch(3), scratch(3), scratch(3)
     cross3(w, p, wp)
     cross3(w, wp, wwp)
-    u = scratch(3)
-    up = scratch(3)
-    wup = scratch(3)
-    uwp = scratch(3)
     for k in range(3):
         for i in range(3):
             u[i] = A[i, k]

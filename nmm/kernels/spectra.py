@@ -1,7 +1,5 @@
 """Singular values of many small matrices in one compiled call."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -17,27 +15,21 @@ from nmm.kernels.compiled import (
     vectorized_without_gil,
     view,
 )
-from nmm.kernels.linear_algebra import EPSILON, orthonormal_rows
-from nmm.kernels.singular_values import MOST_SWEEPS
+from nmm.kernels.linear_algebra import EPSILON, MOST_SWEEPS, orthonormal_rows
 
-#: Matrices a compiled call: what nothing interrupts.
+#: Matrices per compiled call, which cannot be interrupted.
 AT_ONCE = 128
-#: More rows than these are first made triangular, which then turn orthogonal sooner.
+#: More rows than this are made triangular first, which then need fewer sweeps.
 FEW_ROWS = 6
-#: So many matrices lie side by side; fewer, where they have so many numbers that a stack would overflow.
+#: Number of matrices side by side; fewer where they would overflow the stack.
 SIDE_BY_SIDE, MOST_NUMBERS = 16, 1 << 14
 
 
 @inlined_in_callers
 def orthogonal_rows(A: Array, squares: Array) -> None:
-    """Turn the rows of each matrix in A (k, m, N) until they are orthogonal, in place: their lengths are its
-    singular values.
-
-    The N matrices lie side by side, so that one instruction is for several; what a matrix becomes does not
-    depend on those beside it.
-
-    squares (k, N) : what the lengths squared become. One-sided Jacobi (Hestenes 1958), as
-    `nmm.kernels.singular_values.singular_rows`, without the vectors and with each length carried along
+    """Make the rows of each matrix in A (k, m, N) orthogonal, in place; squares (k, N): their squared
+    lengths, the singular values squared. The N matrices lie side by side, so that one instruction serves
+    several; they do not affect each other's results.
     """
     k, m, N = A.shape
     product, cosine, sine = scratch(N), scratch(N), scratch(N)
@@ -84,10 +76,8 @@ def orthogonal_rows(A: Array, squares: Array) -> None:
 
 @compiled
 def put(J: Array, A: Array, p: int) -> None:
-    """A[:, :, p] = J (s, m), lying: A is (min(s, m), max(s, m), N); not numbers where one of J is not finite.
-
-    Of many rows the triangle that has their singular values, and zeros beside it.
-    """
+    """A[:, :, p] = J (s, m), transposed if s > m; NaN where J is not finite. Many rows become a triangle with
+    the same singular values, and zeros."""
     s, m = J.shape
     k, longer = A.shape[:2]
     finite = True
@@ -117,7 +107,6 @@ def put(J: Array, A: Array, p: int) -> None:
 
 @compiled
 def write_roots(squares: Array, p: int, found: Array) -> None:
-    """found (k,): the roots of squares[:, p], falling."""
     for i in range(squares.shape[0]):
         value, place = math.sqrt(squares[i, p]), i
         while place > 0 and found[place - 1] < value:
@@ -131,13 +120,13 @@ WRITE_SPECTRA = types.void(types.float64[:, :, ::1], types.float64[:, ::1])
 
 @vectorized_without_gil
 def write_spectra(J: Array, found: Array) -> None:
-    """found (N, k): the singular values of J (N, s, m), k = min(s, m), falling; NaN where J is not finite."""
+    """found (N, k): singular values of J (N, s, m), k = min(s, m), descending; NaN where J is not finite."""
     s, m = J.shape[1], J.shape[2]
     k, longer = min(s, m), max(s, m)
     width = max(1, min(SIDE_BY_SIDE, J.shape[0], MOST_NUMBERS // (k * longer)))
     A, squares = scratch((k, longer, width)), scratch((k, width))
     for first in range(0, J.shape[0], width):
-        for p in range(width):  # where none is left, the last one again
+        for p in range(width):  # repeats the last matrix where none is left
             put(view(J, min(first + p, J.shape[0] - 1) * s * m, (s, m)), A, p)
         orthogonal_rows(A, squares)
         for p in range(min(width, J.shape[0] - first)):
@@ -155,9 +144,9 @@ def write_spectrum(J: Array, found: Array) -> None:
 
 
 def spectra(J: Array, threads: int | None = None) -> Array:
-    """Singular values (N, min(s, m)) of J (N, s, m), falling; not numbers where J is not finite.
+    """Singular values (N, min(s, m)) of J (N, s, m), descending; NaN where J is not finite.
 
-    In so many threads, as many as there are cores when None. Small ones are as accurate as large ones where
+    `threads` is the number of cores when None. Small ones are as accurate as large ones where
     J's rows are (Demmel and Veselić 1992).
     """
     J = np.ascontiguousarray(J, dtype=np.float64)

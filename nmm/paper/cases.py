@@ -1,48 +1,70 @@
-"""The four cases of the paper's section VI: which scenario, which figures, what the axes call things."""
+"""The four cases of the paper's section VI: scenarios, figures, names of axes and results."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+#: The resolvers compared, the paper's own first.
+RESOLVERS = ("rg", "pg")
+#: Sampling period of all runs, s.
+DT = 0.005
+
 
 @dataclass(frozen=True)
 class Case:
-    """One case.
-
-    Attributes
-    ----------
-    number : 1 to 4
-    scenario : the bundled scenario
-    title : a headline
-    symbol : the objective's name
-    zoom : end of the initial transient that the objective's figure enlarges, s
-    figures : number and caption of the paper's two figures
-    """
+    """A case; `zoom`: end, s, of the transient enlarged in the objective's figure; `motion`: a caption."""
 
     number: int
     scenario: str
     title: str
     symbol: str
     zoom: float
-    figures: tuple[tuple[int, str], tuple[int, str]]
+    motion: str
 
     @property
     def folder(self) -> str:
-        """Name of its folder in the paper's."""
         return f"case{self.number}"
 
+    @property
+    def figures(self) -> tuple[tuple[int, str], tuple[int, str]]:
+        """Number and caption of the paper's two figures."""
+        symbol = self.symbol.removesuffix("(q)")
+        compared = (
+            f"RG and PG minimising {symbol}: the whole run with the initial transient enlarged (above), "
+            "and on a logarithmic scale down to 10⁻⁸ of the largest value (below)."
+        )
+        return (2 * self.number + 1, self.motion), (2 * self.number + 2, compared)
 
-#: The resolvers compared, the paper's own first.
-RESOLVERS = ("rg", "pg")
-#: Sample time of all runs, s.
-DT = 0.005
+
+@dataclass(frozen=True)
+class Row:
+    """A row of a case's table: name, unit, and values with RG and PG as text."""
+
+    name: str
+    unit: str
+    rg: str
+    pg: str
 
 
-def _comparison(symbol: str) -> str:
-    return (
-        f"RG and PG minimising {symbol}: the whole run with the initial transient enlarged (above), "
-        "and on a logarithmic scale down to 10⁻⁸ of the largest value (below)."
-    )
+@dataclass(frozen=True)
+class Claim:
+    """A statement about a case, its source, the result, and whether they agree."""
+
+    statement: str
+    source: str
+    found: str
+    holds: bool
+
+
+@dataclass(frozen=True)
+class CaseResult:
+    """A case's results as plain data for other processes: numbers, each run's samples, durations, s."""
+
+    number: int
+    rows: tuple[Row, ...]
+    claims: tuple[Claim, ...]
+    samples: int
+    seconds: float
 
 
 CASES = (
@@ -52,10 +74,7 @@ CASES = (
         "Position task, planar arm",
         "H₁(q)",
         2.5,
-        (
-            (3, "Trajectory tracking with RG. The platform backs up first, then drives round the circle."),
-            (4, _comparison("H₁")),
-        ),
+        "Trajectory tracking with RG. The platform backs up first, then drives round the circle.",
     ),
     Case(
         2,
@@ -63,10 +82,7 @@ CASES = (
         "Position and pointing task, planar arm",
         "H₂(q)",
         2.0,
-        (
-            (5, "Trajectory tracking and target pointing of link 2 with RG."),
-            (6, _comparison("H₂")),
-        ),
+        "Trajectory tracking and target pointing of link 2 with RG.",
     ),
     Case(
         3,
@@ -74,10 +90,7 @@ CASES = (
         "Configuration-dependent pointing task, planar arm",
         "H₃(q)",
         1.0,
-        (
-            (7, "Trajectory tracking and configuration-dependent target pointing of link 1 with RG."),
-            (8, _comparison("H₃")),
-        ),
+        "Trajectory tracking and configuration-dependent target pointing of link 1 with RG.",
     ),
     Case(
         4,
@@ -85,9 +98,6 @@ CASES = (
         "Position task, elbow-type arm",
         "H₄(q)",
         0.6,
-        (
-            (9, "Position of the end-effector with RG; the reference motion is dashed."),
-            (10, _comparison("H₄")),
-        ),
+        "Position of the end-effector with RG; the reference motion is dashed.",
     ),
 )

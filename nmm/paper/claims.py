@@ -1,40 +1,120 @@
-"""What the paper says of each case of section VI, or what follows from it, held against what came out."""
+"""The results of a case's two runs, and the paper's claims held against them."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nmm.paper.cases import Case
-from nmm.paper.numbers import (
-    ALPHA,
-    CENTER,
-    GAIN,
-    RADIUS,
-    backing_up,
-    decay_deviation,
-    decay_rate,
-    input_symbol,
-    ripple,
-    second_half,
-    settling_time,
-)
-from nmm.paper.results import Claim
-from nmm.words import number_text
+from nmm.arrays import Array
+from nmm.paper.cases import Case, Claim, Row
+from nmm.text_format import number_text
 
 if TYPE_CHECKING:
+    from nmm.control.controller import Controller
     from nmm.runs.trajectory import Trajectory
 
+_SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+#: Centre (m) and radius (m) of the circle of eq. (16).
+CENTER, RADIUS = (2.0, 2.0), 3.0
+#: Step size of both methods and gain of all tasks in the paper's runs, 1/s.
+ALPHA, GAIN = 10.0, 1.0
 #: Deviations from exact exponential decay below this are RK4's own at a step of 5 ms (m or rad): they are
 #: 3e-6 at most, in case 3, and fall with the fourth power of the step.
 INTEGRATOR = 1e-5
 
 
+def input_symbol(name: str) -> str:
+    """An input as the paper writes it: ω, q̇₁."""
+    return {"omega": "ω"}.get(name, f"q̇{name[1:].translate(_SUBSCRIPTS)}" if name[:1] == "q" else name)
+
+
+def decay_deviation(trajectory: Trajectory) -> float:
+    """The largest component of e(t) - e(0) exp(-K t) in the run, in the rows' units."""
+    exact = trajectory.error[0] * np.exp(-GAIN * (trajectory.t - trajectory.t[0]))[:, None]
+    return float(np.abs(trajectory.error - exact).max())
+
+
+def decay_rate(t: Array, values: Array, above: float) -> float:
+    """Rate of exp(-rate t), 1/s, fitted to the first stretch of `values` above a fraction of the first."""
+    end = int(np.argmax(values <= above * values[0])) or len(values)
+    return float(-np.polyfit(t[:end], np.log(values[:end]), 1)[0])
+
+
+def settling_time(trajectory: Trajectory, fraction: float) -> float | None:
+    """When H last falls below a fraction of H(0), s, if it stays there."""
+    above = np.flatnonzero(trajectory.objective > fraction * trajectory.objective[0])
+    last = int(above[-1]) + 1 if above.size else 0
+    return float(trajectory.t[last]) if last < len(trajectory) else None
+
+
+def ripple(trajectory: Trajectory) -> float:
+    """Range of H in the second half of the run."""
+    t = trajectory.t
+    return float(np.ptp(trajectory.objective[t >= 0.5 * (t[0] + t[-1])]))
+
+
+def backing_up(trajectory: Trajectory) -> float:
+    """How long the platform drives backwards from the start, s."""
+    forward = np.flatnonzero(trajectory.u[:, 0] >= 0.0)
+    return float(trajectory.t[forward[0]] if forward.size else trajectory.t[-1])
+
+
+def smallest_determinant(trajectory: Trajectory, controller: Controller) -> float | None:
+    """The smallest |det Ja| along RG's motion, Ja the columns of J_bar in use, else None."""
+    if np.any(trajectory.partition < 0):
+        return None
+    samples = zip(trajectory.t.tolist(), trajectory.q, trajectory.partition, strict=True)
+    blocks = np.array([controller.evaluate(t, q).J[:, columns] for t, q, columns in samples])
+    return float(np.abs(np.linalg.det(blocks)).min())
+
+
+def table(rg: Trajectory, pg: Trajectory, determinant: float | None) -> list[Row]:
+    summaries = rg.summary(), pg.summary()
+
+    def row(name: str, unit: str, number: Callable[[Trajectory], float | None], digits: int = 3) -> Row:
+        return Row(name, unit, *(number_text(number(run), digits) for run in (rg, pg)))
+
+    def read_row(name: str, unit: str, key: str, digits: int = 3) -> Row:
+        return Row(name, unit, *(number_text(numbers[key], digits) for numbers in summaries))
+
+    units = ", ".join(dict.fromkeys(rg.r_units))
+    decays = (f"{decay_rate(run.t, run.error_norm, 1e-9):.5f}" for run in (rg, pg))
+    rows = [
+        read_row("‖e‖ at the start", units, "error_initial", 4),
+        read_row("‖e‖ at the end", units, "error_final"),
+        row("largest |e(t) − e(0) exp(−K t)|", units, decay_deviation),
+        Row("fitted rate of decay of ‖e‖", "1/s", *decays),
+        read_row("H at the start", "1", "objective_initial", 4),
+        row("H below 10 % of that for good after", "s", lambda run: settling_time(run, 0.1)),
+        row("H below 1 % of that for good after", "s", lambda run: settling_time(run, 0.01)),
+        row("H below 0.1 % of that for good after", "s", lambda run: settling_time(run, 0.001)),
+        read_row("mean H in the second half", "1", "objective_mean_second_half"),
+        read_row("largest H in the second half", "1", "objective_max_second_half"),
+        row("ripple (largest less smallest H) there", "1", ripple),
+        read_row("smallest singular value of J̄", "mixed", "sigma_min"),
+        Row("smallest |det Ja|", "mixed", number_text(determinant), "–"),
+        Row("switches of partition", "1", str(rg.switches), "–"),
+        row("smallest θ", "rad", lambda run: float(run.q[:, 2].min())),
+        row("largest θ", "rad", lambda run: float(run.q[:, 2].max()), 4),
+        read_row("largest ‖J̄ u − rate‖", "mixed", "residual_max", 2),
+        read_row("largest sideways velocity", "m/s", "lateral_slip_max", 2),
+    ]
+    for name, unit in zip(rg.robot.u_names, rg.robot.u_units, strict=True):
+        sizes = (number_text(numbers["u_max"][name]) for numbers in summaries)
+        rows.append(Row(f"largest |{input_symbol(name)}|", unit, *sizes))
+    return rows
+
+
 def claims(case: Case, rg: Trajectory, pg: Trajectory, determinant: float | None) -> list[Claim]:
-    """The claims of a case; `determinant` is the smallest |det Ja| of RG's motion."""
     special = {1: _first, 2: _second, 3: _third, 4: _fourth}[case.number]
     return [_tracking(rg, pg), *special(rg, pg, determinant or 0.0), _steady_state(rg, pg)]
+
+
+def _both(numbers: Sequence[float | None]) -> str:
+    """ "0.1 (RG), 0.2 (PG)"."""
+    return ", ".join(f"{number_text(x)} ({who})" for x, who in zip(numbers, ("RG", "PG"), strict=True))
 
 
 def _tracking(rg: Trajectory, pg: Trajectory) -> Claim:
@@ -51,29 +131,30 @@ def _tracking(rg: Trajectory, pg: Trajectory) -> Claim:
 
 
 def _steady_state(rg: Trajectory, pg: Trajectory) -> Claim:
-    means = [float(second_half(run).mean()) for run in (rg, pg)]
+    means = [run.summary()["objective_mean_second_half"] for run in (rg, pg)]
     return Claim(
         "RG optimises better than PG.",
         "section VII",
-        f"Mean H in the second half of the run: {number_text(means[0])} (RG), {number_text(means[1])} (PG).",
+        f"Mean H in the second half of the run: {_both(means)}.",
         means[0] <= means[1],
     )
 
 
 def _faster(rg: Trajectory, pg: Trajectory, statement: str, source: str) -> Claim:
-    times = [settling_time(run, 0.01) for run in (rg, pg)]
-    finest = [settling_time(run, 0.001) for run in (rg, pg)]
+    times, told = _settling(rg, pg, 0.01)
     return Claim(
         statement,
         source,
-        f"H stays below 1 % of H(0) after {_or_never(times[0])} (RG), {_or_never(times[1])} (PG); "
-        f"below 0.1 % after {_or_never(finest[0])} (RG), {_or_never(finest[1])} (PG).",
+        f"H stays below 1 % of H(0) after {told}; below 0.1 % after {_settling(rg, pg, 0.001)[1]}.",
         times[0] is not None and (times[1] is None or times[0] < times[1]),
     )
 
 
-def _or_never(time: float | None) -> str:
-    return "never" if time is None else f"{number_text(time)} s"
+def _settling(rg: Trajectory, pg: Trajectory, fraction: float) -> tuple[list[float | None], str]:
+    """When H falls below a fraction of H(0) for good, as numbers and in words."""
+    times = [settling_time(run, fraction) for run in (rg, pg)]
+    told = ["never" if time is None else f"{number_text(time)} s" for time in times]
+    return times, f"{told[0]} (RG), {told[1]} (PG)"
 
 
 def _switching(rg: Trajectory, determinant: float, statement: str, source: str) -> Claim:
@@ -104,8 +185,7 @@ def _first(rg: Trajectory, pg: Trajectory, determinant: float) -> list[Claim]:
         Claim(
             "RG keeps a lower ripple in steady state.",
             "Fig. 4",
-            f"Ripple in the second half of the run: {number_text(ripples[0])} (RG), "
-            f"{number_text(ripples[1])} (PG).",
+            f"Ripple in the second half of the run: {_both(ripples)}.",
             ripples[0] < ripples[1],
         ),
         _switching(
@@ -120,7 +200,7 @@ def _second(rg: Trajectory, pg: Trajectory, determinant: float) -> list[Claim]:
     deviation = float(np.abs(rg.objective - exact).max())
     outside = np.hypot(rg.q[:, 0] - CENTER[0], rg.q[:, 1] - CENTER[1]) - RADIUS
     steady = outside[rg.t > 3.0]
-    largest = [float(second_half(run).max()) for run in (rg, pg)]
+    largest = [run.summary()["objective_max_second_half"] for run in (rg, pg)]
     return [
         Claim(
             "No switching is needed: the minor Δ₁₂₃ = d never vanishes.",
@@ -182,12 +262,12 @@ def _third(rg: Trajectory, pg: Trajectory, determinant: float) -> list[Claim]:
 
 
 def _fourth(rg: Trajectory, pg: Trajectory, determinant: float) -> list[Claim]:
-    times = [settling_time(run, 0.01) for run in (rg, pg)]
+    times, told = _settling(rg, pg, 0.01)
     return [
         Claim(
             "Both methods recover the optimal value of H₄ fast.",
             "Fig. 10",
-            f"H₄ stays below 1 % of H₄(0) after {_or_never(times[0])} (RG), {_or_never(times[1])} (PG).",
+            f"H₄ stays below 1 % of H₄(0) after {told}.",
             all(time is not None and time < 1.0 for time in times),
         ),
         _switching(

@@ -1,41 +1,35 @@
-"""The paper's folder: written whole or not at all."""
+"""The paper's folder, written whole or not at all: case after case, and one page."""
 
 from __future__ import annotations
 
-import json
 import time
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from nmm.errors import InputError
-from nmm.folders.whole import has_format, replaced_folder
-from nmm.machine import made_with
-from nmm.paper.cases import CASES, RESOLVERS
-from nmm.paper.results import CaseResult, Claim
+from nmm import __version__
+from nmm.errors import RunError, expect
+from nmm.figure_options import PLAIN, FigureOptions
+from nmm.folders.whole import FolderKind, replaced_folder
+from nmm.paper.cases import CASES, DT, RESOLVERS, Case, CaseResult, Claim
+from nmm.paper.claims import claims, smallest_determinant, table
 from nmm.processes import share_out
-from nmm.progress import Progress
-from nmm.runs.figure_options import PLAIN, FigureOptions
+from nmm.progress import Progress, between
+from nmm.runs.trajectory import Outcome, Trajectory
+from nmm.templates import template
 
 if TYPE_CHECKING:
+    from nmm.scenario import Scenario
     from nmm.tables import Table
 
-#: Marks a folder as one of ours.
-FORMAT = "nmm paper 1"
-_MARKER = "paper.json"
+is_paper = FolderKind("nmm paper 1", "paper.json")
 
 
 @dataclass(frozen=True)
 class PaperReport:
-    """What `write_paper` wrote.
-
-    Attributes
-    ----------
-    folder, index : the folder, and the page in it
-    cases : the numbers of each case
-    seconds : that it took
-    """
+    """What `write_paper` wrote: the folder, the page in it, the numbers of each case; how long it took, s."""
 
     folder: Path
     index: Path
@@ -49,17 +43,13 @@ class PaperReport:
 
     def table(self) -> Table:
         """The numbers of all runs, a column each: "1 RG", "1 PG", "2 RG", ...; read from the folder."""
-        from nmm.runs.trajectory import Trajectory
         from nmm.tables import comparison_table
 
-        runs = [
-            replace(
-                Trajectory.load(self.folder / case.folder / resolver),
-                label=f"{case.number} {resolver.upper()}",
-            )
-            for case in CASES
-            for resolver in RESOLVERS
-        ]
+        runs = []
+        for case in CASES:
+            for resolver in RESOLVERS:
+                run = Trajectory.load(self.folder / case.folder / resolver)
+                runs.append(replace(run, label=f"{case.number} {resolver.upper()}"))
         return comparison_table(runs)
 
     @property
@@ -90,8 +80,7 @@ def write_paper(
     InputError : jobs below 1; the folder exists and is not ours, or cannot be written
     RunError : a run did not reach its end
     """
-    if jobs < 1:
-        raise InputError(f"jobs: expected at least 1, got {jobs}")
+    expect(jobs >= 1, "jobs", "at least 1", jobs)
     began = time.perf_counter()
     shown = replace(figures, formats=tuple(dict.fromkeys(["png", *figures.formats])))
     done = dict.fromkeys((case.number for case in CASES), 0.0)
@@ -102,30 +91,74 @@ def write_paper(
             progress(sum(done.values()) / len(done))
 
     with replaced_folder(folder, is_paper, patience=1.0) as temporary:
-        found = share_out(partial(_case, folder=temporary, figures=shown), list(done), jobs, advance)
+        found = share_out(partial(run_case, folder=temporary, figures=shown), list(done), jobs, advance)
         results = tuple(found[number] for number in sorted(found))
-        from nmm.paper.page import render
-
         (temporary / "index.html").write_text(render(results), encoding="utf-8")
-        content = {
-            "format": FORMAT,
-            "made_with": made_with(),
-            "holds": all(claim.holds for result in results for claim in result.claims),
-            "cases": [asdict(result) for result in results],
-        }
-        text = json.dumps(content, indent=2, ensure_ascii=False)
-        (temporary / _MARKER).write_text(text + "\n", encoding="utf-8")
-    folder = Path(folder)
-    return PaperReport(folder, folder / "index.html", results, time.perf_counter() - began)
+        holds = all(claim.holds for result in results for claim in result.claims)
+        is_paper.write(temporary, {"holds": holds, "cases": [asdict(result) for result in results]})
+    return PaperReport(Path(folder), Path(folder, "index.html"), results, time.perf_counter() - began)
 
 
-def is_paper(folder: Path) -> bool:
-    """Whether a folder was written by `write_paper`."""
-    return has_format(folder / _MARKER, FORMAT)
+def render(results: Sequence[CaseResult]) -> str:
+    """The page of these cases, with relative links only."""
+    holding = [claim.holds for result in results for claim in result.claims]
+    return template("nmm.paper", "templates", "index.html").render(
+        cases=[(CASES[result.number - 1], result) for result in results],
+        resolvers=RESOLVERS,
+        dt_ms=f"{1000.0 * DT:g}",
+        version=__version__,
+        holding=sum(holding),
+        claims=len(holding),
+    )
 
 
-def _case(number: int, progress: Progress, folder: Path, figures: FigureOptions) -> CaseResult:
-    # Imported where it is done: a process that only shares the cases out needs none of it.
-    from nmm.paper.case_run import run_case
+def run_case(number: int, progress: Progress, folder: Path, figures: FigureOptions) -> CaseResult:
+    """Run a case with RG and PG, and write its files into the existing `folder`; RunError if a run did not
+    reach its end, KeyboardInterrupt if it was interrupted."""
+    from nmm.playback import write_html
 
-    return run_case(number, folder, progress, figures)
+    began = time.perf_counter()
+    case = CASES[number - 1]
+    rg, pg = _runs(case, between(progress, 0.0, 0.3))
+    determinant = smallest_determinant(rg, _scenario(case, "rg").controller())
+    rows, found = table(rg, pg, determinant), claims(case, rg, pg, determinant)
+    own = folder / case.folder
+    own.mkdir()
+    for k, trajectory in enumerate((rg, pg)):
+        trajectory.save(own / trajectory.resolver, figures=figures)
+        progress(0.4 + 0.15 * k)
+    _write_figures(case, rg, pg, folder, figures)
+    progress(0.7)
+    write_html([rg, pg], own / "playback.html", title=f"Case {case.number}: {case.title}")
+    progress(1.0)
+    return CaseResult(number, tuple(rows), tuple(found), len(rg), time.perf_counter() - began)
+
+
+def _scenario(case: Case, resolver: str) -> Scenario:
+    from nmm.scenario import Scenario
+
+    return Scenario.load(case.scenario, {"dt": DT}).with_resolver(resolver)
+
+
+def _runs(case: Case, progress: Progress | None) -> list[Trajectory]:
+    found: list[Trajectory] = []
+    for k, resolver in enumerate(RESOLVERS):
+        trajectory = _scenario(case, resolver).run(between(progress, 0.5 * k, 0.5))
+        if trajectory.outcome is Outcome.INTERRUPTED:
+            raise KeyboardInterrupt
+        if not trajectory.complete:
+            raise RunError(f"case {case.number} with {resolver.upper()}: {trajectory.message}")
+        found.append(trajectory)
+    return found
+
+
+def _write_figures(case: Case, rg: Trajectory, pg: Trajectory, folder: Path, figures: FigureOptions) -> None:
+    from nmm.figures import objective_comparison, stroboscopic, tracking
+    from nmm.figures.style import save_as
+
+    (motion, _), (objective, _) = case.figures
+    across = figures.across()
+    shown = (tracking if case.number == 4 else stroboscopic)(rg, **across)
+    save_as(shown, folder, f"fig{motion:02d}", figures)
+    compared = objective_comparison([rg, pg], zoom=(0.0, case.zoom), symbol=case.symbol, **across)
+    save_as(compared, folder, f"fig{objective:02d}", figures)

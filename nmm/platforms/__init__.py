@@ -5,34 +5,36 @@ from __future__ import annotations
 from contextlib import suppress
 
 from nmm.errors import InputError
-from nmm.kinds import PLATFORMS
-from nmm.platforms.base import Platform
-from nmm.platforms.car import Car, FrontDriveCar
-from nmm.platforms.differential_drive import DifferentialDrive
-from nmm.platforms.fixed import Fixed
-from nmm.platforms.layout import AddedJoint, Layout, Pivot, RollingJoint
-from nmm.platforms.mecanum import Mecanum
-from nmm.platforms.omnidirectional import Omnidirectional
-from nmm.platforms.skid_steer import SkidSteer
-from nmm.platforms.tractor import Tractor, Trailer
-from nmm.platforms.unicycle import Unicycle
-from nmm.platforms.wheeled import (
-    CasterWheel,
-    CommonSpeed,
-    FixedWheel,
-    Hitch,
-    OmniWheel,
-    Speed,
-    Spin,
-    Spins,
-    SteeredWheel,
-    WheeledPlatform,
-)
+from nmm.kinds import PLATFORMS as PLATFORMS
+from nmm.platforms.base import Platform as Platform
+from nmm.platforms.car import Car as Car
+from nmm.platforms.car import FrontDriveCar as FrontDriveCar
+from nmm.platforms.omnidirectional import FixedBase as FixedBase
+from nmm.platforms.omnidirectional import Mecanum as Mecanum
+from nmm.platforms.omnidirectional import Omnidirectional as Omnidirectional
+from nmm.platforms.skid_steer import SkidSteer as SkidSteer
+from nmm.platforms.tractor import Tractor as Tractor
+from nmm.platforms.tractor import Trailer as Trailer
+from nmm.platforms.unicycle import DifferentialDrive as DifferentialDrive
+from nmm.platforms.unicycle import Unicycle as Unicycle
+from nmm.platforms.wheel_layout import AddedJoint as AddedJoint
+from nmm.platforms.wheel_layout import Layout as Layout
+from nmm.platforms.wheel_layout import Pivot as Pivot
+from nmm.platforms.wheel_layout import RollingJoint as RollingJoint
+from nmm.platforms.wheeled.descriptions import CasterWheel as CasterWheel
+from nmm.platforms.wheeled.descriptions import FixedWheel as FixedWheel
+from nmm.platforms.wheeled.descriptions import Hitch as Hitch
+from nmm.platforms.wheeled.descriptions import OmniWheel as OmniWheel
+from nmm.platforms.wheeled.descriptions import SteeredWheel as SteeredWheel
+from nmm.platforms.wheeled.inputs import CommonSpeed as CommonSpeed
+from nmm.platforms.wheeled.inputs import WeightedSpins as WeightedSpins
+from nmm.platforms.wheeled.inputs import WheelSpeed as WheelSpeed
+from nmm.platforms.wheeled.inputs import WheelSpin as WheelSpin
+from nmm.platforms.wheeled.platform import WheeledPlatform as WheeledPlatform
 
 
 def usual_platform(layout: Layout | None) -> tuple[Platform, str]:
-    """The platform of a file that says none, and why it: a car where wheels steer as a car's do ("wheels"),
-    else a unicycle ("default")."""
+    """A car if the file's wheels steer as a car's do ("wheels"), otherwise a unicycle ("default")."""
     steered = {pivot.joint for pivot in layout.pivots if pivot.steers} if layout is not None else set()
     if layout is not None and any(wheel.carrier in steered for wheel in layout.wheels):
         with suppress(InputError):
@@ -44,35 +46,3 @@ def platform_by_name(name: str) -> type[Platform]:
     """The kind of platform of that name; `InputError` lists the names."""
     kind: type[Platform] = PLATFORMS.named(name)
     return kind
-
-
-__all__ = [
-    "PLATFORMS",
-    "AddedJoint",
-    "Car",
-    "CasterWheel",
-    "CommonSpeed",
-    "DifferentialDrive",
-    "Fixed",
-    "FixedWheel",
-    "FrontDriveCar",
-    "Hitch",
-    "Layout",
-    "Mecanum",
-    "OmniWheel",
-    "Omnidirectional",
-    "Pivot",
-    "Platform",
-    "RollingJoint",
-    "SkidSteer",
-    "Speed",
-    "Spin",
-    "Spins",
-    "SteeredWheel",
-    "Tractor",
-    "Trailer",
-    "Unicycle",
-    "WheeledPlatform",
-    "platform_by_name",
-    "usual_platform",
-]

@@ -4,44 +4,58 @@ from __future__ import annotations
 
 import copy
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, positive, vector
-from nmm.errors import InputError, expect_known
+from nmm.errors import InputError, expect, expect_known
+from nmm.findings import Finding
 from nmm.kernels.compiled import Kernel
-from nmm.platforms.layout import NEAR, AddedJoint, Layout
 from nmm.platforms.steering import SteeredAxle
+from nmm.platforms.wheel_layout import NEAR, AddedJoint, Layout
 
+#: The coordinates that every platform begins with.
+PLANAR = ("x", "y", "theta")
 #: Given and measured lengths that differ by a smaller share are the same.
 CLOSE = 0.01
-#: The methods `pfaffian` that `of_many` marked: an overriding one counts as of one configuration.
+#: The methods `pfaffian` that `of_many` marked.
 _of_many: set[Callable[[Any, Array], Array]] = set()
 
 
 def of_many(pfaffian: Callable[[Any, Array], Array]) -> Callable[[Any, Array], Array]:
-    """Decorator of a `pfaffian` that takes several configurations, too: (..., n_p), A (..., n_p - p, n_p)."""
+    """Marks a `pfaffian` that takes qp (..., n_p), A (..., n_p - p, n_p); overrides are not marked."""
     _of_many.add(pfaffian)
     return pfaffian
 
 
+def coordinates_with(platform: str, joints: Sequence[str]) -> tuple[str, ...]:
+    """x, y, theta and the joints; `InputError` for a name that is none, is x, y or theta, or comes twice."""
+    names = list(PLANAR)
+    where = f"{platform}: joints"
+    for joint in joints:
+        expect(isinstance(joint, str) and joint, where, "the name of a joint", joint)
+        expect(joint not in PLANAR, where, "a joint's name other than x, y, theta", joint)
+        expect(joint not in names, where, "a name of its own for each", joint)
+        names.append(joint)
+    return tuple(names)
+
+
 class Platform(ABC):
-    """A driftless platform. To add one, write a subclass in a file of its own that:
+    """A driftless platform. To add one, write a subclass with
 
-    1. sets `name`, `coordinates` (none, or x, y, theta first), `inputs` and `input_units`, as class
-       attributes or, when they depend on the platform's parameters, in `__init__`;
-    2. implements `velocity_map`, a kernel of signature `compiled.PLATFORM`;
-    3. implements `pfaffian`, the constraint rows with `A(qp) G(qp) = 0`, written independently
-       of G (from the rolling of the wheels): the tests check the one against the other.
+    1. `name`, `coordinates` (none, or x, y, theta first), `inputs` and `input_units`, as class attributes or,
+       when they depend on the platform's parameters, set in `__init__`;
+    2. `velocity_map`, a kernel of signature `compiled.PLATFORM`;
+    3. `pfaffian`, the constraint rows with `A(qp) G(qp) = 0`, written independently of G (from the rolling of
+       the wheels): the tests check the one against the other.
 
-    It may say more: `parameters` (the numbers that the kernel reads) and their `parameter_names`, `fit` (how
+    It may have more: `parameters` (the numbers that the kernel reads) and their `parameter_names`, `fit` (how
     to measure them in a robot's file) and `lengths` (what a file is compared with), `coordinate_limits`,
     `problem` (where its wheels cannot roll, and why), `roller`, `rolls_at` and `sliding` (of wheels that do
-    more than roll), `steered_axle` (what turns it where no task feels that), `added_joint` (a coordinate that
-    files lack).
+    more than roll), `steered_axle` (what turns it where no task does), `added_joint` (one that files lack).
 
     Parameters
     ----------
@@ -64,9 +78,11 @@ class Platform(ABC):
     """
 
     name: str
-    coordinates: tuple[str, ...] = ("x", "y", "theta")
+    coordinates: tuple[str, ...] = PLANAR
     inputs: tuple[str, ...]
     input_units: tuple[str, ...]
+    #: The attributes that `fit` measures, m.
+    _fitted: tuple[str, ...] = ()
     _limits: Mapping[str, float] = {}
 
     def __init__(self, *, limits: Mapping[str, float] | None = None) -> None:
@@ -85,43 +101,35 @@ class Platform(ABC):
 
     @classmethod
     def fit(cls, layout: Layout) -> Self:
-        """The platform with its parameters measured in a robot's file; without parameters, the platform.
-
-        Raises
-        ------
-        InputError : the file lacks what the platform needs (a steering joint, two wheels on one axle, ...)
-        """
+        """The platform with its parameters, if any, measured in a robot's file; `InputError` where the file
+        lacks what they need (a steering joint, two wheels on one axle, ...)."""
         return cls()
 
     @property
     def lengths(self) -> Mapping[str, float]:
         """What `fit` measures, by name, m; nothing by default."""
-        return {}
+        return {name: getattr(self, name) for name in self._fitted}
 
     def measured(self, layout: Layout) -> Mapping[str, float]:
         """`lengths` as a robot's file has them, m; `InputError` where it lacks what the platform needs."""
         return type(self).fit(layout).lengths
 
-    def compared(self, layout: Layout) -> tuple[str, ...]:
-        """What a robot's file says against this platform, a sentence each, with both numbers.
-
-        Nothing where the file has no wheels or the platform no `lengths`, which may differ by 1 mm or 1 %.
-
-        Raises
-        ------
-        InputError : its joints cannot be those of the file
-        """
+    def compared(self, layout: Layout) -> tuple[Finding, ...]:
+        """What a robot's file says against this platform, with both numbers (1 mm or 1 % may differ); nothing
+        without wheels or `lengths`. `InputError` where its joints cannot be those of the file."""
         if not layout.wheels or not self.lengths:
             return ()
         try:
             measured = self.measured(layout)
         except InputError as error:
-            return (f"given by hand, and not what its file holds: {error}",)
-        return tuple(
-            f"platform {self.name}: {name} is {given:g} m as given, and {measured[name]:.6g} m in the file"
-            for name, given in self.lengths.items()
-            if name in measured and abs(given - measured[name]) > max(NEAR, CLOSE * abs(measured[name]))
-        )
+            return (Finding("platform_misfit", {"platform": self.name, "reason": str(error)}),)
+        found = []
+        for name, given in self.lengths.items():
+            own = measured.get(name, given)
+            if abs(given - own) > max(NEAR, CLOSE * abs(own)):
+                values = {"platform": self.name, "name": name, "given": given, "measured": own}
+                found.append(Finding("platform_length_differs", values))
+        return tuple(found)
 
     def added_joint(self, layout: Layout) -> AddedJoint | None:
         """A coordinate of its own that the file lacks, or limits of one that the file's others imply."""
@@ -130,10 +138,7 @@ class Platform(ABC):
     @property
     @abstractmethod
     def velocity_map(self) -> Kernel:
-        """Kernel that writes G (n_p, p) and G_q (n_p, p, n_p), G_q[i, j, k] = dG[i, j]/dqp[k].
-
-        Both arrays come filled with zeros.
-        """
+        """Kernel that writes G (n_p, p) and G_q (n_p, p, n_p), G_q[i, j, k] = dG[i, j]/dqp[k], into zeros."""
 
     @abstractmethod
     def pfaffian(self, qp: Array) -> Array:
@@ -146,8 +151,8 @@ class Platform(ABC):
 
     @property
     def parameter_names(self) -> Mapping[str, str]:
-        """What the lengths in `parameters` are called in formulas, in their order, each with what it is where
-        its name does not say so ("" otherwise); without names, formulas have the numbers."""
+        """What the lengths in `parameters` are called in formulas, in order, each with what it is where its
+        name does not say so ("" otherwise); without names, formulas have the numbers."""
         return {}
 
     @property
@@ -165,9 +170,9 @@ class Platform(ABC):
         return None
 
     def roller(self, x: float, y: float) -> float:
-        """Angle γ of the rollers of the wheel at (x, y) m on the root's body: the wheel grips along the
-        direction in which it rolls, turned by γ (rad) about z. 0 for a wheel without rollers and for one
-        whose rollers turn about its rolling direction; ±π/4 for a mecanum wheel."""
+        """Angle γ (rad) of the rollers of the wheel at (x, y) m on the root's body: it grips along its
+        rolling direction turned by γ about z. 0 without rollers or where they turn about the rolling
+        direction, ±π/4 for a mecanum wheel."""
         return 0.0
 
     def rolls_at(self, x: float, y: float) -> tuple[float, float]:
@@ -176,22 +181,17 @@ class Platform(ABC):
         return x, y
 
     def sliding(self, up: Array) -> Array:
-        """How fast its wheels slide over the ground by design at the inputs (..., p): (...,) m/s, of the one
-        that slides fastest. 0 where all roll."""
+        """Speed (...,), m/s, at inputs (..., p), of the wheel that slides fastest by design; 0 if none."""
         return np.zeros(up.shape[:-1])
 
     def steered_axle(self, body: str) -> SteeredAxle | None:
-        """What steers a body where, at first order, only the speed moves it; None where nothing needs to.
-
-        Parameters
-        ----------
-        body : the coordinate that turns it: "theta" for the main body, a hitch's joint for a trailer
-        """
+        """What steers a body where, at first order, only the speed moves it; None where nothing needs to. The
+        coordinate `body` turns it: "theta" for the main body, a hitch's joint for a trailer."""
         return None
 
     def described(self) -> dict[str, str]:
-        """The parameters in words, with their units, for people."""
-        return {}
+        """The parameters in words, with their units, for people; by default the `lengths`."""
+        return {name: f"{length:g} m" for name, length in self.lengths.items()}
 
     @property
     def n_p(self) -> int:

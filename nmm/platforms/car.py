@@ -10,22 +10,24 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, positive
-from nmm.errors import InputError
-from nmm.kernels.compiled import PLATFORM, Kernel, kernel
-from nmm.platforms.ackermann import are_below, steered_pair
-from nmm.platforms.base import Platform, of_many
-from nmm.platforms.layout import NEAR, AddedJoint, Layout, Pivot
-from nmm.platforms.measuring import (
+from nmm.errors import expect
+from nmm.findings import Finding
+from nmm.kernels.compiled import PLATFORM, kernel
+from nmm.platforms.base import Platform, coordinates_with, of_many
+from nmm.platforms.steering import SteeredAxle, SteeringPivot, steered_pair
+from nmm.platforms.unicycle import across, roll_ahead
+from nmm.platforms.wheel_layout import (
+    NEAR,
+    AddedJoint,
+    Layout,
+    Pivot,
     check_axle,
     misfit,
-    say_pivots,
-    say_wheels,
+    stands_below,
+    steering_pivots,
     symmetric_limit,
     wheels_on,
 )
-from nmm.platforms.own_joints import coordinates_with
-from nmm.platforms.steering import SteeredAxle, SteeringPivot
-from nmm.platforms.unicycle import across
 
 #: The coordinate of a car whose two wheels steer without a joint midway between them.
 STEER = "steer"
@@ -36,15 +38,10 @@ _ACROSS = 1e-6
 @kernel(PLATFORM)
 def rear_drive(qp: Array, parameters: Array, G: Array, G_q: Array) -> None:
     """G = [[cos θ, 0], [sin θ, 0], [tan δ / L, 0], [0, 1]]; parameters = [L]."""
-    cosine = math.cos(qp[2])
-    sine = math.sin(qp[2])
     tangent = math.tan(qp[3])
-    G[0, 0] = cosine
-    G[1, 0] = sine
+    roll_ahead(qp, G, G_q)
     G[2, 0] = tangent / parameters[0]
     G[3, 1] = 1.0
-    G_q[0, 0, 2] = -sine
-    G_q[1, 0, 2] = cosine
     G_q[2, 0, 3] = (1.0 + tangent * tangent) / parameters[0]
 
 
@@ -67,10 +64,12 @@ def front_drive(qp: Array, parameters: Array, G: Array, G_q: Array) -> None:
 
 
 class _Bicycle(Platform):
-    """What both cars have: where the wheels stand, and that none of them slides."""
+    """What both cars share: where the wheels stand, and that none of them slides."""
 
     inputs = ("v", "steering_rate")
     input_units = ("m/s", "rad/s")
+    parameter_names: Mapping[str, str] = {"L": ""}
+    _fitted = ("wheelbase",)
     #: The widest steering angle that it may be limited to, rad, and to which it is steered by itself.
     _widest: float
     _steered_to = math.radians(60.0)
@@ -88,52 +87,39 @@ class _Bicycle(Platform):
         self.coordinates = coordinates_with(self.name, [steering])
         self.max_steering = None
         if max_steering is not None:
-            self.max_steering = positive(max_steering, f"{self.name}: max_steering")
-            if self.max_steering > self._widest:
-                raise InputError(
-                    f"{self.name}: max_steering: expected at most {math.degrees(self._widest):.6g} degrees, "
-                    f"got {math.degrees(self.max_steering):.6g} ({self.max_steering:g} rad)"
-                )
+            where = f"{self.name}: max_steering"
+            self.max_steering = limit = positive(max_steering, where)
+            most = f"at most {self._widest:.6g} rad ({math.degrees(self._widest):.6g} degrees)"
+            expect(limit <= self._widest, where, most, limit)
         super().__init__(limits=limits)
 
     @classmethod
     def fit(cls, layout: Layout) -> Self:
         """Wheelbase and steering joint of the file; the joint's limits when they are symmetric.
 
-        The steering joint is the upright joint on the root's body whose name holds "steer" and which stands
-        on the x axis, ahead of the reference point. Without one, two such joints with wheels, equally far
-        beside the x axis, count as one midway between them, the coordinate `steer`.
-
-        Raises
-        ------
-        InputError : there is none, or there are several; the rear wheels are not at the reference point
-        """
-        named = [pivot for pivot in layout.pivots if _may_steer(pivot)]
+        The steering joint is upright, on the root's body, on the x axis ahead of the reference point, with
+        "steer" in its name; or two such joints with wheels, equally far beside the x axis, count as one
+        midway, `steer`. `InputError` for none, several, or rear wheels that are not at the reference
+        point."""
+        named = [pivot for pivot in steering_pivots(layout) if abs(pivot.y) <= NEAR < pivot.x]
         pair = None if named else steered_pair(layout)
         if len(named) != 1 and pair is None:
-            expected = (
-                'one steering joint: upright, "steer" in its name, on the x axis of the root, x > 0; or two '
-                "with wheels, equally far beside it"
-            )
+            expected = 'one steering joint: upright, "steer" in its name, on the x axis of the root, x > 0'
+            expected += "; or two with wheels, equally far beside it"
             wrong = f"there are {len(named)}" if named else "there is none"
-            raise misfit(layout, cls.name, expected, wrong, say_pivots(layout.pivots))
+            raise misfit(layout, cls.name, expected, wrong, layout.pivots)
         check_axle(layout, cls.name)
         if pair is not None:
             lower, upper = pair.range(cls._widest)
             even = upper < cls._widest and abs(lower + upper) <= NEAR
             return cls(pair.x, steering=STEER, max_steering=upper if even else None)
         for wheel in wheels_on(layout, named[0].joint):
-            if not are_below([wheel]):
+            if not stands_below(wheel):
                 expected = "the steered wheel below its steering axis, rolling ahead (see platform wheeled)"
-                raise misfit(layout, cls.name, expected, "it is off it or turned", say_wheels([wheel]))
+                raise misfit(layout, cls.name, expected, "it is off it or turned", [wheel])
         limit = symmetric_limit(named[0])
-        if limit is not None and limit > cls._widest:
-            limit = None
-        return cls(named[0].x, steering=named[0].joint, max_steering=limit)
-
-    @property
-    def lengths(self) -> Mapping[str, float]:
-        return {"wheelbase": self.wheelbase}
+        within = limit is None or limit <= cls._widest
+        return cls(named[0].x, steering=named[0].joint, max_steering=limit if within else None)
 
     def measured(self, layout: Layout) -> Mapping[str, float]:
         own = self._pivot(layout)
@@ -142,21 +128,21 @@ class _Bicycle(Platform):
         check_axle(layout, self.name)
         return {"wheelbase": own.x}
 
-    def compared(self, layout: Layout) -> tuple[str, ...]:
+    def compared(self, layout: Layout) -> tuple[Finding, ...]:
         own = self._pivot(layout)
         if own is not None and abs(own.y) > NEAR:
             expected = "its steering joint on the x axis: its angle is that of a wheel there"
             wrong = f"{own.joint} is beside it: leave it out, and two such joints make the coordinate {STEER}"
-            raise misfit(layout, self.name, expected, wrong, say_pivots(layout.pivots))
+            raise misfit(layout, self.name, expected, wrong, layout.pivots)
         return super().compared(layout)
 
     def added_joint(self, layout: Layout) -> AddedJoint | None:
-        """Midway between two wheels that steer, within what their joints allow of angle and rate."""
+        """Midway between two steered wheels, within what their joints allow of angle and rate."""
         pair, own = steered_pair(layout), self._pivot(layout)
         if pair is None:
             return None
         lower, upper = pair.range(self._widest)
-        for lowest, highest in ((own.lower, own.upper) if own else (lower, upper), self.coordinate_limits[3]):
+        for lowest, highest in (*([(own.lower, own.upper)] if own else []), self.coordinate_limits[3]):
             lower, upper = max(lower, float(lowest)), min(upper, float(highest))
         return AddedJoint(self.steering, pair.x, 0.0, lower, upper, pair.rate(lower, upper))
 
@@ -167,13 +153,9 @@ class _Bicycle(Platform):
     def parameters(self) -> Array:
         return np.array([self.wheelbase])
 
-    @property
-    def parameter_names(self) -> Mapping[str, str]:
-        return {"L": ""}
-
     def described(self) -> dict[str, str]:
         widest = "its joint's" if self.max_steering is None else f"{math.degrees(self.max_steering):.4g}°"
-        return {"wheelbase": f"{self.wheelbase:g} m", "steering": self.steering, "max_steering": widest}
+        return super().described() | {"steering": self.steering, "max_steering": widest}
 
     @property
     def coordinate_limits(self) -> Array:
@@ -192,12 +174,9 @@ class _Bicycle(Platform):
 
     @of_many
     def pfaffian(self, qp: Array) -> Array:
-        """Neither the rear axle nor the steered wheel slides sideways.
+        """Neither the rear axle nor the steered wheel, at (x + L cos θ, y + L sin θ), slides sideways:
 
-        The rear axle's midpoint does not move along the axle: -sin θ x_dot + cos θ y_dot = 0. The steered
-        wheel, at (x + L cos θ, y + L sin θ), does not move across its direction θ + δ:
-        -sin(θ + δ) x_dot + cos(θ + δ) y_dot + L cos δ θ_dot = 0.
-        """
+        -sin θ x_dot + cos θ y_dot = 0,  -sin(θ + δ) x_dot + cos(θ + δ) y_dot + L cos δ θ_dot = 0."""
         turned = np.exp(1j * qp[..., 3])
         steered = np.exp(1j * qp[..., 2]) * turned
         front = np.zeros((*qp.shape[:-1], 1, 4))
@@ -233,11 +212,8 @@ class Car(_Bicycle):
     """
 
     name = "car"
+    velocity_map = rear_drive
     _widest = math.acos(_ACROSS)
-
-    @property
-    def velocity_map(self) -> Kernel:
-        return rear_drive
 
     def problem(self, qp: ArrayLike) -> str | None:
         """That the steered wheel stands across the car, where v would drag it sideways."""
@@ -276,14 +252,6 @@ class FrontDriveCar(_Bicycle):
     """
 
     name = "front_drive_car"
+    velocity_map = front_drive
     _widest = math.pi
     _steered_to = math.radians(85.0)
-
-    @property
-    def velocity_map(self) -> Kernel:
-        return front_drive
-
-
-def _may_steer(pivot: Pivot) -> bool:
-    on_axis = pivot.carrier == "theta" and abs(pivot.y) <= NEAR and pivot.x > NEAR
-    return on_axis and pivot.steers

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, positive, scalar
-from nmm.errors import InputError
-from nmm.kernels.compiled import PLATFORM, Kernel, kernel
+from nmm.errors import expect
+from nmm.kernels.compiled import PLATFORM, kernel
 from nmm.platforms.base import Platform, of_many
-from nmm.platforms.layout import Layout, RollingJoint
-from nmm.platforms.measuring import NEAR, misfit, rolls_forward, same, say_wheels, wheels_on
 from nmm.platforms.unicycle import across
+from nmm.platforms.wheel_layout import NEAR, Layout, RollingJoint, main_wheels, same
 
 
 @kernel(PLATFORM)
@@ -42,11 +41,11 @@ def skid_steer(qp: Array, parameters: Array, G: Array, G_q: Array) -> None:
 class SkidSteer(Platform):
     """qp = [x, y, theta] (m, m, rad), up = [omega_left, omega_right] (rad/s, positive rolls forward).
 
-    x, y is the middle of the wheels, theta their heading from the world's x axis. In a turn wheels that are
-    not at their side's centre of rotation slide: by design, and `sliding` says how fast. Where these centres
-    are depends on the ground, the load and the tires, and changes little with the speed. They are measured by
-    driving: on hard ground they lie farther out than the wheels (1.5 to 2 times), so that the robot turns
-    less than its wheels say. Without numbers they are at the wheels, as if these slid sideways only.
+    x, y is the middle of the wheels, theta their heading from the world's x axis. In a turn, wheels that are
+    not at their side's centre of rotation slide by design; `sliding` says how fast. Where these centres are
+    depends on the ground, the load and the tires, and changes little with the speed. They are measured by
+    driving: on hard ground they lie 1.5 to 2 times farther out than the wheels, so that the robot turns less
+    than its wheels say. Without numbers they are at the wheels, as if these slid sideways only.
 
     A. Mandow, J. L. Martínez, J. Morales, J. L. Blanco, A. García-Cerezo, J. González, *Experimental
     Kinematics for Wheeled Skid-Steer Mobile Robots*, IROS 2007; J. L. Martínez et al., *Approximating
@@ -77,6 +76,8 @@ class SkidSteer(Platform):
     name = "skid_steer"
     inputs = ("omega_left", "omega_right")
     input_units = ("rad/s", "rad/s")
+    velocity_map = skid_steer
+    _fitted = ("radius", "length", "width")
 
     def __init__(
         self,
@@ -96,31 +97,21 @@ class SkidSteer(Platform):
         self.left = half if left is None else scalar(left, f"{self.name}: left")
         self.right = -half if right is None else scalar(right, f"{self.name}: right")
         self.ahead = scalar(ahead, f"{self.name}: ahead")
-        if self.left - self.right <= 0.0:
-            raise InputError(
-                f"{self.name}: left, right: expected the left wheels' centre of rotation to the left of the "
-                f"right wheels', got y = {self.left:g} and {self.right:g} m"
-            )
+        centres = (self.left, self.right)
+        expected = "the left wheels' centre of rotation to the left of the right wheels', y in m"
+        expect(self.left - self.right > 0.0, f"{self.name}: left, right", expected, centres)
         super().__init__(limits=limits)
 
     @classmethod
     def fit(cls, layout: Layout) -> Self:
-        """Radius, length and width of the file's wheels, with the centres of rotation at the wheels.
-
-        Raises
-        ------
-        InputError : the root's body does not carry wheels of one radius that roll forward on two axles or
-            more, as many to the left as to the right of the reference point, which is midway between the
-            first axle and the last
-        """
-        wheels = wheels_on(layout, "theta")
-        wrong = _misfit(wheels)
-        if wrong is not None:
-            expected = (
-                "wheels of one radius that roll forward on two axles or more, equally far to the left and "
-                "right, with the reference point in their middle"
-            )
-            raise misfit(layout, cls.name, expected, wrong, say_wheels(wheels))
+        """Radius, length and width of the file's wheels, with the centres of rotation there; `InputError`
+        unless the root's body carries wheels of one radius that roll forward on two axles or more, as many to
+        the left as to the right of the reference point, midway between the outer axles."""
+        expected = (
+            "wheels of one radius that roll forward on two axles or more, equally far to the left and right"
+        )
+        expected += ", with the reference point in their middle"
+        wheels = main_wheels(layout, cls.name, expected, _why_no_two_sides, 4)
         length = max(wheel.x for wheel in wheels) - min(wheel.x for wheel in wheels)
         return cls(wheels[0].radius, length, 2.0 * abs(wheels[0].y))
 
@@ -128,21 +119,9 @@ class SkidSteer(Platform):
     def parameters(self) -> Array:
         return np.array([self.radius, self.left, self.right, self.ahead])
 
-    @property
-    def lengths(self) -> Mapping[str, float]:
-        return {"radius": self.radius, "length": self.length, "width": self.width}
-
     def described(self) -> dict[str, str]:
-        return {
-            "radius": f"{self.radius:g} m",
-            "length": f"{self.length:g} m",
-            "width": f"{self.width:g} m",
-            "centres of rotation": f"left {self.left:g} m, right {self.right:g} m, ahead {self.ahead:g} m",
-        }
-
-    @property
-    def velocity_map(self) -> Kernel:
-        return skid_steer
+        centres = f"left {self.left:g} m, right {self.right:g} m, ahead {self.ahead:g} m"
+        return super().described() | {"centres of rotation": centres}
 
     @of_many
     def pfaffian(self, qp: Array) -> Array:
@@ -162,13 +141,7 @@ class SkidSteer(Platform):
         return np.abs(turn) * math.hypot(out, 0.5 * self.length + abs(self.ahead))
 
 
-def _misfit(wheels: tuple[RollingJoint, ...]) -> str | None:
-    """What is wrong with them, or None."""
-    if len(wheels) < 4:
-        return f"the root's body carries {len(wheels)}"
-    for wheel in wheels:
-        if not rolls_forward(wheel):
-            return f"{wheel.joint} does not roll forward"
+def _why_no_two_sides(wheels: Sequence[RollingJoint]) -> str | None:
     if not same(abs(wheel.y) for wheel in wheels) or abs(wheels[0].y) <= NEAR:
         return "they are not equally far to the left and right of the reference point: give axle (--axle X,Y)"
     left, right = (sorted(wheel.x for wheel in wheels if wheel.y * side > 0.0) for side in (1.0, -1.0))
@@ -178,6 +151,4 @@ def _misfit(wheels: tuple[RollingJoint, ...]) -> str | None:
         return "they are on one axle"
     if abs(left[-1] + left[0]) > 2.0 * NEAR:
         return "the reference point is not midway between the first and the last axle: give axle (--axle X,Y)"
-    if not same(wheel.radius for wheel in wheels):
-        return "their radii differ"
     return None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -11,13 +11,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, positive, scalar
-from nmm.errors import InputError
-from nmm.kernels.compiled import PLATFORM, Kernel, kernel, scratch
-from nmm.platforms.base import Platform, of_many
-from nmm.platforms.layout import Layout
-from nmm.platforms.own_joints import coordinates_with
+from nmm.errors import expect, one_or_several
+from nmm.kernels.compiled import PLATFORM, kernel, scratch
+from nmm.platforms.base import Platform, coordinates_with, of_many
 from nmm.platforms.steering import SteeredAxle, SteeringPivot
-from nmm.platforms.trailer_layout import measure_trailers
+from nmm.platforms.unicycle import roll_ahead
+from nmm.platforms.wheel_layout import (
+    NEAR,
+    Layout,
+    Pivot,
+    check_axle,
+    misfit,
+    rolls_forward,
+    same,
+    symmetric_limit,
+    wheels_on,
+)
 
 #: Beyond its limit a hitch is folded by more than this, rad.
 _SLACK = 1e-9
@@ -25,20 +34,13 @@ _SLACK = 1e-9
 
 @kernel(PLATFORM)
 def tractor(qp: Array, parameters: Array, G: Array, G_q: Array) -> None:
-    """From body to body, with (v, ω) of the axle in front, hitch angle b, hitch h and length l:
+    """From body to body, with (v, ω) of the axle in front and its derivatives in b_1, b_2, ..., hitch angle
+    b, hitch h and length l; parameters = [h_1, l_1, h_2, l_2, ...]:
 
-    ω' = -(v sin b + h ω cos b) / l,  v' = v cos b - h ω sin b,  b_dot = ω' - ω;
-
-    parameters = [h_1, l_1, h_2, l_2, ...]. The derivatives in b_1, b_2, ... run along with them.
-    """
+    ω' = -(v sin b + h ω cos b) / l,  v' = v cos b - h ω sin b,  b_dot = ω' - ω."""
     trailers = parameters.shape[0] // 2
-    cosine = math.cos(qp[2])
-    sine = math.sin(qp[2])
-    G[0, 0] = cosine
-    G[1, 0] = sine
+    roll_ahead(qp, G, G_q)
     G[2, 1] = 1.0
-    G_q[0, 0, 2] = -sine
-    G_q[1, 0, 2] = cosine
     v_b = scratch(trailers)
     w_b = scratch(trailers)
     for j in range(2):
@@ -128,32 +130,39 @@ class Tractor(Platform):
     name = "tractor"
     inputs = ("v", "omega")
     input_units = ("m/s", "rad/s")
+    velocity_map = tractor
 
     def __init__(self, trailers: Sequence[Trailer], *, limits: Mapping[str, float] | None = None) -> None:
-        try:
-            self.trailers = tuple(trailers)
-        except TypeError:
-            raise InputError(f"{self.name}: trailers: expected a list of Trailer, got {trailers!r}") from None
-        if not self.trailers:
-            raise InputError(f"{self.name}: trailers: expected at least one Trailer, got none")
-        for trailer in self.trailers:
-            if not isinstance(trailer, Trailer):
-                raise InputError(f"{self.name}: trailers: expected a list of Trailer, got {trailer!r} in it")
+        where, expected = f"{self.name}: trailers", "one Trailer or more, in a list"
+        expect(isinstance(trailers, Iterable), where, expected, trailers)
+        self.trailers = one_or_several(tuple(trailers), Trailer, where, expected)
+        expect(self.trailers, where, expected, self.trailers)
         self.coordinates = coordinates_with(self.name, [trailer.joint for trailer in self.trailers])
         super().__init__(limits=limits)
 
     @classmethod
     def fit(cls, layout: Layout) -> Self:
         """The trailers of the file: the upright joints, one on another from the root's body on, whose names
-        hold "hitch" or "trailer", each with wheels on one axle behind it.
-
-        Raises
-        ------
-        InputError : no such joint, or two on one body, or one off the x axis; a trailer without wheels, or
-            with wheels on several axles or ahead of its hitch
-        """
-        measured = measure_trailers(layout, cls.name)
-        return cls([Trailer(one.length, one.hitch, one.joint, one.max_angle) for one in measured])
+        hold "hitch" or "trailer", each with wheels on one axle behind it; `InputError` where there is none,
+        two are on one body, one is off the x axis, or a trailer lacks such wheels."""
+        found: list[Trailer] = []
+        carrier, axle = "theta", 0.0
+        while named := [pivot for pivot in layout.pivots if pivot.carrier == carrier and pivot.hitches]:
+            if len(named) > 1:
+                expected = "at most one hitch on each body"
+                raise misfit(layout, cls.name, expected, f"{carrier} carries several", named)
+            (pivot,) = named
+            if abs(pivot.y) > NEAR:
+                expected = "hitches midway between the wheels of the body in front"
+                raise misfit(layout, cls.name, expected, f"{pivot.joint} is off the x axis", named)
+            length = _length(layout, cls.name, pivot)
+            found.append(Trailer(length, axle - pivot.x, pivot.joint, symmetric_limit(pivot)))
+            carrier, axle = pivot.joint, -length
+        if not found:
+            expected = 'an upright joint on the root\'s body with "hitch" or "trailer" in its name'
+            raise misfit(layout, cls.name, expected, "there is none", layout.pivots)
+        check_axle(layout, cls.name)
+        return cls(found)
 
     @property
     def lengths(self) -> Mapping[str, float]:
@@ -181,20 +190,12 @@ class Tractor(Platform):
 
     def described(self) -> dict[str, str]:
         return {
-            f"trailer at {trailer.joint}": f"hitch {trailer.hitch:g} m behind the axle ahead, length "
-            f"{trailer.length:g} m"
-            for trailer in self.trailers
+            f"trailer at {one.joint}": f"hitch {one.hitch:g} m behind the axle ahead, length {one.length:g} m"
+            for one in self.trailers
         }
 
-    @property
-    def velocity_map(self) -> Kernel:
-        return tractor
-
     def steered_axle(self, body: str) -> SteeredAxle | None:
-        """A first trailer that is hitched on the tractor's axle: the tractor is its steered wheel.
-
-        Hitched off the axle, it feels omega.
-        """
+        """A first trailer hitched on the tractor's axle is steered by the tractor; off it, it feels omega."""
         trailer = self.trailers[0]
         if body != trailer.joint or trailer.hitch != 0.0:
             return None
@@ -230,3 +231,21 @@ class Tractor(Platform):
                 folded, limit = math.degrees(abs(angle)), math.degrees(trailer.max_angle)
                 return f"{trailer.joint} is folded to {folded:.4g} degrees, beyond its limit of {limit:.4g}"
         return None
+
+
+def _length(layout: Layout, platform: str, pivot: Pivot) -> float:
+    """From the hitch to the trailer's axle, m."""
+    wheels = wheels_on(layout, pivot.joint)
+    wrong = None
+    if not wheels:
+        wrong = f"the trailer on {pivot.joint} has none"
+    elif not all(rolls_forward(wheel) for wheel in wheels):
+        wrong = f"those on {pivot.joint} do not all roll forward"
+    elif not same(wheel.x for wheel in wheels):
+        wrong = f"those on {pivot.joint} are on several axles"
+    elif wheels[0].x >= -NEAR:
+        wrong = f"those on {pivot.joint} are not behind it"
+    if wrong is not None:
+        expected = "each trailer to have wheels on one axle behind its hitch"
+        raise misfit(layout, platform, expected, wrong, wheels)
+    return -wheels[0].x

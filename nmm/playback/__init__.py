@@ -1,7 +1,4 @@
-"""Playback: motions in a browser with MeshCat, as one file or live.
-
-Names are loaded when first used (`lazy_loader`; the list of names is `__init__.pyi`).
-"""
+"""Playback: motions in a browser with MeshCat, as one file or live."""
 
 import lazy_loader
 

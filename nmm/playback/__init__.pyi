@@ -1,6 +1,6 @@
 from .ellipsoids import EllipsoidOptions as EllipsoidOptions
+from .html import Page as Page
 from .html import write_html as write_html
-from .inline import Page as Page
 from .live import LiveViewer as LiveViewer
 from .live import play as play
 from .obstacles import Body as Body

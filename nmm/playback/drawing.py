@@ -1,23 +1,33 @@
-"""The list of commands that makes a page: who draws what where, in order."""
+"""The list of commands that makes a page: JSON that a browser reads back without loss."""
 
-from __future__ import annotations
-
+import base64
 import hashlib
-from collections.abc import Mapping, Sequence
+import json
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from nmm.arrays import Array
-from nmm.playback.encoding import encode, packed
-from nmm.playback.keyframes import Keyframes
-from nmm.playback.placements import Placements, position_and_quaternion
-from nmm.playback.shapes import shapes
-from nmm.playback.sticks import appearance
-from nmm.robots.robot import Robot
 
 Rgb = tuple[float, float, float]
 Command = dict[str, Any]
+
+_KEYS: Mapping[type, str] = {np.float32: "f32", np.float64: "f64", np.uint32: "u32", np.uint16: "u16"}
+
+
+def packed(values: ArrayLike, dtype: type) -> dict[str, str]:
+    """An array for the page: {"f32": base64 of its little-endian bytes}, likewise f64, u32 and u16."""
+    flat = np.ascontiguousarray(values, dtype=np.dtype(dtype).newbyteorder("<"))
+    return {_KEYS[dtype]: base64.b64encode(flat.tobytes()).decode("ascii")}
+
+
+def encode(command: Mapping[str, Any]) -> str:
+    """One command as one line of JSON that may stand inside a <script> element."""
+    text = json.dumps(command, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+    # U+2028 and U+2029 end a line for some readers; "<" could end the element.
+    return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
 
 class Drawing:
@@ -28,7 +38,6 @@ class Drawing:
         self._geometries: dict[str, str] = {}
 
     def add(self, kind: str, **fields: Any) -> None:
-        """Append a command."""
         self.commands.append({"type": kind, **fields})
 
     def transform(self, path: str, matrix: Array) -> None:
@@ -45,8 +54,7 @@ class Drawing:
         rank: int = 0,
         sheet: bool = False,
     ) -> None:
-        """A mesh. Where surfaces coincide, the one of the lowest rank is seen. A sheet hides nothing and has
-        no shadow."""
+        """Where surfaces coincide, the lowest rank is seen. A sheet hides nothing and has no shadow."""
         identity = hashlib.sha1(encode(geometry).encode("utf-8"), usedforsecurity=False).hexdigest()
         if identity not in self._geometries:
             self._geometries[identity] = f"geometry{len(self._geometries)}"
@@ -55,91 +63,9 @@ class Drawing:
         self.add("object", path=path, geometry=self._geometries[identity], material=material)
 
 
-class DrawnRobot:
-    """A robot in the page: a node for each joint, in its parent's, and below the joints what is seen.
-
-    Attributes
-    ----------
-    paths : path of each joint of the display model, joint 1 first
-    root : path of the node that is the platform's root link
-    """
-
-    def __init__(
-        self, drawing: Drawing, robot: Robot, path: str, *, tint: Rgb | None = None, rank: int = 0
-    ) -> None:
-        model = robot.display_model
-        self.placements = Placements(robot)
-        below = [path]
-        for joint in range(1, model.njoints):
-            below.append(f"{below[model.parents[joint]]}/{segment(model.names[joint])}")
-        self.paths = below[1:]
-        # A fixed base stands where the robot's own node is.
-        self.root = below[model.getJointId("theta") if robot.platform.n_p else 0]
-        seen = appearance(robot).shapes.geometryObjects
-        self.visuals = [
-            f"{below[geometry.parentJoint]}/visual {i} {segment(geometry.name)}"
-            for i, geometry in enumerate(seen)
-        ]
-        self._drawing = drawing
-        for at, geometry in zip(self.visuals, seen, strict=True):
-            drawing.transform(at, np.array(geometry.placement.homogeneous))
-            for k, shape in enumerate(shapes(geometry)):
-                color = _mixed(shape.color[:3], tint)
-                drawing.object(f"{at}/{k}", shape.geometry, color, opacity=shape.color[3], rank=rank)
-                if not np.array_equal(shape.matrix, np.eye(4)):
-                    drawing.transform(f"{at}/{k}", shape.matrix)
-
-    def place(self, q: Array, wheels: Array) -> None:
-        """Put the robot at coordinates q (n,) with wheel angles (W,)."""
-        for path, matrix in zip(self.paths, self.placements.relative(q, wheels), strict=True):
-            self._drawing.transform(path, matrix)
-
-    def pose(self, q: Array, wheels: Array) -> Command:
-        """The command that moves it to coordinates q (n,) with wheel angles (W,) in a page that shows it."""
-        matrices = self.placements.relative(q, wheels)
-        transforms = [
-            [path, matrix.T.ravel().tolist()] for path, matrix in zip(self.paths, matrices, strict=True)
-        ]
-        return {"type": "pose", "transforms": transforms}
-
-    def animations(self, frames: Keyframes, start: float) -> list[Command]:
-        """MeshCat's animations: a clip for each joint that moves. Times count from `start`."""
-        matrices = np.array(
-            [self.placements.relative(q, w) for q, w in zip(frames.q, frames.wheels, strict=True)]
-        )
-        times, kept = page_times(frames.t - start)
-        positions, quaternions = position_and_quaternion(matrices[kept])
-        animations = []
-        for joint, path in enumerate(self.paths):
-            animations += animation(
-                path, times, {"position": positions[:, joint], "quaternion": quaternions[:, joint]}
-            )
-        return animations
-
-    def ghosts(self, path: str, q: Array, wheels: Array, texts: Sequence[str]) -> None:
-        """Transparent copies at q (G, n), each with its text above it; the page makes them from the robot's
-        own geometry."""
-        matrices = np.array([self.placements.world(*at) for at in zip(q, wheels, strict=True)])
-        poses = np.concatenate(position_and_quaternion(matrices), axis=-1)
-        self._drawing.add(
-            "ghosts",
-            path=path,
-            texts=list(texts),
-            joints=[
-                {"path": joint, "poses": packed(poses[:, i], np.float64)}
-                for i, joint in enumerate(self.paths)
-            ],
-        )
-
-
 def animation(path: str, times: Array, tracks: Mapping[str, Array]) -> list[Command]:
-    """MeshCat's animation of a node; none where nothing changes.
-
-    Parameters
-    ----------
-    times : (K,) from `page_times`
-    tracks : "position" (K, 3), "quaternion" (K, 4), "scale" (K, 3)
-    """
+    """MeshCat's animation of a node: its "position" (K, 3), "quaternion" (K, 4) and "scale" (K, 3) at times
+    (K,) from `page_times`; empty where nothing changes."""
     moving = [
         {
             "name": f".{name}",
@@ -154,25 +80,12 @@ def animation(path: str, times: Array, tracks: Mapping[str, Array]) -> list[Comm
 
 
 def segment(name: str) -> str:
-    """A name as one segment of a path."""
     return name.replace("/", "_") or "_"
 
 
-def _mixed(color: Sequence[float], tint: Rgb | None) -> Rgb:
-    """A colour drawn towards a tint; dark parts stay dark."""
-    red, green, blue = color[:3]
-    if tint is None:
-        return red, green, blue
-    light = min(0.45 + 0.7 * (0.3 * red + 0.6 * green + 0.1 * blue), 1.0)
-    mixed = [0.25 * c + 0.75 * light * t for c, t in zip((red, green, blue), tint, strict=True)]
-    return mixed[0], mixed[1], mixed[2]
-
-
 def page_times(t: Array) -> tuple[Array, Array]:
-    """Times in the browser's single precision, ascending, and which of them are kept.
-
-    The last one is rounded down: seeking to the end must find it.
-    """
+    """Ascending times in the browser's single precision, and which ones are kept; the last is rounded down,
+    because seeking to the end must find it."""
     times = t.astype(np.float32)
     if times[-1] > t[-1]:
         times[-1] = np.nextafter(times[-1], np.float32(0.0))

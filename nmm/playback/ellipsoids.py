@@ -1,68 +1,52 @@
 """Manipulability ellipsoids in the scene: translucent, at the end-effector, moving with it."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from nmm.analysis.singular.drawn_ellipsoids import (
+from nmm.analysis.singular.ellipsoids import (
     ARM,
     NAMES,
+    Ellipsoids,
     drawn_ellipsoids,
     drawn_frame,
     drawn_scale,
     largest_radius,
     scale_text,
 )
-from nmm.analysis.singular.ellipsoids import Ellipsoids
 from nmm.analysis.singular.parts import WHOLE
 from nmm.arrays import Array, interpolated
+from nmm.ellipsoid_options import EllipsoidOptions
 from nmm.playback.drawing import Command, Drawing, Rgb, animation, page_times
 from nmm.playback.extent import extent_of
 from nmm.playback.keyframes import Keyframes
 from nmm.playback.placements import position_and_quaternion
 from nmm.robots.motion import Motion
-from nmm.runs.ellipsoid_options import EllipsoidOptions
 
-#: Colours of the arm's, and of the legend's entry for robots of several colours.
+#: Colours of the arms' ellipsoids, and of the legend's entry for robots of several colours.
 ARM_COLOR: Rgb = (0.93, 0.62, 0.02)
 SEVERAL: Rgb = (0.36, 0.44, 0.54)
 OPACITY = {WHOLE: 0.24, ARM: 0.55}
 #: The least radius as drawn, beside the largest: a flat ellipsoid is seen, but its number stays 0.
 THINNEST = 0.012
-#: Between two frames the page may be off by this much of the largest radius, in shape and in place; frames
-#: are put in between, in so many rounds at most.
+#: The page may be off by this share of the largest radius between two frames, in shape and place; otherwise
+#: frames are inserted, in at most this many rounds.
 CLOSE = 0.01
 ROUNDS = 5
 
 
 class SceneEllipsoids:
-    """The ellipsoids of the motions of one scene, on one scale.
-
-    Parameters
-    ----------
-    motions, frames : the motions and their keyframes
-
-    Attributes
-    ----------
-    scale : m of drawing for each m/s
-    thinnest : least radius as drawn, m
-    t, parts : of each motion, (K,) s and ellipsoids at these instants; denser than the keyframes where the
-        page would be off between them
-    """
+    """The ellipsoids of a scene's motions, on one scale, m drawn for each m/s: for each motion, `parts` at
+    `t` (K,) s, denser than its keyframes where the page would be off between those."""
 
     def __init__(
-        self,
-        motions: Sequence[Motion],
-        frames: Sequence[Keyframes],
-        options: EllipsoidOptions,
+        self, motions: Sequence[Motion], frames: Sequence[Keyframes], options: EllipsoidOptions
     ) -> None:
         self.names = [drawn_frame(options, motion.robot, motion.frame) for motion in motions]
         robots = [motion.robot for motion in motions]
         first = [
-            drawn_ellipsoids(options, *each)
-            for each in zip(robots, self.names, [frame.q for frame in frames], strict=True)
+            drawn_ellipsoids(options, robot, name, frame.q)
+            for robot, name, frame in zip(robots, self.names, frames, strict=True)
         ]
         extent = max(extent_of(motion.robot, motion.q[0]) for motion in motions)
         self.scale = drawn_scale(options, extent, first)
@@ -88,24 +72,22 @@ class SceneEllipsoids:
             self.parts.append(parts)
 
     def radii(self, motion: int, part: str) -> Array:
-        """Radii (K, 3) as drawn, m."""
+        """As drawn, (K, 3) m."""
         return np.maximum(self.scale * np.nan_to_num(self.parts[motion][part].radii), self.thinnest)
 
     def around(self, boxes: Array, times: Array) -> Array:
-        """Boxes (motions, T, 2, 3) at the times (T,), enlarged to hold the ellipsoids too."""
+        """Boxes (motions, T, 2, 3) at the times (T,), enlarged to hold the ellipsoids."""
         enlarged = boxes.copy()
         for i, (t, parts) in enumerate(zip(self.t, self.parts, strict=True)):
+            box = enlarged[i].swapaxes(0, 1)
             for part, found in parts.items():
                 half = np.linalg.norm(found.axes * self.radii(i, part)[:, None], axis=2)
-                low, high = (
-                    interpolated(times, t, corner) for corner in (found.center - half, found.center + half)
-                )
-                enlarged[i, :, 0] = np.minimum(enlarged[i, :, 0], low)
-                enlarged[i, :, 1] = np.maximum(enlarged[i, :, 1], high)
+                np.minimum(box[0], interpolated(times, t, found.center - half), out=box[0])
+                np.maximum(box[1], interpolated(times, t, found.center + half), out=box[1])
         return enlarged
 
     def draw(self, drawing: Drawing, motion: int, path: str, color: Rgb, start: float) -> list[Command]:
-        """Draw those of one motion below `path`; returns their animations. Times count from `start`."""
+        """Draw one motion's below `path`; returns their animations. Times count from `start`."""
         parts, group = self.parts[motion], f"{path}/ellipsoids"
         times, kept = page_times(self.t[motion] - start)
         center = parts[WHOLE].center[kept]
@@ -117,50 +99,43 @@ class SceneEllipsoids:
             node, radii = f"{group}/{part}", self.radii(motion, part)[kept]
             turned = np.tile(np.eye(4), (len(times), 1, 1))
             turned[:, :3, :3] = parts[part].axes[kept]
-            drawing.add(
-                "ellipsoid",
-                path=node,
-                color=list(ARM_COLOR if part == ARM else color),
-                opacity=OPACITY[part],
-                after=after,
-            )
+            shade = list(ARM_COLOR if part == ARM else color)
+            drawing.add("ellipsoid", path=node, color=shade, opacity=OPACITY[part], after=after)
             drawing.transform(node, turned[0] @ np.diag([*radii[0], 1.0]))
             _, quaternions = position_and_quaternion(turned)
             animations += animation(node, times, {"quaternion": quaternions, "scale": radii})
         return animations
 
     def tell(self, drawing: Drawing, paths: Sequence[str], color: Rgb) -> None:
-        """The legend: what is what, and the scale. `color` is that of the whole robot's."""
-        named = ", ".join(dict.fromkeys(self.names))
-        entries = []
-        for part in dict.fromkeys(part for parts in self.parts for part in parts):
-            nodes = [
-                f"{path}/ellipsoids/{part}"
-                for path, parts in zip(paths, self.parts, strict=True)
-                if part in parts
-            ]
-            shown = ARM_COLOR if part == ARM else color if len(paths) == 1 else SEVERAL
-            entries.append(
-                {"text": f"velocities of {named}: {NAMES[part]}", "color": list(shown), "paths": nodes}
-            )
-        drawing.add(
-            "ellipsoids",
-            groups=[f"{path}/ellipsoids" for path in paths],
-            entries=entries,
-            note=scale_text(self.scale),
-        )
+        """Append the legend and the scale; `color` is that of the whole robot's ellipsoid."""
+        nodes: dict[str, list[str]] = {}
+        for path, parts in zip(paths, self.parts, strict=True):
+            for part in parts:
+                nodes.setdefault(part, []).append(f"{path}/ellipsoids/{part}")
+        groups = [f"{path}/ellipsoids" for path in paths]
+        shade = color if len(paths) == 1 else SEVERAL
+        draw_legend(drawing, groups, ", ".join(dict.fromkeys(self.names)), nodes, shade, self.scale)
+
+
+def draw_legend(
+    drawing: Drawing,
+    groups: Sequence[str],
+    frames: str,
+    nodes: Mapping[str, Sequence[str]],
+    color: Rgb,
+    scale: float,
+) -> None:
+    shades = {part: list(ARM_COLOR if part == ARM else color) for part in nodes}
+    entries = [
+        {"text": f"velocities of {frames}: {NAMES[part]}", "color": shades[part], "paths": paths}
+        for part, paths in nodes.items()
+    ]
+    drawing.add("ellipsoids", groups=list(groups), entries=entries, note=scale_text(scale))
 
 
 def between_error(at: Ellipsoids, exact: Ellipsoids, scale: float) -> Array:
-    """How far the page is off halfway between frames, (K - 1,) m as drawn.
-
-    The page takes centre and radii linearly and turns the axes evenly.
-
-    Parameters
-    ----------
-    at : K ellipsoids at the frames
-    exact : the K - 1 halfway
-    """
+    """How far the page is off halfway between K frames, (K - 1,) m as drawn: it interpolates centre and radii
+    linearly and turns the axes evenly."""
     # Halfway between two rotations is the one nearest to their sum.
     U, _, Vt = np.linalg.svd(at.axes[1:] + at.axes[:-1])
     axes, radii = U @ Vt, 0.5 * (at.radii[1:] + at.radii[:-1])

@@ -1,19 +1,25 @@
-"""How much room a robot takes while it moves: what the camera and the ground have to hold."""
-
-from __future__ import annotations
+"""How much room robots take while they move: what the camera and the ground have to hold."""
 
 import itertools
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from nmm.arrays import Array
-from nmm.playback.placements import Placements
+from nmm.arrays import Array, interpolated
+from nmm.playback.keyframes import Keyframes
+from nmm.playback.placements import Placements, base_position
 from nmm.playback.rolling import Rolling
 from nmm.playback.sticks import appearance
+from nmm.robots.motion import Motion
 from nmm.robots.robot import Robot
 
 _CORNERS = np.array(list(itertools.product((0, 1), repeat=3)))
+#: Height of a robot's name tag, as a multiple of the robot's.
+TAG = 1.1
+#: Random poses that measure the room a robot can take.
+POSES = 100
 
 
 def corners(boxes: Array) -> Array:
@@ -26,18 +32,15 @@ def robot_boxes(robot: Robot, q: Array, wheels: Array) -> Array:
     placements = Placements(robot)
     model, visuals = robot.display_model, appearance(robot).shapes
     data, geometry_data = model.createData(), visuals.createData()
-    local = {
-        i: box for i, geometry in enumerate(visuals.geometryObjects) if (box := _local(geometry)) is not None
-    }
+    local = [shape_corners(geometry.geometry) for geometry in visuals.geometryObjects]
     boxes = np.empty((len(q), 2, 3))
     for k in range(len(q)):
-        pin.updateGeometryPlacements(
-            model, data, visuals, geometry_data, placements.configuration(q[k], wheels[k])
-        )
+        at = placements.configuration(q[k], wheels[k])
+        pin.updateGeometryPlacements(model, data, visuals, geometry_data, at)
         points = [
             box @ placement.rotation.T + placement.translation
-            for i, box in local.items()
-            for placement in [geometry_data.oMg[i]]
+            for box, placement in zip(local, geometry_data.oMg, strict=True)
+            if box is not None
         ]
         # A robot of shapes without bounds is as large as its skeleton.
         everything = np.vstack(points or [data.oMi[i].translation for i in range(model.njoints)])
@@ -46,14 +49,77 @@ def robot_boxes(robot: Robot, q: Array, wheels: Array) -> Array:
 
 
 def extent_of(robot: Robot, q: Array) -> float:
-    """Diagonal of the box around a robot at q (n,), m."""
     box = robot_boxes(robot, q[np.newaxis], Rolling(robot).settled(q)[np.newaxis])[0]
     return float(np.linalg.norm(np.ptp(box, axis=0)))
 
 
-def _local(geometry: pin.GeometryObject) -> Array | None:
-    """Corners of a geometry's own box, (8, 3); None when it has no bounds (planes, half-spaces)."""
-    shape = geometry.geometry
+def shape_corners(shape: Any) -> Array | None:
+    """Corners of the box around a Coal shape, in its axes, (8, 3) m; None for planes and half-spaces."""
     shape.computeLocalAABB()
     box = np.array([shape.aabb_local.min_, shape.aabb_local.max_])
     return corners(box) if np.all(np.isfinite(box)) and np.all(np.abs(box) < 1e6) else None
+
+
+def reached(robot: Robot, q: Array, wheels: Array) -> Array:
+    """Boxes around the robot at q (n,) and with its joints anywhere in their limits, (POSES + 1, 2, 3)."""
+    lower, upper = np.clip(robot.q_limits, -np.pi, np.pi).T
+    poses = np.random.default_rng(0).uniform(lower, upper, (POSES, robot.n))
+    moving = np.arange(robot.n) >= min(3, robot.platform.n_p)
+    poses[:, ~moving] = q[~moving]
+    poses = np.vstack([q, robot.following.placed(poses)])
+    return robot_boxes(robot, poses, np.tile(wheels, (len(poses), 1)))
+
+
+def wall(motions: Sequence[Motion]) -> list[float] | None:
+    """The normal (2,), towards the robots, of the upright plane nearest to the paths; None without one."""
+    paths = [line for motion in motions for line in (motion.desired, motion.driven) if line is not None]
+    points = np.vstack(paths)[:, :2] if paths else np.zeros((0, 2))
+    if len(points) < 3:
+        return None
+    middle = points.mean(axis=0)
+    spread, axes = np.linalg.eigh(np.cov(points.T))
+    if spread[1] < 1e-12:
+        return None
+    normal = axes[:, 0]
+    bases = np.vstack([base_position(motion.robot, motion.q) for motion in motions])
+    side = float((bases.mean(axis=0) - middle) @ normal)
+    return (-normal if side < 0.0 else normal).tolist()
+
+
+def middle(motions: Sequence[Motion], frames: Sequence[Keyframes], times: Array) -> Array:
+    """Midpoint of the platforms at the times, (times, 2)."""
+    places = [
+        interpolated(times, frame.t, base_position(motion.robot, frame.q))
+        for motion, frame in zip(motions, frames, strict=True)
+    ]
+    return np.asarray(np.mean(places, axis=0))
+
+
+def view_points(boxes: Array, motions: Sequence[Motion]) -> Array:
+    points = [corners(boxes).reshape(-1, 3)]
+    for motion in motions:
+        points += [
+            line[:: max(1, len(line) // 200)] for line in (motion.driven, motion.desired) if line is not None
+        ]
+        if motion.target is not None:
+            points.append(np.atleast_2d(motion.target))
+    return np.vstack(points)
+
+
+def tag_places(motions: Sequence[Motion], boxes: Array, times: Array) -> Array:
+    """Where the motions' name tags are at the times, (P, 3); the page writes them so high above the roots."""
+    found = []
+    for i, motion in enumerate(motions):
+        at = interpolated(times, motion.t, base_position(motion.robot, motion.q))
+        found.append(np.column_stack([at, np.full(len(at), TAG * boxes[i, 0, 1, 2])]))
+    return np.vstack(found)
+
+
+def held(boxes: Array, middle: Array) -> dict[str, float]:
+    """The upright cylinder, m, to keep in view around the middle (K, 2); robot boxes (motions, K, 2, 3)."""
+    offsets = corners(boxes)[..., :2] - middle[:, np.newaxis]
+    return {
+        "radius": float(np.linalg.norm(offsets, axis=-1).max()),
+        "low": float(boxes[..., 2].min()),
+        "high": float(boxes[..., 2].max()),
+    }

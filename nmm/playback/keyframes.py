@@ -1,6 +1,4 @@
-"""Which instants of a motion the page holds."""
-
-from __future__ import annotations
+"""The instants of a motion that a page holds."""
 
 from dataclasses import dataclass
 
@@ -13,9 +11,9 @@ from nmm.robots.motion import Motion
 
 #: No part may turn further than this between two frames, rad: half a turn would be played backwards.
 LARGEST_TURN = 1.0
-#: A page holds at most so many frames a motion (before it looks at `LARGEST_TURN`).
+#: A page holds at most this many frames of a motion (before `LARGEST_TURN` adds some).
 MOST_FRAMES = 6000
-#: Frames put between two samples at most: a motion that needs more shows nothing that one could see.
+#: Frames inserted between two samples at most: a motion that needs more is too fast to be seen.
 MOST_BETWEEN = 32
 
 
@@ -32,36 +30,28 @@ class Keyframes:
 
 
 def keyframes(motion: Motion, fps: float = 60.0, wheels: Array | None = None) -> Keyframes:
-    """Thin a motion to about `fps` frames a second of its time; its wheels' angles (N, D), if they are known.
-
-    Frames are samples of the motion, the first and the last among them; only where parts turn by more
-    than `LARGEST_TURN` between two samples are frames put in between, linear in the coordinates.
-    """
-    t, wheels = motion.t, wheel_angles(motion) if wheels is None else wheels
-    kept = samples_kept(t, fps)
-    everything = np.column_stack([motion.q, wheels])[kept]
-    times = t[kept]
-    turning = [unit == "rad" for unit in motion.robot.q_units] + [True] * wheels.shape[1]
-    steps = np.abs(np.diff(everything[:, turning], axis=0)).max(axis=1, initial=0.0)
+    """Thin a motion with wheel angles (N, D) to about `fps` samples a second, with both ends; where parts
+    turn by more than `LARGEST_TURN` in between, frames linear in the coordinates are added."""
+    wheels = wheel_angles(motion) if wheels is None else wheels
+    frames = np.column_stack([motion.t, motion.q, wheels])[samples_kept(motion.t, fps)]
+    turning = [False, *(unit == "rad" for unit in motion.robot.q_units), *[True] * wheels.shape[1]]
+    steps = np.abs(np.diff(frames[:, turning], axis=0)).max(axis=1, initial=0.0)
     between = np.clip(np.ceil(steps / LARGEST_TURN), 1, MOST_BETWEEN).astype(int)
     if np.any(between > 1):
         grid = [np.arange(k) / k + i for i, k in enumerate(between)]
-        at = np.concatenate([*grid, [len(times) - 1.0]])
-        index = np.arange(len(times), dtype=np.float64)
-        everything = interpolated(at, index, everything)
-        times = np.interp(at, index, times)
-    n = motion.robot.n
-    return Keyframes(times, everything[:, :n], everything[:, n:])
+        at = np.concatenate([*grid, [len(frames) - 1.0]])
+        frames = interpolated(at, np.arange(len(frames), dtype=np.float64), frames)
+    first = 1 + motion.robot.n
+    return Keyframes(frames[:, 0], frames[:, 1:first], frames[:, first:])
 
 
 def samples_kept(t: Array, fps: float) -> Array:
-    """Which of the samples at t (N,), s, are frames: about `fps` a second, both ends among them."""
+    """Indices of samples at t (N,), s, about `fps` a second, with both ends."""
     count = min(int(np.ceil((t[-1] - t[0]) * fps)) + 1, MOST_FRAMES)
     return np.unique(np.concatenate([_nearest(t, np.linspace(t[0], t[-1], count)), [0, len(t) - 1]]))
 
 
 def ghost_samples(motion: Motion, count: int) -> list[int]:
-    """Samples at which ghosts stand: evenly along the way that platform and end-effector travel."""
     if count <= 0 or len(motion.t) < 2:
         return []
     steps = np.linalg.norm(np.diff(base_position(motion.robot, motion.q), axis=0), axis=1)
@@ -74,8 +64,7 @@ def ghost_samples(motion: Motion, count: int) -> list[int]:
 
 
 def _nearest(values: Array, wanted: Array) -> Array:
-    """Indices of the ascending `values` that lie nearest to `wanted`."""
-    right = np.clip(np.searchsorted(values, wanted), 1, max(len(values) - 1, 1))
-    right = np.minimum(right, len(values) - 1)
+    last = len(values) - 1
+    right = np.searchsorted(values, wanted).clip(min(1, last), last)
     left = np.maximum(right - 1, 0)
     return np.where(wanted - values[left] <= values[right] - wanted, left, right)

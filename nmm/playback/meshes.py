@@ -1,4 +1,4 @@
-"""Mesh files for the browser: a piece a material, no more triangles than one sees, sharp edges kept."""
+"""Mesh files for the browser: a piece per material, decimated, with sharp edges kept."""
 
 from __future__ import annotations
 
@@ -7,22 +7,24 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import manifold3d
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
-from nmm.arrays import Array
-from nmm.playback.decimation import Indices, decimated
+from nmm.arrays import Array, Flags, Integers
 
 if TYPE_CHECKING:
     import trimesh
 
 Color = tuple[float, float, float, float]
-
 #: Faces that meet at less than this angle are shaded as one smooth surface, rad.
 SMOOTH = np.radians(35.0)
-#: A file's surface may be off by this share of its size (the diagonal of the box around it): a pixel when it
-#: fills the window.
+#: A surface may be off by this share of its box's diagonal: a pixel when it fills the window.
 OFF = 1e-3
+Indices = NDArray[np.uint32]
+#: From a mesh's middle to the tips of the cones that close openings, in its size; along no drawing's faces.
+AWAY = 3.0 * np.array([0.37, -0.52, 0.77])
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,31 +37,23 @@ class MeshPiece:
 
 
 def mesh_pieces(geometry: pin.GeometryObject) -> list[MeshPiece]:
-    """The pieces of a mesh, in the geometry's frame.
-
-    Pinocchio merges a file's parts and forgets their materials, so that the file is read again. It is
-    believed only as long as it fills the box that Pinocchio's mesh fills (units, axes, scales).
-    """
+    """A mesh's pieces in the geometry's frame, read again from the file because Pinocchio merges parts and
+    drops materials, and used only if they fill the box of Pinocchio's mesh (units, axes, scales)."""
     loaded = _pinocchio_mesh(geometry.geometry)
     pieces = _file_pieces(str(geometry.meshPath))
     if not pieces:
         return loaded
     scale = np.asarray(geometry.meshScale, dtype=float)
-    flip = np.prod(scale) < 0.0
-    scaled = [
-        MeshPiece(piece.vertices * scale, piece.faces[:, ::-1] if flip else piece.faces, piece.color)
-        for piece in pieces
-    ]
-    if not loaded or np.allclose(
-        _box(scaled), _box(loaded), atol=3.0 * OFF * np.ptp(_box(loaded), axis=0).max()
-    ):
+    way = -1 if np.prod(scale) < 0.0 else 1
+    scaled = [MeshPiece(one.vertices * scale, one.faces[:, ::way], one.color) for one in pieces]
+    if not loaded:
         return scaled
-    return loaded
+    box = _box(loaded)
+    return scaled if np.allclose(_box(scaled), box, atol=3.0 * OFF * np.ptp(box, axis=0).max()) else loaded
 
 
 @lru_cache(maxsize=256)
 def _file_pieces(path: str) -> tuple[MeshPiece, ...]:
-    """A mesh file's pieces, unscaled; none when trimesh cannot read it."""
     if not Path(path).is_file():
         return ()
     import trimesh
@@ -77,7 +71,7 @@ def _file_pieces(path: str) -> tuple[MeshPiece, ...]:
 
 
 def _light(mesh: trimesh.Trimesh, off: float) -> tuple[Array, Indices]:
-    """A decimated mesh, whose vertices are shared between the faces of a smooth surface, and only there."""
+    """A decimated mesh whose vertices are shared only within smooth surfaces."""
     import trimesh
 
     mesh = mesh.copy()
@@ -93,20 +87,83 @@ def _color(mesh: trimesh.Trimesh) -> Color | None:
     visual = mesh.visual
     if visual.kind is None:
         return None
-    color = visual.material.main_color if visual.kind == "texture" else visual.main_color
-    red, green, blue, alpha = (float(c) / 255.0 for c in color)
+    color = (visual.material if visual.kind == "texture" else visual).main_color
+    red, green, blue, alpha = (float(part) / 255.0 for part in color)
     return red, green, blue, alpha
 
 
 def _pinocchio_mesh(shape: pin.hppfcl.CollisionGeometry) -> list[MeshPiece]:
-    """The mesh that Pinocchio loaded, as one piece."""
     if not isinstance(shape, pin.hppfcl.BVHModelBase) or not shape.num_tris:
         return []
     triangles = (shape.tri_indices(i) for i in range(shape.num_tris))
-    faces = np.array([[t[0], t[1], t[2]] for t in triangles], dtype=np.uint32)
+    faces = np.array([[t[k] for k in range(3)] for t in triangles], dtype=np.uint32)
     return [MeshPiece(np.array(shape.vertices(), dtype=float), faces, None)]
 
 
 def _box(pieces: list[MeshPiece]) -> Array:
     vertices = np.vstack([piece.vertices for piece in pieces])
     return np.array([vertices.min(axis=0), vertices.max(axis=0)])
+
+
+def decimated(vertices: Array, faces: Indices, off: float) -> tuple[Array, Indices]:
+    """A mesh of vertices (V, 3), m, and faces (F, 3) with fewer triangles, off by at most about `off`, m.
+
+    Manifold (Julian Smith, Emmett Lalish) simplifies closed surfaces only. So the mesh is cut where more or
+    fewer than two faces meet, and each opening is closed by a cone, removed afterwards; a mesh that Manifold
+    still refuses stays as it is.
+    """
+    corners, open_edges = _cut(faces)
+    points = np.zeros((corners.max() + 1, 3))
+    points[corners] = vertices[faces]
+    begins, ends = corners[open_edges], np.roll(corners, -1, axis=1)[open_edges]
+    loops, tip = np.unique(_components(begins, ends, len(points))[begins], return_inverse=True)
+    low, high = points.min(axis=0), points.max(axis=0)
+    tips = np.tile(0.5 * (low + high) + np.linalg.norm(high - low) * AWAY, (len(loops), 1))
+    cones = np.column_stack([ends, begins, len(points) + tip])
+    own = manifold3d.Manifold.reserve_ids(2)
+    ends_of_parts = np.unique([0, 3 * len(corners), 3 * (len(corners) + len(cones))])
+    closed = manifold3d.Manifold(
+        manifold3d.Mesh(
+            vert_properties=np.vstack([points, tips]).astype(np.float32),
+            tri_verts=np.vstack([corners, cones]).astype(np.uint32),
+            run_index=ends_of_parts.astype(np.uint32),
+            run_original_id=np.arange(own, own + len(ends_of_parts) - 1, dtype=np.uint32),
+        )
+    )
+    if closed.status() != manifold3d.Error.NoError:
+        return vertices, faces
+    found = closed.simplify(off).to_mesh()
+    runs = zip(found.run_original_id, found.run_index, found.run_index[1:], strict=False)
+    kept = [found.tri_verts[start // 3 : end // 3] for run, start, end in runs if run == own]
+    used, numbered = np.unique(np.vstack([np.zeros((0, 3), np.uint32), *kept]), return_inverse=True)
+    if not len(used):
+        return vertices, faces
+    return np.array(found.vert_properties[used, :3], dtype=float), numbered.reshape(-1, 3).astype(np.uint32)
+
+
+def _cut(faces: Indices) -> tuple[Integers, Flags]:
+    """The vertex of each face's corners (F, 3), shared by faces that edges of exactly two faces connect; and
+    which edges (F, 3), from corner to corner, have no other face."""
+    begins, ends = faces.astype(np.int64), np.roll(faces, -1, axis=1).astype(np.int64)
+    code = np.minimum(begins, ends) * (int(faces.max()) + 1) + np.maximum(begins, ends)
+    _, edge, count = np.unique(code, return_inverse=True, return_counts=True)
+    edge, forward = edge.reshape(-1), (begins < ends).reshape(-1)
+    # Two faces that traverse it in opposite directions.
+    paired = ((count == 2) & (np.bincount(edge, forward) == 1))[edge]
+    order = np.argsort(2 * edge[paired] + forward[paired], kind="stable")
+    one, other = np.flatnonzero(paired)[order].reshape(-1, 2).T
+    corner = np.arange(faces.size)
+    following = np.roll(corner.reshape(-1, 3), -1, axis=1).reshape(-1)
+    same = _components(
+        np.concatenate([corner[one], following[one]]),
+        np.concatenate([following[other], corner[other]]),
+        faces.size,
+    )
+    return same.reshape(-1, 3), ~paired.reshape(-1, 3)
+
+
+def _components(begins: Integers, ends: Integers, count: int) -> Integers:
+    import trimesh
+
+    edges = np.column_stack([begins, ends])
+    return np.asarray(trimesh.graph.connected_component_labels(edges, count), dtype=np.int64)

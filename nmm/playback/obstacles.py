@@ -1,6 +1,4 @@
-"""Obstacles in the page, and a line between the two points that are nearest to each other."""
-
-from __future__ import annotations
+"""Obstacles in the page, and a line between the two nearest points."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -10,56 +8,45 @@ import numpy as np
 import pinocchio as pin
 
 from nmm.arrays import Array
-from nmm.playback.drawing import Command, Drawing, Rgb, animation, page_times
-from nmm.playback.encoding import encode, packed
-from nmm.playback.extent import corners
+from nmm.playback.drawing import Command, Drawing, Rgb, animation, encode, packed, page_times
+from nmm.playback.extent import shape_corners
 from nmm.playback.keyframes import samples_kept
 from nmm.playback.placements import position_and_quaternion
-from nmm.playback.shapes import shapes, triangles
-from nmm.robots.bodies import Body, Nearest
-from nmm.robots.motion import Motion
+from nmm.playback.shapes import Shape, shapes, triangles
+from nmm.robots.motion import Body, Motion, Nearest
 
 OBSTACLE: Rgb = (0.62, 0.55, 0.38)
 NEAR: Rgb = (0.12, 0.14, 0.18)
 TOO_NEAR: Rgb = (0.83, 0.10, 0.22)
 #: How much of what is behind a half-space's face it covers.
 SHEET = 0.28
-#: The nearest points are shown where they are nearer than this beyond the distance to keep, m.
+#: The nearest points are shown when they are closer than the distance to keep plus this, m.
 REACH = 0.3
 #: A distance counts as kept where it is short by no more than this, m.
 ROUNDING = 1e-6
 
 
 class SceneObstacles:
-    """The obstacles of several motions, each drawn once where motions share it.
-
-    Parameters
-    ----------
-    motions : at least one
-    boxes (motions, K, 2, 3) : around the robots at K instants, m
-    fps : frames for each second of motion
-    """
+    """Obstacles of motions, each drawn once where motions share it; robot boxes (motions, K, 2, 3) m."""
 
     def __init__(self, motions: Sequence[Motion], boxes: Array, fps: float) -> None:
         self._fps = fps
         self._room = np.array([boxes[..., 0, :].min(axis=(0, 1)), boxes[..., 1, :].max(axis=(0, 1))])
         self.drawn: list[tuple[Body, Motion]] = []
-        # Of runs that ended early the longer one knows more.
+        # The longest run first: those that ended early share its obstacles.
         for motion in sorted(motions, key=lambda motion: -len(motion.t)):
             for body in motion.bodies:
                 if not any(_same(body, motion, *other) for other in self.drawn):
                     self.drawn.append((body, motion))
 
     def points(self) -> Array:
-        """Corners (K, 3) that a camera has to hold, m: of what comes near the robots' room, not of what is
-        far away, nor of half-spaces."""
+        """Corners (K, 3), m, for the camera: of what is near the robots' room, without half-spaces."""
         middle, half = self._room.mean(axis=0), 0.5 * np.ptp(self._room, axis=0)
         # As much again on each side as the room is wide, so that a wall's end is seen where it is near.
         around = half + max(0.5 * float(np.linalg.norm(half)), 0.5)
         found = [np.zeros((0, 3))]
         for body, motion in self.drawn:
-            box = _box(body)
-            if box is None:
+            if (box := shape_corners(body.geometry)) is None:
                 continue
             every = max(1, len(body.places) // 100)
             places = body.places[samples_kept(motion.t, self._fps)] if len(body.places) > 1 else body.places
@@ -70,7 +57,7 @@ class SceneObstacles:
         return np.vstack(found)
 
     def draw(self, drawing: Drawing, size: float, start: float) -> list[Command]:
-        """Draw them; returns their animations. size : half the diagonal of what is shown, m."""
+        """Draw them; returns their animations. `size` is half the diagonal of what is shown, m."""
         animations: list[Command] = []
         for i, (body, motion) in enumerate(self.drawn):
             path = f"/nmm/obstacle {i}"
@@ -79,7 +66,7 @@ class SceneObstacles:
                 sheet, top = self._sheet(body, size)
                 drawing.object(f"{path}/sheet", sheet, OBSTACLE, opacity=SHEET, sheet=True)
             else:
-                for k, shape in enumerate(shapes(pin.GeometryObject(body.name, 0, pin.SE3(), body.geometry))):
+                for k, shape in enumerate(_drawn(body)):
                     drawing.object(f"{path}/{k}", shape.geometry, OBSTACLE)
                     drawing.transform(f"{path}/{k}", shape.matrix)
                 top = _top(body)
@@ -92,14 +79,12 @@ class SceneObstacles:
         return animations
 
     def tell(self, drawing: Drawing) -> None:
-        """Their entry in the legend."""
         if self.drawn:
             paths = [f"/nmm/obstacle {i}" for i in range(len(self.drawn))]
             drawing.add("obstacles", paths=paths, color=list(OBSTACLE))
 
     def _sheet(self, body: Body, size: float) -> tuple[dict[str, Any], Array]:
-        """A square of a half-space's face, in its axes, about the middle of the robots' room, and where its
-        name is written."""
+        """A square of a half-space's face, in its axes, about the robots' room, and its label's place."""
         place = body.places[0]
         normal, offset = np.array(body.geometry.n), float(body.geometry.d)
         middle = place[:3, :3].T @ (self._room.mean(axis=0) - place[:3, 3])
@@ -108,14 +93,13 @@ class SceneObstacles:
         across /= np.linalg.norm(across)
         along = np.cross(normal, across)
         ends = [middle + size * (a * across + b * along) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-        faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.uint32)
-        return triangles(np.array(ends), faces), ends[2]
+        return triangles(np.array(ends), np.array([[0, 1, 2], [0, 2, 3]], dtype=np.uint32)), ends[2]
 
 
 def draw_nearest(
     drawing: Drawing, motion: Motion, path: str, color: Rgb | None, start: float, fps: float
 ) -> None:
-    """The line between a motion's nearest points; of one of several motions in its colour."""
+    """The line between a motion's nearest points, in the motion's colour where there are several."""
     found: Nearest | None = motion.nearest
     if found is None or not np.isfinite(found.distance).any():
         return
@@ -139,38 +123,27 @@ def draw_nearest(
 
 
 def _same(body: Body, motion: Motion, other: Body, others: Motion) -> bool:
-    """Whether two runs say the same of an obstacle, for as long as both last."""
-    if body.name != other.name or _identity(body) != _identity(other):
-        return False
-    if len(body.places) == len(other.places) == 1:
-        return bool(np.allclose(body.places, other.places))
-    if len(body.places) == 1 or len(other.places) == 1:
+    moves, moved = len(body.places) > 1, len(other.places) > 1
+    if body.name != other.name or moves != moved or _identity(body) != _identity(other):
         return False
     common = min(len(motion.t), len(others.t))
-    return bool(
-        np.allclose(motion.t[:common], others.t[:common])
-        and np.allclose(body.places[:common], other.places[:common])
-    )
+    same_times = not moves or np.allclose(motion.t[:common], others.t[:common])
+    return bool(same_times and np.allclose(body.places[:common], other.places[:common]))
+
+
+def _drawn(body: Body) -> list[Shape]:
+    return shapes(pin.GeometryObject(body.name, 0, pin.SE3(), body.geometry))
 
 
 def _identity(body: Body) -> str:
     if isinstance(body.geometry, coal.Halfspace):
         return f"{body.geometry.n} {body.geometry.d}"
-    drawn = shapes(pin.GeometryObject(body.name, 0, pin.SE3(), body.geometry))
-    return " ".join(encode(shape.geometry) for shape in drawn)
-
-
-def _box(body: Body) -> Array | None:
-    """Corners of the box around a shape in its axes, (8, 3), m; None of a half-space, which has none."""
-    if isinstance(body.geometry, coal.Halfspace):
-        return None
-    body.geometry.computeLocalAABB()
-    return corners(np.array([body.geometry.aabb_local.min_, body.geometry.aabb_local.max_]))
+    return " ".join(encode(shape.geometry) for shape in _drawn(body))
 
 
 def _top(body: Body) -> Array:
-    """Above the middle of a shape, in its axes, (3,) m: where its name is written."""
-    box, place = _box(body), body.places[0]
+    """The place of its label: above the middle of a shape, in its axes, (3,) m."""
+    box, place = shape_corners(body.geometry), body.places[0]
     if box is None:
         return np.zeros(3)
     at = box @ place[:3, :3].T

@@ -1,4 +1,4 @@
-"""A run in a browser while it is computed, at the pace of its own time."""
+"""A run shown in a browser while it is computed, in real time: the robot, its path and its curves."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import math
 import threading
 import time
 from collections.abc import Mapping
-from types import TracebackType
 from typing import NamedTuple
 
 import numpy as np
@@ -14,60 +13,52 @@ from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, Integers
 from nmm.control.controller import Controller
+from nmm.control.quantities import Record
+from nmm.control.recorded import Recorded
+from nmm.ellipsoid_options import Wanted
 from nmm.errors import NmmError
-from nmm.looks import looks_of_labels
-from nmm.playback.channels import Channels
-from nmm.playback.curves import draw_curves
-from nmm.playback.drawing import Drawing
-from nmm.playback.encoding import encode, packed
-from nmm.playback.growing import Growing
-from nmm.playback.live import announce
-from nmm.playback.page import socket_page
-from nmm.playback.rolling import Rolling
-from nmm.playback.scene import live_scene, playback_scene
-from nmm.playback.server import PageServer, Visitor
-from nmm.playback.surroundings import Surroundings
-from nmm.playback.watching import Watching, counted
-from nmm.runs.ellipsoid_options import Wanted
+from nmm.playback.channels import live_channels, partition_text
+from nmm.playback.drawing import Drawing, encode, packed
+from nmm.playback.rolling import RolledRobot
+from nmm.playback.scene import playback_scene
+from nmm.playback.server import Visitor
+from nmm.playback.session import RobotSession, Watching, counted
+from nmm.resolver_style import looks_of_labels
+from nmm.robots.frame_path import FramePath
+from nmm.runs.components import Axes
+from nmm.runs.joining import row_names
 from nmm.runs.recording import Recorder
+from nmm.runs.shown_frame import shown_frame
 from nmm.runs.trajectory import Trajectory
 
-SCRIPTS, STYLES = ("running.js",), ("running.css",)
-#: Pictures a second.
-FPS = 30.0
-#: A page's curves have at most so many samples a second, besides those of its pictures, Hz.
+#: Samples per second of a page's curves at most, besides those of its pictures, Hz.
 KEPT = 60.0
-#: The clock lets the time go that a picture is later than this, s.
-LATE = 0.25
-#: What a page sends that wants all of a run that has been computed.
+#: Requests all that has been computed.
 ALL = '{"type":"all"}'
-#: What a page is told first.
 BEGINS = "the run begins"
-#: How long an answer is waited for at the end, s.
+#: How long to wait for an answer at the end, s.
 PATIENCE = 1.0
-#: Wheels roll through at most so many samples between two pictures.
+#: Samples that wheels roll through between two pictures at most.
 ROLLED = 32
 
 
 class Leg(NamedTuple):
-    """What is recorded from one event to the next, and which of all rows the tasks have that are then
-    active."""
+    """The record between two events, and the rows of the tasks active then."""
 
     recorder: Recorder
     rows: Integers
 
 
 class Picture(NamedTuple):
-    """What pages are told from now on: its number, how many samples curves have, the robot as lines of
-    commands, and words."""
+    """Its number, how many samples curves have, commands that place the robot, and a text."""
 
     number: int
     samples: int
     lines: list[str]
-    told: str
+    text: str
 
 
-class LiveRun:
+class LiveRun(RobotSession):
     """A run in a browser while it is computed: what has been computed is shown at its own time, 30 pictures a
     second, and all of it, to be played and looked through, afterwards.
 
@@ -75,8 +66,8 @@ class LiveRun:
             run = simulate(controller, q0, duration, watch=live.watch)
             live.stay(run)
 
-    The clock begins when the first page comes, and waits where the run is slower than its own time. What
-    pages do, and whether they answer, changes nothing of the run: a thread of its own reads what is recorded.
+    The clock begins when the first page comes, and waits where the run is slower than its own time. Pages
+    cannot change or delay the run: a thread of their own reads what is recorded.
 
     Parameters
     ----------
@@ -110,63 +101,42 @@ class LiveRun:
         port: int | None = None,
         open_browser: bool = True,
     ) -> None:
-        self._robot = robot = controller.robot
+        robot = controller.robot
         self._title = robot.name if title is None else title
         self._end = float(duration)
         self._growing = Growing(controller)
-        self._rolling = Rolling(robot)
-        self._q = robot.following.placed(robot.q(q0))
-        self._wheels = self._rolling.settled(self._q)
         self._legs: list[Leg] = []
         self._leg, self._sample, self._instant = 0, 0, -1.0  # the next one to show, and what KEPT counts
         self._times: list[float] = []
         self._values: list[Array] = []
         self._pages: list[Watching] = []
-        self._came, self._stop = threading.Event(), threading.Event()
-        self._began = math.nan
-        self._t = 0.0
-        self._late = 0
-        self._finished = self._over = False
+        self._came = threading.Event()
+        self._began, self._t = math.nan, 0.0
+        self._finished = self._over = self._reported = False
         self._whole: list[str] | None = None
-        resolver = getattr(controller, "resolver_name", controller.resolver.name)
-        commands, self._drawn = live_scene(
-            robot, self._q, self._wheels, title=self._title, room=float(robot.reach)
-        )
-        collisions = controller.collisions
-        obstacles = () if collisions is None else tuple(collisions.obstacles)
-        self._surroundings = Surroundings(obstacles, robot, self._q, self._wheels)
-        drawing = Drawing()
-        self._surroundings.draw(drawing, 2.0 * float(robot.reach))
-        look = looks_of_labels([resolver.upper()])
-        draw_curves(drawing, [Channels(np.zeros(0), 0, self._growing.channels)], look, 0.0)
-        running = Drawing()
-        running.add(
-            "running",
-            duration=self._end,
-            path=self._growing.drawn[0],
-            desired=self._growing.drawn[1],
-            color=list(look[0].rgb),
-        )
-        # The last command of a scene says that it has come.
-        commands = [*commands[:-1], *drawing.commands, commands[-1], *running.commands]
         self._picture = Picture(1, 0, [], BEGINS)
-        self._server = PageServer(
-            lambda host, token: socket_page(self._title, host, token, scripts=SCRIPTS, styles=STYLES),
-            [encode(command) for command in commands],
+        look = looks_of_labels([controller.resolver.name.upper()])[0]
+        running = Drawing()
+        path, desired = self._growing.drawn
+        running.add("running", duration=self._end, path=path, desired=desired, color=list(look.rgb))
+        collisions = controller.given.collisions
+        super().__init__(
+            RolledRobot(robot, robot.following.placed(robot.q(q0))),
+            self._title,
             self._visit,
+            obstacles=() if collisions is None else collisions.obstacles,
+            channels=self._growing.channels,
+            look=look,
+            further=running.commands,
+            scripts=("running.js",),
+            styles=("running.css",),
             port=port,
         )
-        self._thread = threading.Thread(target=self._show, name="nmm live run", daemon=True)
-        self._thread.start()
-        announce(self._server, "Playing", [robot], open_browser=open_browser)
-
-    @property
-    def url(self) -> str:
-        """Address of the page."""
-        return self._server.url
+        self.begin(self._show, "nmm live run")
+        self.announce("Playing", [robot], open_browser=open_browser)
 
     def watch(self, recorder: Recorder) -> None:
-        """Show what that recorder gets from now on: what `simulate` calls."""
+        """Show what that recorder gets from now on; `simulate` calls it."""
         if not self._legs:
             self._began = time.monotonic()
         self._legs.append(Leg(recorder, self._growing.active_rows()))
@@ -174,52 +144,32 @@ class LiveRun:
     def stay(
         self, run: Trajectory, *, ellipsoids: Wanted = False, stop: threading.Event | None = None
     ) -> None:
-        """Show the rest of the run, which is computed, and then all of it; returns at Ctrl-C or when `stop`
-        is set, with the server closed. How many pictures were drawn and dropped is printed.
+        """Show the rest of a computed run, then all of it; returns at Ctrl-C or when `stop` is set, with the
+        server closed. How many pictures were drawn and dropped is printed.
 
         Raises
         ------
-        InputError : ellipsoids as in `playback_scene`
+        InputError : ellipsoids as in `write_html`
         """
-        told, stop = False, stop or threading.Event()
-        try:
+        with self.ending(self._print_report):
             self._end, self._finished = float(run.t[-1]), True
             commands = playback_scene([run], title=self._title, ellipsoids=ellipsoids)
             self._whole = [encode(command) for command in commands]
-            # Not for ever at once: on some systems Ctrl-C cannot end that.
-            while not stop.wait(timeout=0.5):
-                if self._over and not told:
-                    told = True
-                    print(self.report(), flush=True)
-        except KeyboardInterrupt:
-            print(flush=True)
-        finally:
-            if not told and self._pages:
-                print(self.report(), flush=True)
-            self.close()
+            self.wait(stop, lambda: self._print_report() if self._over else None)
+
+    def _print_report(self) -> None:
+        if self._pages and not self._reported:
+            self._reported = True
+            print(self.report(), flush=True)
 
     def report(self) -> str:
-        """How many pictures were made of how long a time of the run, and what became of them."""
+        """How many pictures were made, of how much of the run, and how many pages drew and dropped."""
         made = self._picture.number
-        late = f"{self._late} could not be made in time; " if self._late else ""
+        late = f"{self.clock.late} could not be made in time; " if self.clock.late else ""
         return f"shown as it ran: {made} pictures of {self._t:.4g} s; {late}{counted(self._pages, made)}"
 
-    def close(self) -> None:
-        """End the server and free its port; again is nothing."""
-        self._stop.set()
-        self._thread.join(timeout=5.0)
-        self._server.close()
-
-    def __enter__(self) -> LiveRun:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self.close()
-
     def _visit(self) -> Visitor:
-        """A page that has come, in the server's thread."""
+        """A new page; called in the server's thread."""
         if self._over:
             return Visitor(lambda: "")
         page = Watching(self._picture.number - 1)
@@ -241,9 +191,9 @@ class LiveRun:
                 "t": packed(np.array(self._times[fresh]), np.float64),
                 "values": packed(np.array(self._values[fresh]), np.float32),
                 "partitions": list(self._growing.partitions),
-                "told": picture.told,
+                "told": picture.text,
                 "whole": self._whole is not None,
-                "dropped": page.dropped(picture.number) + self._late,
+                "dropped": page.dropped(picture.number) + self.clock.late,
             }
             return "\n".join([*picture.lines, encode(run)])
 
@@ -255,52 +205,41 @@ class LiveRun:
         return Visitor(latest, heard, lambda: page.leaves(self._picture.number))
 
     def _show(self) -> None:
-        """Make pictures at the run's own time, until all of it has been shown; the thread that does so."""
-        before = due = shown = time.monotonic()
-        while not self._stop.is_set() and not self._over:
-            now = time.monotonic()
-            if not self._came.is_set():  # nobody looks yet
+        shown = time.monotonic()
+        while not self.ended.is_set() and not self._over:
+            if not self._came.is_set():  # no page yet
                 self._came.wait(0.05)
-                before = due = shown = time.monotonic()
+                self.clock.stand()
+                shown = time.monotonic()
                 continue
-            known = self._known()
-            wanted, before = self._t + min(now - before, LATE), now
+            known, wanted = self._known(), self._t + self.clock.passed()
             waits = wanted > known and not self._finished
             self._t = max(self._t, min(wanted, known))
             self._make(waits)
-            if waits or not self._legs:
-                due = now
-            elif now - due > 1.0 / FPS:
-                self._late += int((now - due) * FPS)
-                due = now
+            now = time.monotonic()
             if not self._finished or self._t < self._end or self._whole is None:
                 shown = now
             elif all(page.has_drawn(self._picture.number) for page in self._pages) or now - shown > PATIENCE:
                 self._server.hello = self._whole
                 self._over = True
             try:
-                self._server.changed()
+                self.changed()
             except NmmError:  # it has been closed
                 return
-            due += 1.0 / FPS
-            self._stop.wait(max(0.0, due - time.monotonic()))
+            self.clock.rest(self.ended, stands=waits or not self._legs)
 
     def _known(self) -> float:
-        """Up to which time samples are known that stay as they are."""
-        for i in range(len(self._legs) - 1, -1, -1):
-            times = self._safe(i)
-            if len(times):
-                return float(times[-1])
-        return 0.0
+        """Time of the last final sample, s."""
+        found = (self._safe(i) for i in reversed(range(len(self._legs))))
+        return next((float(times[-1]) for times in found if len(times)), 0.0)
 
     def _safe(self, leg: int) -> Array:
-        """The times of a leg's samples that stay as they are: the last one may be taken again."""
+        """Times of a leg's final samples: while a leg goes on, its last one may be taken again."""
         ended = self._finished or leg + 1 < len(self._legs)
         times = self._legs[leg].recorder.t
         return times if ended else times[:-1]
 
     def _make(self, waits: bool) -> None:
-        """The next picture, where there is something new to see."""
         new = False
         while self._leg < len(self._legs):
             ended = self._leg + 1 < len(self._legs)
@@ -312,33 +251,93 @@ class LiveRun:
             if not ended or last < len(times):
                 break
             self._leg, self._sample = self._leg + 1, 0
-        told = self._words(waits)
+        text = self._state(waits)
         before = self._picture
-        if new or told != before.told:
-            lines = [self._surroundings.moved(self._t), self._drawn.pose(self._q, self._wheels)]
-            self._picture = Picture(
-                before.number + 1, len(self._times), [encode(line) for line in lines], told
-            )
+        if new or text != before.text:
+            self._picture = Picture(before.number + 1, len(self._times), self.placed(self._t), text)
 
     def _take(self, leg: Leg, at: Integers) -> None:
-        """Take the samples numbered `at` of a leg: where the robot is at the last, and what curves keep."""
+        """Take a leg's samples `at`: the robot's place at the last one, and the curves' samples."""
         found, times = leg.recorder.found, leg.recorder.t
         rolled = at[np.unique(np.linspace(0, len(at) - 1, min(len(at), ROLLED)).astype(int))]
-        way = np.vstack([self._q, found.q[rolled]])
-        self._wheels = self._rolling.angles(way, start=self._wheels)[-1]
-        self._q = way[-1]
+        self.shown.roll(found.q[rolled])
         instants = np.floor(times[at] * KEPT + 1e-6)
-        kept = at[np.diff(instants, prepend=self._instant) > 0]
-        kept = np.union1d(kept, at[-1:])
+        kept = np.union1d(at[np.diff(instants, prepend=self._instant) > 0], at[-1:])
         self._instant = float(instants[-1])
         self._values += list(self._growing.values(leg.recorder, leg.rows, kept))
         self._times += times[kept].tolist()
 
-    def _words(self, waits: bool) -> str:
-        """What a page says of the state."""
+    def _state(self, waits: bool) -> str:
         if not self._legs:
             return BEGINS
         if waits:
             rate = self._known() / max(time.monotonic() - self._began, 1e-9)
             return f"waits for the computation, at {rate:.1g} times real time"
         return "" if self._t < self._end else "drawing all of it"
+
+
+class Growing:
+    """What a page plots of a run while it is recorded; tasks that come and go have NaN rows while inactive.
+    `channels` have no values; `partitions` names RG's partitions by number, as they come; `drawn` tells
+    whether a frame's path is drawn, and whether its desired one."""
+
+    def __init__(self, controller: Controller) -> None:
+        self._robot = robot = controller.robot
+        self._schedule = controller.schedule
+        tasks = controller.task if self._schedule is None else self._schedule.tasks
+        self._counts = [len(task.rows(robot)) for task in tasks]
+        rows = [row for task in tasks for row in task.rows(robot)]
+        self._rows = len(rows)
+        self._shown = shown_frame(tasks, robot)
+        self._path = None if self._shown.frame is None else FramePath(robot, self._shown.frame)
+        self.drawn = self._path is not None, self._path is not None and bool(self._shown.rows)
+        self.partitions: list[str] = []
+        self._numbers: dict[tuple[int, ...], int] = {}
+        names = [row.name for row in rows] if self._schedule is None else row_names(robot, self._schedule)
+        # Of tasks that come and go the levels come and go, too.
+        some = controller.limits is not None and self._schedule is None
+        self._levels = len(tasks.levels(robot)) if some else 0
+        axes = Axes(robot, tuple(names), tuple(row.unit for row in rows), self._levels)
+        hidden = {"objective"} if controller.given.objective is None else set()
+        self._partitioned = controller.resolver.name.lower() == "rg"
+        self._curves, self.channels = live_channels(axes, hidden, partitioned=self._partitioned)
+
+    def active_rows(self) -> Integers:
+        """Rows of the tasks active now, among all rows; called when a leg of the run begins."""
+        on = [True] * len(self._counts) if self._schedule is None else self._schedule.moment.active
+        return np.flatnonzero(np.repeat(np.array(on, dtype=bool), np.array(self._counts, dtype=int)))
+
+    def values(self, recorder: Recorder, rows: Integers, at: Integers) -> Array:
+        """Values (K, channels) at samples `at` (K,) of a recorder with those rows, then the drawn frame's
+        position (K, 3), m, and its desired one, as `drawn` has them."""
+        found = Recorded._make(whole[at] for whole in recorder.found)
+        record = Record(self._robot, {"t": recorder.t[at], **found._asdict()})
+        known = slice(len(rows))  # without a task, a recorder has a row of its own
+
+        def of_all(own: Array) -> Array:
+            whole = np.full((len(at), self._rows), np.nan)
+            whole[:, rows] = own[:, known]
+            return whole
+
+        parts = []
+        for one in self._curves:
+            own = getattr(found, one.name) if one.of is None else one.of(record)
+            if one.shape == "Nl":
+                own = own[:, : self._levels]
+            parts.append(of_all(own) if one.shape == "Ns" else own)
+        if self._partitioned:
+            parts.append(self._partition(found.partition))
+        parts += [found.u, found.q]
+        if self._path is not None:
+            place = self._path.positions(found.q)
+            parts.append(place)
+            if self._shown.rows:
+                parts.append(self._shown.desired(place, of_all(found.r_d)))
+        return np.column_stack(parts)
+
+    def _partition(self, columns: Integers) -> Array:
+        keys = [tuple(one[one >= 0].tolist()) for one in np.sort(columns, axis=1)]
+        found = [self._numbers.setdefault(key, len(self._numbers)) for key in keys]
+        new = list(self._numbers)[len(self.partitions) :]
+        self.partitions += [partition_text(self._robot, key) for key in new]
+        return np.array(found, dtype=np.float64)

@@ -1,30 +1,27 @@
-"""The scene: robots that move, their paths and ghosts, the target, the ground, and where to look from."""
+"""The scene: moving robots, their paths and ghosts, the target, the ground, and the view."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nmm.arrays import Array
-from nmm.errors import InputError
-from nmm.looks import looks, looks_of_labels
-from nmm.playback.channels import channels
-from nmm.playback.curves import draw_curves
-from nmm.playback.drawing import Command, Drawing, DrawnRobot, Rgb
-from nmm.playback.encoding import packed
-from nmm.playback.extent import corners, robot_boxes
-from nmm.playback.facts import draw_facts
-from nmm.playback.framing import TAG, boxes_around, held, middle, reached, tag_places, view_points, wall
+from nmm.arrays import Array, interpolated
+from nmm.collisions.obstacle import Obstacle, obstacle_places
+from nmm.ellipsoid_options import Wanted, options_of
+from nmm.errors import expect
+from nmm.playback import extent
+from nmm.playback.channels import channels, draw_curves, draw_facts
+from nmm.playback.drawing import Command, Drawing, Rgb, packed
 from nmm.playback.keyframes import MOST_FRAMES, Keyframes, ghost_samples, keyframes, samples_kept
 from nmm.playback.obstacles import SceneObstacles, draw_nearest
 from nmm.playback.placements import base_position
 from nmm.playback.rolling import wheel_angles
-from nmm.playback.shapes import Y_TO_Z, cylinder, sphere
-from nmm.robots.motion import Motion
+from nmm.playback.shapes import Y_TO_Z, DrawnRobot, cylinder, sphere
+from nmm.resolver_style import looks, looks_of_labels
+from nmm.robots.motion import Body, Motion
 from nmm.robots.robot import Robot
-from nmm.runs.ellipsoid_options import Wanted, options_of
 from nmm.runs.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -33,7 +30,6 @@ if TYPE_CHECKING:
 DESIRED: Rgb = (0.16, 0.18, 0.22)
 TARGET: Rgb = (0.83, 0.10, 0.22)
 
-#: Instants at which the room that the robots take is measured.
 INSTANTS = 80
 
 
@@ -50,24 +46,9 @@ def playback_scene(
     autoplay: bool = False,
     ellipsoids: Wanted = False,
 ) -> list[Command]:
-    """Commands for runs that are played: robots, paths, ghosts, animation, and their curves.
-
-    Parameters
-    ----------
-    runs : at least one
-    title : heading of the page
-    ghosts : transparent copies of each robot along its way; 6 when not given, 3 of each of several
-    fps : frames for each second of motion
-    autoplay : whether the page begins to play by itself
-    ellipsoids : whether manipulability ellipsoids are drawn, or how (`EllipsoidOptions`)
-
-    Raises
-    ------
-    InputError : no motion, or one without samples; ellipsoids of a frame or with sizes that a robot does
-        not have
-    """
-    if not runs:
-        raise InputError("motions: expected at least one motion, got none")
+    """Commands for runs that are played, options as of `write_html`; `InputError` for no motion, one without
+    samples, or ellipsoids of a frame or with sizes that a robot does not have."""
+    expect(runs, "motions", "at least one motion", [])
     motions = [run.motion() if isinstance(run, Trajectory) else run for run in runs]
     worn = looks_of_labels([motion.label for motion in motions])
     wheels = [wheel_angles(motion) for motion in motions]
@@ -75,16 +56,17 @@ def playback_scene(
     start = min(float(motion.t[0]) for motion in motions)
     end = max(float(motion.t[-1]) for motion in motions)
     times = np.linspace(start, end, INSTANTS)
-    boxes = boxes_around(motions, frames, times)
+    at = [[interpolated(times, frame.t, values) for values in (frame.q, frame.wheels)] for frame in frames]
+    boxes = np.array(
+        [extent.robot_boxes(motion.robot, *now) for motion, now in zip(motions, at, strict=True)]
+    )
     shown = _ellipsoids(motions, frames, ellipsoids)
     if shown is not None:
         boxes = shown.around(boxes, times)
     obstacles = SceneObstacles(motions, boxes, fps)
-    view = np.vstack([view_points(boxes, motions), obstacles.points()])
+    view = np.vstack([extent.view_points(boxes, motions), obstacles.points()])
     size = max(0.5 * float(np.linalg.norm(np.ptp(view, axis=0))), 1e-3)
     several = len(motions) > 1
-    if ghosts is None:
-        ghosts = 3 if several else 6
     drawing = Drawing()
     drawing.add(
         "stage",
@@ -95,9 +77,9 @@ def playback_scene(
         start=start,
         duration=end - start,
         view=packed(view, np.float64),
-        tags=packed(tag_places(motions, boxes, times) if several else np.zeros((0, 3)), np.float64),
-        follow=held(boxes, middle(motions, frames, times)),
-        wall=wall(motions),
+        tags=packed(extent.tag_places(motions, boxes, times) if several else np.zeros((0, 3)), np.float64),
+        follow=extent.held(boxes, extent.middle(motions, frames, times)),
+        wall=extent.wall(motions),
         size=size,
     )
     animations = obstacles.draw(drawing, size, start)
@@ -107,21 +89,15 @@ def playback_scene(
         robot = DrawnRobot(drawing, motion.robot, f"{path}/robot", tint=color if several else None, rank=i)
         robot.place(frame.q[0], frame.wheels[0])
         animations += robot.animations(frame, start)
-        height = TAG * float(boxes[i, 0, 1, 2])
-        samples = ghost_samples(motion, ghosts)
-        if samples:
-            whose = f"{look.name} " if several else ""
-            texts = [f"{whose}{motion.t[k]:.3g} s" for k in samples]
+        height = extent.TAG * float(boxes[i, 0, 1, 2])
+        tag = look.name if several else ""
+        if samples := ghost_samples(motion, (3 if several else 6) if ghosts is None else ghosts):
+            texts = [f"{tag}{' ' * several}{motion.t[k]:.3g} s" for k in samples]
             robot.ghosts(f"{path}/ghosts", motion.q[samples], wheels[i][samples], texts)
+        # Unlabelled, the page attributes the line to the end-effector.
+        label = look.name or ("" if motion.driven is not None else motion.robot.name)
         drawing.add(
-            "motion",
-            path=path,
-            root=robot.root,
-            # The page calls the line that it draws the end-effector's, unless it is told otherwise.
-            label=look.name or ("" if motion.driven is not None else motion.robot.name),
-            color=list(color),
-            tag=look.name if several else "",
-            height=height,
+            "motion", path=path, root=robot.root, label=label, color=list(color), tag=tag, height=height
         )
         drawn = samples_kept(motion.t, fps)
         for name, points, thick in (
@@ -129,14 +105,7 @@ def playback_scene(
             ("platform", _on_the_floor(motion, size), 0.6),
         ):
             if points is not None:
-                drawing.add(
-                    "path",
-                    path=f"{path}/{name}",
-                    color=list(color),
-                    points=packed(points[drawn], np.float32),
-                    times=packed(motion.t[drawn] - start, np.float64),
-                    thick=thick,
-                )
+                _line(drawing, f"{path}/{name}", color, points[drawn], motion.t[drawn] - start, thick)
         draw_nearest(drawing, motion, path, color if several else None, start, fps)
         if shown is not None:
             animations += shown.draw(drawing, i, path, color, start)
@@ -145,32 +114,20 @@ def playback_scene(
     _targets(drawing, motions, size)
     if shown is not None:
         shown.tell(drawing, [f"/nmm/motion {i}" for i in range(len(motions))], worn[0].rgb)
-    told = [channels(run) for run in runs]
-    draw_curves(drawing, told, worn, start)
-    draw_facts(drawing, runs, told, worn, start)
+    plotted = [channels(run) for run in runs]
+    draw_curves(drawing, plotted, worn, start)
+    draw_facts(drawing, runs, plotted, worn, start)
     drawing.add("set_animation", animations=animations, options={"play": False, "repetitions": 1})
     drawing.add("ready")
     return drawing.commands
 
 
 def live_scene(
-    robot: Robot,
-    q: Array,
-    wheels: Array,
-    *,
-    title: str,
-    room: float = 2.0,
-    seen: Array | None = None,
+    robot: Robot, q: Array, wheels: Array, *, title: str, room: float = 2.0, seen: Array | None = None
 ) -> tuple[list[Command], DrawnRobot]:
-    """Commands for a robot that somebody moves from outside, and the robot, to place it.
-
-    Parameters
-    ----------
-    q, wheels : (n,) where it stands at first, and (D,) its wheels' angles, rad
-    room : ground to show around it, m
-    seen : (K, 3) points that are to be seen besides, m
-    """
-    box = robot_boxes(robot, q[np.newaxis], wheels[np.newaxis])[0]
+    """Commands for a robot at q (n,) with wheel angles (D,) that is moved from outside, and the drawn robot,
+    to place it; the view holds `room`, m, of ground around it and the points `seen` (K, 3)."""
+    box = extent.robot_boxes(robot, q[np.newaxis], wheels[np.newaxis])[0]
     around = box + np.array([[-room, -room, 0.0], [room, room, 0.0]])
     if seen is not None and len(seen):
         low, high = np.minimum(around[0], seen.min(axis=0)), np.maximum(around[1], seen.max(axis=0))
@@ -183,8 +140,8 @@ def live_scene(
         autoplay=False,
         start=0.0,
         duration=0.0,
-        view=packed(corners(around), np.float64),
-        follow=held(reached(robot, q, wheels)[np.newaxis], base_position(robot, q)[np.newaxis]),
+        view=packed(extent.corners(around), np.float64),
+        follow=extent.held(extent.reached(robot, q, wheels)[np.newaxis], base_position(robot, q)[np.newaxis]),
         size=0.5 * float(np.linalg.norm(np.ptp(around, axis=0))),
     )
     drawn = DrawnRobot(drawing, robot, "/nmm/motion 0/robot")
@@ -196,22 +153,31 @@ def live_scene(
         label=robot.name,
         color=list(looks([""])[0].rgb),
         tag="",
-        height=TAG * float(box[1, 2]),
+        height=extent.TAG * float(box[1, 2]),
     )
     drawing.add("ready")
     return drawing.commands, drawn
 
 
+def still(robot: Robot, q: Array, obstacles: Iterable[Obstacle], **beside: Any) -> Motion:
+    """A robot that stands at q (n,), with obstacles as at t = 0, and what else is beside it."""
+    now = np.zeros(1)
+    bodies = tuple(Body(one.name, one.shape.geometry(), obstacle_places(one, now)) for one in obstacles)
+    return Motion(robot, now, q[np.newaxis], np.zeros((1, robot.n_u)), bodies=bodies, **beside)
+
+
 def points_beside(motion: Motion, boxes: Array) -> Array:
-    """Points (K, 3) m that show what stands beside a robot: its desired path, target and bodies near it."""
+    """Points (K, 3), m, of what is beside a robot: its desired path, target and bodies near it."""
     given = [np.atleast_2d(one) for one in (motion.desired, motion.target) if one is not None]
     return np.vstack([*given, SceneObstacles([motion], boxes[np.newaxis], 1.0).points()])
 
 
-def draw_beside(drawing: Drawing, motion: Motion, boxes: Array) -> None:
-    """Append the commands that draw it, as it is at the motion's first sample; boxes (1, 2, 3) as above."""
-    points = np.vstack([points_beside(motion, boxes), boxes.reshape(-1, 3)])
-    size = 0.5 * float(np.linalg.norm(np.ptp(points, axis=0)))
+def draw_beside(drawing: Drawing, motion: Motion, boxes: Array, size: float | None = None) -> None:
+    """Append the commands that draw it as at the motion's first sample; `boxes` (1, 2, 3) are around the
+    robot, `size` is half the diagonal of what is shown, m, by default of all of this."""
+    if size is None:
+        points = np.vstack([points_beside(motion, boxes), boxes.reshape(-1, 3)])
+        size = 0.5 * float(np.linalg.norm(np.ptp(points, axis=0)))
     obstacles = SceneObstacles([motion], boxes[np.newaxis], 1.0)
     obstacles.draw(drawing, size, 0.0)
     obstacles.tell(drawing)
@@ -222,10 +188,9 @@ def draw_beside(drawing: Drawing, motion: Motion, boxes: Array) -> None:
 def _ellipsoids(
     motions: Sequence[Motion], frames: Sequence[Keyframes], wanted: Wanted
 ) -> SceneEllipsoids | None:
-    """The ellipsoids asked for."""
     if wanted is False:
         return None
-    # Not before: with it comes the whole of the analysis.
+    # Imported only here: it imports the whole analysis.
     from nmm.playback.ellipsoids import SceneEllipsoids
 
     options = options_of(wanted)
@@ -233,28 +198,28 @@ def _ellipsoids(
 
 
 def _desired(drawing: Drawing, motions: Sequence[Motion]) -> None:
-    """Each desired path once: motions that are compared usually share it."""
+    """Each desired path once: compared motions usually share it."""
     seen: list[Array] = []
     for motion in motions:
         path = motion.desired
         if path is None or any(path.shape == other.shape and np.allclose(path, other) for other in seen):
             continue
         kept = np.unique(np.linspace(0, len(path) - 1, MOST_FRAMES).astype(int))
-        drawing.add(
-            "path",
-            path=f"/nmm/desired {len(seen)}",
-            color=list(DESIRED),
-            points=packed(path[kept], np.float32),
-            times=None,
-            thick=1.0,
-        )
+        _line(drawing, f"/nmm/desired {len(seen)}", DESIRED, path[kept])
         seen.append(path)
 
 
+def _line(
+    drawing: Drawing, path: str, color: Rgb, points: Array, t: Array | None = None, thick: float = 1.0
+) -> None:
+    """A path through points (K, 3), m, which grows over times (K,) if given."""
+    line, times = packed(points, np.float32), None if t is None else packed(t, np.float64)
+    drawing.add("path", path=path, color=list(color), points=line, times=times, thick=thick)
+
+
 def _targets(drawing: Drawing, motions: Sequence[Motion], size: float) -> None:
-    """A ball on a pole at each target."""
-    given = [np.atleast_2d(motion.target) for motion in motions if motion.target is not None]
-    targets = {tuple(target) for several in given for target in several.tolist()}
+    given = [motion.target for motion in motions if motion.target is not None]
+    targets = {tuple(target) for several in given for target in np.atleast_2d(several).tolist()}
     radius = min(max(0.015 * size, 0.02), 0.2)
     for i, (x, y, z) in enumerate(sorted(targets)):
         path = f"/nmm/target {i}"
@@ -274,7 +239,7 @@ def _targets(drawing: Drawing, motions: Sequence[Motion], size: float) -> None:
 
 
 def _on_the_floor(motion: Motion, size: float) -> Array | None:
-    """Where the platform has been (N, 3), just above the floor; None for one that stays."""
+    """The platform's path (N, 3), just above the floor; None if it stays."""
     at = base_position(motion.robot, motion.q)
     if float(np.ptp(at, axis=0).max(initial=0.0)) < 1e-6:
         return None

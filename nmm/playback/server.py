@@ -1,4 +1,4 @@
-"""A web server in a thread of this process, on the loopback interface: it ends when the process does."""
+"""A web server on the loopback interface, in a thread of this process, with which it ends."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import socket
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import dataclass
 
 import tornado.web
@@ -16,27 +17,21 @@ import tornado.websocket
 from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets
 
-from nmm.errors import InputError, RunError
+from nmm.errors import InputError, RunError, expect
 
 LOOPBACK = "127.0.0.1"
 #: Tried in this order when no port is asked for; if all are taken, the system chooses.
 PORTS = range(7000, 7020)
 #: Pause between two poses sent to a page, s: no screen shows more.
 PERIOD = 1.0 / 60.0
-#: What a page says is shorter than this, bytes; more ends its connection.
+#: Longest message of a page, bytes; a longer one ends its connection.
 LONGEST_MESSAGE = 4096
 
 
 @dataclass(frozen=True)
 class Visitor:
-    """A page that has come. All is called in the server's thread.
-
-    Attributes
-    ----------
-    latest : lines for what is new to it; "" for nothing
-    heard : called with what it says; whether `latest` then has something new
-    gone : called when it has gone
-    """
+    """Callbacks of a connected page, in the server's thread: `latest` gives new lines, or ""; `heard` takes a
+    message and tells whether there is something new; `gone` is called when the page has left."""
 
     latest: Callable[[], str]
     heard: Callable[[str | bytes], bool] = lambda message: False
@@ -44,27 +39,12 @@ class Visitor:
 
 
 class PageServer:
-    """Serves one page and sends it commands.
+    """Serves one page and sends it commands; `InputError` for a port taken, not allowed, or not a port.
 
-    A page that connects gets `hello`, then, whenever `changed()` has been called, what its `latest()` says:
-    a page that is slow, or asleep in a background tab, misses what is old and delays nobody. Only a page that
-    this server has sent connects: it knows the token, and comes from this address.
-
-    Parameters
-    ----------
-    page : makes the page, given the server's address "127.0.0.1:port" and the token
-    hello : lines of commands for a page that has just connected
-    visit : makes the `Visitor` for a page that has connected; when not given, pages are told no more
-    port : the port, or None for a free one
-
-    Attributes
-    ----------
-    port, host, url, token : where it is, "127.0.0.1:port", "http://127.0.0.1:port/"; what its pages know
-    hello : as given; another list is what pages get that come from now on
-
-    Raises
-    ------
-    InputError : the port is taken, not allowed, or not a port
+    `page` makes it from the host ("127.0.0.1:port") and the token. A connected page gets the lines of
+    `hello`, which may be replaced, then its visitor's `latest()` after each `changed()`: a slow page, or one
+    in a background tab, misses what is old and delays no other. Only this server's pages can connect: they
+    know the token and come from this address.
     """
 
     def __init__(
@@ -98,7 +78,7 @@ class PageServer:
         atexit.register(self.close)
 
     def changed(self) -> None:
-        """Say that `latest` has something new. Never waits for a page. `RunError` once closed."""
+        """Announce news in `latest`, without waiting for a page; `RunError` once closed."""
         if self._closed:
             raise RunError("the viewer has been closed")
         if not self._notified:
@@ -106,7 +86,6 @@ class PageServer:
             self._loop.call_soon_threadsafe(self._wake)
 
     def close(self) -> None:
-        """Stop, close the pages' connections and free the port; again is nothing."""
         if self._closed:
             return
         self._closed = True
@@ -143,7 +122,7 @@ class PageServer:
     async def _hang_up(self, http: HTTPServer) -> None:
         for page in tuple(self.pages):
             page.close()
-        # A page that does not answer is left alone.
+        # At most a second for a page that does not answer.
         await asyncio.wait([asyncio.ensure_future(http.close_all_connections())], timeout=1.0)
         waiting = [task for task in asyncio.all_tasks() if task is not asyncio.current_task()]
         for task in waiting:
@@ -152,7 +131,7 @@ class PageServer:
 
 
 class _Local(tornado.web.RequestHandler):
-    """Answers only who asked for this address: a name that some site points at 127.0.0.1 is not it."""
+    """Answers requests for this address only, not for a foreign name that resolves to 127.0.0.1."""
 
     def initialize(self, server: PageServer) -> None:
         self.server = server
@@ -172,9 +151,8 @@ class _Page(_Local):
 class _Socket(tornado.websocket.WebSocketHandler, _Local):
     def prepare(self) -> None:
         super().prepare()
-        if not secrets.compare_digest(
-            self.get_query_argument("token", "").encode(), self.server.token.encode()
-        ):
+        known = self.get_query_argument("token", "").encode()
+        if not secrets.compare_digest(known, self.server.token.encode()):
             raise tornado.web.HTTPError(403)
 
     def open(self, *args: str, **kwargs: str) -> None:
@@ -183,7 +161,7 @@ class _Socket(tornado.websocket.WebSocketHandler, _Local):
         self.news = asyncio.Event()
         self.news.set()
         self.server.pages.add(self)
-        # A task of its own: Tornado notices that a page has gone only once this method has returned.
+        # Its own task: Tornado notices that a page is gone only after this method has returned.
         self._sending = asyncio.ensure_future(self._send())
 
     async def _send(self) -> None:
@@ -212,23 +190,17 @@ class _Socket(tornado.websocket.WebSocketHandler, _Local):
 
 
 def _listen(port: int | None) -> socket.socket:
-    """A socket that listens on loopback only."""
     if port is None:
         for candidate in (*PORTS, 0):
-            try:
+            with suppress(OSError):
                 return bind_sockets(candidate, LOOPBACK, socket.AF_INET)[0]
-            except OSError:
-                continue
         raise RunError(f"no free port on {LOOPBACK}")
-    if not 0 < port < 65536:
-        raise InputError(f"port: expected a number from 1 to 65535, got {port}")
+    expect(0 < port < 65536, "port", "a number from 1 to 65535", port)
     try:
         return bind_sockets(port, LOOPBACK, socket.AF_INET)[0]
     except PermissionError:
-        raise InputError(
-            f"port: {port} is reserved; expected one above 1023 or none, for a free one"
-        ) from None
+        expected = "one above 1023 or none, for a free one"
+        raise InputError(f"{port} is reserved", where="port", expected=expected) from None
     except OSError:
-        raise InputError(
-            f"port: {port} is in use; expected a free port, or none, to have one found"
-        ) from None
+        expected = "a free port, or none, to have one found"
+        raise InputError(f"{port} is in use", where="port", expected=expected) from None

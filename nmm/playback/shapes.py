@@ -1,7 +1,6 @@
-"""Pinocchio's visual geometries as three.js geometries, each with the placement that its axes need."""
+"""Robots in the page: Pinocchio's visual geometries as three.js geometries, on a node for each joint."""
 
-from __future__ import annotations
-
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,8 +8,12 @@ import numpy as np
 import pinocchio as pin
 
 from nmm.arrays import Array
-from nmm.playback.encoding import packed
+from nmm.playback.drawing import Command, Drawing, Rgb, animation, packed, page_times, segment
+from nmm.playback.keyframes import Keyframes
 from nmm.playback.meshes import Color, Indices, mesh_pieces
+from nmm.playback.placements import Placements, position_and_quaternion
+from nmm.playback.sticks import appearance
+from nmm.robots.robot import Robot
 
 fcl = pin.hppfcl
 
@@ -18,9 +21,78 @@ fcl = pin.hppfcl
 Y_TO_Z = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 
 
+class DrawnRobot:
+    """A robot in the page: a node for each joint in its parent's, visuals below. `paths` has the nodes of the
+    display model's joints, from joint 1; `root` is the root link's."""
+
+    def __init__(
+        self, drawing: Drawing, robot: Robot, path: str, *, tint: Rgb | None = None, rank: int = 0
+    ) -> None:
+        model = robot.display_model
+        self.placements = Placements(robot)
+        below = [path]
+        for joint in range(1, model.njoints):
+            below.append(f"{below[model.parents[joint]]}/{segment(model.names[joint])}")
+        self.paths = below[1:]
+        # A fixed base stands at the robot's own node.
+        self.root = below[model.getJointId("theta") if robot.platform.n_p else 0]
+        self._drawing = drawing
+        for i, geometry in enumerate(appearance(robot).shapes.geometryObjects):
+            at = f"{below[geometry.parentJoint]}/visual {i} {segment(geometry.name)}"
+            drawing.transform(at, np.array(geometry.placement.homogeneous))
+            for k, shape in enumerate(shapes(geometry)):
+                color = _mixed(shape.color[:3], tint)
+                drawing.object(f"{at}/{k}", shape.geometry, color, opacity=shape.color[3], rank=rank)
+                if not np.array_equal(shape.matrix, np.eye(4)):
+                    drawing.transform(f"{at}/{k}", shape.matrix)
+
+    def place(self, q: Array, wheels: Array) -> None:
+        for path, matrix in self._nodes(q, wheels):
+            self._drawing.transform(path, matrix)
+
+    def pose(self, q: Array, wheels: Array) -> Command:
+        """The command that moves it to q (n,) with wheel angles (W,) in a page that shows it."""
+        transforms = [[path, matrix.T.ravel().tolist()] for path, matrix in self._nodes(q, wheels)]
+        return {"type": "pose", "transforms": transforms}
+
+    def _nodes(self, q: Array, wheels: Array) -> Iterator[tuple[str, Array]]:
+        return zip(self.paths, self.placements.relative(q, wheels), strict=True)
+
+    def animations(self, frames: Keyframes, start: float) -> list[Command]:
+        """MeshCat's animations: a clip for each moving joint. Times count from `start`."""
+        poses = zip(frames.q, frames.wheels, strict=True)
+        matrices = np.array([self.placements.relative(*pose) for pose in poses])
+        times, kept = page_times(frames.t - start)
+        positions, quaternions = position_and_quaternion(matrices[kept])
+        animations = []
+        for path, place, turn in zip(
+            self.paths, positions.swapaxes(0, 1), quaternions.swapaxes(0, 1), strict=True
+        ):
+            animations += animation(path, times, {"position": place, "quaternion": turn})
+        return animations
+
+    def ghosts(self, path: str, q: Array, wheels: Array, texts: Sequence[str]) -> None:
+        """Transparent copies at q (G, n), texts above them; the page makes them from the robot's geometry."""
+        matrices = np.array([self.placements.world(*at) for at in zip(q, wheels, strict=True)])
+        poses = np.concatenate(position_and_quaternion(matrices), axis=-1)
+        joints = [
+            {"path": joint, "poses": packed(poses[:, i], np.float64)} for i, joint in enumerate(self.paths)
+        ]
+        self._drawing.add("ghosts", path=path, texts=list(texts), joints=joints)
+
+
+def _mixed(color: Sequence[float], tint: Rgb | None) -> Rgb:
+    """A colour drawn towards a tint; dark colours stay dark."""
+    red, green, blue = color
+    if tint is not None:
+        light = min(0.45 + 0.7 * (0.3 * red + 0.6 * green + 0.1 * blue), 1.0)
+        red, green, blue = (0.25 * c + 0.75 * light * t for c, t in zip(color, tint, strict=True))
+    return red, green, blue
+
+
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """A three.js geometry (its JSON, without uuid), its colour, and its placement in the geometry's frame."""
+    """A three.js geometry (JSON without uuid), its colour and its placement in the geometry's frame."""
 
     geometry: dict[str, Any]
     color: Color
@@ -28,53 +100,37 @@ class Shape:
 
 
 def shapes(geometry: pin.GeometryObject) -> list[Shape]:
-    """What to draw for a visual geometry; nothing for kinds that have no bounded surface."""
+    """What to draw for a visual geometry; nothing for kinds without a bounded surface."""
     red, green, blue, alpha = (float(c) for c in geometry.meshColor)
     color = (red, green, blue, alpha if alpha > 0.0 else 1.0)
     primitive = _primitive(geometry.geometry)
     if primitive is not None:
         data, matrix = primitive
         return [Shape(data, color, matrix)]
-    return [
-        Shape(
-            triangles(piece.vertices, piece.faces),
-            color if piece.color is None or geometry.overrideMaterial else piece.color,
-            np.eye(4),
-        )
-        for piece in mesh_pieces(geometry)
-    ]
+    found = []
+    for piece in mesh_pieces(geometry):
+        own = color if piece.color is None or geometry.overrideMaterial else piece.color
+        found.append(Shape(triangles(piece.vertices, piece.faces), own, np.eye(4)))
+    return found
 
 
 def triangles(vertices: Array, faces: Indices) -> dict[str, Any]:
-    """Triangles; the browser computes the normals."""
     short = len(vertices) <= 2**16
     kind, dtype = ("Uint16Array", np.uint16) if short else ("Uint32Array", np.uint32)
-    return {
-        "type": "BufferGeometry",
-        "data": {
-            "attributes": {
-                "position": {"itemSize": 3, "type": "Float32Array", "array": packed(vertices, np.float32)}
-            },
-            "index": {"type": kind, "array": packed(faces, dtype)},
-        },
-    }
+    position = {"itemSize": 3, "type": "Float32Array", "array": packed(vertices, np.float32)}
+    index = {"type": kind, "array": packed(faces, dtype)}
+    return {"type": "BufferGeometry", "data": {"attributes": {"position": position}, "index": index}}
 
 
 def sphere(radius: float) -> dict[str, Any]:
-    """A sphere, radius in m."""
     sides = _sides(radius)
     return {"type": "SphereGeometry", "radius": radius, "widthSegments": sides, "heightSegments": sides // 2}
 
 
 def cylinder(radius: float, length: float) -> dict[str, Any]:
     """A cylinder along y, m."""
-    return {
-        "type": "CylinderGeometry",
-        "radiusTop": radius,
-        "radiusBottom": radius,
-        "height": length,
-        "radialSegments": _sides(radius),
-    }
+    ends = {"radiusTop": radius, "radiusBottom": radius}
+    return {"type": "CylinderGeometry", **ends, "height": length, "radialSegments": _sides(radius)}
 
 
 def _sides(radius: float) -> int:
@@ -90,34 +146,28 @@ def _primitive(shape: pin.hppfcl.CollisionGeometry) -> tuple[dict[str, Any], Arr
         return sphere(float(shape.radius)), np.eye(4)
     if isinstance(shape, fcl.Ellipsoid):
         return sphere(1.0), np.diag([*(float(radius) for radius in shape.radii), 1.0])
-    if isinstance(shape, fcl.Cylinder):
-        return cylinder(float(shape.radius), 2.0 * float(shape.halfLength)), Y_TO_Z
-    if isinstance(shape, fcl.Cone):
-        height, radius = 2.0 * float(shape.halfLength), float(shape.radius)
-        return {
-            "type": "ConeGeometry",
-            "radius": radius,
-            "height": height,
-            "radialSegments": _sides(radius),
-        }, Y_TO_Z
-    if isinstance(shape, fcl.Capsule):
-        return _capsule(float(shape.radius), float(shape.halfLength)), Y_TO_Z
     if isinstance(shape, fcl.ConvexBase):
         return _convex(np.array(shape.points(), dtype=float)), np.eye(4)
+    for kind, made in ((fcl.Cylinder, cylinder), (fcl.Cone, _cone), (fcl.Capsule, _capsule)):
+        if isinstance(shape, kind):
+            return made(float(shape.radius), 2.0 * float(shape.halfLength)), Y_TO_Z
     return None
 
 
-def _capsule(radius: float, half_length: float) -> dict[str, Any]:
+def _cone(radius: float, length: float) -> dict[str, Any]:
+    return {"type": "ConeGeometry", "radius": radius, "height": length, "radialSegments": _sides(radius)}
+
+
+def _capsule(radius: float, length: float) -> dict[str, Any]:
     """A capsule along y: its outline turned about y."""
     sides = _sides(radius)
     angles = np.linspace(-np.pi / 2.0, np.pi / 2.0, sides // 2 + 2)
-    heights = radius * np.sin(angles) + np.where(angles < 0.0, -half_length, half_length)
+    heights = radius * np.sin(angles) + np.where(angles < 0.0, -0.5 * length, 0.5 * length)
     outline = [{"x": float(x), "y": float(y)} for x, y in zip(radius * np.cos(angles), heights, strict=True)]
     return {"type": "LatheGeometry", "points": outline, "segments": sides}
 
 
 def _convex(points: Array) -> dict[str, Any]:
-    """A convex polyhedron, flat faces, seen from outside."""
     from scipy.spatial import ConvexHull
 
     hull = ConvexHull(points)

@@ -1,10 +1,4 @@
-"""What is seen of a robot: its visual shapes, and for bodies without any their collision shapes or sticks.
-
-A body is everything that moves with one joint. Quick experiments write URDFs of bare joints: those robots
-are drawn as a stick figure, from each joint to the next. A body with a visual looks as its file says.
-"""
-
-from __future__ import annotations
+"""What is drawn of a robot: visuals; for bodies without any, collision shapes or sticks between joints."""
 
 from collections.abc import Container, Iterator
 from dataclasses import dataclass
@@ -14,49 +8,42 @@ import pinocchio as pin
 
 from nmm.arrays import Array
 from nmm.errors import RobotError
+from nmm.playback.placements import joint_screw
 from nmm.robots.loading.joint_kinds import axis, is_revolute, kind
-from nmm.robots.loading.provenance import parts_of
+from nmm.robots.loading.provenance import loaded_parts
 from nmm.robots.meshes import read_meshes
 from nmm.robots.robot import Robot
 from nmm.robots.wheel import Wheel
 
 fcl = pin.hppfcl
 
+Color = tuple[float, float, float, float]
 GREY, DARK = (0.62, 0.65, 0.69, 1.0), (0.25, 0.27, 0.30, 1.0)
-#: Radius of a stick over the usual length of one, and its bounds, m; a joint's ball, a rail over a stick.
+#: Radius of a stick over the median length of one, and its bounds, m; a joint's ball, a rail over a stick.
 SLIM, THINNEST, THICKEST, BALL, RAIL = 0.05, 0.002, 0.025, 1.8, 0.5
-#: Radius of a root link without shapes and without wheels, m; of a fixed one no more than this of the arm.
+#: Radius of a root link without shapes and wheels, m; of a fixed one at most this share of the arm.
 BASE, FOOT = 0.2, 0.15
-#: Points nearer than this are one, m, and a slider's way beyond this is none.
+#: Points nearer than this, m, are one; a prismatic joint's limits beyond LONGEST, m, are none.
 SAME, LONGEST = 1e-6, 10.0
 
 
 @dataclass(frozen=True, eq=False)
 class Appearance:
-    """What is drawn of a robot.
-
-    Attributes
-    ----------
-    shapes : on `display_model`; `visual_model` itself where every body has a visual
-    solids, sticks : the links that are drawn by their collision shapes, and as sticks
-    """
+    """What is drawn: shapes on `display_model`, or `visual_model` itself if every body has a visual; and the
+    links drawn by their collision shapes (`solids`) and as sticks."""
 
     shapes: pin.GeometryModel
     solids: tuple[str, ...] = ()
     sticks: tuple[str, ...] = ()
 
     def notes(self) -> list[str]:
-        """A sentence for each way in which links are drawn that have no visuals."""
-        found = []
-        if self.solids:
-            found.append(f"links without visuals are drawn by their collision shapes: {_listed(self.solids)}")
-        if self.sticks:
-            found.append(f"links without shapes are drawn as sticks: {_listed(self.sticks)}")
-        return found
+        solids = f"links without visuals are drawn by their collision shapes: {_listed(self.solids)}"
+        sticks = f"links without shapes are drawn as sticks: {_listed(self.sticks)}"
+        return [solids] * bool(self.solids) + [sticks] * bool(self.sticks)
 
 
 def appearance(robot: Robot) -> Appearance:
-    """What to draw of a robot; its models stay as they are. Sticks come after the visuals."""
+    """What to draw of a robot, whose models stay unchanged; sticks come after visuals."""
     model, visuals = robot.display_model, robot.visual_model
     seen = {int(geometry.parentJoint) for geometry in visuals.geometryObjects}
     bare = [joint for joint in range(_root(robot), model.njoints) if joint not in seen]
@@ -77,7 +64,7 @@ def appearance(robot: Robot) -> Appearance:
 
 @dataclass(frozen=True, eq=False)
 class _Plate:
-    """A root link: its middle (3,), half its sides, or its radius twice, (2,), thickness; m."""
+    """A root link: its middle (3,), half its sides or twice its radius, (2,), and thickness; m."""
 
     middle: Array
     half: Array
@@ -86,8 +73,8 @@ class _Plate:
 
 
 def _plate(robot: Robot) -> _Plate:
-    """A disc through wheels that are equally far from the reference point, a box between others, and a disc
-    on the ground where the root link has none."""
+    """A disc through wheels equally far from the reference point, a box between others, and a disc on the
+    ground for a root link without wheels."""
     wheels = [wheel for wheel in robot.wheels if wheel.carrier == "theta"]
     if not wheels:
         return _Plate(np.array([0.0, 0.0, 0.1 * BASE]), np.full(2, BASE), 0.2 * BASE, round=True)
@@ -95,9 +82,8 @@ def _plate(robot: Robot) -> _Plate:
     height, thick = float(centers[:, 2].mean()), 0.5 * min(wheel.radius for wheel in wheels)
     away = np.linalg.norm(centers[:, :2], axis=1)
     if np.ptp(away) <= 0.1 * away.max():
-        # One wheel right below the reference point is as far from it as nothing.
-        radius = max(away.max(), thick)
-        return _Plate(np.array([0.0, 0.0, height]), np.full(2, radius), thick, round=True)
+        # A single wheel right below the reference point has no distance from it.
+        return _Plate(np.array([0.0, 0.0, height]), np.full(2, max(away.max(), thick)), thick, round=True)
     points = np.vstack([centers[:, :2], np.zeros(2)])
     low, high = points.min(axis=0), points.max(axis=0)
     half = 0.5 * np.maximum(high - low, 0.25 * np.max(high - low))
@@ -105,25 +91,19 @@ def _plate(robot: Robot) -> _Plate:
 
 
 class _StickFigure:
-    """The shapes that stand for bodies without any."""
-
     def __init__(self, robot: Robot, bare: list[int]) -> None:
         self.robot, self.model, self.bare = robot, robot.display_model, bare
         self.root, self.plate = _root(robot), _plate(robot)
         self.wheels = {self.model.getJointId(wheel.joint): wheel for wheel in robot.wheels}
         self.lines = {joint: list(self._lines(joint)) for joint in bare if joint not in self.wheels}
-        lengths = [
-            float(np.linalg.norm(end - start))
-            for joint, lines in self.lines.items()
-            for start, end in lines
-            if joint != self.root or not robot.platform.n_p
-        ]
+        of_platform = {self.root} if robot.platform.n_p else set()
+        arms = [line for joint, lines in self.lines.items() if joint not in of_platform for line in lines]
+        lengths = [float(np.linalg.norm(end - start)) for start, end in arms]
         usual = float(np.median(lengths)) if lengths else BASE
         self.radius = float(np.clip(SLIM * usual, THINNEST, THICKEST))
         self.reach = sum(lengths)
 
     def shapes(self) -> Iterator[pin.GeometryObject]:
-        """Everything, joint by joint."""
         for joint in self.bare:
             name = str(self.model.names[joint])
             if joint in self.wheels:
@@ -135,7 +115,7 @@ class _StickFigure:
                 yield self._base()
                 continue
             parent = int(self.model.parents[joint])
-            # Links without length between others that have shapes stay unseen.
+            # Links without length between others with shapes stay unseen.
             if not self.lines[joint] and not self.lines.get(parent):
                 continue
             if is_revolute(self.model.joints[joint]):
@@ -147,15 +127,11 @@ class _StickFigure:
     def _lines(self, joint: int) -> Iterator[tuple[Array, Array]]:
         """From the joint's origin to its children's and to the farthest frame, (3,) each, in its frame."""
         model = self.model
-        ends = [
-            np.array(model.jointPlacements[child].translation)
-            for child in range(joint + 1, model.njoints)
-            if model.parents[child] == joint
-        ]
-        carried = [
-            np.array(frame.placement.translation) for frame in model.frames if frame.parentJoint == joint
-        ]
-        # Of the platform's own frames none is an end.
+        children = [child for child in range(joint + 1, model.njoints) if model.parents[child] == joint]
+        ends = [np.array(model.jointPlacements[child].translation) for child in children]
+        frames = [frame for frame in model.frames if frame.parentJoint == joint]
+        carried = [np.array(frame.placement.translation) for frame in frames]
+        # The platform's own frames are no ends.
         if carried and joint != self.root:
             far = max(carried, key=np.linalg.norm)
             if not any(np.linalg.norm(far - end) < SAME for end in ends):
@@ -166,25 +142,19 @@ class _StickFigure:
                 yield start, end
 
     def _foot(self, end: Array) -> Array:
-        """Where a stick stands on the root link: on a platform as nearly below its end as can be."""
+        """Where a stick stands on the root link: on a platform as nearly below its end as possible."""
         if not self.robot.platform.n_p:
             return np.zeros(3)
         plate = self.plate
-        half = 0.7 * plate.half if plate.round else plate.half
-        return np.array(
-            [*np.clip(end[:2], plate.middle[:2] - half, plate.middle[:2] + half), plate.middle[2]]
-        )
+        half, middle = 0.7 * plate.half if plate.round else plate.half, plate.middle
+        return np.array([*np.clip(end[:2], middle[:2] - half, middle[:2] + half), middle[2]])
 
     def _base(self) -> pin.GeometryObject:
-        """The root link: a flat disc or box."""
         plate = self.plate
-        middle, half = plate.middle, plate.half
-        if not self.robot.platform.n_p and self.reach > 0.0:
-            half = np.minimum(half, FOOT * self.reach)
-        at = pin.SE3(np.eye(3), middle)
-        if plate.round:
-            return _shape("base", self.root, at, fcl.Cylinder(float(half[0]), plate.thick))
-        return _shape("base", self.root, at, fcl.Box(2.0 * half[0], 2.0 * half[1], plate.thick))
+        fixed = not self.robot.platform.n_p and self.reach > 0.0
+        x, y = (np.minimum(plate.half, FOOT * self.reach) if fixed else plate.half).tolist()
+        shape = fcl.Cylinder(x, plate.thick) if plate.round else fcl.Box(2.0 * x, 2.0 * y, plate.thick)
+        return _shape("base", self.root, pin.SE3(np.eye(3), plate.middle), shape)
 
     def _tyre(self, joint: int, wheel: Wheel) -> pin.GeometryObject:
         along = axis(self.model.joints[joint], pin.neutral(self.model))
@@ -192,13 +162,11 @@ class _StickFigure:
         return _shape(f"wheel {wheel.joint}", joint, pin.SE3(_towards(along), np.zeros(3)), tyre, DARK)
 
     def _way(self, joint: int) -> tuple[Array, Array] | None:
-        """Where a slider ends, (3,) twice, in its parent's frame; None where that is not known."""
+        """The ends (3,) of a prismatic joint in its parent's frame; None if unknown."""
         model, sliding = self.model, self.model.joints[joint]
         if not kind(sliding).startswith("P") or sliding.nq != 1:
             return None
-        data = sliding.createData()
-        sliding.calc(data, pin.neutral(model))
-        along = np.array(data.S, dtype=np.float64).reshape(6)[:3]
+        along, _ = joint_screw(model, joint)
         ends = [float(limit[sliding.idx_q]) for limit in (model.lowerPositionLimit, model.upperPositionLimit)]
         if not all(abs(end) < LONGEST for end in ends) or ends[1] - ends[0] < SAME:
             return None
@@ -207,21 +175,17 @@ class _StickFigure:
 
 
 def _root(robot: Robot) -> int:
-    """The joint that carries the root link; x and y before it carry nothing."""
     return int(robot.display_model.getJointId("theta")) if robot.platform.n_p else 0
 
 
 def _solids(robot: Robot, joints: Container[int]) -> list[pin.GeometryObject]:
-    """The collision shapes of some joints, grey, on the display model."""
     display = robot.display_model
     try:
-        names, collisions = display.names, parts_of(robot).collision_model
-    except RobotError:  # made by hand: the wheels' shapes are those of what carries them
+        names, collisions = display.names, loaded_parts(robot).collision_model
+    except RobotError:  # not from a file: the wheels' shapes are those of what carries them
         names, collisions = robot.model.names, robot.shapes.collision_model
     places = {i: display.getJointId(name) for i, name in enumerate(names) if display.existJointName(name)}
-    drawn = [
-        geometry for geometry in collisions.geometryObjects if places.get(geometry.parentJoint) in joints
-    ]
+    drawn = [one for one in collisions.geometryObjects if places.get(one.parentJoint) in joints]
     read_meshes(drawn, robot.name)
     solids = [pin.GeometryObject(geometry) for geometry in drawn]
     for geometry in solids:
@@ -231,7 +195,7 @@ def _solids(robot: Robot, joints: Container[int]) -> list[pin.GeometryObject]:
 
 
 def _links(robot: Robot, joints: set[int]) -> tuple[str, ...]:
-    """The link right below each joint, or the joint itself where there is none."""
+    """The link right below each joint, or the joint itself if there is none."""
     model = robot.display_model
     names: dict[int, str] = {}
     for frame in model.frames:
@@ -246,23 +210,19 @@ def _listed(names: tuple[str, ...], most: int = 8) -> str:
 
 
 def _stick(name: str, joint: int, start: Array, end: Array, radius: float) -> pin.GeometryObject:
-    """A capsule whose round ends are about the two points."""
+    """A capsule whose round ends are centred on the two points."""
     length = float(np.linalg.norm(end - start))
     at = pin.SE3(_towards((end - start) / length), 0.5 * (start + end))
     return _shape(name, joint, at, fcl.Capsule(radius, length))
 
 
 def _towards(direction: Array) -> Array:
-    """A rotation that turns z to a unit vector."""
+    """A rotation that takes z to a unit vector."""
     return np.asarray(pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), direction).matrix())
 
 
 def _shape(
-    name: str,
-    joint: int,
-    at: pin.SE3,
-    shape: pin.hppfcl.CollisionGeometry,
-    color: tuple[float, float, float, float] = GREY,
+    name: str, joint: int, at: pin.SE3, shape: pin.hppfcl.CollisionGeometry, color: Color = GREY
 ) -> pin.GeometryObject:
     geometry = pin.GeometryObject(name, joint, at, shape)
     geometry.meshColor = np.array(color)

@@ -1,29 +1,49 @@
-"""A robot in a browser, with a slider for each coordinate and its frames: what `nmm view` shows."""
+"""A robot in a browser, with its frames and a slider for each coordinate: what `nmm view` shows."""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array
 from nmm.functions.function import Function
+from nmm.functions.program import Program
 from nmm.functions.tasks.task import Stack, Task
-from nmm.playback.encoding import encode
-from nmm.playback.live import serve
-from nmm.playback.page import socket_page
-from nmm.playback.server import PageServer
-from nmm.playback.viewer_scene import viewer_scene
+from nmm.playback.drawing import Command, Drawing, segment
+from nmm.playback.extent import robot_boxes
+from nmm.playback.html import HEIGHT, file_page, framed
+from nmm.playback.placements import joint_screw, position_and_quaternion
+from nmm.playback.rolling import Rolling
+from nmm.playback.scene import draw_beside, live_scene, points_beside, still
+from nmm.playback.session import Session
+from nmm.playback.shapes import DrawnRobot
 from nmm.robots.motion import Motion
+from nmm.robots.reach import first_tip, tips
 from nmm.robots.robot import Robot
+from nmm.runs.shown_frame import shown_frame
 
 if TYPE_CHECKING:
     from nmm.playback.viewed_task import ViewedTask
+    from nmm.scenario import Scenario
 
 SCRIPTS = ("viewer_joints.js", "viewer_labels.js", "viewer_frames.js", "viewer_task.js")
 STYLES = ("viewer.css",)
+#: Limits beyond this, m or rad, are none.
+UNBOUNDED = 1e3
+#: About this many points beside the robot are kept in view.
+HELD = 60
+#: A slider's ends where there is no limit: rad, m of the platform, m of the arm.
+ANGLE, WAY, REACH = float(np.pi), 3.0, 1.0
+#: Instants at which a scenario's desired path is evaluated.
+INSTANTS = 400
+#: A shorter path, m, is a point.
+STANDS = 1e-6
 
 
 def view(
@@ -39,15 +59,13 @@ def view(
 ) -> None:
     """Show a robot in a browser, to be moved by hand; returns at Ctrl-C or when `stop` is set.
 
-    The address is printed. Each page that opens it has sliders of its own: the page computes where the
-    joints are, from their placements and axes. Of a task the program tells what the robot can do for it
-    where the sliders are: singular values of J, manipulability, ellipsoids, and what is lost. Only this
-    machine can reach it.
+    The address is printed; only this machine can reach it. Each page has sliders of its own, and computes
+    where the joints are. Of a task, the page shows what the robot can do for it there: singular values of J,
+    manipulability, ellipsoids, and what is lost.
 
     Parameters
     ----------
-    robot : the robot
-    q : (n,) m and rad, where it stands at first; when not given, zero, or the limit that is nearest to zero
+    q : (n,) m and rad, where it stands at first; when not given, zero, or the limit nearest to zero
     frames : whether frames are shown at first: the root link's, each joint's link, and those at the tips
     task : what the robot shall do: one task or several, or functions of the robot alone
     beside : what stands around it: the desired path, the target and the bodies of a motion
@@ -69,20 +87,149 @@ def view(
     Showing the robot at http://127.0.0.1:.../ (Ctrl-C ends it)
     """
     at = robot.rest if q is None else robot.q(q)
-    viewed = None if task is None else _viewed(robot, task, at)
+    viewed = None
+    if task is not None:
+        from nmm.playback.viewed_task import ViewedTask  # with it comes the whole of the analysis
+
+        several = task.tasks if isinstance(task, Stack) else task if isinstance(task, Sequence) else (task,)
+        viewed = ViewedTask(robot, tuple(several), at)
     commands = viewer_scene(robot, at, frames=frames, task=viewed, beside=beside)
-    server = PageServer(
-        lambda host, token: socket_page(robot.name, host, token, scripts=SCRIPTS, styles=STYLES),
-        [encode(command) for command in commands],
-        None if viewed is None else viewed.visitor,
-        port=port,
-    )
-    serve(server, "Showing the robot", [robot], open_browser=open_browser, stop=stop)
+    visit = None if viewed is None else viewed.visitor
+    session = Session(robot.name, commands, visit, scripts=SCRIPTS, styles=STYLES, port=port)
+    session.serve("Showing the robot", [robot], open_browser=open_browser, stop=stop)
 
 
-def _viewed(robot: Robot, task: Task | Function | Sequence[Task | Function], q: Array) -> ViewedTask:
-    # Not before: with it comes the whole of the analysis.
-    from nmm.playback.viewed_task import ViewedTask
+def of_robot(robot: Robot) -> str:
+    page = file_page(viewer_scene(robot, robot.rest), robot.name, scripts=SCRIPTS, styles=STYLES)
+    return framed(page, robot.name, HEIGHT)
 
-    several = task.tasks if isinstance(task, Stack) else task if isinstance(task, Sequence) else (task,)
-    return ViewedTask(robot, tuple(several), q)
+
+def viewer_scene(
+    robot: Robot,
+    q: Array,
+    *,
+    frames: bool = True,
+    task: ViewedTask | None = None,
+    beside: Motion | None = None,
+) -> list[Command]:
+    """Commands for a robot at q (n,) that the page's sliders move; options as of `view`."""
+    wheels = Rolling(robot).settled(q)
+    boxes = robot_boxes(robot, q[np.newaxis], wheels[np.newaxis])
+    seen = np.zeros((0, 3)) if beside is None else points_beside(beside, boxes)
+    commands, drawn = live_scene(robot, q, wheels, title=robot.name, room=1.0, seen=seen)
+    length = float(np.clip(0.08 * np.linalg.norm(np.ptp(boxes[0], axis=0)), 0.02, 0.25))
+    drawing = Drawing()
+    if beside is not None:
+        draw_beside(drawing, beside, boxes)
+    if task is not None:
+        task.draw(drawing)
+    listed = list(_frames(robot, drawn, drawing))
+    drawing.add("joints", coordinates=list(_coordinates(robot, drawn, q)))
+    pose = first_tip(robot) or next((frame["name"] for frame in listed if frame["shown"]), "")
+    drawing.add("frames", frames=listed, shown=frames, length=length, pose=pose)
+    if task is not None:
+        drawing.commands.append(task.answer(q))
+    drawing.add("hold", beside=seen[:: max(1, len(seen) // HELD)].tolist())
+    # The last command tells that all is there.
+    return [*commands[:-1], *drawing.commands, commands[-1]]
+
+
+def _coordinates(robot: Robot, drawn: DrawnRobot, q: Array) -> Iterator[dict[str, Any]]:
+    """Each coordinate: its slider or what it follows, its joint's placement at zero in the parent's frame,
+    and its screw: for a unit of it the joint turns by `angular` and slides by `linear`."""
+    model = robot.display_model
+    mimic_joints = {one.joint: one for one in robot.mimic_joints}
+    for i, (name, unit, (lower, upper)) in enumerate(
+        zip(robot.q_names, robot.q_units, robot.q_limits, strict=True)
+    ):
+        joint = model.getJointId(name)
+        linear, angular = joint_screw(model, joint)
+        position, quaternion = position_and_quaternion(model.jointPlacements[joint].homogeneous)
+        of_platform = i < robot.platform.n_p
+        end = ANGLE if unit == "rad" else WAY if of_platform else REACH
+        arms = [arm for arm, joints in robot.arms.items() if name in joints]
+        follower = mimic_joints.get(name)
+        yield {
+            "name": name,
+            "follows": None if follower is None else asdict(follower),
+            "unit": unit,
+            "of": "platform" if of_platform else next(iter(arms), "arm"),
+            "lower": float(lower) if abs(lower) < UNBOUNDED else min(-end, float(q[i])),
+            "upper": float(upper) if abs(upper) < UNBOUNDED else max(end, float(q[i])),
+            "value": float(q[i]),
+            "path": drawn.paths[joint - 1],
+            "position": position.tolist(),
+            "quaternion": quaternion.tolist(),
+            "linear": linear.tolist(),
+            "angular": angular.tolist(),
+        }
+
+
+def _frames(robot: Robot, drawn: DrawnRobot, drawing: Drawing) -> Iterator[dict[str, Any]]:
+    """Frames that a task may name: the node of each, and whether it is shown at first."""
+    model = robot.display_model
+    ends = set(tips(robot))
+    chosen = {*_joint_links(robot), *ends}
+    for i, name in enumerate(robot.frames):
+        frame = _frame(model, name)
+        if frame is None or name in robot.platform.coordinates[:2]:
+            continue  # x and y are steps on the way to the root
+        parent = drawn.paths[frame.parentJoint - 1] if frame.parentJoint else drawn.paths[0].rsplit("/", 1)[0]
+        path = f"{parent}/frame {i} {segment(name)}"
+        drawing.transform(path, np.array(frame.placement.homogeneous))
+        yield {"name": name, "path": path, "shown": name in chosen, "tip": name in ends}
+
+
+def _frame(model: pin.Model, name: str) -> pin.Frame | None:
+    """The display model's frame of that name, chosen as by `Robot.frame_id`."""
+    for kind in (pin.FrameType.BODY, pin.FrameType.OP_FRAME):
+        if model.existFrame(name, kind):
+            return model.frames[model.getFrameId(name, kind)]
+    return model.frames[model.getFrameId(name)] if model.existFrame(name) else None
+
+
+def _joint_links(robot: Robot) -> Iterator[str]:
+    """The root link and the link below each joint, or the joint's own frame where there is no link."""
+    model, n_p = robot.model, robot.platform.n_p
+    root = model.getJointId("theta") if n_p else 0
+    joints = [root, *(model.getJointId(name) for name in robot.q_names[3 if n_p else 0 :])]
+    for joint in joints:
+        links = [
+            frame.name
+            for frame in model.frames
+            if frame.parentJoint == joint
+            and frame.type == pin.FrameType.BODY
+            and (joint == root or frame.placement.isIdentity(1e-9))
+        ]
+        yield links[0] if links else str(model.names[joint])
+
+
+def asked_for(scenario: Scenario, robot: Robot) -> Motion:
+    """The robot at the scenario's start, in one sample, with desired path, target and obstacles. A path that
+    depends on the robot's place, or on tasks that come and go, is left out."""
+    q = robot.following.placed(robot.q(scenario.parts.q0))
+    tasks = tuple(scenario.controller().task)
+    frame = shown_frame(tasks, robot)
+    path = frame.path(robot, q[np.newaxis])
+    desired, target = None, frame.mark(path)
+    if path is not None and frame.rows and not any(one.when for one in tasks):
+        times = np.linspace(0.0, float(scenario.parts.duration), INSTANTS)
+        r_d = _references(tasks, robot, q, times)
+        known = np.isfinite(r_d[:, list(frame.rows.values())]).all(axis=1)
+        points = frame.desired(np.repeat(path, INSTANTS, axis=0), r_d)[known]
+        if len(points) and np.ptp(points, axis=0).max() > STANDS:
+            desired = points
+        elif len(points) and target is None:
+            target = points[0]
+    return still(robot, q, scenario.obstacles(robot), desired=desired, target=target)
+
+
+def _references(tasks: tuple[Task, ...], robot: Robot, q: Array, times: Array) -> Array:
+    """Targets (N, s) of the tasks' rows at times, s; NaN where they depend on q."""
+    program = Program(robot, [task.reference for task in tasks])
+    program.lay_out()
+    found = []
+    for t in times:
+        rows = program.evaluate(float(t), q)
+        found.append(np.concatenate([np.where(one.value_q.any(axis=1), np.nan, one.value) for one in rows]))
+    return np.array(found)

@@ -1,9 +1,4 @@
-"""Videos of runs: the playback page, picture by picture, through a headless Chromium and ffmpeg.
-
-chromium  a page in a browser without a window, and pictures of it
-encoder   pictures made into a file, by ffmpeg
-render    which page, which instants
-"""
+"""Videos of runs: the playback page, picture by picture, through a headless Chromium and ffmpeg."""
 
 import lazy_loader
 

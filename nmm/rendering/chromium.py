@@ -1,4 +1,4 @@
-"""A page in a Chromium without a window, spoken to through its debugging protocol."""
+"""A page in a headless Chromium, controlled through its debugging protocol."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ import subprocess
 import sys
 import tempfile
 import time
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from nmm.errors import RunError
+from nmm.rendering.encoder import last_words
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge")
 OPTIONS = (
@@ -33,16 +33,14 @@ os.dup2(read, 3)
 os.dup2(write, 4)
 os.execv(sys.argv[3], sys.argv[3:])
 """
-#: How long a browser may take to start, and to answer, s.
+#: How long a browser may take to start and to answer, s.
 PATIENCE = 60.0
 
 
 def find_browser() -> str:
-    """Chromium's or Chrome's program; `RunError` where there is none."""
-    for name in NAMES:
-        found = shutil.which(name)
-        if found is not None:
-            return found
+    """Chromium's or Chrome's program; `RunError` if there is none."""
+    if found := next(filter(None, map(shutil.which, NAMES)), None):
+        return found
     raise RunError(
         "videos need Chromium or Chrome, and none is installed (Debian: apt-get install chromium); "
         f"looked for {', '.join(NAMES)}"
@@ -50,19 +48,9 @@ def find_browser() -> str:
 
 
 class HeadlessPage:
-    """A file in a browser without a window: `with HeadlessPage(path, (width, height)) as page:`.
-
-    The browser is a process of its own, which ends with this, and has its files in a temporary folder.
-
-    Parameters
-    ----------
-    file : an HTML file
-    size : width and height, px
-
-    Raises
-    ------
-    RunError : no browser; one that does not start or answer
-    """
+    """An HTML file in a browser without a window: `with HeadlessPage(path, (width, height)) as page:`. The
+    browser ends with it and keeps its files in a temporary folder; `RunError` if there is none, or it does
+    not start or answer."""
 
     def __init__(self, file: Path, size: tuple[int, int]) -> None:
         self._file, self._size = file, size
@@ -70,30 +58,32 @@ class HeadlessPage:
         self._number, self._session, self._read = 0, "", b""
 
     def __enter__(self) -> HeadlessPage:
-        self._folder = tempfile.TemporaryDirectory(prefix="nmm-browser-", ignore_cleanup_errors=True)
-        self._log = Path(self._folder.name) / "log"
-        theirs_in, self._to = os.pipe()
-        self._from, theirs_out = os.pipe()
-        # Root has no sandbox to be put into.
-        unboxed = ["--no-sandbox"] if os.geteuid() == 0 else []
-        command = [self._browser, *OPTIONS, *unboxed, f"--user-data-dir={self._folder.name}", "about:blank"]
-        begin = [sys.executable, "-I", "-S", "-c", PIPED, str(theirs_in), str(theirs_out)]
-        with self._log.open("wb") as log:
-            self._process = subprocess.Popen(
-                [*begin, *command],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=log,
-                pass_fds=(theirs_in, theirs_out),
-                start_new_session=True,
-            )
-        os.close(theirs_in)
-        os.close(theirs_out)
-        try:
+        with ExitStack() as opened:
+            temporary = tempfile.TemporaryDirectory(prefix="nmm-browser-", ignore_cleanup_errors=True)
+            folder = opened.enter_context(temporary)
+            self._log = Path(folder) / "log"
+            theirs_in, self._to = os.pipe()
+            self._from, theirs_out = os.pipe()
+            for pipe in (self._to, self._from):
+                opened.callback(os.close, pipe)
+            # Chromium's sandbox does not run as root.
+            unboxed = ["--no-sandbox"] if os.geteuid() == 0 else []
+            command = [self._browser, *OPTIONS, *unboxed, f"--user-data-dir={folder}", "about:blank"]
+            begin = [sys.executable, "-I", "-S", "-c", PIPED, str(theirs_in), str(theirs_out)]
+            with self._log.open("wb") as log:
+                self._process = subprocess.Popen(
+                    [*begin, *command],
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.DEVNULL,
+                    stderr=log,
+                    pass_fds=(theirs_in, theirs_out),
+                    start_new_session=True,
+                )
+            opened.callback(_end, self._process)
+            os.close(theirs_in)
+            os.close(theirs_out)
             self._open()
-        except BaseException:
-            self.__exit__(None, None, None)
-            raise
+            self._opened = opened.pop_all()
         return self
 
     def _open(self) -> None:
@@ -109,7 +99,7 @@ class HeadlessPage:
         self._ask("Page.navigate", url=self._file.resolve().as_uri())
 
     def _ask(self, method: str, **parameters: Any) -> dict[str, Any]:
-        """What the browser answers; messages both ways are JSON, each with a zero byte behind it."""
+        """The browser's answer; messages both ways are JSON, each followed by a zero byte."""
         self._number += 1
         message = {"id": self._number, "method": method, "params": parameters}
         if self._session:
@@ -119,13 +109,13 @@ class HeadlessPage:
         except BrokenPipeError:
             raise self._ended() from None
         end = time.monotonic() + PATIENCE
-        while True:
-            told = json.loads(self._message(end))
-            if told.get("id") == self._number:
-                if "error" in told:
-                    raise RunError(f"{self._browser}: {method}: {told['error'].get('message')}")
-                result: dict[str, Any] = told["result"]
-                return result
+        answer: dict[str, Any] = {}
+        while answer.get("id") != self._number:
+            answer = json.loads(self._message(end))
+        if "error" in answer:
+            raise RunError(f"{self._browser}: {method}: {answer['error'].get('message')}")
+        found: dict[str, Any] = answer["result"]
+        return found
 
     def _message(self, end: float) -> bytes:
         while b"\0" not in self._read:
@@ -140,19 +130,17 @@ class HeadlessPage:
         return message
 
     def _ended(self) -> RunError:
-        lines = self._log.read_text(errors="replace").strip().splitlines()
-        return RunError(f"{self._browser} has ended: {lines[-1] if lines else 'without a word'}")
+        return RunError(f"{self._browser} has ended: {last_words(self._log) or 'without a word'}")
 
     def evaluate(self, expression: str) -> Any:
         """The value of an expression in the page, or of its promise; `RunError` for what it throws."""
-        told = self._ask("Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True)
-        if "exceptionDetails" in told:
-            problem = told["exceptionDetails"]
+        answer = self._ask("Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True)
+        if "exceptionDetails" in answer:
+            problem = answer["exceptionDetails"]
             raise RunError(f"the page: {problem.get('exception', {}).get('description') or problem['text']}")
-        return told["result"].get("value")
+        return answer["result"].get("value")
 
     def wait_for(self, expression: str) -> None:
-        """Until an expression is true."""
         end = time.monotonic() + PATIENCE
         while not self.evaluate(f"Boolean({expression})"):
             if time.monotonic() > end:
@@ -163,13 +151,12 @@ class HeadlessPage:
         """What it shows, as PNG."""
         return base64.b64decode(self._ask("Page.captureScreenshot", format="png")["data"])
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        # Its helpers, too: they are of its session.
-        with suppress(ProcessLookupError):
-            os.killpg(self._process.pid, signal.SIGKILL)
-        self._process.wait()
-        os.close(self._to)
-        os.close(self._from)
-        self._folder.cleanup()
+    def __exit__(self, *_: object) -> None:
+        self._opened.close()
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """End the browser and its helpers, which share its session."""
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()

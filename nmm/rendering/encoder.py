@@ -1,7 +1,5 @@
 """Pictures made into a video, by ffmpeg."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess
@@ -9,11 +7,9 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-from nmm.errors import InputError, RunError
-from nmm.files import replaceable
-from nmm.writing import writing
+from nmm.errors import InputError, RunError, expect
+from nmm.files import replaceable, writing
 
-#: ffmpeg's options by the file's suffix.
 CODECS = {
     ".mp4": ("-c:v", "libx264", "-crf", "20", "-pix_fmt", "yuv420p", "-movflags", "+faststart"),
     ".webm": ("-c:v", "libvpx-vp9", "-crf", "32", "-b:v", "0", "-pix_fmt", "yuv420p", "-row-mt", "1"),
@@ -22,20 +18,17 @@ CODECS = {
 
 
 def expect_video(file: Path) -> Path:
-    """The file that a video takes the place of; `InputError` for another suffix, a folder that is not there,
-    a device."""
-    if file.suffix.lower() not in CODECS:
-        raise InputError(f"{file}: expected a file that ends in {', '.join(CODECS)}")
+    """The path of a video to write; `InputError` for another suffix, a missing folder or a device."""
+    expect(file.suffix.lower() in CODECS, str(file), f"a file that ends in {', '.join(CODECS)}")
     if file.is_dir() or not file.parent.is_dir():
         what = "is a folder" if file.is_dir() else f"the folder {file.parent} is not there"
-        raise InputError(f"{file}: cannot be written: {what}")
+        raise InputError(f"cannot be written: {what}", where=str(file))
     return replaceable(file)
 
 
 def find_ffmpeg() -> str:
-    """ffmpeg's program, the system's or the one of the package imageio-ffmpeg; `RunError` for none."""
-    found = shutil.which("ffmpeg")
-    if found is not None:
+    """The system's ffmpeg, or the one of the package imageio-ffmpeg; `RunError` for none."""
+    if found := shutil.which("ffmpeg"):
         return found
     try:
         import imageio_ffmpeg
@@ -47,20 +40,13 @@ def find_ffmpeg() -> str:
         ) from None
 
 
+def last_words(log: Path) -> str:
+    return "".join(log.read_text(errors="replace").strip().splitlines()[-1:])
+
+
 def encode(pictures: Iterable[bytes], file: Path, fps: float) -> None:
-    """Write PNG pictures as a video, which appears whole or not at all.
-
-    Parameters
-    ----------
-    pictures : all of one size, whose sides are even
-    file : its suffix says the format: .mp4, .webm, .gif
-    fps : pictures a second
-
-    Raises
-    ------
-    InputError : another suffix, a file that cannot be written
-    RunError : no ffmpeg, or one that fails
-    """
+    """Write PNG pictures of one size with even sides as a video in the format of the file's suffix, whole or
+    not at all; `InputError` for a file that cannot be written, `RunError` if ffmpeg is missing or fails."""
     target = expect_video(file)
     program = find_ffmpeg()
     with writing(target, patience=1.0) as hidden, tempfile.TemporaryDirectory(dir=hidden) as folder:
@@ -85,9 +71,8 @@ def encode(pictures: Iterable[bytes], file: Path, fps: float) -> None:
             process.wait()
             raise
         if process.wait() != 0:
-            lines = log.read_text(errors="replace").strip().splitlines()
-            raise RunError(f"ffmpeg: {lines[-1] if lines else 'ended without a word'}")
+            raise RunError(f"ffmpeg: {last_words(log) or 'ended without a word'}")
         try:
             made.replace(target)
         except OSError as error:
-            raise InputError(f"{file}: cannot be written: {error.strerror}") from None
+            raise InputError(f"cannot be written: {error.strerror}", where=str(file)) from None

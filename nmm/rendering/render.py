@@ -1,25 +1,26 @@
-"""A video of runs: instants of their playback page, one after the other."""
+"""A video of runs: instants of their playback page in sequence."""
 
 from __future__ import annotations
 
+import json
 import math
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from nmm.arrays import counted, positive
-from nmm.errors import InputError, expect_known
+from nmm.ellipsoid_options import Wanted
+from nmm.errors import InputError, expect, expect_known
 from nmm.playback.html import write_html
 from nmm.playback.scene import Shown
 from nmm.progress import Progress
 from nmm.rendering.chromium import HeadlessPage, find_browser
 from nmm.rendering.encoder import encode, expect_video, find_ffmpeg
-from nmm.runs.ellipsoid_options import Wanted
 
 VIEWS = ("iso", "top", "front", "wall")
 #: Sides of a picture, px.
 LEAST, MOST = 64, 4096
-#: Pictures of a video at most: an hour at 30 a second.
+#: At most an hour at 30 pictures a second.
 MOST_PICTURES = 108_000
 
 
@@ -72,66 +73,49 @@ def render(
     width, height = _checked_size(size)
     fps, speed = positive(fps, "fps"), positive(speed, "speed")
     expect_known("view", view, VIEWS, "render")
-    if not 0.0 <= apart <= 1.0:
-        raise InputError(f"apart: expected 0 to 1, got {apart:g}")
+    expect(0.0 <= apart <= 1.0, "apart", "0 to 1", apart)
     expect_video(Path(file))
-    if not motions:
-        raise InputError("motions: expected at least one motion, got none")
+    expect(motions, "motions", "at least one motion")
     times = _times(motions, start, end, fps, speed)
     find_browser(), find_ffmpeg()  # before anything is drawn
     with tempfile.TemporaryDirectory(prefix="nmm-video-", ignore_cleanup_errors=True) as folder:
         page = write_html(motions, Path(folder) / "page.html", title=title, ghosts=0, ellipsoids=ellipsoids)
         with HeadlessPage(page, (width, height)) as browser:
             browser.wait_for("window.nmm && nmm.stage && !document.body.classList.contains('loading')")
-            browser.evaluate(
-                f"nmm.film({{view: '{view}', follow: {_js(follow)}, plots: {_js(plots)}, apart: {apart}}})"
-            )
+            shown = {"view": view, "follow": bool(follow), "plots": bool(plots), "apart": float(apart)}
+            browser.evaluate(f"nmm.film({json.dumps(shown)})")
             encode(_pictures(browser, times, progress), Path(file), fps)
     return Path(file)
 
 
 def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
-    if len(size) != 2:
-        raise InputError(f"size: expected width and height, got {len(size)} numbers")
+    expect(len(size) == 2, "size", "width and height", size)
     width, height = (counted(side, "size") for side in size)
     for side in (width, height):
-        if side % 2 or not LEAST <= side <= MOST:
-            raise InputError(
-                f"size: expected even numbers from {LEAST} to {MOST} px, as in 1280x720, got {width}x{height}"
-            )
+        expected = f"even numbers from {LEAST} to {MOST} px, as in 1280x720"
+        expect(side % 2 == 0 and LEAST <= side <= MOST, "size", expected, f"{width}x{height}")
     return width, height
 
 
 def _times(
     motions: Sequence[Shown], start: float | None, end: float | None, fps: float, speed: float
 ) -> list[float]:
-    """The instants of the pictures, s."""
     first, last = min(float(one.t[0]) for one in motions), max(float(one.t[-1]) for one in motions)
     begin, stop = first if start is None else start, last if end is None else end
-    if not first <= begin <= stop <= last:
-        raise InputError(
-            f"start and end (--from, --to): expected instants of the run, from {first:g} to {last:g} s, one "
-            f"after the other, got {begin:g} and {stop:g}"
-        )
+    expected = f"instants of the run, from {first:g} to {last:g} s, one after the other"
+    expect(first <= begin <= stop <= last, "start and end (--from, --to)", expected, (begin, stop))
     wanted = (stop - begin) * fps / speed
     if not wanted < MOST_PICTURES:
-        raise InputError(
-            f"fps: {wanted:.6g} pictures; expected at most {MOST_PICTURES}: fewer a second, or a part of "
-            "the run"
-        )
+        expected = f"at most {MOST_PICTURES}: fewer a second, or a part of the run"
+        raise InputError(f"{wanted:.6g} pictures", where="fps", expected=expected)
     count = math.floor(wanted + 1e-9) + 1
     return [begin + k * speed / fps for k in range(count)]
 
 
 def _pictures(page: HeadlessPage, times: Sequence[float], progress: Progress | None) -> Iterator[bytes]:
+    tell = progress or (lambda share: None)
     for k, t in enumerate(times):
-        if progress is not None:
-            progress(k / len(times))
+        tell(k / len(times))
         page.evaluate(f"nmm.filmed({t!r})")
         yield page.picture()
-    if progress is not None:
-        progress(1.0)
-
-
-def _js(flag: bool) -> str:
-    return "true" if flag else "false"
+    tell(1.0)

@@ -1,28 +1,14 @@
-"""Resolvers: one file each. `RESOLVERS` finds them by name; `nmm.kinds` lists them."""
+"""Resolvers, one file each; `nmm.kinds` lists them by name."""
 
-from nmm.kinds import RESOLVERS
-from nmm.resolvers.answer import Answer, Status
-from nmm.resolvers.base import Resolver, Setup
-from nmm.resolvers.callable_resolver import CallableResolver
-from nmm.resolvers.damped_least_squares import DampedLeastSquares
-from nmm.resolvers.extended_jacobian import ExtendedJacobian
-from nmm.resolvers.problem import Dimensions, Problem
-from nmm.resolvers.projected_gradient import ProjectedGradient
-from nmm.resolvers.reduced_gradient import ReducedGradient
-from nmm.resolvers.state import State
-
-__all__ = [
-    "RESOLVERS",
-    "Answer",
-    "CallableResolver",
-    "DampedLeastSquares",
-    "Dimensions",
-    "ExtendedJacobian",
-    "Problem",
-    "ProjectedGradient",
-    "ReducedGradient",
-    "Resolver",
-    "Setup",
-    "State",
-    "Status",
-]
+from nmm.resolvers.answer import Answer as Answer
+from nmm.resolvers.answer import Status as Status
+from nmm.resolvers.base import Resolver as Resolver
+from nmm.resolvers.base import Setup as Setup
+from nmm.resolvers.base import State as State
+from nmm.resolvers.callable_resolver import CallableResolver as CallableResolver
+from nmm.resolvers.damped_least_squares import DampedLeastSquares as DampedLeastSquares
+from nmm.resolvers.extended_jacobian import ExtendedJacobian as ExtendedJacobian
+from nmm.resolvers.problem import Dimensions as Dimensions
+from nmm.resolvers.problem import Problem as Problem
+from nmm.resolvers.projected_gradient import ProjectedGradient as ProjectedGradient
+from nmm.resolvers.reduced_gradient import ReducedGradient as ReducedGradient

@@ -1,4 +1,4 @@
-"""What a resolver gives back: the inputs, how it went, and the certificate."""
+"""What a resolver returns: inputs, status and certificate."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import numpy as np
 
 from nmm.arrays import Array
 from nmm.kernels.compiled import compiled, inlined
-from nmm.kernels.linear_algebra import residual_norm
-from nmm.kernels.memory import Cell, Vector
+from nmm.kernels.linear_algebra import norm, residual_norm
+from nmm.kernels.record_layout import SampledCell, SampledVector
 from nmm.resolvers.problem_arrays import ProblemArrays
 
 
 class Status(IntEnum):
-    """How a resolution went. Those below `SINGULAR_J` come with inputs, those from there on without.
+    """The outcome of a resolution; only those before `SINGULAR_J` have inputs.
 
     Examples
     --------
@@ -50,7 +50,7 @@ class Status(IntEnum):
 _MEANINGS = {
     Status.SOLVED: "solved",
     Status.RELAXED: "the rate of the task, or of an added one, was scaled or damped on purpose",
-    Status.INEXACT: "J u differs from the rate that the task asks for, and nobody said that it should",
+    Status.INEXACT: "J u differs from the rate that the task asks for, unintentionally",
     Status.FALLBACK: "there was no answer to bring within the limits: the inputs are those nearest to rest",
     Status.SINGULAR_J: "the task Jacobian J lost rank",
     Status.SINGULAR_JA: "the block Ja of the reduced gradient is singular though J is not: "
@@ -60,27 +60,24 @@ _MEANINGS = {
     Status.NOT_FINITE: "an input is not finite",
 }
 
-#: For kernels, which write numbers.
-SOLVED, RELAXED = int(Status.SOLVED), int(Status.RELAXED)
-INEXACT, FALLBACK = int(Status.INEXACT), int(Status.FALLBACK)
-SINGULAR_J, SINGULAR_JA = int(Status.SINGULAR_J), int(Status.SINGULAR_JA)
-SINGULAR_JE, NOT_FINITE = int(Status.SINGULAR_JE), int(Status.NOT_FINITE)
+#: The same as integers, for kernels.
+SOLVED, RELAXED, INEXACT, FALLBACK, SINGULAR_J, SINGULAR_JA, SINGULAR_JE, NOT_FINITE = map(int, Status)
 
-#: J u may differ from the rate by this much, times 1 + ‖rate‖, in the rows' units: rounding.
+#: J u may differ from the rate by this much, times 1 + ‖rate‖, in the rows' units, due to rounding.
 EXACT = 1e-9
 
 
 class AnswerArrays(NamedTuple):
-    """An `Answer` as kernels write it: u (m,); status, residual, measure, side, excess (); scale (levels,).
+    """An `Answer` as kernels write it: u (m,); status, residual, measure, side, excess (); nu (levels,).
 
-    Before the kernel is called u, residual, measure and excess are not numbers (an excess that is one says
-    that limits were seen to), status is NOT_FINITE, side is 0 and scale is 1. `side` is the sign of det J_e
-    where the extended Jacobian inverts it: two samples on different sides have a singular J_e between them.
+    Before the kernel is called u, residual, measure and excess are NaN, status is NOT_FINITE, side is 0 and
+    nu is 1. A finite excess means that the kernel enforced limits. `side` is the sign of det J_e where the
+    extended Jacobian inverts it: between samples on different sides J_e is singular.
 
     Examples
     --------
-    >>> written = nmm.AnswerArrays(
-    ...     u=np.zeros(2), status=np.array(0.0), scale=np.ones(1),
+    >>> written = nmm.extending.AnswerArrays(
+    ...     u=np.zeros(2), status=np.array(0.0), nu=np.ones(1),
     ...     residual=np.array(0.0), measure=np.array(1.0), side=np.array(0.0),
     ...     excess=np.array(0.0),
     ... )
@@ -88,21 +85,20 @@ class AnswerArrays(NamedTuple):
     'SOLVED'
     """
 
-    u: Vector
-    status: Cell
-    scale: Vector
-    residual: Cell
-    measure: Cell
-    side: Cell
-    excess: Cell
+    u: SampledVector
+    status: SampledCell
+    nu: SampledVector
+    residual: SampledCell
+    measure: SampledCell
+    side: SampledCell
+    excess: SampledCell
 
 
 def unanswered(m: int, levels: int) -> AnswerArrays:
-    """What a kernel finds: room for m inputs and as many levels."""
     return AnswerArrays(
         u=np.full(m, np.nan),
         status=np.array(float(NOT_FINITE)),
-        scale=np.ones(levels),
+        nu=np.ones(levels),
         residual=np.array(np.nan),
         measure=np.array(np.nan),
         side=np.array(0.0),
@@ -116,15 +112,15 @@ class Answer:
 
     Attributes
     ----------
-    u : (m,) the inputs; not numbers where the status is not `usable`
-    status : how it went
-    scale : (levels,) the share of each level's rate that is given; below 1 where the status is RELAXED, 0
+    u : (m,) the inputs; NaN where the status is not `usable`
+    status : the outcome
+    nu : (levels,) ν, the share of each level's rate that is given; below 1 where the status is RELAXED, 0
         where it is FALLBACK
     residual : ‖J u - rate‖
     measure : of the matrix inverted: PG and EJ, its last pivot (rows in their scales) over its first, or
         over 1 if that is larger; RG, |det Ja|, divided by sqrt(det J Jᵀ) with automatic partitions; DLS, the
         least singular value (rows in their scales)
-    excess : by how much rows of limits that contradict each other had to be widened, in their units
+    excess : by how much contradictory rows of limits had to be widened, in their units
 
     Examples
     --------
@@ -136,7 +132,7 @@ class Answer:
 
     u: Array
     status: Status
-    scale: Array
+    nu: Array
     residual: float
     measure: float
     excess: float = 0.0
@@ -149,22 +145,14 @@ class Answer:
     @classmethod
     def of(cls, written: AnswerArrays) -> Answer:
         """A copy of what a kernel wrote."""
-        return cls(
-            written.u.copy(),
-            Status(int(written.status[()])),
-            written.scale.copy(),
-            float(written.residual[()]),
-            float(written.measure[()]),
-            float(written.excess[()]),
-        )
+        status, numbers = Status(int(written.status[()])), (written.residual, written.measure, written.excess)
+        return cls(written.u.copy(), status, written.nu.copy(), *(float(cell[()]) for cell in numbers))
 
 
 @inlined
 def certified(residual: float, rounding: float, asked: float) -> int:
-    """The status of inputs with a residual ‖J u - rate‖ that rounding may hide so much of, asked = ‖rate‖.
-
-    Inexact is also what rounding does not let certify, where u is some 1e7 times larger than the rate.
-    """
+    """The status for a residual ‖J u - rate‖, part of which rounding may hide; asked = ‖rate‖. Where u is
+    about 1e7 times larger than the rate, rounding prevents a certificate: the status is INEXACT, too."""
     if not math.isfinite(residual):
         return NOT_FINITE
     return INEXACT if residual + rounding > EXACT * (1.0 + asked) else SOLVED
@@ -172,20 +160,14 @@ def certified(residual: float, rounding: float, asked: float) -> int:
 
 @compiled
 def certify(problem: ProblemArrays, answer: AnswerArrays) -> None:
-    """Residual and status of the u that was written: solved, inexact, or not finite."""
+    """Write residual and status (solved, inexact or not finite) of the u that was written."""
     residual, rounding = residual_norm(problem.J, answer.u, problem.rate)
     answer.residual[()] = residual
-    square = 0.0
-    for i in range(problem.rate.shape[0]):
-        square += problem.rate[i] * problem.rate[i]
-    answer.status[()] = certified(residual, rounding, math.sqrt(square))
+    answer.status[()] = certified(residual, rounding, norm(problem.rate))
 
 
 @compiled
 def added_residual(problem: ProblemArrays, u: Array) -> float:
-    """‖J_added u - rate_added‖, 0 where rounding hides it and where there is no added task."""
+    """‖J_added u - rate_added‖, 0 where rounding hides it and without an added task."""
     missed, _ = residual_norm(problem.added_J, u, problem.added_rate)
-    square = 0.0
-    for i in range(problem.added_rate.shape[0]):
-        square += problem.added_rate[i] * problem.added_rate[i]
-    return missed if missed > EXACT * (1.0 + math.sqrt(square)) else 0.0
+    return missed if missed > EXACT * (1.0 + norm(problem.added_rate)) else 0.0

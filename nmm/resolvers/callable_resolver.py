@@ -11,34 +11,33 @@ from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, Integers
 from nmm.errors import InputError
-from nmm.kernels.compiled import Kernel, kernel
+from nmm.kernels.compiled import Kernel, clear, kernel
 from nmm.kernels.linear_algebra import residual_norm
 from nmm.resolvers.answer import SOLVED, Answer, AnswerArrays, Status, certified
-from nmm.resolvers.base import NO_OPTIONS, RESOLVER, Resolver, Setup
+from nmm.resolvers.base import RESOLVER, Resolver, Setup
+from nmm.resolvers.limit_check import bring_within
 from nmm.resolvers.problem import Dimensions, Problem
 from nmm.resolvers.problem_arrays import ProblemArrays
-from nmm.resolvers.within import bring_within
 
 
 @kernel(RESOLVER)
 def left_to_python(
     problem: ProblemArrays, numbers: Array, options: Integers, state: Integers, answer: AnswerArrays
 ) -> None:
-    """No inputs yet: the compiled step stops short of them, and `CallableResolver.finish` finds them."""
-    for j in range(answer.u.shape[0]):
-        answer.u[j] = 0.0
-    answer.status[()] = SOLVED
+    """Write zeros; `CallableResolver.finish` computes the inputs after the compiled step, and limits them."""
+    clear(answer.u)
+    answer.status[()], answer.excess[()] = SOLVED, 0.0
 
 
-#: Inputs are kept near to the function's in the Euclidean norm.
+#: Limited inputs are the nearest to the function's in the Euclidean norm.
 NO_METRIC: Array = np.zeros((0, 0))
 
 
 class CallableResolver(Resolver):
     """u from a Python function of a `Problem` (problem.J, .rate, .h, ...): (m,) inputs, or an `Answer`.
 
-    J u is compared with the rate: an answer that differs is INEXACT, which a run tells. A function that
-    scales or damps the rate on purpose says so: it returns an `Answer` with status RELAXED and its scale.
+    J u is compared with the rate: an answer that differs is INEXACT, which a run reports. A function that
+    scales or damps the rate on purpose returns an `Answer` with status RELAXED and its nu.
 
     Parameters
     ----------
@@ -54,21 +53,19 @@ class CallableResolver(Resolver):
     """
 
     name: ClassVar[str] = "callable"
+    exact: ClassVar[bool] = False
+    kernel: ClassVar[Kernel] = left_to_python
 
     def __init__(self, function: Callable[[Problem], ArrayLike | Answer]) -> None:
         self.function = function
 
-    @property
-    def kernel(self) -> Kernel:
-        return left_to_python
-
     def setup(self, dimensions: Dimensions) -> Setup:
         self.check(dimensions)
-        return Setup(np.zeros(0), NO_OPTIONS)
+        return Setup(np.zeros(0))
 
     def finish(self, problem: ProblemArrays, dimensions: Dimensions, answer: AnswerArrays) -> None:
         answer.measure[()] = np.nan
-        answer.scale[:] = 1.0
+        answer.nu[:] = 1.0
         answer.excess[()] = np.nan
         if not all(np.isfinite(given).all() for given in (problem.J, problem.rate, problem.h)):
             answer.status[()] = Status.NOT_FINITE
@@ -80,7 +77,7 @@ class CallableResolver(Resolver):
             return
         u = np.asarray(found.u if isinstance(found, Answer) else found, dtype=np.float64)
         if u.shape != answer.u.shape:
-            raise InputError(f"callable resolver: expected u of shape {answer.u.shape}, got {u.shape}")
+            raise InputError(where="callable resolver", expected=f"u of shape {answer.u.shape}", got=u)
         answer.u[:] = u
         residual, rounding = residual_norm(problem.J, answer.u, problem.rate)
         answer.residual[()] = residual
@@ -89,5 +86,5 @@ class CallableResolver(Resolver):
             answer.measure[()] = found.measure
             if found.status is not Status.SOLVED and answer.status[()] < Status.SINGULAR_J:
                 answer.status[()] = found.status
-                answer.scale[:] = found.scale
+                answer.nu[:] = found.nu
         bring_within(problem, NO_METRIC, answer)

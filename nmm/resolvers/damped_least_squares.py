@@ -9,17 +9,15 @@ import numpy as np
 from nmm.arrays import Array, Integers, positive
 from nmm.errors import expect_known
 from nmm.kernels.compiled import Kernel, kernel, view
-from nmm.kernels.damping import BELOW, LARGEST
+from nmm.kernels.damping import BELOW, LARGEST, Law
 from nmm.resolvers.answer import AnswerArrays
-from nmm.resolvers.base import RESOLVER, Resolver, Setup, StepRule, step_rule
-from nmm.resolvers.damped import damp
+from nmm.resolvers.base import RESOLVER, Resolver, Setup, StepRule, Weights, metric_root, step_rule
+from nmm.resolvers.damped import any_passed, damp, damp_between_stops
+from nmm.resolvers.limit_check import bring_within
 from nmm.resolvers.problem import Dimensions
 from nmm.resolvers.problem_arrays import ProblemArrays
-from nmm.resolvers.stops import any_passed, damp_between_stops
-from nmm.resolvers.weights import Weights, metric_root
-from nmm.resolvers.within import bring_within
 
-#: Numbers: α, λ, ε and, with weights, C row after row. Options: which law, in the order of `Damping`.
+#: Numbers: α, λ, ε and, with weights, C row by row. Options: the law, in the order of `Damping`.
 ALPHA, DAMPING, THRESHOLD, C = 0, 1, 2, 3
 LAW = 0
 
@@ -30,25 +28,24 @@ Damping = Literal["constant", "variable", "directions"]
 def damped_least_squares(
     problem: ProblemArrays, numbers: Array, options: Integers, state: Integers, answer: AnswerArrays
 ) -> None:
-    """`damped_solution`, between stops; weights give the coordinates in which limits keep u near it, too."""
+    """`damped_solution`, between stops; limits keep u near it in the metric of the weights."""
     m = problem.J.shape[1]
     plain = numbers.shape[0] == C
     W = view(numbers, 0 if plain else C, (0, 0) if plain else (m, m))
-    damp(problem, numbers[ALPHA], options[LAW], numbers[DAMPING], numbers[THRESHOLD], W, answer)
+    law = Law(options[LAW], numbers[DAMPING], numbers[THRESHOLD])
+    damp(problem, numbers[ALPHA], law, W, answer)
     if problem.ends.shape[0] == 1 and any_passed(problem, answer.u):
-        damp_between_stops(
-            problem, numbers[ALPHA], options[LAW], numbers[DAMPING], numbers[THRESHOLD], W, answer
-        )
+        damp_between_stops(problem, numbers[ALPHA], law, W, answer)
     bring_within(problem, W, answer)
 
 
 class DampedLeastSquares(Resolver):
     """The least of ‖J u - rate‖² + λ² ‖u‖², and -α h in J's null space: the projected gradient where λ = 0.
 
-    Rows are taken in their natural scales, weights as the projected gradient takes them. Singular
-    configurations stop no run: there the inputs stay bounded, and the task gets the share of its rate
-    that the answer's scale says. The objective is felt by the task only in directions with σ below the
-    threshold, which become part of the null space as σ falls to 0: so u is continuous where the rank changes.
+    Rows are taken in their natural scales, weights as for the projected gradient. A run continues at singular
+    configurations: the inputs stay bounded, and the answer's ν is the share of its rate that the task gets.
+    The objective affects the task only in directions with σ below the threshold, which become part of the
+    null space as σ falls to 0: so u is continuous where the rank changes.
 
     Parameters
     ----------
@@ -58,13 +55,13 @@ class DampedLeastSquares(Resolver):
         and Klein 1988, Chiaverini 1997); "variable", all directions by the least σ (Nakamura and
         Hanafusa 1986, with σ_min for the manipulability); "constant", all by λ everywhere (Wampler 1986)
     damping : the largest λ > 0
-    threshold : ε > 0; where all σ are as large, nothing is damped and the answer is the projected
-        gradient's ("constant" damps the rate everywhere, and keeps the objective out of the task from ε on)
+    threshold : ε > 0; where no σ is smaller, nothing is damped and the answer is the projected gradient's
+        ("constant" damps the rate everywhere, and keeps the objective out of the task from ε on)
     weights : None; m positive numbers; a mapping from names of inputs or of their groups ("platform",
-        "arm"), 1 for the rest: a large weight spares the input; or a symmetric positive definite
+        "arm"), 1 for the rest: an input with a large weight moves less; or a symmetric positive definite
         (m, m) matrix
-    step : "constant", α as it is; "armijo", α at most, at each sample shortened until the objective falls
-        along the sample's motion, so that no α dt is too large
+    step : "constant": α; "armijo": at each sample α is shortened until the objective falls along the sample's
+        motion, so that α dt is never too large
 
     Examples
     --------
@@ -77,6 +74,8 @@ class DampedLeastSquares(Resolver):
     """
 
     name: ClassVar[str] = "dls"
+    exact: ClassVar[bool] = False
+    kernel: ClassVar[Kernel] = damped_least_squares
     alpha_at: ClassVar[int | None] = ALPHA
 
     def __init__(
@@ -95,10 +94,6 @@ class DampedLeastSquares(Resolver):
         self.damping = positive(damping, "damping")
         self.threshold = positive(threshold, "threshold")
         self.weights = weights
-
-    @property
-    def kernel(self) -> Kernel:
-        return damped_least_squares
 
     def setup(self, dimensions: Dimensions) -> Setup:
         self.check(dimensions)

@@ -1,4 +1,4 @@
-"""Extended Jacobian: as many added rows as there is redundancy, then one inverse (paper, III-A)."""
+"""Extended Jacobian: as many added rows as there is redundancy, then a single inverse (paper, III-A)."""
 
 from __future__ import annotations
 
@@ -7,25 +7,25 @@ from typing import ClassVar, Literal, get_args
 import numpy as np
 
 from nmm.arrays import Array, Integers, positive
-from nmm.errors import InputError, expect_known
+from nmm.errors import expect, expect_known
 from nmm.kernels.compiled import Kernel, clear, compiled, integer_scratch, kernel, scratch, view
-from nmm.kernels.damping import BELOW, DIRECTIONS, LARGEST, damped_solution
-from nmm.kernels.linear_algebra import closest_solution, eliminate, orthonormal_rows, project_out
-from nmm.resolvers.answer import (
-    INEXACT,
-    RELAXED,
-    SINGULAR_J,
-    SINGULAR_JE,
-    SOLVED,
-    AnswerArrays,
-    certify,
+from nmm.kernels.damping import USUAL, damped_solution
+from nmm.kernels.linear_algebra import (
+    add,
+    closest_solution,
+    copied,
+    eliminate,
+    less,
+    orthonormal_rows,
+    project_out,
 )
+from nmm.resolvers.answer import INEXACT, RELAXED, SINGULAR_J, SINGULAR_JE, SOLVED, AnswerArrays, certify
 from nmm.resolvers.base import RESOLVER, Resolver, Setup
+from nmm.resolvers.limit_check import beyond, bring_within, call_limit
 from nmm.resolvers.problem import Dimensions
 from nmm.resolvers.problem_arrays import ProblemArrays
-from nmm.resolvers.within import beyond, bring_within, call_limit
 
-#: Numbers: the tolerance. Options: whether the added task is damped where it asks for what the task fixes.
+#: Numbers: the tolerance. Options: whether to damp the added task where it conflicts with the task.
 TOLERANCE = 0
 DAMPED = 0
 
@@ -43,18 +43,13 @@ def extended_jacobian(
     if options[DAMPED] == 1 and damped_beside(problem, numbers[TOLERANCE], answer):
         bring_within(problem, view(numbers, 0, (0, 0)), answer)
         return
-    M = scratch((m, m + 1))
-    scales = scratch(m)
+    M, b, scales = scratch((m, m + 1)), scratch(m), scratch(m)
+    both_tasks(problem, M, b, scales)
     for i in range(m):
-        for j in range(m):
-            M[i, j] = J[i, j] if i < s else problem.added_J[i - s, j]
-        M[i, m] = problem.rate[i] if i < s else problem.added_rate[i - s]
-        scales[i] = problem.row_scales[i] if i < s else problem.added_row_scales[i - s]
+        M[i, m] = b[i]
     determinant, answer.measure[()] = eliminate(M, scales)
     if answer.measure[()] <= numbers[TOLERANCE]:
-        order = integer_scratch(s)
-        L = scratch((s, s))
-        Q = scratch((s, m))
+        order, L, Q = integer_scratch(s), scratch((s, s)), scratch((s, m))
         regular = orthonormal_rows(J, problem.row_scales, order, L, Q) > numbers[TOLERANCE]
         answer.status[()] = SINGULAR_JE if regular else SINGULAR_J
         return
@@ -69,11 +64,24 @@ def extended_jacobian(
 
 
 @compiled
-def damped_beside(problem: ProblemArrays, tolerance: float, answer: AnswerArrays) -> bool:
-    """The task exactly, the added task by damped least squares in its null space; False where none is needed.
+def both_tasks(problem: ProblemArrays, M: Array, b: Array, scales: Array) -> None:
+    """The first columns of M (m, ...) become [J; J_added], b their rates (m,), scales their rows' scales
+    (m,).
+    """
+    s, m = problem.J.shape
+    for i in range(m):
+        for j in range(m):
+            M[i, j] = problem.J[i, j] if i < s else problem.added_J[i - s, j]
+        b[i] = problem.rate[i] if i < s else problem.added_rate[i - s]
+        scales[i] = problem.row_scales[i] if i < s else problem.added_row_scales[i - s]
 
-    J_e loses rank with J or with J_added (I - J⁺ J), rows in their scales: the second is damped. Where the
-    task has levels the added task is one more below them, and all are damped as levels are.
+
+@compiled
+def damped_beside(problem: ProblemArrays, tolerance: float, answer: AnswerArrays) -> bool:
+    """The task exactly, the added task damped in its null space; False where no damping is needed.
+
+    J_e loses rank with J or with J_added (I - J⁺ J), rows in their scales; the second is damped. For a task
+    with levels the added task is one more level below them, and all levels are damped.
     """
     if problem.ends.shape[0] > 1:
         return damped_levels(problem, answer)
@@ -87,19 +95,16 @@ def damped_beside(problem: ProblemArrays, tolerance: float, answer: AnswerArrays
     clear(u0)
     closest_solution(problem.rate, u0, order, L, Q, u)
     for i in range(k):
-        b[i] = problem.added_rate[i]
-        for j in range(m):
-            b[i] -= added_J[i, j] * u[j]
-            A[i, j] = added_J[i, j]
-        project_out(A, i, Q, s)
-    scales, dt = problem.added_row_scales, problem.dt[()]
+        b[i] = less(problem.added_rate[i], added_J[i], u)
+        copied(added_J[i], A[i])
+        project_out(A[i], Q, s)
     ends, shares = integer_scratch(1), scratch(1)
     ends[0] = k
-    least, damped = damped_solution(A, scales, b, ends, u0, DIRECTIONS, LARGEST, BELOW, dt, free, shares)
+    scales, dt = problem.added_row_scales, problem.dt[()]
+    least, damped = damped_solution(A, scales, b, ends, u0, USUAL, dt, free, shares)
     if not damped:
         return False
-    for j in range(m):
-        u[j] += free[j]
+    add(u, 1.0, free)
     answer.measure[()] = least
     certify(problem, answer)
     if answer.status[()] == SOLVED:
@@ -109,45 +114,35 @@ def damped_beside(problem: ProblemArrays, tolerance: float, answer: AnswerArrays
 
 @compiled
 def damped_levels(problem: ProblemArrays, answer: AnswerArrays) -> bool:
-    """Level by level, the added task the last, each in what those above leave; False where none is damped."""
-    s, m = problem.J.shape
-    levels = problem.ends.shape[0]
+    """Each level, the added task last, in the null space of those above; False where none is damped."""
+    m, levels = problem.J.shape[1], problem.ends.shape[0]
     A, b, scales, u0, u = scratch((m, m)), scratch(m), scratch(m), scratch(m), scratch(m)
     ends, shares = integer_scratch(levels + 1), scratch(levels + 1)
-    for i in range(m):
-        for j in range(m):
-            A[i, j] = problem.J[i, j] if i < s else problem.added_J[i - s, j]
-        b[i] = problem.rate[i] if i < s else problem.added_rate[i - s]
-        scales[i] = problem.row_scales[i] if i < s else problem.added_row_scales[i - s]
+    both_tasks(problem, A, b, scales)
     for level in range(levels):
         ends[level] = problem.ends[level]
     ends[levels] = m
     clear(u0)
-    dt = problem.dt[()]
-    least, damped = damped_solution(A, scales, b, ends, u0, DIRECTIONS, LARGEST, BELOW, dt, u, shares)
+    least, damped = damped_solution(A, scales, b, ends, u0, USUAL, problem.dt[()], u, shares)
     if not damped:
         return False
-    for j in range(m):
-        answer.u[j] = u[j]
+    copied(u, answer.u)
     answer.measure[()] = least
     certify(problem, answer)
     if answer.status[()] == INEXACT:
-        for level in range(levels):
-            answer.scale[level] = shares[level]
+        copied(shares, answer.nu)
     answer.status[()] = RELAXED
     return True
 
 
 @compiled
 def inverse(problem: ProblemArrays, T: Array) -> None:
-    """T = [J; J_added]⁻¹, rows in their scales: the metric in which limits keep both tasks near."""
-    s, m = problem.J.shape
-    M, scales = scratch((m, 2 * m)), scratch(m)
+    """T = [J; J_added]⁻¹, rows in their scales: limits keep u near in the metric of both tasks."""
+    m = problem.J.shape[1]
+    M, b, scales = scratch((m, 2 * m)), scratch(m), scratch(m)
     clear(M)
+    both_tasks(problem, M, b, scales)
     for i in range(m):
-        scales[i] = problem.row_scales[i] if i < s else problem.added_row_scales[i - s]
-        for j in range(m):
-            M[i, j] = problem.J[i, j] if i < s else problem.added_J[i - s, j]
         M[i, m + i] = scales[i]
     eliminate(M, scales)
     for i in range(m):
@@ -158,29 +153,30 @@ def inverse(problem: ProblemArrays, T: Array) -> None:
 class ExtendedJacobian(Resolver):
     """u = J_e⁻¹ [rate; y_dot + K_y (y_d - y)] with the added task y = h(q) (paper, section III-A).
 
-    The added task has as many rows as the first leaves free, k = p + n_m - s; the controller takes it
-    (`Controller(..., added_task=...)`).
+    The added task has as many rows as the first leaves free, k = p + n_m - s; it is an argument of the
+    controller (`Controller(..., added_task=...)`).
 
     Parameters
     ----------
     tolerance : J_e counts as singular where its last pivot, rows in their natural scales, is below this,
         times the largest pivot if that is above 1
-    singular : what happens where J_e loses rank though J does not (algorithmic singularities): "stop", the
-        run ends there; "damped", the task is done and the added task damped, as by damped least squares with
-        its usual numbers, in the directions in which the task leaves it hardly anything; levels of priority
-        are damped, too, where those above leave them hardly anything
+    singular : what happens where J_e loses rank though J does not (algorithmic singularities): "stop" ends
+        the run; with "damped" the task stays exact and the added task is damped, as by damped least squares
+        with its defaults, in the directions that the task hardly leaves free; likewise levels of priority
 
     Examples
     --------
     >>> robot = nmm.load("unicycle_2r")
-    >>> hand = nmm.Task(nmm.Position("ee", "xy"), [2.0, 1.0])
+    >>> reach = nmm.Task(nmm.Position("ee", "xy"), [2.0, 1.0])
     >>> arm = nmm.Task(nmm.Posture("q1", "q2"), [0.3, 0.6])
-    >>> controller = nmm.Controller(robot, hand, nmm.ExtendedJacobian(), added_task=arm)
+    >>> controller = nmm.Controller(robot, reach, nmm.ExtendedJacobian(), added_task=arm)
     >>> nmm.simulate(controller, robot.q({"q2": 0.5}), 10).q[-1, 3:].round(3)
     array([0.3, 0.6])
     """
 
     name: ClassVar[str] = "ej"
+    exact: ClassVar[bool] = True
+    kernel: ClassVar[Kernel] = extended_jacobian
     takes_added_task: ClassVar[bool] = True
 
     def __init__(self, tolerance: float = 1e-10, singular: Singular = "stop") -> None:
@@ -188,16 +184,9 @@ class ExtendedJacobian(Resolver):
         expect_known("singular", singular, get_args(Singular))
         self.singular = singular
 
-    @property
-    def kernel(self) -> Kernel:
-        return extended_jacobian
-
     def setup(self, dimensions: Dimensions) -> Setup:
         self.check(dimensions, all_levels=True)
         free = dimensions.m - dimensions.s
-        if dimensions.k != free:
-            raise InputError(
-                f"added_task: expected {free} rows ({dimensions.m} inputs less {dimensions.s} rows of the "
-                f"task), got {dimensions.k}"
-            )
+        expected = f"{free} rows ({dimensions.m} inputs less {dimensions.s} rows of the task)"
+        expect(dimensions.k == free, "added_task", expected, dimensions.k)
         return Setup(np.array([self.tolerance]), np.array([self.singular == "damped"], dtype=np.int64))

@@ -1,44 +1,44 @@
-"""Partitions J T = [Ja Jb] of the reduced gradient: candidates, which is best, and when it changes."""
+"""Partitions J T = [Ja Jb] of the reduced gradient: candidates, the best one, and when it changes."""
 
 from __future__ import annotations
 
 import itertools
 import math
 from collections.abc import Sequence
-from types import TracebackType
 from typing import Self
 
 import numpy as np
 
 from nmm.arrays import Array, Integers
-from nmm.errors import InputError, unknown
-from nmm.kernels.compiled import compiled, integer_scratch, scratch
-from nmm.kernels.linear_algebra import eliminate, orthonormal_rows
+from nmm.errors import InputError, expect, expect_kind, expect_known
+from nmm.findings import Finding
+from nmm.kernels.compiled import clear, compiled, integer_scratch, scratch, view
+from nmm.kernels.linear_algebra import add, copied, dot, eliminate, orthonormal_rows
+from nmm.resolvers.base import State
 from nmm.resolvers.problem import Dimensions
-from nmm.resolvers.state import State
 
-#: A partition: the inputs whose columns form Ja, by name or by index.
+#: The inputs whose columns form Ja, by name or by index.
 Partition = Sequence[str | int]
 
 MOST_CANDIDATES = 20_000
-#: Automatic candidates beyond this number are searched, not tried.
+#: More automatic candidates than this are searched rather than tried one by one.
 MOST_TRIED = 2_000
-#: An exchange of columns has to make |det Ja| larger by more than this share.
+#: An exchange of columns has to increase |det Ja| by more than this share.
 _GAIN = 1e-9
 _MOST_EXCHANGES = 1_000
-#: A block as irregular as this has lost rank.
+#: A block at most as regular as this has lost rank.
 _LOST = 1e-13
 
 #: The integers of the state: FREE, HELD or OVERDUE; the sign of det Ja; the columns of Ja, NONE before
-#: the first call and where there is no such block.
+#: the first call and without such a block.
 MODE, SIGN, COLUMNS = 0, 1, 2
 NONE = -1
-#: The partition may change; it is kept; it was kept although it fell below its threshold.
+#: The partition may change; is kept; was kept although its measure fell below the threshold.
 FREE, HELD, OVERDUE = 0, 1, 2
 
 
 class PartitionState(State):
-    """The partition in use, kept through an integration step, which then sees one smooth right-hand side.
+    """The partition in use, constant through an integration step, whose right-hand side is then smooth.
 
     Parameters
     ----------
@@ -55,27 +55,23 @@ class PartitionState(State):
         self.memory[MODE] = HELD
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._overdue = bool(self.memory[MODE] == OVERDUE)
         self.memory[MODE] = FREE
 
     def may_stand(self, before: Integers) -> bool:
-        """Not where the partition fell below its threshold at a stage, nor where det Ja changed its sign:
-        in between Ja was singular."""
+        """False where a stage's measure fell below the threshold, or Ja was singular in between."""
         return not (self._overdue or self._passed_zero(before))
 
     def _passed_zero(self, before: Integers) -> bool:
         same = np.array_equal(before[COLUMNS:], self.memory[COLUMNS:])
         return bool(same and before[SIGN] * self.memory[SIGN] < 0)
 
-    def reservation(self, before: Integers, inputs: Sequence[str]) -> str:
+    def reservation(self, before: Integers, inputs: Sequence[str], t: float) -> Finding | None:
         if not self._passed_zero(before):
-            return ""
-        names = ", ".join(inputs[column] for column in before[COLUMNS:])
-        advice = "J itself is close to losing rank" if self.automatic else "give more partitions"
-        return f"the block Ja of [{names}] became singular and no other candidate was better: {advice}"
+            return None
+        names = [inputs[column] for column in before[COLUMNS:]]
+        return Finding("partition_singular", {"inputs": names, "automatic": bool(self.automatic)}, {"t": t})
 
     def partition(self, s: int) -> Integers:
         return self.memory[COLUMNS:].copy()
@@ -86,34 +82,27 @@ def candidate_columns(partitions: Sequence[Partition], dimensions: Dimensions) -
 
     Raises
     ------
-    InputError : too many candidates, a name or an index that is no input's, a wrong number of them
+    InputError : too many candidates, an unknown name or index of an input, a wrong number of inputs
     """
-    if not partitions:
-        count = math.comb(dimensions.m, dimensions.s)
-        if count > MOST_CANDIDATES:
-            raise InputError(f"partitions: {count} candidates are too many to try; give a list of some")
-        every = itertools.combinations(range(dimensions.m), dimensions.s)
-        return np.fromiter(itertools.chain.from_iterable(every), dtype=np.int64)
+    count = math.comb(dimensions.m, dimensions.s)
+    if not partitions and count > MOST_CANDIDATES:
+        raise InputError(f"too many to try ({count}); give a list of some", where="partitions")
     given = (_columns(partition, dimensions) for partition in partitions)
-    return np.fromiter(itertools.chain.from_iterable(given), dtype=np.int64)
+    every = given if partitions else itertools.combinations(range(dimensions.m), dimensions.s)
+    return np.fromiter(itertools.chain.from_iterable(every), dtype=np.int64)
 
 
 def _columns(partition: Partition, dimensions: Dimensions) -> tuple[int, ...]:
     columns = []
     for item in partition:
-        if isinstance(item, str) and item not in dimensions.inputs:
-            raise InputError(unknown("input", item, dimensions.inputs, "partitions"))
-        if not isinstance(item, (str, int, np.integer)):
-            raise InputError(f"partitions: expected names or indices of inputs, got {item!r}")
+        expect_kind(item, (str, int, np.integer), "partitions", "names or indices of inputs")
+        if isinstance(item, str):
+            expect_known("input", item, dimensions.inputs, "partitions")
         column = dimensions.inputs.index(item) if isinstance(item, str) else int(item)
-        if not 0 <= column < dimensions.m:
-            raise InputError(f"partitions: expected an index from 0 to {dimensions.m - 1}, got {column}")
+        expect(0 <= column < dimensions.m, "partitions", f"an index from 0 to {dimensions.m - 1}", column)
         columns.append(column)
-    if len(columns) != dimensions.s or len(set(columns)) != len(columns):
-        raise InputError(
-            f"partitions: expected {dimensions.s} different inputs, as many as the task has rows, "
-            f"got {list(partition)}"
-        )
+    distinct = len({*columns}) == len(columns) == dimensions.s
+    expect(distinct, "partitions", f"{dimensions.s} different inputs, one a row of the task", list(partition))
     return tuple(columns)
 
 
@@ -124,80 +113,60 @@ def solve_partition(
     """M = [*, Ja⁻¹ J, Ja⁻¹ rate], shape (s, s + m + 1). Returns det Ja and how regular Ja is."""
     s, m = J.shape
     scales = scratch(s)
+    copied(row_scales, scales)
+    put_block(J, columns, M)
     for i in range(s):
-        scales[i] = row_scales[i]
-        for j in range(s):
-            M[i, j] = J[i, columns[j]]
-        for j in range(m):
-            M[i, s + j] = J[i, j]
         M[i, s + m] = rate[i]
     return eliminate(M, scales)
 
 
-def are_searched(dimensions: Dimensions) -> bool:
-    """Whether there are too many automatic candidates to try them all."""
-    return math.comb(dimensions.m, dimensions.s) > MOST_TRIED
-
-
-def searched_threshold(threshold: float, dimensions: Dimensions) -> float:
-    """Θ for as many candidates: half of what the best one's measure is at least, if that is less.
-
-    The measures' squares add up to 1, so the best one's is at least 1 / sqrt(count).
-    """
-    return min(threshold, 0.5 / math.sqrt(math.comb(dimensions.m, dimensions.s)))
+@compiled
+def put_block(J: Array, columns: Integers, M: Array) -> None:
+    s, m = J.shape
+    for i in range(s):
+        for j in range(s):
+            M[i, j] = J[i, columns[j]]
+        for j in range(m):
+            M[i, s + j] = J[i, j]
 
 
 @compiled
 def search_partition(J: Array, columns: Integers) -> None:
-    """Write into `columns` a partition whose |det Ja| no exchange of one column makes larger.
+    """Write into `columns` a partition whose |det Ja| no exchange of one column increases.
 
-    A rank-revealing QR: columns by pivoted orthogonalisation, then exchanged while an entry of Ja⁻¹ Jb, by
-    which |det Ja| grows, is above 1. Where J has lost rank the columns are the pivots.
-
-    Source: M. Gu, S. Eisenstat, "Efficient algorithms for computing a strong rank-revealing QR
-    factorization", SIAM J. Scientific Computing 17(4), 1996, with f = 1.
+    Columns come from pivoted orthogonalisation, then are exchanged while an entry of Ja⁻¹ Jb, the factor of
+    |det Ja|, is above 1; where J has lost rank, they stay. Source: M. Gu, S. Eisenstat, "Efficient algorithms
+    for computing a strong rank-revealing QR factorization", SIAM J. Sci. Computing 17(4), 1996, with f = 1.
     """
     s, m = J.shape
-    rest = scratch((s, m))
+    rest = scratch((m, s))
     for i in range(s):
         for j in range(m):
-            rest[i, j] = J[i, j]
+            rest[j, i] = J[i, j]
     for k in range(s):
         largest = -1.0
         for j in range(m):
-            square = 0.0
-            for i in range(s):
-                square += rest[i, j] * rest[i, j]
-            taken = False
+            square, taken = dot(rest[j], rest[j]), False
             for i in range(k):
                 taken = taken or columns[i] == j
             if square > largest and not taken:
-                largest = square
-                columns[k] = j
-        if largest <= 0.0:
-            continue
-        for j in range(m):
-            along = 0.0
-            if j != columns[k]:
-                for i in range(s):
-                    along += rest[i, columns[k]] * rest[i, j]
-                for i in range(s):
-                    rest[i, j] -= along / largest * rest[i, columns[k]]
-        for i in range(s):
-            rest[i, columns[k]] = 0.0
+                largest, columns[k] = square, j
+        if largest > 0.0:
+            pivot = rest[columns[k]]
+            for j in range(m):
+                if j != columns[k]:
+                    add(rest[j], -(dot(pivot, rest[j]) / largest), pivot)
+            clear(pivot)
     M, scales = scratch((s, s + m)), scratch(s)
     for _ in range(_MOST_EXCHANGES):
+        put_block(J, columns, M)
         for i in range(s):
             scales[i] = 1.0
-            for j in range(s):
-                M[i, j] = J[i, columns[j]]
-            for j in range(m):
-                M[i, s + j] = J[i, j]
         if eliminate(M, scales)[1] <= _LOST:
             return
         out, into, gain = -1, -1, 1.0 + _GAIN
         for i in range(s):
-            for j in range(m):  # of a column of Ja itself, 0 or 1 up to rounding
+            for j in range(m):  # for a column of Ja itself, 0 or 1 up to rounding
                 if abs(M[i, s + j]) > gain:
                     out, into, gain = i, j, abs(M[i, s + j])
         if out < 0:
@@ -207,15 +176,12 @@ def search_partition(J: Array, columns: Integers) -> None:
 
 @compiled
 def choose_partition(J: Array, candidates: Integers, columns: Integers) -> None:
-    """Write into `columns` the candidate with the largest |det Ja|, the first of equals; without candidates,
-    `search_partition`."""
+    """Write the candidate with the largest |det Ja|, the first of equals, or that of `search_partition`."""
     s = J.shape[0]
     if candidates.shape[0] == 0:
         search_partition(J, columns)
         return
-    Ja = scratch((s, s))
-    scales = scratch(s)
-    largest = -1.0
+    Ja, scales, largest = scratch((s, s)), scratch(s), -1.0
     for c in range(0, candidates.shape[0], s):
         for i in range(s):
             scales[i] = 1.0
@@ -224,16 +190,14 @@ def choose_partition(J: Array, candidates: Integers, columns: Integers) -> None:
         size = abs(eliminate(Ja, scales)[0])
         if size > largest * (1.0 + 1e-12):  # rounding must not reverse the order of equals
             largest = size
-            for j in range(s):
-                columns[j] = candidates[c + j]
+            copied(view(candidates, c, (s,)), columns)
 
 
 @compiled
 def volume(J: Array, row_scales: Array, tolerance: float) -> float:
     """sqrt(det J Jᵀ), by Cauchy-Binet the norm of all det Ja; 0 when J lost rank."""
     s, m = J.shape
-    order = integer_scratch(s)
-    L = scratch((s, s))
+    order, L = integer_scratch(s), scratch((s, s))
     if orthonormal_rows(J, row_scales, order, L, scratch((s, m))) <= tolerance:
         return 0.0
     product = 1.0

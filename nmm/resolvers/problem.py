@@ -1,4 +1,4 @@
-"""What a resolver gets: the problem of one control step."""
+"""The problem of one control step, which a resolver solves."""
 
 from __future__ import annotations
 
@@ -9,28 +9,28 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, Integers, array, one_line, scalar, vector
-from nmm.errors import InputError
-from nmm.resolvers.limited import limit
+from nmm.arrays import Array, Integers, array, scalar, vector
+from nmm.errors import InputError, expect
 from nmm.resolvers.problem_arrays import ProblemArrays
+from nmm.resolvers.saturation import limit
 
-#: What kernels have beside the problem's own numbers.
+#: Fields of `ProblemArrays` besides the problem's own numbers.
 MEMORY = ("ends", "stops", "active", "limiter")
 
 
 class Dimensions(NamedTuple):
-    """What stays the same from step to step: rows of the task and of the added task, names of the inputs.
+    """What is constant from step to step: rows of the task and of the added task, names of the inputs.
 
     Attributes
     ----------
     s, k : rows of the task and of the added task
     inputs : their names
-    groups : inputs that are spoken of together, by the group's name ("platform", "arm")
+    groups : names of inputs by group ("platform", "arm")
     levels : the rows of each level of priority; one level when empty
 
     Examples
     --------
-    >>> dimensions = nmm.Dimensions(s=2, k=0, inputs=("v", "omega", "q1", "q2"))
+    >>> dimensions = nmm.extending.Dimensions(s=2, k=0, inputs=("v", "omega", "q1", "q2"))
     >>> dimensions.m, nmm.ProjectedGradient().setup(dimensions).numbers.shape
     (4, (2,))
     """
@@ -49,24 +49,24 @@ class Dimensions(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Find u with J u = rate that is good for the objective: everything that a resolver is told.
+    """Find u with J u = rate that serves the objective: all that a resolver gets.
 
     Parameters
     ----------
     J : (s, m) task Jacobian; rate : (s,) task velocity, in the rows' units per second
-    h : (m,) gradient of the objective seen by the inputs, Sᵀ ∂H/∂q
+    h : (m,) gradient of the objective by the inputs, Sᵀ ∂H/∂q
     inputs : names of the inputs, for partitions and weights given by name; u0, u1, ... when not given
     groups : inputs by the name of their group
     row_scales : (s,) natural size of each row in its unit (the robot's reach for metres, 1 for radians),
         against which pivots are judged; 1 when not given
     levels : rows of each level of priority, from the highest on; one level when not given
     added_J, added_rate, added_row_scales : (k, m), (k,) and (k,), the added task of the extended Jacobian
-    u_lower, u_upper : (m,) u_lower <= u <= u_upper; infinite where there is none
+    u_lower, u_upper : (m,) u_lower <= u <= u_upper; infinite for none
     limit_rows, lower, upper : (l, m), (l,) and (l,): lower <= limit_rows u <= upper
-    limit_levels : (l,) 0 for rows that are always kept, as all are when not given; k for those that are kept
-        before the k-th level of priority, as far as the levels above it leave it
-    before : (m,) the inputs of the step before, 0 when not given
-    dt : the time that u will stand, s; not a number where it is not known
+    limit_levels : (l,) 0 for rows that are always kept (default); k for those kept before the k-th level of
+        priority, as far as the levels above it allow
+    before : (m,) the previous inputs, 0 when not given
+    dt : how long u will be applied, s; NaN where unknown
 
     Raises
     ------
@@ -100,15 +100,13 @@ class Problem:
 
     def __post_init__(self) -> None:
         J = array(self.J, "J")
-        if J.ndim != 2:
-            raise InputError(f"J: expected a matrix, got shape {J.shape}")
+        expect(J.ndim == 2, "J", "a matrix", J)
         s, m = J.shape
         names = tuple(f"u{i}" for i in range(m)) if self.inputs is None else tuple(self.inputs)
-        if len(names) != m:
-            raise InputError(f"inputs: expected {m} names, as J has columns, got {len(names)}")
+        expect(len(names) == m, "inputs", f"{m} names, as J has columns", len(names))
         levels = (s,) if self.levels is None else tuple(int(rows) for rows in self.levels)
         if sum(levels) != s or min(levels, default=0) < 0:
-            raise InputError(f"levels: expected numbers of rows that add up to {s}, got {list(levels)}")
+            raise InputError(where="levels", expected=f"numbers of rows that add up to {s}", got=list(levels))
         added_J = np.zeros((0, m)) if self.added_J is None else _rows(self.added_J, m, "added_J")
         limit_rows = np.zeros((0, m)) if self.limit_rows is None else _rows(self.limit_rows, m, "limit_rows")
         k, count = len(added_J), len(limit_rows)
@@ -130,8 +128,7 @@ class Problem:
             "before": np.zeros(m) if self.before is None else vector(self.before, m, "before"),
             "dt": float("nan") if np.isnan(self.dt) else scalar(self.dt, "dt"),
         }
-        for name, value in given.items():
-            object.__setattr__(self, name, value)
+        vars(self).update(given)
 
     @classmethod
     def of(cls, arrays: ProblemArrays, dimensions: Dimensions) -> Problem:
@@ -139,29 +136,24 @@ class Problem:
         problem = object.__new__(cls)
         vars(problem).update(
             {name: value.copy() for name, value in arrays._asdict().items() if name not in MEMORY},
+            **{name: getattr(dimensions, name) for name in ("inputs", "groups", "levels")},
             dt=float(arrays.dt),
-            inputs=dimensions.inputs,
-            groups=dimensions.groups,
-            levels=dimensions.levels,
         )
         return problem
 
     @property
     def dimensions(self) -> Dimensions:
-        """What of the problem stays the same from step to step."""
-        arrays, inputs = self.arrays, tuple(self.inputs or ())
-        return Dimensions(
-            *(len(arrays.J), len(arrays.added_J), inputs), dict(self.groups or {}), tuple(self.levels or ())
-        )
+        """What is constant from step to step."""
+        arrays, inputs, groups = self.arrays, tuple(self.inputs or ()), dict(self.groups or {})
+        return Dimensions(len(arrays.J), len(arrays.added_J), inputs, groups, tuple(self.levels or ()))
 
     @property
     def arrays(self) -> ProblemArrays:
-        """The numbers, as kernels read them."""
+        """The problem as kernels read it."""
         ends = np.cumsum(self.levels or (), dtype=np.int64)
         own = {name: np.asarray(getattr(self, name)) for name in ProblemArrays._fields if name not in MEMORY}
-        stops, active = (
-            np.zeros(more + len(own["h"]) + len(own["lower"]), dtype=np.int64) for more in (0, 1)
-        )
+        count = len(own["h"]) + len(own["lower"])
+        stops, active = np.zeros(count, dtype=np.int64), np.zeros(1 + count, dtype=np.int64)
         limited = len(own["lower"]) > 0 or np.isfinite([own["u_lower"], own["u_upper"]]).any()
         limiter = limit.address if limited else 0
         return ProblemArrays(ends=ends, stops=stops, active=active, limiter=limiter, **own)
@@ -169,24 +161,20 @@ class Problem:
 
 def _rows(value: ArrayLike, m: int, name: str) -> Array:
     rows = array(value, name)
-    if rows.ndim != 2 or rows.shape[1] != m:
-        raise InputError(f"{name}: expected {m} columns, got shape {rows.shape}")
+    expect(rows.ndim == 2 and rows.shape[1] == m, name, f"{m} columns", rows)
     return rows
 
 
 def _scales(value: ArrayLike | None, count: int, name: str) -> Array:
     scales = np.ones(count) if value is None else vector(value, count, name)
-    if np.any(scales <= 0.0):
-        raise InputError(f"{name}: expected numbers above 0, got {scales.min():g}")
+    expect(np.all(scales > 0.0), name, "numbers above 0", scales.min(initial=1.0))
     return scales
 
 
 def _limit_levels(value: ArrayLike | None, count: int, levels: int) -> Integers:
     given = np.zeros(count) if value is None else vector(value, count, "limit_levels")
     if np.any((given < 0) | (given > levels + 1) | (given != np.floor(given))):
-        raise InputError(
-            f"limit_levels: expected whole numbers from 0 to {levels + 1}, got {one_line(given)}"
-        )
+        raise InputError(where="limit_levels", expected=f"whole numbers from 0 to {levels + 1}", got=given)
     return given.astype(np.int64)
 
 
@@ -194,10 +182,10 @@ def _bounds(lower: ArrayLike | None, upper: ArrayLike | None, count: int, *names
     found = {}
     for name, value, none in zip(names, (lower, upper), (-np.inf, np.inf), strict=True):
         bounds = np.full(count, none) if value is None else np.array(value, dtype=np.float64)
-        if bounds.shape != (count,) or np.any(np.isnan(bounds)):
-            raise InputError(f"{name}: expected {count} numbers (infinite for none), got {bounds}")
+        valid = bounds.shape == (count,) and not np.any(np.isnan(bounds))
+        expect(valid, name, f"{count} numbers (infinite for none)", bounds)
         found[name] = bounds
     low, high = found.values()
     for i in np.flatnonzero(low > high):
-        raise InputError(f"{names[0]}: {low[i]:g} of number {i} is above its {names[1]}, {high[i]:g}")
+        raise InputError(f"{low[i]:g} of number {i} is above its {names[1]}, {high[i]:g}", where=names[0])
     return found

@@ -1,12 +1,20 @@
-"""What a resolver's kernel gets: the problem of one control step, as one record."""
+"""The problem of one control step as kernels read it."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from nmm.kernels.memory import Cell, IntegerVector, Matrix, Vector
+from nmm.kernels.record_layout import (
+    Cell,
+    IntegerVector,
+    Matrix,
+    SampledIntegerVector,
+    SampledMatrix,
+    SampledVector,
+    Vector,
+)
 
-#: What `stops` says of a bound.
+#: Values of `stops`.
 UPPER, LOWER = 1, 2
 
 
@@ -15,24 +23,25 @@ class ProblemArrays(NamedTuple):
 
     Attributes
     ----------
-    J (s, m), rate (s,) : J u = rate, one level of priority below the other
+    J (s, m), rate (s,) : J u = rate, by level of priority
     row_scales (s,) : the natural size of each row, in its unit
     ends (levels,) : the row after the last of each level
     added_J (k, m), added_rate (k,), added_row_scales (k,) : the added task of the extended Jacobian
-    h (m,) : the objective's gradient, seen by the inputs
+    h (m,) : the objective's gradient by the inputs
     u_lower, u_upper (m,) : u_lower <= u <= u_upper, infinite for none
     limit_rows (l, m), lower (l,), upper (l,) : lower <= limit_rows u <= upper
     limit_levels (l,) : 0 for rows that are always kept, k for those that are kept before the k-th level
-    stops (m + l,) : which bounds of inputs, then of rows, end a way and are no speeds: UPPER, LOWER or both
-    active (1 + m + l,) : which of them held back the step before (see `nearest_within`); changed
-    before (m,) : the inputs of the step before
-    dt () : the time that u will stand, s; not a number where it is not known
-    limiter : where the code of `limit` begins; 0 where there are no limits
+    stops (m + l,) : which bounds, of inputs, then of rows, limit a position, not a speed: UPPER, LOWER or
+        both
+    active (1 + m + l,) : those active at the previous step (see `nearest_within`); changed
+    before (m,) : the previous inputs
+    dt () : how long u will be applied, s; NaN where unknown
+    limiter : address of `limit`; 0 without limits
 
     Examples
     --------
     >>> arrays = nmm.Problem(J=[[1.0, 0.5]], rate=[2.0], h=[0.0, 1.0]).arrays
-    >>> isinstance(arrays, nmm.ProblemArrays), arrays.J.shape, arrays.ends.tolist()
+    >>> isinstance(arrays, nmm.extending.ProblemArrays), arrays.J.shape, arrays.ends.tolist()
     (True, (1, 2), [1])
     """
 
@@ -44,14 +53,14 @@ class ProblemArrays(NamedTuple):
     added_rate: Vector
     added_row_scales: Vector
     h: Vector
-    u_lower: Vector
-    u_upper: Vector
-    limit_rows: Matrix
-    lower: Vector
-    upper: Vector
+    u_lower: SampledVector
+    u_upper: SampledVector
+    limit_rows: SampledMatrix
+    lower: SampledVector
+    upper: SampledVector
     limit_levels: IntegerVector
-    stops: IntegerVector
-    active: IntegerVector
-    before: Vector
+    stops: SampledIntegerVector
+    active: SampledIntegerVector
+    before: SampledVector
     dt: Cell
     limiter: int

@@ -1,4 +1,4 @@
-"""Projected Gradient: the minimum-norm solution and the gradient's part in J's null space (paper, III-B)."""
+"""Projected gradient: the minimum-norm solution, and the gradient's part in J's null space (paper, III-B)."""
 
 from __future__ import annotations
 
@@ -8,17 +8,16 @@ import numpy as np
 
 from nmm.arrays import Array, Integers, positive
 from nmm.kernels.compiled import Kernel, integer_scratch, kernel, scratch, view
-from nmm.kernels.damping import BELOW, DIRECTIONS, LARGEST
+from nmm.kernels.damping import USUAL
 from nmm.kernels.linear_algebra import closest_solution, orthonormal_rows
 from nmm.resolvers.answer import SINGULAR_J, AnswerArrays, certify
-from nmm.resolvers.base import NO_OPTIONS, RESOLVER, Resolver, Setup, StepRule, step_rule
+from nmm.resolvers.base import RESOLVER, Resolver, Setup, StepRule, Weights, metric_root, step_rule
 from nmm.resolvers.damped import damp, unweigh, weigh
+from nmm.resolvers.limit_check import bring_within
 from nmm.resolvers.problem import Dimensions
 from nmm.resolvers.problem_arrays import ProblemArrays
-from nmm.resolvers.weights import Weights, metric_root
-from nmm.resolvers.within import bring_within
 
-#: Numbers: α, the tolerance and, with weights, C row after row.
+#: Numbers: α, the tolerance and, with weights, C row by row.
 ALPHA, TOLERANCE, C = 0, 1, 2
 
 
@@ -26,47 +25,33 @@ ALPHA, TOLERANCE, C = 0, 1, 2
 def projected_gradient(
     problem: ProblemArrays, numbers: Array, options: Integers, state: Integers, answer: AnswerArrays
 ) -> None:
-    """u = J⁺ rate - α (I - J⁺ J) h, with J⁺ J = Qᵀ Q from J's orthonormal rows.
-
-    With weights, in the coordinates ũ = C⁻¹ u in which the weighted norm is the Euclidean one; that is
-    the metric, too, in which limits keep u near to it. With levels of priority J may lose rank, as the levels
-    may contradict each other: directions that do are damped.
-    """
-    J, h, u = problem.J, problem.h, answer.u
-    s, m = J.shape
-    alpha = numbers[ALPHA]
+    """u = J⁺ rate - α (I - J⁺ J) h, with J⁺ J = Qᵀ Q from J's orthonormal rows; with weights, in ũ = C⁻¹ u,
+    whose Euclidean norm is the weighted one, limits included. Contradictory directions of levels are
+    damped."""
+    s, m = problem.J.shape
+    plain, alpha = numbers.shape[0] == C, numbers[ALPHA]
+    W = view(numbers, 0 if plain else C, (0, 0) if plain else (m, m))
     if problem.ends.shape[0] > 1:
-        plain = numbers.shape[0] == C
-        metric = view(numbers, 0 if plain else C, (0, 0) if plain else (m, m))
-        damp(problem, alpha, DIRECTIONS, LARGEST, BELOW, metric, answer)
-        bring_within(problem, metric, answer)
+        damp(problem, alpha, USUAL, W, answer)
+        bring_within(problem, W, answer)
         return
-    order = integer_scratch(s)
-    L = scratch((s, s))
-    Q = scratch((s, m))
-    u0 = scratch(m)
-    if numbers.shape[0] == C:
+    order, L, Q = integer_scratch(s), scratch((s, s)), scratch((s, m))
+    J, u0, solution = problem.J, scratch(m), answer.u
+    if plain:  # as `weigh`, without copies
         for j in range(m):
-            u0[j] = -alpha * h[j]
-        answer.measure[()] = orthonormal_rows(J, problem.row_scales, order, L, Q)
-        if answer.measure[()] <= numbers[TOLERANCE]:
-            answer.status[()] = SINGULAR_J
-            return
-        closest_solution(problem.rate, u0, order, L, Q, u)
+            u0[j] = -alpha * problem.h[j]
     else:
-        W = view(numbers, C, (m, m))
-        weighted_J = scratch((s, m))
-        weigh(problem, alpha, W, weighted_J, u0)
-        answer.measure[()] = orthonormal_rows(weighted_J, problem.row_scales, order, L, Q)
-        if answer.measure[()] <= numbers[TOLERANCE]:
-            answer.status[()] = SINGULAR_J
-            return
-        solution = scratch(m)
-        closest_solution(problem.rate, u0, order, L, Q, solution)
-        unweigh(W, solution, u)
+        J, solution = scratch((s, m)), scratch(m)
+        weigh(problem, alpha, W, J, u0)
+    answer.measure[()] = orthonormal_rows(J, problem.row_scales, order, L, Q)
+    if answer.measure[()] <= numbers[TOLERANCE]:
+        answer.status[()] = SINGULAR_J
+        return
+    closest_solution(problem.rate, u0, order, L, Q, solution)
+    if not plain:
+        unweigh(W, solution, answer.u)
     certify(problem, answer)
-    plain = numbers.shape[0] == C
-    bring_within(problem, view(numbers, 0 if plain else C, (0, 0) if plain else (m, m)), answer)
+    bring_within(problem, W, answer)
 
 
 class ProjectedGradient(Resolver):
@@ -80,19 +65,19 @@ class ProjectedGradient(Resolver):
     ----------
     alpha : step size α > 0, 1/s times the unit of H's curvature
     weights : None; m positive numbers; a mapping from names of inputs or of their groups ("platform",
-        "arm"), 1 for the rest: a large weight spares the input; or a symmetric positive definite
+        "arm"), 1 for the rest: an input with a large weight moves less; or a symmetric positive definite
         (m, m) matrix
     tolerance : J counts as singular where its last pivot, rows in their natural scales, is below this,
         times the first pivot if that is above 1
-    step : "constant", α as it is; "armijo", α at most, at each sample shortened until the objective falls
-        along the sample's motion, so that no α dt is too large
+    step : "constant": α; "armijo": at each sample α is shortened until the objective falls along the sample's
+        motion, so that α dt is never too large
 
     Examples
     --------
     >>> robot = nmm.load("unicycle_2r")
     >>> task = nmm.Task(nmm.Position("ee", "xy"), [2.0, 1.0])
     >>> resolver = nmm.ProjectedGradient(alpha=10, weights={"platform": 4.0})
-    >>> controller = nmm.Controller(robot, task, resolver, nmm.Quadratic(nmm.Square("q1")))
+    >>> controller = nmm.Controller(robot, task, resolver, nmm.Quadratic(nmm.QuadraticTerm("q1")))
     >>> q = robot.q({"q2": 0.5})
     >>> u, step = controller(0.0, q), controller.evaluate(0.0, q)
     >>> np.allclose(step.J @ u, step.rate)
@@ -100,6 +85,8 @@ class ProjectedGradient(Resolver):
     """
 
     name: ClassVar[str] = "pg"
+    exact: ClassVar[bool] = True
+    kernel: ClassVar[Kernel] = projected_gradient
     alpha_at: ClassVar[int | None] = ALPHA
 
     def __init__(
@@ -114,11 +101,7 @@ class ProjectedGradient(Resolver):
         self.weights = weights
         self.tolerance = positive(tolerance, "tolerance")
 
-    @property
-    def kernel(self) -> Kernel:
-        return projected_gradient
-
     def setup(self, dimensions: Dimensions) -> Setup:
         self.check(dimensions)
         C = metric_root(self.weights, dimensions)
-        return Setup(np.array([self.alpha, self.tolerance, *C]), NO_OPTIONS)
+        return Setup(np.array([self.alpha, self.tolerance, *C]))

@@ -1,4 +1,4 @@
-"""Reduced Gradient: optimisation in the inputs that the task leaves free (paper, III-C)."""
+"""Reduced gradient: optimisation in the inputs that the task leaves free (paper, III-C)."""
 
 from __future__ import annotations
 
@@ -9,36 +9,35 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from nmm.arrays import Array, Integers, positive
-from nmm.errors import InputError, expect_known
+from nmm.errors import InputError, expect, expect_known
 from nmm.kernels.compiled import Kernel, clear, compiled, kernel, scratch, view
-from nmm.kernels.damping import BELOW, DIRECTIONS, LARGEST, step_threshold
+from nmm.kernels.damping import BELOW, USUAL, step_threshold
+from nmm.kernels.linear_algebra import copied
 from nmm.resolvers.answer import INEXACT, RELAXED, SINGULAR_J, SINGULAR_JA, AnswerArrays, certify
-from nmm.resolvers.base import RESOLVER, Resolver, Setup, StepRule, step_rule
+from nmm.resolvers.base import RESOLVER, Resolver, Setup, StepRule, Weights, step_rule, weight_diagonal
 from nmm.resolvers.damped import damp
+from nmm.resolvers.limit_check import beyond, bring_within, call_limit
 from nmm.resolvers.partitions import (
     COLUMNS,
     FREE,
     MODE,
+    MOST_TRIED,
     NONE,
     OVERDUE,
     SIGN,
     Partition,
     PartitionState,
-    are_searched,
     candidate_columns,
     choose_partition,
-    searched_threshold,
     solve_partition,
     volume,
 )
 from nmm.resolvers.problem import Dimensions
 from nmm.resolvers.problem_arrays import ProblemArrays
-from nmm.resolvers.weights import Weights, weight_diagonal
-from nmm.resolvers.within import beyond, bring_within, call_limit
 
 #: Numbers: α, Θ, the tolerance and, with weights, c = W^(-1/2).
 ALPHA, THRESHOLD, TOLERANCE, C = 0, 1, 2, 3
-#: Options: whether measures are divided by sqrt(det J Jᵀ), whether it is damped where no partition is well
+#: Options: whether to divide measures by sqrt(det J Jᵀ), whether to damp where no partition is well
 #: conditioned, then the candidates' columns.
 NORMALISED, DAMPED, CANDIDATES = 0, 1, 2
 
@@ -47,26 +46,26 @@ NORMALISED, DAMPED, CANDIDATES = 0, 1, 2
 def reduced_gradient(
     problem: ProblemArrays, numbers: Array, options: Integers, state: Integers, answer: AnswerArrays
 ) -> None:
-    """ub = -α (hb - (Ja⁻¹ Jb)ᵀ ha), ua = Ja⁻¹ (rate - Jb ub) (paper, eqs. 8 to 10).
-
-    With weights, in the inputs ũ = u / c in which the weighted norm is the Euclidean one.
-    """
+    """ub = -α (hb - (Ja⁻¹ Jb)ᵀ ha), ua = Ja⁻¹ (rate - Jb ub) (paper, eqs. 8 to 10); with weights, in ũ = u /
+    c, whose Euclidean norm is the weighted one."""
     J, h = problem.J, problem.h
     s, m = J.shape
     weighted, damped = numbers.shape[0] > C, options[DAMPED] == 1
     if weighted:
-        weighted_J, weighted_h = scratch((s, m)), scratch(m)
-        scale_columns(J, h, view(numbers, C, (m,)), weighted_J, weighted_h)
-        J, h = weighted_J, weighted_h
+        J, h = scratch((s, m)), scratch(m)
+        for j in range(m):
+            h[j] = numbers[C + j] * problem.h[j]
+            for i in range(s):
+                J[i, j] = problem.J[i, j] * numbers[C + j]
     columns = view(state, COLUMNS, (s,))
-    M = scratch((s, s + m + 1))
+    M, T = scratch((s, s + m + 1)), scratch((m, m))
     unit = 1.0
     if options[NORMALISED] == 1:
         unit = volume(J, problem.row_scales, numbers[TOLERANCE])
         if unit == 0.0 and not damped:
             answer.status[()] = SINGULAR_J
             return
-    determinant, regular = partitioned(problem, J, unit, numbers, options, state, columns, M)
+    determinant, regular = partitioned(problem, J, unit, numbers, options, state, M)
     answer.measure[()] = abs(determinant) / unit if unit > 0.0 else 0.0
     state[SIGN] = int(determinant > 0.0) - int(determinant < 0.0)
     share = damped_share(problem, regular) if damped else 0.0
@@ -74,14 +73,15 @@ def reduced_gradient(
         state[SIGN] = 0
         for i in range(s):
             columns[i] = NONE
-        damp_alone(problem, numbers, weighted, answer)
+        damp_weighted(problem, numbers, T, answer)
+        bring_within(problem, T, answer)
         return
     if regular <= numbers[TOLERANCE]:
         lost = volume(J, problem.row_scales, numbers[TOLERANCE]) == 0.0
         answer.status[()] = SINGULAR_J if lost else SINGULAR_JA
         return
     u = answer.u
-    for j in range(m):  # the reduced gradient; it is zero on Ja's own columns up to rounding
+    for j in range(m):  # the reduced gradient, on Ja's own columns 0 up to rounding
         reduced = h[j]
         for i in range(s):
             reduced -= M[i, s + j] * h[columns[i]]
@@ -100,9 +100,8 @@ def reduced_gradient(
             u[j] *= numbers[C + j]
     certify(problem, answer)
     if share > 0.0:
-        blend(problem, numbers, weighted, share, answer)
+        blend(problem, numbers, share, T, answer)
     if beyond(problem, answer):
-        T = scratch((m, m))
         reduced_metric(M, columns, 1.0 - share, T)
         if weighted:
             for i in range(m):
@@ -113,7 +112,7 @@ def reduced_gradient(
 
 @compiled
 def damped_share(problem: ProblemArrays, regular: float) -> float:
-    """How much of the answer is the damped one: none of it for a Ja as regular as ε, all for half of that."""
+    """The damped answer's share: 0 where Ja is at least as regular as ε, 1 where at most half as regular."""
     square = 0.0
     for i in range(problem.rate.shape[0]):
         square += (problem.rate[i] / problem.row_scales[i]) ** 2
@@ -122,53 +121,37 @@ def damped_share(problem: ProblemArrays, regular: float) -> float:
 
 
 @compiled
-def damp_alone(problem: ProblemArrays, numbers: Array, weighted: bool, answer: AnswerArrays) -> None:
-    """The answer of damped least squares with its own λ and ε, in the metric of the weights."""
-    m = problem.J.shape[1]
-    W = scratch((m, m))
-    metric(numbers, weighted, W)
-    damp(problem, numbers[ALPHA], DIRECTIONS, LARGEST, BELOW, W, answer)
-    bring_within(problem, W, answer)
+def damp_weighted(problem: ProblemArrays, numbers: Array, W: Array, answer: AnswerArrays) -> None:
+    """Damped least squares with its default λ and ε, in the metric of the weights; W = diag(c)."""
+    clear(W)
+    for j in range(W.shape[0]):
+        W[j, j] = numbers[C + j] if numbers.shape[0] > C else 1.0
+    damp(problem, numbers[ALPHA], USUAL, W, answer)
 
 
 @compiled
-def blend(problem: ProblemArrays, numbers: Array, weighted: bool, share: float, answer: AnswerArrays) -> None:
-    """(1 - share) of the reduced gradient's u, and as much as share of the damped one."""
-    m = problem.J.shape[1]
-    reduced, W = scratch(m), scratch((m, m))
-    metric(numbers, weighted, W)
-    for j in range(m):
-        reduced[j] = answer.u[j]
-    measure = answer.measure[()]
-    damp(problem, numbers[ALPHA], DIRECTIONS, LARGEST, BELOW, W, answer)
+def blend(problem: ProblemArrays, numbers: Array, share: float, W: Array, answer: AnswerArrays) -> None:
+    """u = (1 - share) times the reduced gradient's u plus share times the damped one; W is overwritten."""
+    reduced, measure = scratch(W.shape[0]), answer.measure[()]
+    copied(answer.u, reduced)
+    damp_weighted(problem, numbers, W, answer)
     answer.measure[()] = measure
-    for j in range(m):
+    for j in range(reduced.shape[0]):
         answer.u[j] = (1.0 - share) * reduced[j] + share * answer.u[j]
-    relaxed, scale = answer.status[()] == RELAXED, answer.scale[0]
+    relaxed, scale = answer.status[()] == RELAXED, answer.nu[0]
     certify(problem, answer)
     if relaxed and answer.status[()] == INEXACT:
         answer.status[()] = RELAXED
         scale = 1.0 - share * (1.0 - scale)
     else:
         scale = 1.0
-    for level in range(answer.scale.shape[0]):
-        answer.scale[level] = scale
-
-
-@compiled
-def metric(numbers: Array, weighted: bool, W: Array) -> None:
-    """diag(c), c = 1 without weights."""
-    clear(W)
-    for j in range(W.shape[0]):
-        W[j, j] = numbers[C + j] if weighted else 1.0
+    for level in range(answer.nu.shape[0]):
+        answer.nu[level] = scale
 
 
 @compiled
 def reduced_metric(M: Array, columns: Integers, share: float, T: Array) -> None:
-    """u = T [ua'; ub] with ua = ua' - Ja⁻¹ Jb ub: limits keep the free inputs near, and the partition.
-
-    With a share of the coupling alone, between this metric and the inputs' own.
-    """
+    """u = T [ua'; ub], ua = ua' - share Ja⁻¹ Jb ub: with share 1 limits change the free inputs the least."""
     s, m = columns.shape[0], T.shape[0]
     clear(T)
     free = s
@@ -193,51 +176,43 @@ def partitioned(
     numbers: Array,
     options: Integers,
     state: Integers,
-    columns: Integers,
     M: Array,
 ) -> tuple[float, float]:
-    """`solve_partition` with the partition kept, or with another where it fell below Θ and may change."""
-    candidates = options[CANDIDATES:]
+    """`solve_partition`; below Θ, or before damping takes over, with a new partition if it may change."""
+    candidates, columns = options[CANDIDATES:], view(state, COLUMNS, (J.shape[0],))
     damped = options[DAMPED] == 1
     if columns[0] == NONE:
         choose_partition(J, candidates, columns)
     determinant, regular = solve_partition(J, problem.rate, problem.row_scales, columns, M)
-    if abs(determinant) < numbers[THRESHOLD] * unit:
-        if state[MODE] == FREE:
+    below = abs(determinant) < numbers[THRESHOLD] * unit
+    alone = damped and damped_share(problem, regular) == 1.0
+    if state[MODE] == FREE:
+        if below or alone:
             choose_partition(J, candidates, columns)
             determinant, regular = solve_partition(J, problem.rate, problem.row_scales, columns, M)
-        elif not damped or damped_share(problem, regular) < 1.0:
-            state[MODE] = OVERDUE
+    elif below and not alone:
+        state[MODE] = OVERDUE
     return determinant, regular
-
-
-@compiled
-def scale_columns(J: Array, h: Array, c: Array, scaled_J: Array, scaled_h: Array) -> None:
-    """J diag(c) and diag(c) h."""
-    s, m = J.shape
-    for j in range(m):
-        scaled_h[j] = c[j] * h[j]
-        for i in range(s):
-            scaled_J[i, j] = J[i, j] * c[j]
 
 
 def _as_tuple(partition: Partition) -> tuple[str | int, ...]:
     if isinstance(partition, str | int):
-        raise InputError(f"partitions: expected lists of inputs, as in [['v', 'q1']], got {partition!r}")
+        raise InputError(where="partitions", expected="lists of inputs, as in [['v', 'q1']]", got=partition)
     return tuple(partition)
 
 
 class ReducedGradient(Resolver):
     """J T = [Ja Jb]: ub descends the reduced gradient of H, ua does the task (paper, eqs. 9 and 10).
 
-    Which columns form Ja is the *partition*. It is chosen at the start as the candidate with the
-    largest |det Ja|, kept while its measure stays at or above `threshold`, then chosen again.
+    The columns of Ja are the *partition*, at the start the candidate with the largest |det Ja|. It is chosen
+    again when its measure falls below `threshold`, with `singular="damped"` also before the damped answer
+    takes over.
 
     Parameters
     ----------
     alpha : step size α > 0, 1/s times the unit of H's curvature
     partitions : "automatic": all candidates, measured by |det Ja| / sqrt(det J Jᵀ), a number in
-        [0, 1] (Cauchy-Binet); above 2,000 of them they are searched by a rank-revealing QR, with Θ at
+        [0, 1] (Cauchy-Binet); more than 2,000 are searched by a rank-revealing QR, with Θ at
         most 1 / (2 sqrt(their number)); or a list of candidates, measured by |det Ja| (the paper's rule:
         [("v", "q1"), ("v", "omega")] in case 1; the arm's joints when n_m = s)
     threshold : Θ; 0.01 for given candidates (the paper's), 0.05 for automatic ones
@@ -245,24 +220,26 @@ class ReducedGradient(Resolver):
         this, times the largest pivot if that is above 1
     weights : None; m positive numbers; or a mapping from names of inputs or of their groups
         ("platform", "arm"), 1 for the rest. The counterpart of the weighted pseudoinverse: the method
-        in the inputs sqrt(w) u. A heavy input is less often among those that do the task (its column
-        counts for less in |det Ja|, weighted from here on), and descends H more slowly (α / w)
-    singular : what happens where no candidate is well conditioned: "stop", the run ends there; "damped", the
-        answer goes over, step by step, to that of damped least squares with its usual numbers, and back
-    step : "constant", α as it is; "armijo", α at most, at each sample shortened until the objective falls
-        along the sample's motion, so that no α dt is too large
+        in the inputs sqrt(w) u. A heavy input is less often in Ja (its column counts for less in
+        |det Ja|, which is then weighted), and descends H more slowly (α / w)
+    singular : what happens where no candidate is well conditioned: "stop" ends the run; with "damped" the
+        answer changes gradually to that of damped least squares with its defaults, and back
+    step : "constant": α; "armijo": at each sample α is shortened until the objective falls along the sample's
+        motion, so that α dt is never too large
 
     Examples
     --------
     >>> robot = nmm.load("unicycle_2r")
     >>> task = nmm.Task(nmm.Position("ee", "xy"), [2.0, 1.0])
     >>> resolver = nmm.ReducedGradient(alpha=10, partitions=[["v", "omega"], ["v", "q1"]], threshold=0.01)
-    >>> controller = nmm.Controller(robot, task, resolver, nmm.Quadratic(nmm.Square("q1")))
+    >>> controller = nmm.Controller(robot, task, resolver, nmm.Quadratic(nmm.QuadraticTerm("q1")))
     >>> controller.evaluate(0.0, robot.q({"q2": 0.5})).partition
     array([0, 1])
     """
 
     name: ClassVar[str] = "rg"
+    exact: ClassVar[bool] = True
+    kernel: ClassVar[Kernel] = reduced_gradient
     alpha_at: ClassVar[int | None] = ALPHA
 
     def __init__(
@@ -279,31 +256,26 @@ class ReducedGradient(Resolver):
         self.step = step_rule(step)
         self.weights = weights
         self.automatic = isinstance(partitions, str)
-        if self.automatic and partitions != "automatic":
-            raise InputError(f"partitions: expected 'automatic' or lists of inputs, got {partitions!r}")
-        self.partitions: tuple[tuple[str | int, ...], ...] = (
-            () if self.automatic else tuple(_as_tuple(p) for p in partitions)
-        )
-        if not self.automatic and not self.partitions:
-            raise InputError("partitions: expected at least one list of inputs, or 'automatic'")
-        self.threshold = positive(
-            (0.05 if self.automatic else 0.01) if threshold is None else threshold, "threshold"
-        )
-        if self.automatic and self.threshold >= 1.0:
-            raise InputError(f"threshold: expected below 1 with automatic partitions, got {self.threshold:g}")
+        self.partitions = () if self.automatic else tuple(_as_tuple(p) for p in partitions)
+        if self.automatic:
+            expect(partitions == "automatic", "partitions", "'automatic' or lists of inputs", partitions)
+        else:
+            expect(self.partitions, "partitions", "at least one list of inputs, or 'automatic'")
+        usual = 0.05 if self.automatic else 0.01
+        self.threshold = positive(usual if threshold is None else threshold, "threshold")
+        below_one = self.threshold < 1.0 or not self.automatic
+        expect(below_one, "threshold", "below 1 (automatic)", self.threshold)
         self.tolerance = positive(tolerance, "tolerance")
         expect_known("singular", singular, ("stop", "damped"))
         self.singular = singular
 
-    @property
-    def kernel(self) -> Kernel:
-        return reduced_gradient
-
     def setup(self, dimensions: Dimensions) -> Setup:
         self.check(dimensions, all_levels=True)
-        searched = self.automatic and are_searched(dimensions)
+        threshold, count = self.threshold, math.comb(dimensions.m, dimensions.s)
+        searched = self.automatic and count > MOST_TRIED
+        if searched:  # the squares of all measures add up to 1, so the best is at least 1 / sqrt(count)
+            threshold = min(threshold, 0.5 / math.sqrt(count))
         candidates = () if searched else candidate_columns(self.partitions, dimensions)
-        threshold = searched_threshold(self.threshold, dimensions) if searched else self.threshold
         c = np.zeros(0) if self.weights is None else weight_diagonal(self.weights, dimensions) ** -0.5
         damped = self.singular == "damped" or len(dimensions.levels) > 1  # levels may contradict each other
         options = [self.automatic, damped, *candidates]

@@ -11,13 +11,13 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, unwritable
-from nmm.errors import NmmError
+from nmm.robots.joint_table import placement_rows
 from nmm.robots.robot import CENTER_OF_MASS, Robot
 
 #: Velocity of the frame's origin, in world axes.
 JACOBIAN_FRAME = pin.LOCAL_WORLD_ALIGNED
 
-#: Pinocchio's data of configurations that nobody holds any more, for the next ones of the same robot.
+#: Pinocchio's data of configurations that are gone, for the next ones of the same robot.
 _spare_data: WeakKeyDictionary[Robot, list[pin.Data]] = WeakKeyDictionary()
 
 
@@ -59,30 +59,25 @@ class Configuration:
         self._neighbours: list[tuple[Configuration, Configuration]] = []
 
     def neighbours(self, step: float) -> list[tuple[Configuration, Configuration]]:
-        """For each coordinate, a step (m, rad) ahead and behind along it; the same until forgotten.
-
-        All functions whose derivatives are differences take these: their kinematics are computed once.
-        """
+        """For each coordinate, a step (m, rad) ahead and behind along it; kept until forgotten, so that all
+        functions with differences for derivatives share their kinematics."""
         if not self._neighbours:
-            for j in range(self.robot.n):
-                ahead, behind = self.q.copy(), self.q.copy()
-                ahead[j] += step
-                behind[j] -= step
-                self._neighbours.append((self._elsewhere(ahead), self._elsewhere(behind)))
+            steps = step * np.eye(self.robot.n)
+            self._neighbours = [(self._elsewhere(self.q + s), self._elsewhere(self.q - s)) for s in steps]
         return self._neighbours
 
     def forget_neighbours(self) -> None:
-        """Let go of them: someone may keep the configuration."""
+        """Forget them: the configuration itself may be kept."""
         self._neighbours = []
 
     def _elsewhere(self, q: Array) -> Configuration:
-        """The robot at q (n,), taken as it is: nobody typed it in."""
+        """The robot at q (n,), without checks: no user gave it."""
         found = object.__new__(Configuration)
         found._compute(self.robot, q, self._spare)
         return found
 
     def __del__(self) -> None:
-        # Nobody holds it, so nobody reads Pinocchio's data any more: making them anew is three quarters of
+        # Its data of Pinocchio are free for another: making them anew is three quarters of
         # what a configuration costs.
         if "_data" in self.__dict__:
             self._spare.append(self._data)
@@ -117,10 +112,7 @@ class Configuration:
         return _center_of_mass(self.robot, self._data)(self.q)
 
     def hessian(self, frame: str) -> Array:
-        """H[i, j, k] = d jacobian[i, j] / dq[k], shape (6, n, n).
-
-        Pinocchio returns the array with the wrong memory order; it is put right here.
-        """
+        """H[i, j, k] = d jacobian[i, j] / dq[k], shape (6, n, n)."""
         if not self._hessians_computed:
             pin.computeJointKinematicHessians(self.robot.model, self._data)
             self._hessians_computed = True
@@ -131,33 +123,27 @@ class Configuration:
 
 
 def frame_hessian(raw: Array) -> Array:
-    """Pinocchio's kinematic Hessian with its memory order put right (see `Configuration.hessian`)."""
+    """Pinocchio's kinematic Hessian in the right memory order."""
     return np.ascontiguousarray(raw.ravel().reshape(raw.shape, order="F"))
 
 
 def kinematics_updater(
     robot: Robot, frames: tuple[str, ...], placements: Array, jacobians: Array, hessians: Array
 ) -> Callable[[float, Array], None]:
-    """What a control loop uses where a `Configuration` would allocate.
-
-    The function returned, `update(t, q)`, computes the kinematics of k frames at q (n,), float64,
-    in world axes: `placements` (k, 3, 4) = [R | p], `jacobians` (k, 6, n) and, if it is not empty,
-    `hessians` (k, 6, n, n). The time is not read. The frame `CENTER_OF_MASS` is the point, with world axes.
-    """
-    if CENTER_OF_MASS in frames:
-        return _with_center_of_mass(robot, frames, placements, jacobians, hessians)
+    """update(t, q): writes the kinematics of k frames at q (n,), world axes, without allocating: `placements`
+    (k, 3, 4) = [R | p], `jacobians` (k, 6, n) and, unless empty, `hessians` (k, 6, n, n). It does not read t.
+    The frame `CENTER_OF_MASS` is the point, with world axes."""
     model, data = robot.model, robot.model.createData()
     compute_jacobians, update_placement = pin.computeJointJacobians, pin.updateFramePlacement
     frame_jacobian, axes = pin.getFrameJacobian, JACOBIAN_FRAME
-    ids = [robot.frame_id(name) for name in frames]
+    ids = {slot: robot.frame_id(name) for slot, name in enumerate(frames) if name != CENTER_OF_MASS}
+    rows = placement_rows(data.oMf)
+    # Pinocchio's Jacobian of a model with one joint is a vector.
+    matrices = jacobians[:, :, 0] if model.nv == 1 else jacobians
     work = [
-        (frame_id, placements[slot], _matrix_view(data.oMf[frame_id]), jacobians[slot])
-        for slot, frame_id in enumerate(ids)
+        (frame_id, placements[slot], rows[frame_id].reshape(4, 3).T, matrices[slot])
+        for slot, frame_id in ids.items()
     ]
-
-    if model.nv == 1:  # Pinocchio's Jacobian is then a vector
-        jacobians = jacobians[:, :, 0]
-        work = [(*item[:3], jacobians[slot]) for slot, item in enumerate(work)]
 
     # Local names, not attributes: a third of this function's own time is looking things up.
     def update(t: float, q: Array) -> None:
@@ -170,19 +156,27 @@ def kinematics_updater(
     def update_with_hessians(t: float, q: Array) -> None:
         update(t, q)
         pin.computeJointKinematicHessians(model, data)
-        for hessian, frame_id in zip(hessians, ids, strict=True):
-            hessian[...] = frame_hessian(pin.getFrameKinematicHessian(model, data, frame_id, axes))
+        for slot, frame_id in ids.items():  # no function asks for that of the centre of mass
+            hessians[slot] = frame_hessian(pin.getFrameKinematicHessian(model, data, frame_id, axes))
 
-    return update_with_hessians if hessians.size else update
+    frames_only = update_with_hessians if hessians.size else update
+    if CENTER_OF_MASS not in frames:
+        return frames_only
+    point = frames.index(CENTER_OF_MASS)
+    center_of_mass = _center_of_mass(robot, model.createData())
+    placements[point, :, :3] = np.eye(3)
+
+    def update_all(t: float, q: Array) -> None:
+        frames_only(t, q)
+        placements[point, :, 3], jacobians[point, :3] = center_of_mass(q)
+
+    return update_all
 
 
 def _center_of_mass(robot: Robot, data: pin.Data) -> Callable[[Array], tuple[Array, Array]]:
-    """com(q) -> centre of mass (3,) and its Jacobian (3, n), with what stands still.
-
-    Pinocchio leaves out the mass on the universe, the root link's of a fixed base.
-    """
+    """com(q) -> centre of mass (3,) and its Jacobian (3, n), with what stands still."""
     model = robot.model
-    standing = model.inertias[0]
+    standing = model.inertias[0]  # the root link's of a fixed base, which Pinocchio leaves out
     moving = pin.computeTotalMass(model, data)
     share = moving / (moving + standing.mass)
     fixed_part = (1.0 - share) * np.array(standing.lever)
@@ -194,41 +188,3 @@ def _center_of_mass(robot: Robot, data: pin.Data) -> Callable[[Array], tuple[Arr
         return share * np.array(data.com[0]) + fixed_part, share * jacobian
 
     return at
-
-
-def _with_center_of_mass(
-    robot: Robot, frames: tuple[str, ...], placements: Array, jacobians: Array, hessians: Array
-) -> Callable[[float, Array], None]:
-    """`kinematics_updater` for frames among which the centre of mass is: that one's slot apart."""
-    slot = frames.index(CENTER_OF_MASS)
-    others = [k for k in range(len(frames)) if k != slot]
-    other_placements, other_jacobians = placements[others], jacobians[others]
-    other_hessians = hessians[others] if hessians.size else hessians
-    update_others = kinematics_updater(
-        robot, tuple(frames[k] for k in others), other_placements, other_jacobians, other_hessians
-    )
-    center_of_mass = _center_of_mass(robot, robot.model.createData())
-    placements[slot, :, :3] = np.eye(3)
-
-    def update(t: float, q: Array) -> None:
-        update_others(t, q)
-        placements[others], jacobians[others] = other_placements, other_jacobians
-        if hessians.size:
-            hessians[others] = other_hessians  # no function asks for that of the centre of mass
-        placements[slot, :, 3], jacobians[slot, :3] = center_of_mass(q)
-
-    return update
-
-
-def _matrix_view(placement: pin.SE3) -> Array:
-    """[R | p] as a (3, 4) view of Pinocchio's own memory, which follows updateFramePlacement at no cost.
-
-    Pinocchio keeps R (column by column) and p next to each other; should that ever change, this
-    raises instead of reading something else.
-    """
-    rotation, translation = placement.rotation, placement.translation
-    start = rotation.__array_interface__["data"][0]
-    adjacent = translation.__array_interface__["data"][0] == start + 9 * rotation.itemsize
-    if not (adjacent and rotation.flags.f_contiguous):
-        raise NmmError("this version of Pinocchio keeps placements in another way than nmm expects")
-    return np.lib.stride_tricks.as_strided(rotation, (3, 4), (8, 24))

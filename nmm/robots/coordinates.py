@@ -1,7 +1,5 @@
 """A robot's coordinates q and inputs u: their names, units and limits, and vectors of them by name."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
@@ -11,32 +9,32 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, Flags, Integers, scalar, unwritable, vector
-from nmm.errors import InputError, expect_known
+from nmm.errors import InputError, expect_known, few
 from nmm.platforms.base import Platform
-from nmm.robots.followers import SLACK, Follower, Following
-from nmm.robots.semantics import POSTURE, Named, Postures, Semantics
+from nmm.robots.mimic_joints import SLACK, MimicJoint, MimicJoints
+from nmm.robots.semantics import POSTURE, Named, NamedPostures, Semantics
 
 #: A limit this large is none, m or rad.
 UNLIMITED = 1e5
 
 
 class Coordinates:
-    """What the model, the platform and the followers of a robot say of q and u."""
+    """What the model, the platform and the mimic joints of a robot say of q and u."""
 
     name: str
     model: pin.Model
     platform: Platform
-    followers: tuple[Follower, ...]
+    mimic_joints: tuple[MimicJoint, ...]
     semantics: Semantics
     parts: Any
 
     @property
     def locked(self) -> Mapping[str, float]:
-        """The joints that loading fixed, because they were named or follow such a joint: where, m or rad."""
+        """Where (m or rad) loading fixed joints that were named, or that follow such a joint."""
         return {} if self.parts is None else dict(self.parts.provenance.held)
 
     @property
-    def postures(self) -> Postures:
+    def postures(self) -> NamedPostures:
         """The SRDF's named postures: the coordinates that each sets, m and rad; `q` takes them by name."""
         return self.semantics.postures
 
@@ -57,9 +55,9 @@ class Coordinates:
         return self.platform.inputs + tuple(self.q_names[i] for i in self.arm_coordinates)
 
     @cached_property
-    def following(self) -> Following:
-        """The followers in numbers: columns, leaders, multipliers, offsets."""
-        return Following(self.followers, self.q_names)
+    def following(self) -> MimicJoints:
+        """The mimic joints in numbers."""
+        return MimicJoints(self.mimic_joints, self.q_names)
 
     @cached_property
     def arm_coordinates(self) -> Integers:
@@ -79,19 +77,16 @@ class Coordinates:
 
     @cached_property
     def q_limits(self) -> Array:
-        """Lower and upper limit of each coordinate, (n, 2), m or rad; infinite where there is none.
-
-        Those of a coordinate that others follow are narrowed to what these allow.
-        """
+        """Limits (n, 2) of the coordinates, m or rad, narrowed by those of mimic joints; infinite without."""
         return unwritable(self._limits[0])
 
     @property
-    def unheeded(self) -> tuple[Follower, ...]:
-        """The followers whose own limits would leave the joint that they follow no room, and do not count."""
+    def unheeded(self) -> tuple[MimicJoint, ...]:
+        """The mimic joints whose limits are ignored: they would leave their leader no room."""
         return self._limits[1]
 
     @cached_property
-    def _limits(self) -> tuple[Array, tuple[Follower, ...]]:
+    def _limits(self) -> tuple[Array, tuple[MimicJoint, ...]]:
         limits = np.column_stack([self.model.lowerPositionLimit, self.model.upperPositionLimit])
         own = self.platform.coordinate_limits
         limits[: len(own), 0] = np.maximum(limits[: len(own), 0], own[:, 0])
@@ -100,19 +95,13 @@ class Coordinates:
 
     @cached_property
     def limited(self) -> Flags:
-        """Whether each lower and upper limit of `q_limits` is one, (n, 2): finite and below 1e5 in size.
-
-        URDF asks for two numbers at every sliding joint, so files write ±1e9 or the largest float for
-        "none". No joint slides a hundred kilometres or turns 16 000 times.
-        """
+        """Whether each lower and upper limit of `q_limits` is one, (n, 2): finite and below 1e5 in size."""
+        # URDF asks for two numbers at every sliding joint: files write ±1e9 or the largest float for "none".
         return unwritable(np.isfinite(self.q_limits) & (np.abs(self.q_limits) < UNLIMITED))
 
     @cached_property
     def u_limits(self) -> Array:
-        """Largest absolute value of each input, (n_u,): the platform's, then the joints' velocity limits.
-
-        Those of a joint that others follow are narrowed to what these allow.
-        """
+        """Largest |u| (n_u,): the platform's, then the joints' velocity limits, narrowed by mimic joints'."""
         own = np.array(self.model.velocityLimit)
         speeds = self.following.slowed(np.where(own > 0.0, own, np.inf))
         moved = self.rate_coordinates
@@ -127,10 +116,8 @@ class Coordinates:
         moved[platform.p :] = self.arm_coordinates
         if platform.n_p > 3:
             G = platform.G(np.zeros(platform.n_p))
-            for column in range(platform.p):
-                (rows,) = np.nonzero(G[:, column])
-                if len(rows) == 1 and rows[0] >= 3 and G[rows[0], column] == 1.0:
-                    moved[column] = rows[0]
+            (alone,) = np.nonzero((np.count_nonzero(G, axis=0) == 1) & (G[3:] == 1.0).any(axis=0))
+            moved[alone] = 3 + G[3:, alone].argmax(axis=0)
         return unwritable(moved)
 
     @property
@@ -157,9 +144,10 @@ class Coordinates:
     def independent(self, name: str) -> int:
         """Index of a coordinate that follows no other; `InputError` names the one that it follows."""
         index = self.coordinate(name)
-        for one in self.followers:
+        for one in self.mimic_joints:
             if one.joint == name:
-                raise InputError(f"robot {self.name}: {name} follows {one.leader} ({one}): give {one.leader}")
+                what = f"{name} follows {one.leader} ({one}): give {one.leader}"
+                raise InputError(what, where=f"robot {self.name}", got=name)
         return index
 
     def input(self, name: str) -> int:
@@ -171,17 +159,17 @@ class Coordinates:
     def expect_unlocked(self, name: str) -> None:
         """`InputError` for a joint that was locked, and so is neither coordinate nor input."""
         if name in self.locked and name not in self.q_names:
-            raise InputError(
-                f"robot {self.name}: {name} is locked at {self.locked[name]:g} (by lock, or --lock), and so "
-                "neither coordinate nor input: leave it out here, or do not lock it"
+            what = (
+                f"{name} is locked at {self.locked[name]:g} (by lock, or --lock), and so neither coordinate "
+                "nor input: leave it out here, or do not lock it"
             )
+            raise InputError(what, where=f"robot {self.name}", got=name)
 
     def q(self, values: Named | ArrayLike | None = None) -> Array:
-        """A configuration: from a vector, taken as it is, or by name, {"posture": "home", "q1": 0.3}.
+        """A configuration from a vector, taken as it is, or by name: {"posture": "home", "q1": 0.3}.
 
-        What is not named is zero, and a follower that is not named is where its leader has it. Coordinates
-        have the last word over a posture. A locked joint may be named where it is locked.
-        """
+        Coordinates override postures. What is not named is zero or, for a mimic joint, follows its leader; a
+        locked joint may be named at its locked value."""
         if values is None or isinstance(values, Mapping):
             if values and POSTURE in values and POSTURE not in self.q_names:
                 values = self.postures.within(values)
@@ -190,15 +178,17 @@ class Coordinates:
                 for name, value in (values or {}).items()
                 if name in self.q_names or abs(self.locked.get(name, np.inf) - scalar(value, name)) > SLACK
             }
+            columns, numbers = [*given], [*given.values()]
             q = np.zeros(self.n)
-            q[list(given)] = list(given.values())
+            q[columns] = numbers
             q = self.following.placed(q)
-            q[list(given)] = list(given.values())
+            q[columns] = numbers
             return q
         try:
             return vector(values, self.n, "q")
         except InputError as error:
-            raise InputError(f"{error} (robot {self.name} has q = {', '.join(self.q_names)})") from None
+            what = f"robot {self.name} has q = {few(self.q_names)}"
+            raise InputError(what, where="q", expected=error.expected, got=error.got) from None
 
     @property
     def rest(self) -> Array:
@@ -206,45 +196,42 @@ class Coordinates:
         lower, upper = self.q_limits.T
         return self.following.placed(np.clip(np.zeros(self.n), lower, upper))
 
-    def outside(self, q: ArrayLike, limits: Array | None = None) -> list[str]:
-        """The coordinates of q (n,) that are outside limits (n, 2), the robot's own when not given: name,
-        value, and the limits."""
+    def outside(self, q: ArrayLike, limits: Array | None = None) -> dict[str, str]:
+        """The coordinates of q (n,) outside limits (n, 2), by default the robot's: by name, in words."""
         q = self.q(q)
         limits = self.q_limits if limits is None else limits
-        following = {one.joint for one in self.followers}  # their leaders' limits are theirs, too
-        return [
-            f"{name} = {value:g} {unit} (from {lower:g} to {upper:g})"
+        following = {one.joint for one in self.mimic_joints}  # their leaders' limits are theirs, too
+        return {
+            name: f"{name} = {value:g} {unit} (from {lower:g} to {upper:g})"
             for name, value, unit, (lower, upper) in zip(self.q_names, q, self.q_units, limits, strict=True)
             if name not in following and not lower - SLACK <= value <= upper + SLACK
-        ]
+        }
 
     def check_limits(self, q: ArrayLike, *, come_back: bool = False) -> None:
-        """`InputError` names every coordinate of q (n,) that is outside its limits, and what they are, and
-        every follower that is not where its leader has it.
-
-        come_back : something brings back what is outside, which then is no complaint
-        """
+        """`InputError` for coordinates of q (n,) outside their limits, unless something lets them come back,
+        and for mimic joints that are not where their leader puts them; `got` has their values by name."""
         q = self.q(q)
-        outside = [] if come_back else self.outside(q)
-        complaints = [f"outside its limits: {', '.join(outside)}"] if outside else []
-        complaints += self._strays(q)
+        outside = {} if come_back else self.outside(q)
         problem = self.platform.problem(q[: self.platform.n_p])
-        if problem is not None:
-            complaints.append(problem)
-        if complaints:
-            raise InputError(f"{self.name}: {'; '.join(complaints)}")
+        complaints = [f"outside its limits: {few([*outside.values()])}"] if outside else []
+        self._refuse(q, complaints, [*outside], [] if problem is None else [problem])
 
     def check_followers(self, q: ArrayLike) -> None:
-        """`InputError` names every follower in q (n,) that is not where its leader has it."""
-        strays = self._strays(self.q(q))
-        if strays:
-            raise InputError(f"{self.name}: {'; '.join(strays)}")
+        """`InputError` for mimic joints in q (n,) that are not where their leader puts them."""
+        self._refuse(self.q(q), [], [], [])
 
-    def _strays(self, q: Array) -> list[str]:
+    def _refuse(self, q: Array, complaints: list[str], names: list[str], more: list[str]) -> None:
+        strays = self._strays(q)
+        if complaints := [*complaints, *strays.values(), *more]:
+            got = {name: float(q[self.q_names.index(name)]) for name in (*names, *strays)}
+            raise InputError("; ".join(complaints), where=self.name, got=got)
+
+    def _strays(self, q: Array) -> dict[str, str]:
+        """The mimic joints that are not where their leader puts them, by name, in words."""
         placed = self.following.placed(q)
-        return [
-            f"{one.joint} is at {q[i]:g} {self.q_units[i]}; it follows {one.leader}, which has it at "
-            f"{placed[i]:g} ({one})"
-            for one, i in zip(self.followers, self.following.columns, strict=True)
+        return {
+            one.joint: f"{one.joint} is at {q[i]:g} {self.q_units[i]}; it follows {one.leader}, which has it "
+            f"at {placed[i]:g} ({one})"
+            for one, i in zip(self.mimic_joints, self.following.columns, strict=True)
             if not abs(q[i] - placed[i]) <= SLACK * max(1.0, abs(placed[i]))
-        ]
+        }

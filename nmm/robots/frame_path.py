@@ -8,12 +8,11 @@ from numba import types
 from nmm.arrays import Array, Integers
 from nmm.kernels.compiled import clear, kernel, scratch, view
 from nmm.kernels.kinematics import Kinematics, compose, place_frames, place_joints
-from nmm.kernels.memory import Memory, views
+from nmm.kernels.record_layout import Memory, views
 from nmm.progress import Progress
 from nmm.robots.joint_table import frame_table
 from nmm.robots.robot import CENTER_OF_MASS, Robot
 
-#: Configurations a compiled call: what nothing interrupts.
 AT_ONCE = 10_000
 
 
@@ -23,7 +22,7 @@ AT_ONCE = 10_000
         *(types.float64[:, ::1], types.float64[:, :, ::1]),
     )
 )
-def follow(integers: Integers, floats: Array, q: Array, points: Array, jacobians: Array) -> None:
+def follow_frame(integers: Integers, floats: Array, q: Array, points: Array, jacobians: Array) -> None:
     """points (N, 3) of the one frame at q (N, n), and, if there is room for them, jacobians (N, 3, n)."""
     here = views(Kinematics, integers, floats, 0)
     n = q.shape[1]
@@ -72,7 +71,7 @@ class FramePath:
         found, none = np.empty((len(q), 3)), np.empty((0, 3, self.robot.n))
         for first in range(0, len(q), AT_ONCE):
             some = slice(first, first + AT_ONCE)
-            follow(*self.blocks, np.ascontiguousarray(q[some]), found[some], none)
+            follow_frame(*self.blocks, np.ascontiguousarray(q[some]), found[some], none)
             if progress is not None:
                 progress(min(1.0, (first + AT_ONCE) / len(q)))
         return found
@@ -80,5 +79,5 @@ class FramePath:
     def jacobians(self, q: Array) -> tuple[Array, Array]:
         """Where the origin is (N, 3), and ∂p/∂q (N, 3, n), world axes, at q (N, n)."""
         points, found = np.empty((len(q), 3)), np.empty((len(q), 3, self.robot.n))
-        follow(*self.blocks, np.ascontiguousarray(q), points, found)
+        follow_frame(*self.blocks, np.ascontiguousarray(q), points, found)
         return points, found

@@ -1,14 +1,12 @@
 """Weights of inputs, by their names or by those of their groups."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, scalar
-from nmm.errors import InputError, unknown
+from nmm.errors import expect_known
 
 #: Numbers above 0: by input or by group ("platform", "arm"), an input's own deciding; 1 for the rest.
 Weights = ArrayLike | Mapping[str, float]
@@ -17,11 +15,10 @@ Weights = ArrayLike | Mapping[str, float]
 def by_name(
     weights: Mapping[str, float], inputs: Sequence[str], groups: Mapping[str, Sequence[str]]
 ) -> Array:
-    """A weight for each input, (m,); `InputError` for an unknown name. Signs are the caller's to check."""
+    """A weight for each input, (m,); `InputError` for an unknown name. The caller checks the signs."""
     found = np.ones(len(inputs))
     for name in weights:
-        if name not in inputs and name not in groups:
-            raise InputError(unknown("input or group", name, [*inputs, *groups], "weights"))
+        expect_known("input or group", name, [*inputs, *groups], "weights")
     # An input's own weight has the last word, a smaller group's the one before.
     order = sorted(weights, key=lambda name: name in inputs or -len(groups[name]))
     for name in order:

@@ -1,13 +1,12 @@
 """A model's joints and frames as compiled kinematics read them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
 import pinocchio as pin
 
 from nmm.arrays import Array
+from nmm.errors import NmmError
 from nmm.kernels.kinematics import FrameTable, Joints
 
 
@@ -18,7 +17,7 @@ def joint_table(model: pin.Model, turned: Sequence[pin.SE3]) -> Joints:
     for i in range(count):
         placements[i] = as_row(turned[model.parents[i]].inverse() * model.jointPlacements[i] * turned[i])
         if i:
-            linear, angular = _twist(model.joints[i], pin.neutral(model))
+            linear, angular = twist(model.joints[i], pin.neutral(model))
             turns[i] = float(angular.any())
             slide[i] = turned[i].rotation.T @ linear
     return Joints(
@@ -34,7 +33,7 @@ def own_axes(model: pin.Model) -> list[pin.SE3]:
     """For each joint its axes as `joint_table` turns them, in its axes as Pinocchio has them."""
     found = [pin.SE3.Identity()]
     for i in range(1, len(model.joints)):
-        _, angular = _twist(model.joints[i], pin.neutral(model))
+        _, angular = twist(model.joints[i], pin.neutral(model))
         rotation = np.eye(3)
         if angular.any():
             rotation = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), angular).toRotationMatrix()
@@ -66,9 +65,29 @@ def as_row(placement: pin.SE3) -> Array:
     return np.concatenate([placement.rotation.ravel(order="F"), placement.translation])
 
 
-def _twist(joint: pin.JointModel, q: Array) -> tuple[Array, Array]:
-    """How a joint's number moves it, in its own axes: linear, angular."""
+def placement_rows(placements: pin.StdVec_SE3) -> Array:
+    """Placements (count, 12), R column by column, then p: a view that follows Pinocchio's own memory;
+    `NmmError` should Pinocchio ever store placements in another way."""
+    if not len(placements):
+        return np.zeros((0, 12))
+    first, last = placements[0], placements[len(placements) - 1]
+    start, end = (_address(one.rotation) for one in (first, last))
+    stride = (end - start) // (len(placements) - 1) if len(placements) > 1 else 96
+    rows = np.lib.stride_tricks.as_strided(first.rotation, (len(placements), 12), (stride, 8))
+    for one, row in ((first, rows[0]), (last, rows[-1])):
+        places = _address(one.rotation), _address(one.translation)
+        if places != (_address(row), _address(row[9:])) or not one.rotation.flags.f_contiguous:
+            raise NmmError("this version of Pinocchio keeps placements in another way than nmm expects")
+    return rows
+
+
+def _address(array: Array) -> int:
+    return int(array.__array_interface__["data"][0])
+
+
+def twist(joint: pin.JointModel, q: Array) -> tuple[Array, Array]:
+    """How a joint moves at q, any configuration of its model, in its own axes: linear, angular."""
     data = joint.createData()
     joint.calc(data, q)  # the only way to the axis that all joint types offer
-    linear, angular = np.array(data.S).reshape(2, 3)
+    linear, angular = np.array(data.S, dtype=np.float64).reshape(2, 3)
     return linear, angular

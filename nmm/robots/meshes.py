@@ -1,9 +1,7 @@
 """Meshes that are read when something draws or collides, not when a robot is loaded.
 
-A shape whose mesh is not read is an ordinary `pin.GeometryObject` (name, joint, placement, scale and colour,
-and the file's path) around a mesh without vertices. So models are reduced, joined, copied and pickled with
-their shapes as ever, and whoever asks a robot for its shapes gets them whole.
-"""
+A shape whose mesh is unread is an ordinary `pin.GeometryObject` around a mesh without vertices, so models are
+reduced, joined, copied and pickled as ever. A robot asked for its shapes reads their meshes first."""
 
 from __future__ import annotations
 
@@ -16,13 +14,13 @@ from weakref import WeakValueDictionary
 import numpy as np
 import pinocchio as pin
 
-from nmm.errors import RobotError
-from nmm.words import one_line, printable
+from nmm.findings import Finding
+from nmm.findings.robot_file import refusal
+from nmm.text_format import one_line
 
 # Read by now and in use: a mesh that several shapes or robots have is read once, and goes with the last.
 _IN_USE: WeakValueDictionary[tuple[object, ...], Any] = WeakValueDictionary()
 _LOCK = threading.RLock()
-_SHOWN = 12
 
 
 class Shapes(NamedTuple):
@@ -31,7 +29,7 @@ class Shapes(NamedTuple):
     Examples
     --------
     >>> shapes = nmm.load("unicycle_2r").shapes
-    >>> isinstance(shapes, nmm.Shapes), len(shapes.visual_model.geometryObjects) > 0
+    >>> isinstance(shapes, nmm.extending.Shapes), len(shapes.visual_model.geometryObjects) > 0
     (True, True)
     """
 
@@ -40,28 +38,18 @@ class Shapes(NamedTuple):
 
 
 def leave_unread(shape: pin.GeometryObject, file: str, scale: Sequence[float]) -> None:
-    """Make a shape that of a mesh file which is yet to be read; `scale` (3,) stretches its axes."""
+    """Gives a shape a mesh file that is yet to be read; `scale` (3,) stretches its axes."""
     shape.geometry, shape.meshPath, shape.meshScale = pin.hppfcl.BVHModelOBBRSS(), file, np.array(scale)
 
 
 def is_unread(shape: pin.GeometryObject) -> bool:
-    """Whether the shape is that of a mesh file that is yet to be read."""
     mesh = shape.geometry
     return isinstance(mesh, pin.hppfcl.BVHModelBase) and not mesh.num_vertices and bool(shape.meshPath)
 
 
 def read_meshes(shapes: Iterable[pin.GeometryObject], where: str) -> None:
-    """Give shapes their meshes where these are not read yet; threads may call it at the same time.
-
-    Parameters
-    ----------
-    shapes : of a geometry model, changed in place
-    where : what messages call the robot
-
-    Raises
-    ------
-    RobotError : meshes that cannot be read, with file and link of each; the others are read
-    """
+    """Give shapes their unread meshes, in place; threads may call it at the same time. `RobotError` names
+    file and link of each mesh that cannot be read; the others are read."""
     problems = []
     with _LOCK:
         for shape in shapes:
@@ -70,13 +58,13 @@ def read_meshes(shapes: Iterable[pin.GeometryObject], where: str) -> None:
                     shape.geometry = _mesh(shape.meshPath, shape.meshScale)
                 except (OSError, ValueError, RuntimeError) as error:
                     # coal puts the place in its own source before the message.
-                    said = isinstance(error, OSError) and error.strerror
-                    cause = said or one_line(str(error).split("message:", 1)[-1])
+                    system = isinstance(error, OSError) and error.strerror
+                    cause = system or one_line(str(error).split("message:", 1)[-1])
                     link = shape.name.rpartition("_")[0]
-                    problems.append(f"link {link!r}: mesh {shape.meshPath} cannot be read: {cause}")
+                    values = {"mesh": shape.meshPath, "reason": cause}
+                    problems.append(Finding("mesh_unreadable", values, {"link": link}))
     if problems:
-        more = [f"and {len(problems) - _SHOWN} more"] if len(problems) > _SHOWN else []
-        raise RobotError(printable(f"{where}: {'; '.join([*problems[:_SHOWN], *more])}"))
+        raise refusal(where, *problems)
 
 
 def _mesh(file: str, scale: np.ndarray) -> Any:
@@ -95,10 +83,8 @@ def mesh_of(file: str, scale: np.ndarray) -> Any:
 
 
 class MeshesWhenAsked:
-    """A field of a dataclass that has a `name`: a geometry model, whose meshes are read when it is asked for.
-
-    `vars(owner)` has the model under the field's name as it is, its meshes perhaps unread.
-    """
+    """A dataclass field that reads a geometry model's meshes when it is asked for; `vars(owner)` holds the
+    model as it is, its meshes perhaps unread."""
 
     def __init__(self, name: str) -> None:
         self._name, self._done = name, f"_{name}_has_meshes"

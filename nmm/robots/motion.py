@@ -4,14 +4,65 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from nmm.arrays import Array, array, matrix, vector
-from nmm.errors import InputError
-from nmm.robots.bodies import Body, Nearest
+from nmm.arrays import Array, Integers, array, matrix, unwritable, vector
+from nmm.errors import expect
 from nmm.robots.robot import Robot
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A shape in the world.
+
+    Attributes
+    ----------
+    name : what it is called
+    geometry : its shape, Coal's
+    places (N, 4, 4) : where it is at the motion's N samples, m, world axes; (1, 4, 4) where it stands
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> ball = nmm.playback.Body("ball", nmm.Sphere(0.2).geometry(), np.eye(4)[None])
+    >>> motion = nmm.playback.Motion(robot, [0.0], robot.rest[None], np.zeros((1, robot.n_u)), bodies=(ball,))
+    >>> motion.bodies[0].name
+    'ball'
+    """
+
+    name: str
+    geometry: Any
+    places: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Nearest:
+    """The two points nearest to each other at each of a motion's N samples.
+
+    Attributes
+    ----------
+    points (N, 6) : of the one shape, then of the other, m, world axes; not a number where nothing is near
+    distance (N,) : m
+    pairs (N,) : which of `names` they belong to, -1 for none
+    names : "one and other" of each pair
+    asked : the distance to keep, m
+
+    Examples
+    --------
+    >>> points = np.array([[1.0, 0.0, 0.5, 1.0, 0.3, 0.5]])
+    >>> near = nmm.playback.Nearest(points, np.array([0.3]), np.array([0]), ("link2 and ball",), asked=0.1)
+    >>> near.names[near.pairs[0]], float(np.linalg.norm(points[0, :3] - points[0, 3:]))
+    ('link2 and ball', 0.3)
+    """
+
+    points: Array
+    distance: Array
+    pairs: Integers
+    names: tuple[str, ...]
+    asked: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,10 +112,8 @@ class Motion:
 
     def __post_init__(self) -> None:
         t = vector(self.t, None, "t")
-        if not t.size:
-            raise InputError("t: expected at least one sample, got none")
-        if np.any(np.diff(t) <= 0.0):
-            raise InputError("t: expected ascending times")
+        expect(t.size, "t", "at least one sample")
+        expect(np.all(np.diff(t) > 0.0), "t", "ascending times")
         checked: dict[str, Array | None] = {
             "t": t,
             "q": matrix(self.q, (t.size, self.robot.n), "q"),
@@ -74,17 +123,13 @@ class Motion:
             "target": None if self.target is None else _target(self.target),
         }
         for name, value in checked.items():
-            if value is not None:
-                value.flags.writeable = False
-            object.__setattr__(self, name, value)
+            object.__setattr__(self, name, None if value is None else unwritable(value))
         if self.frame is not None:
             self.robot.frame_id(self.frame)
         for body in self.bodies:
-            if body.places.shape not in ((t.size, 4, 4), (1, 4, 4)):
-                raise InputError(
-                    f"bodies: {body.name}: expected placements of shape ({t.size}, 4, 4) or (1, 4, 4), "
-                    f"got {body.places.shape}"
-                )
+            expected = f"placements of shape ({t.size}, 4, 4) or (1, 4, 4)"
+            shape = body.places.shape
+            expect(shape in ((t.size, 4, 4), (1, 4, 4)), f"bodies: {body.name}", expected, shape)
         if self.nearest is not None:
             matrix(np.nan_to_num(self.nearest.points), (t.size, 6), "nearest: points")
 
@@ -109,8 +154,7 @@ class Motion:
 
 def _points(value: Array, name: str) -> Array:
     points = array(value, name)
-    if points.ndim != 2 or points.shape[1] != 3:
-        raise InputError(f"{name}: expected points of shape (M, 3), got shape {points.shape}")
+    expect(points.ndim == 2 and points.shape[1] == 3, name, "points of shape (M, 3)", points)
     return points
 
 

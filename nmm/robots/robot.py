@@ -13,14 +13,15 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array
-from nmm.doors import door
-from nmm.errors import InputError, unknown
+from nmm.errors import InputError, expect, few, no_such
+from nmm.findings import Finding
 from nmm.kernels.kinematics import Joints
+from nmm.lazy_call import lazy_call
 from nmm.platforms.base import Platform
 from nmm.robots.coordinates import Coordinates
-from nmm.robots.followers import Follower
 from nmm.robots.joint_table import joint_table, own_axes
 from nmm.robots.meshes import MeshesWhenAsked, Shapes
+from nmm.robots.mimic_joints import MimicJoint
 from nmm.robots.semantics import Semantics
 from nmm.robots.wheel import Wheel
 
@@ -45,7 +46,7 @@ class Robot(Coordinates):
     arguments : the xacro arguments that the file was read with
     notes : what loading did to the file, a sentence each
     arms : the joints of each arm by the arm's name, when several were mounted or one was named
-    followers : coordinates that follow another one, which follows nobody; they have no input of their own
+    followers : the mimic joints, each by an independent coordinate; they have no input of their own
     semantics : what its SRDF says
     parts : what loading keeps for mounting and for reports (`nmm.robots.loading.provenance.Parts`)
 
@@ -72,43 +73,36 @@ class Robot(Coordinates):
     wheels: tuple[Wheel, ...] = ()
     source: str = ""
     arguments: Mapping[str, str] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
+    notes: tuple[Finding, ...] = ()
     arms: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    followers: tuple[Follower, ...] = ()
+    mimic_joints: tuple[MimicJoint, ...] = ()
     semantics: Semantics = field(default_factory=Semantics)
     parts: Any = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        if self.model.nq != self.model.nv:
-            raise InputError(
-                f"{self.name}: expected one number per joint, got nq {self.model.nq}, nv {self.model.nv}"
-            )
+        sizes = self.model.nq, self.model.nv
+        expect(sizes[0] == sizes[1], self.name, "one number per joint, nq = nv", sizes)
         shared = [name for name in self.q_names[self.platform.n_p :] if name in self.platform.inputs]
         if shared:
-            raise InputError(
-                f"{self.name}: joints have the names of inputs of the {self.platform.name} platform: "
-                f"{', '.join(shared)}"
-            )
+            what = f"joints have the names of inputs of the {self.platform.name} platform: {few(shared)}"
+            raise InputError(what, where=self.name)
         head = self.q_names[: self.platform.n_p]
-        if head != self.platform.coordinates:
-            raise InputError(
-                f"{self.name}: the {self.platform.name} platform expects the first coordinates to be "
-                f"{', '.join(self.platform.coordinates)}, the model has {', '.join(head)}"
-            )
-        for one in self.followers:
+        expected = f"{', '.join(self.platform.coordinates)} as the first coordinates"
+        where = f"{self.name}: platform {self.platform.name}"
+        expect(head == self.platform.coordinates, where, expected, head)
+        for one in self.mimic_joints:
             if one.joint in head:
-                raise InputError(f"{self.name}: {one}: the {self.platform.name} platform moves {one.joint}")
+                what = f"the {self.platform.name} platform moves {one.joint}"
+                raise InputError(what, where=f"{self.name}: {one}", got=one.joint)
         try:
             self.following  # noqa: B018  # whether there are such coordinates is seen when it is made
         except InputError as error:
-            raise InputError(f"{self.name}: {error}") from None
+            raise error.at(self.name) from None
 
     @property
     def shapes(self) -> Shapes:
-        """Its shapes without asking for their meshes: names, places, colours, pairs.
-
-        With `replace(robot, **robot.shapes._asdict(), ...)` they stay as they are: it asks for what it lacks.
-        """
+        """Its shapes, whose meshes may be unread: names, places, colours, pairs. They stay unread with
+        `replace(robot, **robot.shapes._asdict(), ...)`, which else asks for what it lacks."""
         return Shapes(vars(self)["visual_model"], vars(self)["collision_model"])
 
     @cached_property
@@ -118,7 +112,7 @@ class Robot(Coordinates):
         numbers = [placement.homogeneous.ravel() for placement in model.jointPlacements]
         numbers += [frame.placement.homogeneous.ravel() for frame in model.frames] + [platform.parameters]
         names = [*self.q_names, *self.u_names, platform.name, *(frame.name for frame in model.frames)]
-        names += map(str, self.followers)
+        names += map(str, self.mimic_joints)
         # Rounded: another machine's last digit is no other robot.
         text = "\n".join([*names, *(f"{number:.6f}" for number in np.concatenate(numbers) + 0.0)])
         return hashlib.sha256(text.replace("-0.000000", "0.000000").encode()).hexdigest()[:16]
@@ -151,28 +145,19 @@ class Robot(Coordinates):
         """Pinocchio's index of a frame; of the link's where a link and a joint share the name."""
         found = self._frame_ids.get(name)
         if found is None:
-            found = self._frame_ids[name] = self._found_frame(name)
+            if name == "universe" or not self.model.existFrame(name):
+                raise no_such("frame", name, self.frames, f"robot {self.name}")
+            found = self._frame_ids[name] = frame_index(self.model, name)
         return found
 
     @cached_property
     def _frame_ids(self) -> dict[str, int]:
         return {}
 
-    def _found_frame(self, name: str) -> int:
-        for kind in (pin.FrameType.BODY, pin.FrameType.OP_FRAME):
-            if self.model.existFrame(name, kind):
-                return int(self.model.getFrameId(name, kind))
-        if name == "universe" or not self.model.existFrame(name):
-            raise InputError(unknown("frame", name, self.frames, f"robot {self.name}"))
-        return int(self.model.getFrameId(name))
-
     @cached_property
     def joint_reaches(self) -> Array:
-        """How far each joint of `model` can be from the first of its arm, (njoints,), m; 0 for no arm's.
-
-        An upper bound: the lengths from joint to joint, added up, and what sliding joints travel within
-        their limits; infinite where there is none.
-        """
+        """How far each joint of `model` can be from the first of its arm, (njoints,), m; 0 for no arm's. An
+        upper bound: the lengths between joints and the travel of sliding ones (infinite if unlimited)."""
         model, sums = self.model, np.zeros(self.model.njoints)
         for joint in range(1, model.njoints):
             index, parent = model.joints[joint].idx_q, int(model.parents[joint])
@@ -186,10 +171,8 @@ class Robot(Coordinates):
 
     @cached_property
     def reach(self) -> float:
-        """How far the frames of an arm can be from its first joint at most, m: the robot's natural length.
-
-        1 for a robot without arms; what lies beyond a sliding joint without limits does not count.
-        """
+        """How far an arm's frames can be from its first joint at most, m: the robot's natural length; 1
+        without arms. What lies beyond a sliding joint without limits does not count."""
         ends = [
             self.joint_reaches[frame.parentJoint] + float(np.linalg.norm(frame.placement.translation))
             for frame in self.model.frames
@@ -199,21 +182,25 @@ class Robot(Coordinates):
 
     def _repr_html_(self) -> str:
         """In a notebook: the page that shows it, with a slider for each coordinate."""
-        page: str = door("nmm.playback.inline:of_robot")(self)
+        page: str = lazy_call("nmm.playback.viewer:of_robot")(self)
         return page
 
     def S(self, q: ArrayLike) -> Array:
-        """S(q), shape (n, n_u): q_dot = S(q) u (paper, eqs. 2 and 3).
-
-        S = blkdiag(G(qp), C), with C the identity where no joint follows another; a follower's row is its
-        leader's, times its multiplier.
-        """
+        """S(q), (n, n_u): q_dot = S(q) u (paper, eqs. 2 and 3). S = blkdiag(G(qp), C), C the identity but for
+        mimic joints: their rows are their leaders', times the multiplier."""
         n_p, p, following = self.platform.n_p, self.platform.p, self.following
         S = np.zeros((self.n, self.n_u))
         S[:n_p, :p] = self.platform.G(self.q(q)[:n_p])
         S[self.arm_coordinates, p + np.arange(len(self.arm_coordinates))] = 1.0
         S[following.columns] = following.multipliers[:, np.newaxis] * S[following.leaders]
         return S
+
+
+def frame_index(model: pin.Model, name: str) -> int:
+    """Pinocchio's index of a frame of that name, which there is: of a link's before a joint's."""
+    kinds = (pin.FrameType.BODY, pin.FrameType.OP_FRAME)
+    kind = next((kind for kind in kinds if model.existFrame(name, kind)), None)
+    return int(model.getFrameId(name) if kind is None else model.getFrameId(name, kind))
 
 
 # Set here, where the dataclass does not take them for defaults.

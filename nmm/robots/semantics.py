@@ -6,7 +6,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from nmm.errors import InputError, unknown
+from nmm.errors import no_such
+from nmm.findings import Finding
 
 #: Coordinates by name, m and rad, and under the key `posture` one or several postures.
 Named = Mapping[str, float | str | Sequence[str]]
@@ -14,25 +15,23 @@ Named = Mapping[str, float | str | Sequence[str]]
 POSTURE = "posture"
 
 
-class Postures(dict[str, Mapping[str, float]]):
+class NamedPostures(dict[str, Mapping[str, float]]):
     """Named postures: coordinates by name, m and rad; `InputError` lists the names for one that is none.
 
     Examples
     --------
-    >>> postures = nmm.Postures({"home": {"q1": 0.5, "q2": 1.0}})
+    >>> postures = nmm.extending.NamedPostures({"home": {"q1": 0.5, "q2": 1.0}})
     >>> postures.within({"posture": "home", "q2": 0.3})
     {'q1': 0.5, 'q2': 0.3}
     """
 
     def __missing__(self, name: object) -> Mapping[str, float]:
         there = self or {"none, for no SRDF was found beside the robot's file that holds one": None}
-        raise InputError(unknown(POSTURE, name, there))
+        raise no_such(POSTURE, name, there)
 
     def within(self, values: Named) -> dict[str, float]:
-        """Coordinates by name, where the key `posture` stands for those of one or several postures.
-
-        Later ones have the last word over earlier ones, and the coordinates beside them over all.
-        """
+        """Coordinates by name; the key `posture` stands for those of one or several postures. Later postures
+        override earlier ones, and the coordinates beside them override all."""
         given = dict(values)
         named = given.pop(POSTURE)
         found: dict[str, float] = {}
@@ -51,27 +50,25 @@ class Semantics:
     groups : the inputs that move each group
     disabled : pairs of links that are not to be kept apart
     files : where it was read
-    notes : what of it does not fit the robot, a sentence each
+    notes : what of it does not fit the robot
 
     Examples
     --------
-    >>> semantics = nmm.Semantics(nmm.Postures({"home": {"q1": 0.5}}), groups={"arm": ("q1", "q2")})
+    >>> postures = nmm.extending.NamedPostures({"home": {"q1": 0.5}})
+    >>> semantics = nmm.extending.Semantics(postures, groups={"arm": ("q1", "q2")})
     >>> semantics.postures["home"]["q1"], semantics.groups["arm"], nmm.load("unicycle_2r").semantics.files
     (0.5, ('q1', 'q2'), ())
     """
 
-    postures: Postures = field(default_factory=Postures)
+    postures: NamedPostures = field(default_factory=NamedPostures)
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     disabled: tuple[tuple[str, str], ...] = ()
     files: tuple[Path, ...] = ()
-    notes: tuple[str, ...] = ()
+    notes: tuple[Finding, ...] = ()
 
     def with_arm(self, arm: Semantics, prefix: str, arms_own: Collection[str]) -> Semantics:
-        """A platform's, with those of an arm: its names with a prefix, and its joints alone, not its base's.
-
-        A posture of both is what both say.
-        """
-        postures = Postures(self.postures)
+        """A platform's with an arm's own joints (not its base's), prefixed; a shared posture sets both."""
+        postures = NamedPostures(self.postures)
         for name, values in arm.postures.items():
             own = {prefix + joint: value for joint, value in values.items() if prefix + joint in arms_own}
             if own:

@@ -33,7 +33,7 @@ class Wheel:
     Examples
     --------
     >>> wheel = nmm.load("unicycle_2r").wheels[0]
-    >>> isinstance(wheel, nmm.Wheel), wheel.joint, wheel.carrier, wheel.radius
+    >>> isinstance(wheel, nmm.extending.Wheel), wheel.joint, wheel.carrier, wheel.radius
     (True, 'left_wheel_joint', 'theta', 0.1)
     """
 

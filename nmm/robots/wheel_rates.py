@@ -24,22 +24,18 @@ def wheel_rates(robot: Robot) -> tuple[tuple[str, ...], Array]:
     """Names of the wheels whose rates q and u determine, and rows (w, 9), m and rad:
     [x, y, angle, r, steer, pivot x, pivot y, a, b].
 
-    A wheel that rolls as (x, y) moves and grips along `angle`, turned and moved about its pivot by an angle
-    φ, turns at (grip . velocity there) / r; of a wheel with rollers r is the radius times cos γ. With δ the
-    coordinate `steer`, tan φ = a sin δ / (cos δ - b sin δ): φ = δ for a = 1 and b = 0, of a wheel on a
-    steering joint or on a first trailer; a car's other steered wheels follow δ (Ackermann). steer is -1 where
-    the wheel hangs on the main body. Casters and wheels on further trailers are left out.
-    """
+    A wheel moves with (x, y), grips along `angle`, and is turned about its pivot by φ: its rate is the speed
+    there along the grip over r; with rollers r is the radius times cos γ. With δ the coordinate `steer` (-1
+    on the main body), tan φ = a sin δ / (cos δ - b sin δ): φ = δ (a = 1, b = 0) on a steering joint or a
+    first trailer; a car's other steered wheels follow δ (Ackermann). No casters or further trailers."""
     rows = {wheel.joint: row for wheel in robot.wheels if (row := _row(robot, wheel)) is not None}
     return tuple(rows), np.array(list(rows.values())).reshape(-1, 9)
 
 
 @inlined
 def rolling(wheel: Any, theta: Any, delta: Any) -> tuple[Any, Any, Any, Any]:
-    """What the rates of x, y, θ and δ add to that of a wheel, 1/m and 1: its row of `wheel_rates` at θ and δ.
-
-    Numbers, or as arrays as many of them. δ is 0 where nothing steers the wheel.
-    """
+    """A row of `wheel_rates` at θ and δ (0 without steering), numbers or arrays: what the rates of x, y, θ
+    and δ add to the wheel's, 1/m and 1."""
     # The wheel's angle φ follows δ: tan φ = a sin δ / (cos δ - b sin δ).
     sine = wheel[7] * np.sin(delta)
     cosine = np.cos(delta) - wheel[8] * np.sin(delta)
@@ -56,7 +52,7 @@ def rolling(wheel: Any, theta: Any, delta: Any) -> tuple[Any, Any, Any, Any]:
     )
 
 
-def turning(robot: Robot, q: Array, q_dot: Array) -> tuple[tuple[str, ...], Array]:
+def turning_wheels(robot: Robot, q: Array, q_dot: Array) -> tuple[tuple[str, ...], Array]:
     """The wheels of `wheel_rates`, and how fast they turn, (N, w) rad/s, at q and q_dot, (N, n)."""
     names, rows = wheel_rates(robot)
     rates = np.zeros((len(q), len(names)))
@@ -71,10 +67,8 @@ def turning(robot: Robot, q: Array, q_dot: Array) -> tuple[tuple[str, ...], Arra
 
 
 def inputs_held_by(robot: Robot, wheels: Collection[str]) -> list[str]:
-    """The platform's inputs that limits of these wheels' rates bound.
-
-    Looked at are the wheels on the main body, where the platform's own joints stand straight.
-    """
+    """The platform's inputs that rate limits of these wheels bound; judged by the wheels on the main body,
+    with the platform's own joints straight."""
     names, rows = wheel_rates(robot)
     held = [row for name, row in zip(names, rows, strict=True) if name in wheels and row[4] < 0.0]
     if not held:
@@ -102,15 +96,13 @@ def _row(robot: Robot, wheel: Wheel) -> list[float] | None:
     if robot.model.names[robot.model.parents[joint]] != "theta" or placement.rotation[2, 2] < 1.0 - _LEVEL:
         return None
     turned = math.atan2(placement.rotation[1, 0], placement.rotation[0, 0])
-    x, y = (float(value) for value in (placement.rotation[:2, :2] @ np.array([x, y])))
-    pivot = [float(value) for value in placement.translation[:2]]
+    x, y = (placement.rotation[:2, :2] @ np.array([x, y])).tolist()
     steer = float(robot.q_names.index(wheel.carrier))
-    return [x, y, angle + turned, radius, steer, *pivot, 1.0, 0.0]
+    return [x, y, angle + turned, radius, steer, *placement.translation[:2].tolist(), 1.0, 0.0]
 
 
 def _following(robot: Robot, wheel: Wheel, angle: float) -> list[float] | None:
-    """The row of a wheel on a swivel that a car's steering angle turns: its axis passes the point about which
-    the car turns, (0, L / tan δ)."""
+    """The row of a wheel on a swivel: its axis passes the point about which a car turns, (0, L / tan δ)."""
     car = robot.platform
     if not isinstance(car, Car | FrontDriveCar) or wheel.carrier != "theta":
         return None
@@ -119,7 +111,7 @@ def _following(robot: Robot, wheel: Wheel, angle: float) -> list[float] | None:
     offset = complex(*(wheel.center - wheel.pivot)[:2]) * turn
     if abs(offset.real) > _TRAIL * wheel.radius:
         return None
-    pivot = [float(value) for value in wheel.pivot[:2]]
+    pivot = wheel.pivot[:2].tolist()
     ratios = [pivot[0] / car.wheelbase, pivot[1] / car.wheelbase]
     steer = float(robot.q_names.index(car.steering))
     return [offset.real, offset.imag, angle - straight, wheel.radius, steer, *pivot, *ratios]

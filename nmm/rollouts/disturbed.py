@@ -1,39 +1,69 @@
-"""A sampled controller that sees a robot with noise, acts on it late, and whose wheels slip."""
-
-from __future__ import annotations
+"""A sampled controller that sees a robot with noise and acts on it late, while its wheels slip."""
 
 import math
 from typing import NamedTuple
 
 import numpy as np
 from numba import types
+from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, Integers
+from nmm.arrays import Array, Integers, counted
 from nmm.control.controller import Controller
 from nmm.control.equations import ControlStep, write_equation
+from nmm.control.recorded import Recorded, note_sample
 from nmm.control.stepping import hold_inputs
-from nmm.functions.program import BESIDE, LaidOut, run
+from nmm.errors import InputError, expect
+from nmm.findings import Finding
+from nmm.functions.program import BESIDE, LaidOut, run_program
 from nmm.kernels.compiled import checked_by_caller, compiled_without_gil, scratch
-from nmm.kernels.memory import Matrix, Vector, record_type, views
+from nmm.kernels.record_layout import Matrix, Vector, record_type, views
 from nmm.resolvers.answer import SINGULAR_J
 from nmm.resolvers.partitions import PartitionState
-from nmm.runs.compiled_loop import BOUND, sample, small
-from nmm.runs.recorded import Recorded, note
+from nmm.runs.closed_loop import finding_in
+from nmm.runs.compiled_loop import DIVERGED_BEYOND, compiled_sample, within_bound
 from nmm.runs.recording import Recorder
-from nmm.runs.trajectory import Outcome
+from nmm.runs.verdict import FindingLine, Outcome
 
 
 class Disturbed(NamedTuple):
-    """What becomes of a robot's inputs, and of what is measured of it.
-
-    noise (N or 0, n) : what is added to q at each sample before the controller sees it, m and rad
-    delay : after how many samples inputs act; before, the robot stands
-    slip (m,) : the share of each input that acts
-    """
+    """A run's disturbances: noise (N or 0, n) added to q at each sample before the controller sees it, m and
+    rad; the delay, in samples, until inputs act; and slip (m,), the share of each input that acts."""
 
     noise: Matrix
     delay: int
     slip: Vector
+
+
+class Plant:
+    """What disturbs `count` runs with n coordinates and m inputs, as a user gives it."""
+
+    def __init__(
+        self, n: int, m: int, count: int, noise: ArrayLike, delay: int, slip: ArrayLike, seed: int
+    ) -> None:
+        self.noise = _broadcast(noise, (n,), "noise")
+        expect(not np.any(self.noise < 0.0), "noise", "standard deviations, at least 0")
+        self.delay, self.seed = counted(delay, "delay", 0), int(seed)
+        self.slip = _broadcast(slip, (count, m), "slip")
+
+    @property
+    def disturbs(self) -> bool:
+        return bool(np.any(self.noise > 0.0) or self.delay or np.any(self.slip != 1.0))
+
+    def at(self, i: int, samples: int) -> Disturbed:
+        noise = np.zeros((0, len(self.noise)))
+        if np.any(self.noise > 0.0):
+            drawn = np.random.default_rng([self.seed, i]).standard_normal((samples, len(self.noise)))
+            noise = drawn * self.noise
+        return Disturbed(noise, self.delay, self.slip[i].copy())
+
+
+def _broadcast(value: ArrayLike, shape: tuple[int, ...], what: str) -> Array:
+    try:
+        found = np.broadcast_to(np.asarray(value, dtype=np.float64), shape).copy()
+    except (TypeError, ValueError):
+        raise InputError(where=what, expected=f"a number or shape {shape}", got=value) from None
+    expect(np.all(np.isfinite(found)), what, "finite numbers")
+    return found
 
 
 _DRIFT = types.int64(
@@ -52,10 +82,8 @@ def drift(
     partitioned: int,
     found: Recorded,
 ) -> int:
-    """The samples at all times, inputs held between them, from q = start. Returns how many were recorded.
-
-    q, r and errors are the robot's, not those that the controller sees; u is what the controller asks for.
-    """
+    """Sample at all times from q = start, inputs held in between; returns how many samples were recorded. q,
+    r and errors are the robot's, not those that the controller sees; u is what the controller asks for."""
     e = views(ControlStep, integers, floats, BESIDE)
     b = views(LaidOut, integers, floats, 0).buffers
     n, m = start.shape[0], disturbed.slip.shape[0]
@@ -66,15 +94,15 @@ def drift(
         noisy = disturbed.noise.shape[0] > 0
         for i in range(n):
             seen[i] = q[i] + (disturbed.noise[k, i] if noisy else 0.0)
-        status = sample(times[k], times[k - 1] if k > 0 else -math.inf, seen, integers, floats)
+        status = compiled_sample(times[k], times[k - 1] if k > 0 else -math.inf, seen, integers, floats)
         for i in range(n):
             found.q[k, i] = q[i]
-        if status >= SINGULAR_J or not small(e.answer.u) or not small(q):
+        if status >= SINGULAR_J or not within_bound(e.answer.u) or not within_bound(q):
             return k
         if noisy:  # the task as it is
-            run(times[k], q, integers, floats)
+            run_program(times[k], q, integers, floats)
             write_equation(e.task, b, e.arm, e.problem.J, e.problem.rate)
-        note(e, b, q, partitioned, k, found)
+        note_sample(integers, floats, q, partitioned, 1.0, k, found)
         if k + 1 < times.shape[0]:
             for j in range(m):
                 acting[j] = (
@@ -88,16 +116,16 @@ def drift(
 
 def driven_disturbed(
     controller: Controller, recorder: Recorder, times: Array, q: Array, disturbed: Disturbed
-) -> tuple[Outcome, str]:
-    """Run and record; how that ended, and why."""
+) -> tuple[Outcome, FindingLine]:
     controller.reset()
-    partitioned, found = int(isinstance(controller.state, PartitionState)), recorder.found
-    with controller.compiled() as blocks:
+    partitioned, found = int(isinstance(controller.solver.state, PartitionState)), recorder.found
+    with controller.solver.compiled() as blocks:
         count = checked_by_caller(drift, _DRIFT)(*blocks, times, q, disturbed, partitioned, found)
-    recorder.flown(count - 1)
+    recorder.passed_over(count - 1)
     if count == len(times):
-        return Outcome.COMPLETED, ""
+        return Outcome.COMPLETED, ()
     seen = found.q[count] + (disturbed.noise[count] if len(disturbed.noise) else 0.0)
-    if controller.failed and np.linalg.norm(seen) < BOUND:
-        return Outcome.SINGULAR, str(controller.failure(times[count], seen))
-    return Outcome.DIVERGED, f"at t = {times[count]:g} s the motion has diverged: beyond {BOUND:g}"
+    if controller.solver.failed and np.linalg.norm(seen) < DIVERGED_BEYOND:
+        return Outcome.SINGULAR, (finding_in(controller.solver.failure(times[count], seen)),)
+    beyond = {"what": "coordinates or inputs", "bound": DIVERGED_BEYOND}
+    return Outcome.DIVERGED, (Finding("diverged", beyond, {"t": float(times[count])}),)

@@ -1,7 +1,6 @@
-"""What is kept of many runs: in memory, or in files, a bounded part at a time."""
+"""What is kept of many runs: measures, and quantities in memory or in files, one bounded part at a time."""
 
-from __future__ import annotations
-
+import math
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,32 +9,44 @@ from typing import Any
 import numpy as np
 
 from nmm.arrays import Array
+from nmm.control.quantities import saved
+from nmm.control.recorded import Recorded
 from nmm.errors import InputError, expect_known
-from nmm.memory import expect_memory
-from nmm.runs.recorded import Recorded
-from nmm.words import listed
+from nmm.kernels.compiled import compiled, compiled_without_gil, scratch, view
+from nmm.kernels.spectra import write_spectrum
+from nmm.machine import expect_memory
 
-#: What can be kept: quantities of a sample, by the names of a trajectory.
-QUANTITIES = ("q", "q_dot", "u", "r", "r_d", "error", "objective", "residual", "scale", "partition")
-#: How large a file of a part is, bytes.
+#: Quantities of a sample that can be kept, named as in a trajectory.
+QUANTITIES = tuple(one.name for one in saved() if one.noted)
+#: Largest size of a part's file, bytes.
 PART = 64e6
+#: What `measure` writes, in order. Norms are over the task's rows in their mixed units, as in a summary.
+MEASURES = (
+    "t_end",
+    "error_initial",
+    "error_final",
+    "error_rms",
+    "error_max",
+    "objective_final",
+    "objective_integral",
+    "sigma_min",
+    "residual_max",
+    "scale_min",
+    "partition_switches",
+    "input_rms",
+    "input_peak",
+    "input_integral",
+)
+
+#: The least singular value is sought at every 64th sample, then at every 8th, then at all.
+STRIDES = (64, 8, 1)
+#: Effect of rounding on a singular value, as a share of the largest one.
+ROUNDING = 1e-13
 
 
 class Kept:
-    """Room for some quantities of every `every`-th sample of B runs.
-
-    Parameters
-    ----------
-    names : of QUANTITIES
-    times (N,) : of the samples, s
-    count : how many runs there are
-    shapes : of one run's quantities
-    folder : where parts go as npz files; None to hold all in memory
-
-    Raises
-    ------
-    InputError : a name that is none; a folder with nothing to keep in it; more than there is memory for
-    """
+    """Room for some of QUANTITIES, shaped as one run's `shapes`, at every `every`-th of the times (N,), s, of
+    `count` runs; in `folder` as npz files of some runs each, or all in memory if None."""
 
     def __init__(
         self,
@@ -49,35 +60,33 @@ class Kept:
         for name in names:
             expect_known("keep", name, QUANTITIES, "rollout")
         if folder is not None and not names:
-            raise InputError(f"folder: there is nothing to write; name what to keep, of {listed(QUANTITIES)}")
-        self.names, self.every, self._folder = tuple(names), every, folder
+            raise InputError(where="folder", expected="names of what to keep", available=QUANTITIES)
+        self._every, self._folder = every, folder
         self.t = times[::every].copy()
-        each = {name: getattr(shapes, name)[::every] for name in names}
-        of_one = sum(one.nbytes for one in each.values())
+        self._each = {name: getattr(shapes, name)[::every] for name in names}
+        of_one = sum(one.nbytes for one in self._each.values())
         self.part = count if folder is None else max(1, min(count, int(PART / max(of_one, 1))))
         expect_memory(
             of_one * self.part,
             f"keep: {', '.join(names)} of {count} runs with {len(self.t)} samples each are",
             "keep less, every so many samples (every=), or in files (folder=)",
         )
-        self._each, self.count = each, count
         self.files: list[Path] = []
 
     def room(self, runs: int) -> dict[str, Array]:
-        """Room for so many runs: not numbers (-1 for integers) where a run has no sample."""
+        """Arrays for so many runs, filled with NaN (-1 for integers)."""
         return {
             name: np.full((runs, *one.shape), -1 if one.dtype.kind == "i" else np.nan, dtype=one.dtype)
             for name, one in self._each.items()
         }
 
     def put(self, room: dict[str, Array], row: int, found: Recorded, count: int) -> None:
-        """The first `count` samples of a run, in a row of the room."""
         for name, whole in room.items():
-            some = getattr(found, name)[: count : self.every]
+            some = getattr(found, name)[: count : self._every]
             whole[row, : len(some)] = some
 
     def write(self, first: int, room: dict[str, Array]) -> None:
-        """A part as a file, whole or not at all."""
+        """Write a part as a file, whole or not at all."""
         if self._folder is None:
             return
         self._folder.mkdir(parents=True, exist_ok=True)
@@ -88,3 +97,69 @@ class Kept:
             np.savez(file, **arrays)
         os.replace(unfinished, path)
         self.files.append(path)
+
+
+@compiled
+def least_singular_value(J: Array, count: int) -> float:
+    """The least singular value of J[:count] (N, s, m), of which few are decomposed: singular values move by
+    at most J's change in the Frobenius norm (Weyl 1912), so a matrix that near to the last one decomposed
+    that its own stays above the least so far is skipped."""
+    s, m = J.shape[1], J.shape[2]
+    found = scratch(min(s, m))
+    least = math.inf
+    for stride in STRIDES:
+        last = -1
+        for k in range(0, count, stride):
+            if last >= 0:
+                square = 0.0
+                for i in range(s):
+                    for j in range(m):
+                        square += (J[k, i, j] - J[last, i, j]) ** 2
+                if found[found.shape[0] - 1] - math.sqrt(square) > least + ROUNDING * found[0]:
+                    continue
+            write_spectrum(view(J, k * s * m, (s, m)), found)
+            least, last = min(least, found[found.shape[0] - 1]), k
+    return least
+
+
+@compiled_without_gil
+def measure(times: Array, count: int, found: Recorded, out: Array) -> None:
+    """Write the measures (len(MEASURES),) of the first `count` samples into `out`; NaN if there are none."""
+    for i in range(out.shape[0]):
+        out[i] = math.nan
+    if count == 0:
+        return
+    s, m = found.error.shape[1], found.u.shape[1]
+    errors, inputs, H, effort = 0.0, 0.0, 0.0, 0.0
+    largest, peak, missed, scale, switches = 0.0, 0.0, 0.0, math.inf, 0
+    before, norm = 0.0, 0.0
+    for k in range(count):
+        square, size = 0.0, 0.0
+        for i in range(s):
+            square += found.error[k, i] * found.error[k, i]
+        for j in range(m):
+            size += found.u[k, j] * found.u[k, j]
+        norm = math.sqrt(square)
+        if k == 0:
+            out[1] = norm
+        else:
+            dt = times[k] - times[k - 1]
+            H += 0.5 * dt * (found.objective[k] + found.objective[k - 1])
+            effort += 0.5 * dt * (size + before)
+            changed = 0
+            for i in range(s):
+                if found.partition[k, i] != found.partition[k - 1, i]:
+                    changed = 1
+            switches += changed
+        before = size
+        errors += square
+        inputs += size
+        largest, peak = max(largest, norm), max(peak, math.sqrt(size))
+        missed = max(missed, found.residual[k])
+        for level in range(found.scale.shape[1]):
+            scale = min(scale, found.scale[k, level])
+    out[0] = times[count - 1]
+    out[2], out[3], out[4] = norm, math.sqrt(errors / count), largest
+    out[5], out[6] = found.objective[count - 1], H
+    out[7], out[8], out[9], out[10] = least_singular_value(found.J, count), missed, scale, switches
+    out[11], out[12], out[13] = math.sqrt(inputs / count), peak, effort

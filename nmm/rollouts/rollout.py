@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,23 +13,24 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, Integers, positive
+from nmm.arrays import Array, Integers, counted, positive
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
 from nmm.control.integrators import Integrator, integrator
-from nmm.control.sequenced import SequencedController
 from nmm.cores import cores
-from nmm.errors import InputError
-from nmm.rollouts.disturbed import driven_disturbed
-from nmm.rollouts.kept import Kept
-from nmm.rollouts.measures import MEASURES, measures
-from nmm.rollouts.plant import Plant
-from nmm.rollouts.starts import Start, checked_starts
-from nmm.runs.closed_loop import driven, sample_times
+from nmm.errors import InputError, expect, no_such
+from nmm.findings.run import line
+from nmm.rollouts.disturbed import Plant, driven_disturbed
+from nmm.rollouts.kept import MEASURES, Kept, measure
+from nmm.runs.clearance import guarded
+from nmm.runs.closed_loop import drive_loop, sample_times
 from nmm.runs.recording import Recorder
-from nmm.runs.simulation import MOST_SAMPLES, guarded
-from nmm.runs.trajectory import Outcome
+from nmm.runs.simulation import MOST_SAMPLES
+from nmm.runs.verdict import Outcome
 from nmm.scenario import Scenario
+
+#: Where runs start: (B, n), (n,), or by name.
+Start = ArrayLike | Mapping[str, float] | Sequence[Mapping[str, float]]
 
 
 @dataclass(frozen=True)
@@ -41,10 +42,9 @@ class Rollouts:
     t (K,) : the samples that were kept, s
     kept : the quantities asked for by name, (B, K, ...), in a trajectory's units; not numbers (partition: -1)
         after a run's end; empty where they are in files
-    measures : (B,) by name, see `nmm.rollouts.measures.MEASURES`; not numbers for a run without a sample
+    measures : (B,) by name, see `nmm.rollouts.kept.MEASURES`; not numbers for a run without a sample
     outcome, message : (B,) how each ended: "ended" at its time, "reached" or "missed" where there is a goal,
-        "singular", "diverged", "failed". Whether the error went as its gain promises is not judged:
-        `simulate` does that
+        "singular", "diverged", "failed"; only `simulate` judges whether errors decay as expected
     samples (B,) : how many samples each has
     files : the files of the parts, in order
 
@@ -69,11 +69,9 @@ class Rollouts:
         return len(self.outcome)
 
     def __getitem__(self, name: str) -> Array:
-        """A quantity kept, or a measure."""
         found = self.kept.get(name, self.measures.get(name))
         if found is None:
-            available = ", ".join([*self.kept, *self.measures])
-            raise InputError(f"{name!r} was not kept; there are {available}")
+            raise no_such("quantity", name, [*self.kept, *self.measures], "rollout")
         return found
 
 
@@ -109,8 +107,7 @@ def rollout(
     slip : the share of each input that acts, 1 for all of it: a number, (m,) or (B, m)
     seed : of the noise; that of a run depends on the seed and on the run's number
     until : a goal, at which a run ends
-    keep : names of what to keep of each sample (`nmm.rollouts.kept.QUANTITIES`)
-    every : keep every so many samples
+    keep, every : names of what to keep (`nmm.rollouts.kept.QUANTITIES`), of each `every`-th sample
     folder : write what is kept there, as npz files of some runs each, instead of holding it
     threads : how many; as many as there are cores for this process when None
     progress : called with the fraction done
@@ -139,32 +136,31 @@ def rollout(
     _check(controllers)
     robot, method = controllers[0].robot, method or "rk4"
     if q0 is None or duration is None:
-        raise InputError("rollout: expected q0 and a duration; only a scenario has its own")
+        raise InputError(where="rollout", expected="q0 and a duration; only a scenario has its own")
     duration, dt = positive(duration, "duration"), positive(0.005 if dt is None else dt, "dt")
     steps = max(1, math.ceil(duration / dt - 1e-9))
-    if steps > MOST_SAMPLES:
-        raise InputError(
-            f"dt: {duration:g} s in steps of {dt:g} s are {steps} samples; at most {MOST_SAMPLES}"
-        )
+    expect(steps <= MOST_SAMPLES, "dt", f"at most {MOST_SAMPLES} samples", dt)
     starts = checked_starts(controllers, q0)
     count = len(starts)
-    plant = Plant.of(robot.n, robot.n_u, count, noise, delay, slip, seed)
-    if plant.disturbs and (method != "zoh" or until is not None or not controllers[0].compilable):
+    plant = Plant(robot.n, robot.n_u, count, noise, delay, slip, seed)
+    if plant.disturbs and (method != "zoh" or until is not None or not controllers[0].solver.compiles_steps):
         raise InputError(
-            "rollout: noise, delay and slip are for method zoh, without a goal (of a scenario that has one, "
-            "hand over scenario.controller()), and for controllers without distances, retreats, Armijo's "
-            f"rule and Python functions; got method {method}{'' if until is None else ' and a goal'}"
+            "of a scenario with a goal, hand over scenario.controller()",
+            where="rollout",
+            expected="with noise, delay or slip method zoh, no goal, and controllers without distances, "
+            "retreats, Armijo's rule and Python functions",
+            got=method if until is None else f"{method} and a goal",
         )
-    if any(one.samples for one in controllers) and method == "adaptive":
-        raise InputError(
-            "method: limits are kept from sample to sample: expected rk4, midpoint, euler or zoh"
-        )
+    sampled = any(one.solver.samples for one in controllers)
+    expect(
+        not (sampled and method == "adaptive"), "method", "rk4, midpoint, euler or zoh with limits", method
+    )
     times = sample_times(0.0, dt, steps, duration)
     where = None if folder is None else Path(folder)
-    every = _whole(every, "every")
+    every = counted(every, "every")
     kept = Kept(keep, times, every, count, Recorder(controllers[0], times).found, where)
     runs = _Runs(controllers, starts, times, method, until, plant, kept)
-    workers = min(_whole(cores() if threads is None else threads, "threads"), count)
+    workers = min(counted(cores() if threads is None else threads, "threads"), count)
     rooms: dict[str, Array] = {}
     with ThreadPoolExecutor(workers) as pool:
         for begin in range(0, count, kept.part):
@@ -191,74 +187,66 @@ def rollout(
     )
 
 
+@dataclass(eq=False)
 class _Runs:
-    """The runs, one after the other in each thread that asks for some, and what is always kept of them.
+    """The runs, one at a time in each thread, and what is always kept of them; none begins after `stop`."""
 
-    Attributes
-    ----------
-    stop : set where no more are to begin
-    """
+    controllers: Sequence[Controller]
+    starts: Array
+    times: Array
+    method: str
+    until: Goal | None
+    plant: Plant
+    kept: Kept
 
-    def __init__(
-        self,
-        controllers: Sequence[Controller],
-        starts: Array,
-        times: Array,
-        method: str,
-        until: Goal | None,
-        plant: Plant,
-        kept: Kept,
-    ) -> None:
-        self._controllers, self._starts, self._times = controllers, starts, times
-        self._method, self._until, self._plant, self._kept = method, until, plant, kept
+    def __post_init__(self) -> None:
         self._local, self.stop = threading.local(), threading.Event()
-        count = len(starts)
+        count = len(self.starts)
         self.measures = np.full((count, len(MEASURES)), np.nan)
         self.samples: Integers = np.zeros(count, dtype=np.int64)
         self.outcome, self.message = [""] * count, [""] * count
 
     def one(self, i: int, room: dict[str, Array], row: int) -> None:
-        """The i-th run, which is kept in a row of the room."""
         if self.stop.is_set():
             return
-        controller, recorder, advance = self._at_hand(i)
-        if self._plant.disturbs:
-            disturbed = self._plant.at(i, len(self._times))
-            outcome, message = driven_disturbed(controller, recorder, self._times, self._starts[i], disturbed)
+        controller, recorder, advance = self._controller(i)
+        if self.plant.disturbs:
+            disturbed = self.plant.at(i, len(self.times))
+            outcome, reasons = driven_disturbed(controller, recorder, self.times, self.starts[i], disturbed)
         else:
-            start = self._starts[i].copy()
-            outcome, message = driven(controller, advance, recorder, self._times, start, None, self._until)
+            start = self.starts[i].copy()
+            outcome, reasons = drive_loop(controller, advance, recorder, self.times, start, None, self.until)
         count = len(recorder)
-        self._kept.put(room, row, recorder.found, count)
-        self.measures[i] = measures(self._times, count, recorder.found)
+        self.kept.put(room, row, recorder.found, count)
+        measure(self.times, count, recorder.found, self.measures[i])
         self.samples[i] = count
-        self.outcome[i], self.message[i] = _ended(outcome, recorder, self._until, controller), message
+        self.outcome[i], self.message[i] = _ended(outcome, recorder, self.until, controller), line(reasons)
 
-    def _at_hand(self, i: int) -> tuple[Controller, Recorder, Integrator]:
-        """A controller that is this thread's alone, with room for its samples, and the integrator."""
-        if len(self._controllers) == 1 and hasattr(self._local, "ready"):
+    def _controller(self, i: int) -> tuple[Controller, Recorder, Integrator]:
+        """This thread's own controller, with room for its samples, and the integrator."""
+        if len(self.controllers) == 1 and hasattr(self._local, "ready"):
             ready: tuple[Controller, Recorder, Integrator] = self._local.ready
             ready[1].clear()
             return ready
-        controller = copy.copy(self._controllers[i if len(self._controllers) > 1 else 0])
-        if controller.samples:
-            controller.dt = float(self._times[1] - self._times[0])
-        advance = guarded(integrator(self._method, controller.robot, 1e-9), controller)
-        self._local.ready = controller, Recorder(controller, self._times), advance
+        controller = copy.copy(self.controllers[i if len(self.controllers) > 1 else 0])
+        if controller.solver.samples:
+            controller.dt = float(self.times[1] - self.times[0])
+        advance = guarded(integrator(self.method, controller.robot, 1e-9), controller)
+        self._local.ready = controller, Recorder(controller, self.times), advance
         return self._local.ready
 
 
 def _check(controllers: Sequence[Controller]) -> None:
-    """`InputError` for controllers whose runs do not fit beside each other."""
-    if any(isinstance(one, SequencedController) for one in controllers):
-        raise InputError("rollout: tasks that come and go are run by simulate alone")
-    if not controllers or not all(isinstance(one, Controller) for one in controllers):
-        raise InputError("rollout: expected a controller, a scenario or a list of controllers")
+    """`InputError` for controllers whose runs cannot stand beside each other."""
+    if any(one.schedule is not None for one in controllers):
+        raise InputError("tasks that come and go are run by simulate alone", where="rollout")
+    made = controllers and all(isinstance(one, Controller) for one in controllers)
+    expect(made, "rollout", "a controller, a scenario or a list of controllers")
     first = controllers[0]
     for k, one in enumerate(controllers):
         same = one.robot.q_names == first.robot.q_names and one.robot.u_names == first.robot.u_names
         if not same or len(one.rows) != len(first.rows):
-            raise InputError(f"rollout: controller {k} has another robot or other rows than the first")
+            raise InputError("another robot or other rows than the first", where=f"rollout: controller {k}")
 
 
 def _ended(outcome: Outcome, recorder: Recorder, until: Goal | None, controller: Controller) -> str:
@@ -269,7 +257,29 @@ def _ended(outcome: Outcome, recorder: Recorder, until: Goal | None, controller:
     return "reached" if until.reached(recorder.so_far.error[-1], controller.rows) else "missed"
 
 
-def _whole(value: int, what: str) -> int:
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
-        raise InputError(f"{what}: expected a whole number, at least 1, got {value!r}")
-    return int(value)
+def checked_starts(controllers: Sequence[Controller], q0: Start) -> Array:
+    """Starts (B, n), for one controller or for each of several; `InputError` names the run."""
+    robot = controllers[0].robot
+    if isinstance(q0, Mapping):
+        found = robot.q(q0)[np.newaxis]
+    elif isinstance(q0, Sequence) and any(isinstance(one, Mapping) for one in q0):
+        found = np.array([robot.q(one) for one in q0])
+    else:
+        found = np.array(q0, dtype=np.float64)
+        found = found[np.newaxis] if found.ndim == 1 else found
+    fits = found.ndim == 2 and found.shape[1] == robot.n and len(found)
+    expect(fits, "q0", f"at least one run, (B, {robot.n}) or ({robot.n},)", found)
+    if len(controllers) > 1:
+        fits = len(found) in (1, len(controllers))
+        expect(fits, "q0", f"1 or {len(controllers)} starts, one a controller", len(found))
+        found = np.broadcast_to(found, (len(controllers), robot.n)).copy()
+    for k, q in enumerate(found):
+        one = controllers[k if len(controllers) > 1 else 0]
+        come_back = one.limits is not None and one.limits.position is not False
+        try:
+            robot.check_limits(robot.q(q), come_back=come_back)
+        except InputError as error:
+            raise error.at(f"run {k}") from None
+        if one.solver.scene is not None:
+            one.solver.scene.check_start(0.0, q)
+    return robot.following.placed(found)

@@ -1,4 +1,4 @@
-"""Distances along a run: at its samples and between them, what was nearest, and what that says."""
+"""Distances along a run: at its samples and between them, and what was nearest."""
 
 from __future__ import annotations
 
@@ -9,33 +9,25 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from nmm.arrays import Array, Integers
-from nmm.collisions.obstacle import Obstacle
-from nmm.collisions.recorded import as_passed, shifts
-from nmm.collisions.setting import Setting
-from nmm.control.guard import Counts, Guard
-from nmm.control.integrators import Around, Velocity
-from nmm.robots.held import Held
-from nmm.words import counted
+from nmm.collisions.obstacle import Obstacle, as_passed, shifts
+from nmm.collisions.scene import Scene
+from nmm.control.controller import Controller
+from nmm.control.integrators import Around, Integrator, Velocity
+from nmm.control.safety_filter import SafetyFilter
+from nmm.robots.zero_order_hold import HeldInputs
 
-#: Between samples distances are looked at after so much motion, m and rad of the coordinates together, and m
-#: of the obstacles.
+#: Motion between two distance checks: of the coordinates, m and rad together, and of obstacles, m.
 APART = 0.01
-#: Looks between two samples at most.
+#: Most checks between two samples.
 LOOKS = 10
-#: A distance is kept where it is short by no more than this, m.
+#: A distance that is short by no more than this counts as kept, m.
 ROUNDING = 1e-6
 
 
 class Swept(NamedTuple):
-    """Distances along N samples.
-
-    clearance (N,) : the least distance at each sample, m; pairs (N,) : between which pair
-    between (N,) : the least on the way to the next sample, its ends included; the last sample's own
-    between_pairs (N,) : between which pair that is
-    points (N, 6) : the two points that are nearest at each sample, of the pair's first shape and of its
-        second, m, world axes; not a number where nothing is near
-    obstacles : as they were
-    """
+    """Distances along N samples: clearance (N,), m, and pairs (N,), the nearest pair, at each sample; between
+    and between_pairs (N,), the same up to the next sample; points (N, 6), the two nearest points, m, in world
+    axes and the pair's order, NaN where nothing is near; the obstacles as they moved."""
 
     clearance: Array
     pairs: Integers
@@ -44,37 +36,48 @@ class Swept(NamedTuple):
     points: Array
     obstacles: tuple[Obstacle, ...]
 
+    @property
+    def kept(self) -> dict[str, Any]:
+        return {
+            "clearance": self.clearance,
+            "clearance_pairs": self.pairs,
+            "clearance_between": self.between,
+            "clearance_points": self.points,
+            "obstacles": self.obstacles,
+        }
+
 
 @dataclass(frozen=True)
 class Guarded(Around):
-    """An integrator that holds the inputs unless everything is farther than the robot can come: what a guard
-    looked along is the way that held inputs make."""
+    """Holds the inputs where anything is near: the safety filter checks the path that held inputs make."""
 
-    guard: Guard
-    held: Held
+    safety_filter: SafetyFilter
+    held: HeldInputs
 
     def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
-        if not self.guard.held:
+        if not self.safety_filter.held:
             ahead = self.integrator.advance(velocity, t, q, q_dot, u, dt)
-            if self.guard.clear(float(np.abs(ahead - q).sum())):
+            if self.safety_filter.clear(float(np.abs(ahead - q).sum())):
                 return ahead
         return self.held(q, u, dt)
 
 
-def swept(setting: Setting, t: Array, q: Array, u: Array, places: Sequence[Sequence[Any]]) -> Swept:
-    """Distances along a motion t (N,), q (N, n), u (N, m): where they could matter, between samples too.
-
-    places : of each sample what `Setting.places` said then
-    """
-    obstacles = tuple(as_passed(one, t, [at[i] for at in places]) for i, one in enumerate(setting.obstacles))
-    with setting.queries.among(obstacles):
-        return _swept(setting, t, q, u, obstacles)
+def guarded(advance: Integrator, controller: Controller) -> Integrator:
+    safety_filter = controller.safety_filter
+    return advance if safety_filter is None else Guarded(advance, safety_filter, HeldInputs(controller.robot))
 
 
-def _swept(setting: Setting, t: Array, q: Array, u: Array, obstacles: tuple[Obstacle, ...]) -> Swept:
-    queries, held = setting.queries, Held(setting.robot)
+def swept(scene: Scene, t: Array, q: Array, u: Array, places: Sequence[Sequence[Any]]) -> Swept:
+    """Distances at t (N,), q (N, n), u (N, m), and between if needed; `places`: the obstacles', by sample."""
+    obstacles = tuple(as_passed(one, t, [at[i] for at in places]) for i, one in enumerate(scene.obstacles))
+    with scene.queries.among(obstacles):
+        return _swept(scene, t, q, u, obstacles)
+
+
+def _swept(scene: Scene, t: Array, q: Array, u: Array, obstacles: tuple[Obstacle, ...]) -> Swept:
+    queries, held = scene.queries, HeldInputs(scene.robot)
     clearance, points = np.full(len(t), np.inf), np.full((len(t), 6), np.nan)
-    pairs = np.full(len(t), -1, dtype=np.int64)
+    pairs: Integers = np.full(len(t), -1)
     for k, (time, place) in enumerate(zip(t, q, strict=True)):
         clearance[k], pairs[k] = queries.nearest(float(time), place)
         if pairs[k] >= 0:
@@ -87,7 +90,7 @@ def _swept(setting: Setting, t: Array, q: Array, u: Array, obstacles: tuple[Obst
         between[k] = ends
         if clearance[k + 1] < clearance[k]:
             between_pairs[k] = pairs[k + 1]
-        if ends - setting.distance > moved * max(1.0, setting.robot.reach) + shifted[k]:
+        if ends - scene.distance > moved * max(1.0, scene.robot.reach) + shifted[k]:
             continue
         # The arc that held inputs make, and what the integrator made otherwise, by and by.
         astray = q[k + 1] - held(q[k], u[k], dt)
@@ -99,50 +102,3 @@ def _swept(setting: Setting, t: Array, q: Array, u: Array, obstacles: tuple[Obst
             if d < between[k]:
                 between[k], between_pairs[k] = d, pair
     return Swept(clearance, pairs, between, between_pairs, points, obstacles)
-
-
-def told(setting: Setting, found: Swept, t: Array, counts: Counts) -> list[str]:
-    """What a run says of its distances, a sentence each."""
-    sentences = list(setting.notes)
-    asked = setting.distance
-    below = found.between < asked - ROUNDING
-    if not len(t):
-        return sentences
-    first = 0
-    if found.clearance[0] < asked - ROUNDING:
-        kept = np.flatnonzero(found.clearance >= asked - ROUNDING)
-        name = setting.words(int(found.pairs[0]))
-        back = f"back at t = {t[kept[0]]:.3g} s" if kept.size else "not back at the end"
-        sentences.append(
-            f"the start is nearer than the distance to keep, {asked:g} m: {name}, "
-            f"{found.clearance[0]:.4g} m; {back}"
-        )
-        first = int(kept[0]) if kept.size else len(t)
-    short = np.flatnonzero(below[first:]) + first
-    if short.size:
-        k = int(short[np.argmin(found.between[short])])
-        name = setting.words(int(found.between_pairs[k]))
-        sentences.append(
-            f"the distance of {asked:g} m could not be kept in {counted(short.size, 'sample')}: "
-            f"{name} came to {found.between[k]:.4g} m at t = {t[k]:.3g} s"
-        )
-    if counts.braked:
-        said = f", {counts.short} of them in vain" if counts.short else ""
-        sentences.append(
-            f"in {counted(counts.braked, 'sample')} the inputs went towards braking to keep distances{said}"
-        )
-    return sentences
-
-
-def ran_into(setting: Setting, found: Swept, t: Array) -> str:
-    """What was run into after it had been clear, and when; "" for nothing. Such a run is not completed."""
-    clear = np.flatnonzero(found.between >= -ROUNDING)
-    if not clear.size:
-        return ""
-    first = int(clear[0])
-    into = np.flatnonzero(found.between[first:] < -ROUNDING) + first
-    if not into.size:
-        return ""
-    begun, worst = int(into[0]), int(into[np.argmin(found.between[into])])
-    pair = setting.words(int(found.between_pairs[worst]))
-    return f"{pair} ran into each other from t = {t[begun]:.3g} s on, by up to {-found.between[worst]:.3g} m"

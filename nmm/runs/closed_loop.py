@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import nullcontext
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,52 +16,65 @@ from nmm.control.goal import Goal
 from nmm.control.idle_inputs import idle_inputs
 from nmm.control.integrators import Integrator
 from nmm.control.sample import Snapshot
-from nmm.control.sequenced import SequencedController
+from nmm.control.sequence import Schedule
 from nmm.control.step import Step
 from nmm.errors import DivergedError, RunError, SingularError
-from nmm.robots.loading.provenance import platform_warnings
-from nmm.runs.broken_limits import outside_at_start
-from nmm.runs.compiled_loop import BOUND, CompiledLoop, compiled_loop
-from nmm.runs.judgement import Ended
+from nmm.findings import Finding
+from nmm.robots.loading.ground import slip_warnings
+from nmm.robots.loading.provenance import provenance_of
+from nmm.runs.clearance import guarded
+from nmm.runs.compiled_loop import DIVERGED_BEYOND, CompiledLoop, compiled_loop
 from nmm.runs.recording import Recorder
-from nmm.runs.trajectory import Outcome
+from nmm.runs.verdict import FindingLine, Outcome
 
 
+class Ended(NamedTuple):
+    """How a run ended: q (n,) is the last configuration recorded, or the start; J (s, m) the task's matrix in
+    the controller's last call, at q or a step from it."""
+
+    outcome: Outcome
+    reasons: FindingLine
+    q: Array
+    J: Array
+
+
+@dataclass
+class Leg:
+    """The samples of a run, or those between two events: the controller of the active tasks, which tasks
+    these are, the integrator without the safety filter, and the latest end, s."""
+
+    controller: Controller
+    active: tuple[bool, ...]
+    integrator: Integrator
+    recorder: Recorder
+    ended: Ended
+    end: float
+
+
+@dataclass
 class Leaving:
-    """The beginning of a leg and its end, where other tasks are active.
+    """The start of a leg, after a sample at `earlier`, s, and its end: q (n,) at the event, if any."""
 
-    Attributes
-    ----------
-    handed : what the leg before leaves to its first sample
-    earlier : the time of the sample before it, s
-    q : (n,) where the event is at which the leg ends; None where it does not end at one
-    """
-
-    def __init__(self, controller: SequencedController, handed: Snapshot, earlier: float) -> None:
-        self._controller = controller
-        self.handed, self.earlier = handed, earlier
-        self.q: Array | None = None
+    schedule: Schedule
+    earlier: float
+    q: Array | None = None
 
     def changes(self, t: float, q: Array) -> bool:
-        """Whether the sample at t and q is another leg's."""
-        if self._controller.changes(t, q):
+        """Whether the sample at t and q belongs to another leg."""
+        if self.schedule.changes(t, q):
             self.q = q
         return self.q is not None
 
-    def stays(self, times: Array, q: Array, first: int, last: int) -> int:
-        """The last of the samples from `first` to `last` before one that is another leg's."""
-        return first - 1 + self._controller.stays(times[first : last + 1], q[first : last + 1])
-
 
 def sample_times(start: float, dt: float, steps: int, end: float) -> Array:
-    """start, start + dt, ... of that many steps, none beyond the end, which rounding does not miss."""
+    """start, start + dt, ... for `steps` steps, up to the end, which is hit despite rounding."""
     times = np.minimum(start + np.arange(steps + 1) * dt, end)
     if end - times[-1] < 1e-6 * dt:
         times[-1] = end
     return times
 
 
-def record(
+def record_run(
     controller: Controller,
     advance: Integrator,
     times: Array,
@@ -69,28 +84,38 @@ def record(
     leg: Leaving | None = None,
     watch: Callable[[Recorder], None] | None = None,
 ) -> tuple[Recorder, Ended]:
-    """Integrate over the times (N,) from q, and say how that ended; `watch` gets the recorder before."""
+    """Integrate over the times (N,) from q; `watch` gets the recorder first."""
     recorder = Recorder(controller, times)
     if watch is not None:
         watch(recorder)
     if len(times) > 1 and not advance.tolerance:  # adaptive steps are shorter than the samples
         controller.dt = float(times[1] - times[0])
-    recorder.warnings += [*platform_warnings(controller.robot), *controller.costs]
-    if controller.limits is not None:
-        recorder.warnings += outside_at_start(controller.robot, controller.kept, q)
-    idle = idle_inputs(controller, q)
-    if idle:
-        recorder.warnings.append(
-            f"without effect on task and objective: {', '.join(idle)}; at first order nothing moves "
-            f"{'it' if len(idle) == 1 else 'them'} (an objective can)"
-        )
-    outcome, message = driven(controller, advance, recorder, times, q, progress, until, leg)
-    recorder.guarded(controller)
+    recorder.findings += _at_start(controller, q)
+    guarded_advance = guarded(advance, controller)
+    outcome, reasons = drive_loop(controller, guarded_advance, recorder, times, q, progress, until, leg)
+    recorder.blocking = controller.report.blocking()
+    if controller.safety_filter is not None:
+        recorder.counts = controller.safety_filter.counts
     last = recorder.q[len(recorder) - 1] if len(recorder) else q
-    return recorder, Ended(outcome, message, last, controller.derivatives[0].copy())
+    return recorder, Ended(outcome, reasons, last, controller.solver.derivatives[0].copy())
 
 
-def driven(
+def _at_start(controller: Controller, q: Array) -> Iterator[Finding]:
+    """Findings about a run before its first sample at q (n,)."""
+    robot, solver = controller.robot, controller.solver
+    yield from provenance_of(robot).contradictions
+    yield from slip_warnings(robot)
+    yield from (Finding("python_costs", {"text": one}) for one in solver.program.costs)
+    if controller.limits is not None:
+        outside = robot.outside(q, solver.limits_on.coordinates)
+        if outside:
+            recovery = solver.limits_on.recovery
+            yield Finding("start_outside_limits", {"outside": [*outside.values()], "recovery": recovery})
+    if idle := idle_inputs(solver, q):
+        yield Finding("idle_inputs", {"inputs": list(idle)})
+
+
+def drive_loop(
     controller: Controller,
     advance: Integrator,
     recorder: Recorder,
@@ -99,160 +124,164 @@ def driven(
     progress: Callable[[float], None] | None = None,
     until: Goal | None = None,
     leg: Leaving | None = None,
-) -> tuple[Outcome, str]:
-    """Integrate and record; how that ended, and why."""
-    outcome, message = Outcome.COMPLETED, ""
-    controller.reset()
-    if leg is not None:
-        controller.sample.restore(leg.handed)
-        recorder.backed_off = 0 if controller.backing is None else controller.backing.count
+) -> tuple[Outcome, FindingLine]:
+    if leg is None:
+        controller.reset()
+    elif controller.solver.retreat_state is not None:  # what the leg before leaves to this one is there
+        recorder.backed_off = controller.solver.retreat_state.count
     try:
-        fly = compiled_loop(controller, advance, until)
+        pass_over = compiled_loop(controller, advance, until)
         # What is taken in Python, too: otherwise digits would depend on where compiled code stops.
-        with nullcontext() if fly is None else controller.compiled_kinematics():
-            _integrate(controller, advance, recorder, times, q, progress, until, leg, fly)
+        with nullcontext() if pass_over is None else controller.solver.program.compiled_kinematics():
+            _Loop(controller, advance, recorder, times, until, leg, pass_over).run(q, progress)
     except SingularError as error:
-        outcome, message = Outcome.SINGULAR, str(error)
+        return Outcome.SINGULAR, (finding_in(error),)
     except DivergedError as error:
-        outcome, message = Outcome.DIVERGED, str(error)
+        return Outcome.DIVERGED, (finding_in(error),)
     except RunError as error:
-        outcome, message = Outcome.FAILED, str(error)
+        return Outcome.FAILED, (finding_in(error),)
     except KeyboardInterrupt:
-        outcome = Outcome.INTERRUPTED
-        message = f"interrupted after {recorder.reached:g} s of {times[-1]:g} s"
-    return outcome, message
+        found = Finding("interrupted", {"end": float(times[-1])}, {"t": recorder.reached})
+        return Outcome.INTERRUPTED, (found,)
+    return Outcome.COMPLETED, ()
 
 
-def _integrate(
-    controller: Controller,
-    advance: Integrator,
-    recorder: Recorder,
-    times: Array,
-    q: Array,
-    progress: Callable[[float], None] | None,
-    until: Goal | None,
-    leg: Leaving | None,
-    fly: CompiledLoop | None,
-) -> None:
-    """From sample to sample, recording each; to the event that ends a leg, whose sample is the next leg's.
+def finding_in(error: RunError) -> Finding:
+    """The finding that an error was raised with, or its sentence where there is no more."""
+    found = error.finding
+    return found if isinstance(found, Finding) else Finding("failed", {"text": str(error)})
 
-    A step that the resolver's state does not let stand is taken again, decided anew at its beginning; if
-    that may not stand either, it is taken with the decisions free at its stages.
+
+@dataclass
+class _Loop:
+    """From sample to sample, recording each, up to the event that ends a leg, whose sample is the next leg's.
+
+    A step that the resolver's state rejects is repeated with a new decision at its start; if that is
+    rejected, too, with decisions free at its stages.
+
+    This is the loop of all controllers. Its second form, `pass_over`, skips samples with purely numerical
+    decisions. Python handles what is not compiled: users' functions and `State` subclasses, distances (Coal's
+    queries, and the ways that are looked along), a retreat's inputs, adaptive and repeated steps, findings.
     """
-    steps = len(times) - 1
-    earlier = controller.sample.snapshot()
-    sample = _sample(controller, float(times[0]), q, -math.inf if leg is None else leg.earlier)
-    recorder.add(sample)
-    k, there = 0, False
-    a_share = steps if progress is None else max(1, steps // 100)
-    while k < steps and not there:
-        if progress is not None and k % a_share == 0:
-            progress(k / steps)
-        whole, backing = False, controller.backing
-        if fly is not None and not (backing is not None and backing.now):
-            decided = controller.state.snapshot()
-            reached, whole = fly(times, k, min(steps, (k // a_share + 1) * a_share), recorder.found)
-            stays = reached
-            if backing is not None:
-                stays = k + backing.quiet(recorder.found.error[k + 1 : reached + 1], controller.dt or 0.0)
-            if leg is not None:
-                stays = leg.stays(times, recorder.found.q, k + 1, stays)
-            if stays < reached:  # begin again, and fly to the sample before the event
-                whole, reached = False, stays
-                before = float(times[k - 1]) if k else -math.inf if leg is None else leg.earlier
-                controller.sample.restore(earlier)
-                _sample(controller, sample.t, sample.q, before)
-                controller.state.restore(decided)
-                if stays > k:
-                    fly(times, k, stays, recorder.found)
+
+    controller: Controller
+    advance: Integrator
+    recorder: Recorder
+    times: Array
+    until: Goal | None
+    leg: Leaving | None
+    pass_over: CompiledLoop | None
+
+    def __post_init__(self) -> None:
+        self.state, self.kept = self.controller.solver.state, self.controller.solver.sample
+
+    def run(self, q: Array, progress: Callable[[float], None] | None) -> None:
+        recorder, times, steps = self.recorder, self.times, len(self.times) - 1
+        earlier = self.kept.snapshot()
+        sample = self._sample(float(times[0]), q, -math.inf if self.leg is None else self.leg.earlier)
+        recorder.add(sample)
+        k, there = 0, False
+        a_share = steps if progress is None else max(1, steps // 100)
+        while k < steps and not there:
+            if progress is not None and k % a_share == 0:
+                progress(k / steps)
+            reached, whole = self._pass_over(k, min(steps, (k // a_share + 1) * a_share))
             if reached > k:
-                recorder.flown(reached)
-                if backing is not None:
-                    backing.pass_over(recorder.found.error[k + 1 : reached], controller.dt or 0.0)
-                k, earlier = reached, controller.sample.snapshot()
-                sample = _sample(controller, float(times[k]), recorder.q[k].copy(), float(times[k - 1]))
+                recorder.passed_over(reached)
+                k, earlier = reached, self.kept.snapshot()
+                sample = self._sample(float(times[k]), recorder.q[k].copy(), float(times[k - 1]))
                 recorder.replace_last(sample)
-                there = until is not None and until.reached(sample.error, controller.rows)
-        if not (whole or there or k == steps):
-            ahead, here = _next(controller, advance, recorder, sample, float(times[k + 1]), earlier, leg)
-            if isinstance(ahead, Leaving):
-                return
-            k, earlier, sample = k + 1, here, ahead
-            recorder.add(sample)
-            there = until is not None and until.reached(sample.error, controller.rows)
-    if progress is not None:
-        progress(1.0)
+                there = self._there(sample)
+            if not (whole or there or k == steps):
+                following, here = self._next(sample, float(times[k + 1]), earlier)
+                if following is None:
+                    return
+                k, earlier, sample = k + 1, here, following
+                recorder.add(sample)
+                there = self._there(sample)
+        if progress is not None:
+            progress(1.0)
+
+    def _there(self, sample: Step) -> bool:
+        return self.until is not None and self.until.reached(sample.error, self.controller.rows)
+
+    def _pass_over(self, k: int, last: int) -> tuple[int, bool]:
+        """The sample that compiled code reaches from sample k, at most an event's, and whether it is
+        `last`."""
+        retreat_state, found = self.controller.solver.retreat_state, self.recorder.found
+        if self.pass_over is None or (retreat_state is not None and retreat_state.now):
+            return k, False
+        left = self.kept.snapshot()
+        reached, whole = self.pass_over(self.times, k, last, found)
+        if self.leg is not None:
+            those = slice(k + 1, reached + 1)
+            stays = k + self.leg.schedule.stays(self.times[those], found.q[those])
+            if stays < reached:  # begin again, up to the sample before the event
+                whole, reached = False, stays
+                self.kept.restore(left)
+                if stays > k:
+                    self.pass_over(self.times, k, stays, found)
+        return reached, whole
+
+    def _next(self, sample: Step, t: float, earlier: Snapshot) -> tuple[Step | None, Snapshot]:
+        """The sample at t (None: another leg's), the state before it; `earlier`: that before `sample`."""
+        here = self.kept.snapshot()
+        stands, following = self._advanced(sample, t)
+        if not stands:
+            self.kept.restore(earlier)
+            self.state.reset()
+            sample = self._sample(sample.t, sample.q)
+            self.recorder.replace_last(sample)
+            before, here = self.state.memory.copy(), self.kept.snapshot()
+            stands, following = self._advanced(sample, t)
+            if not stands:
+                self.kept.restore(here)
+                following = self._next_sample(t, self._integrated(sample, t), sample.t)
+                reserved = self.state.reservation(before, self.controller.robot.u_names, sample.t)
+                self.recorder.find_once(reserved)
+        return following, here
+
+    def _advanced(self, sample: Step, t: float) -> tuple[bool, Step | None]:
+        """Whether the step to t stands, and the sample there (None: another leg's)."""
+        left, before = self.kept.snapshot(), self.state.memory.copy()
+        try:
+            with self.state.held():
+                q = self._integrated(sample, t)
+        except SingularError:
+            if self.state.may_stand(before):
+                raise
+            return False, None
+        if not self.state.may_stand(before):
+            return False, None
+        self.kept.end_stages(left)
+        following = self._next_sample(t, q, sample.t)
+        return following is None or self.state.may_stand(before), following
+
+    def _next_sample(self, t: float, q: Array, earlier: float) -> Step | None:
+        """The sample at t; None if an event ends the leg there."""
+        changes = self.leg is not None and self.leg.changes(t, q)
+        return None if changes else self._sample(t, q, earlier)
+
+    def _integrated(self, sample: Step, t: float) -> Array:
+        velocity = self.controller.velocity
+        return self.advance.advance(velocity, sample.t, sample.q, sample.q_dot, sample.u, t - sample.t)
+
+    def _sample(self, t: float, q: Array, earlier: float = -math.inf) -> Step:
+        """The sample at t; accelerations count from the one at `earlier`, finally less than dt before."""
+        controller = self.controller
+        _within_bound(q, "coordinates", t)
+        if t - earlier < (controller.dt or math.nan) * (1.0 - 1e-9):
+            self.kept.elapsed = t - earlier
+        controller.period_monitor.forget()  # compiled code has made those between
+        try:
+            controller(t, q)
+        finally:
+            self.kept.elapsed = None
+        sample = controller.last(t, q)
+        _within_bound(sample.u, "inputs", t)
+        return sample
 
 
-def _next(
-    controller: Controller,
-    advance: Integrator,
-    recorder: Recorder,
-    sample: Step,
-    t: float,
-    earlier: Snapshot,
-    leg: Leaving | None,
-) -> tuple[Step | Leaving, Snapshot]:
-    """The sample at t, or the event there, and what `sample` left to it; `earlier` is what that one found."""
-    state, here = controller.state, controller.sample.snapshot()
-    ahead = _advanced(controller, advance, sample, t, leg)
-    if ahead is None:
-        state.reset()
-        controller.sample.restore(earlier)
-        sample = _sample(controller, sample.t, sample.q)
-        recorder.replace_last(sample)
-        before, here = state.snapshot(), controller.sample.snapshot()
-        ahead = _advanced(controller, advance, sample, t, leg)
-        if ahead is None:
-            controller.sample.restore(here)
-            ahead = _ahead(controller, t, _integrated(controller, advance, sample, t), sample.t, leg)
-            recorder.warn_once(sample.t, state.reservation(before, controller.robot.u_names))
-    return ahead, here
-
-
-def _advanced(
-    controller: Controller, advance: Integrator, sample: Step, t: float, leg: Leaving | None
-) -> Step | Leaving | None:
-    """The next sample, at t, or the event there; None where the step to it may not stand."""
-    state = controller.state
-    before = state.snapshot()
-    try:
-        with state.held():
-            q = _integrated(controller, advance, sample, t)
-    except SingularError:
-        if state.may_stand(before):
-            raise
-        return None
-    if not state.may_stand(before):
-        return None
-    ahead = _ahead(controller, t, q, sample.t, leg)
-    return ahead if isinstance(ahead, Leaving) or state.may_stand(before) else None
-
-
-def _ahead(controller: Controller, t: float, q: Array, earlier: float, leg: Leaving | None) -> Step | Leaving:
-    """The sample at t, or the event that leaves it to other tasks."""
-    if leg is not None and leg.changes(t, q):
-        return leg
-    return _sample(controller, t, q, earlier)
-
-
-def _integrated(controller: Controller, advance: Integrator, sample: Step, t: float) -> Array:
-    return advance.advance(controller.velocity, sample.t, sample.q, sample.q_dot, sample.u, t - sample.t)
-
-
-def _sample(controller: Controller, t: float, q: Array, earlier: float = -math.inf) -> Step:
-    """The sample at t; accelerations count from the one before it, at `earlier`: less than dt in the end."""
-    if not q.dot(q) < BOUND**2:  # a NaN compares false
-        raise DivergedError(f"at t = {t:g} s the motion has diverged: the coordinates are beyond {BOUND:g}")
-    elapsed, dt = controller.sample.elapsed, math.nan if controller.dt is None else controller.dt
-    if t - earlier < dt * (1.0 - 1e-9):
-        elapsed[()] = t - earlier
-    controller.pace.forget()  # compiled code has made those between
-    try:
-        controller(t, q)
-    finally:
-        elapsed[()] = dt
-    sample = controller.last(t, q)
-    if not sample.u.dot(sample.u) < BOUND**2:
-        raise DivergedError(f"at t = {t:g} s the motion has diverged: the inputs are beyond {BOUND:g}")
-    return sample
+def _within_bound(x: Array, what: str, t: float) -> None:
+    if not x.dot(x) < DIVERGED_BEYOND**2:  # a NaN compares false
+        raise DivergedError(Finding("diverged", {"what": what, "bound": DIVERGED_BEYOND}, {"t": t}))

@@ -1,7 +1,6 @@
 """The closed loop over many samples in one compiled call, without the GIL.
 
-It does what `closed_loop` does from sample to sample, to the last digit, as long as nothing out of the
-ordinary happens; where something does, it stops before it, and `closed_loop` sees to that step.
+It equals `closed_loop` to the last digit, and stops before anything that needs `closed_loop`.
 """
 
 from __future__ import annotations
@@ -15,12 +14,13 @@ from numba import types
 
 from nmm.arrays import Array, Integers
 from nmm.control.controller import Controller
-from nmm.control.equations import ControlStep, call_step
-from nmm.control.goal import Goal
+from nmm.control.equations import ControlStep, call_step, watch_error
+from nmm.control.goal import Goal, norms, unit_codes
 from nmm.control.integrators import Integrator
+from nmm.control.recorded import Recorded, note_sample
 from nmm.control.step_size import Descent, call_shorten, shorten
-from nmm.control.stepping import Tableau, go_on, tableau
-from nmm.functions.program import BESIDE, LaidOut
+from nmm.control.stepping import Tableau, end_stages, go_on, tableau
+from nmm.functions.program import BESIDE
 from nmm.kernels.compiled import (
     checked_by_caller,
     compiled,
@@ -29,84 +29,43 @@ from nmm.kernels.compiled import (
     scratch,
     view,
 )
-from nmm.kernels.memory import IntegerVector, Vector, record_type, views
+from nmm.kernels.record_layout import IntegerVector, Vector, keep, kept, put_back, record_type, views
 from nmm.resolvers.answer import SINGULAR_J
+from nmm.resolvers.base import State
 from nmm.resolvers.partitions import COLUMNS, FREE, HELD, MODE, OVERDUE, SIGN, PartitionState
-from nmm.resolvers.state import State
-from nmm.runs.recorded import Recorded, note
 
 #: Coordinates or inputs whose norm is beyond this have diverged, m, rad, m/s or rad/s.
-BOUND = 1e6
-#: How long a call lasts at most, about, s: nothing interrupts it.
+DIVERGED_BEYOND = 1e6
+#: Longest call, about, s: it cannot be interrupted.
 A_CALL = 0.03
-#: So many times the samples of the longest call before a call has at most, by the time that those took.
+#: A call has at most this many times the samples of the longest one before.
 MOST_TIMES = 64
 
 
 class Ends(NamedTuple):
-    """Where a run ends before its time.
-
-    units (s,) : of the task's rows: 0 m, 1 rad, -1 another
-    tolerances (2,) : norms of the error over rows of metres and of radians that are an arrival; negative
-        where there is no goal
-    """
+    """A goal: the units of the task's rows (`unit_codes`) and tolerances, m and rad; negative: no goal."""
 
     units: IntegerVector
     tolerances: Vector
 
 
 class Choice(NamedTuple):
-    """How α is chosen at each sample: where the code of `shorten` begins, 0 where it is constant, and the
-    blocks of what is descended."""
+    """How α is chosen: where the code of `shorten` begins, 0 for a constant α, and the objective's blocks."""
 
     code: int
     integers: IntegerVector
     floats: Vector
 
 
-FLY = types.int64(
+ADVANCE_SAMPLES = types.int64(
     *(types.int64[::1], types.float64[::1], record_type(Tableau), types.float64[::1], types.int64),
     *(types.int64, types.int64, record_type(Ends), record_type(Choice), record_type(Recorded)),
 )
 
 
 @compiled
-def remember(e: ControlStep, floats: Array, integers: Integers) -> None:
-    """Copy bounds, the inputs before, the active limits and the resolver's state."""
-    p = e.problem
-    m, rows, active, state = p.before.shape[0], p.lower.shape[0], p.active.shape[0], e.state.shape[0]
-    for j in range(m):
-        floats[j], floats[m + j], floats[2 * m + j] = p.u_lower[j], p.u_upper[j], p.before[j]
-    for i in range(rows):
-        floats[3 * m + i], floats[3 * m + rows + i] = p.lower[i], p.upper[i]
-    for i in range(active):
-        integers[i] = p.active[i]
-    for i in range(state):
-        integers[active + i] = e.state[i]
-    for j in range(m):  # rows' never change
-        integers[active + state + j] = p.stops[j]
-
-
-@compiled
-def recall(e: ControlStep, floats: Array, integers: Integers) -> None:
-    """What `remember` copied."""
-    p = e.problem
-    m, rows, active, state = p.before.shape[0], p.lower.shape[0], p.active.shape[0], e.state.shape[0]
-    for j in range(m):
-        p.u_lower[j], p.u_upper[j], p.before[j] = floats[j], floats[m + j], floats[2 * m + j]
-    for i in range(rows):
-        p.lower[i], p.upper[i] = floats[3 * m + i], floats[3 * m + rows + i]
-    for i in range(active):
-        p.active[i] = integers[i]
-    for i in range(state):
-        e.state[i] = integers[active + i]
-    for j in range(m):
-        p.stops[j] = integers[active + state + j]
-
-
-@compiled
 def passed_zero(e: ControlStep, before: Integers) -> bool:
-    """Whether det Ja has changed its sign with the same partition (`PartitionState.may_stand`)."""
+    """Whether det Ja changed sign with the same partition (`PartitionState.may_stand`)."""
     for i in range(COLUMNS, e.state.shape[0]):
         if before[i] != e.state[i]:
             return False
@@ -114,57 +73,51 @@ def passed_zero(e: ControlStep, before: Integers) -> bool:
 
 
 @compiled
-def small(numbers: Array) -> bool:
-    """Whether the norm is within BOUND; not with a number that is none."""
+def within_bound(numbers: Array) -> bool:
+    """Whether the norm is within BOUND; false for NaN."""
     square = 0.0
     for i in range(numbers.shape[0]):
         square += numbers[i] * numbers[i]
-    return square < BOUND * BOUND
+    return square < DIVERGED_BEYOND * DIVERGED_BEYOND
 
 
 @compiled
-def sample(t: float, earlier: float, q: Array, integers: Integers, floats: Array) -> float:
-    """The sample at (t, q); accelerations count from the one before it, at `earlier`."""
+def compiled_sample(t: float, earlier: float, q: Array, integers: Integers, floats: Array) -> float:
+    """The sample at (t, q); accelerations count from the one at `earlier`."""
     e = views(ControlStep, integers, floats, BESIDE)
-    usual = e.limits.elapsed[()]
     if t - earlier < e.problem.dt[()] * (1.0 - 1e-9):
         e.limits.elapsed[()] = t - earlier
     status = float(call_step(e.step, t, q, integers, floats))
-    e.limits.elapsed[()] = usual
+    e.limits.elapsed[()] = math.nan
     return status
 
 
 @compiled
 def arrived(error: Array, ends: Ends) -> bool:
-    """`Goal.reached`."""
-    square_m, square_rad = 0.0, 0.0
-    for i in range(error.shape[0]):
-        if ends.units[i] == 0:
-            square_m += error[i] * error[i]
-        if ends.units[i] == 1:
-            square_rad += error[i] * error[i]
-    return math.sqrt(square_m) <= ends.tolerances[0] and math.sqrt(square_rad) <= ends.tolerances[1]
+    metres, radians = norms(error, ends.units)
+    return metres <= ends.tolerances[0] and radians <= ends.tolerances[1]
 
 
 @compiled
-def alpha(e: ControlStep, choice: Choice) -> tuple[float, float]:
-    """The α in use and the resolver's own; 1 and 1 where it is constant."""
+def whole_alpha(e: ControlStep, choice: Choice) -> float:
+    """Restore the resolver's own α; 1 where α is constant."""
     if choice.code == 0:
-        return 1.0, 1.0
+        return 1.0
     own = views(Descent, choice.integers, choice.floats, BESIDE)
-    return float(e.numbers[own.alpha_at]), float(own.whole[()])
+    e.numbers[own.alpha_at] = own.whole[()]
+    return float(own.whole[()])
 
 
 @compiled
-def set_alpha(e: ControlStep, choice: Choice, value: float) -> None:
-    """Use that α, where it is not constant."""
-    if choice.code != 0:
-        own = views(Descent, choice.integers, choice.floats, BESIDE)
-        e.numbers[own.alpha_at] = value
+def alpha(e: ControlStep, choice: Choice) -> float:
+    """The α in use; 1 where it is constant."""
+    if choice.code == 0:
+        return 1.0
+    return float(e.numbers[views(Descent, choice.integers, choice.floats, BESIDE).alpha_at])
 
 
 @compiled_without_gil
-def fly(
+def advance_samples(
     integers: Integers,
     floats: Array,
     method: Tableau,
@@ -176,102 +129,77 @@ def fly(
     choice: Choice,
     found: Recorded,
 ) -> int:
-    """From the sample `first`, which was just made, to the sample `last`. Returns the last one recorded.
-
-    There it stops: before a step that may not stand or fails, at a sample whose limits were widened or that
-    has arrived. What is remembered is then as before that sample, which is to be made again; with no sample
-    recorded, as after `first`.
-    """
+    """From the sample `first`, just made, towards `last`; returns the last one recorded. Stops before a step
+    that fails, is rejected or leads to a retreat, and at samples that widened limits or arrived; the state is
+    then as before that sample, which is to be made again (as after `first` if none was recorded)."""
     e = views(ControlStep, integers, floats, BESIDE)
-    b = views(LaidOut, integers, floats, 0).buffers
-    p = e.problem
-    n, m = found.q.shape[1], p.before.shape[0]
-    size, count = 3 * m + 2 * p.lower.shape[0], p.active.shape[0] + e.state.shape[0] + m
-    was, now, decided = scratch(size), scratch(size), integer_scratch(e.state.shape[0] + 1)
-    was_integers, now_integers = integer_scratch(count + 1), integer_scratch(count + 1)
-    ahead = scratch(n)
-    remember(e, was, was_integers)
-    earlier, whole = alpha(e, choice)
+    n = found.q.shape[1]
+    count, size = kept(integers, floats)
+    both, both_integers = scratch((2, size)), integer_scratch(2 * count)
+    was, was_integers = view(both, 0, (size,)), view(both_integers, 0, (count,))
+    now, now_integers = view(both, size, (size,)), view(both_integers, count, (count,))
+    ahead, decided = scratch(n), integer_scratch(e.state.shape[0] + 1)
+    keep(integers, floats, was_integers, was)
     reached = first
     for k in range(first + 1, last + 1):
         for i in range(e.state.shape[0]):
             decided[i] = e.state[i]
+        keep(integers, floats, now_integers, now)
         if partitioned == 1:
             e.state[MODE] = HELD
         q = view(found.q, (k - 1) * n, (n,))
         status = go_on(times[k - 1], times[k] - times[k - 1], q, integers, floats, method, ahead)
-        fine = status < SINGULAR_J and small(ahead)
+        fine = status < SINGULAR_J and within_bound(ahead)
         if partitioned == 1:
             fine = fine and e.state[MODE] != OVERDUE and not passed_zero(e, decided)
             e.state[MODE] = FREE
         if not fine:
             break
-        remember(e, now, now_integers)
-        set_alpha(e, choice, whole)
-        status = sample(times[k], times[k - 1], ahead, integers, floats)
+        if method.weights.shape[0] > 1:
+            end_stages(integers, floats, now_integers, now)
+            keep(integers, floats, now_integers, now)
+        whole = whole_alpha(e, choice)
+        status = compiled_sample(times[k], times[k - 1], ahead, integers, floats)
         if choice.code != 0:
             call_shorten(choice.code, times[k], ahead, integers, floats, choice.integers, choice.floats)
             status = e.answer.status[()]
-        if status >= SINGULAR_J or not small(e.answer.u):
+        if watch_error(integers, floats) or status >= SINGULAR_J or not within_bound(e.answer.u):
             break
         if partitioned == 1 and passed_zero(e, decided):
             break
-        note(e, b, ahead, partitioned, k, found)
-        found.step_size[k] = alpha(e, choice)[0] / whole
+        note_sample(integers, floats, ahead, partitioned, alpha(e, choice) / whole, k, found)
         reached = k
-        for i in range(size):
-            was[i] = now[i]
-        for i in range(count):
-            was_integers[i] = now_integers[i]
+        side = (reached - first) % 2
+        was, was_integers = view(both, side * size, (size,)), view(both_integers, side * count, (count,))
+        now = view(both, (1 - side) * size, (size,))
+        now_integers = view(both_integers, (1 - side) * count, (count,))
         if e.answer.excess[()] > 0.0 or arrived(e.task.error, ends):
             break
-    recall(e, was, was_integers)
-    if reached == first:
-        set_alpha(e, choice, earlier)
+    put_back(integers, floats, was_integers, was)
     return reached
 
 
 class CompiledLoop:
-    """`fly` for a controller and an integrator.
-
-    Parameters
-    ----------
-    until : where the run ends before its time
-    """
-
     def __init__(self, controller: Controller, method: Tableau, until: Goal | None) -> None:
         self._controller, self._method = controller, method
-        self._partitioned = int(isinstance(controller.state, PartitionState))
-        codes = {"m": 0, "rad": 1}
+        self._partitioned = int(isinstance(controller.solver.state, PartitionState))
         self._ends = Ends(
-            np.array([codes.get(row.unit, -1) for row in controller.rows], dtype=np.int64),
+            unit_codes([row.unit for row in controller.rows]),
             np.array([-1.0, -1.0] if until is None else [until.m, until.rad]),
         )
-        chosen = controller.step_size
-        self._choice = (
-            Choice(0, np.zeros(0, dtype=np.int64), np.zeros(0))
-            if chosen is None
-            else Choice(shorten.address, *chosen.blocks)
-        )
-        self._fly = checked_by_caller(fly, FLY)
+        self._choice = Choice(0, np.zeros(0, dtype=np.int64), np.zeros(0))
+        if controller.solver.step_size is not None:
+            self._choice = Choice(shorten.address, *controller.solver.step_size.blocks)
+        self._fly = checked_by_caller(advance_samples, ADVANCE_SAMPLES)
         self._at_once = 16
 
     def __call__(self, times: Array, first: int, last: int, found: Recorded) -> tuple[int, bool]:
-        """`fly`, to `last` or as far as a short call goes: the sample reached, and whether it went so far."""
+        """One short call of `advance_samples`: the sample reached, and whether that is `last`."""
         last = min(last, first + self._at_once)
         began = time.perf_counter()
-        with self._controller.compiled() as blocks:
-            reached = self._fly(
-                *blocks,
-                self._method,
-                times,
-                first,
-                last,
-                self._partitioned,
-                self._ends,
-                self._choice,
-                found,
-            )
+        with self._controller.solver.compiled() as blocks:
+            given = self._method, times, first, last, self._partitioned, self._ends, self._choice, found
+            reached = self._fly(*blocks, *given)
         if reached == last:
             fitting = 0.8 * A_CALL * (last - first) / max(time.perf_counter() - began, 1e-9)
             self._at_once = max(self._at_once, min(int(fitting), MOST_TIMES * self._at_once))
@@ -279,9 +207,9 @@ class CompiledLoop:
 
 
 def compiled_loop(controller: Controller, advance: Integrator, until: Goal | None) -> CompiledLoop | None:
-    """The loop of a controller that is compiled as a whole; None for another one."""
+    """The loop of a controller that compiles as a whole, else None."""
     method = tableau(advance)
-    plain = type(controller.state) in (State, PartitionState) and (until is None or type(until) is Goal)
-    if method is None or not (plain and controller.flies):
+    plain = type(controller.solver.state) in (State, PartitionState) and type(until) in (Goal, type(None))
+    if method is None or not (plain and controller.solver.compiles_runs):
         return None
     return CompiledLoop(controller, method, until)

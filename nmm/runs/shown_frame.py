@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nmm.arrays import Array
-from nmm.errors import InputError
+from nmm.errors import expect
 from nmm.functions.function import Function, Shown
 from nmm.functions.tasks.position import AXES
 from nmm.functions.tasks.task import Task
@@ -17,25 +17,18 @@ from nmm.robots.robot import Robot
 
 
 class ShownFrame(NamedTuple):
-    """The frame that tasks position, or without one the frame that a task turns.
-
-    Attributes
-    ----------
-    frame : its name; None where no task speaks of one
-    rows : of the tasks' values, the one that holds each world axis
-    target : what a task looks at, (2,) or (3,) m
-    """
+    """The frame that tasks position, else turn; the row of each world axis; a point to look at, (2,) or (3,)
+    m."""
 
     frame: str | None
     rows: dict[int, int]
     target: Array | None
 
     def path(self, robot: Robot, q: Array) -> Array | None:
-        """Where the frame is at q (N, n), (N, 3) m; None without a frame."""
         return None if self.frame is None else FramePath(robot, self.frame).positions(q)
 
     def desired(self, path: Array, r_d: Array) -> Array:
-        """Where tasks want it by r_d (N, s), (N, 3) m; where it is, along axes and times without a task."""
+        """Where r_d (N, s) puts the frame, (N, 3) m; `path` along axes and at times without a task."""
         desired = path.copy()
         for axis, row in self.rows.items():
             said = np.isfinite(r_d[:, row])
@@ -43,18 +36,18 @@ class ShownFrame(NamedTuple):
         return desired
 
     def mark(self, path: Array | None) -> Array | None:
-        """The target, (3,) m: one in the plane at the height at which the frame begins."""
+        """The point looked at, (3,) m; a planar one at the frame's initial height."""
         if self.target is None or path is None:
             return None
         return np.array([*self.target, path[0, 2]]) if len(path) and self.target.size == 2 else self.target
 
 
-def shown(tasks: Iterable[Task], robot: Robot) -> ShownFrame:
+def shown_frame(tasks: Iterable[Task], robot: Robot) -> ShownFrame:
     """What tasks show of themselves; `InputError` for what cannot be drawn."""
     frame: str | None = None
     turned: str | None = None
-    rows: dict[int, int] = {}
     target: Array | None = None
+    rows: dict[int, int] = {}
     row = 0
     for task in tasks:
         count = len(task.rows(robot))
@@ -70,15 +63,13 @@ def shown(tasks: Iterable[Task], robot: Robot) -> ShownFrame:
 
 
 def _said(function: Function, robot: Robot, rows: int) -> Shown:
-    """What the function shows, checked before the run that is to be shown."""
+    """What the function shows, validated before the run."""
     said, name = function.shown(), f"{type(function).__name__}.shown"
     for frame in (said.positions, said.turns):
         if frame is not None:
             robot.frame_id(frame)
-    if not all(axis in AXES and row in range(rows) for axis, row in said.axes.items()):
-        raise InputError(
-            f"{name}: expected axes from x, y, z with rows from 0 to {rows - 1}, got {dict(said.axes)}"
-        )
-    if said.looks_at is not None and np.shape(said.looks_at) not in ((2,), (3,)):
-        raise InputError(f"{name}: expected 2 or 3 numbers as looks_at, got {said.looks_at!r}")
+    fits = all(axis in AXES and row in range(rows) for axis, row in said.axes.items())
+    expect(fits, name, f"axes from x, y, z with rows from 0 to {rows - 1}", dict(said.axes))
+    fits = said.looks_at is None or np.shape(said.looks_at) in ((2,), (3,))
+    expect(fits, name, "2 or 3 numbers as looks_at", said.looks_at)
     return said

@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nmm.control.quantities import placed
+from nmm.errors import RunError
+
 if TYPE_CHECKING:
+    from nmm.control.controller import Controller
     from nmm.runs.trajectory import Trajectory
 
+STEPS = 500
 
-def rows(trajectory: Trajectory, numbers: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """Labels and values of the numbers of a run, as tables and pages show them.
 
-    numbers : its summary
-    """
-    method = f"{trajectory.called}, {trajectory.method}, dt {trajectory.dt:g} s"
-    yield "resolver", method
+def summary_rows(
+    trajectory: Trajectory, numbers: Mapping[str, Any], *, events: bool = True
+) -> Iterator[tuple[str, str]]:
+    """Labels and values of a run's summary for tables and pages; `events`: also of tasks' starts and ends."""
+    yield "resolver", f"{trajectory.called}, {trajectory.method}, dt {trajectory.dt:g} s"
     outcome = str(trajectory.outcome)
     if len(trajectory):
         outcome += f", {trajectory.t[-1]:g} s in {len(trajectory)} samples"
@@ -31,7 +36,7 @@ def rows(trajectory: Trajectory, numbers: Mapping[str, Any]) -> Iterator[tuple[s
         seen = trajectory.error[:, row]
         seen = seen[~np.isnan(seen)]
         yield f"error of {name}", f"{seen[0]:.3g} → {seen[-1]:.3g} {unit}" if len(seen) else "never active"
-    for event in trajectory.events:
+    for event in trajectory.events if events else ():
         yield f"t = {event.t:.4g} s", f"{event.task} {event.what}{f': {event.why}' if event.why else ''}"
     yield "tracking ‖e‖", f"RMS {numbers['error_rms']:.3g}, {numbers['error_max']:.3g} at most"
     if (settles := numbers["settling_time"]) is not None:
@@ -43,12 +48,12 @@ def rows(trajectory: Trajectory, numbers: Mapping[str, Any]) -> Iterator[tuple[s
     yield "inputs ‖u‖", f"RMS {numbers['input_rms']:.3g}, {numbers['input_peak']:.3g} at most"
     yield "peak inputs", _peaks(trajectory, numbers["u_max"])
     yield "smallest σ_min", f"{numbers['sigma_min']:.3g}"
-    if trajectory.unmet.samples:
-        unmet = trajectory.unmet
+    if (unmet := trajectory.unmet).samples:
         share = f"{unmet.samples} of {len(trajectory)} samples"
         yield "J u differs from the rate", f"in {share}, by {unmet.largest:.3g} at most"
-    if numbers["step_size_min"] < 1.0:
-        yield "share of α taken", f"{numbers['step_size_mean']:.3g}, {numbers['step_size_min']:.3g} at least"
+    for one in placed():
+        if one.line is not None and not np.all(trajectory[one.name] == one.fill):
+            yield one.line[0], one.line[1].format_map(numbers)
     if trajectory.limited:
         share = numbers["scaled_share"]
         least = f"{numbers['scale_min']:.3g} at least; below 1 {100 * share:.3g} % of the time"
@@ -82,10 +87,25 @@ def rows(trajectory: Trajectory, numbers: Mapping[str, Any]) -> Iterator[tuple[s
 
 
 def _peaks(trajectory: Trajectory, largest: Mapping[str, float]) -> str:
-    """The largest input of each unit."""
     units = dict(zip(trajectory.robot.u_names, trajectory.robot.u_units, strict=True))
     names = [
         max((name for name in units if units[name] == unit), key=largest.__getitem__)
         for unit in dict.fromkeys(units.values())
     ]
     return ", ".join(f"{name} {largest[name]:.3g} {units[name]}" for name in names)
+
+
+def step_time(controller: Controller, trajectory: Trajectory) -> float:
+    """Median time of a control step, s, in back-to-back calls at a run's samples; 0 if none succeeds.
+    `controller` is like the run's, with its dt; its state is reset."""
+    times = []
+    controller.reset()
+    for t, q in zip(trajectory.t[:STEPS].tolist(), trajectory.q[:STEPS], strict=True):
+        begun = perf_counter()
+        try:
+            controller(t, q)
+        except RunError:
+            break
+        times.append(perf_counter() - begun)
+    controller.reset()
+    return float(np.median(times)) if times else 0.0

@@ -2,47 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nmm.arrays import Array, Integers
-from nmm.collisions.obstacle import Obstacle
-from nmm.collisions.recorded import places
+from nmm.collisions.obstacle import Obstacle, obstacle_places
+from nmm.control.quantities import QUANTITIES, Record
 from nmm.control.sequence import Event
-from nmm.doors import door
+from nmm.ellipsoid_options import Wanted
+from nmm.errors import expect_known
+from nmm.figure_options import Drawn
+from nmm.findings import Finding
+from nmm.findings.run import line
+from nmm.lazy_call import lazy_call
 from nmm.machine import made_with
-from nmm.robots.bodies import Body, Nearest
-from nmm.robots.motion import Motion
+from nmm.robots.motion import Body, Motion, Nearest
 from nmm.robots.robot import Robot
-from nmm.runs.ellipsoid_options import Wanted
-from nmm.runs.figure_options import Drawn
-from nmm.runs.residuals import NONE, Residuals
+from nmm.runs.residuals import NO_RESIDUALS, Residuals
+from nmm.runs.verdict import AS_ASKED, Awaited, Verdict
+from nmm.runs.verdict import Outcome as Outcome
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-
-class Outcome(StrEnum):
-    """How a run ended (docs/outcomes.md).
-
-    Examples
-    --------
-    >>> run = nmm.Scenario.load("unicycle_3r_out_of_reach").run()
-    >>> run.outcome is nmm.Outcome.MISSED, run.complete
-    (True, False)
-    """
-
-    COMPLETED = "completed"
-    MISSED = "missed"
-    SINGULAR = "singular"
-    DIVERGED = "diverged"
-    UNSTABLE = "unstable"
-    FAILED = "failed"
-    INTERRUPTED = "interrupted"
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +56,9 @@ class Trajectory:
     unmet : where J u differed from the rate
     r_names, r_units : the task's rows
     resolver, method, dt : how it was made
-    outcome, message, warnings : how it ended and why
+    verdict : how it ended, why, and what else is worth a warning; `outcome`, `findings`, `message` and
+        `warnings` are read from it. Of a run that went wrong a shorter dt is tried when one of these is first
+        read (of `outcome`, where it depends on that)
     frame : the end-effector frame that the task positions, if any
     path, desired (N, 3): its path and, where the task says, the desired one, m in the world
     target (3,): the fixed point that a bearing looks at, if any
@@ -87,6 +74,7 @@ class Trajectory:
     events : when tasks that come and go began and ended, and why
     label : what it is called among other runs; "" for its resolver
     made_with : the versions and the machine that computed it (`nmm.machine`); empty where a folder lacks them
+    more : further recorded quantities by name; `trajectory[name]` is any of them
 
     Examples
     --------
@@ -117,23 +105,21 @@ class Trajectory:
     resolver: str
     method: str
     dt: float
-    outcome: Outcome = Outcome.COMPLETED
-    message: str = ""
-    warnings: tuple[str, ...] = ()
+    verdict: Verdict | Awaited = AS_ASKED
     frame: str | None = None
     path: Array | None = None
     desired: Array | None = None
     target: Array | None = None
-    unmet: Residuals = NONE
+    unmet: Residuals = NO_RESIDUALS
     limited: bool = False
-    shares: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    shares: Array = field(default_factory=QUANTITIES["shares"].absent)
     limit_names: tuple[str, ...] = ()
-    step_size: Array = field(default_factory=lambda: np.ones(0))
-    crossed: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    clearance: Array = field(default_factory=lambda: np.zeros(0))
-    clearance_between: Array = field(default_factory=lambda: np.zeros(0))
-    clearance_pairs: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    clearance_points: Array = field(default_factory=lambda: np.zeros((0, 6)))
+    step_size: Array = field(default_factory=QUANTITIES["step_size"].absent)
+    crossed: Integers = field(default_factory=QUANTITIES["crossed"].absent)
+    clearance: Array = field(default_factory=QUANTITIES["clearance"].absent)
+    clearance_between: Array = field(default_factory=QUANTITIES["clearance_between"].absent)
+    clearance_pairs: Integers = field(default_factory=QUANTITIES["clearance_pairs"].absent)
+    clearance_points: Array = field(default_factory=QUANTITIES["clearance_points"].absent)
     clearance_names: tuple[str, ...] = ()
     clearance_asked: float = 0.0
     obstacles: tuple[Obstacle, ...] = ()
@@ -142,6 +128,23 @@ class Trajectory:
     events: tuple[Event, ...] = ()
     label: str = ""
     made_with: dict[str, str | int] = field(default_factory=made_with)
+    more: dict[str, Array] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, arrays: Mapping[str, Any], **rest: Any) -> Trajectory:
+        """With those arrays by name, and what else it has; what is no attribute goes into `more`."""
+        own = {name: value for name, value in arrays.items() if name in cls.__dataclass_fields__}
+        return cls(**own, **rest, more={name: arrays[name] for name in arrays if name not in own})
+
+    def __getitem__(self, name: str) -> Array:
+        """A recorded quantity by its name (`nmm.control.quantities`); `InputError` for what is none of it."""
+        expect_known("quantity", name, [one.name for one in QUANTITIES.values() if one.saved or one.of])
+        one, known = QUANTITIES[name], {**vars(self), **self.more}
+        if name in known:
+            return known[name]
+        if one.of is None:
+            return one.absent(N=len(self))
+        return one.of(Record(self.robot, {each: known[each] for each in QUANTITIES if each in known}))
 
     def __len__(self) -> int:
         return len(self.t)
@@ -149,6 +152,26 @@ class Trajectory:
     def __repr__(self) -> str:
         end = f"{self.t[-1]:g} s in {len(self)} samples" if len(self) else "no samples"
         return f"Trajectory({self.robot.name}, {self.resolver}, {self.outcome}, {end})"
+
+    @property
+    def outcome(self) -> Outcome:
+        """How it ended."""
+        return self.verdict.outcome
+
+    @property
+    def message(self) -> str:
+        """Why it ended so, in words; empty where there is nothing to say."""
+        return line(self.verdict.reasons)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What else is worth a warning, in words."""
+        return tuple(line(one) for one in self.verdict.warnings)
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What `message` and `warnings` say, as data (docs/outcomes.md lists the codes)."""
+        return (*self.verdict.reasons, *(one for many in self.verdict.warnings for one in many))
 
     @property
     def complete(self) -> bool:
@@ -163,14 +186,17 @@ class Trajectory:
     @property
     def error_norm(self) -> Array:
         """‖e‖ of the tasks active at each sample, (N,), in the mixed units of the rows."""
-        return np.asarray(np.linalg.norm(np.where(np.isnan(self.error), 0.0, self.error), axis=1))
+        return self["error_norm"]
+
+    @property
+    def switched(self) -> list[int]:
+        """The samples from which RG has another partition."""
+        return np.flatnonzero(self["partition_changes"]).tolist()
 
     @property
     def switches(self) -> int:
         """How often RG changed its partition."""
-        if len(self) < 2:
-            return 0
-        return int(np.sum(np.any(np.diff(self.partition, axis=0) != 0, axis=1)))
+        return len(self.switched)
 
     @property
     def moving(self) -> Array | None:
@@ -183,8 +209,8 @@ class Trajectory:
     def held(self) -> Array:
         """(K, 3) m in the world: the points where the desired path stays, from event to event."""
         points = [part[0] for part in self._stretches if _stays(part)]
-        new = [not any(np.allclose(one, other) for other in points[:i]) for i, one in enumerate(points)]
-        return np.array(points).reshape(-1, 3)[np.array(new, dtype=bool)]
+        new = [x for i, x in enumerate(points) if not any(np.allclose(x, other) for other in points[:i])]
+        return np.array(new).reshape(-1, 3)
 
     @property
     def marks(self) -> Array:
@@ -193,25 +219,26 @@ class Trajectory:
 
     @property
     def _stretches(self) -> list[Array]:
-        """The desired path from event to event."""
         if self.desired is None:
             return []
         events = np.searchsorted(self.t, sorted({event.t for event in self.events}))
         return [part for part in np.split(self.desired, events) if len(part)]
 
-    def with_scenario(self, scenario: dict[str, Any], warnings: tuple[str, ...] = ()) -> Trajectory:
+    def with_scenario(self, scenario: dict[str, Any], warnings: Sequence[Finding] = ()) -> Trajectory:
         """The same trajectory with the scenario that it came from, and with what that warns of."""
-        return replace(self, scenario=scenario, warnings=(*warnings, *self.warnings))
+        return replace(self, scenario=scenario, verdict=self.verdict.after(warnings))
 
     def summary(self) -> dict[str, Any]:
         """The run in numbers, ready for JSON."""
-        return door("nmm.runs.summary:summarise")(self)
+        return lazy_call("nmm.diagnosis.summary:summarise")(self)
 
     def save(
         self, folder: str | Path, *, figures: Drawn = True, html: bool = False, ellipsoids: Wanted = False
     ) -> Path:
         """Write the run's folder (see `nmm.folders.run.save`): arrays, tables, summary, figures, playback."""
-        return door("nmm.folders.run:save")(self, folder, figures=figures, html=html, ellipsoids=ellipsoids)
+        return lazy_call("nmm.folders.run:save")(
+            self, folder, figures=figures, html=html, ellipsoids=ellipsoids
+        )
 
     @staticmethod
     def load(folder: str | Path, robot: Robot | None = None) -> Trajectory:
@@ -221,18 +248,19 @@ class Trajectory:
         ------
         InputError : it is no run's folder, or its robot cannot be loaded, or is another one
         """
-        return door("nmm.folders.run:load")(folder, robot)
+        return lazy_call("nmm.folders.run:load")(folder, robot)
 
     def plot(self, **options: float) -> Figure:
         """One figure that shows the run: the motion from above, errors, objective, inputs; `width`, in."""
-        return door("nmm.figures:overview")(self, **options)
+        return lazy_call("nmm.figures:overview")(self, **options)
 
     def plot_ellipses(self, path: str | Path | None = None, options: Wanted = True) -> Figure:
         """The end-effector's path with manipulability ellipses; also as a file (`nmm.figures.ellipses`)."""
-        return door("nmm.figures.ellipses:ellipses")(self, options, path)
+        return lazy_call("nmm.figures.ellipses:ellipses")(self, options, path)
 
     def motion(self, label: str | None = None) -> Motion:
         """What playback shows of it."""
+        near = self.clearance_points, self.clearance, self.clearance_pairs
         return Motion(
             robot=self.robot,
             t=self.t,
@@ -243,28 +271,21 @@ class Trajectory:
             target=self.marks if len(self.marks) else None,
             label=self.called if label is None else label,
             frame=self.frame,
-            bodies=tuple(Body(one.name, one.shape.geometry(), places(one, self.t)) for one in self.obstacles),
-            nearest=self._nearest(),
-        )
-
-    def _nearest(self) -> Nearest | None:
-        if not len(self) or len(self.clearance_points) != len(self):
-            return None
-        return Nearest(
-            self.clearance_points,
-            self.clearance,
-            self.clearance_pairs,
-            self.clearance_names,
-            self.clearance_asked,
+            bodies=tuple(
+                Body(one.name, one.shape.geometry(), obstacle_places(one, self.t)) for one in self.obstacles
+            ),
+            nearest=Nearest(*near, self.clearance_names, self.clearance_asked)
+            if len(self) and len(self.clearance_points) == len(self)
+            else None,
         )
 
     def play(self, *, port: int | None = None, open_browser: bool = True, ellipsoids: Wanted = False) -> None:
         """Play the motion in a browser with MeshCat; returns when the user ends it (Ctrl-C)."""
-        door("nmm.playback:play")([self], port=port, open_browser=open_browser, ellipsoids=ellipsoids)
+        lazy_call("nmm.playback:play")([self], port=port, open_browser=open_browser, ellipsoids=ellipsoids)
 
     def _repr_html_(self) -> str | None:
         """In a notebook: the page that plays it."""
-        page: str | None = door("nmm.playback.inline:of_run")(self)
+        page: str | None = lazy_call("nmm.playback.html:of_run")(self)
         return page
 
 

@@ -9,13 +9,13 @@ from typing import Any
 
 from nmm.errors import ScenarioError
 from nmm.files import read_bytes
-from nmm.scenario.named_reference import is_path
-from nmm.scenario.numbers import shown
+from nmm.scenario.keys import is_path
 from nmm.scenario.yaml_text import LONGEST, Place, dotted, read_text
-from nmm.words import listed
+from nmm.text_format import listed
 
 #: Where one mapping may stand for a list of one: its index 0 is the mapping.
 _ONE_OR_MORE = ("task", "objective", "added_task")
+_MISSING = object()
 
 
 def _shorthand(path: Place, data: Mapping[str, Any]) -> str | None:
@@ -31,23 +31,16 @@ def _shorthand(path: Place, data: Mapping[str, Any]) -> str | None:
 class Document:
     """Plain data (mappings, lists, strings, booleans, None) and where each part of it was written.
 
-    Numbers stay strings, to be read as arithmetic: YAML 1.1 has its own mind about `1e-3` and `010`.
-
-    Attributes
-    ----------
-    name : the file, as errors name it
-    data : the top mapping
-    lines : line of each key and item, from 1
-    folder : where the file is
-    settings : the places that were set since, and the working folder at that time
-    tied : places that an anchor (&) and its aliases (*) gave one value
+    Numbers stay strings, to be read as arithmetic: YAML 1.1 reads `1e-3` as text and `010` as 8.
     """
 
-    name: str
+    name: str  #: the file, as errors name it
     data: dict[str, Any]
-    lines: dict[Place, int] = field(default_factory=dict)
-    folder: Path = field(default_factory=Path.cwd)
+    lines: dict[Place, int] = field(default_factory=dict)  #: of each key and item, from 1
+    folder: Path = field(default_factory=Path.cwd)  #: where the file is
+    #: The places that were set since, and the working folder at that time.
     settings: dict[Place, Path] = field(default_factory=dict)
+    #: Places that an anchor (&) and its aliases (*) gave one value.
     tied: list[list[Place]] = field(default_factory=list)
 
     def where(self, path: Place) -> str:
@@ -88,23 +81,16 @@ class Document:
         return sentences
 
     def _touched(self, path: Place) -> bool:
-        """Whether a place was set, or what it is in, or something in it."""
         return any(path[: len(place)] == place[: len(path)] for place in self.settings)
 
     def _setting_of(self, path: Place) -> Place | None:
         return next((place for place in self.settings if path[: len(place)] == place), None)
 
     def with_settings(self, settings: Mapping[str, object]) -> Document:
-        """A copy in which the values at dotted paths are others, set one after the other.
+        """A copy with other values, text as in the file or plain data, at dotted paths (`Scenario.override`).
 
-        Parameters
-        ----------
-        settings : keys as "resolver.alpha" or "task.0.gain", counting begins at 0; values are text, read as
-            in the file ("5/4*pi", "[v, q1]", "{x: 1}"), or plain data
-
-        Raises
-        ------
-        ScenarioError : a path leads nowhere, or the text is not YAML
+        They are set one after the other; `ScenarioError` for a path that leads nowhere, and text that is no
+        YAML.
         """
         copy = replace(self, data=_copied(self.data), settings=dict(self.settings))
         for key, value in settings.items():
@@ -112,55 +98,40 @@ class Document:
         return copy
 
     def _set(self, key: str, value: object) -> None:
-        path = _parsed(key, self)
+        where = f"{self.name}: set {key}"
+        path: Place = ()
         place: Any = self.data
-        for depth, step in enumerate(path[:-1]):
-            if isinstance(place, dict):
-                inner = place.setdefault(step, {})
-                shorthand = _shorthand(path[: depth + 1], self.data)
-                if isinstance(inner, str) and shorthand is not None:
-                    inner = place[step] = {shorthand: inner}
-                place = inner
-            else:
-                place = place[step]
-        if isinstance(value, str):
-            value = read_text(value, f"{self.name}: set {key}", lines=False).value
-        place[path[-1]] = _copied(value)
-        self.settings[path] = Path.cwd()
-
-
-def _parsed(key: str, document: Document) -> Place:
-    """The path of a dotted key, with indices where there are lists; `ScenarioError` when it leads nowhere."""
-    path: Place = ()
-    place: Any = document.data
-    for step in key.split("."):
-        where = f"{document.name}: set {key}"
-        if not step:
-            raise ScenarioError(f"{where}: expected a dotted key such as resolver.alpha or task.0.gain")
-        if isinstance(place, list):
-            if not step.isdecimal() or int(step) >= len(place):
-                last = len(place) - 1
+        holder: Any = None  # the mapping or list that holds the place
+        for step in key.split("."):
+            shorthand = _shorthand(path, self.data) if isinstance(place, str) else None
+            if not step:
                 raise ScenarioError(
-                    f"{where}: {dotted(path)} is a list; expected an index from 0 to {last}, got {step!r}"
+                    where=where, expected="a dotted key such as resolver.alpha or task.0.gain"
                 )
-            path = (*path, int(step))
-            place = place[int(step)]
-        elif isinstance(place, dict) and step == "0" and path and path[-1] in _ONE_OR_MORE:
-            continue
-        elif isinstance(place, dict):
-            path = (*path, step)
-            place = place.get(step, {})
-        elif isinstance(place, str) and (shorthand := _shorthand(path, document.data)) is not None:
-            path = (*path, step)
-            place = place if step == shorthand else {}
-        elif is_path(place):
-            raise ScenarioError(f"{where}: {dotted(path)} is {place}: set {place}.{step}")
-        else:
-            raise ScenarioError(
-                f"{where}: {dotted(path)} is {shown(place)}, which has no keys: "
-                f"give it some, as in --set '{dotted(path)}={{{step}: …}}'"
-            )
-    return path
+            if shorthand is not None:
+                place = holder[path[-1]] = {shorthand: place}
+            elif place is _MISSING:
+                place = holder[path[-1]] = {}
+            if isinstance(place, list):
+                if not step.isdecimal() or int(step) >= len(place):
+                    expected = f"an index up to {len(place) - 1}"
+                    raise ScenarioError("it is a list", where=where, expected=expected, got=step)
+                path, place, holder = (*path, int(step)), place[int(step)], place
+            elif isinstance(place, dict):
+                if step != "0" or not path or path[-1] not in _ONE_OR_MORE:
+                    path, place, holder = (*path, step), place.get(step, _MISSING), place
+            elif is_path(place):
+                raise ScenarioError(f"{dotted(path)} is {place}: set {place}.{step}", where=where)
+            else:
+                raise ScenarioError(
+                    f"{dotted(path)} is {ScenarioError.show(place)}, which has no keys: give it some, "
+                    f"as in --set '{dotted(path)}={{{step}: …}}'",
+                    where=where,
+                )
+        if isinstance(value, str):
+            value = read_text(value, where, lines=False).value
+        holder[path[-1]] = _copied(value)
+        self.settings[path] = Path.cwd()
 
 
 def _copied(value: Any) -> Any:
@@ -174,13 +145,12 @@ def _copied(value: Any) -> Any:
 
 
 def read_file(path: Path) -> Document:
-    """Read a scenario file; `ScenarioError` names file and line of what is wrong with it."""
     try:
         text = read_bytes(path, LONGEST).decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise ScenarioError(f"{path}: expected UTF-8 text") from None
+        raise ScenarioError(where=path, expected="UTF-8 text") from None
     except OSError as error:
-        raise ScenarioError(f"{path}: cannot be read ({error.strerror})") from None
+        raise ScenarioError(f"cannot be read ({error.strerror})", where=path) from None
     return document_of(text, str(path), path.resolve().parent)
 
 
@@ -188,6 +158,6 @@ def document_of(text: str, name: str, folder: Path) -> Document:
     """The document of a scenario's text; `name` is what errors call it, `folder` where it stands."""
     data, lines, tied = read_text(text, name)
     if not isinstance(data, dict):
-        raise ScenarioError(f"{name}: expected a mapping (key: value), got {shown(data)}")
+        raise ScenarioError(where=name, expected="a mapping (key: value)", got=data)
     lines.pop((), None)  # of the file as a whole its name is enough
     return Document(name, data, lines, folder, tied=tied)

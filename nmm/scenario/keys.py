@@ -1,31 +1,63 @@
-"""A part of a scenario: its keys, checked by pydantic, and the object that it makes."""
+"""A part of a scenario: its keys, checked by pydantic; and references that are named by their paths."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import copy
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import reduce
+from contextvars import ContextVar
+from dataclasses import dataclass
+from functools import partial, reduce
 from operator import or_
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
-from pydantic_core import ErrorDetails, PydanticCustomError
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    GetCoreSchemaHandler,
+    ValidationError,
+    ValidationInfo,
+    model_validator,
+)
+from pydantic_core import CoreSchema, ErrorDetails
 
-from nmm.errors import InputError, unknown
-from nmm.scenario.numbers import shown
+from nmm.errors import InputError, NmmError, ScenarioError, expect_known, no_such
 from nmm.scenario.yaml_text import Place
 
+P = TypeVar("P")
+T = TypeVar("T")
 #: Which of two a value is, where a number or a function may stand: pydantic puts it into its locations.
 NUMBER, FUNCTION = "<number>", "<function>"
+_PATH = re.compile(r"task(\.\w+)+")
 
 
-class KeyedError(InputError):
+class KeyedError(ScenarioError):
     """What is wrong, and at which place of the scenario; `Scenario` adds the file and the line."""
 
-    def __init__(self, place: Place, text: str) -> None:
-        super().__init__(text)
+    def __init__(self, place: Place, what: str = "", **fields: Any) -> None:
+        super().__init__(what, **fields)
         self.place = place
-        self.text = text
+
+    @classmethod
+    def of(cls, place: Place, error: NmmError) -> KeyedError:
+        inner = error.place if isinstance(error, KeyedError) else ()
+        return error.placed(error.where, partial(cls, (*place, *inner)))
+
+
+_older_names: ContextVar[bool] = ContextVar("older_names", default=False)
+
+
+@contextmanager
+def older_names() -> Iterator[None]:
+    """In the block, keys may have the names that they had in earlier versions, as in an old run's folder."""
+    token = _older_names.set(True)
+    try:
+        yield
+    finally:
+        _older_names.reset(token)
 
 
 @contextmanager
@@ -33,15 +65,17 @@ def at(*place: str | int) -> Iterator[None]:
     """Errors of the block are about this place; places nest."""
     try:
         yield
-    except KeyedError as error:
-        raise KeyedError((*place, *error.place), error.text) from None
     except InputError as error:
-        raise KeyedError(place, str(error)) from None
+        raise KeyedError.of(place, error) from None
 
 
-def at_key(key: str, text: str) -> PydanticCustomError:
-    """What a validator raises for an error at a key of the mapping that it looks at."""
-    return PydanticCustomError("at_key", "{text}", {"text": text, "key": key})
+def each(parts: Iterable[P], make: Callable[[P], T], *place: str | int) -> list[T]:
+    """What is made of each part of the list at this place; errors know which one."""
+    found = []
+    for i, part in enumerate(parts):
+        with at(*place, i):
+            found.append(make(part))
+    return found
 
 
 class Part(BaseModel):
@@ -56,62 +90,77 @@ class Part(BaseModel):
     @classmethod
     def _known_keys(cls, data: Any) -> Any:
         if isinstance(data, Mapping):
+            if _older_names.get():
+                data = {cls.renamed.get(key, key): value for key, value in data.items()}
             for key in data:
                 if key in cls.renamed:
-                    raise at_key(str(key), f"this key is called {cls.renamed[key]} now")
-                if key not in cls.model_fields:
-                    raise at_key(str(key), unknown("key", key, cls.model_fields))
+                    raise KeyedError((str(key),), f"this key is called {cls.renamed[key]} now")
+                with at(str(key)):
+                    expect_known("key", key, cls.model_fields)
         return data
+
+    def given(self, *keys: str) -> dict[str, Any]:
+        """The values of these keys, of all when none is named, without those that are None."""
+        values = {key: getattr(self, key) for key in keys or type(self).model_fields}
+        return {key: value for key, value in values.items() if value is not None}
 
     @contextmanager
     def own_keys(self) -> Iterator[None]:
-        """An error of the block whose text begins with one of this part's keys is about that key."""
+        """An error of the block whose `where` begins with one of this part's keys is about that key."""
         try:
             yield
         except KeyedError:
             raise
         except InputError as error:
-            head, _, rest = str(error).partition(": ")
-            if head in type(self).model_fields and rest:
-                raise KeyedError((head,), rest) from None
+            head, _, rest = error.where.partition(": ")
+            if head in type(self).model_fields:
+                raise error.placed(rest, partial(KeyedError, (head,))) from None
             raise
 
 
-def one_of(parts: Mapping[str, type[Part]]) -> Any:
-    """The type of a value that is one of several parts, told by its `kind`; complains about one without."""
+@dataclass(frozen=True, eq=False)
+class OneOf:
+    """Of an annotation: the value is one of several parts, chosen by its `kind`, which has to be there."""
 
-    def check(value: Any) -> Any:
+    parts: Mapping[str, type[Part]]
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        either: Any = reduce(or_, self.parts.values())
+        chosen = Annotated[either, Field(discriminator="kind")]
+        return handler.generate_schema(Annotated[chosen, BeforeValidator(self._check)])
+
+    def _check(self, value: Any) -> Any:
         if isinstance(value, Mapping) and "kind" not in value:
-            raise at_key("kind", f"this key is missing; available: {', '.join(parts)}")
+            raise KeyedError(("kind",), "this key is missing", available=self.parts)
         return value
-
-    either: Any = reduce(or_, parts.values())
-    return Annotated[Annotated[either, Field(discriminator="kind")], BeforeValidator(check)]
 
 
 def first_error(error: ValidationError, data: Any) -> KeyedError:
     """The first thing that pydantic found wrong with `data`, as one line at its place."""
     details = error.errors(include_url=False)
-    place, text = _explained(details[0])
-    more = f" (and {len(details) - 1} more)" if len(details) > 1 else ""
-    return KeyedError(as_written(place, data), text + more)
+    first = _explained(details[0])
+    what = first.what
+    if len(details) > 1:
+        what = f"the first of {len(details)} faults" + (f": {what}" if what else "")
+    place = as_written(first.place, data)
+    return KeyedError(
+        place, what, where=first.where, expected=first.expected, got=first.got, available=first.available
+    )
 
 
-def _explained(detail: ErrorDetails) -> tuple[Place, str]:
-    place = detail["loc"]
-    kind, context, came = detail["type"], detail.get("ctx", {}), shown(detail["input"])
-    if kind == "at_key":
-        return (*place, context["key"]), context["text"]
+def _explained(detail: ErrorDetails) -> KeyedError:
+    place, kind, context, came = detail["loc"], detail["type"], detail.get("ctx", {}), detail["input"]
     if kind == "value_error":
-        return place, str(context["error"])
+        error = context["error"]
+        return KeyedError.of(place, error if isinstance(error, NmmError) else InputError(str(error)))
     if kind == "missing":
-        return place, "this key is missing"
+        return KeyedError(place, "this key is missing")
     if kind == "union_tag_invalid":
-        names = _unquoted(context["expected_tags"]).split(", ")
-        return (*place, "kind"), unknown("kind", context["tag"], names)
+        names = context["expected_tags"].replace("'", "").split(", ")
+        return no_such("kind", context["tag"], names, error=partial(KeyedError, (*place, "kind")))
     if kind == "literal_error":
-        names = _unquoted(context["expected"].replace(" or ", ", ")).split(", ")
-        return place, unknown("value", detail["input"], names)
+        names = context["expected"].replace(" or ", ", ").replace("'", "").split(", ")
+        return no_such("value", came, names, error=partial(KeyedError, place))
     expected = {
         "greater_than": "a number above {gt:g}",
         "too_short": "at least {min_length}",
@@ -126,31 +175,23 @@ def _explained(detail: ErrorDetails) -> tuple[Place, str]:
     }.get(kind)
     if expected is None:
         message = " ".join(detail["msg"].split())
-        return place, f"{message[:1].lower()}{message[1:]}, got {came}"
-    return place, f"expected {expected.format(**context)}, got {came}"
-
-
-def _unquoted(names: str) -> str:
-    return names.replace("'", "")
-
-
-def _kind_of_short(data: Mapping[str, Any]) -> str | None:
-    """The kind of a mapping that is written without: {rpy: ...} and {quaternion: ...} are rotations."""
-    return "rotation" if {"rpy", "quaternion"} & set(data) else None
+        return KeyedError(place, f"{message[:1].lower()}{message[1:]}, got {ScenarioError.show(came)}")
+    return KeyedError(place, expected=expected.format(**context), got=came)
 
 
 def as_written(place: Place, data: Any) -> Place:
     """A place in the checked parts as the place in the data that they were made from.
 
-    Left out are the kinds that pydantic puts into its locations, the index of a list of one that is
-    written without the list, and the keys of what is written in short (a bare name or number).
+    Omits the kinds that pydantic adds, the index of a list of one written without the list, and the keys of
+    shorthand (a bare name or number).
     """
     written: list[str | int] = []
     for depth, step in enumerate(place):
         if isinstance(data, Mapping):
+            short = "rotation" if {"rpy", "quaternion"} & {*data} else None  # written without its kind
             if step in data:
                 data = data[step]
-            elif isinstance(step, int) or step in (NUMBER, FUNCTION, data.get("kind", _kind_of_short(data))):
+            elif isinstance(step, int) or step in (NUMBER, FUNCTION, data.get("kind", short)):
                 continue
             else:  # a key that is missing, or left at its default
                 return (*written, *place[depth:])
@@ -160,3 +201,43 @@ def as_written(place: Place, data: Any) -> Place:
             continue
         written.append(step)
     return tuple(written)
+
+
+def is_path(value: object) -> bool:
+    """Whether a text is meant as a path to a task's reference: no number is, and no frame is called so."""
+    return isinstance(value, str) and _PATH.fullmatch(value.strip()) is not None
+
+
+class NamedReferences:
+    """The references of a scenario's tasks by their paths, from its plain data; the validators' context."""
+
+    def __init__(self, data: Mapping[str, Any]) -> None:
+        tasks = data.get("task")
+        listed = {"task": tasks} if isinstance(tasks, Mapping) else {}
+        # A task that is written without the list is the list's only one, too.
+        numbered = tasks if isinstance(tasks, list) else listed.values()
+        listed |= {f"task.{i}": task for i, task in enumerate(numbered)}
+        self._references = {
+            f"{name}.reference": task["reference"]
+            for name, task in listed.items()
+            if isinstance(task, Mapping) and "reference" in task
+        }
+        self._open: list[str] = []
+
+    @contextmanager
+    def followed(self, path: str) -> Iterator[Any]:
+        """What is written at a path; `ValueError` where nothing is, and in a circle."""
+        expect_known("reference", path, self._references)
+        if path in self._open:
+            circle = " → ".join([*self._open[self._open.index(path) :], path])
+            raise InputError(expected="a reference that does not lead back to itself", got=circle)
+        self._open.append(path)
+        try:
+            yield copy.deepcopy(self._references[path])  # pydantic takes the same object for a circle
+        finally:
+            self._open.pop()
+
+
+def references_of(info: ValidationInfo) -> NamedReferences:
+    """Those of the scenario that is being checked; a part that is checked alone has none."""
+    return info.context if isinstance(info.context, NamedReferences) else NamedReferences({})

@@ -1,7 +1,5 @@
 """Numbers as people write them in a scenario: `0.005`, `1e-3`, `5/4*pi`, `sqrt(2)/2`."""
 
-from __future__ import annotations
-
 import ast
 import math
 import operator
@@ -17,7 +15,8 @@ from simpleeval import (  # type: ignore[import-untyped]  # it has no annotation
     SimpleEval,
 )
 
-from nmm.words import quoted
+from nmm.errors import InputError, ScenarioError
+from nmm.text_format import quoted
 
 #: Numbers, or lists of them to any depth, as plain data.
 Nested = float | list[Any]
@@ -32,75 +31,67 @@ _OPERATORS: dict[type[ast.AST], Callable[..., float]] = {
     ast.USub: operator.neg,
     ast.UAdd: operator.pos,
 }
-_SYNTAX = (ast.BinOp, ast.UnaryOp, ast.Constant, ast.Name, ast.Call)
-_EXPECTED = "expected a number or arithmetic with pi (+ - * / ** sqrt)"
+_SYNTAX = (ast.BinOp, ast.UnaryOp, ast.Name, ast.Call)
+_EXPECTED = "a number or arithmetic with pi (+ - * / ** sqrt)"
 
 
-class _Arithmetic(SimpleEval):
-    """simpleeval with floating-point numbers, + - * / **, pi and sqrt, and nothing else.
+def _literal(node: ast.Constant) -> float:
+    """A number as a float, so that no power can grow into an integer that fills the memory."""
+    if isinstance(node.value, bool) or not isinstance(node.value, int | float):
+        raise InvalidExpression(f"{node.value!r} is not a real number")
+    return float(node.value)
 
-    Every literal becomes a float, so that no power can grow into an integer that fills the memory.
-    """
 
-    nodes: dict[type[ast.AST], Callable[..., Any]]
-
-    def __init__(self) -> None:
-        super().__init__(operators=_OPERATORS, functions={"sqrt": math.sqrt}, names={"pi": math.pi})
-        self.nodes = {kind: evaluate for kind, evaluate in self.nodes.items() if kind in _SYNTAX}
-        self.nodes[ast.Constant] = self._literal
-
-    @staticmethod
-    def _literal(node: ast.Constant) -> float:
-        if isinstance(node.value, bool) or not isinstance(node.value, int | float):
-            raise InvalidExpression(f"{node.value!r} is not a real number")
-        return float(node.value)
+def _arithmetic() -> SimpleEval:
+    """simpleeval with floating-point numbers, + - * / **, pi and sqrt, and nothing else."""
+    made = SimpleEval(operators=_OPERATORS, functions={"sqrt": math.sqrt}, names={"pi": math.pi})
+    made.nodes = {kind: made.nodes[kind] for kind in _SYNTAX} | {ast.Constant: _literal}
+    return made
 
 
 @lru_cache(maxsize=10_000)
 def evaluate(text: str) -> float:
     """The value of an arithmetic expression; `ValueError` when it is none, or not finite."""
     if text.strip().lower().lstrip("+-.") in ("nan", "inf", "infinity"):
-        raise ValueError(f"expected a finite number, got {text!r}")
+        raise InputError(expected="a finite number", got=text)
     if len(text) > LONGEST:
-        raise ValueError(f"{_EXPECTED} of at most {LONGEST} characters, got {len(text)}")
+        raise InputError(expected=f"{_EXPECTED} of at most {LONGEST} characters", got=len(text))
     try:
-        value = _Arithmetic().eval(text, ast.parse(text.strip(), mode="eval").body)
+        value = _arithmetic().eval(text, ast.parse(text.strip(), mode="eval").body)
     except NameNotDefined as error:
-        raise ValueError(f"{_EXPECTED}, got {text!r} (unknown name {error.name!r})") from None
+        raise InputError(f"unknown name {quoted(error.name)}", expected=_EXPECTED, got=text) from None
     except ZeroDivisionError:
-        raise ValueError(f"expected a finite number, got {text!r} (a division by zero)") from None
+        raise InputError("a division by zero", expected="a finite number", got=text) from None
     except OverflowError:
-        raise ValueError(f"expected a finite number, got {text!r} (too large)") from None
+        raise InputError("too large", expected="a finite number", got=text) from None
     except (InvalidExpression, SyntaxError, ValueError, TypeError, RecursionError, MemoryError):
-        raise ValueError(f"{_EXPECTED}, got {text!r}") from None
+        raise InputError(expected=_EXPECTED, got=text) from None
     if isinstance(value, complex) or callable(value):
-        raise ValueError(f"{_EXPECTED}, got {text!r}")
+        raise InputError(expected=_EXPECTED, got=text)
     return float(value)
 
 
 def number(value: object) -> float:
-    """A finite float from a number or an expression; `ValueError` says what came instead."""
+    """A finite float from a number or an expression; `InputError` for anything else."""
     if isinstance(value, str):
         result = evaluate(value)
     elif isinstance(value, Real) and not isinstance(value, bool):
         result = float(value)
     else:
-        raise ValueError(f"{_EXPECTED}, got {shown(value)}")
+        raise InputError(expected=_EXPECTED, got=value)
     if not math.isfinite(result):
-        raise ValueError(f"expected a finite number, got {shown(value)}")
+        raise InputError(expected="a finite number", got=value)
     return result
 
 
 def integer(value: object) -> int:
-    """A whole number."""
     result = number(value)
     if result != int(result):
-        raise ValueError(f"expected a whole number, got {shown(value)}")
+        raise InputError(expected="a whole number", got=value)
     return int(result)
 
 
 def nested(value: object) -> Nested:
-    """A number, or lists of them to any depth: shapes are the business of what reads them."""
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, list | tuple):
@@ -109,21 +100,13 @@ def nested(value: object) -> Nested:
 
 
 def numbers(value: object) -> list[Nested]:
-    """A list of numbers, or of lists of them."""
     result = nested(value)
     if not isinstance(result, list):
-        raise ValueError(f"expected a list of numbers, got {shown(value)}")
+        raise InputError(expected="a list of numbers", got=value)
     return result
 
 
-def shown(value: object) -> str:
-    """A value as an error shows it: on one line, not too long."""
-    if value is None:
-        return "nothing (null)"
-    if isinstance(value, bool):
-        return str(value).lower()
-    return quoted(value)
-
+shown = ScenarioError.show
 
 Number = Annotated[float, BeforeValidator(number)]
 Positive = Annotated[float, BeforeValidator(number), Field(gt=0.0)]
@@ -140,17 +123,16 @@ def numbers_by_name(value: Mapping[Any, object], what: str = "") -> dict[str, fl
     for name, item in value.items():
         try:
             result[str(name)] = number(item)
-        except ValueError as error:
-            raise ValueError(f"{what}{name}: {error}") from None
+        except InputError as error:
+            raise error.at(f"{what}{name}") from None
     return result
 
 
 def number_or_by_name(value: object) -> float | dict[str, float] | None:
-    """A number for all, or numbers by name."""
     if value is None:
         return None
     if isinstance(value, bool | list):
-        raise ValueError(f"expected a number, or numbers by name, got {shown(value)}")
+        raise InputError(expected="a number, or numbers by name", got=value)
     return numbers_by_name(value) if isinstance(value, Mapping) else number(value)
 
 

@@ -1,9 +1,9 @@
 """The objectives of a scenario: what the redundancy is used for."""
 
-from __future__ import annotations
-
+import operator
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Literal
+from functools import reduce
+from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
@@ -11,32 +11,32 @@ from nmm.control.collisions import Collisions
 from nmm.functions.function import Function
 from nmm.functions.objectives.base import Objective
 from nmm.functions.objectives.clearance import Clearance
-from nmm.functions.objectives.quadratic import Quadratic, Square
+from nmm.functions.objectives.coordinates import Quadratic, QuadraticTerm
 from nmm.kinds import OBJECTIVES
 from nmm.robots.robot import Robot
-from nmm.scenario.function_part import FunctionPart, check_coordinates, check_functions, check_names
+from nmm.scenario.constructors import (
+    Combination,
+    FunctionPart,
+    MadePart,
+    check_coordinates,
+    check_part,
+    listed,
+    part_of,
+)
 from nmm.scenario.functions import REFERENCES_BY_NAME, Reference
-from nmm.scenario.keys import FUNCTION, NUMBER, Part, at, one_of
-from nmm.scenario.made_part import MadePart, part_of
-from nmm.scenario.named_reference import is_path
+from nmm.scenario.keys import FUNCTION, NUMBER, OneOf, Part, at, each, is_path
 from nmm.scenario.numbers import Number, Positive
-from nmm.scenario.spelling import Combination
 
 USUAL = Clearance()
 
 
 def _spelled(value: object) -> str:
-    """Whether a value is a function of time or of the configuration, or a number."""
     return FUNCTION if isinstance(value, Mapping | FunctionPart) or is_path(value) else NUMBER
 
 
-if TYPE_CHECKING:
-    Target = float | FunctionPart
-    Weight = float | FunctionPart
-else:
-    _function, _told = Annotated[Reference, Tag(FUNCTION)], Discriminator(_spelled)
-    Target = Annotated[Annotated[Number, Tag(NUMBER)] | _function, _told]
-    Weight = Annotated[Annotated[Positive, Tag(NUMBER)] | _function, _told]
+_Function = Annotated[Reference, Tag(FUNCTION)]
+Target = Annotated[Annotated[Number, Tag(NUMBER)] | _Function, Discriminator(_spelled)]
+Weight = Annotated[Annotated[Positive, Tag(NUMBER)] | _Function, Discriminator(_spelled)]
 
 
 class ObjectivePart(MadePart):
@@ -50,14 +50,11 @@ class ObjectivePart(MadePart):
     maximise: bool = Field(False, description="whether to maximise it: its negative is minimised")
 
     def among(self, collisions: Collisions | None) -> Objective:
-        """The objective of a run that keeps these distances."""
         objective: Objective = self.make()
         return objective
 
     def build(self, robot: Robot, collisions: Collisions | None = None) -> Objective:
-        """The weighted objective; errors know their key."""
-        check_names(self, robot)
-        check_functions(self, robot)
+        check_part(self, robot)
         objective = self.among(collisions)
         with self.own_keys():
             for _, term in objective.terms_on(robot):
@@ -79,7 +76,6 @@ class TermPart(Part):
     weight: Positive = Field(1.0, description="above 0")
 
     def aim(self, i: int) -> float | Function:
-        """The target; errors know the key of term i."""
         if isinstance(self.target, FunctionPart):
             with at("terms", i, "target"):
                 target: Function = self.target.make("rad")
@@ -95,7 +91,9 @@ class QuadraticPart(ObjectivePart):
     terms: list[TermPart] = Field(description="the squares that are added up", min_length=1)
 
     def make(self, unit: str = "m") -> Objective:
-        return Quadratic(*(Square(term.of, term.aim(i), term.weight) for i, term in enumerate(self.terms)))
+        return Quadratic(
+            *(QuadraticTerm(term.of, term.aim(i), term.weight) for i, term in enumerate(self.terms))
+        )
 
     def build(self, robot: Robot, collisions: Collisions | None = None) -> Objective:
         for i, term in enumerate(self.terms):
@@ -137,7 +135,7 @@ class MaximisedPart(ObjectivePart):
 
 SPECIAL: dict[str, type[ObjectivePart]] = {"quadratic": QuadraticPart, "clearance": ClearancePart}
 BASES = dict.fromkeys(
-    ("manipulability", "weighed_manipulability", "directional_manipulability", "inverse_condition"),
+    ("manipulability", "weighted_manipulability", "directional_manipulability", "inverse_condition"),
     MaximisedPart,
 )
 OBJECTIVE_PARTS: dict[str, type[ObjectivePart]] = {
@@ -148,27 +146,15 @@ OBJECTIVE_PARTS: dict[str, type[ObjectivePart]] = {
 for _part in OBJECTIVE_PARTS.values():
     _part.model_rebuild(_types_namespace=REFERENCES_BY_NAME)
 
-
-def _listed(value: object) -> object:
-    if value is None:
-        return []
-    return value if isinstance(value, list | tuple) else [value]
-
-
-if TYPE_CHECKING:
-    ObjectiveList = list[ObjectivePart]
-else:
-    #: One objective, a list that is added up, or nothing.
-    ObjectiveList = Annotated[list[one_of(OBJECTIVE_PARTS)], BeforeValidator(_listed)]
+#: One objective, a list that is added up, or nothing.
+ObjectiveList = Annotated[
+    list[Annotated[ObjectivePart, OneOf(OBJECTIVE_PARTS)]],
+    BeforeValidator(lambda given: [] if given is None else listed(given)),
+]
 
 
 def build_objective(
     parts: list[ObjectivePart], robot: Robot, collisions: Collisions | None = None
 ) -> Objective | None:
-    """The sum of the parts, if there are any; `collisions` are those of the run."""
-    total: Objective | None = None
-    for i, part in enumerate(parts):
-        with at(i):
-            objective = part.build(robot, collisions)
-        total = objective if total is None else total + objective
-    return total
+    built = each(parts, lambda part: part.build(robot, collisions))
+    return reduce(operator.add, built) if built else None

@@ -1,7 +1,5 @@
 """The keys of a scenario as text: what `nmm scenarios --keys` prints."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
@@ -9,20 +7,15 @@ from typing import NamedTuple
 from pydantic_core import PydanticUndefined
 
 from nmm.kinds import RESOLVERS
-from nmm.scenario.collisions import CollisionsPart
-from nmm.scenario.conditions import CONDITION_PARTS
+from nmm.scenario.collisions import SHAPE_PARTS, CollisionsPart, ObstaclePart
 from nmm.scenario.functions import FUNCTION_PARTS, REFERENCE_PARTS
-from nmm.scenario.goals import GoalPart, RetreatPart
 from nmm.scenario.keys import Part
-from nmm.scenario.limits import BoundPart, LimitsPart
+from nmm.scenario.limits import BoundPart, GoalPart, LimitsPart, RetreatPart, SteeringPart
 from nmm.scenario.objectives import OBJECTIVE_PARTS, TermPart
-from nmm.scenario.obstacles import ObstaclePart
 from nmm.scenario.resolvers import RESOLVER_PARTS
 from nmm.scenario.robot import ArmPart, MountedPart, RobotPart
 from nmm.scenario.schema import ScenarioPart
-from nmm.scenario.shapes import SHAPE_PARTS
-from nmm.scenario.steering import SteeringPart
-from nmm.scenario.tasks import TASK_PARTS
+from nmm.scenario.tasks import CONDITION_PARTS, TASK_PARTS
 
 
 class Section(NamedTuple):
@@ -34,7 +27,7 @@ class Section(NamedTuple):
 
 
 def sections() -> Iterator[Section]:
-    """The parts of a scenario, from the top; a reference that is a task's function too is told once."""
+    """The parts of a scenario, from the top; a reference that is a task's function too is listed once."""
     yield _section("the file", ScenarioPart)
     yield _section("robot", RobotPart)
     yield _section("robot, with arms mounted", MountedPart)
@@ -86,7 +79,6 @@ def _section(title: str, part: type[Part], called: str = "") -> Section:
 
 
 def _text(value: object) -> str:
-    """A default as the file would say it; nothing where there is none."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, SteeringPart):

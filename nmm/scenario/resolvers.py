@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from nmm.errors import InputError
 from nmm.kinds import RESOLVERS
-from nmm.scenario.keys import KeyedError, one_of
-from nmm.scenario.made_part import MadePart, part_of
-from nmm.scenario.numbers import Positive, integer, shown
+from nmm.scenario.constructors import MadePart, part_of
+from nmm.scenario.keys import KeyedError, OneOf
+from nmm.scenario.numbers import Positive, integer
 from nmm.scenario.tasks import TaskList, listed
 
 
@@ -22,20 +23,14 @@ class ResolverPart(MadePart):
 def _partitions(value: object) -> object:
     if isinstance(value, str):
         if value != "automatic":
-            raise ValueError(f"expected automatic, or a list of lists of inputs, got {shown(value)}")
+            raise InputError(expected="automatic, or a list of lists of inputs", got=value)
         return value
     if not isinstance(value, list | tuple) or not all(isinstance(item, list | tuple) for item in value):
-        raise ValueError(
-            f"expected automatic, or a list of lists of inputs ([[v, q1], [v, omega]]), got {shown(value)}"
-        )
+        raise InputError(expected="automatic, or lists of inputs ([[v, q1], [v, omega]])", got=value)
     return [
         [item if isinstance(item, str) and not item.isdecimal() else integer(item) for item in p]
         for p in value
     ]
-
-
-def _listed_or_none(value: object) -> object:
-    return value if value is None else listed(value)
 
 
 class WithAddedTask(ResolverPart):
@@ -43,7 +38,9 @@ class WithAddedTask(ResolverPart):
 
     renamed: ClassVar[dict[str, str]] = {"constraint": "added_task"}
 
-    added_task: Annotated[TaskList | None, BeforeValidator(_listed_or_none)] = Field(
+    added_task: Annotated[
+        TaskList | None, BeforeValidator(lambda value: None if value is None else listed(value))
+    ] = Field(
         None,
         description="the task y = h(q) that takes up the redundancy, or a list of such, p + n_m - s rows "
         "together; when not given and the objective is quadratic with so many terms, each term's combination "
@@ -72,7 +69,7 @@ RESOLVER_PARTS: dict[str, type[ResolverPart]] = {
 
 class OwnPart(ResolverPart):
     """The resolver of a Python file, as a run's folder records it. It is named on the command line, or given
-    in Python: code of a file that a scenario names is never run, whoever wrote the scenario."""
+    in Python: code of a file that a scenario names is never run."""
 
     kind: Literal["own"]
     source: str
@@ -80,7 +77,8 @@ class OwnPart(ResolverPart):
     def make(self, unit: str = "m") -> Any:
         raise KeyedError(
             ("source",),
-            f"a scenario runs no Python; expected {self.source} as --resolver FILE.py:NAME, or in Python as "
+            "a scenario runs no Python",
+            expected=f"{self.source} as --resolver FILE.py:NAME, or in Python as "
             "scenario.with_resolver(resolver)",
         )
 
@@ -93,7 +91,4 @@ class OwnPart(ResolverPart):
         return self.model_dump()
 
 
-if TYPE_CHECKING:
-    AnyResolver = ResolverPart
-else:
-    AnyResolver = one_of({**RESOLVER_PARTS, "own": OwnPart})
+AnyResolver = Annotated[ResolverPart, OneOf({**RESOLVER_PARTS, "own": OwnPart})]

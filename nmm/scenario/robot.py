@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, WrapValidator, model_validator
 
-from nmm.errors import InputError, unknown
-from nmm.scenario.keys import KeyedError, Part, at, at_key
-from nmm.scenario.numbers import Number, number, numbers, numbers_by_name, shown
+from nmm.errors import InputError, expect_known
+from nmm.files import named_folder
+from nmm.scenario.keys import KeyedError, Part, at
+from nmm.scenario.numbers import Number, number, numbers, numbers_by_name
 from nmm.scenario.yaml_text import Place
 
 if TYPE_CHECKING:
@@ -25,56 +27,48 @@ PACKAGE = "package://"
 
 
 def _argument(value: object) -> str:
-    """A xacro argument as the text that xacro reads."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str | int | float):
         return str(value)
-    raise ValueError(f"expected a number or text, got {shown(value)}")
+    raise InputError(expected="a number or text", got=value)
 
 
 def _wheels(value: object) -> object:
-    """Names, or radii by name."""
     if isinstance(value, Mapping):
         return numbers_by_name(value)
     if value is None or isinstance(value, list | tuple):
         return value
-    raise ValueError(f"expected a list of joints, or a radius for each, got {shown(value)}")
+    raise InputError(expected="a list of joints, or a radius for each", got=value)
 
 
 def _file_name(value: object) -> object:
-    """A name or path that a file system can look up."""
     if isinstance(value, str) and (not value.strip() or "\0" in value):
-        raise ValueError(f"expected a name or a path, got {shown(value)}")
+        raise InputError(expected="a name or a path", got=value)
     return value
 
 
+def _point(value: object, sizes: tuple[int, ...], expected: str) -> object:
+    point = numbers(value)
+    if len(point) not in sizes or not all(isinstance(item, float) for item in point):
+        raise InputError(expected=expected, got=value)
+    return point
+
+
 def _axle(value: object) -> object:
-    """A frame's name, or two or three numbers."""
     if value is None or isinstance(value, str):
         return value
-    point = numbers(value)
-    if len(point) not in (2, 3) or not all(isinstance(item, float) for item in point):
-        raise ValueError(f"expected a frame, [x, y] or [x, y, z], got {shown(value)}")
-    return point
-
-
-def _three(value: object) -> object:
-    point = numbers(value)
-    if len(point) != 3 or not all(isinstance(item, float) for item in point):
-        raise ValueError(f"expected 3 numbers, got {shown(value)}")
-    return point
+    return _point(value, (2, 3), "a frame, [x, y] or [x, y, z]")
 
 
 def _kind_of_platform(value: object) -> object:
-    """A name, or a mapping from `kind` and the keywords of the platform's constructor."""
     if isinstance(value, Mapping):
         if not isinstance(value.get("kind"), str):
-            raise at_key("kind", "expected the kind of platform")
+            raise KeyedError(("kind",), expected="the kind of platform")
         return {str(key): item if key == "kind" else _plain(item) for key, item in value.items()}
     if value is None or isinstance(value, str):
         return value
-    raise ValueError(f"expected a kind of platform, or a mapping with kind, got {shown(value)}")
+    raise InputError(expected="a kind of platform, or a mapping with kind", got=value)
 
 
 def _plain(value: object) -> Any:
@@ -90,7 +84,7 @@ def _plain(value: object) -> Any:
 
 
 FileName = Annotated[str, BeforeValidator(_file_name)]
-Three = Annotated[list[float], BeforeValidator(_three)]
+Three = Annotated[list[float], BeforeValidator(lambda value: _point(value, (3,), "3 numbers"))]
 
 
 class RobotPart(Part):
@@ -111,7 +105,8 @@ class RobotPart(Part):
     )
     package_dirs: list[FileName] = Field(
         default_factory=list,
-        description="folders that hold the packages of package:// names, relative to the scenario",
+        description="folders that hold the packages of package:// names, or NAME=FOLDER of one, relative to "
+        "the scenario",
     )
     wheels: Annotated[list[str] | dict[str, float] | None, BeforeValidator(_wheels)] = Field(
         None,
@@ -141,25 +136,27 @@ class RobotPart(Part):
     )
 
     def build(self, absolute: Absolute, place: Place) -> Robot:
-        """The robot; `place` is where this part stands in the scenario."""
         from nmm.robots.loading import load
 
-        data = self.explicit(absolute, place)
-        keywords = {key: data[key] for key in type(self).model_fields if key not in ("source", "platform")}
-        platform = _platform(self.platform)
-        return load(data["source"], platform=platform, **keywords)
+        data = self.explicit(absolute, place) | {"platform": _platform(self.platform)}
+        return load(data.pop("source"), **data)
 
     def explicit(self, absolute: Absolute, place: Place) -> dict[str, Any]:
-        """Every key as plain data, files with absolute paths."""
-        source = self.source
-        is_name = not Path(source).suffix and len(Path(source).parts) == 1
-        if not is_name and not source.startswith(PACKAGE):
-            source = str(absolute(source, (*place, "source")))
-        folders = [str(absolute(folder, (*place, "package_dirs"))) for folder in self.package_dirs]
-        srdf = self.srdf
-        if srdf is not None and not srdf.startswith(PACKAGE):
-            srdf = str(absolute(srdf, (*place, "srdf")))
-        return {**self.model_dump(), "source": source, "package_dirs": folders, "srdf": srdf}
+        def whole(file: str, key: str) -> str:
+            return file if file.startswith(PACKAGE) else str(absolute(file, (*place, key)))
+
+        def package_folder(given: str) -> str:
+            name, folder = named_folder(given)
+            path = absolute(folder, (*place, "package_dirs"))
+            return f"{name}={path}" if name else str(path)
+
+        is_name = not Path(self.source).suffix and len(Path(self.source).parts) == 1
+        return {
+            **self.model_dump(),
+            "source": self.source if is_name else whole(self.source, "source"),
+            "package_dirs": [package_folder(folder) for folder in self.package_dirs],
+            "srdf": None if self.srdf is None else whole(self.srdf, "srdf"),
+        }
 
 
 def _named(value: object) -> object:
@@ -176,19 +173,14 @@ class ArmPart(Part):
     at: str | None = Field(
         None, description="the platform's frame that carries it; when not given, mount, arm_mount or top"
     )
-    xyz: Three = Field(
-        default_factory=lambda: [0.0, 0.0, 0.0], description="of the arm's root link in that frame, m"
-    )
-    rpy: Three = Field(
-        default_factory=lambda: [0.0, 0.0, 0.0], description="roll, pitch, yaw about fixed axes, rad"
-    )
+    xyz: Three = Field([0.0, 0.0, 0.0], description="of the arm's root link in that frame, m")
+    rpy: Three = Field([0.0, 0.0, 0.0], description="roll, pitch, yaw about fixed axes, rad")
     prefix: str | None = Field(
         None,
         description="put before the arm's names; when not given, none, or the arm's name where they clash",
     )
 
     def mount_on(self, platform: Robot, absolute: Absolute, place: Place) -> Robot:
-        """The platform with this arm."""
         from nmm.robots.loading import mount
 
         with at("arm"):
@@ -197,7 +189,6 @@ class ArmPart(Part):
             return mount(platform, arm, at=self.at, placement=(self.xyz, self.rpy), prefix=self.prefix)
 
     def explicit(self, absolute: Absolute, place: Place) -> dict[str, Any]:
-        """Every key as plain data, files with absolute paths."""
         return {**self.model_dump(), "arm": self.arm.explicit(absolute, (*place, "arm"))}
 
 
@@ -224,45 +215,34 @@ class MountedPart(Part):
         if "arms" in data:
             for key in ("arm", "at", "xyz", "rpy", "prefix"):
                 if key in data:
-                    raise at_key(key, "expected it in the list of arms, where arms is given")
+                    raise KeyedError((key,), expected="it in the list of arms, where arms is given")
             if not data["arms"]:
-                raise at_key("arms", "expected at least 1")
+                raise KeyedError(("arms",), expected="at least 1")
         return data
 
     def build(self, absolute: Absolute, place: Place) -> Robot:
-        """The platform with its arms; `place` is where this part stands in the scenario."""
         for name in self.limits.keys() & self.platform.limits.keys():
-            raise KeyedError(("limits", name), f"expected once, it is in platform.limits.{name} too")
+            raise KeyedError(("limits", name), expected=f"once, it is in platform.limits.{name} too")
         with at("platform"):
             robot = self._limited().build(absolute, (*place, "platform"))
-        single = self._single()
-        if single is not None:
-            return single.mount_on(robot, absolute, place)
-        for i, arm in enumerate(self.arms):
-            with at("arms", i):
-                robot = arm.mount_on(robot, absolute, (*place, "arms", i))
+        for below, arm in self._mounted():
+            with at(*below):
+                robot = arm.mount_on(robot, absolute, (*place, *below))
         return robot
 
     def explicit(self, absolute: Absolute, place: Place) -> dict[str, Any]:
-        """Every key of the form that was used, as plain data, files with absolute paths."""
         platform = {"platform": self._limited().explicit(absolute, (*place, "platform"))}
-        single = self._single()
-        if single is not None:
-            return platform | single.explicit(absolute, place)
-        arms = [arm.explicit(absolute, (*place, "arms", i)) for i, arm in enumerate(self.arms)]
-        return {**platform, "arms": arms}
+        arms = [arm.explicit(absolute, (*place, *below)) for below, arm in self._mounted()]
+        return {**platform, "arms": arms} if self.arm is None else platform | arms[0]
 
     def _limited(self) -> RobotPart:
-        """The platform with the limits that stand beside it."""
         return self.platform.model_copy(update={"limits": self.platform.limits | self.limits})
 
-    def _single(self) -> ArmPart | None:
-        if self.arm is None:
-            return None
-        zero = [0.0, 0.0, 0.0]
-        return ArmPart(
-            arm=self.arm, at=self.at, xyz=self.xyz or zero, rpy=self.rpy or zero, prefix=self.prefix
-        )
+    def _mounted(self) -> list[tuple[Place, ArmPart]]:
+        """The arms, and where in this part each is written: the only one may be written in it."""
+        if self.arm is not None:
+            return [((), ArmPart(**self.given(*ArmPart.model_fields)))]
+        return [(("arms", i), arm) for i, arm in enumerate(self.arms)]
 
 
 def _chosen(value: Any, _: Any) -> RobotPart | MountedPart:
@@ -291,14 +271,16 @@ def _platform(value: str | dict[str, Any] | None) -> Platform | str | None:
             return kind.name
         parameters = inspect.signature(kind).parameters
         for key in keywords:
-            if key not in parameters:
-                raise KeyedError((key,), unknown("key", key, ["kind", *parameters]))
+            with at(key):
+                expect_known("key", key, ["kind", *parameters])
         for key, parameter in parameters.items():
             if key not in keywords and parameter.default is inspect.Parameter.empty:
                 raise KeyedError((key,), f"this key is missing for platform {kind.name} with parameters")
         try:
             return kind(**keywords)
         except InputError as error:
-            text = str(error).removeprefix(f"{kind.name}: ")
-            head, _, rest = text.partition(": ")
-            raise (KeyedError((head,), rest) if head in keywords and rest else InputError(text)) from None
+            where = error.where.removeprefix(kind.name).removeprefix(": ")
+            head, _, rest = where.partition(": ")
+            if head in keywords:
+                raise error.placed(rest, partial(KeyedError, (head,))) from None
+            raise error.placed(where) from None

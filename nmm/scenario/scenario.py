@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
-from nmm.errors import ScenarioError, unknown
+from nmm.errors import ScenarioError, no_such
+from nmm.findings import Finding
 from nmm.kinds import RESOLVERS
 from nmm.progress import Progress
 from nmm.scenario.document import Document, read_file
-from nmm.scenario.keys import KeyedError, as_written, at, first_error
+from nmm.scenario.keys import KeyedError, NamedReferences, as_written, at, first_error
 
 if TYPE_CHECKING:
     from nmm.collisions.obstacle import Obstacle
@@ -31,7 +33,7 @@ KEYS_OF_A_RUN = ("q0", "duration", "method", "tolerance")
 
 
 class Scenario:
-    """A robot, a start, a task, an objective and a resolver, as a YAML file says them.
+    """A robot, a start, a task, an objective and a resolver, as a YAML file states them.
 
     Made by `Scenario.load`; nothing in it changes afterwards: `override` and `with_resolver` return
     another. `nmm scenarios --keys` lists the keys of the file.
@@ -56,13 +58,13 @@ class Scenario:
         self.path = Path(document.name)
         own_name = re.sub(r"[^\w.-]", "_", self.path.name.split(".", 1)[0]) or "scenario"
         data = {"name": own_name, **document.data}
-        from nmm.scenario.named_reference import NamedReferences
         from nmm.scenario.schema import ScenarioPart
 
-        try:
-            self.parts = ScenarioPart.model_validate(data, context=NamedReferences(data))
-        except ValidationError as error:
-            raise self._located(first_error(error, data)) from None
+        with self._located():
+            try:
+                self.parts = ScenarioPart.model_validate(data, context=NamedReferences(data))
+            except ValidationError as error:
+                raise first_error(error, data) from None
         #: What is worth a warning of what was set, a sentence each.
         self.warnings = tuple(document.parted())
         self.name = self.parts.name
@@ -133,11 +135,8 @@ class Scenario:
     def robot(self) -> Robot:
         """The robot, loaded once."""
         if self._robot is None:
-            try:
-                with at("robot"):
-                    self._robot = self.parts.robot.build(self.document.absolute, ("robot",))
-            except KeyedError as error:
-                raise self._located(error) from None
+            with self._located(), at("robot"):
+                self._robot = self.parts.robot.build(self.document.absolute, ("robot",))
         return self._robot
 
     def controller(self) -> Controller:
@@ -147,26 +146,21 @@ class Scenario:
         ------
         ScenarioError : what the robot does not have, or what does not fit together
         """
-        from nmm.runs.simulation import compile_ahead_of_a_run
+        from nmm.diagnosis.compile_ahead import compile_a_run_in_parallel
 
-        compile_ahead_of_a_run()  # most who have a controller made run it
+        compile_a_run_in_parallel()  # most who have a controller made run it
         robot = self.robot()
-        try:
+        with self._located():
             own = self._own if self.parts.resolver.kind == OWN else None
             return self.parts.build(robot, self.absolute, own)
-        except KeyedError as error:
-            raise self._located(error) from None
 
     def obstacles(self, robot: Robot) -> tuple[Obstacle, ...]:
         """What a robot keeps off in it; `ScenarioError` for a mesh that is not there."""
         part = self.parts.collisions
-        try:
-            with at("collisions"):
-                return (
-                    () if part is None else tuple(part.build_obstacles(robot, self.absolute, ("collisions",)))
-                )
-        except KeyedError as error:
-            raise self._located(error) from None
+        if part is None:
+            return ()
+        with self._located(), at("collisions"):
+            return tuple(part.build_obstacles(robot, self.absolute, ("collisions",)))
 
     def run(
         self,
@@ -174,7 +168,7 @@ class Scenario:
         controller: Controller | None = None,
         watch: Callable[[Recorder], None] | None = None,
     ) -> Trajectory:
-        """Run it; a run that fails or is interrupted (Ctrl-C) returns what it has, and says so.
+        """Run it; a run that fails or is interrupted (Ctrl-C) returns what was computed.
 
         Parameters
         ----------
@@ -186,12 +180,13 @@ class Scenario:
         from nmm.runs.simulation import simulate
 
         parts = self.parts
-        try:
+        with self._located():
             if controller is None:
                 controller = self.controller()
             else:
                 parts.check_start(self.robot())
             with at(), parts.own_keys():
+                until = None if parts.until is None else parts.until.make()
                 trajectory = simulate(
                     controller,
                     parts.q0,
@@ -199,13 +194,13 @@ class Scenario:
                     parts.dt,
                     parts.method,
                     tolerance=parts.tolerance,
-                    until=None if parts.until is None else parts.until.make(),
+                    until=until,
                     progress=progress,
                     watch=watch,
                 )
-        except KeyedError as error:
-            raise self._located(error) from None
-        return trajectory.with_scenario(self.resolved(), self.warnings)
+        return trajectory.with_scenario(
+            self.resolved(), [Finding("setting_parted", {"text": one}) for one in self.warnings]
+        )
 
     def resolved(self) -> dict[str, Any]:
         """Every key as plain data, defaults included, numbers evaluated, files with absolute paths.
@@ -221,9 +216,14 @@ class Scenario:
     def _explicit_robot(self) -> dict[str, Any]:
         return self.parts.robot.explicit(self.document.absolute, ("robot",))
 
-    def _located(self, error: KeyedError) -> ScenarioError:
-        place = as_written(error.place, self.document.data)
-        return ScenarioError(f"{self.document.where(place)}: {' '.join(error.text.split())}")
+    @contextmanager
+    def _located(self) -> Iterator[None]:
+        """Errors of the block that know their key name the file and the line, too."""
+        try:
+            yield
+        except KeyedError as error:
+            place = self.document.where(as_written(error.place, self.document.data))
+            raise error.at(place, ScenarioError) from None
 
 
 def _with_settings(document: Document, settings: Mapping[str, object]) -> Document:
@@ -250,4 +250,4 @@ def _find(name_or_path: str | Path) -> Path:
         return bundled[name_or_path]
     if path.is_file() or path.suffix in SUFFIXES or len(path.parts) > 1:
         return path
-    raise ScenarioError(unknown("scenario", str(name_or_path), bundled))
+    raise no_such("scenario", str(name_or_path), bundled, error=ScenarioError)

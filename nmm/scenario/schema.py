@@ -1,7 +1,5 @@
 """The keys of a scenario, from the top."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
@@ -10,7 +8,7 @@ from pydantic import BeforeValidator, Field
 from nmm.control.controller import Controller
 from nmm.control.sequence import Sequence
 from nmm.control.sequenced import SequencedController
-from nmm.errors import InputError
+from nmm.errors import InputError, few
 from nmm.functions.tasks.task import Stack
 from nmm.kinds import RESOLVERS
 from nmm.resolvers.base import Resolver
@@ -18,16 +16,14 @@ from nmm.robots.robot import Robot
 from nmm.robots.semantics import POSTURE
 from nmm.scenario.collisions import CollisionsPart
 from nmm.scenario.functions import REFERENCE_PARTS
-from nmm.scenario.goals import GoalPart, RetreatPart
-from nmm.scenario.keys import Part, at, at_key
-from nmm.scenario.limits import LimitsPart, part_or_none
-from nmm.scenario.numbers import Nested, Positive, numbers, numbers_by_name, shown
+from nmm.scenario.keys import KeyedError, Part, at
+from nmm.scenario.limits import GoalPart, LimitsPart, RetreatPart, SteeringPart, part_or_none
+from nmm.scenario.numbers import Nested, Positive, numbers, numbers_by_name
 from nmm.scenario.objectives import ObjectiveList, QuadraticPart, build_objective
 from nmm.scenario.resolvers import AnyResolver, WithAddedTask
 from nmm.scenario.robot import Absolute, RobotChoice
-from nmm.scenario.steering import SteeringPart
 from nmm.scenario.tasks import TASK_PARTS, TaskList, TaskPart, build_tasks, listed
-from nmm.words import listed as in_words
+from nmm.text_format import listed as in_words
 
 
 def _start(value: object) -> dict[str, Any] | list[Nested]:
@@ -39,7 +35,7 @@ def _start(value: object) -> dict[str, Any] | list[Nested]:
         return numbers_by_name(rest)
     names = [named] if isinstance(named, str) else named
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise at_key(POSTURE, f"expected a posture's name, or a list of such, got {shown(named)}")
+        raise KeyedError((POSTURE,), expected="a posture's name, or a list of such", got=named)
     return {POSTURE: named, **numbers_by_name(rest)}
 
 
@@ -103,11 +99,9 @@ class ScenarioPart(Part):
             levels = Stack.of(task).levels(robot)
             s, first = sum(levels), levels[0]
             if first > robot.n_u and not sequenced:
-                names = ", ".join(robot.u_names)
                 of = "" if len(levels) == 1 else " in the first level of priority"
-                raise InputError(
-                    f"expected at most {robot.n_u} rows{of}, as many as inputs ({names}), got {first}"
-                )
+                expected = f"at most {robot.n_u} rows{of}, as many as inputs ({few(robot.u_names)})"
+                raise InputError(expected=expected, got=first)
         with at("limits"):
             limits = None if self.limits is None else self.limits.build(robot)
         with at("collisions"):
@@ -121,10 +115,9 @@ class ScenarioPart(Part):
         steering = None if self.steering is None else self.steering.build()
         with at("resolver"):
             resolver, added = own or self.resolver.make(), None
+            rest = (limits, self.dt, retreat, steering or False)
             if sequenced:
-                return SequencedController(
-                    robot, task, resolver, objective, limits, self.dt, retreat, steering or False
-                )
+                return SequencedController(robot, task, resolver, objective, *rest)
             if isinstance(self.resolver, WithAddedTask):
                 with at("added_task"):
                     added = build_tasks(self._added_task(self.resolver), robot)
@@ -133,18 +126,7 @@ class ScenarioPart(Part):
                     held = 0 if law is None else len(law.inputs)
                     self._check_added(robot, rows, robot.n_u - s, held)
             with self.resolver.own_keys():
-                return Controller(
-                    robot,
-                    task,
-                    resolver,
-                    objective,
-                    added,
-                    limits,
-                    self.dt,
-                    retreat,
-                    steering or False,
-                    collisions,
-                )
+                return Controller(robot, task, resolver, objective, added, *rest, collisions)
 
     def check_start(self, robot: Robot) -> None:
         """`KeyedError` for a q0 that is none of the robot's, or outside limits that are not kept."""
@@ -163,36 +145,25 @@ class ScenarioPart(Part):
         squares = [part for part in self.objective if isinstance(part, QuadraticPart) and not part.maximise]
         if len(squares) < len(self.objective):
             return []
-        return [
-            TASK_PARTS["coordinates"].model_validate(
-                {
-                    "kind": "coordinates",
-                    "of": [term.of],
-                    "reference": REFERENCE_PARTS["constant"].model_validate(
-                        {"kind": "constant", "value": term.target}
-                    ),
-                    "gain": resolver.gain,
-                }
-            )
-            for part in squares
-            for term in part.terms
-        ]
+        made = []
+        for term in (term for part in squares for term in part.terms):
+            target = REFERENCE_PARTS["constant"].model_validate({"kind": "constant", "value": term.target})
+            keys = {"kind": "coordinates", "of": [term.of], "reference": target, "gain": resolver.gain}
+            made.append(TASK_PARTS["coordinates"].model_validate(keys))
+        return made
 
     def _check_added(self, robot: Robot, rows: int, redundancy: int, held: int) -> None:
         if rows in (redundancy, redundancy - held):
             return
-        came = f"none is given and the objective has {rows} quadratic terms"
-        if isinstance(self.resolver, WithAddedTask) and self.resolver.added_task is not None:
-            came = f"got {rows}"
+        given = isinstance(self.resolver, WithAddedTask) and self.resolver.added_task is not None
+        what = "" if given else f"the objective has {rows} quadratic terms"
         own = robot.following.independent.tolist()
         arm = [*own[robot.platform.n_p :], *own[: robot.platform.n_p][::-1]][:redundancy]
         q = robot.q(self.q0)
         names, values = ", ".join(robot.q_names[i] for i in arm), ", ".join(f"{q[i]:.4g}" for i in arm)
-        raise InputError(
-            f"expected {redundancy} rows (the inputs less the rows of the task), {came}; as in --set "
-            f"'resolver.added_task={{kind: coordinates, of: [{names}], reference: [{values}], gain: 1}}' "
-            "(docs/resolvers.md)"
-        )
+        example = f"{{kind: coordinates, of: [{names}], reference: [{values}], gain: 1}}"
+        expected = f"{redundancy} rows, as in --set 'resolver.added_task={example}'"
+        raise InputError(what, expected=expected, got=rows)
 
     def explicit(self) -> dict[str, Any]:
         """Every key as plain data, with what the library chooses where the file leaves it open."""

@@ -1,28 +1,25 @@
 """A task in a word, as people type it: "position:ee:xy", "pose", or a mapping as in a scenario."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
 
-from nmm.errors import InputError, expect_known
+from nmm.errors import InputError, expect, expect_known
 from nmm.functions.function import Function
 from nmm.functions.program import evaluate
 from nmm.functions.tasks.task import Task
 from nmm.kinds import TASKS
 from nmm.robots.configuration import Configuration
-from nmm.robots.loading.tips import branches, end_at
+from nmm.robots.reach import arm_branches, arm_end
 from nmm.robots.robot import Robot
-from nmm.scenario.constructors import STARRED, parameters
+from nmm.scenario.constructors import POINT, SPELLINGS, STARRED, parameters
 from nmm.scenario.functions import FUNCTION_PARTS
 from nmm.scenario.keys import KeyedError, as_written, first_error
-from nmm.scenario.spelling import POINT, SPELLINGS
 from nmm.scenario.tasks import TASK_PARTS
 from nmm.scenario.yaml_text import dotted, read_text
-from nmm.words import counted, listed
+from nmm.text_format import counted, listed
 
 #: What a text may be.
 EXPECTED = "KIND:FRAME:AXES, as in position:ee:xy, or a mapping as in a scenario"
@@ -34,22 +31,16 @@ def short_task(text: str, robot: Robot) -> Task | Function:
     KIND, KIND:FRAME, KIND:FRAME:AXES or KIND::AXES; without a frame the end of the arm, without axes those
     that the robot can move along; coordinates:q1,q2 and posture:q1,q2 take names. Or a mapping, as in a
     scenario's `task`.
-
-    Raises
-    ------
-    InputError : what the text says wrong, and what there is
     """
     stripped = text.strip()
-    if not stripped:
-        raise InputError(f"task: expected {EXPECTED}, got nothing")
+    expect(stripped, "task", EXPECTED, text)
     if stripped.startswith("{"):
         data = read_text(stripped, f"task {text}", lines=False).value
     else:
         data = _from_words(stripped, robot)
-    if not isinstance(data, Mapping):
-        raise InputError(f"task {text}: expected {EXPECTED}")
+    expect(isinstance(data, Mapping), f"task {text}", EXPECTED)
     if data.get("kind") is None:
-        raise InputError(f"task {text}: kind: this key is missing; expected one of {', '.join(TASKS)}")
+        raise InputError("this key is missing", where=f"task {text}: kind", available=TASKS)
     kind = str(data["kind"])
     expect_known("kind", kind, TASKS, f"task {text}")
     try:
@@ -58,15 +49,15 @@ def short_task(text: str, robot: Robot) -> Task | Function:
         return FUNCTION_PARTS[kind].model_validate(dict(data)).build(robot)
     except ValidationError as error:
         wrong = first_error(error, data)
-        raise InputError(f"task {text}: {dotted(as_written(wrong.place, data))}: {wrong.text}") from None
+        raise wrong.at(f"task {text}: {dotted(as_written(wrong.place, data))}", InputError) from None
     except KeyedError as error:
-        raise InputError(f"task {text}: {dotted(error.place)}: {error.text}") from None
+        raise error.at(f"task {text}: {dotted(error.place)}", InputError) from None
     except InputError as error:
-        raise InputError(f"task {text}: {error}") from None
+        raise error.at(f"task {text}") from None
 
 
 def _from_words(text: str, robot: Robot) -> dict[str, Any]:
-    """The mapping that words stand for: what a kind takes says which words it has."""
+    """The mapping that words stand for; the keys of a kind decide which words it has."""
     kind, *words = (word.strip() for word in text.split(":"))
     expect_known("kind", kind, TASKS, f"task {text}")
     part = FUNCTION_PARTS[kind]
@@ -74,7 +65,7 @@ def _from_words(text: str, robot: Robot) -> dict[str, Any]:
     if STARRED in keys:
         names = [name.strip() for name in words[0].split(",")] if words and words[0] else None
         if len(words) > 1 or (names is None and keys[STARRED].is_required()) or not all(names or ["-"]):
-            raise InputError(f"task {text}: expected {kind}:NAME,NAME,...")
+            raise InputError(where=f"task {text}", expected=f"{kind}:NAME,NAME,...")
         return {"kind": kind} | ({} if names is None else {STARRED: names})
     others = [key for key, field in keys.items() if field.is_required() and key not in ("kind", "frame")]
     if others:
@@ -82,7 +73,7 @@ def _from_words(text: str, robot: Robot) -> dict[str, Any]:
         points = {p.key for p in parameters(part.makes) if SPELLINGS.get(p.annotation) is POINT}
         shown = [f"{key}: {'[1, 0, 1]' if key in points else '...'}" for key in others]
         needed = ", ".join([f"kind: {kind}", *framed, *shown])
-        raise InputError(f"task {text}: expected a mapping, as in {{{needed}}}")
+        raise InputError(where=f"task {text}", expected=f"a mapping, as in {{{needed}}}")
     data: dict[str, Any] = {"kind": kind}
     given = words.pop(0) if words and ("frame" in keys or not words[0]) else ""
     if "frame" in keys:
@@ -90,9 +81,7 @@ def _from_words(text: str, robot: Robot) -> dict[str, Any]:
         expect_known("frame", data["frame"], robot.frames, f"task {text}")
     axes = words.pop(0) if words else ""
     if words or (axes and "axes" not in keys):
-        raise InputError(
-            f"task {text}: expected KIND:FRAME:AXES, as in position:ee:xy; axes are of positions"
-        )
+        raise InputError(where=f"task {text}", expected="KIND:FRAME:AXES, AXES for positions only")
     if "axes" in keys:
         data["axes"] = axes or moving_axes(data, robot)
     return data
@@ -100,14 +89,13 @@ def _from_words(text: str, robot: Robot) -> dict[str, Any]:
 
 def _tip(robot: Robot, text: str) -> str:
     """The end of the arm; of several branches (a head, a tray) that of the one with the most joints."""
-    found = [(len(branch), end_at(robot, branch[-1])) for branch in branches(robot)]
+    found = [(len(branch), arm_end(robot, branch[-1])) for branch in arm_branches(robot)]
     ends = sorted(((count, end) for count, end in found if end), key=lambda one: -one[0])
     if not ends or (len(ends) > 1 and ends[0][0] == ends[1][0]):
-        several = [f"{end} ({counted(count, 'joint')})" for count, end in ends]
-        expected = f"task {text}: expected a frame, as in {text.split(':')[0]}:FRAME; "
-        if several:
-            raise InputError(f"{expected}arms end at {listed(several)}")
-        raise InputError(f"{expected}available: {', '.join(robot.frames)}")
+        names = [f"{end} ({counted(count, 'joint')})" for count, end in ends[:4]]
+        what = f"arms end at {listed(names)}" if ends else ""
+        expected = f"a frame, as in {text.split(':')[0]}:FRAME"
+        raise InputError(what, where=f"task {text}", expected=expected, available=robot.frames)
     return ends[0][1]
 
 

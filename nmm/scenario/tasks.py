@@ -1,21 +1,97 @@
-"""The tasks of a scenario: a function, the reference that it follows, and the gain."""
+"""The tasks of a scenario: a function, the reference that it follows, the gain, and when it is done."""
 
-from __future__ import annotations
+from collections.abc import Callable, Sequence
+from typing import Annotated, ClassVar, Literal
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, cast
+from pydantic import BeforeValidator, Field
 
-from pydantic import BeforeValidator, Field, create_model
-
-from nmm.errors import InputError
+from nmm.errors import InputError, expect_known, few
 from nmm.functions.function import Row
+from nmm.functions.tasks.conditions import After, Between, Condition, While
 from nmm.functions.tasks.task import Task
 from nmm.robots.robot import Robot
-from nmm.scenario.conditions import ConditionList, build_conditions
-from nmm.scenario.function_part import FunctionPart
-from nmm.scenario.functions import FUNCTION_PARTS, Reference
-from nmm.scenario.keys import KeyedError, at, one_of
-from nmm.scenario.numbers import Numbers, Speeds, Whole, shown
+from nmm.scenario.constructors import FunctionPart
+from nmm.scenario.functions import FUNCTION_PARTS, Reference, with_functions
+from nmm.scenario.keys import OneOf, Part, at, each
+from nmm.scenario.numbers import Number, Numbers, Positive, Speeds, Whole
+
+
+class ConditionPart(Part):
+    """A condition of the class `makes`, of whose constructor its keys are the arguments."""
+
+    makes: ClassVar[Callable[..., Condition]]
+
+    def build(self, robot: Robot) -> Condition:
+        """The condition; errors know their key."""
+        given = self.given()
+        with self.own_keys():
+            return self.makes(**{key: value for key, value in given.items() if key != "kind"})
+
+
+class BetweenPart(ConditionPart):
+    """From one time to another."""
+
+    makes = Between
+    kind: Literal["between"]
+    start: Number = Field(0.0, description="s")
+    end: Positive | None = Field(None, description="s, after the start; the end of the run when not given")
+
+
+class WhilePart(ConditionPart):
+    """While a function of the robot is within bounds."""
+
+    kind: Literal["while"]
+    function: Annotated[FunctionPart, OneOf(FUNCTION_PARTS)] = Field(
+        description="a mapping with the kind of a task's function, and its keys"
+    )
+    lower: Numbers | None = Field(None, description="least value, or one a row; none when not given; m, rad")
+    upper: Numbers | None = Field(
+        None, description="largest value, or one a row; none when not given; m, rad"
+    )
+    margin: Number = Field(
+        0.01,
+        description="once it holds, it does so until a row is beyond its bound by more than this; m, rad",
+    )
+
+    def build(self, robot: Robot) -> Condition:
+        with at("function"):
+            function = self.function.build(robot)
+        with self.own_keys():
+            return While(function, **self.given("lower", "upper", "margin"))
+
+
+class AfterPart(ConditionPart):
+    """Once the error of another task has stayed within a tolerance; from then on for good."""
+
+    makes = After
+    kind: Literal["after"]
+    task: str = Field(description="that task's name")
+    within: Speeds = Field(
+        0.01,
+        description="of its error's norm over rows of one unit: a number, or numbers by unit ({m: 0.005})",
+    )
+    hold: Number = Field(0.1, description="how long the error has to stay there, s")
+    instead: bool = Field(False, description="whether that task ends when this one begins")
+
+
+#: The conditions, by kind.
+CONDITION_PARTS: dict[str, type[ConditionPart]] = {
+    "between": BetweenPart,
+    "while": WhilePart,
+    "after": AfterPart,
+}
+
+
+def build_conditions(parts: list[ConditionPart], names: list[str], robot: Robot) -> list[Condition]:
+    """The conditions of a task among others of these names; errors know their key."""
+
+    def condition(part: ConditionPart) -> Condition:
+        if isinstance(part, AfterPart):
+            with at("task"):
+                expect_known("task name", part.task, names)
+        return part.build(robot)
+
+    return each(parts, condition, "when")
 
 
 def listed(value: object) -> object:
@@ -24,7 +100,7 @@ def listed(value: object) -> object:
         return value
     if isinstance(value, dict):
         return [value]
-    raise ValueError(f"expected a mapping with a kind, or a list of such, got {shown(value)}")
+    raise InputError(expected="a mapping with a kind, or a list of such", got=value)
 
 
 class TaskPart(FunctionPart):
@@ -42,8 +118,7 @@ class TaskPart(FunctionPart):
     )
 
     priority: Whole = Field(
-        1,
-        description="1, 2, ...: a task gets what those of lower numbers leave, and takes nothing from them",
+        1, description="1, 2, ...: a task gets what those of lower numbers leave, and takes nothing from them"
     )
     speed: Speeds | None = Field(
         None,
@@ -56,7 +131,7 @@ class TaskPart(FunctionPart):
         "a number or numbers by unit",
     )
     name: str = Field("", description="for messages, and for tasks that come after it")
-    when: Annotated[ConditionList, BeforeValidator(listed)] = Field(
+    when: Annotated[list[Annotated[ConditionPart, OneOf(CONDITION_PARTS)]], BeforeValidator(listed)] = Field(
         default_factory=list,
         description="a condition of kind between, while or after, or a list of such, which all have to hold, "
         "for a task that comes and goes; none for one that is always there",
@@ -71,50 +146,35 @@ class TaskPart(FunctionPart):
             reference = self.reference.build(robot, units.pop() if len(units) == 1 else "1")
             _check_rows(rows, reference.rows(robot))
         when = build_conditions(self.when, list(names), robot)
+        named = {key: getattr(self, key) for key in ("gain", "priority", "speed", "braking", "name")}
         with self.own_keys():
-            task = Task(
-                function, reference, self.gain, self.priority, self.speed, self.braking, self.name, when
-            )
+            task = Task(function, reference, **named, when=when)
             task.approach(robot)
         with at("gain"):
             try:
                 task.gain_matrix(robot)
-            except ValueError as error:
-                raise KeyedError((), str(error).partition(": ")[2]) from None
+            except InputError as error:
+                raise error.placed("") from None
         return task
 
 
 def _check_rows(rows: tuple[Row, ...], targets: tuple[Row, ...]) -> None:
     """`InputError` when a reference has not the number of components, or the units, of its task."""
     if len(targets) != len(rows):
-        names = ", ".join(row.name for row in rows)
-        raise InputError(f"expected {len(rows)} components, as the task has ({names}), got {len(targets)}")
+        names = few([row.name for row in rows])
+        raise InputError(expected=f"{len(rows)} components, as the task has ({names})", got=len(targets))
     for row, target in zip(rows, targets, strict=True):
         if row.unit != target.unit and "1" not in (row.unit, target.unit):
-            raise InputError(f"expected {row.unit} as {row.name} of the task, got {target.unit}")
+            raise InputError(expected=f"{row.unit} as {row.name} of the task", got=target.unit)
 
 
 #: By kind: the function's part, with a reference and a gain.
-TASK_PARTS: dict[str, type[TaskPart]] = {
-    kind: cast(
-        type[TaskPart],
-        create_model(
-            f"{part.makes.__name__}Task", __base__=(TaskPart, part), __module__=__name__, __doc__=part.__doc__
-        ),
-    )
-    for kind, part in FUNCTION_PARTS.items()
-}
-if TYPE_CHECKING:
-    TaskList = list[TaskPart]
-else:
-    #: One task, or several done together, one above the other.
-    TaskList = list[one_of(TASK_PARTS)]
+TASK_PARTS = with_functions(TaskPart)
+#: One task, or several done together, one above the other.
+TaskList = list[Annotated[TaskPart, OneOf(TASK_PARTS)]]
 
 
 def build_tasks(parts: list[TaskPart], robot: Robot) -> list[Task]:
     """The tasks; errors know their key."""
-    tasks, names = [], [part.name for part in parts if part.name]
-    for i, part in enumerate(parts):
-        with at(i):
-            tasks.append(part.build_task(robot, names))
-    return tasks
+    names = [part.name for part in parts if part.name]
+    return each(parts, lambda part: part.build_task(robot, names))

@@ -1,7 +1,5 @@
 """Strict YAML as plain data: no tags, one document, every key once, and the line of each."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import yaml
@@ -40,11 +38,9 @@ def read_text(text: str, name: str, *, lines: bool = True) -> Plain:
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         place = name if mark is None or not lines else f"{name}:{mark.line + 1}"
-        raise ScenarioError(f"{place}: not valid YAML: {error.problem or error.context}") from None
+        raise ScenarioError(f"not valid YAML: {error.problem or error.context}", where=place) from None
     except yaml.YAMLError as error:
-        raise ScenarioError(f"{name}: not valid YAML: {' '.join(str(error).split())}") from None
-    except RecursionError:
-        raise ScenarioError(f"{name}: not valid YAML: nested too deeply") from None
+        raise ScenarioError(f"not valid YAML: {error}", where=name) from None
     reader = _Reader(name)
     value = None if root is None else reader.plain(root, ())
     return Plain(value, reader.lines, reader.tied)
@@ -57,21 +53,20 @@ def _check_events(text: str, name: str) -> None:
         line = 1 if event.start_mark is None else event.start_mark.line + 1
         nodes += isinstance(event, yaml.NodeEvent)
         if nodes > MOST_NODES:
-            raise ScenarioError(f"{name}:{line}: expected at most {MOST_NODES} values")
+            raise ScenarioError(where=f"{name}:{line}", expected=f"at most {MOST_NODES} values")
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
         if depth > DEEPEST:
             raise ScenarioError(
-                f"{name}:{line}: not valid YAML: nested too deeply; expected at most {DEEPEST} lists and "
-                "mappings in one another"
+                f"not valid YAML: nested too deeply, beyond {DEEPEST}", where=f"{name}:{line}"
             )
         if isinstance(event, yaml.DocumentStartEvent):
             documents += 1
             if documents > 1:
-                raise ScenarioError(f"{name}:{line}: expected one YAML document, got a second")
+                raise ScenarioError("a second one", where=f"{name}:{line}", expected="one YAML document")
         tag = getattr(event, "tag", None)
         if tag is not None:
-            shown_tag = str(tag).replace("tag:yaml.org,2002:", "!!")
-            raise ScenarioError(f"{name}:{line}: expected plain YAML, got the tag {shown_tag}")
+            tag = str(tag).replace("tag:yaml.org,2002:", "!!")
+            raise ScenarioError(f"it has the tag {tag}", where=f"{name}:{line}", expected="plain YAML")
 
 
 class _Reader:
@@ -94,10 +89,10 @@ class _Reader:
         self.lines.setdefault(path, line)
         self._count += 1
         if self._count > MOST_NODES:  # aliases of aliases multiply
-            raise ScenarioError(f"{self._name}:{line}: expected at most {MOST_NODES} values")
+            raise ScenarioError(where=f"{self._name}:{line}", expected=f"at most {MOST_NODES} values")
         self._places.setdefault(id(node), []).append(path)
         if id(node) in self._open:
-            raise ScenarioError(f"{self._name}:{line}: an alias (*) that holds itself")
+            raise ScenarioError("an alias (*) that holds itself", where=f"{self._name}:{line}")
         if isinstance(node, yaml.ScalarNode):
             return self._scalar(node)
         self._open.add(id(node))
@@ -106,7 +101,7 @@ class _Reader:
                 return [self.plain(item, (*path, i)) for i, item in enumerate(node.value)]
             return self._mapping(node, path)
         except RecursionError:
-            raise ScenarioError(f"{self._name}:{line}: not valid YAML: nested too deeply") from None
+            raise ScenarioError("not valid YAML: nested too deeply", where=f"{self._name}:{line}") from None
         finally:
             self._open.discard(id(node))
 
@@ -115,11 +110,13 @@ class _Reader:
         for key_node, value_node in node.value:
             line = key_node.start_mark.line + 1
             if not isinstance(key_node, yaml.ScalarNode):
-                raise ScenarioError(f"{self._name}:{line}: expected a name as key, got a list or a mapping")
+                raise ScenarioError(
+                    "a list or mapping as key", where=f"{self._name}:{line}", expected="a name"
+                )
             key = key_node.value
             if key in result:
                 where = f"{self._name}:{line}: {dotted((*path, key))}"
-                raise ScenarioError(f"{where}: expected every key once, this is the second")
+                raise ScenarioError(where=where, expected="every key once, this is the second")
             self.lines[(*path, key)] = line
             result[key] = self.plain(value_node, (*path, key))
         return result

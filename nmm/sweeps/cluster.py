@@ -1,25 +1,23 @@
-"""A sweep's chunks computed by the workers of a Dask cluster, with the results of this machine."""
-
-from __future__ import annotations
+"""A sweep's chunks computed by a Dask cluster's workers, with the same results as on this machine."""
 
 import asyncio
 import logging
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
+from itertools import islice
 from typing import Any
 
 from nmm import __version__
-from nmm.errors import InputError, NmmError, RunError
-from nmm.sweeps.extra import needed
-from nmm.sweeps.work import Computed
-from nmm.words import listed
+from nmm.errors import InputError, NmmError, RunError, expect
+from nmm.sweeps.rows import Computed, needed
+from nmm.text_format import listed
 
-#: How long a scheduler may take to answer, and to have a worker, s.
+#: How long a scheduler may take to answer and to have a worker, s.
 PATIENCE = 10.0
-#: Chunks that each thread of a worker has waiting beside the one that it computes.
+#: Chunks that wait in each thread of a worker, besides the one being computed.
 AHEAD = 2
-#: Text, because a worker without nmm could not load a function of ours that would say so.
+#: As text, because a worker without nmm could not load a function of ours that reports it.
 _ASK_VERSION = (
     "__import__('nmm').__version__ if __import__('importlib.util').util.find_spec('nmm') else 'none'"
 )
@@ -27,17 +25,11 @@ _ASK_VERSION = (
 
 @contextmanager
 def cluster(address: str) -> Iterator[Any]:
-    """A Dask client of the scheduler at an address, whose workers all have this version of nmm.
-
-    Raises
-    ------
-    InputError : no such address; no scheduler answers, or has a worker, within `PATIENCE`; a worker
-        without nmm, or with another version
-    """
+    """A Dask client of the scheduler at an address; each of its workers has this version of nmm."""
     distributed = needed("distributed", "a sweep on a cluster")
     logger = logging.getLogger("distributed")
     level = logger.level
-    logger.setLevel(logging.CRITICAL + 1)  # what goes wrong is told once, by us
+    logger.setLevel(logging.CRITICAL + 1)  # errors are reported once, by us
     try:
         _check_answers(distributed, address)
         client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
@@ -51,7 +43,7 @@ def cluster(address: str) -> Iterator[Any]:
 
 
 def _check_answers(distributed: Any, address: str) -> None:
-    """A question of our own before there is a client, because one that cannot connect goes on trying."""
+    """Ask before there is a client, because a client that cannot connect goes on trying."""
 
     async def kind() -> str:
         async with asyncio.timeout(PATIENCE), distributed.rpc(address, timeout=PATIENCE) as server:
@@ -60,48 +52,36 @@ def _check_answers(distributed: Any, address: str) -> None:
     try:
         found = asyncio.run(kind())
     except (OSError, TimeoutError):
-        raise InputError(f"--scheduler {address}: no scheduler answers there within {PATIENCE:g} s") from None
+        problem = f"no scheduler answers there within {PATIENCE:g} s"
+        raise InputError(problem, where=f"--scheduler {address}") from None
     except (ValueError, TypeError) as error:
-        raise InputError(
-            f"--scheduler: expected an address such as tcp://127.0.0.1:8786, got {address!r} ({error})"
-        ) from None
-    if found != "Scheduler":
-        raise InputError(f"--scheduler {address}: expected a Dask scheduler, found a {found or 'stranger'}")
+        expected = "an address such as tcp://127.0.0.1:8786"
+        raise InputError(str(error), where="--scheduler", expected=expected, got=address) from None
+    expect(found == "Scheduler", f"--scheduler {address}", "a Dask scheduler", found or "a stranger")
 
 
 def _check_workers(client: Any, address: str) -> None:
+    where = f"--scheduler {address}"
     try:
         client.wait_for_workers(1, timeout=PATIENCE)
     except TimeoutError:
-        raise InputError(
-            f"--scheduler {address}: the scheduler has no worker, and none came within {PATIENCE:g} s"
-        ) from None
-    versions = client.run(eval, _ASK_VERSION)
-    without = sorted(worker for worker, version in versions.items() if version == "none")
+        problem, expected = "the scheduler has no worker", f"a worker within {PATIENCE:g} s"
+        raise InputError(problem, where=where, expected=expected) from None
+    versions = sorted(client.run(eval, _ASK_VERSION).items())
+    without = [worker for worker, version in versions if version == "none"]
     if without:
-        raise InputError(
-            f"--scheduler {address}: no nmm on {'worker' if len(without) == 1 else 'workers'} "
-            f"{listed(without)}; expected nmm {__version__} on each"
-        )
-    others = [
-        f"{version} on {worker}" for worker, version in sorted(versions.items()) if version != __version__
-    ]
+        problem = f"no nmm on {'worker' if len(without) == 1 else 'workers'} {listed(without)}"
+        raise InputError(problem, where=where, expected=f"nmm {__version__} on each")
+    others = [f"{version} on {worker}" for worker, version in versions if version != __version__]
     if others:
-        raise InputError(
-            f"--scheduler {address}: nmm {listed(others)}; expected {__version__} on each, as here"
-        )
+        raise InputError(f"nmm {listed(others)}", where=where, expected=f"{__version__} on each, as here")
 
 
 def as_done_by(
     client: Any, job: Callable[[int, None], Computed], chunks: Sequence[int]
 ) -> Generator[tuple[int, Computed]]:
-    """The chunks, each with what job(chunk, None) gives, as they are done; a lost worker's go to others.
-
-    Raises
-    ------
-    NmmError : what a job raised
-    RunError : the scheduler was lost, or a chunk took several workers with it
-    """
+    """Each chunk with the result of job(chunk, None), as they finish; a lost worker's go to others. Raises
+    what a job raised, or `RunError` if the scheduler was lost or a chunk took several workers down."""
     distributed = needed("distributed", "a sweep on a cluster")
     waiting = iter(chunks)
     submit = partial(client.submit, job, pure=False)
@@ -109,13 +89,9 @@ def as_done_by(
     numbers: dict[Any, int] = {}
 
     def following(count: int) -> list[Any]:
-        """So many futures of chunks that come next."""
-        made = []
-        for _, chunk in zip(range(count), waiting, strict=False):
-            future = submit(chunk, None)
-            numbers[future] = chunk
-            made.append(future)
-        return made
+        made = {submit(chunk, None): chunk for chunk in islice(waiting, count)}
+        numbers.update(made)
+        return list(made)
 
     done = distributed.as_completed(following((1 + AHEAD) * threads), loop=client.loop)
     try:
@@ -125,10 +101,8 @@ def as_done_by(
             except NmmError:
                 raise
             except Exception as error:
-                text = " ".join(str(error).split())
-                raise RunError(
-                    f"the cluster did not compute a part: {type(error).__name__}: {text}"
-                ) from None
+                text = f"{type(error).__name__}: {' '.join(str(error).split())}"
+                raise RunError(f"the cluster did not compute a part: {text}") from None
             done.update(following(1))
             yield numbers.pop(future), found
     finally:

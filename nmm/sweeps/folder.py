@@ -1,52 +1,48 @@
-"""A sweep's folder: what the sweep is, the chunks that are done, and the table at the end."""
-
-from __future__ import annotations
+"""A sweep's folder: its definition, the chunks that are done, and finally the table in Parquet."""
 
 import json
 import shutil
 import tempfile
-from collections.abc import Iterator
+import time
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from nmm.errors import InputError
-from nmm.files import taken
+from nmm.files import taken, whole_file
 from nmm.folders.whole import check_folder, has_format
 from nmm.machine import made_with
 from nmm.scenario.numbers import shown
-from nmm.sweeps.columns import columns_of
 from nmm.sweeps.definition import Definition
-from nmm.sweeps.table import join_parts, rows_in, schema_of, write_part
-from nmm.sweeps.work import Computed
-from nmm.writing import whole_file
+from nmm.sweeps.rows import Computed, arrow, columns_of, parquet, rows_of
 
-#: Marks a folder as one of ours.
 FORMAT = "nmm sweep 1"
 MANIFEST, TABLE = "sweep.json", "rows.parquet"
+#: Rows of a row group in the finished table.
+GROUP = 65_536
+#: Sweeps with fewer rows begin without an estimate.
+TIMED = 200_000
+#: The longest estimated duration allowed.
+MOST_DAYS = 30.0
+DAY = 86_400.0
+#: Bytes of a cell, measured in tables of 10^4 rows.
+CELL = 8.0
 
 
 def is_sweep(folder: Path) -> bool:
-    """Whether a folder holds a sweep that nmm wrote."""
     return has_format(folder / MANIFEST, FORMAT)
 
 
 class SweepFolder:
-    """The folder of one sweep.
+    """The folder of one sweep: new, empty, or with this sweep begun. A part is written whole, after its
+    chunk's runs: a chunk is done exactly when its part is there.
 
-        sweep.json          what the sweep is (`Definition.plain`), its columns, whether it is complete
+        sweep.json            what the sweep is (`Definition.plain`), its columns, whether it is complete
         parts/000042.parquet  rows of a chunk, while there are chunks to do
-        rows.parquet        all rows, in order
-        runs/000000017/     the run folder of a row, where they are kept
-        index.html          the page
-
-    A part is written after the runs of its chunk, and is there whole or not at all: a chunk is done exactly
-    when its part is there.
-
-    Parameters
-    ----------
-    path : a new or an empty folder, or one where this sweep was begun
-    definition : of the sweep
+        rows.parquet          all rows, in order
+        runs/000000017/       the run folder of a row, where they are kept
+        index.html            the page
     """
 
     def __init__(self, path: str | Path, definition: Definition) -> None:
@@ -56,41 +52,36 @@ class SweepFolder:
         self._schema = schema_of(definition)
 
     def check(self) -> None:
-        """`InputError` for a folder of something else, of another sweep, or that cannot be written."""
+        """`InputError` for a folder with something else or another sweep, or one that cannot be written."""
         check_folder(self.path, lambda path: is_sweep(path) or _hardly_begun(path))
         if not is_sweep(self.path):
             return
         there = json.loads((self.path / MANIFEST).read_text(encoding="utf-8"))["definition"]
         difference = _difference(there, self.definition.plain())
         if difference:
-            raise InputError(
-                f"{self.path}: holds another sweep: {difference}; expected a new folder, or the same sweep"
-            )
+            place, was, now = difference
+            where, expected = f"{self.path}: {place[1:]}", f"{shown(was)}, or a new folder"
+            raise InputError("holds another sweep", where=where, expected=expected, got=now)
 
     @contextmanager
     def opened(self) -> Iterator[None]:
-        """The folder, begun or to go on with, for this process alone.
-
-        Raises
-        ------
-        InputError : as `check`; another process is at it
-        """
+        """The folder, for this process alone; `InputError` as `check`, or where another process uses it."""
         self.check()
         try:
             self.path.mkdir(parents=True, exist_ok=True)
             lock = (self.path / ".lock").open("wb")
         except OSError as error:
-            raise InputError(f"{self.path}: cannot be written: {error.strerror}") from None
+            raise InputError(f"cannot be written: {error.strerror}", where=str(self.path)) from None
         with lock:
             if taken(lock) is False:
-                raise InputError(f"{self.path}: another process is at this sweep")
+                raise InputError("another process is at this sweep", where=str(self.path))
             self._remove_leftovers()
             if not is_sweep(self.path):
                 self._write_manifest(complete=False)
             yield
 
     def _remove_leftovers(self) -> None:
-        """What a process that was killed had not finished."""
+        """Remove what a killed process left unfinished."""
         for folder in (self.path, self.parts, self.path / "runs"):
             for left in folder.glob(".*"):
                 if left.is_dir():
@@ -100,31 +91,25 @@ class SweepFolder:
 
     @property
     def complete(self) -> bool:
-        """Whether the table is there with all rows."""
         return self.table.exists() and rows_in(self.table) == self.definition.rows
 
     def missing(self) -> list[int]:
-        """The chunks that are not done, in order."""
         if self.complete:
             return []
         self.parts.mkdir(exist_ok=True)
-        chunks = range(self.definition.chunks)
-        return [
-            chunk for chunk in chunks if rows_in(self._part(chunk)) != len(self.definition.indices(chunk))
-        ]
+        sizes = {chunk: len(self.definition.indices(chunk)) for chunk in range(self.definition.chunks)}
+        return [chunk for chunk, size in sizes.items() if rows_in(self._part(chunk)) != size]
 
     def add(self, chunk: int, found: Computed) -> None:
-        """A chunk is done."""
         for index, files in found.runs.items():
-            self._write_run(self.path / run_folder(index), files)
-        write_part(found.rows, self._part(chunk), self._schema)
+            self._write_run(self.path / f"runs/{index:09d}", files)
+        table = arrow().Table.from_pylist(found.rows, schema=self._schema)
+        with whole_file(self._part(chunk)) as temporary:
+            parquet().write_table(table, temporary)
 
     def finish(self) -> None:
-        """All chunks are done: one table of them."""
         if not self.complete:
-            join_parts(
-                [self._part(chunk) for chunk in range(self.definition.chunks)], self.table, self._schema
-            )
+            join_parts(list(map(self._part, range(self.definition.chunks))), self.table, self._schema)
         shutil.rmtree(self.parts, ignore_errors=True)
         self._write_manifest(complete=True)
 
@@ -149,31 +134,80 @@ class SweepFolder:
     def _write_run(folder: Path, files: dict[str, bytes]) -> None:
         folder.parent.mkdir(exist_ok=True)
         temporary = Path(tempfile.mkdtemp(prefix=".", dir=folder.parent))
-        temporary.chmod(0o755)
-        for name, content in files.items():
-            (temporary / name).write_bytes(content)
-        shutil.rmtree(folder, ignore_errors=True)  # of a chunk that was killed
-        temporary.rename(folder)
+        try:
+            temporary.chmod(0o755)
+            for name, content in files.items():
+                (temporary / name).write_bytes(content)
+            shutil.rmtree(folder, ignore_errors=True)  # of a chunk that was killed
+            temporary.rename(folder)
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
 
 
 def _hardly_begun(folder: Path) -> bool:
-    """Whether a sweep was killed in a folder before it wrote what it is."""
+    """Whether a sweep was killed in a folder before it wrote its definition."""
     return all(path.name.startswith((".lock", f".{MANIFEST}")) for path in folder.iterdir())
 
 
-def run_folder(index: int) -> str:
-    """Where the run of a row is kept, from the sweep's folder."""
-    return f"runs/{index:09d}"
+def _difference(there: Any, here: Any, place: str = "") -> tuple[str, Any, Any] | None:
+    """The first key where two definitions differ, and both values, None for a missing one."""
+    if not (isinstance(there, dict) and isinstance(here, dict)):
+        return None if there == here else (place, there, here)
+    inner = (_difference(there.get(key), here.get(key), f"{place}.{key}") for key in there | here)
+    return next(filter(None, inner), None)
 
 
-def _difference(there: Any, here: Any, place: str = "") -> str:
-    """The first place where two definitions differ, with both values; "" where they do not."""
-    if isinstance(there, dict) and isinstance(here, dict):
-        for key in [*there, *(key for key in here if key not in there)]:
-            inner = f"{place}.{key}" if place else str(key)
-            if key not in here or key not in there:
-                return f"{inner} is {'not given there' if key in here else 'not given here'}"
-            if found := _difference(there[key], here[key], inner):
-                return found
-        return ""
-    return "" if there == here else f"{place} is {shown(there)} there, {shown(here)} here"
+def schema_of(definition: Definition) -> Any:
+    """The table's pyarrow schema, with the definition and what each column is as metadata."""
+    pa = arrow()
+    kinds = {"count": pa.int64(), "number": pa.float64(), "text": pa.string()}
+    fields = [
+        pa.field(column.name, kinds[column.kind], metadata={"unit": column.unit, "about": column.about})
+        for column in columns_of(definition)
+    ]
+    return pa.schema(fields, metadata={"nmm": json.dumps(definition.plain())})
+
+
+def rows_in(path: Path) -> int:
+    """Rows of a file; -1 if it cannot be read."""
+    try:
+        return int(parquet().read_metadata(path).num_rows)
+    except (OSError, arrow().ArrowException):
+        return -1
+
+
+def join_parts(parts: Sequence[Path], path: Path, schema: Any) -> None:
+    """Join the parts' rows in order in one file, with one row group in memory at a time."""
+    pa, pq = arrow(), parquet()
+    with whole_file(path) as temporary, pq.ParquetWriter(temporary, schema) as writer:
+        tables: list[Any] = []
+        for part in parts:
+            tables.append(pq.read_table(part, schema=schema, partitioning=None))
+            if part == parts[-1] or sum(table.num_rows for table in tables) >= GROUP:
+                writer.write_table(pa.concat_tables(tables).combine_chunks())
+                tables = []
+
+
+def check_size(definition: Definition, workers: int, folder: Path) -> None:
+    """`InputError` for more than `MOST_DAYS`, `workers` rows at a time, or a table too large for its disk."""
+    rows = definition.rows
+    if rows < TIMED:
+        return
+    rows_of(definition, [0])  # the first one compiles, and loads the robot
+    began = time.perf_counter()
+    rows_of(definition, [1])
+    each = time.perf_counter() - began
+    days, size = rows * each / workers / DAY, rows * CELL * len(columns_of(definition))
+    parent = next(parent for parent in (folder.absolute(), *folder.absolute().parents) if parent.exists())
+    free = float(shutil.disk_usage(parent).free)
+    long = f"{days / 365.25:.3g} years" if days > 365.25 else f"{days:.3g} days"
+    what = (
+        f"{rows} rollouts of {each:.2g} s each take {long} with {workers} at a time, and "
+        f"{size / 1e9:.3g} GB for their table"
+    )
+    if days > MOST_DAYS:
+        expected = f"at most {MOST_DAYS:g} days: fewer, or more workers"
+        raise InputError(what, where="samples", expected=expected)
+    if 2.0 * size > free:  # the parts, and the table of them
+        expected = f"at most half of what is free at {parent}, {free / 1e9:.3g} GB"
+        raise InputError(what, where="samples", expected=expected)

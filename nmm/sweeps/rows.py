@@ -1,41 +1,141 @@
-"""Rows of a sweep by their numbers: each a rollout of the scenario with its settings.
-
-Rows whose settings are numbers share a robot, and those that begin elsewhere a controller; several threads
-take them one by one, as their integration is compiled code that does not hold the GIL.
-"""
+"""Rows of a sweep by number: each a rollout of the scenario with its settings, measured in columns. Rows
+whose settings are numbers share a robot, and those that only start elsewhere a controller. Threads take the
+rows one by one, as the integration is compiled code that does not hold the GIL."""
 
 from __future__ import annotations
 
 import gc
 import json
+import tempfile
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, nullcontext
-from typing import TYPE_CHECKING, Any, TypeVar
+from contextlib import nullcontext
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
+import numpy as np
+
+from nmm import __version__
+from nmm.control.quantities import placed
+from nmm.diagnosis.summary import RUN_NUMBERS
 from nmm.errors import InputError, RunError
 from nmm.progress import Progress
 from nmm.scenario import Scenario
 from nmm.scenario.scenario import KEYS_OF_A_RUN
-from nmm.sweeps.columns import failed, measured
-from nmm.sweeps.definition import Definition
+from nmm.sweeps.definition import Definition, Listed
 
 if TYPE_CHECKING:
     from nmm.control.controller import Controller
     from nmm.runs.trajectory import Trajectory
 
-#: So many scenarios with their robots are kept in a process, and controllers in a thread, those last used.
+#: ‖e‖ has settled where it stays below this share of its initial value.
+SETTLED = 0.02
+#: Scenarios with robots kept in a process, and controllers in a thread, those used last.
 MOST_KEPT = 16
-#: What is not compiled as a whole has time for one thread: Python has, and shapes are read when asked for.
+#: One thread at a time runs what is not wholly compiled: Python gains nothing by more, and shapes load late.
 _lock = threading.RLock()
 _robots: OrderedDict[tuple[str, str], Scenario] = OrderedDict()
 _own = threading.local()
-
 Keep = Callable[[int, "Trajectory"], None]
 Key = TypeVar("Key")
 Value = TypeVar("Value")
+
+
+def needed(module: str, what: str) -> Any:
+    """A module of the extra `nmm[sweep]`; `InputError` if it is not installed says what needs it."""
+    try:
+        return import_module(module)
+    except ImportError:
+        package = module.split(".")[0]
+        problem = f'{what} needs {package}, which is not installed: pip install "nmm[sweep]"'
+        raise InputError(problem) from None
+
+
+arrow = partial(needed, "pyarrow", "a sweep's table in Parquet")
+parquet = partial(needed, "pyarrow.parquet", "a sweep's table in Parquet")
+
+
+class Column(NamedTuple):
+    """A column: its name, its type ("number", "count" or "text"), its unit, and what it is."""
+
+    name: str
+    kind: str
+    unit: str
+    about: str
+
+
+#: Columns of measured numbers that come first, in this order.
+_FIRST = (
+    "t_end", "arrival", "error_initial", "error_final", "error_max", "error_max_second_half", "error_rms",
+    "objective_initial", "objective_final", "objective_mean_second_half", "objective_max_second_half",
+    "objective_integral", "scale_min", "scaled_share", "sigma_min", "residual_max", "unmet_share",
+    "margin_min", "clearance_min", "effort", "input_rms", "input_peak", "partition_switches",
+    "step_size_min", "lateral_slip_max",
+)  # fmt: skip
+
+
+def _measured_columns() -> Iterator[Column]:
+    """Those of the summary's numbers, which may have the units of rows or inputs, and two of sweeps alone."""
+    for one in placed():
+        unit = "" if one.unit in ("rows", "inputs", "coordinates") else one.unit
+        for number in one.numbers:
+            if number.about:
+                yield Column(number.key, "count" if one.whole else "number", unit, number.about)
+    yield from (Column(one.key, "number", one.unit, one.about) for one in RUN_NUMBERS if one.about)
+    settled = "with `until` when it was there; without, from when on ‖e‖ < 2 % of its start"
+    yield Column("arrival", "number", "s", settled)
+    yield Column("effort", "number", "", "∫ ‖u‖² dt")
+
+
+_COLUMNS = {one.name: one for one in _measured_columns()}
+MEASURED = (
+    Column(
+        "outcome", "text", "", "how the rollout ended (docs/outcomes.md); refused: what varies is no input"
+    ),
+    Column("message", "text", "", "why"),
+    Column("warnings", "count", "", "how many things the run warned of"),
+    *(_COLUMNS[name] for name in dict.fromkeys((*_FIRST, *_COLUMNS))),
+)
+
+
+def columns_of(definition: Definition) -> list[Column]:
+    parameters = [
+        Column(one.key, "text" if isinstance(one, Listed) and not one.numbers else "number", "", "varied")
+        for one in definition.vary
+    ]
+    peaks = [
+        Column(f"u_max.{name}", "number", "", f"largest |{name}|, per second") for name in definition.inputs
+    ]
+    return [Column("index", "count", "", "the row's number"), *parameters, *MEASURED, *peaks]
+
+
+def measured(trajectory: Trajectory) -> dict[str, Any]:
+    summary = trajectory.summary()
+    found = {column.name: summary.get(column.name) for column in MEASURED}
+    found["warnings"] = len(summary["warnings"])
+    if len(trajectory):
+        found["arrival"] = _arrival(trajectory, summary)
+        found["effort"] = float(np.trapezoid(np.sum(trajectory.u**2, axis=1), trajectory.t))
+    return found | {f"u_max.{name}": value for name, value in summary.get("u_max", {}).items()}
+
+
+def failed(outcome: str, message: str) -> dict[str, Any]:
+    unknown = dict.fromkeys(column.name for column in MEASURED)
+    return unknown | {"outcome": outcome, "message": message, "warnings": 0}
+
+
+def _arrival(trajectory: Trajectory, summary: dict[str, Any]) -> float | None:
+    """When the target was reached, or ‖e‖ settled, s; None if never."""
+    until = (trajectory.scenario or {}).get("until")
+    if until is not None:
+        return summary["t_end"] if trajectory.complete else None
+    above = np.flatnonzero(trajectory.error_norm > SETTLED * summary["error_initial"])
+    first = int(above[-1]) + 1 if len(above) else 0
+    return float(trajectory.t[first]) if first < len(trajectory) else None
 
 
 def rows_of(
@@ -45,23 +145,14 @@ def rows_of(
     progress: Progress | None = None,
     threads: int = 1,
 ) -> list[dict[str, Any]]:
-    """The rows of these numbers, in their order: cells by column (`columns.columns_of`).
+    """The rows of these numbers, in order: cells by column (`columns_of`), None where unknown. `keep` is
+    called with each row's number and trajectory, if there is one.
 
-    A rollout that fails is a row that says why: `outcome` "refused" is one whose settings are no input (a
-    start outside limits), "error" one that raised what it should not have. A cell that is not known is None.
-    Cells do not depend on the threads.
-
-    Parameters
-    ----------
-    keep : called with each row's number and trajectory, where there is one
-    progress : called with the fraction done after each row
-    threads : how many, at least 1. With more of them Ctrl-C ends it when the rows under way are done
-
-    Raises
-    ------
-    KeyboardInterrupt : a rollout was interrupted; rows are whole or not there
+    A failed rollout's row says why: `outcome` "refused" for invalid settings (a start outside limits),
+    "error" for an unexpected exception. Cells do not depend on `threads`; with several, Ctrl-C takes effect
+    when the rows under way are done.
     """
-    told, changes = definition.parameters(indices), definition.changes(indices)
+    cells_of, changes = definition.parameters(indices), definition.changes(indices)
     rows: list[dict[str, Any]] = []
 
     def found(k: int) -> dict[str, Any]:
@@ -69,12 +160,13 @@ def rows_of(
 
     def add(cells: dict[str, Any]) -> None:
         k = len(rows)
-        rows.append({"index": indices[k], **told[k], **cells})
+        rows.append({"index": indices[k], **cells_of[k], **cells})
         if progress is not None:
             progress(len(rows) / len(indices))
 
-    with _garbage_of_its_own():
-        # Of several the first one compiles alone.
+    gc.freeze()  # looking for garbage among all that libraries hold takes a tenth of the time
+    try:
+        # With several threads the first row compiles alone.
         first = len(indices) if threads == 1 else min(1, len(indices))
         for k in range(first):
             add(found(k))
@@ -86,17 +178,9 @@ def rows_of(
                 except BaseException:
                     pool.shutdown(wait=False, cancel_futures=True)
                     raise
-    return rows
-
-
-@contextmanager
-def _garbage_of_its_own() -> Iterator[None]:
-    """Garbage is looked for among what the block makes: among all that libraries hold takes a tenth of it."""
-    gc.freeze()
-    try:
-        yield
     finally:
         gc.unfreeze()
+    return rows
 
 
 def _rollout(
@@ -125,10 +209,8 @@ def _rollout(
 def _controller_of(
     scenario: Scenario, definition: Definition, changes: dict[str, Any]
 ) -> tuple[Controller, bool]:
-    """A controller for a row's scenario, and whether its steps are compiled as a whole.
-
-    Such a one is this thread's, and it is used again: what a run leaves in it, the next one resets.
-    """
+    """A controller for a row's scenario, and whether its steps are compiled as a whole; if so, it is this
+    thread's, and used again, as each run resets what the one before left."""
     others = {key: value for key, value in changes.items() if key.split(".")[0] not in KEYS_OF_A_RUN}
     key = definition.digest, json.dumps(others, default=str)
     if not hasattr(_own, "controllers"):
@@ -143,19 +225,12 @@ def _controller_of(
 
 
 def wholly_compiled(controller: Controller) -> bool:
-    """Whether nothing of a run has to be done in Python, from its first sample to its last."""
-    from nmm.control.sequenced import SequencedController
-
-    return not isinstance(controller, SequencedController) and controller.compilable
+    """Whether a run needs no Python, from its first sample to its last."""
+    return controller.schedule is None and controller.solver.compiles_steps
 
 
 def scenario_of(definition: Definition, changes: dict[str, Any]) -> Scenario:
-    """The scenario with a row's settings; its robot is loaded once for each way in which it changes.
-
-    Raises
-    ------
-    ScenarioError : the settings are none, or do not fit together
-    """
+    """The scenario with a row's settings; its robot is loaded once for each way in which it changes."""
     of_robot = {key: value for key, value in changes.items() if key.split(".")[0] == "robot"}
     rest = {key: value for key, value in changes.items() if key not in of_robot}
     key = definition.digest, json.dumps(of_robot, default=str)
@@ -167,10 +242,35 @@ def scenario_of(definition: Definition, changes: dict[str, Any]) -> Scenario:
 
 
 def _kept(kept: OrderedDict[Key, Value], key: Key, new: Value | None = None) -> Value:
-    """What is kept under a key, or is new there; what was used the longest ago is forgotten."""
+    """What is kept under a key, or is new there; the least recently used is forgotten."""
     if new is not None:
         kept[key] = new
         if len(kept) > MOST_KEPT:
             kept.popitem(last=False)
     kept.move_to_end(key)
     return kept[key]
+
+
+class Computed(NamedTuple):
+    """The rows of a chunk, and the files of the run folders kept, by row and name."""
+
+    rows: list[dict[str, Any]]
+    runs: dict[int, dict[str, bytes]]
+
+
+def computed(chunk: int, progress: Progress | None, definition: Definition, threads: int = 1) -> Computed:
+    """Chunk number `chunk` of a sweep; `RunError` where this process has another version of nmm."""
+    if definition.version != __version__:
+        raise RunError(
+            f"a worker has nmm {__version__}, and the sweep is of nmm {definition.version}: expected the same"
+        )
+    runs: dict[int, dict[str, bytes]] = {}
+
+    def keep(index: int, trajectory: Trajectory) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            html = definition.keep == "playback"
+            saved = trajectory.save(Path(folder) / "run", figures=False, html=html)
+            runs[index] = {path.name: path.read_bytes() for path in saved.iterdir()}
+
+    kept = keep if definition.keep else None
+    return Computed(rows_of(definition, definition.indices(chunk), kept, progress, threads), runs)

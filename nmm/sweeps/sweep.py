@@ -4,34 +4,43 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import ExitStack, closing
-from functools import partial
+from functools import partial, reduce
+from operator import getitem
 from pathlib import Path
 from typing import Any
 
 from nmm import __version__
-from nmm.bundled import bundled_scenarios
+from nmm.arrays import counted
+from nmm.bundled import bundled_scenarios, bundled_sweeps
 from nmm.cores import cores
-from nmm.errors import InputError, expect_known
+from nmm.errors import InputError, ScenarioError, expect, expect_known
 from nmm.processes import as_done
 from nmm.progress import Progress
 from nmm.scenario import Scenario
-from nmm.scenario.numbers import integer
+from nmm.scenario.document import read_file
+from nmm.scenario.numbers import number
+from nmm.scenario.scenario import SUFFIXES
 from nmm.scenario.yaml_text import dotted
-from nmm.sweeps.check import check_varied
 from nmm.sweeps.cluster import as_done_by, cluster
-from nmm.sweeps.definition import KEPT, Definition
-from nmm.sweeps.estimate import check_size
-from nmm.sweeps.folder import SweepFolder, is_sweep
-from nmm.sweeps.rows import wholly_compiled
-from nmm.sweeps.sampling import GRID, SAMPLERS, check_total
-from nmm.sweeps.swept import Swept
-from nmm.sweeps.varied import Range, Varied, varied
-from nmm.sweeps.work import computed
-from nmm.words import listed
+from nmm.sweeps.definition import (
+    GRID,
+    KEPT,
+    SAMPLERS,
+    Definition,
+    Range,
+    Varied,
+    check_total,
+    check_varied,
+    varied,
+)
+from nmm.sweeps.folder import SweepFolder, check_size, is_sweep
+from nmm.sweeps.result import SweepResult, write_page
+from nmm.sweeps.rows import computed, wholly_compiled
+from nmm.text_format import listed
 
-#: So many rows a core are computed by threads; more are worth processes of their own.
+#: Up to this many rows a core, threads compute them; for more, processes pay.
 FEW_ROWS = 128
-#: So many threads a process has at most, however many cores there are.
+#: The most threads of a process, on any number of cores.
 MOST_THREADS = 3
 
 
@@ -79,19 +88,19 @@ class Sweep:
         self.scenario = loaded.with_settings(settings) if settings else loaded
         self.scenario.controller()
         varying = tuple(varied(key, given) for key, given in vary.items())
-        if not varying:
-            raise InputError("vary: expected at least one key to vary, such as q0.x=-1:1")
+        expect(varying, "vary", "at least one key to vary, such as q0.x=-1:1")
         sampler, points = _sampling(varying, sampler, samples)
         if keep is not None:
             expect_known("what to keep", keep, KEPT, "keep")
         check_varied(self.scenario, varying)
         robot, document = self.scenario.robot(), self.scenario.document
+        data: Any = document.data
         bundled = {path: name for name, path in bundled_scenarios().items()}
         self.definition = Definition(
             name=name or self.scenario.name,
             title=title or self.scenario.title or name or self.scenario.name,
             scenario=bundled.get(self.scenario.path) or str(self.scenario.path.resolve()),
-            settings={dotted(place): _value(document.data, place) for place in document.settings},
+            settings={dotted(place): reduce(getitem, place, data) for place in document.settings},
             document=document,
             keys=self.scenario.resolved(),
             vary=varying,
@@ -106,14 +115,12 @@ class Sweep:
 
     @classmethod
     def load(cls, name_or_path: str | Path, **changes: Any) -> Sweep:
-        """A sweep that is bundled (`unicycle_2r_starts`) or a YAML file, with other keywords than it says.
+        """A sweep that is bundled (`unicycle_2r_starts`) or a YAML file, with other keywords.
 
         Raises
         ------
         InputError : no such sweep, or what is wrong with it
         """
-        from nmm.sweeps.files import read_sweep
-
         return cls(**(read_sweep(name_or_path) | changes))
 
     def run(
@@ -123,18 +130,16 @@ class Sweep:
         jobs: int | None = None,
         scheduler: str | None = None,
         progress: Progress | None = None,
-    ) -> Swept:
+    ) -> SweepResult:
         """Compute the rows that are not in the folder yet, and write table and page.
 
-        However it ends, what is done stays; the same sweep in the same folder goes on there, nothing lost or
-        doubled, and ends with the same table.
+        After an interruption, the same sweep in the same folder goes on and ends with the same table.
 
         Parameters
         ----------
         folder : a new or an empty one, or one where this sweep was begun
-        jobs : rows that are computed at the same time on this machine; as many as it has cores, when not
-            given. They are threads where rows are few and share a robot, and processes otherwise, for which a
-            script needs `if __name__ == "__main__":`
+        jobs : rows computed at the same time on this machine, by default one a core: by threads if rows are
+            few and share a robot, else by processes, for which a script needs `if __name__ == "__main__":`
         scheduler : the address of a Dask scheduler (tcp://host:port) whose workers compute instead
         progress : called with the fraction done, of the rows that were done before, too
 
@@ -146,15 +151,15 @@ class Sweep:
         """
         definition, place = self.definition, SweepFolder(folder, self.definition)
         if jobs is not None and scheduler is not None:
-            raise InputError("jobs: a cluster has as many as it has workers: expected jobs or scheduler")
+            problem = "a cluster has as many as it has workers"
+            raise InputError(problem, where="jobs", expected="jobs or scheduler")
         local = _whole(cores() if jobs is None else jobs, "jobs", 1)
         place.check()
         with ExitStack() as stack:
             client = None if scheduler is None else stack.enter_context(cluster(scheduler))
             if not is_sweep(place.path):
-                check_size(
-                    definition, local if client is None else sum(client.nthreads().values()), place.path
-                )
+                workers = local if client is None else sum(client.nthreads().values())
+                check_size(definition, workers, place.path)
             stack.enter_context(place.opened())
             missing = place.missing()
             done = _Done(definition, missing, progress)
@@ -170,19 +175,14 @@ class Sweep:
                     place.add(chunk, rows)
                     done.report(chunk, 1.0)
             place.finish()
-            swept = Swept(place.path, definition)
-            from nmm.sweeps.page import write_page
-
+            swept = SweepResult(place.path, definition)
             write_page(swept)
         return swept
 
     def _threads(self, jobs: int, rows: int) -> int:
-        """How many rows a process computes at the same time, of `jobs` in all, where so many rows are left.
-
-        Several where a process of their own would hardly have begun before they are done, robots stay the
-        same, and steps are compiled as a whole, which holds no GIL; what Python does in between bounds how
-        many.
-        """
+        """Rows that a process computes at the same time, of `jobs` in all, with `rows` left: several if they
+        are too few for processes to pay, robots stay the same, and steps are compiled as a whole, which holds
+        no GIL; limited by what Python does in between."""
         controller, varying = self.scenario.controller(), self.definition.vary
         shared = not any(one.key.split(".")[0] == "robot" for one in varying)
         if rows > FEW_ROWS * jobs or not shared or self.definition.keep or not wholly_compiled(controller):
@@ -191,8 +191,6 @@ class Sweep:
 
 
 class _Done:
-    """How much is done, as chunks tell of themselves."""
-
     def __init__(self, definition: Definition, missing: list[int], progress: Progress | None) -> None:
         self._sizes = {chunk: len(definition.indices(chunk)) for chunk in missing}
         self._under_way = dict.fromkeys(missing, 0.0)
@@ -202,7 +200,6 @@ class _Done:
             progress(self._done / self._rows)
 
     def report(self, chunk: int, fraction: float) -> None:
-        """A chunk is done to that fraction."""
         self._done += self._sizes[chunk] * (fraction - self._under_way[chunk])
         self._under_way[chunk] = fraction
         if self._progress is not None:
@@ -210,30 +207,23 @@ class _Done:
 
 
 def _sampling(vary: tuple[Varied, ...], sampler: str | None, samples: object) -> tuple[str, int]:
-    """The sampler's name, and how many points it is asked for."""
     ranges = [one for one in vary if isinstance(one, Range)]
     chosen = sampler or ("sobol" if ranges else GRID)
     expect_known("sampler", chosen, [GRID, *SAMPLERS], "sampler")
     if chosen == GRID and ranges:
         one = ranges[0]
-        raise InputError(
-            f"vary {one.key}: a grid needs a count: expected {one.lower:g}:{one.upper:g}:COUNT, or another "
-            f"sampler ({listed(list(SAMPLERS), 'or')})"
-        )
+        expected = f"{one.lower:g}:{one.upper:g}:COUNT, or another sampler ({listed(list(SAMPLERS), 'or')})"
+        raise InputError("a grid needs a count", where=f"vary {one.key}", expected=expected)
+    if chosen != GRID and not ranges:
+        problem = f"{chosen} has nothing to sample, as every key has its values"
+        raise InputError(problem, where="sampler", expected="a range LOWER:UPPER")
     if not ranges:
-        if chosen != GRID:
-            raise InputError(
-                f"sampler: {chosen} has nothing to sample, as every key has its values; expected a range "
-                "LOWER:UPPER"
-            )
         if samples is not None:
-            raise InputError(
-                "samples: a grid has as many rollouts as its values have combinations; leave it out"
-            )
+            problem = "a grid has as many rollouts as its values have combinations; leave it out"
+            raise InputError(problem, where="samples")
         return chosen, 1
-    if samples is None:
-        keys = ", ".join(one.key for one in ranges)
-        raise InputError(f"samples: expected how many points of the ranges to take ({keys})")
+    keys = ", ".join(one.key for one in ranges)
+    expect(samples is not None, "samples", f"how many points of the ranges to take ({keys})")
     total = _whole(samples, "samples", 1)
     check_total(chosen, total)
     return chosen, total
@@ -241,15 +231,46 @@ def _sampling(vary: tuple[Varied, ...], sampler: str | None, samples: object) ->
 
 def _whole(value: object, name: str, least: int) -> int:
     try:
-        found = integer(value)
-    except ValueError as error:
-        raise InputError(f"{name}: {error}") from None
-    if found < least:
-        raise InputError(f"{name}: expected at least {least}, got {found}")
-    return found
+        return counted(number(value), name, least)
+    except InputError as error:
+        raise error if error.where == name else error.at(name) from None
 
 
-def _value(data: Any, place: tuple[str | int, ...]) -> Any:
-    for step in place:
-        data = data[step]
-    return data
+#: The keys of a file, and the keyword of `Sweep` for each.
+KEYS = {key: key for key in ("name", "title", "scenario", "vary", "samples", "sampler", "seed", "keep")} | {
+    "set": "settings"
+}
+
+
+def is_sweep_file(name_or_path: str | Path) -> bool:
+    """Whether it names a bundled sweep, or a YAML file that says what varies."""
+    if str(name_or_path) in bundled_sweeps():
+        return True
+    path = Path(name_or_path)
+    return path.suffix in SUFFIXES and path.is_file() and "vary" in read_file(path).data
+
+
+def read_sweep(name_or_path: str | Path) -> dict[str, Any]:
+    """Keywords of `Sweep` from a bundled sweep or a file, which is read as strictly as a scenario."""
+    bundled = bundled_sweeps()
+    path = bundled.get(str(name_or_path), Path(name_or_path))
+    if not path.is_file() and path.suffix not in SUFFIXES:
+        expect_known("sweep", str(name_or_path), bundled, error=ScenarioError)
+    document = read_file(path)
+    data = document.data
+    for key in data:
+        expect_known("key", key, KEYS, document.where((key,)), ScenarioError)
+    for key in ("scenario", "vary"):
+        if key not in data:
+            raise ScenarioError("this key is missing", where=f"{document.where((key,))}: {key}")
+    for key in ("vary", "set"):
+        if not isinstance(data.get(key, {}), Mapping):
+            where = document.where((key,))
+            raise ScenarioError(where=where, expected="a mapping (key: value)", got=data[key])
+    found = {keyword: data[key] for key, keyword in KEYS.items() if key in data}
+    name = data["scenario"]
+    if not isinstance(name, str):
+        raise ScenarioError(where=document.where(("scenario",)), expected="a scenario's name", got=name)
+    if name not in bundled_scenarios():
+        found["scenario"] = document.absolute(name, ("scenario",))
+    return {"name": path.name.split(".", 1)[0], **found}

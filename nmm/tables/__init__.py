@@ -1,8 +1,4 @@
-"""Runs side by side in a table for a paper.
-
-table           names, units and numbers, a column a run; written as LaTeX, CSV or Markdown
-quantities      which numbers of runs, and of laps, stand in it
-"""
+"""Numbers of runs, or of laps, side by side in a table for a paper: LaTeX, CSV or Markdown."""
 
 from nmm.tables.quantities import comparison_table, laps_table
 from nmm.tables.table import FORMS, Quantity, Table

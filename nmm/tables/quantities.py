@@ -1,4 +1,4 @@
-"""Which numbers of runs stand in a table: those of their summaries, with units."""
+"""The numbers of runs in a table: those of their summaries, with units."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nmm.errors import InputError
+from nmm.control.quantities import named_numbers
+from nmm.diagnosis.summary import RUN_NUMBERS
+from nmm.errors import expect
 from nmm.latex import escaped
 from nmm.tables.table import Quantity, Table, Value
 
@@ -16,19 +18,29 @@ if TYPE_CHECKING:
     from nmm.analysis.redundancy.laps import Repeatability
     from nmm.runs.trajectory import Trajectory
 
-Summary = dict[str, Any]
-#: What a run that was not limited says nothing of.
-_LIMITED = ("scale_min", "scaled_share")
-#: What a run says of which nothing happened.
+#: Those of the summary's numbers that come first, in this order.
+_FIRST = (
+    "t_end", "error_rms", "error_max", "error_final", "settling_time", "objective_initial", "objective_final",
+    "objective_mean_second_half", "objective_integral", "input_rms", "input_peak", "u_max", "sigma_min",
+    "scale_min", "scaled_share", "margin_min", "clearance_min", "partition_switches", "lateral_slip_max",
+    "sliding_max",
+)  # fmt: skip
+#: Which runs have a number, where some have none;
+_OF: dict[str, Callable[[Trajectory], bool]] = {
+    **dict.fromkeys(("scale_min", "scaled_share"), lambda run: run.limited),
+    "partition_switches": lambda run: run.resolver == "rg",
+}
+#: values of a run in which nothing of the quantity happened;
 _NOTHING: dict[str, Value] = {"partition_switches": 0, "scaled_share": 0.0, "lateral_slip_max": 0.0}
+#: and values that are worth no row.
+_USUAL: dict[str, Value] = {"outcome": "completed", "sliding_max": 0.0}
 
 
 def comparison_table(trajectories: Sequence[Trajectory]) -> Table:
     """The numbers of runs side by side, as their summaries have them.
 
-    Only what they differ in or what is asked for: outcomes where one did not complete, the objective where
-    there is one, limits where some were kept. The time of a control step, which `nmm compare` measures, is
-    not a number of a run.
+    Rows that say nothing are left out: outcomes where all completed, the objective without one, limits where
+    none were kept. The time of a control step, which `nmm compare` measures, is not a number of a run.
 
     Parameters
     ----------
@@ -45,14 +57,16 @@ def comparison_table(trajectories: Sequence[Trajectory]) -> Table:
     >>> print(table.markdown().splitlines()[0])
     |  | RG | PG |
     """
-    if not trajectories:
-        raise InputError("comparison_table: expected at least one run")
+    expect(trajectories, "comparison_table", "at least one run")
     summaries = [trajectory.summary() for trajectory in trajectories]
-    quantities = [
-        quantity
-        for key, name, latex, unit in _rows(trajectories)
-        if _told(quantity := Quantity(key, name, latex, unit, _values(summaries, key), _NOTHING.get(key)))
-    ]
+    quantities = []
+    for key, name, unit, latex in _rows(trajectories):
+        outer, _, inner = key.partition(".")
+        found = [one.get(outer) if not inner else one.get(outer, {}).get(inner) for one in summaries]
+        has = [_OF[key](run) if key in _OF else True for run in trajectories]
+        values = tuple(value if there else None for value, there in zip(found, has, strict=True))
+        if any(value not in (None, _USUAL.get(key)) for value in values):
+            quantities.append(Quantity(key, name, latex, unit, values, _NOTHING.get(key)))
     return Table(tuple(trajectory.called for trajectory in trajectories), tuple(quantities))
 
 
@@ -79,8 +93,8 @@ def laps_table(found: Repeatability) -> Table:
             ("displacement", "platform displacement", "m", lambda one: one.displacement),
             ("errors", "task error", ", ".join(names), lambda one: one.errors[1:]),
         ):
-            told = f"{name}, lap {k + 1}"
-            quantities.append(Quantity(f"{key}.{k + 1}", told, told, unit, after(k, numbers)))
+            text = f"{name}, lap {k + 1}"
+            quantities.append(Quantity(f"{key}.{k + 1}", text, text, unit, after(k, numbers)))
     last = "last drift over that before"
     factors = Quantity("factor", last, last, "", tuple(one.factor for one in found.laps))
     if any(factor is not None for factor in factors.values):
@@ -89,57 +103,22 @@ def laps_table(found: Repeatability) -> Table:
 
 
 def _rows(runs: Sequence[Trajectory]) -> Iterator[tuple[str, str, str, str]]:
-    """Key, name, name as LaTeX, unit."""
-    error = _units(run.r_units for run in runs)
-    inputs = _units(run.robot.u_units for run in runs)
-    yield "outcome", "outcome", "outcome", ""
-    yield "dt", "step", "step", "s"
-    yield "t_end", "duration", "duration", "s"
-    yield "error_rms", "‖e‖, RMS", r"$\|e\|$, RMS", error
-    yield "error_max", "‖e‖, largest", r"$\|e\|$, largest", error
-    yield "error_final", "‖e‖, at the end", r"$\|e\|$, at the end", error
-    yield "settling_time", "‖e‖ down to 2 % after", r"$\|e\|$ down to 2\,\% after", "s"
-    if any((run.scenario or {}).get("objective") or np.any(run.objective) for run in runs):
-        yield "objective_initial", "H, at the start", "$H$, at the start", ""
-        yield "objective_final", "H, at the end", "$H$, at the end", ""
-        yield "objective_mean_second_half", "H, mean of 2nd half", "$H$, mean of 2nd half", ""
-        yield "objective_integral", "∫ H dt", r"$\int H\,dt$", "s"
-    yield "input_rms", "‖u‖, RMS", r"$\|u\|$, RMS", inputs
-    yield "input_peak", "‖u‖, largest", r"$\|u\|$, largest", inputs
-    for name, unit in {
+    units = {"rows": _units(run.r_units for run in runs), "inputs": _units(run.robot.u_units for run in runs)}
+    objective = any((run.scenario or {}).get("objective") or np.any(run.objective) for run in runs)
+    inputs = {
         name: unit for run in runs for name, unit in zip(run.robot.u_names, run.robot.u_units, strict=True)
-    }.items():
-        yield f"u_max.{name}", f"|{name}|, largest", f"{_size(name)}, largest", unit
-    yield "sigma_min", "σ_min, least", r"$\sigma_{\min}$, least", "mixed"
-    if any(run.limited for run in runs):
-        yield "scale_min", "λ, least", r"$\lambda$, least", ""
-        yield "scaled_share", "time with λ < 1, share", r"time with $\lambda < 1$, share", ""
-    yield "margin_min", "margin to limits, least (share)", "margin to limits, least (share)", ""
-    yield "clearance_min", "clearance, least", "clearance, least", "m"
-    if any(run.resolver == "rg" for run in runs):
-        yield "partition_switches", "switches of partition", "switches of partition", ""
-    yield "lateral_slip_max", "lateral slip, largest", "lateral slip, largest", "m/s"
-    yield "sliding_max", "designed sliding, largest", "designed sliding, largest", "m/s"
-
-
-def _values(summaries: Sequence[Summary], key: str) -> tuple[Value, ...]:
-    """Of each run, None where it says nothing."""
-    found: list[Value] = []
-    for summary in summaries:
-        outer, _, inner = key.partition(".")
-        value = summary.get(outer)
-        value = (value or {}).get(inner) if inner else value
-        silent = (key in _LIMITED and not summary["limited"]) or (
-            key == "partition_switches" and summary["resolver"] != "rg"
-        )
-        found.append(None if silent else value)
-    return tuple(found)
-
-
-def _told(quantity: Quantity) -> bool:
-    """Whether a row says something: outcomes when one did not complete, wheels when they slide."""
-    usual: dict[str, Value] = {"outcome": "completed", "sliding_max": 0.0}
-    return any(value not in (None, usual.get(quantity.key)) for value in quantity.values)
+    }
+    yield "outcome", "outcome", "", "outcome"
+    yield "dt", "step", "s", "step"
+    named = [*named_numbers(), *((one.unit, one) for one in RUN_NUMBERS if one.name)]
+    by_key = {number.key: (unit, number) for unit, number in named}
+    for key in dict.fromkeys((*_FIRST, *by_key)):
+        unit, number = by_key[key]
+        if key == "u_max":
+            for one, own in inputs.items():
+                yield f"{key}.{one}", number.name.format(one), own, number.latex.format(_size(one))
+        elif objective or not key.startswith("objective_"):
+            yield key, number.name, units.get(unit, unit), number.latex or number.name
 
 
 def _units(listed: Any) -> str:
@@ -147,7 +126,7 @@ def _units(listed: Any) -> str:
 
 
 def _size(name: str) -> str:
-    """The size of an input in LaTeX: a joint's is its rate, a single letter and ω are symbols."""
+    """An input's magnitude in LaTeX: a joint's is its rate; a single letter and ω are symbols."""
     if joint := re.fullmatch(r"q(\d*)", name):
         return rf"$|\dot q{f'_{{{joint[1]}}}' if joint[1] else ''}|$"
     symbol = r"\omega" if name == "omega" else name

@@ -1,4 +1,4 @@
-"""A table of runs, and the forms that papers and other programs take it in."""
+"""A table of runs, and its forms for papers and other programs."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TypeAlias
 
 from nmm import latex
-from nmm.errors import InputError
-from nmm.words import listed, number_text, printable
+from nmm.errors import InputError, expect
+from nmm.text_format import listed, number_text, printable
 
 #: A number, a word, or None where a run has none.
 Value: TypeAlias = float | int | str | None
@@ -20,21 +20,19 @@ Value: TypeAlias = float | int | str | None
 
 @dataclass(frozen=True)
 class Quantity:
-    """A row: a quantity of every run.
+    """A row: the values of a quantity in every run.
 
     Attributes
     ----------
     key : its name in summary.json; "u_max.v" for what lies deeper there
-    name, latex : for readers, as plain text and as LaTeX
-    unit : "" where it has none
-    values : of each run
+    name, latex, unit : for readers, as plain text and as LaTeX; "" for no unit
     nothing : the value of a run in which nothing of it happened; rows of no other are for `csv` alone
 
     Examples
     --------
     >>> run = nmm.Scenario.load("unicycle_2r_position").with_settings({"duration": 1}).run()
     >>> quantity = nmm.comparison_table([run]).quantities[0]
-    >>> isinstance(quantity, nmm.Quantity), quantity.name, quantity.unit
+    >>> isinstance(quantity, nmm.extending.Quantity), quantity.name, quantity.unit
     (True, 'step', 's')
     """
 
@@ -119,16 +117,14 @@ class Table:
         InputError : another suffix, a file that cannot be written
         """
         path = Path(path)
-        if path.suffix.lower() not in _SUFFIXES:
-            raise InputError(f"{path}: expected a file that ends in {listed(list(_SUFFIXES), 'or')}")
+        expect(path.suffix.lower() in _SUFFIXES, path, f"a file that ends in {listed(list(_SUFFIXES), 'or')}")
         try:
             path.write_text(FORMS[_SUFFIXES[path.suffix.lower()]](self), encoding="utf-8")
         except OSError as error:
-            raise InputError(f"{path}: cannot be written: {error.strerror}") from None
+            raise InputError(f"cannot be written: {error.strerror}", where=path) from None
         return path
 
 
-#: The forms by name.
 FORMS: dict[str, Callable[[Table], str]] = {
     "latex": Table.latex,
     "csv": Table.csv,
@@ -153,5 +149,5 @@ def _plain_value(value: Value) -> str:
 
 
 def _markdown(text: str) -> str:
-    """Without what Markdown takes for marks."""
+    """Escape what Markdown takes for markup."""
     return re.sub(r"([\\`*_{}\[\]<>|])", r"\\\1", printable(text))

@@ -4,8 +4,6 @@
 may include it.
 """
 
-from __future__ import annotations
-
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, Template
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from nmm.cli.runs import runs_in
+from nmm.cli.playing import runs_in
 from nmm.errors import NmmError
 from nmm.playback.html import page_of
 

@@ -74,7 +74,7 @@ def check(case: Any) -> str:
             reference = nmm.Circle(center, radius=case["radius"], rate=case["rate"])
         task = nmm.Task(nmm.Position(frame, axes), reference, gain=case["gain"])
         kind = RESOLVERS[case["resolver"]]
-        resolver = kind() if case["resolver"] in ("ej", "dls") else kind(alpha=case["alpha"])
+        resolver = kind(alpha=case["alpha"]) if case["resolver"] in ("pg", "rg") else kind()
         objective = nmm.JointRange() if case["objective"] and len(robot.arm_coordinates) else None
         options: dict[str, Any] = {"limits": nmm.Limits(), "dt": DT} if case["limits"] else {}
         controller = nmm.Controller(robot, task, resolver, objective, **options)

@@ -66,7 +66,9 @@ def redundancy(counts: object) -> str:
 
 
 def _gradient(q: Matrix) -> Matrix:
-    objective = nmm.Quadratic(nmm.Square({"theta": 1, "q1": 1, "q2": 1}, pi / 2), nmm.Square("q1", pi / 4))
+    objective = nmm.Quadratic(
+        nmm.QuadraticTerm({"theta": 1, "q1": 1, "q2": 1}, pi / 2), nmm.QuadraticTerm("q1", pi / 4)
+    )
     return ROBOT.S(q).T @ objective.gradient(nmm.Configuration(ROBOT, q))
 
 

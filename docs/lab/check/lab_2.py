@@ -15,8 +15,10 @@ CIRCLE = nmm.Circle(center=[2, 2], radius=3, rate=0.08 * pi, phase=5 / 4 * pi)
 TIMES = np.linspace(0, 20, len(SAMPLES))
 
 
-def _closed_loop(t: float, q: Matrix) -> nmm.Step:
-    objective = nmm.Quadratic(nmm.Square({"theta": 1, "q1": 1, "q2": 1}, pi / 2), nmm.Square("q1", pi / 4))
+def _closed_loop(t: float, q: Matrix) -> nmm.extending.Step:
+    objective = nmm.Quadratic(
+        nmm.QuadraticTerm({"theta": 1, "q1": 1, "q2": 1}, pi / 2), nmm.QuadraticTerm("q1", pi / 4)
+    )
     task = nmm.Task(nmm.Position("ee", "xy"), CIRCLE, gain=GAIN)
     return nmm.Controller(ROBOT, task, nmm.ProjectedGradient(ALPHA), objective).evaluate(t, q)
 

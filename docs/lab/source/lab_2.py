@@ -17,7 +17,9 @@ import nmm
 
 np.set_printoptions(precision=3, suppress=True)
 robot = nmm.load("unicycle_2r")
-objective = nmm.Quadratic(nmm.Square({"theta": 1, "q1": 1, "q2": 1}, pi / 2), nmm.Square("q1", pi / 4))
+objective = nmm.Quadratic(
+    nmm.QuadraticTerm({"theta": 1, "q1": 1, "q2": 1}, pi / 2), nmm.QuadraticTerm("q1", pi / 4)
+)
 
 # %% [markdown]
 # What you wrote in lab 1, here by `nmm`:

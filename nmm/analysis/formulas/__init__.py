@@ -3,7 +3,8 @@
 from nmm.analysis.formulas.bounds import Bound, lower_bound, never_zero, vanishing
 from nmm.analysis.formulas.claims import Claim, singular_set
 from nmm.analysis.formulas.expansion import TooLarge
-from nmm.analysis.formulas.symbolic_analysis import SymbolicAnalysis, symbolic
+from nmm.analysis.formulas.from_robot import symbolic
+from nmm.analysis.formulas.symbolic_analysis import SymbolicAnalysis
 
 __all__ = [
     "Bound",

@@ -1,21 +1,19 @@
-"""How far J stays from losing rank; which minors vanish nowhere, and which do somewhere in any case."""
+"""How far J stays from losing rank; which minors vanish nowhere, and which always vanish somewhere."""
 
-from __future__ import annotations
-
-import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
 import sympy
+from sympy.printing.str import StrPrinter
 
 from nmm.analysis.formulas.claims import NOTHING, Claim
-from nmm.analysis.formulas.expressions import Product, Sum, Symbol, Trig, alone, is_constant, text, to_sympy
-from nmm.analysis.formulas.readable import condition_text, expanded
+from nmm.analysis.formulas.expressions import Product, Sum, Symbol, Trig, alone, inline, is_constant, to_sympy
+from nmm.analysis.formulas.readable import condition, expanded
 from nmm.analysis.formulas.symbolic_analysis import SymbolicAnalysis
-from nmm.analysis.singular.minors import minor_name
-from nmm.words import signed_sum
+from nmm.findings import Finding
+from nmm.latex import Formula, formula, linear_formula, minor_name, symbol
 
 
 @dataclass(frozen=True)
@@ -36,16 +34,47 @@ class Bound:
     exact: bool = False
 
     def __str__(self) -> str:
-        parts = [f"|{a}| > {_bars(b)}" if b != 0 else f"{a} != 0" for a, b in self.requires]
-        parts += [f"{name} != 0" for name in self.nonzero]
-        return f"{minor_name(self.columns)} vanishes nowhere" + (
-            f" {'exactly when' if self.exact else 'when'} {' and '.join(parts)}" if parts else ""
-        )
+        return str(self.finding())
+
+    def finding(
+        self,
+        values: Mapping[str, float] | None = None,
+        moving: Collection[str] = (),
+        units: Mapping[str, str] | None = None,
+    ) -> Finding:
+        """The bound in words, and whether it holds for values of the lengths, in m unless `units` says
+        otherwise; `moving` are quantities that depend on the configuration and are never negative."""
+        known = values or {}
+        larger: list[tuple[Formula, Formula | None]] = []
+        for a, b in self.requires:
+            left = sympy_formula(a, known)
+            size = left if b == 0 or left in moving else formula("|", left, "|")
+            larger.append((size, sympy_formula(b, known) if b != 0 else None))
+        found: dict[str, Any] = {"minor": self.columns, "larger": larger}
+        found |= {"nonzero": self.nonzero, "exact": self.exact}
+        if values is not None and (larger or self.nonzero):
+            names = self._names
+            found["holds"] = self.holds(values)
+            if found["holds"] is None:
+                found["through"] = [name for name in moving if name in names]
+            else:
+                used, units = (name for name in values if name in names), units or {}
+                found["here"] = {name: (values[name], units.get(name, "m")) for name in used}
+        return Finding("minor_never_zero", found)
+
+    def reasons(self, values: Mapping[str, float]) -> tuple[Finding, ...]:
+        """Why it holds, "terms_bounded"; empty where lengths only have to differ from 0."""
+        terms = [tuple(sympy_formula(one, values) for one in pair) for pair in self.requires if pair[1] != 0]
+        return (Finding("terms_bounded", {"terms": terms}),) if terms else ()
+
+    @property
+    def _names(self) -> set[str]:
+        found = {str(symbol) for pair in self.requires for one in pair for symbol in one.free_symbols}
+        return found | set(self.nonzero)
 
     def holds(self, values: Mapping[str, float]) -> bool | None:
-        """Whether the conditions hold for these values; None when they speak of more than these."""
-        known = all(str(s) in values for pair in self.requires for part in pair for s in part.free_symbols)
-        if not known or not set(self.nonzero) <= set(values):
+        """Whether the conditions hold for these values; None when they involve further quantities."""
+        if not self._names <= set(values):
             return None
         numbers = [
             [float(part.subs({s: values[str(s)] for s in part.free_symbols})) for part in pair]
@@ -55,43 +84,43 @@ class Bound:
         return nonzero and all(abs(a) > (b or NOTHING) for a, b in numbers)
 
 
-def _bars(expression: Any) -> str:
-    return re.sub(r"Abs\((\w+)\)", r"|\1|", str(expression))
+def sympy_formula(expression: Any, values: Mapping[str, float]) -> Formula:
+    """A SymPy expression as it is shown; |l1| is written l1 where l1 is above 0."""
+    plain = expression.replace(
+        sympy.Abs, lambda of: of if values.get(str(of), -1.0) > 0.0 else sympy.Abs(of, evaluate=False)
+    )
+    names = {one: symbol(str(one)).latex for one in plain.free_symbols}
+    text = _Text().doprint(plain).replace("**", "^").replace("*", " ")
+    return Formula(text, sympy.latex(plain, symbol_names=names, fold_short_frac=True))
+
+
+class _Text(StrPrinter):
+    def _print_Abs(self, of: Any) -> str:
+        return f"|{self._print(of.args[0])}|"
 
 
 def lower_bound(analysis: SymbolicAnalysis) -> Claim | None:
-    """det J Jᵀ >= C² / Σ a² by Cauchy and Schwarz, where Σ a Δ = C without coordinates; None without one.
+    """det J Jᵀ >= C² / Σ a² by Cauchy and Schwarz, where Σ a Δ = C has no coordinates; None without such a C.
 
-    A C that is a product of lengths proves that J never loses rank.
+    If C is a product of lengths, J never loses rank.
     """
     derivation, ring = analysis.derivation, analysis.derivation.ring
     if any(one.variables() for one in derivation.row_denominators):
         return None
-    divided = {
-        name
-        for name, one in zip(analysis.u_names, derivation.column_denominators, strict=True)
-        if one.variables()
-    }
+    below = zip(analysis.u_names, derivation.column_denominators, strict=True)
+    divided = {name for name, one in below if one.variables()}
     columns = [key for key, value in analysis.numerators.items() if value and divided.isdisjoint(key)]
     if not columns:
         return None
-    keys = {
-        key
-        for name in columns
-        for key in analysis.numerators[name].terms
-        if any(ring.is_angle[i] or ring.names[i] not in analysis.geometry for i, _ in key)
-    }
+    moving = {i for i, name in enumerate(ring.names) if ring.is_angle[i] or name not in analysis.geometry}
+    terms = [analysis.numerators[name].terms for name in columns]
+    keys = sorted({key for one in terms for key in one if any(i in moving for i, _ in key)})
     rows = [
-        [
-            Fraction(0) if (v := analysis.numerators[name].terms.get(key)) is None else v[part]
-            for name in columns
-        ]
-        for key in sorted(keys)
+        [sympy.Rational(*one[key][part].as_integer_ratio()) if key in one else 0 for one in terms]
+        for key in keys
         for part in (0, 1)
     ]
-    matrix = sympy.Matrix(
-        [[sympy.Rational(v.numerator, v.denominator) for v in row] for row in rows] or [[0] * len(columns)]
-    )
+    matrix = sympy.Matrix(rows or [[0] * len(columns)])
     for vector in sorted(matrix.nullspace(), key=lambda v: sum(bool(entry) for entry in v)):
         total = ring.number(0)
         for name, weight in zip(columns, vector, strict=True):
@@ -104,30 +133,24 @@ def lower_bound(analysis: SymbolicAnalysis) -> Claim | None:
         constant = Product(number, tuple((Symbol(ring.names[i]), n) for i, n in key))
         square = sum(weight**2 for weight in vector)
         used = [(w, name) for name, w in zip(columns, vector, strict=True) if w]
-        written = signed_sum((w, f"{'' if abs(w) == 1 else f'{abs(w)} '}{minor_name(n)}") for w, n in used)
+        combination = linear_formula((w, minor_name(name)) for w, name in used)
         over = Fraction(int(square.p), int(square.q))
-        bound = text(Product(number**2 / over, tuple((f, 2 * n) for f, n in constant.factors)))
-        return Claim(
-            f"det J J^T >= {bound} at every configuration",
-            True,
-            (
-                f"{written} = {text(constant)}, whatever q is",
-                f"so the squares of these minors sum to at least {bound} (Cauchy and Schwarz)"
-                if len(used) > 1
-                else f"so its square is {bound}",
-                "det J J^T is the sum of the squares of all maximal minors (Cauchy and Binet)",
-            ),
-            (to_sympy(constant, analysis.symbols),),
+        bound = inline(Product(number**2 / over, tuple((f, 2 * n) for f, n in constant.factors)))
+        steps = (
+            Finding("combination_constant", {"combination": combination, "constant": inline(constant)}),
+            Finding("squares_bounded", {"bound": bound, "count": len(used)}),
+            Finding("cauchy_binet"),
         )
+        return Claim(Finding("gram_bound", {"bound": bound}), steps, (to_sympy(constant, analysis.symbols),))
     return None
 
 
 def never_zero(analysis: SymbolicAnalysis) -> dict[tuple[str, ...], Bound]:
     """The minors that vanish nowhere under a condition on the lengths, and the condition.
 
-    A factor that is a sum vanishes nowhere when its term without coordinates is larger than what the others
-    can reach, cosines and sines being at most 1; where each of them can be reached alone, it vanishes
-    somewhere otherwise, too. A minor with a cosine or sine as a factor is not listed.
+    A sum as a factor vanishes nowhere if its term without coordinates exceeds what the others can reach, with
+    cosines and sines at most 1; otherwise it vanishes somewhere, if these can be reached independently. A
+    minor with a cosine or sine as a factor is not listed.
     """
     found = {}
     for columns, form in analysis.minor_forms.items():
@@ -153,19 +176,23 @@ def never_zero(analysis: SymbolicAnalysis) -> dict[tuple[str, ...], Bound]:
     return found
 
 
-def vanishing(analysis: SymbolicAnalysis) -> dict[tuple[str, ...], str]:
-    """The minors that vanish somewhere whatever the lengths, and why; joint limits are not looked at.
+def vanishing(analysis: SymbolicAnalysis) -> dict[tuple[str, ...], Finding]:
+    """The minors that vanish somewhere whatever the lengths, and why, "minor_vanishing".
 
-    One that is 0, or has as a factor a coordinate, the cosine or sine of some, or a sum whose mean over all
-    angles is 0: it takes both signs, and 0 between them.
+    Joint limits are ignored. Such a minor is 0, or has as a factor a coordinate, a cosine or sine, or a sum
+    whose mean over all angles is 0, which takes both signs and so 0 between them.
     """
-    found = {}
+    found: dict[tuple[str, ...], Finding] = {}
+
+    def add(columns: tuple[str, ...], **values: Any) -> None:
+        found[columns] = Finding("minor_vanishing", {"minor": columns, **values})
+
     for columns, form in analysis.minor_forms.items():
         if not form.number:
-            found[columns] = "it is 0"
+            add(columns)
         for factor, power in form.factors:
             if power > 0 and isinstance(factor, Symbol) and factor.name in analysis.q:
-                found[columns] = f"{factor.name} is a factor"
+                add(columns, factor=symbol(factor.name))
             if power < 0 or isinstance(factor, Symbol):
                 continue
             value, ring = expanded(alone(factor), analysis.derivation.ring), analysis.derivation.ring
@@ -173,27 +200,20 @@ def vanishing(analysis: SymbolicAnalysis) -> dict[tuple[str, ...], str]:
             if not names <= {*analysis.geometry, *_angles(analysis)}:
                 continue
             if not value.without({ring.names.index(name) for name in _angles(analysis)}):
-                said = condition_text(alone(factor), analysis.named_forms)
-                found[columns] = (
-                    f"{said} is a factor"
-                    if isinstance(factor, Trig)
-                    else f"its factor {said} has mean 0 over the joint angles, so that it changes its sign"
-                )
+                of = condition(alone(factor), analysis.named_forms)
+                add(columns, factor=of, mean_zero=not isinstance(factor, Trig))
                 break
     return found
 
 
 def _angles(analysis: SymbolicAnalysis) -> list[str]:
-    """The coordinates in rad."""
     units = zip(analysis.robot.q_names, analysis.robot.q_units, strict=True)
     return [name for name, unit in units if unit == "rad"]
 
 
 def _attained(factor: Sum, analysis: SymbolicAnalysis) -> bool:
-    """Whether the terms with coordinates, a cosine or sine each, take any values between -1 and 1 together.
-
-    They do when the combinations of coordinates in them are linearly independent.
-    """
+    """Whether the terms with coordinates, a cosine or sine each, reach all values from -1 to 1 independently:
+    the combinations of coordinates in them are linearly independent."""
     angles = _angles(analysis)
     rows = []
     for term in factor.terms:
@@ -210,7 +230,7 @@ def _attained(factor: Sum, analysis: SymbolicAnalysis) -> bool:
 
 
 def _condition(factor: Sum, analysis: SymbolicAnalysis) -> tuple[Any, Any] | None:
-    """The constant term, and the bound of the others; None without a constant term."""
+    """The constant term and the bound of the others; None without a constant term or a bound."""
     constant, reach = 0, 0
     for term in factor.terms:
         if all(isinstance(f, Symbol) and f.name not in analysis.q for f, _ in term.factors):
@@ -224,7 +244,7 @@ def _condition(factor: Sum, analysis: SymbolicAnalysis) -> tuple[Any, Any] | Non
 
 
 def _reach(term: Product, analysis: SymbolicAnalysis) -> Any:
-    """The largest absolute value that a term may take; None where a coordinate in it has no bound."""
+    """The largest absolute value of a term; None where a coordinate in it has no bound."""
     total = sympy.Rational(abs(term.number).numerator, term.number.denominator)
     for factor, power in term.factors:
         if isinstance(factor, Symbol):

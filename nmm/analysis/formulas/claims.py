@@ -1,56 +1,67 @@
-"""Where J loses rank: a statement with its proof, or that none was found."""
+"""Where J loses rank: a statement with its proof, by cases of which factors of the minors vanish."""
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import sympy
 
-from nmm.analysis.formulas.expressions import GREEK, Product, Symbol, alone, is_constant, text, to_sympy
-from nmm.analysis.formulas.families import Cases, TooMany
-from nmm.analysis.formulas.groebner import Undecided
-from nmm.analysis.formulas.readable import condition_text, factored
+from nmm.analysis.formulas.expressions import (
+    Product,
+    Symbol,
+    Trig,
+    alone,
+    inline,
+    is_constant,
+    leaves,
+    to_sympy,
+)
+from nmm.analysis.formulas.readable import condition, factored, in_names
 from nmm.analysis.formulas.symbolic_analysis import SymbolicAnalysis
-from nmm.analysis.formulas.zeros import Zeros
-from nmm.analysis.singular.minors import minor_name
+from nmm.analysis.formulas.zeros import Basis, Limits, Undecided, Zeros
+from nmm.findings import Finding
+from nmm.latex import Formula
 
-#: What rounding and the digits of a file leave of zero.
+#: Smaller values are rounding, also by a file's digits, and count as zero.
 NOTHING = 1e-9
-#: Products of terms for a proof in one step; there is another way when they are not enough.
-_BRIEF = 100_000
+#: A longer proof is not readable.
+_CASES = 200
+#: For a proof in one step; beyond them, cases are distinguished.
+_BRIEF = Limits(100, 1000, 10_000)
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A statement, whether it is proved, and the steps.
+    """A statement and the steps of its proof; `str` of each is a sentence.
 
     Attributes
     ----------
-    statement : one sentence
-    proved : whether the steps are a proof; if not, `statement` says what was not decided
-    steps : one sentence each
+    statement : "rank_lost", "rank_full", "rank_except", "gram_bound", or "rank_undecided" without a proof
+    steps : of the proof
     families : the exceptional set of the statement: it is where all expressions of one family vanish
     conditions : expressions that all vanish in that set, and nowhere else; none when it is empty
     """
 
-    statement: str
-    proved: bool
-    steps: tuple[str, ...]
+    statement: Finding
+    steps: tuple[Finding, ...] = ()
     conditions: tuple[Any, ...] = ()
     families: tuple[tuple[Any, ...], ...] = ()
+
+    @property
+    def proved(self) -> bool:
+        """Whether the steps are a proof; if not, the statement says what was not decided."""
+        return self.statement.code != "rank_undecided"
 
 
 def singular_set(analysis: SymbolicAnalysis, zero: Sequence[str] = ()) -> Claim:
     """Where J loses rank, for all values of the lengths that are not zero.
 
-    A factor of a minor that depends on lengths alone counts as zero, or as not zero, as this robot's own is.
+    A factor of a minor that depends on lengths alone counts as zero, or not, as it is for this robot.
 
-    All minors vanish where one factor of each does. The cases are gone through; one is impossible when 1 is
-    in the ideal of its factors and cos² + sin² - 1, lengths divided out (Nullstellensatz, over the complex
-    numbers, hence over the real ones), and ends when each minor has a factor that vanishes all over it.
-    J's rank where it does not exist (cos(steering) = 0, say) is not spoken of.
+    All minors vanish where one factor of each does. A case is impossible if 1 is in the ideal of its factors
+    and cos² + sin² - 1, lengths divided out (Nullstellensatz, over the complex numbers, hence over the real
+    ones), and ends when each minor has a factor that vanishes throughout it. Nothing is said about
+    configurations where J does not exist (cos(steering) = 0, say).
 
     Parameters
     ----------
@@ -64,168 +75,208 @@ def singular_set(analysis: SymbolicAnalysis, zero: Sequence[str] = ()) -> Claim:
         analysis = analysis.without(*zero)
     forms = {columns: form for columns, form in analysis.minor_forms.items() if form.number}
     s = len(analysis.row_names)
-    gone = f" for {' = '.join(analysis.derivation.zero)} = 0" if analysis.derivation.zero else ""
+    gone = list(analysis.derivation.zero)
     if not forms:
-        return Claim(
-            f"J has rank below {s} everywhere{gone}", True, ("every maximal minor is identically 0",)
-        )
-    nonzero, below, zeros = _quantities(analysis, list(forms.values()))
-    gone_minors = [columns for columns, form in forms.items() if _has(form, zeros)]
-    steps = [f"{', '.join(map(minor_name, gone_minors))} = 0, as {_zero_text(zeros)}"] if gone_minors else []
-    forms = {columns: form for columns, form in forms.items() if columns not in gone_minors}
+        step = Finding("minors_identically_zero")
+        return Claim(Finding("rank_lost", {"rank": s, **_some(gone=gone)}), (step,))
+    domain = _domain(analysis, list(forms.values()))
+    vanish = [
+        columns for columns, form in forms.items() if any(alone(f) in domain.zero for f, _ in form.factors)
+    ]
+    zero_formulas = [condition(one, {}) for one in domain.zero]
+    steps = [Finding("minors_zero", {"minors": vanish, "zero": zero_formulas})] if vanish else []
+    forms = {columns: form for columns, form in forms.items() if columns not in vanish}
     if not forms:
-        where = _where(analysis, [], below, zeros)
-        return Claim(f"J has rank below {s} everywhere{where}", True, tuple(steps))
+        nowhere = domain._replace(nonzero=[])
+        return Claim(Finding("rank_lost", {"rank": s, **nowhere.said(analysis)}), tuple(steps))
     try:
-        nowhere = _nowhere(list(forms.values()), nonzero, below, zeros)
-        if nowhere is not None:
-            where = _where(analysis, nowhere, below, zeros)
-            step = "1 is a combination of the minors and cos^2 + sin^2 - 1"
-            step += f", where {', '.join(map(text, nowhere))} may be divided by" if nowhere else ""
-            step += " (Nullstellensatz)"
-            return Claim(f"J has rank {s} at every configuration{where}", True, (*steps, step))
-        cases = _cases(analysis, forms, nonzero, below, zeros)
-    except (Undecided, TooMany):
-        return Claim(
-            f"not decided: where J loses rank{gone}, as its minors are too large for a proof", False, ()
-        )
-    cases.steps[:0] = steps
-    where = _where(analysis, nonzero, below, zeros)
+        needed = _nowhere(list(forms.values()), domain)
+        if needed is not None:
+            steps.append(Finding("nullstellensatz", _some(divided=[inline(one) for one in needed.nonzero])))
+            return Claim(Finding("rank_full", {"rank": s, **needed.said(analysis)}), tuple(steps))
+        cases = Cases(analysis, forms, domain)
+    except Undecided:
+        return Claim(Finding("rank_undecided", _some(gone=gone)))
+    steps += cases.steps
+    said = domain.said(analysis)
+    if not cases.families:
+        return Claim(Finding("rank_full", {"rank": s, **said}), tuple(steps))
+    conditions = [[condition(one, analysis.named_forms) for one in family] for family in cases.families]
+    factors = [in_names(factor, analysis.named_forms) for family in cases.families for factor in family]
+    used = {leaf.name for leaf in leaves(*factors) if isinstance(leaf, Symbol)}
+    named = {name: inline(form) for name, form in analysis.named_forms.items() if name in used}
+    statement = Finding("rank_except", {"rank": s, "families": conditions, "named": named, **said})
     families = tuple(
         tuple(to_sympy(factor, analysis.symbols) for factor in family) for family in cases.families
     )
-    said = [
-        " and ".join(f"{condition_text(factor, analysis.named_forms)} = 0" for factor in family)
-        for family in cases.families
-    ]
-    if not said:
-        return Claim(f"J has rank {s} at every configuration{where}", True, tuple(cases.steps))
-    alternatives = " or ".join(f"({one})" if len(said) > 1 and " and " in one else one for one in said)
-    used = [
-        f"{GREEK[name]} = {text(form)}"
-        for name, form in analysis.named_forms.items()
-        if GREEK[name] in alternatives
-    ]
-    meaning = f"; {', '.join(used)}" if used else ""
-    statement = f"J has rank {s} except exactly where {alternatives}{where}{meaning}"
-    return Claim(statement, True, tuple(cases.steps), _as_one(families), families)
+    vanishing = families[0]
+    if len(families) > 1:  # a product that vanishes exactly in the union of the families
+        sums = [one[0] if len(one) == 1 else sympy.Add(*(part**2 for part in one)) for one in families]
+        vanishing = (sympy.Mul(*sums),)
+    return Claim(statement, tuple(steps), vanishing, families)
 
 
-def _quantities(
-    analysis: SymbolicAnalysis, forms: list[Product]
-) -> tuple[list[Product], list[Product], list[Product]]:
-    """What is not 0: lengths, auxiliary ones too, and sums of them; what else J is divided by; what is 0."""
-    ring = analysis.derivation.ring
-    lengths = {*analysis.geometry, *analysis.definitions}
-    used = set().union(*(numerator.variables() for numerator in analysis.numerators.values()))
-    nonzero, zero = _constants(forms, analysis)
-    below: dict[Product, None] = {}
-    for denominator in analysis.denominators:
-        used |= denominator.variables()
-        for factor, _ in factored(denominator).factors:
-            if not isinstance(factor, Symbol) and alone(factor) not in nonzero:
-                below[alone(factor)] = None
-    names = [ring.names[i] for i in sorted(used) if not ring.is_angle[i] and ring.names[i] in lengths]
-    return (
-        [*(alone(Symbol(name)) for name in names), *nonzero],
-        list(below),
-        [one for one in zero if one not in below],
-    )
+def _some(**values: list[Any]) -> dict[str, Any]:
+    return {name: value for name, value in values.items() if value}
 
 
-def _constants(
-    forms: Iterable[Product], analysis: SymbolicAnalysis
-) -> tuple[dict[Product, None], dict[Product, None]]:
-    """Constant sums, cosines and sines among the factors: not 0 for this robot, and 0 for it."""
+class Domain(NamedTuple):
+    """Where a statement holds: what is not 0 (lengths, auxiliary ones too, and sums of them), the other
+    divisors of J, and what is 0 for this robot."""
+
+    nonzero: list[Product]
+    below: list[Product]
+    zero: list[Product]
+
+    def zeros(self, products: Sequence[Product], limits: Limits | None = None) -> Zeros:
+        return Zeros(products, [*self.nonzero, *self.below], limits, self.zero)
+
+    def said(self, analysis: SymbolicAnalysis) -> dict[str, Any]:
+        """The domain as values of a finding; auxiliary quantities are apart, as they depend on q."""
+        moving = [alone(Symbol(name)) for name in analysis.definitions]
+        return _some(
+            gone=list(analysis.derivation.zero),
+            zero=[condition(one, {}) for one in self.zero],
+            nonzero=[condition(one, {}) for one in self.nonzero if one not in moving],
+            moving=[inline(one) for one in self.nonzero if one in moving],
+            exists=[condition(one, analysis.named_forms) for one in self.below],
+        )
+
+
+def _domain(analysis: SymbolicAnalysis, forms: Sequence[Product]) -> Domain:
+    ring, symbols = analysis.derivation.ring, analysis.symbols
+    values = {symbols[name]: value for name, value in analysis.geometry.items()}
     nonzero: dict[Product, None] = {}
     zero: dict[Product, None] = {}
-    values = {analysis.symbols[name]: value for name, value in analysis.geometry.items()}
-    for form in forms:
-        for factor, _ in form.factors:
-            if isinstance(factor, Symbol) or not is_constant(factor, analysis.geometry):
-                continue
-            value = float(to_sympy(alone(factor), analysis.symbols).subs(values))
+    for factor in (factor for form in forms for factor, _ in form.factors):
+        if is_constant(factor, analysis.geometry) and not isinstance(factor, Symbol):
+            value = float(to_sympy(alone(factor), symbols).subs(values))
             (zero if abs(value) < NOTHING else nonzero)[alone(factor)] = None
-    return nonzero, zero
+    denominators = [alone(one) for value in analysis.denominators for one, _ in factored(value).factors]
+    below = [one for one in denominators if not isinstance(one.factors[0][0], Symbol) and one not in nonzero]
+    divisible = [*analysis.numerators.values(), *analysis.denominators]
+    used = {ring.names[i] for value in divisible for i in value.variables() if not ring.is_angle[i]}
+    lengths = used & {*analysis.geometry, *analysis.definitions}
+    names = [alone(Symbol(name)) for name in ring.names if name in lengths]
+    return Domain([*names, *nonzero], list(dict.fromkeys(below)), [one for one in zero if one not in below])
 
 
-def _has(form: Product, factors: list[Product]) -> bool:
-    """Whether some of these are factors of a product."""
-    return any(alone(factor) in factors for factor, _ in form.factors)
-
-
-def _nowhere(
-    forms: list[Product], nonzero: list[Product], below: list[Product], zero: list[Product]
-) -> list[Product] | None:
-    """What must not be 0 for the minors to have no common zero; None when they may have one."""
+def _nowhere(forms: Sequence[Product], domain: Domain) -> Domain | None:
+    """The domain with only what the minors need to have no common zero; None when they may have one."""
 
     def empty(nonzero: list[Product]) -> bool:
-        zeros = Zeros(forms, [*nonzero, *below], _BRIEF, zero)
-        return zeros.within(zeros.everywhere, *forms).is_one
-
-    try:
-        if not empty(nonzero):
-            return None
-    except Undecided:
-        return None
-    needed = list(nonzero)
-    for quantity in reversed(nonzero):
-        fewer = [one for one in needed if one != quantity]
         try:
-            needed = fewer if empty(fewer) else needed
+            zeros = domain._replace(nonzero=nonzero).zeros(forms, _BRIEF)
+            return zeros.within(zeros.everywhere, *forms).is_one
         except Undecided:
-            continue
-    return needed
+            return False
+
+    needed = domain.nonzero
+    if not empty(needed):
+        return None
+    for quantity in reversed(domain.nonzero):
+        fewer = [one for one in needed if one != quantity]
+        needed = fewer if empty(fewer) else needed
+    return domain._replace(nonzero=needed)
 
 
-def _cases(
-    analysis: SymbolicAnalysis,
-    forms: dict[tuple[str, ...], Product],
-    nonzero: list[Product],
-    below: list[Product],
-    zero: list[Product],
-) -> Cases:
-    """The case distinction, gone through."""
-    minors = []
-    for columns, form in forms.items():
-        factors = [alone(factor) for factor, power in form.factors if power > 0]
-        said = f"{minor_name(columns)} = {text(analysis.short_forms[columns])}"
-        minors.append((said, [factor for factor in factors if factor not in [*nonzero, *below]]))
-    zeros = Zeros(list(forms.values()), [*nonzero, *below], zero=zero)
-    cases = Cases(zeros, minors, dict(analysis.named_forms))
-    cases.explore()
-    return cases
+class Cases:
+    """The case distinction of minors that are not 0: the `steps` of the proof, and `families` of factors. All
+    minors vanish exactly where all factors of one family do. `Undecided` beyond the limits."""
 
+    def __init__(
+        self, analysis: SymbolicAnalysis, forms: Mapping[tuple[str, ...], Product], domain: Domain
+    ) -> None:
+        self.families: list[list[Product]] = []
+        self.steps: list[Finding] = []
+        self._zeros = domain.zeros(list(forms.values()))
+        self._names, self._count = analysis.named_forms, 0
+        known = [*domain.nonzero, *domain.below]
+        #: (columns, as it is shown, the factors that may vanish) of each minor.
+        self._minors = [
+            (
+                columns,
+                inline(analysis.short_forms[columns]),
+                [alone(one) for one, power in form.factors if power > 0 and alone(one) not in known],
+            )
+            for columns, form in forms.items()
+        ]
+        self._case([], self._zeros.everywhere)
+        self.families = [self._plain(family) for family in self.families]
+        self._drop_parts()
 
-def _zero_text(zero: list[Product]) -> str:
-    return " and ".join(f"{condition_text(one, {})} = 0" for one in zero)
+    def _case(self, given: list[Product], basis: Basis) -> None:
+        self._count += 1
+        if self._count > _CASES:
+            raise Undecided
+        for family in self.families:
+            if all(self._zeros.vanishes(factor, basis) for factor in family):
+                self._step("case_covered", given, family=self._shown(family))
+                return
+        left = [minor for minor in self._minors if not any(self._zeros.contains(f, basis) for f in minor[2])]
+        while left:  # the easy question is answered; the hard one only for the minor that is taken
+            minor = min(left, key=lambda minor: len(minor[2]))
+            hidden = [factor for factor in minor[2] if self._zeros.vanishes(factor, basis)]
+            if not hidden:
+                break
+            basis = self._zeros.within(basis, hidden[0])
+            left = [one for one in left if not any(self._zeros.contains(f, basis) for f in one[2])]
+        if not left:
+            self._step("case_singular", given)
+            self.families.append(given)
+            return
+        columns, form, factors = minor
+        if not factors:
+            self._step("case_regular", given, minor=columns, form=form)
+            return
+        possible = [(factor, self._zeros.within(basis, factor)) for factor in factors]
+        ways = self._shown([factor for factor, inside in possible if not inside.is_one])
+        excluded = self._shown([factor for factor, inside in possible if inside.is_one])
+        self._step("case_split", given, minor=columns, form=form, ways=ways, excluded=excluded)
+        for factor, inside in possible:
+            if not inside.is_one:
+                self._case([*given, factor], inside)
 
+    def _plain(self, family: list[Product]) -> list[Product]:
+        """The same set by fewer and simpler factors: cosines and sines of single angles where possible."""
+        zeros, basis = self._zeros, self._zeros.within(self._zeros.everywhere, *family)
+        angles = [leaf.angle for leaf in leaves(*family) if isinstance(leaf, Trig)]
+        names = dict.fromkeys(name for angle in angles for name, _ in angle if zeros.known(name))
+        waves = [alone(Trig(kind, ((name, 1),))) for name in names for kind in ("sin", "cos")]
+        single = [wave for wave in waves if zeros.vanishes(wave, basis)]
+        chosen: list[Product] = []
+        inside = zeros.everywhere
+        for factor in [*single, *sorted(family, key=lambda factor: len(condition(factor, {})))]:
+            if all(zeros.vanishes(one, inside) for one in family):
+                break
+            if not zeros.vanishes(factor, inside):
+                chosen.append(factor)
+                inside = zeros.within(inside, factor)
+        for factor in list(chosen):
+            others = [one for one in chosen if one is not factor]
+            if others and zeros.vanishes(factor, zeros.within(zeros.everywhere, *others)):
+                chosen = others
+        if set(chosen) != set(family):
+            self._step("same_set", family=self._shown(family), simpler=self._shown(chosen))
+        return chosen
 
-def _where(
-    analysis: SymbolicAnalysis, nonzero: list[Product], below: list[Product], zero: list[Product]
-) -> str:
-    """For which lengths a statement is made, and where: an auxiliary quantity depends on q."""
-    gone = analysis.derivation.zero
-    moving = [alone(Symbol(name)) for name in analysis.definitions]
-    lengths = ", ".join(condition_text(one, {}) for one in nonzero if one not in moving)
-    parts = [f"{' = '.join(gone)} = 0"] if gone else []
-    parts += [_zero_text(zero)] if zero else []
-    parts += [f"all nonzero {lengths}"] if lengths else []
-    elsewhere = " and ".join(f"{text(one)} != 0" for one in nonzero if one in moving)
-    exists = " and ".join(f"{condition_text(one, analysis.named_forms)} != 0" for one in below)
-    return (
-        (f", for {' and '.join(parts)}" if parts else "")
-        + (f", wherever {elsewhere}" if elsewhere else "")
-        + (f", where J exists ({exists})" if exists else "")
-    )
+    def _drop_parts(self) -> None:
+        """Drop families whose set is part of another's."""
+        kept: list[list[Product]] = []
+        for family in sorted(self.families, key=len):
+            basis = self._zeros.within(self._zeros.everywhere, *family)
+            for other in kept:
+                if all(self._zeros.vanishes(factor, basis) for factor in other):
+                    if set(family) != set(other):
+                        self._step("part_of", family=self._shown(family), whole=self._shown(other))
+                    break
+            else:
+                kept.append(family)
+        self.families = kept
 
+    def _shown(self, factors: list[Product]) -> list[Formula]:
+        return [condition(factor, self._names) for factor in factors]
 
-def _as_one(families: tuple[tuple[Any, ...], ...]) -> tuple[Any, ...]:
-    """Expressions that all vanish exactly in the union of the families."""
-    if len(families) == 1:
-        return families[0]
-    single = [
-        family[0] if len(family) == 1 else sympy.Add(*(expression**2 for expression in family))
-        for family in families
-    ]
-    return (sympy.Mul(*single),)
+    def _step(self, code: str, given: Sequence[Product] = (), **values: Any) -> None:
+        case = {"given": self._shown(list(given))} if given else {}
+        self.steps.append(Finding(code, case | values))

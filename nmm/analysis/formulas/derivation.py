@@ -6,34 +6,71 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
+import numpy as np
+
 from nmm.analysis.formulas.expansion import Expansion, Ring, exact
 from nmm.analysis.formulas.frames import Frames
 from nmm.analysis.formulas.geometry import Geometry
-from nmm.analysis.formulas.platform_columns import platform_columns
-from nmm.analysis.formulas.quotient import common_multiple
-from nmm.analysis.formulas.row_values import Auxiliary, Value, value_without
+from nmm.analysis.formulas.quotient import Quotient, Untraceable, common_multiple, quotient
 from nmm.analysis.formulas.task_rows import TracedRow, task_rows
-from nmm.errors import InputError, expect_known
+from nmm.analysis.formulas.tracing import traced
+from nmm.analysis.formulas.written import Auxiliary, Value, value_without
+from nmm.errors import InputError, expect, expect_known
+from nmm.findings import Finding
 from nmm.functions.tasks.task import Stack
+from nmm.platforms.base import Platform
 from nmm.robots.robot import Robot
+
+#: Most digits of a number in G; more, as of roots, are not readable.
+_READABLE = 20
+#: G times one factor a column, and these factors.
+Columns = tuple[list[list[Expansion]], list[Expansion]]
+
+
+def platform_columns(frames: Frames) -> Columns:
+    """The rows of G (n_p, p), each column times a common denominator that may vanish, such as cos(steering),
+    and these denominators (p); `InputError` says why a platform's kernel has no formula."""
+    platform, ring = frames.robot.platform, frames.geometry.ring
+    try:
+        G = traced_G(platform, frames)[0]
+        columns = [[quotient(entry, ring) for entry in column] for column in G.T]
+        parts = [part for column in columns for entry in column for part in (entry.over, entry.under)]
+        numbers = (number for part in parts for pair in part.terms.values() for number in pair)
+        if any(len(str(number)) > _READABLE for number in numbers):
+            raise Untraceable("its numbers have too many digits to be read")
+    except (Untraceable, TypeError) as error:  # TypeError: of numbers alone
+        problem = f"no formula for G of the platform {platform.name!r}: {error}"
+        raise InputError(f"{problem} (the numeric analysis takes every platform)", where="symbolic") from None
+    below = [common_multiple(entry.under for entry in column) for column in columns]
+    above = [[entry.above(under) for entry in column] for column, under in zip(columns, below, strict=True)]
+    return [[column[i] for column in above] for i in range(platform.n_p)], below
+
+
+def traced_G(platform: Platform, frames: Frames) -> tuple[np.ndarray, np.ndarray]:
+    """G (n_p, p) and G_q (n_p, p, n_p) as the platform's kernel writes them; see `Platform.velocity_map`."""
+    geometry, names = frames.geometry, platform.parameter_names
+    parameters: list[object] = list(platform.parameters)
+    if names:
+        pairs = zip(platform.parameters, names, strict=True)
+        parameters = [Quotient(geometry.length(float(value), name)) for value, name in pairs]
+        geometry.notes += [
+            Finding("length_symbol", {"name": name, "meaning": what})
+            for name, what in names.items()
+            if what and name in geometry.values
+        ]
+    n_p = platform.n_p
+    qp = np.array(frames.coordinates()[:n_p], dtype=object)
+    G = np.full((n_p, platform.p), 0.0, dtype=object)
+    G_q = np.full((n_p, platform.p, n_p), 0.0, dtype=object)
+    traced(platform.velocity_map, frames)(qp, np.array(parameters, dtype=object), G, G_q)
+    return G, G_q
 
 
 @dataclass(frozen=True, eq=False)
 class Derivation:
-    """What the formulas are written from.
-
-    Attributes
-    ----------
-    ring : the variables
-    values : the rows of f (s)
-    matrix : J's entries (s, m) times a denominator for each row and each column
-    row_denominators, column_denominators : these
-    auxiliaries : the symbols for quantities that would make the formulas long
-    lengths : the robot's own values of lengths and fixed angles, by name
-    target_moves : whether a target depends on q, so that the matrix is J_bar of eq. 13
-    zero : lengths that were set to 0
-    notes : what was rounded or summed up
-    """
+    """What the formulas are written from: the rows of f (s), and J's entries (s, m) times a denominator for
+    each row and column. `lengths` are the robot's own, with fixed angles; those in `zero` were set to 0. If
+    `target_moves`, a target depends on q and the matrix is J_bar of eq. 13."""
 
     ring: Ring
     values: tuple[Value, ...]
@@ -44,31 +81,26 @@ class Derivation:
     lengths: Mapping[str, float]
     target_moves: bool = False
     zero: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    notes: tuple[Finding, ...] = ()
 
     def without(self, names: Sequence[str]) -> Derivation:
-        """The same with lengths set to 0.
-
-        Raises
-        ------
-        InputError : a name that is no length, or a length that J is divided by
-        """
+        """The same with lengths set to 0; `InputError` for an unknown one or one that J is divided by."""
         for name in names:
             expect_known("length", name, self.lengths)
-            if self.ring.is_angle[self.ring.names.index(name)]:
-                raise InputError(f"{name}: expected a length, it is an angle")
+            is_angle = self.ring.is_angle[self.ring.names.index(name)]
+            expect(not is_angle, name, "a length, it is an angle")
         gone = {self.ring.names.index(name) for name in names}
         self.ring.renewed()
 
         def less(entries: tuple[Expansion, ...]) -> tuple[Expansion, ...]:
             for entry in entries:
                 if any(i in gone and n < 0 for key in entry.terms for i, n in key):
-                    raise InputError(f"{', '.join(names)} = 0: J is divided by it")
+                    raise InputError("J is divided by it", where=f"{', '.join(names)} = 0")
             return tuple(entry.without(gone) for entry in entries)
 
         rows, columns = less(self.row_denominators), less(self.column_denominators)
         if not all(rows) or not all(columns):
-            raise InputError(f"{', '.join(names)} = 0: J is divided by a quantity that is 0 then")
+            raise InputError("J is divided by a quantity that is 0 then", where=f"{', '.join(names)} = 0")
         return replace(
             self,
             values=tuple(value_without(value, gone) for value in self.values),
@@ -89,6 +121,10 @@ def derived(robot: Robot, stack: Stack, geometry: Geometry) -> Derivation:
     G, columns = platform_columns(frames)
     one = geometry.ring.number(1)
     below = [_denominator(row, frames) for row in rows]
+    notes = list(geometry.notes)
+    for joint in robot.mimic_joints:
+        names = ("joint", "leader", "multiplier", "offset")
+        notes.append(Finding("mimic_joint", {name: getattr(joint, name) for name in names}))
     return Derivation(
         ring=geometry.ring,
         values=tuple(row.value for row in rows),
@@ -98,12 +134,12 @@ def derived(robot: Robot, stack: Stack, geometry: Geometry) -> Derivation:
         auxiliaries=tuple(frames.auxiliaries),
         lengths=geometry.values,
         target_moves=any(row.target_moves for row in rows),
-        notes=tuple(dict.fromkeys([*geometry.notes, *map(str, robot.followers)])),
+        notes=tuple({str(note): note for note in notes}.values()),
     )
 
 
 def _denominator(row: TracedRow, frames: Frames) -> tuple[list[Expansion], Expansion]:
-    """The gradient times a common denominator, and this; with auxiliary lengths, and all that may vanish."""
+    """The gradient times a common denominator (all that may vanish, auxiliary lengths too), and this."""
     under = common_multiple([entry.under for entry in row.gradient] + [*row.defined])
     above = [entry.above(under) for entry in row.gradient]
     powers = [dict(key) for entry in above for key in entry.terms]
@@ -117,14 +153,12 @@ def _times_S(row: Sequence[Expansion], G: list[list[Expansion]], frames: Frames)
     """A row times S = blkdiag(G, C)."""
     robot, ring = frames.robot, frames.geometry.ring
     platform, gradient = robot.platform, list(row)
-    for one in robot.followers:
+    for one in robot.mimic_joints:
         leader, follower = robot.coordinate(one.leader), robot.coordinate(one.joint)
         gradient[leader] = gradient[leader] + gradient[follower].scaled(exact(one.multiplier))
-    moved = []
-    for j in range(platform.p):
-        total = ring.number(0)
-        for i in range(platform.n_p):
-            if G[i][j] and gradient[i]:
-                total = total + gradient[i] * G[i][j]
-        moved.append(total)
+    products = [
+        [gradient[i] * G[i][j] for i in range(platform.n_p) if G[i][j] and gradient[i]]
+        for j in range(platform.p)
+    ]
+    moved = (sum(column, ring.number(0)) for column in products)
     return (*moved, *(gradient[i] for i in robot.arm_coordinates))

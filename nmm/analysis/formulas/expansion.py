@@ -1,18 +1,17 @@
-"""Trigonometric polynomials in exact arithmetic: sums of e^{i k·angles} times powers of scalars.
-
-Products of cosines and sines become sums of angles at once, so that equal expressions are equal term by term
-and a platform's heading falls out of the minors without any simplification.
-"""
+"""Trigonometric polynomials in exact arithmetic: sums of e^{i k·angles} times powers of scalars. As products
+of cosines and sines become sums of angles at once, equal expressions are equal term by term, and a platform's
+heading drops out of the minors without any simplification."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping
+import operator
+from collections.abc import Iterable, Mapping
 from fractions import Fraction
+from typing import Any
 
-from sympy import QQ, QQ_I
-from sympy.polys.rings import ring as polynomial_ring
+import flint
 
 from nmm.errors import InputError
 
@@ -29,39 +28,29 @@ class TooLarge(InputError):
 
 
 class Ring:
-    """The variables of an analysis, and how much work it may still do.
-
-    Parameters
-    ----------
-    budget : products of terms after which `TooLarge` is raised
-
-    Attributes
-    ----------
-    names, is_angle : of each variable
-    sample : a value of each, together in general position: where a kernel that is traced branches
-    ratios : for an angle α, by its index, the name of the scalar α / sin α
-    branched : whether a kernel has compared formulas
-    """
+    """The variables of an analysis, and how many products of terms it may still take (`budget`)."""
 
     def __init__(self, budget: int) -> None:
         self.names: list[str] = []
         self.is_angle: list[bool] = []
+        #: A value of each variable, together in general position: where a kernel that is traced branches.
         self.sample: list[float] = []
+        #: For an angle α, by its index, the name of the scalar α / sin α.
         self.ratios: dict[int, str] = {}
+        #: Whether a kernel has compared formulas.
         self.branched = False
         self.budget = budget
         self._left = budget
 
     def renewed(self) -> None:
-        """The whole budget again, for another analysis in the same variables."""
         self._left = self.budget
 
     def variable(self, name: str, angle: bool) -> int:
-        """Index of a variable, which is made when it is new."""
+        """Index of a variable, added if it is new."""
         if name in self.names:
             index = self.names.index(name)
             if self.is_angle[index] != angle:
-                raise InputError(f"symbolic: {name!r} names an angle and a length; give other names")
+                raise InputError(f"{name!r} names an angle and a length; give other names", where="symbolic")
             return index
         self.names.append(name)
         self.is_angle.append(angle)
@@ -69,13 +58,11 @@ class Ring:
         return len(self.names) - 1
 
     def spend(self, products: int) -> None:
-        """Count work; `TooLarge` when none is left."""
         self._left -= products
         if self._left < 0:
             raise TooLarge(f"formulas too long to be read (more than {self.budget} products of terms)")
 
     def number(self, value: Fraction | int) -> Expansion:
-        """A constant."""
         return Expansion(self, {(): (Fraction(value), _ZERO)} if value else {})
 
     def scalar(self, name: str, power: int = 1) -> Expansion:
@@ -84,13 +71,19 @@ class Ring:
 
     def cos(self, angle: Mapping[int, int]) -> Expansion:
         """cos(k·angles); `angle` holds k by the variables' index."""
-        return self.wave(angle, (Fraction(1, 2), _ZERO))
+        return self._wave(angle, (Fraction(1, 2), _ZERO))
 
     def sin(self, angle: Mapping[int, int]) -> Expansion:
-        """sin(k·angles)."""
-        return self.wave(angle, (_ZERO, Fraction(-1, 2)))
+        return self._wave(angle, (_ZERO, Fraction(-1, 2)))
 
-    def wave(self, angle: Mapping[int, int], half: Gaussian) -> Expansion:
+    def waves(self, angle: Mapping[int, int], quarters: int) -> tuple[Expansion, Expansion]:
+        """Cosine and sine of k·angles plus some quarter turns."""
+        cosine, sine = self.cos(angle), self.sin(angle)
+        for _ in range(quarters):
+            cosine, sine = -sine, cosine
+        return cosine, sine
+
+    def _wave(self, angle: Mapping[int, int], half: Gaussian) -> Expansion:
         """half e^{i k·angles} and its conjugate."""
         k = tuple(sorted((i, n) for i, n in angle.items() if n))
         if not k:
@@ -116,15 +109,7 @@ class Expansion:
     __hash__ = None  # type: ignore[assignment]  # made of a dict
 
     def __add__(self, other: Expansion) -> Expansion:
-        terms = dict(self.terms)
-        for key, (re, im) in other.terms.items():
-            old = terms.get(key)
-            new = (re, im) if old is None else (old[0] + re, old[1] + im)
-            if new[0] or new[1]:
-                terms[key] = new
-            else:
-                del terms[key]
-        return Expansion(self.ring, terms)
+        return collected(self.ring, itertools.chain(self.terms.items(), other.terms.items()))
 
     def __neg__(self) -> Expansion:
         return self.scaled(Fraction(-1))
@@ -133,32 +118,23 @@ class Expansion:
         return self + (-other)
 
     def scaled(self, factor: Fraction) -> Expansion:
-        """Times a number."""
         if not factor:
             return Expansion(self.ring, {})
         return Expansion(self.ring, {k: (re * factor, im * factor) for k, (re, im) in self.terms.items()})
 
     def __mul__(self, other: Expansion) -> Expansion:
         self.ring.spend(len(self.terms) * len(other.terms))
-        terms: dict[Key, Gaussian] = {}
-        for one, (a, b) in self.terms.items():
-            for two, (c, d) in other.terms.items():
-                key = _times(one, two)
-                re = a * c - b * d if b and d else a * c
-                im = a * d + b * c
-                old = terms.get(key)
-                terms[key] = (re, im) if old is None else (old[0] + re, old[1] + im)
-        return Expansion(self.ring, {k: v for k, v in terms.items() if v[0] or v[1]})
+        products = (
+            (_times(one, two), (a * c - b * d if b and d else a * c, a * d + b * c))
+            for one, (a, b) in self.terms.items()
+            for two, (c, d) in other.terms.items()
+        )
+        return collected(self.ring, products)
 
     def power(self, exponent: int) -> Expansion:
-        """To a power of at least 0."""
-        result = self.ring.number(1)
-        for _ in range(exponent):
-            result = result * self
-        return result
+        return math.prod([self] * exponent, start=self.ring.number(1))
 
     def derivative(self, variable: int) -> Expansion:
-        """By an angle or a scalar."""
         angle = self.ring.is_angle[variable]
         terms: dict[Key, Gaussian] = {}
         for key, (re, im) in self.terms.items():
@@ -171,7 +147,7 @@ class Expansion:
         return Expansion(self.ring, terms)
 
     def split(self) -> tuple[Expansion, Expansion]:
-        """A number with powers of scalars that all terms have, and the rest, which multiples have, too."""
+        """The number and powers of scalars common to all terms, and the rest, which multiples share."""
         scalars = [i for i in sorted(self.variables()) if not self.ring.is_angle[i]]
         least = [(i, min(dict(key).get(i, 0) for key in self.terms)) for i in scalars]
         common = Expansion(self.ring, {tuple((i, n) for i, n in least if n): (Fraction(1), _ZERO)})
@@ -188,38 +164,35 @@ class Expansion:
         return Expansion(self.ring, {tuple((i, -n) for i, n in key): (1 / number, _ZERO)})
 
     def divided(self, other: Expansion) -> Expansion | None:
-        """By another one, where that leaves no remainder."""
+        """The quotient; None where the division leaves a remainder."""
         if not other.variables():
             return self * other.inverse()
         if not self or not other.variables() <= self.variables():
             return None if self else self
-        variables = sorted(self.variables())
         self.ring.spend(len(self.terms) * len(other.terms))
-        domain = polynomial_ring([f"x{i}" for i in variables], QQ_I)[0]
-        shifts = [
-            {i: min(dict(key).get(i, 0) for key in one.terms) for i in variables} for one in (self, other)
-        ]
-        top, bottom = (
-            domain.from_dict(
-                {
-                    tuple(dict(key).get(i, 0) - shift[i] for i in variables): QQ_I(*map(QQ.convert, number))
-                    for key, number in one.terms.items()
-                }
-            )
-            for one, shift in zip((self, other), shifts, strict=True)
-        )
-        quotient, remainder = top.div(bottom)
-        if remainder:
+        variables = sorted(self.variables())
+        context = flint.fmpq_mpoly_ctx.get([f"x{i}" for i in variables], "lex")
+        shifts, parts = [], []
+        for one in (self, other):
+            powers = [[dict(key).get(i, 0) for i in variables] for key in one.terms]
+            shifts.append([min(column) for column in zip(*powers, strict=True)])
+            keys = [tuple(map(operator.sub, key, shifts[-1])) for key in powers]
+            for numbers in zip(*one.terms.values(), strict=True):
+                parts.append(context.from_dict(dict(zip(keys, map(rational, numbers), strict=True))))
+        a, b, c, d = parts
+        norm = c * c + d * d  # of c + d i, by which a + b i is divided
+        try:
+            re, im = ((part / norm).to_dict() for part in (a * c + b * d, b * c - a * d))
+        except flint.utils.flint_exceptions.DomainError:
             return None
         terms = {}
-        for powers, number in quotient.items():
-            moved = [(i, n + shifts[0][i] - shifts[1][i]) for i, n in zip(variables, powers, strict=True)]
-            parts = [Fraction(int(part.numerator), int(part.denominator)) for part in (number.x, number.y)]
-            terms[tuple((i, n) for i, n in moved if n)] = (parts[0], parts[1])
+        for exponents in sorted({*re, *im}, reverse=True):
+            moved = zip(variables, map(int, exponents), *shifts, strict=True)
+            key = tuple((i, n) for i, power, more, less in moved if (n := power + more - less))
+            terms[key] = (fraction(re.get(exponents, 0)), fraction(im.get(exponents, 0)))
         return Expansion(self.ring, terms)
 
     def at_sample(self) -> float:
-        """The value at `Ring.sample`."""
         ring, total = self.ring, 0.0
         for key, (re, im) in self.terms.items():
             angle = sum(n * ring.sample[i] for i, n in key if ring.is_angle[i])
@@ -228,7 +201,6 @@ class Expansion:
         return total
 
     def variables(self) -> set[int]:
-        """Those that occur."""
         return {i for key in self.terms for i, _ in key}
 
     def without(self, variables: set[int]) -> Expansion:
@@ -237,27 +209,39 @@ class Expansion:
         return Expansion(self.ring, kept)
 
 
+def collected(ring: Ring, terms: Iterable[tuple[Key, Gaussian]]) -> Expansion:
+    found: dict[Key, Gaussian] = {}
+    for key, (re, im) in terms:
+        old = found.get(key)
+        found[key] = (re, im) if old is None else (old[0] + re, old[1] + im)
+    return Expansion(ring, {key: number for key, number in found.items() if number[0] or number[1]})
+
+
 def _times(one: Key, two: Key) -> Key:
     if not one or not two:
         return one or two
     powers = dict(one)
     for i, n in two:
-        total = powers.get(i, 0) + n
-        if total:
-            powers[i] = total
-        else:
-            del powers[i]
-    return tuple(sorted(powers.items()))
+        powers[i] = powers.get(i, 0) + n
+    return tuple(sorted((i, n) for i, n in powers.items() if n))
+
+
+def rational(number: Fraction) -> Any:
+    return flint.fmpq(number.numerator, number.denominator)
+
+
+def fraction(number: Any) -> Fraction:
+    return Fraction(int(number.numerator), int(number.denominator))
 
 
 def exact(value: float) -> Fraction:
-    """The shortest decimal fraction that is this float, without the dust of its last digits."""
+    """A simple fraction within the float's rounding, else its shortest decimal form."""
     near = Fraction(value).limit_denominator(1_000_000)
     return near if abs(float(near) - value) < 1e-15 * max(1.0, abs(value)) else Fraction(repr(value))
 
 
 def maximal_minors(rows: list[list[Expansion]]) -> dict[tuple[int, ...], Expansion]:
-    """Of a matrix (s, m), s <= m, by their columns: along the first row, each smaller minor made once."""
+    """Minors of a matrix (s, m), s <= m, by columns: along the first row, each smaller one made once."""
     ring = rows[0][0].ring
     below: dict[tuple[int, ...], Expansion] = {(): ring.number(1)}
     for size, row in enumerate(reversed(rows), 1):

@@ -1,51 +1,83 @@
-"""What kernels read of a robot, as formulas: placements and Jacobians of frames; auxiliary quantities."""
+"""What kernels read of a robot, as formulas: placements and Jacobians of frames, step by step from a frame
+back to the world; auxiliary quantities."""
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any
+from functools import partial
+from itertools import takewhile
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from nmm.analysis.formulas.center_of_mass import center
 from nmm.analysis.formulas.expansion import Expansion
-from nmm.analysis.formulas.geometry import Geometry
-from nmm.analysis.formulas.kinematics import Step, position, steps_to, turns, twists
+from nmm.analysis.formulas.geometry import (
+    Geometry,
+    Turning,
+    Vector,
+    back,
+    cross,
+    merged,
+    signed_axis,
+    turned,
+    unit_vectors,
+)
 from nmm.analysis.formulas.quotient import Linear, Quotient, Untraceable
-from nmm.analysis.formulas.row_values import Auxiliary
-from nmm.analysis.formulas.turning import Vector, turned, unit_vectors
+from nmm.analysis.formulas.written import Auxiliary
+from nmm.arrays import Array
+from nmm.errors import InputError
 from nmm.kernels import records
 from nmm.robots.robot import CENTER_OF_MASS, Robot
 
 
-class Lazy:
-    """An array whose entries are made when they are read."""
+def center(robot: Robot, geometry: Geometry) -> Vector:
+    """The whole robot's centre of mass in world axes. Masses are in the symbols: `x_com_q1` (m) is, along x
+    of joint q1's frame, the first moment of all that q1 carries, as if each joint behind it were where it is
+    attached, over the robot's mass."""
+    model = robot.model
+    masses = np.array([inertia.mass for inertia in model.inertias])
+    weights = masses.copy()  # of all that a joint carries
+    for index in range(model.njoints - 1, 0, -1):
+        weights[model.parents[index]] += weights[index]
+    first = [mass * np.array(inertia.lever) for mass, inertia in zip(masses, model.inertias, strict=True)]
+    for index in range(1, model.njoints):
+        offset = np.array(model.jointPlacements[index].translation)
+        first[model.parents[index]] = first[model.parents[index]] + weights[index] * offset
+    names = ["com", *(f"com_{name}" for name in list(model.names)[1:])]
+    moments = [geometry.vector(vector / weights[0], name) for vector, name in zip(first, names, strict=True)]
+    for index in range(model.njoints - 1, 0, -1):
+        placement, motion = joint_steps(robot, index)
+        moment, share, parent = moments[index], weights[index] / weights[0], model.parents[index]
+        moved = carried(motion, moment, geometry)
+        if motion.kind == "prismatic" and share != 1.0:
+            weight = geometry.length(share, f"share_{motion.label}")
+            moved = [a + weight * (b - a) for a, b in zip(moment, moved, strict=True)]
+        behind = carried(placement._replace(translation=np.zeros(3)), moved, geometry)
+        moments[parent] = [a + b for a, b in zip(moments[parent], behind, strict=True)]
+    return moments[0]
 
-    def __init__(
-        self, entry: Callable[..., Any], shape: tuple[int, ...], first: tuple[int, ...] = ()
-    ) -> None:
+
+class Lazy:
+    def __init__(self, entry: Callable[..., Any], shape: tuple[int, ...]) -> None:
         self._entry = entry
-        self._first = first
         self.shape = shape
 
     def __getitem__(self, index: int | tuple[int, ...]) -> Any:
         found = index if isinstance(index, tuple) else (index,)
         if len(found) == len(self.shape):
-            return self._entry(*self._first, *found)
-        return Lazy(self._entry, self.shape[len(found) :], (*self._first, *found))
+            return self._entry(*found)
+        return Lazy(partial(self._entry, *found), self.shape[len(found) :])
 
 
 def lazy(entry: Callable[..., Any], *shape: int) -> Any:
-    """Such an array, for what takes numpy's."""
     return Lazy(entry, shape)
 
 
 def unread(what: str, dimensions: int) -> Any:
-    """An array that has no formulas."""
-
     def refuse(*index: int) -> None:
         raise Untraceable(f"it reads {what}")
 
@@ -54,65 +86,56 @@ def unread(what: str, dimensions: int) -> Any:
 
 @dataclass(eq=False)
 class Frames:
-    """What kernels read of a robot, each quantity made once.
-
-    Attributes
-    ----------
-    auxiliaries : what the auxiliary symbols mean
-    undefined : what a function that was traced is undefined without: the lengths, squared, of atan2's vectors
-    """
+    """What kernels read of a robot, each quantity computed once."""
 
     robot: Robot
     geometry: Geometry
     auxiliaries: list[Auxiliary] = field(default_factory=list)
+    #: Squared lengths of atan2's vectors: the traced function is undefined where one is 0.
     undefined: list[Expansion] = field(default_factory=list)
     _made: dict[Any, Any] = field(default_factory=dict)
 
     def coordinates(self) -> list[Linear]:
-        """The robot's coordinates as kernels get them."""
         return [Linear(self.geometry.ring, {index: Fraction(1)}) for index in self._indices()]
 
     def read(self, frames: tuple[str, ...]) -> records.Frames:
-        """Placements and Jacobians of some frames; no second derivatives."""
+        """Placements and Jacobians of frames, without second derivatives."""
         k, n = len(frames), self.robot.n
         placements = lazy(lambda k, i, j: Quotient(self._column(frames[k], j)[i]), k, 3, 4)
         jacobians = lazy(lambda k, i, j: Quotient(self._motion(frames[k], i)[j]), k, 6, n)
         return records.Frames(np.arange(k), placements, jacobians, unread("second derivatives of frames", 4))
 
     def position(self, frame: str, seen_from: str | None = None) -> Vector:
-        """A frame's origin, in world axes or as another frame sees it."""
+        robot, geometry = self.robot, self.geometry
         if frame == CENTER_OF_MASS:
-            return self._once(frame, lambda: center(self.robot, self.geometry))
-        return self._once(
-            (frame, seen_from), lambda: position(steps_to(self.robot, frame, seen_from), self.geometry)
-        )
+            return self._once(frame, lambda: center(robot, geometry))
+        return self._once((frame, seen_from), lambda: position(steps_to(robot, frame, seen_from), geometry))
 
     def _column(self, frame: str, j: int) -> Vector:
         if j == 3:
             return self.position(frame)
-        geometry = self.geometry
+        robot, geometry, unit = self.robot, self.geometry, unit_vectors(self.geometry.ring)[j]
         return self._once(
-            (frame, j),
-            lambda: turned(
-                turns(steps_to(self.robot, frame), geometry), unit_vectors(geometry.ring)[j], geometry.ring
-            ),
+            (frame, j), lambda: turned(turns(steps_to(robot, frame), geometry), unit, geometry.ring)
         )
 
     def _motion(self, frame: str, i: int) -> Vector:
         if i < 3:
             return self._once((frame, i, "linear"), lambda: self.gradient(self.position(frame)[i]))
-        moving = self._once((frame, "angular"), lambda: self._angular(steps_to(self.robot, frame)))
-        zero = [self.geometry.ring.number(0)] * 3
-        return [moving.get(name, zero)[i - 3] for name in self.robot.q_names]
+        return [turn[i - 3] for turn in self._once((frame, "angular"), lambda: self._angular(frame))]
 
-    def _angular(self, steps: list[Step]) -> dict[str, Vector]:
-        """The twists' angular parts in world axes."""
+    def _angular(self, frame: str) -> list[Vector]:
+        """ω per coordinate, in world axes."""
+        steps, ring = steps_to(self.robot, frame), self.geometry.ring
         forward = turns(steps, self.geometry)
-        moving = twists(steps, self.geometry).angular
-        return {name: turned(forward, part, self.geometry.ring) for name, part in moving.items()}
+        return [turned(forward, twist[3:], ring) for twist in self.twists(steps)]
+
+    def twists(self, steps: list[Step]) -> list[Vector]:
+        """v over ω of the last frame per coordinate, in its own axes."""
+        found, rest = twists(steps, self.geometry), [self.geometry.ring.number(0)] * 6
+        return [found.get(name, rest) for name in self.robot.q_names]
 
     def gradient(self, value: Expansion) -> list[Expansion]:
-        """Derivatives by the robot's coordinates."""
         return [value.derivative(index) for index in self._indices()]
 
     def _indices(self) -> list[int]:
@@ -124,35 +147,30 @@ class Frames:
             self._made[key] = make()
         return self._made[key]
 
-    def free_names(self, *names: str) -> list[str]:
-        """The names, with a number behind them when one of them is taken."""
-        taken = {*self.robot.q_names, *self.geometry.ring.names}
-        for number in range(1, 100):
-            found = [name if number == 1 else f"{name}{number}" for name in names]
-            if not taken.intersection(found):
-                return found
-        raise AssertionError("a hundred auxiliary quantities")
-
     def auxiliary(self, *wanted: tuple[str, str, Sequence[Expansion]]) -> list[str]:
-        """Symbols for quantities, each with the name that it has if that is free, its kind and arguments."""
+        """Names of symbols for quantities, each given as (preferred name, kind, arguments); if one of the
+        names is taken, all get the same number."""
         size, quantities = len(wanted), [(kind, tuple(arguments)) for _, kind, arguments in wanted]
         for i in range(len(self.auxiliaries) - size + 1):
             group = self.auxiliaries[i : i + size]
             if [one[1:] for one in group] == quantities:
                 return [one.name for one in group]
-        names = self.free_names(*(name for name, _, _ in wanted))
+        taken = {*self.robot.q_names, *self.geometry.ring.names}
+        endings = itertools.chain([""], itertools.count(2))
+        tried = ([f"{name}{ending}" for name, _, _ in wanted] for ending in endings)
+        names = next(names for names in tried if taken.isdisjoint(names))
         for name, quantity in zip(names, quantities, strict=True):
             self.auxiliaries.append(Auxiliary(name, *quantity))
         return names
 
     def positive(self) -> set[int]:
-        """Variables that are auxiliary lengths."""
+        """Indices of auxiliary lengths, which are never negative."""
         ring = self.geometry.ring
         kinds = {one.name: one.kind for one in self.auxiliaries}
         return {i for i, name in enumerate(ring.names) if kinds.get(name) in ("length", "root")}
 
     def angle(self, sine: Expansion, cosine: Expansion) -> Linear | None:
-        """atan2 of both, where it is a combination of angles and a number of quarter turns."""
+        """atan2 of both, where that is a combination of angles plus quarter turns."""
         ring, half = self.geometry.ring, Fraction(1, 2)
         size = cosine.split()[0] if cosine else ring.number(1)
         if size.variables() <= self.positive():
@@ -170,6 +188,129 @@ class Frames:
         return None
 
     def matrix(self, product: tuple[Any, ...]) -> str:
-        """A name for a rotation, by what it is the product of: R, R2, R3."""
+        """A name for a rotation that is this product: R, R2, R3."""
         count = sum(isinstance(name, str) and name[0] == "R" for name in self._made.values()) + 1
         return str(self._once(("matrix", product), lambda: "R" if count == 1 else f"R{count}"))
+
+
+class Step(NamedTuple):
+    """A fixed placement, or the motion of a joint, "revolute" or "prismatic", about or along a unit axis;
+    `backward` for its inverse."""
+
+    label: str
+    kind: str
+    translation: Array = np.zeros(3)
+    rotation: Array = np.eye(3)
+    axis: Array = np.zeros(3)
+    backward: bool = False
+
+
+def joint_steps(robot: Robot, index: int) -> list[Step]:
+    """A joint's placement in the frame of the joint before, and its motion; `index` is Pinocchio's.
+    `InputError` for a joint that neither turns nor slides."""
+    model = robot.model
+    joint, placement = model.joints[index], model.jointPlacements[index]
+    data = joint.createData()
+    joint.calc(data, np.zeros(model.nq))
+    motion = np.array(data.S, dtype=np.float64).reshape(-1)
+    if motion.size != 6 or motion[:3].any() == motion[3:].any():
+        what = f"{model.names[index]} is a {str(joint.shortname()).removeprefix('JointModel')}"
+        raise InputError(what, where="symbolic", expected="joints that turn or slide")
+    name, slides = str(model.names[index]), bool(motion[:3].any())
+    return [
+        Step(name, "fixed", np.array(placement.translation), np.array(placement.rotation)),
+        Step(name, "prismatic" if slides else "revolute", axis=motion[:3] if slides else motion[3:]),
+    ]
+
+
+def steps_to(robot: Robot, frame: str, seen_from: str | None = None) -> list[Step]:
+    """The steps from the world, or from another frame, to a frame, without joints that carry both.
+    `InputError` for an unknown frame, or a joint on the way that neither turns nor slides."""
+    model = robot.model
+    at = model.frames[robot.frame_id(frame)]
+    steps = [Step(frame, "fixed", np.array(at.placement.translation), np.array(at.placement.rotation))]
+    index = int(at.parentJoint)
+    while index > 0:
+        steps = joint_steps(robot, index) + steps
+        index = int(model.parents[index])
+    if seen_from is None:
+        return steps
+    other = steps_to(robot, seen_from)
+    pairs = zip(steps[:-1], other[:-1], strict=False)
+    shared = len(list(takewhile(lambda pair: pair[0].label == pair[1].label, pairs)))
+    return [step._replace(backward=True) for step in reversed(other[shared:])] + steps[shared:]
+
+
+def position(steps: list[Step], geometry: Geometry) -> Vector:
+    """The last frame's origin as seen from the first."""
+    _name_lengths(steps, geometry)
+    p = [geometry.ring.number(0)] * 3
+    for step in reversed(steps):
+        p = carried(step, p, geometry)
+    return p
+
+
+def turns(steps: list[Step], geometry: Geometry) -> tuple[Turning, ...]:
+    """The turns whose product is the last frame's rotation in the axes of the first."""
+    return merged([turn for step in steps for turn in _turns_of(step, geometry)])
+
+
+def twists(steps: list[Step], geometry: Geometry) -> dict[str, list[Expansion]]:
+    """v over ω of the last frame, in its own axes, for each joint on the way by name: v = Rᵀ (a × p) and
+    ω = Rᵀ a where it turns about a."""
+    ring = geometry.ring
+    _name_lengths(steps, geometry)
+    behind: list[Turning] = []
+    zero = [ring.number(0)] * 3
+    p, found = zero, {}
+    for step in reversed(steps):
+        if step.kind != "fixed":
+            axis = [-entry if step.backward else entry for entry in _axis(step, geometry)]
+            home = back(merged(behind))
+            v, w = (cross(axis, p), axis) if step.kind == "revolute" else (axis, zero)
+            found[step.label] = turned(home, v, ring) + turned(home, w, ring)
+        p = carried(step, p, geometry)
+        behind = [*_turns_of(step, geometry), *behind]
+    return found
+
+
+def _name_lengths(steps: list[Step], geometry: Geometry) -> None:
+    """Name lengths from the root on: the order in formulas, not the one in which they are met here."""
+    for step in steps:
+        geometry.vector(step.translation, step.label)
+
+
+def carried(step: Step, point: Vector, geometry: Geometry) -> Vector:
+    """A point behind a step, as seen from before it."""
+    offset = geometry.vector(step.translation, step.label)
+    if step.kind == "prismatic":
+        q = geometry.ring.scalar(step.label)
+        offset = [entry * q for entry in _axis(step, geometry)]
+    turning = _turns_of(step, geometry)
+    if step.backward:
+        point = [entry - part for entry, part in zip(point, offset, strict=True)]
+        return turned(turning, point, geometry.ring)
+    return [a + b for a, b in zip(turned(turning, point, geometry.ring), offset, strict=True)]
+
+
+def _turns_of(step: Step, geometry: Geometry) -> list[Turning]:
+    if step.kind == "prismatic":
+        return []
+    if step.kind == "fixed":
+        found = geometry.rotation(step.rotation, step.label)
+    else:
+        angle = geometry.ring.variable(step.label, True)
+        straight = signed_axis(step.axis)
+        if straight is not None:
+            found = [Turning(straight[0], ((angle, straight[1]),))]
+        else:
+            tilt = geometry.towards(step.axis, step.label)
+            found = [*tilt, Turning(2, ((angle, 1),)), *back(tilt)]
+    return back(found) if step.backward else found
+
+
+def _axis(step: Step, geometry: Geometry) -> Vector:
+    straight, ring = signed_axis(step.axis), geometry.ring
+    if straight is None:
+        return turned(geometry.towards(step.axis, step.label), unit_vectors(ring)[2], ring)
+    return [ring.number(straight[1] * int(i == straight[0])) for i in range(3)]

@@ -5,15 +5,77 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from typing import NamedTuple
 
 import numpy as np
 
 from nmm.analysis.formulas.expansion import Expansion, Ring, exact
-from nmm.analysis.formulas.turning import Turning
 from nmm.arrays import Array
 from nmm.errors import InputError
+from nmm.findings import Finding
 
-#: Lengths (m) below it are what rounding leaves of zero.
+Vector = list[Expansion]
+
+
+class Turning(NamedTuple):
+    """A turn about x, y or z (0, 1, 2) by k·angles, ((variable, k), ...), plus 0 to 3 quarter turns."""
+
+    axis: int
+    angle: tuple[tuple[int, int], ...] = ()
+    quarters: int = 0
+
+    def inverse(self) -> Turning:
+        return Turning(self.axis, tuple((i, -k) for i, k in self.angle), -self.quarters % 4)
+
+    def of(self, vector: Vector, ring: Ring) -> Vector:
+        cosine, sine = ring.waves(dict(self.angle), self.quarters)
+        i, j = (self.axis + 1) % 3, (self.axis + 2) % 3
+        turned = list(vector)
+        turned[i] = cosine * vector[i] - sine * vector[j]
+        turned[j] = sine * vector[i] + cosine * vector[j]
+        return turned
+
+
+def turned(turns: Sequence[Turning], vector: Vector, ring: Ring) -> Vector:
+    """A vector after several turns, the last one first: as by the product of their matrices."""
+    for turn in reversed(turns):
+        vector = turn.of(vector, ring)
+    return vector
+
+
+def back(turns: Sequence[Turning]) -> list[Turning]:
+    return [turn.inverse() for turn in reversed(turns)]
+
+
+def merged(turns: Sequence[Turning]) -> tuple[Turning, ...]:
+    """Neighbours about one axis joined, those without effect dropped."""
+    found: list[Turning] = []
+    for turn in turns:
+        if found and found[-1].axis == turn.axis:
+            before = found.pop()
+            angle = dict(before.angle)
+            for i, k in turn.angle:
+                angle[i] = angle.get(i, 0) + k
+            kept = tuple((i, k) for i, k in angle.items() if k)
+            turn = Turning(turn.axis, kept, (before.quarters + turn.quarters) % 4)
+        if turn.angle or turn.quarters:
+            found.append(turn)
+    return tuple(found)
+
+
+def unit_vectors(ring: Ring) -> list[Vector]:
+    return [[ring.number(int(i == j)) for j in range(3)] for i in range(3)]
+
+
+def dot(a: Vector, b: Vector) -> Expansion:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    return [a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3] for i in range(3)]
+
+
+#: Smaller lengths (m) are rounding and count as zero.
 _NO_LENGTH = 1e-12
 #: The same for entries of rotation matrices and angles, rad, which files write with fewer digits.
 _NOTHING = 1e-9
@@ -22,20 +84,9 @@ _SQUARE = 1e-5
 
 
 class Geometry:
-    """The lengths and fixed angles met on the way, each a symbol (or an exact number), and their values.
-
-    Parameters
-    ----------
-    ring : where the symbols live
-    arguments : names for lengths by their label, as `x_q2`; a label without one is its own name
-    demanded : whether a name that cannot be had (a coordinate's, or that of another length) is an error
-    as_numbers : keep lengths as decimal fractions instead
-    taken : names that no length may have: the coordinates'
-
-    Raises
-    ------
-    InputError : (of its methods) a name that cannot be had
-    """
+    """The robot's lengths and fixed angles, each a symbol (or an exact number), and their values. A length
+    has the name that `arguments` give its label, as `x_q2`, or the label itself; if names are `demanded`, one
+    that is `taken` by a coordinate, or by another length, is an error."""
 
     def __init__(
         self,
@@ -47,7 +98,7 @@ class Geometry:
     ) -> None:
         self.ring = ring
         self.values: dict[str, float] = {}
-        self.notes: list[str] = []
+        self.notes: list[Finding] = []
         self._arguments = arguments
         self._demanded = demanded
         self._as_numbers = as_numbers
@@ -55,31 +106,27 @@ class Geometry:
         self._names: dict[str, str] = {}
 
     def length(self, value: float, label: str) -> Expansion:
-        """A length (m) as a symbol; its sign is kept outside where it is an argument's."""
+        """A length (m) as a symbol; the sign of an argument's name stays outside."""
         if abs(value) < _NO_LENGTH:
             return self.ring.number(0)
         if self._as_numbers:
             return self.ring.number(exact(value))
         given = self._arguments.get(label, label)
         sign = -1 if given.startswith("-") else 1
-        if label not in self._names:
-            self._names[label] = self._name(given.removeprefix("-"), sign * value, label)
-        self._valued(self._names[label], sign * value, False)
-        return self.ring.scalar(self._names[label]).scaled(Fraction(sign))
+        index = self._variable(label, given.removeprefix("-"), sign * value, False)
+        return self.ring.scalar(self.ring.names[index]).scaled(Fraction(sign))
 
     def fixed_angle(self, value: float) -> int:
-        """The variable for an angle (rad) that has no name in the robot's file: angle1, angle2, ..."""
-        label = f"angle of {value:.9f} rad"
-        if label not in self._names:
-            count = sum(label.startswith("angle of") for label in self._names)
-            self._names[label] = self._name(f"angle{count + 1}", value, label)
-        return self._valued(self._names[label], value, True)
+        """The variable for an angle (rad) without a name in the robot's file: angle1, angle2, ..."""
+        count = sum(label.startswith("angle of") for label in self._names)
+        return self._variable(f"angle of {value:.9f} rad", f"angle{count + 1}", value, True)
 
-    def _valued(self, name: str, value: float, angle: bool) -> int:
-        """The variable of a name, with its value."""
-        self.values[name] = value
-        index = self.ring.variable(name, angle)
-        self.ring.sample[index] = value
+    def _variable(self, label: str, name: str, value: float, angle: bool) -> int:
+        """The variable with this label, under the given name if it is free."""
+        if label not in self._names:
+            self._names[label] = self._name(name, value, label)
+        index = self.ring.variable(self._names[label], angle)
+        self.values[self._names[label]] = self.ring.sample[index] = value
         return index
 
     def _name(self, name: str, value: float, label: str) -> str:
@@ -90,14 +137,11 @@ class Geometry:
             if same and not used and name not in self._taken:
                 return name
             if self._demanded:
-                of = (
-                    "the coordinate"
-                    if name in self._taken
-                    else "another quantity"
-                    if used
-                    else (f"another length of {self.values[name]:g} m")
-                )
-                raise InputError(f"arguments: {name!r} for {label} = {value:g}: it is the name of {of}")
+                of = "the coordinate" if name in self._taken else "another quantity"
+                if name not in self._taken and not used:
+                    of = f"another length of {self.values[name]:g} m"
+                what = f"{name!r} for {label} = {value:g}: it is the name of {of}"
+                raise InputError(what, where="arguments")
             name = label
         while name in self._taken or name in self.ring.names:
             name += "_"
@@ -111,12 +155,8 @@ class Geometry:
 
     def rotation(self, matrix: Array, label: str) -> list[Turning]:
         """A fixed rotation as Rz(yaw) Ry(pitch) Rx(roll)."""
-        roll, pitch, yaw = _roll_pitch_yaw(matrix)
-        return [
-            self.turn(yaw, 2, f"yaw_{label}"),
-            self.turn(pitch, 1, f"pitch_{label}"),
-            self.turn(roll, 0, f"roll_{label}"),
-        ]
+        angles = zip(("roll", "pitch", "yaw"), _roll_pitch_yaw(matrix), strict=True)
+        return [self.turn(value, i, f"{name}_{label}") for i, (name, value) in reversed([*enumerate(angles)])]
 
     def towards(self, axis: Array, label: str) -> list[Turning]:
         """Rz(a) Ry(b), which turns z into a unit axis."""
@@ -125,22 +165,20 @@ class Geometry:
         return [self.turn(yaw, 2, f"axis_yaw_{label}"), self.turn(pitch, 1, f"axis_pitch_{label}")]
 
     def turn(self, value: float, axis: int, label: str) -> Turning:
-        """A turn by a fixed angle (rad) about x, y or z: quarter turns exact, other angles symbols."""
+        """A turn by a fixed angle (rad) about x, y or z: quarter turns are exact, other angles symbols."""
         quarters = round(value / (math.pi / 2))
         excess = value - quarters * math.pi / 2
         if abs(excess) < _SQUARE:
             if abs(excess) > _NOTHING:
                 self.notes.append(
-                    f"{label} = {value:.10g} rad taken as {quarters} pi/2 ({excess:.1e} rad away)"
+                    Finding("angle_rounded", {"name": label, "value": value, "quarters": quarters})
                 )
             return Turning(axis, (), quarters % 4)
-        if label not in self._names:
-            self._names[label] = self._name(label, value, label)
-        return Turning(axis, ((self._valued(self._names[label], value, True), 1),))
+        return Turning(axis, ((self._variable(label, label, value, True), 1),))
 
 
 def _roll_pitch_yaw(R: Array) -> tuple[float, float, float]:
-    """Angles with R = Rz(yaw) Ry(pitch) Rx(roll); roll is 0 where only yaw -+ roll counts."""
+    """Angles with R = Rz(yaw) Ry(pitch) Rx(roll); roll is 0 where only yaw -+ roll is determined."""
     flat = math.hypot(R[0, 0], R[1, 0])
     pitch = math.atan2(-R[2, 0], flat)
     if flat < _NOTHING:

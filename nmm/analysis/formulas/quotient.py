@@ -1,4 +1,4 @@
-"""Numbers that kernels are run on to get formulas: quotients of trigonometric polynomials; coordinates."""
+"""Numbers on which kernels are run to get formulas: quotients of trigonometric polynomials; coordinates."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ _SQUARE = 1e-9
 
 
 class Untraceable(InputError):
-    """A kernel does what has no formula here."""
+    """A kernel does what has no formula."""
 
 
 class Traced(NDArrayOperatorsMixin, ABC):
-    """Arithmetic, beside numbers of Python and numpy. Comparisons, on which a kernel branches, are made where
-    the variables have the values of `Ring.sample`, a point in general position; `==` is exact."""
+    """Arithmetic together with numbers of Python and numpy. `==` is exact; other comparisons, on which a
+    kernel branches, are made at `Ring.sample`, a point in general position."""
 
     ring: Ring
 
@@ -46,7 +46,7 @@ class Traced(NDArrayOperatorsMixin, ABC):
 
 
 class Quotient(Traced):
-    """A trigonometric polynomial over another one; lengths alone are divided by as they are."""
+    """One trigonometric polynomial over another; lengths alone go into the numerator, as negative powers."""
 
     def __init__(self, over: Expansion, under: Expansion | None = None) -> None:
         self.ring = over.ring
@@ -63,25 +63,22 @@ class Quotient(Traced):
         return self
 
     def times(self, other: Quotient) -> Quotient:
-        """Their product; what one is divided by and the other has as a factor is cancelled."""
         a, d = _cancelled(self.over, other.under)
         c, b = _cancelled(other.over, self.under)
         return Quotient(a * c, b * d)
 
     def plus(self, other: Quotient) -> Quotient:
-        """Their sum."""
         under = common_multiple([self.under, other.under])
         return Quotient(*_cancelled(self.above(under) + other.above(under), under))
 
     def inverse(self) -> Quotient:
-        """1 over it."""
         if not self.over:
             raise Untraceable("it divides by what is 0")
         factor, under = self.over.split()
         return Quotient(self.under * factor.inverse(), under)
 
     def above(self, under: Expansion) -> Expansion:
-        """The numerator over a multiple of the denominator."""
+        """The numerator over `under`, a multiple of the denominator."""
         factor = under.divided(self.under)
         if factor is None:
             raise Untraceable("its denominators have no common multiple")
@@ -89,13 +86,8 @@ class Quotient(Traced):
 
 
 class Linear(Traced):
-    """A combination of coordinates and a constant; angles may go into cosines and sines, or out as a value.
-
-    Attributes
-    ----------
-    terms : coefficients by the variables' indices
-    constant : rad, or m
-    """
+    """A combination of coordinates (coefficients by index) plus a constant, rad or m; angles may go into
+    cosines and sines, or out as a value."""
 
     def __init__(self, ring: Ring, terms: dict[int, Fraction], constant: Fraction = Fraction(0)) -> None:
         self.ring = ring
@@ -121,13 +113,12 @@ class Linear(Traced):
 
     @property
     def quarters(self) -> tuple[int, float]:
-        """The constant in quarter turns, and what is left of it, rad."""
+        """The constant in quarter turns, and the remainder, rad."""
         count = round(float(self.constant) / (math.pi / 2))
         rest = float(self.constant) - count * math.pi / 2
         return count, rest if abs(rest) > _SQUARE else 0.0
 
     def wave(self, geometry: Geometry) -> tuple[Quotient, Quotient]:
-        """Its cosine and sine."""
         ring, angle = self.ring, {}
         for i, n in self.terms.items():
             if not ring.is_angle[i] or n.denominator != 1:
@@ -136,19 +127,16 @@ class Linear(Traced):
         quarters, rest = self.quarters
         if rest:
             angle[geometry.fixed_angle(abs(rest))] = 1 if rest > 0.0 else -1
-        cosine, sine = ring.cos(angle), ring.sin(angle)
-        for _ in range(quarters % 4):
-            cosine, sine = -sine, cosine
+        cosine, sine = ring.waves(angle, quarters % 4)
         return Quotient(cosine), Quotient(sine)
 
 
 def quotient(value: Any, ring: Ring) -> Quotient:
-    """A number of any kind as a quotient."""
     return value.quotient() if isinstance(value, Traced) else Quotient(ring.number(exact(float(value))))
 
 
 def common_multiple(values: Iterable[Expansion]) -> Expansion:
-    """A polynomial that all are factors of, as far as one of them is another's."""
+    """A polynomial divisible by all of them; common factors are found only where one divides another."""
     first, *others = values
     for value in others:
         if value.divided(first) is not None:
@@ -159,12 +147,11 @@ def common_multiple(values: Iterable[Expansion]) -> Expansion:
 
 
 def _cancelled(over: Expansion, under: Expansion) -> tuple[Expansion, Expansion]:
-    """Both without one of them, where it is a factor of the other."""
+    """Both, divided by one of them where that is a factor of the other."""
     if not under.variables():
         return over, under
-    one = under.ring.number(1)
     if (divided := over.divided(under)) is not None:
-        return divided, one
+        return divided, under.ring.number(1)
     if over.variables() and (divided := under.divided(over)) is not None:
         factor, rest = divided.split()
         return factor.inverse(), rest

@@ -1,58 +1,57 @@
-"""From a trigonometric polynomial to the form that a person would write.
-
-SymPy's `simplify`, `fu` and `factor(trigsimp(...))` take 6 to 8 s for the paper's 3R, which is 0.4 s here,
-and leave products such as Λ (d + Λ c1) as sums of ten terms; `trigsimp` by Gröbner bases takes 28 s for one.
-"""
-
-from __future__ import annotations
+"""From a trigonometric polynomial to the form that a person would write. SymPy's `simplify`, `fu` and
+`factor(trigsimp(...))` take 6 to 8 s for the paper's 3R, which takes 0.4 s here, and leave products such as
+Λ (d + Λ c1) as sums of ten terms; `trigsimp` by Gröbner bases takes 28 s for one."""
 
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from fractions import Fraction
+from functools import reduce
 from math import gcd, lcm
 
-from nmm.analysis.formulas.expansion import Expansion, Gaussian, Key, Ring
-from nmm.analysis.formulas.expressions import ZERO, Node, Product, Sum, Symbol, Trig, alone, is_constant, text
+from nmm.analysis.formulas.expansion import Expansion, Gaussian, Key, Ring, collected
+from nmm.analysis.formulas.expressions import (
+    ZERO,
+    Node,
+    Product,
+    Sum,
+    Symbol,
+    Trig,
+    alone,
+    inline,
+    is_constant,
+)
 from nmm.analysis.formulas.trigonometric_factors import factors_of
+from nmm.latex import Formula, symbol
 
 #: Names of factors that several minors have, in the order in which they are given.
 FACTOR_NAMES = ("Lambda", "Gamma", "Phi", "Psi", "Omega")
 #: A factor gets a name when at least so many minors have it.
 _OFTEN = 3
-#: So many cosines and sines of sums are tried as products.
+#: Sums of at least so many cosines and sines are tried as products.
 _MANY = 4
-#: More waves than that are not tried together.
+#: A sum of more waves is not tried as a whole.
 _LONG = 100
 
 
 def factored(value: Expansion) -> Product:
-    """The value as a product; sums of angles inside sums are split where that is shorter.
-
-    Raises
-    ------
-    TooLarge : see `factors_of`
-    """
+    """The value as a product; inside sums, cosines and sines of sums are split where that is shorter."""
     if not value:
         return ZERO
     number, scalars, factors = factors_of(value)
-    result = Product(number).times(_scalars(value, scalars))
     parts = [part for factor, power in factors for part in [as_sum(factor)] * power]
-    for part in sorted(parts, key=_length):
-        result = result.times(part)
-    return tidy(result)
+    start = Product(number).times(_scalars(value, scalars))
+    return tidy(reduce(Product.times, sorted(parts, key=_length), start))
 
 
 def expanded(product: Product, ring: Ring) -> Expansion:
-    """The polynomial that a product was written from; no factor in it may have a name."""
+    """The polynomial behind a product without named factors."""
     total = ring.number(product.number)
     for factor, power in product.factors:
         if isinstance(factor, Symbol):
             total = total * ring.scalar(factor.name, power)
             continue
         if isinstance(factor, Sum):
-            one = ring.number(0)
-            for term in factor.terms:
-                one = one + expanded(term, ring)
+            one = sum((expanded(term, ring) for term in factor.terms), ring.number(0))
         else:
             angle = {ring.variable(name, True): n for name, n in factor.angle}
             one = ring.cos(angle) if factor.kind == "cos" else ring.sin(angle)
@@ -63,33 +62,22 @@ def expanded(product: Product, ring: Ring) -> Expansion:
 def named(
     products: Sequence[Product], taken: Collection[str], lengths: Collection[str]
 ) -> tuple[dict[str, Product], list[Product]]:
-    """Names, none of those taken, for sums that several products have as a factor; the products in them.
-
-    Sums of lengths alone come last.
-    """
+    """Free names for sums that several products have as a factor, those of lengths alone last, and the
+    products in these names."""
     names: dict[str, Product] = {}
     products = list(products)
-    for name in FACTOR_NAMES:
-        if name in taken:
-            continue
-        counts: Counter[Sum] = Counter()
-        for product in products:
-            counts.update(set(_sums(product)))
-        often = [
-            (not is_constant(node, lengths), count, _size(node), node)
-            for node, count in counts.items()
-            if count >= _OFTEN
-        ]
+    for name in (name for name in FACTOR_NAMES if name not in taken):
+        counts = Counter(node for product in products for node in dict.fromkeys(_sums(product)))
+        often = [node for node, count in counts.items() if count >= _OFTEN]
         if not often:
             break
-        node = max(often, key=lambda entry: entry[:3])[3]
+        node = max(often, key=lambda node: (not is_constant(node, lengths), counts[node], _size(node)))
         names[name] = alone(node)
         products = [_replaced(product, node, Symbol(name)) for product in products]
     return names, products
 
 
 def in_names(product: Product, names: Mapping[str, Product]) -> Product:
-    """A product with the factors that have names written as these."""
     for name, form in names.items():
         node = form.factors[0][0]
         if isinstance(node, Sum):
@@ -97,16 +85,17 @@ def in_names(product: Product, names: Mapping[str, Product]) -> Product:
     return product
 
 
-def condition_text(factor: Product, names: Mapping[str, Product]) -> str:
-    """A factor of a minor where it is said to vanish: "sin(q2)", "Λ", "d + Λ c1"."""
+def condition(factor: Product, names: Mapping[str, Product]) -> Formula:
+    """A factor of a minor as it is said to vanish: "sin(q2)", "Λ", "d + Λ c1"."""
     node = factor.factors[0][0]
     if isinstance(node, Trig) and len(node.angle) == 1 and node.angle[0][1] == 1:
-        return f"{node.kind}({node.angle[0][0]})"
-    return text(in_names(factor, names))
+        angle = symbol(node.angle[0][0])
+        return Formula(f"{node.kind}({angle})", rf"\{node.kind}({angle.latex})")
+    return inline(in_names(factor, names))
 
 
 def as_sum(value: Expansion) -> Product:
-    """A value without looking for factors, as a product of a number and one sum (or one cosine)."""
+    """A value, not factored, as a number times one sum (or one cosine)."""
     if not value:
         return ZERO
     ring = value.ring
@@ -136,12 +125,11 @@ def as_sum(value: Expansion) -> Product:
 
 
 def _written(terms: list[Product]) -> Product:
-    """A sum with what is common taken out."""
     return _normalised(_collected(terms))
 
 
 def _split(value: Expansion) -> list[Product] | None:
-    """C cos φ + S sin φ + R, for the angle that leaves the fewest waves; None when none leaves fewer."""
+    """C cos φ + S sin φ + R for the angle that leaves the fewest waves; None where none leaves fewer."""
     found: list[tuple[int, int, tuple[Expansion, Expansion, Expansion]]] = []
     for angle in value.variables():
         if value.ring.is_angle[angle] and all(abs(dict(key).get(angle, 0)) <= 1 for key in value.terms):
@@ -163,21 +151,16 @@ def _split(value: Expansion) -> list[Product] | None:
 
 def _harmonics(value: Expansion, angle: int) -> tuple[Expansion, Expansion, Expansion]:
     """C, S and R of C cos φ + S sin φ + R; φ occurs once in each wave or not at all."""
-    cosine: dict[Key, Gaussian] = {}
-    sine: dict[Key, Gaussian] = {}
+    cosine: list[tuple[Key, Gaussian]] = []
+    sine: list[tuple[Key, Gaussian]] = []
     for key, (re, im) in value.terms.items():
         n = dict(key).get(angle, 0)
         if n:
             # (a e^{ir}) e^{iφ} and its conjugate: C gets a e^{ir}, S gets i a e^{ir}, and their conjugates.
             other = tuple((i, k) for i, k in key if i != angle)
-            for table, term in ((cosine, (re, im)), (sine, (-n * im, n * re))):
-                old = table.get(other, (Fraction(0), Fraction(0)))
-                table[other] = (old[0] + term[0], old[1] + term[1])
-    made = [
-        Expansion(value.ring, {key: part for key, part in table.items() if part[0] or part[1]})
-        for table in (cosine, sine)
-    ]
-    return made[0], made[1], value.without({angle})
+            cosine.append((other, (re, im)))
+            sine.append((other, (-n * im, n * re)))
+    return collected(value.ring, cosine), collected(value.ring, sine), value.without({angle})
 
 
 def _terms(value: Expansion) -> list[Product]:
@@ -204,7 +187,7 @@ def _scalars(value: Expansion, key: Key) -> Product:
 
 
 def _collected(terms: list[Product]) -> list[Product]:
-    """Terms with the most frequent common cosine or sine taken out: d + c1 (l2 s2 + l3 s23)."""
+    """Terms with the most frequent cosine or sine factored out: d + c1 (l2 s2 + l3 s23)."""
     counts = Counter(f for term in terms for f, n in term.factors if not isinstance(f, Symbol) and n > 0)
     shared = [f for f, count in counts.most_common() if count > 1]
     if not shared or counts[shared[0]] == len(terms):
@@ -217,7 +200,7 @@ def _collected(terms: list[Product]) -> list[Product]:
 
 
 def _normalised(terms: list[Product]) -> Product:
-    """A sum with whole coprime coefficients, the first one positive, times what was taken out."""
+    """A sum with coprime integer coefficients, the first one positive, times what was factored out."""
     if len(terms) == 1:
         return terms[0]
     over = lcm(*(term.number.denominator for term in terms))
@@ -233,22 +216,16 @@ def _normalised(terms: list[Product]) -> Product:
     return front.times(alone(Sum(tuple(term.times(back) for term in terms))))
 
 
-def _rank(term: Product) -> tuple[int, int, str]:
+def _rank(term: Product) -> tuple[int, int]:
     """Constants first, then by the number of joints in the angle."""
-    angles = [sum(abs(n) for _, n in f.angle) if isinstance(f, Trig) else 9 for f, _ in term.factors
-              if not isinstance(f, Symbol)]  # fmt: skip
-    return (len(angles), sum(angles), "")
+    factors = [factor for factor, _ in term.factors if not isinstance(factor, Symbol)]
+    angles = [sum(abs(n) for _, n in f.angle) if isinstance(f, Trig) else 9 for f in factors]
+    return len(angles), sum(angles)
 
 
 def _length(product: Product) -> int:
     """How many letters, roughly, a product takes."""
-    total = 0
-    for factor, n in product.factors:
-        if isinstance(factor, Sum):
-            total += abs(n) * sum(_length(term) + 1 for term in factor.terms)
-        else:
-            total += 1
-    return total
+    return sum(abs(n) * _size(f) if isinstance(f, Sum) else 1 for f, n in product.factors)
 
 
 def _size(node: Sum) -> int:
@@ -256,7 +233,6 @@ def _size(node: Sum) -> int:
 
 
 def _sums(product: Product) -> Iterator[Sum]:
-    """Sums that are factors in a product, or in the terms of its sums."""
     for factor, _ in product.factors:
         if isinstance(factor, Sum):
             yield factor
@@ -265,13 +241,12 @@ def _sums(product: Product) -> Iterator[Sum]:
 
 
 def _replaced(product: Product, node: Sum, symbol: Symbol) -> Product:
-    """The product with a sum (or its terms among those of a larger one) written as a symbol."""
+    """The product with a sum, or its terms among those of a larger sum, replaced by a symbol."""
     factors: list[tuple[Node, int]] = []
     for factor, power in product.factors:
         if factor == node:
             factors.append((symbol, power))
-            continue
-        if isinstance(factor, Sum):
+        elif isinstance(factor, Sum):
             terms = [_replaced(term, node, symbol) for term in factor.terms]
             for sign in (1, -1):
                 part = [Product(term.number * sign, term.factors) for term in node.terms]
@@ -279,8 +254,8 @@ def _replaced(product: Product, node: Sum, symbol: Symbol) -> Product:
                     rest = [term for term in terms if term not in part]
                     terms = [*rest, Product(Fraction(sign), ((symbol, 1),))]
             factors.append((Sum(tuple(terms)), power))
-            continue
-        factors.append((factor, power))
+        else:
+            factors.append((factor, power))
     return tidy(Product(product.number, tuple(factors)))
 
 

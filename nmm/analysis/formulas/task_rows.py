@@ -1,48 +1,40 @@
-"""Rows of tasks, and of references that depend on q: their kernels, run on symbols."""
+"""Rows of tasks, and of references that depend on q: their kernels, run on symbols. Distances and directions
+that would make formulas long get symbols of their own before a kernel runs."""
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from nmm.analysis.formulas.auxiliaries import polar
-from nmm.analysis.formulas.expansion import Expansion
-from nmm.analysis.formulas.frames import Frames, unread
-from nmm.analysis.formulas.kinematics import steps_to, turns, twists
+from nmm.analysis.formulas.expansion import Expansion, exact
+from nmm.analysis.formulas.frames import Frames, lazy, steps_to, turns, unread
+from nmm.analysis.formulas.geometry import back, cross, dot, signed_axis, turned
 from nmm.analysis.formulas.quotient import Linear, Quotient, Untraceable, quotient
-from nmm.analysis.formulas.row_values import Arc, Share, Turn, Value
 from nmm.analysis.formulas.tracing import traced
-from nmm.analysis.singular.reached import Reached
+from nmm.analysis.formulas.written import Arc, Share, Turn, Value
+from nmm.analysis.singular.jacobians import Reached
 from nmm.errors import InputError
 from nmm.functions.function import Function, Stage
+from nmm.functions.references.circle import bearing
 from nmm.functions.tasks import Stack
-from nmm.functions.tasks.frame_pose import frame_pose
-from nmm.functions.tasks.orientation import orientation_error
-from nmm.functions.tasks.pose import pose_error
+from nmm.functions.tasks.pointing import pointing
+from nmm.functions.tasks.pose import frame_pose, orientation_error, pose_error
+from nmm.functions.tasks.position import distance
 from nmm.kernels import records
+from nmm.kernels.records import Frames as Read
 from nmm.kernels.records import Rows
 from nmm.robots.robot import CENTER_OF_MASS, Robot
 
-#: The parts of a frame's velocity, linear over angular, that the errors of logarithms are, where they are 0.
-_COMPARED = ((orientation_error, range(3, 6)), (pose_error, range(6)))
+#: For errors that are logarithms, the rows of the frame's velocity, linear over angular, that J has at 0.
+_COMPARED: dict[Any, range] = {orientation_error: range(3, 6), pose_error: range(6)}
 
-
-#: Two times, s, that are nothing to any motion: what differs between them depends on the time.
+#: Two times, s, special to no motion: what differs between them depends on the time.
 _INSTANTS = (0.7548776662, 1.5698402910)
 
 
 class TracedRow(NamedTuple):
-    """One row of f.
-
-    Attributes
-    ----------
-    value : f's
-    gradient : derivatives of f - g by the coordinates (n)
-    target_moves : whether g has some
-    defined : what f or g is undefined without
-    """
+    """One row of f: its value, derivatives of f - g by the coordinates (n), whether g depends on q, and what
+    must not be 0 for f and g to be defined."""
 
     value: Value
     gradient: list[Quotient]
@@ -51,19 +43,14 @@ class TracedRow(NamedTuple):
 
 
 def frames_of(functions: Iterable[Function], robot: Robot) -> list[str]:
-    """Names of the frames that functions read."""
+    """Names of the frames that functions read, the centre of mass not among them."""
     stages = [stage for function in functions for stage in function.stages(robot)]
     found = dict.fromkeys(frame for stage in stages for frame in stage.frames)
     return [frame for frame in found if frame != CENTER_OF_MASS]
 
 
 def task_rows(stack: Stack, frames: Frames) -> list[TracedRow]:
-    """The rows of f, with the derivatives of f - g, which J of eq. 13 is made of.
-
-    Raises
-    ------
-    InputError : a function or a reference whose kernel does what has no formula
-    """
+    """The rows of f, with the derivatives of f - g, from which J of eq. 13 is made."""
     found = []
     for task in stack:
         task.rows(frames.robot)
@@ -74,11 +61,17 @@ def task_rows(stack: Stack, frames: Frames) -> list[TracedRow]:
         if task.function.comparison is not None:
             kind = type(task.function).__name__
             if not reached:
-                raise InputError(
-                    f"symbolic: the error of {kind} is a logarithm, which has no formula here; give the "
-                    f"function without a target: J is then that of the error 0, in the frame's own axes"
+                problem = f"the error of {kind} is a logarithm, which has no formula here"
+                other = (
+                    "the function without a target: J is then that of the error 0, in the frame's own axes"
                 )
-            gradients = _at_no_error(task.function, frames)
+                raise InputError(f"{problem}; give {other}", where="symbolic")
+            if task.function.comparison not in _COMPARED:
+                raise InputError(f"no formula for the error of {kind}", where="symbolic")
+            (stage,) = task.function.stages(frames.robot)
+            moving = frames.twists(steps_to(frames.robot, *stage.frames))
+            parts = _COMPARED[task.function.comparison]  # of the frame's velocity in its own axes
+            gradients = [[Quotient(twist[part]) for twist in moving] for part in parts]
         elif not reached:
             targets = function_rows(task.reference, frames, target=True)[1]
             moves = [any(target) for target in targets]
@@ -94,14 +87,8 @@ def task_rows(stack: Stack, frames: Frames) -> list[TracedRow]:
 def function_rows(
     function: Function, frames: Frames, target: bool = False
 ) -> tuple[list[Value], list[list[Quotient]]]:
-    """Values (s) and derivatives by the coordinates (s, n) of a function of the configuration.
-
-    A target's values may depend on the time: they are those of some instant.
-
-    Raises
-    ------
-    InputError : a function whose kernel does what has no formula
-    """
+    """Values (s) of a function of the configuration and its derivatives by the coordinates (s, n). A target's
+    values may be those of some instant. `InputError` says why its kernel has no formula."""
     ring, s = frames.geometry.ring, len(function.rows(frames.robot))
     stages = function.stages(frames.robot)
     for stage in reversed(stages) if len(stages) > 1 else ():
@@ -116,15 +103,12 @@ def function_rows(
         values = [_value(value, frames) for value in rows.value[:s]]
         gradients = [[quotient(entry, ring) for entry in row] for row in rows.value_q[:s]]
     except (Untraceable, TypeError) as error:  # TypeError: of numbers alone
-        raise InputError(
-            f"symbolic: no formula for {type(function).__name__}: {error} (the numeric analysis takes every "
-            "function)"
-        ) from None
+        problem = f"no formula for {type(function).__name__}: {error}"
+        raise InputError(f"{problem} (the numeric analysis takes every function)", where="symbolic") from None
     return values, gradients
 
 
 def _evaluated(stages: Sequence[Stage], t: float, frames: Frames) -> Rows:
-    """A function's rows, as its stages write them."""
     n, size = frames.robot.n, max(stage.rows for stage in stages)
     rows = Rows(*(np.full(shape, 0.0, dtype=object) for shape in (size, size, (size, n))))
     for stage in stages:
@@ -138,16 +122,17 @@ def _evaluated(stages: Sequence[Stage], t: float, frames: Frames) -> Rows:
 
 
 def _run(stage: Stage, t: float, rows: Rows, frames: Frames) -> None:
-    """Call a stage's kernel: the one place that knows what a function's kernel gets."""
+    """Call a stage's kernel: the only place that knows its arguments."""
     q = np.array(frames.coordinates(), dtype=object)
     at = records.At(t, q, unread("G", 2), unread("G's derivatives", 3))
-    read = polar(stage, frames.read(stage.frames), rows, frames)
+    read, change = frames.read(stage.frames), _CHANGES.get(stage.kernel)
+    if change is not None:
+        read = change(stage, read, rows, frames)
     own = Rows(*(block[: stage.rows] for block in rows))
     traced(stage.kernel, frames)(at, read, stage.numbers, own)
 
 
 def _value(value: Any, frames: Frames) -> Value:
-    """A row's value as it is written."""
     ring = frames.geometry.ring
     if isinstance(value, Arc | Turn):
         return value
@@ -165,8 +150,8 @@ def _value(value: Any, frames: Frames) -> Value:
 
 
 def _frame_pose(stage: Stage, rows: Rows, frames: Frames) -> None:
-    """What the kernel `frame_pose` computes, whose rotation vector is a logarithm: that stays a name, and has
-    derivatives where a task compares it (see `_at_no_error`)."""
+    """What the kernel `frame_pose` computes. Its rotation vector, a logarithm, stays a name, and has
+    derivatives where a task compares it (see `task_rows`)."""
     geometry, ring = frames.geometry, frames.geometry.ring
     product = tuple(
         (turn.axis, tuple((ring.names[i], k) for i, k in turn.angle), turn.quarters)
@@ -181,18 +166,83 @@ def _frame_pose(stage: Stage, rows: Rows, frames: Frames) -> None:
             rows.value[row] = Turn(part - 3, frames.matrix(product), product)
 
 
-def _at_no_error(function: Function, frames: Frames) -> list[list[Quotient]]:
-    """J of a logarithm's error where it is 0: the frame's velocity in its own axes."""
-    parts = next((parts for kernel, parts in _COMPARED if kernel is function.comparison), None)
-    if parts is None:
-        raise InputError(f"symbolic: no formula for the error of {type(function).__name__}")
-    (stage,) = function.stages(frames.robot)
-    moving = twists(steps_to(frames.robot, *stage.frames), frames.geometry)
-    zero = [frames.geometry.ring.number(0)] * 3
-    return [
-        [
-            Quotient((moving.linear, moving.angular)[part // 3].get(joint, zero)[part % 3])
-            for joint in frames.robot.q_names
-        ]
-        for part in parts
+def _bearing(stage: Stage, read: Read, rows: Rows, frames: Frames) -> Read:
+    """T - p = rho (cos g, sin g)."""
+    ring, value = frames.geometry.ring, rows.value
+    towards = [ring.number(exact(float(entry))) for entry in stage.numbers]
+    seen = [to - at for to, at in zip(towards, _polynomials(value[:2], frames), strict=True)]
+    if any(entry.variables() for entry in seen):
+        rho, turn = frames.auxiliary(("rho", "length", seen), ("g", "bearing", seen))
+        g = {ring.variable(turn, True): 1}
+        for i, wave in enumerate((ring.cos(g), ring.sin(g))):
+            value[i] = Quotient(towards[i] - ring.scalar(rho) * wave)
+    return read
+
+
+def _distance(stage: Stage, read: Read, rows: Rows, frames: Frames) -> Read:
+    """d = to - p = rho (cos beta cos alpha, cos beta sin alpha, sin beta)."""
+    ring, value, at = frames.geometry.ring, rows.value, frames.position(stage.frames[0])
+    d = [to - p for to, p in zip(_polynomials(value, frames), at, strict=True)]
+    level = not d[2]
+    up = [] if level else [("beta", "elevation", d)]
+    rho, azimuth, *rest = frames.auxiliary(
+        ("rho", "length", d[:2] if level else d), ("alpha", "bearing", d[:2]), *up
+    )
+    alpha = {ring.variable(azimuth, True): 1}
+    along = [ring.cos(alpha), ring.sin(alpha), ring.number(0)]
+    if not level:
+        beta = {ring.variable(rest[0], True): 1}
+        along = [entry * ring.cos(beta) for entry in along[:2]] + [ring.sin(beta)]
+    value[:] = [Quotient(p + ring.scalar(rho) * entry) for p, entry in zip(at, along, strict=True)]
+    return read
+
+
+def _pointing(stage: Stage, read: Read, rows: Rows, frames: Frames) -> Read:
+    """l = rho (cos alpha, sin alpha (cos beta, sin beta)) along the task's axes; kappa is alpha / sin alpha.
+    All is in the frame's own axes; in others, the result would be the same."""
+    ring = frames.geometry.ring
+    if signed_axis(stage.numbers[:3]) is None:
+        raise Untraceable("its axis is not x, y or z (or its negative)")
+    axes = [[ring.number(exact(float(entry))) for entry in axis] for axis in stage.numbers.reshape(3, 3)]
+    steps, at = steps_to(frames.robot, *stage.frames), frames.position(*stage.frames)
+    d = [to - p for to, p in zip(_polynomials(rows.value, frames), at, strict=True)]
+    seen = turned(back(turns(steps, frames.geometry)), d, ring)
+    fixed = not any(quotient(entry, ring) for entry in rows.value_q.flat)  # in the world
+    along = [dot(axis, seen) for axis in axes]
+    rho, off, around, kappa = frames.auxiliary(
+        ("rho", "length", seen),
+        ("alpha", "off axis", along),
+        ("beta", "bearing", along[1:]),
+        ("kappa", "over sine", along),
+    )
+    alpha, beta = ring.variable(off, True), ring.variable(around, True)
+    ring.ratios[alpha] = kappa
+    length, sine = ring.scalar(rho), ring.sin({alpha: 1})
+    parts = [
+        length * ring.cos({alpha: 1}),
+        *(length * sine * wave({beta: 1}) for wave in (ring.cos, ring.sin)),
     ]
+    point = [dot([axis[i] for axis in axes], parts) for i in range(3)]
+    velocity = frames.twists(steps)
+    rows.value[:] = list(map(Quotient, point))
+    if not fixed:
+        gradients = [frames.gradient(entry) for entry in seen]
+        for k, motion in enumerate(velocity):
+            carried = [a + b for a, b in zip(motion[:3], cross(motion[3:], point), strict=True)]
+            rows.value_q[:, k] = [Quotient(gradients[i][k] + carried[i]) for i in range(3)]
+    return read._replace(
+        placements=lazy(lambda k, i, j: float(i == j), 1, 3, 4),
+        jacobians=lazy(lambda k, i, j: Quotient(velocity[j][i]), 1, 6, frames.robot.n),
+    )
+
+
+def _polynomials(values: Any, frames: Frames) -> list[Expansion]:
+    found = [quotient(value, frames.geometry.ring) for value in values]
+    if any(value.under.variables() for value in found):
+        raise Untraceable("it is taken of quotients")
+    return [value.over for value in found]
+
+
+#: Rewrite the point in a kernel's rows by its distance rho and angles from another, which keeps formulas
+#: short; return the placements and Jacobians that the kernel then reads.
+_CHANGES: dict[Any, Callable[..., Read]] = {bearing: _bearing, distance: _distance, pointing: _pointing}

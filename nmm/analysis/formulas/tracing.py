@@ -1,7 +1,5 @@
 """Kernels run as plain Python on symbols: the function that computes a number computes its formula."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from fractions import Fraction
@@ -13,16 +11,13 @@ import numpy as np
 from nmm.analysis.formulas.expansion import Expansion, exact
 from nmm.analysis.formulas.frames import Frames
 from nmm.analysis.formulas.quotient import Linear, Quotient, Traced, Untraceable, quotient
-from nmm.analysis.formulas.row_values import Arc
+from nmm.analysis.formulas.written import Arc
 
 
 def traced(kernel: Any, frames: Frames) -> Callable[..., Any]:
-    """A kernel, or a function that one calls, with `math` and `numpy` that take symbols.
-
-    Its code is the same, and so is that of the functions that it calls; branches are taken as they are for
-    `Ring.sample`.
-    """
-    modules = {math: _Math(frames), np: _Numpy(frames)}
+    """A kernel's own code with `math` and `numpy` that take symbols, also in the functions that it calls;
+    branches are taken as at `Ring.sample`."""
+    modules = {module: _Module(module, frames) for module in (math, np)}
     known: dict[Any, FunctionType] = {}
 
     def copied(function: Any) -> Any:
@@ -60,22 +55,30 @@ def _names(code: CodeType) -> Iterator[str]:
             yield from _names(constant)
 
 
-class _Math:
-    """`math` for numbers and for symbols."""
+class _Module:
+    """`math` or `numpy` for numbers and for symbols."""
 
-    def __init__(self, frames: Frames) -> None:
+    def __init__(self, module: ModuleType, frames: Frames) -> None:
+        self._module = module
         self._frames = frames
 
     def __getattr__(self, name: str) -> Any:
-        """What else there is, for numbers alone."""
-        there = getattr(math, name)
+        """Everything else: `math` takes numbers alone, numpy asks the symbols."""
+        there = getattr(self._module, name)
+        if self._module is np or not callable(there):
+            return there
 
         def plain(*arguments: Any) -> Any:
             if any(isinstance(argument, Traced) for argument in arguments) and not name.startswith("is"):
                 raise Untraceable(f"it takes math.{name} of a formula")
             return there(*arguments)
 
-        return plain if callable(there) else there
+        return plain
+
+    def zeros(self, shape: Any, dtype: Any = None) -> Any:
+        return np.full(shape, 0.0, dtype=object) if dtype is None else np.zeros(shape, dtype)
+
+    empty = zeros
 
     def cos(self, x: Any) -> Any:
         return self._wave(x, 0) if isinstance(x, Traced) else math.cos(x)
@@ -95,7 +98,7 @@ class _Math:
         return self.sqrt(sum((part * part for part in parts[1:]), parts[0] * parts[0]))
 
     def sqrt(self, x: Any) -> Any:
-        """The root of a square of what is not below 0; another one gets a name."""
+        """The root of the square of what is not below 0; any other root gets a name."""
         if not isinstance(x, Traced):
             return math.sqrt(x)
         square = self._polynomial(x)
@@ -106,7 +109,7 @@ class _Math:
         return Quotient(root)
 
     def _root(self, square: Expansion) -> Expansion | None:
-        """Of a number, times squares of auxiliary lengths and of sines of angles between 0 and π."""
+        """The root of a number times squares of auxiliary lengths and of sines of angles between 0 and π."""
         if not square:
             return square
         size, rest = square.split()
@@ -125,7 +128,7 @@ class _Math:
         return root * Expansion(ring, halved)
 
     def atan2(self, y: Any, x: Any) -> Any:
-        """An angle itself where y and x are its sine and cosine, times what is above 0."""
+        """The angle itself where y and x are its sine and cosine, times a positive factor."""
         if not isinstance(y, Traced) and not isinstance(x, Traced):
             return math.atan2(y, x)
         ring = y.ring if isinstance(y, Traced) else x.ring
@@ -135,25 +138,10 @@ class _Math:
             self._frames.undefined.append(square.split()[1])
         return self._frames.angle(sine, cosine) or Arc(sine, cosine)
 
+    arctan2 = atan2
+
     def _polynomial(self, value: Traced) -> Expansion:
         found = value.quotient()
         if found.under.variables():
             raise Untraceable("it takes a square root or atan2 of quotients")
         return found.over
-
-
-class _Numpy:
-    """`numpy` with arrays that hold symbols."""
-
-    def __init__(self, frames: Frames) -> None:
-        own = _Math(frames)
-        self.cos, self.sin, self.tan, self.sqrt = own.cos, own.sin, own.tan, own.sqrt
-        self.arctan2, self.hypot = own.atan2, own.hypot
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(np, name)
-
-    def zeros(self, shape: Any, dtype: Any = None) -> Any:
-        return np.full(shape, 0.0, dtype=object) if dtype is None else np.zeros(shape, dtype)
-
-    empty = zeros

@@ -1,26 +1,70 @@
-"""Values of rows and auxiliary quantities, written; headings as sums of angles where they are such."""
+"""Values of rows and auxiliary quantities as they are written; headings as sums of angles where possible."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import sympy
 
 from nmm.analysis.formulas.expansion import Expansion
-from nmm.analysis.formulas.expressions import Product, Sum, Symbol, alone, latex, text, to_sympy
+from nmm.analysis.formulas.expressions import Product, Sum, Symbol, alone, shown, to_sympy
 from nmm.analysis.formulas.quotient import Linear
 from nmm.analysis.formulas.readable import as_sum, factored
-from nmm.analysis.formulas.row_values import Auxiliary, Share, Turn, Value
+from nmm.latex import Formula, formula
+
+
+@dataclass(frozen=True)
+class Arc:
+    """An angle atan2(sine, cosine), with which no kernel can compute."""
+
+    sine: Expansion
+    cosine: Expansion
+
+
+class Turn(NamedTuple):
+    """Component 0, 1 or 2 of the rotation vector of a named matrix, the product of turns about an axis (0, 1,
+    2) by angles and quarter turns."""
+
+    part: int
+    name: str
+    product: tuple[tuple[int, tuple[tuple[str, int], ...], int], ...]
+
+
+class Share(NamedTuple):
+    """A factor times an angle, given by name."""
+
+    angle: str
+    factor: Expansion
+
+
+Value: TypeAlias = Expansion | Arc | Linear | Turn | Share
+
+
+class Auxiliary(NamedTuple):
+    """A symbol for a quantity that would make formulas long. Of its arguments a, b, c, the kinds are:
+    "length" of a vector (2 or 3), "bearing" atan2(b, a), "elevation" atan2(c, hypot(a, b)), "off axis"
+    atan2(hypot(b, c), a), "over sine" (the angle off axis over its sine), and "root" of a."""
+
+    name: str
+    kind: str
+    arguments: tuple[Expansion, ...]
+
+
+def value_without(value: Value, variables: set[int]) -> Value:
+    """A value with scalars set to 0."""
+    if isinstance(value, Expansion):
+        return value.without(variables)
+    if isinstance(value, Arc):
+        return Arc(value.sine.without(variables), value.cosine.without(variables))
+    if isinstance(value, Share):
+        return value._replace(factor=value.factor.without(variables))
+    return value
 
 
 class Written(NamedTuple):
-    """A formula in three forms."""
-
     expression: Any
-    text: str
-    latex: str
+    formula: Formula
 
 
 #: Names of a rotation vector's components; as functions of the matrix' nine entries, row by row.
@@ -28,7 +72,7 @@ ROTATION_VECTOR = tuple(f"rotation_vector_{axis}" for axis in "xyz")
 
 
 def written(value: Value, symbols: Mapping[str, Any]) -> Written:
-    """A row's value; the value of an angle is not wrapped."""
+    """A row's value; angles are not wrapped."""
     if isinstance(value, Expansion):
         return _of(factored(value), symbols)
     if isinstance(value, Linear):
@@ -36,95 +80,70 @@ def written(value: Value, symbols: Mapping[str, Any]) -> Written:
     if isinstance(value, Share):
         return _of(alone(Symbol(value.angle)).times(factored(value.factor)), symbols)
     if isinstance(value, Turn):
-        axis = "xyz"[value.part]
-        return Written(
-            sympy.Function(ROTATION_VECTOR[value.part])(*_matrix(value, symbols)),
-            f"log({value.name}).{axis}",
-            rf"\log({value.name})_{axis}",
-        )
+        axis, expression = "xyz"[value.part], sympy.Function(ROTATION_VECTOR[value.part])
+        text, latex = f"log({value.name}).{axis}", rf"\log({value.name})_{axis}"
+        return Written(expression(*_matrix(value, symbols)), Formula(text, latex))
     sine, cosine = (_of(factored(part), symbols) for part in (value.sine, value.cosine))
     return _atan2(sine, cosine)
 
 
-def matrix_text(turn: Turn) -> str:
+def rotation_formula(turn: Turn) -> Formula:
     """A rotation as a product of turns: Rz(theta + q1) Ry(q2)."""
-    return _turns_written(turn, text, "R{axis}({angle})", "pi/2", "pi")
+    turns = [_turn(axis, angle, quarters) for axis, angle, quarters in turn.product]
+    return Formula(" ".join(turns) or "1", " ".join(one.latex for one in turns) or "1")
 
 
-def matrix_latex(turn: Turn) -> str:
-    """The same as LaTeX."""
-    return _turns_written(turn, latex, "R_{axis}({angle})", r"\frac{\pi}{2}", r"\pi")
-
-
-def _turns_written(turn: Turn, style: Callable[[Product], str], form: str, half: str, whole: str) -> str:
-    written = []
-    for axis, angle, quarters in turn.product:
-        inside = (
-            style(_sum([Product(Fraction(n), ((Symbol(name), 1),)) for name, n in angle])) if angle else ""
-        )
-        constant = {0: "", 1: f" + {half}", 2: f" + {whole}", 3: f" - {half}"}[quarters]
-        if not inside:
-            constant = constant.replace(" + ", "").replace(" - ", "-")
-        written.append(form.replace("{axis}", "xyz"[axis]).replace("{angle}", inside + constant))
-    return " ".join(written) or "1"
+def _turn(axis: int, angle: Sequence[tuple[str, int]], quarters: int) -> Formula:
+    inside = [shown(_sum([Product(Fraction(n), ((Symbol(name), 1),)) for name, n in angle]))] if angle else []
+    half = Formula("pi/2", r"\frac{\pi}{2}")
+    added = {0: [], 1: [" + ", half], 2: [" + ", Formula("pi", r"\pi")], 3: [" - ", half]}[quarters]
+    if added and not inside:
+        added[0] = "-" if quarters == 3 else ""
+    total = formula(*inside, *added)
+    return Formula(f"R{'xyz'[axis]}({total})", f"R_{'xyz'[axis]}({total.latex})")
 
 
 def _matrix(turn: Turn, symbols: Mapping[str, Any]) -> Any:
-    """A rotation as a SymPy matrix."""
-    product = sympy.eye(3)
+    product, about = sympy.eye(3), (sympy.rot_ccw_axis1, sympy.rot_ccw_axis2, sympy.rot_ccw_axis3)
     for axis, angle, quarters in turn.product:
         total = sympy.Add(*(n * symbols[name] for name, n in angle), quarters * sympy.pi / 2)
-        i, j = (axis + 1) % 3, (axis + 2) % 3
-        matrix = sympy.eye(3)
-        matrix[i, i] = matrix[j, j] = sympy.cos(total)
-        matrix[i, j], matrix[j, i] = -sympy.sin(total), sympy.sin(total)
-        product = product * matrix
+        product = product * about[axis](total)
     return product
 
 
 def auxiliary_written(auxiliary: Auxiliary, symbols: Mapping[str, Any]) -> Written:
-    """What an auxiliary symbol stands for."""
-    everything = [_of(as_sum(argument), symbols) for argument in auxiliary.arguments]
+    a, *rest = everything = [_of(as_sum(argument), symbols) for argument in auxiliary.arguments]
     if auxiliary.kind == "root":
-        (a,) = everything
-        return Written(sympy.sqrt(a.expression), f"sqrt({a.text})", rf"\sqrt{{{a.latex}}}")
-    a, b, *rest = everything
+        root = Formula(f"sqrt({a.formula})", rf"\sqrt{{{a.formula.latex}}}")
+        return Written(sympy.sqrt(a.expression), root)
     if auxiliary.kind == "length":
         return _hypot(*everything)
     if auxiliary.kind == "bearing":
-        up, along = b, a
-    elif auxiliary.kind == "elevation":
-        up, along = rest[0], _hypot(a, b)
-    else:
-        up, along = _hypot(b, rest[0]), a
-    angle = _atan2(up, along)
+        return _atan2(rest[0], a)
+    if auxiliary.kind == "elevation":
+        return _atan2(rest[1], _hypot(a, rest[0]))
+    angle = _atan2(_hypot(*rest), a)
     if auxiliary.kind != "over sine":
         return angle
-    return Written(
-        1 / sympy.sinc(angle.expression),
-        f"a/sin(a), a = {angle.text}",
-        rf"a / \sin a, \; a = {angle.latex}",
-    )
+    text, latex = f"a/sin(a), a = {angle.formula}", rf"a / \sin a, \; a = {angle.formula.latex}"
+    return Written(1 / sympy.sinc(angle.expression), Formula(text, latex))
 
 
 def _hypot(*parts: Written) -> Written:
-    return Written(
-        sympy.sqrt(sympy.Add(*(part.expression**2 for part in parts))),
-        f"hypot({', '.join(part.text for part in parts)})",
-        r"\sqrt{" + " + ".join(f"({part.latex})^2" for part in parts) + "}",
-    )
+    text = f"hypot({', '.join(part.formula for part in parts)})"
+    squares = " + ".join(f"({part.formula.latex})^2" for part in parts)
+    root = sympy.sqrt(sympy.Add(*(part.expression**2 for part in parts)))
+    return Written(root, Formula(text, rf"\sqrt{{{squares}}}"))
 
 
 def _atan2(sine: Written, cosine: Written) -> Written:
-    return Written(
-        sympy.atan2(sine.expression, cosine.expression),
-        f"atan2({sine.text}, {cosine.text})",
-        rf"\mathrm{{atan2}}({sine.latex}, {cosine.latex})",
-    )
+    text = f"atan2({sine.formula}, {cosine.formula})"
+    latex = rf"\mathrm{{atan2}}({sine.formula.latex}, {cosine.formula.latex})"
+    return Written(sympy.atan2(sine.expression, cosine.expression), Formula(text, latex))
 
 
 def _of(product: Product, symbols: Mapping[str, Any]) -> Written:
-    return Written(to_sympy(product, symbols), text(product), latex(product))
+    return Written(to_sympy(product, symbols), shown(product))
 
 
 def _sum(terms: list[Product]) -> Product:
@@ -132,7 +151,7 @@ def _sum(terms: list[Product]) -> Product:
 
 
 def _linear(value: Linear, symbols: Mapping[str, Any]) -> Written:
-    """A combination of coordinates, and a number of quarter turns or what else is added."""
+    """A combination of coordinates plus quarter turns or another constant."""
     names = value.ring.names
     terms = [Product(n, ((Symbol(names[i]), 1),)) for i, n in value.terms.items()]
     quarters, rest = value.quarters
@@ -142,8 +161,6 @@ def _linear(value: Linear, symbols: Mapping[str, Any]) -> Written:
     if not quarters:
         return found
     turn = {1: " + pi/2", 2: " + pi", -1: " - pi/2"}.get(quarters, f" {quarters:+d} pi/2")
-    return Written(
-        found.expression + quarters * sympy.pi / 2,
-        found.text + turn,
-        found.latex + turn.replace("pi/2", r"\frac{\pi}{2}").replace("+ pi", r"+ \pi"),
-    )
+    turn_latex = turn.replace("pi/2", r"\frac{\pi}{2}").replace("+ pi", r"+ \pi")
+    total = Formula(found.formula + turn, found.formula.latex + turn_latex)
+    return Written(found.expression + quarters * sympy.pi / 2, total)

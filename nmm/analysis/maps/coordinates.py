@@ -8,12 +8,12 @@ from typing import Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.analysis.maps.evaluation import Evaluator, Judged, Smallness
+from nmm.analysis.maps.measures import Evaluator, Judged, Smallness
 from nmm.analysis.maps.result import About, Map
 from nmm.analysis.maps.singular_set import SingularSet, singular_set
 from nmm.analysis.singular.jacobians import Subject
 from nmm.arrays import Array, counted, vector
-from nmm.errors import InputError
+from nmm.errors import InputError, expect
 from nmm.progress import Progress, between
 from nmm.robots.robot import Robot
 
@@ -49,8 +49,7 @@ def singularity_map(
     measures : some of sigma_min (without, this), inverse_condition, manipulability, arm_manipulability,
         platform_manipulability, weighted, eccentricity (`nmm.analysis.maps.measures.MEASURES`)
     part : whose columns of J: "robot" (without, this), "platform", "arm" or an arm's name
-    t : s; without, 0
-    alpha : the arm's share in "weighted", in [0, 1]; without, 0.5
+    t, alpha : s, without 0; the arm's share in "weighted", in [0, 1], without 0.5
     weights : W > 0 of the inputs, by input or group ("platform", "arm"): the measures are of J W^(-1/2)
     length, sizes : as `analyse`; an input's limit as its size makes its top speed count as 1
 
@@ -111,13 +110,10 @@ def singularity_map(
 
 
 def coordinates(over: Sequence[str], robot: Robot) -> tuple[tuple[str, str], list[int]]:
-    """Two coordinates and their places in q."""
     given = [over] if isinstance(over, str) else list(over)
-    if len(given) != 2:
-        raise InputError(f"over: expected two coordinates, as in ('q1', 'q2'), got {over!r}")
+    expect(len(given) == 2, "over", "two coordinates, as in ('q1', 'q2')", over)
     columns = [robot.independent(name) for name in given]
-    if columns[0] == columns[1]:
-        raise InputError(f"over: expected two different coordinates, got {given[0]} twice")
+    expect(columns[0] != columns[1], "over", f"two different coordinates, got {given[0]} twice")
     return (given[0], given[1]), columns
 
 
@@ -127,20 +123,16 @@ def check_held(
     """`InputError` for a coordinate that is given one value and is varied: that value would not count."""
     for name in given:
         if name in varied:
-            raise InputError(f"{what}: {name} is {how} ({', '.join(varied)})")
+            raise InputError(f"{name} is {how} ({', '.join(varied)})", where=what)
 
 
 def sample_counts(samples: int | Sequence[int]) -> tuple[int, int]:
-    """How many along the first and the second axis."""
     if isinstance(samples, str) or not isinstance(samples, Sequence):
         samples = [samples, samples]
-    if len(samples) != 2:
-        raise InputError(f"samples: expected a whole number, or two, got {samples!r}")
+    expect(len(samples) == 2, "samples", "a whole number, or two", samples)
     columns, rows = counted(samples[0], "samples", 2), counted(samples[1], "samples", 2)
-    if columns * rows > MOST_NODES:
-        raise InputError(
-            f"samples: expected at most {MOST_NODES} in all, as in 4000 x 4000, got {columns} x {rows}"
-        )
+    most = f"at most {MOST_NODES} in all, as in 4000 x 4000, got {columns} x {rows}"
+    expect(columns * rows <= MOST_NODES, "samples", most)
     return columns, rows
 
 
@@ -151,30 +143,24 @@ def grid_axes(
     ranges: Mapping[str, Sequence[float]] | None,
     counts: tuple[int, int],
 ) -> tuple[Array, Array]:
-    """The coordinates of columns and rows."""
     given = dict(ranges or {})
     for name in given:
         if name not in names:
             robot.coordinate(name)  # names the ones there are
-            raise InputError(f"ranges: {name} is not on an axis of the map ({', '.join(names)})")
-    first, second = (
-        np.linspace(
-            *(checked_range(given[name], name) if name in given else usual_range(robot, name, held)), count
-        )
-        for name, count in zip(names, counts, strict=True)
-    )
-    return first, second
+            raise InputError(f"{name} is not on an axis of the map ({', '.join(names)})", where="ranges")
+    ends = [
+        checked_range(given[name], name) if name in given else usual_range(robot, name, held)
+        for name in names
+    ]
+    return np.linspace(*ends[0], counts[0]), np.linspace(*ends[1], counts[1])
 
 
 def checked_range(given: Sequence[float], name: str) -> tuple[float, float]:
     """(lower, upper) with room between them."""
     lower, upper = vector(given, 2, f"range of {name}")
-    if not lower < upper:
-        raise InputError(f"range of {name}: expected lower below upper, got {lower:g} to {upper:g}")
-    if max(-lower, upper) > FARTHEST:
-        raise InputError(
-            f"range of {name}: expected no more than {FARTHEST:g} to either side, got {lower:g} to {upper:g}"
-        )
+    where, got = f"range of {name}", f"got {lower:g} to {upper:g}"
+    expect(lower < upper, where, f"lower below upper, {got}")
+    expect(max(-lower, upper) <= FARTHEST, where, f"no more than {FARTHEST:g} to either side, {got}")
     return float(lower), float(upper)
 
 

@@ -1,148 +1,109 @@
-"""How well a matrix J moves its task, as one number: a table of measures, each vectorised over many J.
+"""How well a matrix J moves its task, as one number: a table of measures, and what evaluates them.
 
+Manipulability of the whole robot (w) and of its arm alone (w_b), and the two weighed by α, are those of
 B. Bayle, J.-Y. Fourquet and M. Renaud, "Manipulability of Wheeled Mobile Manipulators: Application to Motion
-Generation", IJRR 22(7-8), 2003, generalise manipulability to mobile manipulators. Here that of the whole
-robot (platform and arm, w), that of the arm alone (w_b) and the two weighed by α are each computed as their
-lines say.
+Generation", IJRR 22(7-8), 2003.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TypedDict
 
 import numpy as np
 
-from nmm.analysis.singular.parts import singular_values, some_columns
-from nmm.arrays import Array
-from nmm.errors import InputError, expect_known
+from nmm.analysis.singular.jacobians import Jacobians, Subject
+from nmm.analysis.singular.parts import WHOLE, expect_inputs, groups, ranks, singular_values, some_columns
+from nmm.analysis.singular.singularity import TOLERANCE
+from nmm.arrays import Array, Integers, scalar
+from nmm.errors import expect, expect_known
+from nmm.progress import Progress, between
+from nmm.resolvers.base import Weights, weight_diagonal
+from nmm.resolvers.problem import Dimensions
+from nmm.text_format import superscript
+
+#: So many configurations' J are held at a time.
+CHUNK = 1 << 14
 
 
-class Spectra:
-    """Singular values of J (N, s, m), part by part, each computed once and when it is asked for.
+def spectra_of(J: Array, columns: Mapping[str, Sequence[int]]) -> dict[str, Array]:
+    """Singular values (N, s) of J (N, s, m) by part; 0 where inputs are missing, NaN where there is no J."""
+    undefined = np.asarray(~np.isfinite(J).all(axis=(1, 2)))
+    J = np.where(undefined[:, np.newaxis, np.newaxis], 0.0, J) if undefined.any() else J
+    found = {part: singular_values(some_columns(J, own)) for part, own in columns.items()}
+    for values in found.values():
+        values[undefined] = np.nan
+    return found
 
-    Parameters
-    ----------
-    J : (N, s, m), not a number where there is none
-    columns : of each part, by its name
-    """
 
-    def __init__(self, J: Array, columns: Mapping[str, Sequence[int]]) -> None:
-        self.undefined = np.asarray(~np.isfinite(J).all(axis=(1, 2)))
-        self._J = np.where(self.undefined[:, np.newaxis, np.newaxis], 0.0, J) if self.undefined.any() else J
-        self._columns = columns
-        self._found: dict[str, Array] = {}
+def volume(values: Array) -> Array:
+    """sqrt(det J Jᵀ), Yoshikawa's w, as the product of the singular values; 0 with too few inputs."""
+    return np.asarray(np.prod(values, axis=-1))
 
-    def of(self, part: str) -> Array:
-        """(N, s), falling; zeros where the part has fewer inputs than the task rows; NaN where J is."""
-        if part not in self._found:
-            values = singular_values(some_columns(self._J, self._columns[part]))
-            values[self.undefined] = np.nan
-            self._found[part] = values
-        return self._found[part]
+
+def inverse_condition(values: Array) -> Array:
+    """σ_min / σ_max, from 0 (lost rank, also where J = 0) to 1 (moves alike in every direction)."""
+    largest = values[:, 0]
+    return np.asarray(values[:, -1] / np.where(largest == 0.0, 1.0, largest))
+
+
+def eccentricity(values: Array) -> Array:
+    """sqrt(1 - (σ_min / σ_max)²), from 0 (a ball of velocities) to 1 (a flat one: lost rank)."""
+    ratio = inverse_condition(values)
+    return np.asarray(np.sqrt((1.0 - ratio) * (1.0 + ratio)))
 
 
 class Measure(NamedTuple):
-    """One number for each J.
+    """One number for each J, `of` (alpha, singular values (N, s) of each part) -> (N,), as in "sigma" or
+    "volume" `unit`s.
 
-    Attributes
-    ----------
-    symbol : as figures write it
-    about : what it is, a line
-    unit : of a singular value ("sigma"), of the product of s of them ("volume"), or none
-    of : (spectra, part, alpha) -> (N,)
-    on_part : whether it speaks of the part asked for; the others have parts of their own
-    better : 1 where more is better, -1 where less is
-    needs : a part that it speaks of, whichever was asked for; "" for none
+    parts : those it always describes, whichever was asked for; empty if it describes that one
+    where_singular : its value where the part's J loses rank; with `parts`, where the whole robot's does
     """
 
     symbol: str
     about: str
     unit: Literal["sigma", "volume", ""]
-    of: Callable[[Spectra, str, float], Array]
-    on_part: bool = True
+    of: Callable[..., Array]
+    parts: tuple[str, ...] = ()
     better: float = 1.0
-    needs: str = ""
-
-
-def volume(spectra: Spectra, part: str) -> Array:
-    """sqrt(det J Jᵀ), Yoshikawa's w, as the product of the singular values; 0 with too few inputs."""
-    return np.asarray(np.prod(spectra.of(part), axis=-1))
-
-
-def inverse_condition(spectra: Spectra, part: str) -> Array:
-    """σ_min / σ_max, from 0 (lost rank, also where J = 0) to 1 (moves alike in every direction)."""
-    values = spectra.of(part)
-    largest = values[:, 0]
-    return np.asarray(values[:, -1] / np.where(largest == 0.0, 1.0, largest))
-
-
-def eccentricity(spectra: Spectra, part: str) -> Array:
-    """sqrt(1 - (σ_min / σ_max)²), from 0 (a ball of velocities) to 1 (a flat one: lost rank)."""
-    ratio = inverse_condition(spectra, part)
-    return np.asarray(np.sqrt((1.0 - ratio) * (1.0 + ratio)))
-
-
-def weighted(spectra: Spectra, part: str, alpha: float) -> Array:
-    """α w_b + (1 - α) w: the arm's and the whole robot's manipulability, weighed by α in [0, 1]."""
-    return alpha * volume(spectra, "arm") + (1.0 - alpha) * volume(spectra, part)
-
-
-def _of_part(part: str, symbol: str) -> Measure:
-    about = f"manipulability of the {part} alone"
-    return Measure(symbol, about, "volume", lambda J, _, __: volume(J, part), on_part=False, needs=part)
+    where_singular: float = 0.0
 
 
 #: The measures by name. A new one is a line here.
 MEASURES: Mapping[str, Measure] = {
     "sigma_min": Measure(
-        "σ_min",
-        "the task's slowest velocity for inputs of size 1",
-        "sigma",
-        lambda J, part, _: J.of(part)[:, -1],
+        "σ_min", "the task's slowest velocity for inputs of size 1", "sigma", lambda _, own: own[:, -1]
     ),
     "inverse_condition": Measure(
         "σ_min / σ_max",
         "inverse condition number: 1 isotropic, 0 singular",
         "",
-        lambda J, part, _: inverse_condition(J, part),
+        lambda _, own: inverse_condition(own),
     ),
-    "manipulability": Measure(
-        "w", "manipulability sqrt(det J Jᵀ)", "volume", lambda J, part, _: volume(J, part)
+    "manipulability": Measure("w", "manipulability sqrt(det J Jᵀ)", "volume", lambda _, own: volume(own)),
+    "arm_manipulability": Measure(
+        "w_b", "manipulability of the arm alone", "volume", lambda _, arm: volume(arm), ("arm",)
     ),
-    "arm_manipulability": _of_part("arm", "w_b"),
-    "platform_manipulability": _of_part("platform", "w_p"),
+    "platform_manipulability": Measure(
+        "w_p", "manipulability of the platform alone", "volume", lambda _, own: volume(own), ("platform",)
+    ),
     "weighted": Measure(
         "α w_b + (1 − α) w",
         "manipulability of arm and whole robot, weighed",
         "volume",
-        lambda J, _, alpha: weighted(J, "robot", alpha),
-        on_part=False,
-        needs="arm",
+        lambda alpha, arm, whole: alpha * volume(arm) + (1.0 - alpha) * volume(whole),
+        ("arm", WHOLE),
     ),
     "eccentricity": Measure(
         "w_5",
         "eccentricity sqrt(1 − (σ_min/σ_max)²): 0 isotropic, 1 singular",
         "",
-        lambda J, part, _: eccentricity(J, part),
+        lambda _, own: eccentricity(own),
         better=-1.0,
+        where_singular=1.0,
     ),
 }
-
-
-def chosen(names: str | Sequence[str]) -> dict[str, Measure]:
-    """Measures by name, in the order given.
-
-    Raises
-    ------
-    InputError : none, or an unknown name
-    """
-    wanted = [names] if isinstance(names, str) else list(names)
-    if not wanted:
-        raise InputError(f"measures: expected at least one of {', '.join(MEASURES)}")
-    for name in wanted:
-        expect_known("measure", name, MEASURES, "measures")
-    return {name: MEASURES[name] for name in wanted}
 
 
 def unit_of(measure: Measure, row_units: Sequence[str], input_units: Sequence[str]) -> str:
@@ -157,4 +118,134 @@ def unit_of(measure: Measure, row_units: Sequence[str], input_units: Sequence[st
     base, s = f"{row}/{per}", len(row_units)
     if measure.unit == "sigma" or s == 1:
         return base
-    return f"({base}){str(s).translate(str.maketrans('0123456789', '⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
+    return f"({base}){superscript(s)}"
+
+
+class Smallness(NamedTuple):
+    """Smallest singular value, product of all, and rank (N,) of a part's J, as judged beside the whole J."""
+
+    sigma: Array
+    volume: Array
+    rank: Integers
+
+
+class Evaluated(NamedTuple):
+    """Measures (N,) by name, NaN where there is no J, and the smallness of the part's J and the arm's."""
+
+    values: dict[str, Array]
+    own: Smallness
+    arm: Smallness | None
+
+
+class Judged(TypedDict, total=False):
+    """The options that all maps share: what is measured, and how.
+
+    Attributes
+    ----------
+    t, measures, part, alpha, weights, length, sizes : see `singularity_map`
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> judged = nmm.analysis.Judged(measures="manipulability", part="arm")
+    >>> found = nmm.analysis.singularity_map((robot, nmm.Position("ee", "xy")), samples=20, **judged)
+    >>> list(found.values), found.about.part
+    (['manipulability'], 'arm')
+    """
+
+    t: float
+    measures: str | Sequence[str]
+    part: str
+    alpha: float
+    weights: Weights | None
+    length: float | None
+    sizes: Mapping[str, float] | None
+
+
+class Evaluator:
+    """Measures at any configurations; the options are those of `singularity_map`."""
+
+    def __init__(
+        self,
+        subject: Subject,
+        *,
+        t: float = 0.0,
+        measures: str | Sequence[str] = ("sigma_min",),
+        part: str = WHOLE,
+        alpha: float = 0.5,
+        weights: Weights | None = None,
+        length: float | None = None,
+        sizes: Mapping[str, float] | None = None,
+    ) -> None:
+        self.jacobians = Jacobians(subject)
+        self.robot = robot = self.jacobians.robot
+        self.t = scalar(t, "t")
+        names = [measures] if isinstance(measures, str) else list(measures)
+        expect(names, "measures", f"at least one of {', '.join(MEASURES)}")
+        for name in names:
+            expect_known("measure", name, MEASURES, "measures")
+        self.measures = {name: MEASURES[name] for name in names}
+        self.columns = groups(robot)
+        expect_inputs(robot, part)
+        for name, measure in self.measures.items():
+            for needed in measure.parts:
+                expect_inputs(robot, needed, f"measure {name}")
+        self.part = part
+        self.alpha = scalar(alpha, "alpha")
+        expect(0.0 <= self.alpha <= 1.0, "alpha", "a number from 0 to 1", self.alpha)
+        self.length, self.sizes = length, dict(sizes or {})
+        rows, _, inputs = self.jacobians.sizes(length, sizes)
+        dimensions = Dimensions(len(rows), 0, robot.u_names, robot.groups)
+        self.weights = np.ones(robot.n_u) if weights is None else weight_diagonal(weights, dimensions)
+        self._natural = self.jacobians.natural(rows)
+        self._factors = inputs / np.sqrt(self.weights) / rows[:, np.newaxis]
+        self.scaled = length is not None or bool(self.sizes)
+
+    @property
+    def arm_beside(self) -> bool:
+        """Whether the arm's singularities are a set of their own beside the whole robot's."""
+        too_few = len(self.columns["arm"]) < len(self.jacobians.rows)
+        return self.part == WHOLE and bool(self.columns["platform"]) and not too_few
+
+    def J(self, q: Array, progress: Progress | None = None) -> Array:
+        """Scaled J (N, s, m) at q (N, n)."""
+        J = self.jacobians.batch(q, self.t, progress)
+        J *= self._factors
+        return J
+
+    def part_of(self, part: str) -> Callable[[Array], Array]:
+        """q (N, n) -> the part's columns of the scaled J."""
+        columns = self.columns[part]
+        return lambda q: some_columns(self.J(q), columns)
+
+    def __call__(self, q: Array, progress: Progress | None = None, *, arm: bool = False) -> Evaluated:
+        """All measures at q (N, n); the arm's only if it is asked for: singular values take long."""
+        parts = {WHOLE, self.part}.union(*(measure.parts for measure in self.measures.values()))
+        columns = {name: self.columns[name] for name in (parts | {"arm"} if arm else parts)}
+        found = []
+        for first in range(0, len(q), CHUNK):
+            J = self.J(q[first : first + CHUNK], between(progress, first / len(q), CHUNK / len(q)))
+            found.append(self._evaluated(spectra_of(J, columns), arm))
+        return Evaluated(
+            {name: np.concatenate([one.values[name] for one in found]) for name in self.measures},
+            Smallness(*map(np.concatenate, zip(*(one.own for one in found), strict=True))),
+            Smallness(*map(np.concatenate, zip(*(one.arm for one in found if one.arm), strict=True)))
+            if arm
+            else None,
+        )
+
+    def _evaluated(self, spectra: Mapping[str, Array], arm: bool) -> Evaluated:
+        largest = np.nan_to_num(spectra[WHOLE][:, 0])
+
+        def smallness(name: str) -> Smallness:
+            values = spectra[name]
+            # Where there is no J, the rank is not lost.
+            rank = ranks(values, largest, TOLERANCE, self._natural)
+            rank[np.isnan(values[:, -1])] = len(self.jacobians.rows)
+            return Smallness(values[:, -1], volume(values), rank)
+
+        values = {
+            name: measure.of(self.alpha, *(spectra[part] for part in measure.parts or (self.part,)))
+            for name, measure in self.measures.items()
+        }
+        return Evaluated(values, smallness(self.part), smallness("arm") if arm else None)

@@ -5,20 +5,42 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-from nmm.analysis.maps.evaluation import Evaluator
-from nmm.analysis.maps.extremes import Extreme, extremes, known_on
-from nmm.analysis.maps.measures import unit_of
+from nmm.analysis.maps.measures import MEASURES, Evaluator, unit_of
 from nmm.analysis.maps.singular_set import SingularSet
+from nmm.analysis.singular.parts import WHOLE
 from nmm.arrays import Array, Integers
-from nmm.doors import door
-from nmm.runs.figure_options import PLAIN, FigureOptions
+from nmm.figure_options import PLAIN, FigureOptions
+from nmm.lazy_call import lazy_call
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+#: Smallest and largest that differ by less than this, of the largest in size, differ by rounding.
+SAME = 1e-9
+EVERYWHERE = "everywhere"
+
+
+class Extreme(NamedTuple):
+    """A value, where on the map it is, and on what: a singular set, in words, "everywhere" where the map has
+    no other value, or "" for a cell's sample.
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> found = nmm.analysis.singularity_map((robot, nmm.Position("ee", "xy")), samples=20)
+    >>> smallest = found.extremes("sigma_min")["smallest"]
+    >>> isinstance(smallest, nmm.analysis.Extreme), round(smallest.value, 4)
+    (True, 0.2135)
+    """
+
+    value: float
+    at: tuple[float, float]
+    on: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,10 +50,8 @@ class About:
     Attributes
     ----------
     robot, task, part : the robot's name, the rows of its task, whose columns of J
-    t, alpha : s; the arm's share in "weighted"
-    weights : W's diagonal by input, where it is not 1
-    units : of each measure
-    sizes : in a sentence, what of different units counts as equal
+    t, alpha, weights : s; the arm's share in "weighted"; W's diagonal by input, where it is not 1
+    units, sizes : of each measure; in a sentence, what of different units counts as equal
     q_names, q_units : of the robot's coordinates
 
     Examples
@@ -55,12 +75,11 @@ class About:
 
     @classmethod
     def of(cls, evaluator: Evaluator) -> About:
-        """Of what an evaluator computes."""
         robot, rows = evaluator.robot, evaluator.jacobians.rows
-        parts = {"arm_manipulability": "arm", "platform_manipulability": "platform", "weighted": "robot"}
         units = {}
         for name, measure in evaluator.measures.items():
-            own = [robot.u_units[j] for j in evaluator.columns[parts.get(name, evaluator.part)]]
+            part = measure.parts[-1] if measure.parts else evaluator.part
+            own = [robot.u_units[j] for j in evaluator.columns[part]]
             # In sizes J is free of units.
             units[name] = "" if evaluator.scaled else unit_of(measure, [row.unit for row in rows], own)
         length = evaluator.length
@@ -150,19 +169,46 @@ class Map:
         worst : of a workspace's worst postures. The best ones are not those that are singular, so only of the
             worst the singular places tell a value
         """
-        known = known_on(measure, self.about.part, self.singular, self.arm_singular)
+        values = (self.worst if worst else self.values)[measure]
+        found = {}
+        for end, pick in (("smallest", np.nanargmin), ("largest", np.nanargmax)):
+            if np.isnan(values).all():
+                found[end] = Extreme(np.nan, (np.nan, np.nan))
+                continue
+            row, column = np.unravel_index(pick(values), values.shape)
+            where = float(self.axes[0][column]), float(self.axes[1][row])
+            found[end] = Extreme(float(values[row, column]), where)
+        known = self._singular_sets(measure)
         between = known if self.kind == "coordinates" or worst else []
-        return extremes((self.worst if worst else self.values)[measure], self.axes, known, between)
+        value = MEASURES[measure].where_singular
+        everywhere = any(those.everywhere for those, _ in known)
+        seen = [found["smallest"].value, found["largest"].value, *([value] if between else [])]
+        if everywhere or max(seen) - min(seen) <= SAME * max(map(abs, seen)):
+            return {
+                end: Extreme(value if everywhere else one.value, one.at, EVERYWHERE)
+                for end, one in found.items()
+            }
+        for those, whose in between[:1]:
+            x, y = (those.lines[0] if those.lines else those.points)[0]
+            on = f"the {whose}singular {' and '.join(those.kinds)}"
+            found["largest" if value > 0.0 else "smallest"] = Extreme(value, (float(x), float(y)), on)
+        return found
+
+    def _singular_sets(self, measure: str) -> list[tuple[SingularSet, str]]:
+        """The sets on which a measure has its value where singular, and whose they are ("" or "arm's ")."""
+        part, found = self.about.part, []
+        if measure == "arm_manipulability":
+            found.append((self.singular if part == "arm" else self.arm_singular, "arm's "))
+        if part == WHOLE or not MEASURES[measure].parts:
+            found.append((self.singular, ""))
+        return [(those, whose) for those, whose in found if those is not None and not those.empty]
 
     @property
     def held(self) -> dict[str, float]:
         """Coordinates that are the same all over the map, by name; the platform's, in a workspace."""
         if self.kind == "coordinates":
-            return {
-                name: float(value)
-                for name, value in zip(self.about.q_names, self.q, strict=True)
-                if name not in self.names
-            }
+            held = zip(self.about.q_names, self.q.tolist(), strict=True)
+            return {name: value for name, value in held if name not in self.names}
         reached = np.isfinite(next(iter(self.values.values())))
         postures = next(iter(self.best_q.values()))[reached]
         same = np.all(postures == postures[:1], axis=0) if len(postures) else np.ones(len(self.q), dtype=bool)
@@ -170,11 +216,11 @@ class Map:
 
     def summary(self) -> dict[str, Any]:
         """What was computed, in plain data."""
-        return door("nmm.folders.map:summary")(self)
+        return lazy_call("nmm.folders.map:summary")(self)
 
     def plot(self, measure: str | None = None, path: str | Path | None = None) -> Figure:
         """The figure of a measure (the first one by default); written, too, where a path is given."""
-        return door("nmm.figures.maps:map_figure")(self, measure, path)
+        return lazy_call("nmm.figures.maps:map_figure")(self, measure, path)
 
     def save(self, folder: str | Path, *, figures: FigureOptions = PLAIN) -> Path:
         """Write map.npz, map.json and a figure a measure.
@@ -188,4 +234,4 @@ class Map:
         ------
         InputError : the folder exists and is not a map's, or cannot be written
         """
-        return door("nmm.folders.map:save")(self, folder, figures=figures)
+        return lazy_call("nmm.folders.map:save")(self, folder, figures=figures)

@@ -1,78 +1,183 @@
-"""The search for the best posture of each cell of a plane: drawn, spread from block to block, filled in."""
+"""The search for the best posture of each cell of a plane: drawn, spread from block to block, filled in. Each
+cell keeps the best one offered for it so far."""
 
-from __future__ import annotations
-
+import itertools
+import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
-from nmm.analysis.maps.best import find_promising
-from nmm.analysis.maps.cells import Grid, Layer
-from nmm.analysis.maps.evaluation import Evaluator
+from nmm.analysis.maps.measures import Evaluator
 from nmm.analysis.maps.reach import Reach
 from nmm.arrays import Array, Flags, Integers
 from nmm.errors import InputError
+from nmm.kernels.compiled import compiled
 from nmm.progress import Progress, between
 
-#: Sides of the blocks, in cells, through which good postures spread. Of large ones also to the blocks beside
-#: them, where the value is better by a hundredth, twice; of small ones, which are many, where it is by a
-#: fifth.
+#: Sides of the blocks, in cells, through which good postures spread. In each sweep, a block's best posture is
+#: tried in the blocks beside it that are worse by more than this share; there are many small blocks.
 BLOCKS, LARGE = (32, 16, 8, 4, 2, 1), 4
 SWEEPS_LARGE, SWEEPS_SMALL = (0.01, 0.01), (0.2,)
-#: Room around what is reached, of its size.
+#: Margin around what is reached, as a share of its size.
 MARGIN = 0.03
 #: How often the cells beside the reached ones are tried.
 TRIES = 8
-#: So near, in cells, is in the middle.
+#: In the middle of its cell is what is nearer to it than this, in cells.
 NEAR = 1e-7
-#: What a smooth branch's values bend from cell to cell, of their range, is less; and how far branches are
-#: carried, in cells.
+#: A smooth branch's values bend by less than this share of their range from cell to cell; and how many
+#: cells branches are carried.
 BENT, SWEEPS = 3e-3, 40
 BESIDE = ((0, 1), (0, -1), (1, 0), (-1, 0))
 
 
-class Search:
-    """Postures offered to the cells, for the best and for the worst value of each measure.
+@compiled
+def find_promising(
+    values: Array, columns: int, down: int, right: int, margin: float, tried: Array, found: Integers
+) -> int:
+    """See `Layer.promising`; found (2, cells): the cells and their neighbours, as many as returned."""
+    count, rows = 0, values.shape[0] // columns
+    for cell in range(values.shape[0]):
+        value = values[cell]
+        row, column = cell // columns + down, cell % columns + right
+        if not math.isfinite(value) or row < 0 or row >= rows or column < 0 or column >= columns:
+            continue
+        other, earlier = row * columns + column, cell - down * columns - right
+        if not math.isfinite(values[other]):
+            continue
+        # Where it wraps round into another row, the worst that comes of it is an idle try.
+        known = 0 <= earlier < values.shape[0] and math.isfinite(values[earlier])
+        change = value - values[earlier] if known else 0.0
+        if value + change > values[other] + margin and tried[other] != value:
+            found[0, count], found[1, count] = cell, other
+            tried[other] = value
+            count += 1
+    return count
 
-    Parameters
-    ----------
-    longest : cells along the longer side
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Square cells over a plane, numbered row by row from the first one's lower corner (2,), in m."""
+
+    lower: Array
+    cell: float
+    columns: int
+    rows: int
+
+    @property
+    def axes(self) -> tuple[Array, Array]:
+        """Centres of columns and rows, m."""
+        counts = np.arange(self.columns), np.arange(self.rows)
+        x, y = (low + self.cell * (k + 0.5) for low, k in zip(self.lower, counts, strict=True))
+        return x, y
+
+    def shape(self, block: int) -> tuple[int, int]:
+        """(columns, rows) of blocks of block x block cells."""
+        return -(-self.columns // block), -(-self.rows // block)
+
+    def cells(self, points: Array) -> Integers:
+        """The number of each point's cell, points (N, 2); -1 outside."""
+        place = np.floor((points - self.lower) / self.cell).astype(np.int64)
+        inside = np.all((place >= 0) & (place < [self.columns, self.rows]), axis=1)
+        return np.where(inside, place[:, 1] * self.columns + place[:, 0], -1)
+
+    def centers(self, cells: Integers, block: int = 1) -> Array:
+        """Centres (N, 2) of cells, or of blocks of block x block of them."""
+        row, column = np.divmod(cells, self.shape(block)[0])
+        return np.asarray(self.lower + self.cell * block * (np.column_stack([column, row]) + 0.5))
+
+    def beside(self, cells: Integers, side: tuple[int, int], block: int = 1) -> tuple[Flags, Integers]:
+        """Which cells, or blocks, have a neighbour (down, right) of them, and these neighbours."""
+        columns, rows = self.shape(block)
+        row, column = cells // columns + side[0], cells % columns + side[1]
+        inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+        return inside, (row * columns + column)[inside]
+
+
+class Layer:
+    """The largest value offered for each cell (smallest with `sign` -1), with its posture.
+
+    Postures in the middle of the cell take precedence, so that neighbours differ by the plane alone.
     """
 
-    def __init__(self, evaluator: Evaluator, reach: Reach, longest: int) -> None:
-        self.evaluator, self.reach, self.longest = evaluator, reach, longest
+    def __init__(self, grid: Grid, n: int, sign: float) -> None:
+        cells = grid.columns * grid.rows
+        self.grid, self.sign = grid, sign
+        self.values = np.full(cells, -np.inf)
+        self.q = np.full((cells, n), np.nan)
+        self.central = np.zeros(cells, dtype=bool)
 
-    def draw(self, count: int, progress: Progress | None) -> None:
-        """Lay out the cells around what `count` postures reach, and offer these.
+    @property
+    def reached(self) -> Flags:
+        return np.asarray(np.isfinite(self.values))
 
-        Raises
-        ------
-        InputError : no posture is within the slab; the frame does not move in the plane
+    def offer(self, cells: Integers, central: Flags, values: Array, q: Array) -> None:
+        """Keep the postures q (N, n) that are better than those of their cells; of equals the last."""
+        signed = self.sign * values
+        offered = np.flatnonzero((cells >= 0) & np.isfinite(signed))
+        offered = offered[np.lexsort((signed[offered], central[offered]))]
+        last = np.full(len(self.values), -1)
+        np.maximum.at(last, cells[offered], np.arange(len(offered)))
+        best = offered[last[last >= 0]]
+        own = cells[best]
+        alike = central[best] == self.central[own]
+        best = best[np.where(alike, signed[best] > self.values[own], central[best])]
+        own = cells[best]
+        self.values[own], self.q[own], self.central[own] = signed[best], q[best], central[best]
+
+    def best_of_blocks(self, block: int) -> tuple[Integers, Integers]:
+        """(blocks, cells): of each block that was reached the best cell, of equally good ones the last."""
+        columns, rows = self.grid.shape(block)
+        values = np.full((rows * block, columns * block), -np.inf)
+        values[: self.grid.rows, : self.grid.columns] = self.values.reshape(self.grid.rows, -1)
+        tiles = values.reshape(rows, block, columns, block).transpose(1, 3, 0, 2).reshape(block**2, -1)
+        last = block**2 - 1 - tiles[::-1].argmax(axis=0)
+        blocks = np.flatnonzero(np.isfinite(tiles.max(axis=0)))
+        corner = blocks // columns * block * self.grid.columns + blocks % columns * block
+        return blocks, corner + last[blocks] // block * self.grid.columns + last[blocks] % block
+
+    def promising(self, side: tuple[int, int], margin: float, tried: Array) -> tuple[Integers, Integers]:
+        """(cells, neighbours) on one side that are worse than extrapolated by more than `margin`.
+
+        `tried`, which is updated, holds the cell's value when each neighbour was last tried from this side.
         """
-        q = self.reach.postures(count)
-        points = self.reach.positions(q, between(progress, 0.0, 0.2))
-        seen = points[self.reach.held(points)][:, self.reach.in_plane]
+        found = np.empty((2, len(self.values)), dtype=np.int64)
+        count = find_promising(self.values, self.grid.columns, *side, margin, tried, found)
+        return found[0, :count].copy(), found[1, :count].copy()
+
+
+class Search:
+    """Postures offered to the cells, for the best and the worst value of each measure.
+
+    The cells, `longest` of them along the longer side, surround what `count` postures reach. `InputError`
+    where no posture is within the slab, or the frame does not move in the plane.
+    """
+
+    def __init__(
+        self, evaluator: Evaluator, reach: Reach, longest: int, count: int, progress: Progress | None
+    ) -> None:
+        self.evaluator, self.reach = evaluator, reach
+        q = reach.postures(count)
+        points = reach.positions(q, between(progress, 0.0, 0.2))
+        seen = points[reach.held(points)][:, reach.in_plane]
         if not len(seen):
-            slab = "{:g} to {:g} m".format(*(self.reach.slab or (0.0, 0.0)))
-            lowest, highest = points[:, self.reach.third].min(), points[:, self.reach.third].max()
-            raise InputError(
-                f"height: no posture puts {self.reach.frame} at {slab}, they reach {lowest:.3g} to "
-                f"{highest:.3g} m"
-            )
+            slab = "{:g} to {:g} m".format(*(reach.slab or (0.0, 0.0)))
+            lowest, highest = points[:, reach.third].min(), points[:, reach.third].max()
+            what = f"no posture puts {reach.frame} at {slab}, they reach {lowest:.3g} to {highest:.3g} m"
+            raise InputError(what, where="height")
         size = np.ptp(seen, axis=0)
-        cell = float(size.max()) * (1.0 + 2.0 * MARGIN) / self.longest
+        cell = float(size.max()) * (1.0 + 2.0 * MARGIN) / longest
         if cell < 1e-9:
-            raise InputError(f"workspace map: the arm does not move {self.reach.frame} in the plane")
+            raise InputError(f"the arm does not move {reach.frame} in the plane", where="workspace map")
         counts = np.maximum(np.ceil(size * (1.0 + 2.0 * MARGIN) / cell - 1e-9), 2).astype(int)
         lower = 0.5 * (seen.min(axis=0) + seen.max(axis=0)) - 0.5 * cell * counts
         self.grid = Grid(lower, cell, int(counts[0]), int(counts[1]))
-        cells, n = self.grid.columns * self.grid.rows, self.evaluator.robot.n
         self.layers = {
-            (name, sign): Layer(cells, n, sign * measure.better)
-            for name, measure in self.evaluator.measures.items()
+            (name, sign): Layer(self.grid, evaluator.robot.n, sign * measure.better)
+            for name, measure in evaluator.measures.items()
             for sign in (1.0, -1.0)
         }
-        self.rank = np.full(cells, -1, dtype=np.int64)
+        self.rank = np.full(self.grid.columns * self.grid.rows, -1)
         self.offer(q, points, progress=between(progress, 0.2, 0.8))
 
     def offer(
@@ -82,32 +187,26 @@ class Search:
         cells: Integers | None = None,
         progress: Progress | None = None,
     ) -> None:
-        """Postures (N, n), each brought to the middle of its cell, where that is in reach.
+        """Postures (N, n), each brought to its cell's middle if in reach.
 
-        Parameters
-        ----------
-        points : where they put the frame (N, 3), if that is known
-        cells : for which cells they are meant; without, for those in which they put the frame
+        The cell is the one given, or that of the frame, at `points` (N, 3) if known.
         """
+        meant = cells is not None
         if cells is None:
             points = self.reach.positions(q) if points is None else points
             cells = np.where(self.reach.held(points), self.grid.cells(points[:, self.reach.in_plane]), -1)
-            usable = np.flatnonzero(cells >= 0)
-            q, points, cells = q[usable], points[usable], cells[usable]
+            q, cells = q[cells >= 0], cells[cells >= 0]
         if not len(q):
             return
         near = NEAR * self.grid.cell
         found, places, left = self.reach.onto(q, self.grid.centers(cells), near, between(progress, 0.0, 0.5))
         central = left <= near
-        outside = np.flatnonzero(
-            (self.grid.cells(places[:, self.reach.in_plane]) != cells) | ~np.isfinite(left)
-        )
-        if points is not None:
-            # A step may be nearer to the middle and yet outside of the square.
-            found[outside] = q[outside]
-        else:
-            inside = np.setdiff1d(np.arange(len(q)), outside, assume_unique=True)
+        inside = (self.grid.cells(places[:, self.reach.in_plane]) == cells) & np.isfinite(left)
+        if meant:
             found, central, cells = found[inside], central[inside], cells[inside]
+        else:
+            # A step may be nearer to the middle and yet outside of the square.
+            found[~inside] = q[~inside]
         if not len(found):
             return
         evaluated = self.evaluator(found, between(progress, 0.5, 0.5))
@@ -117,116 +216,95 @@ class Search:
         np.maximum.at(self.rank, cells[known], evaluated.own.rank[known])
 
     def spread(self, progress: Progress | None) -> None:
-        """From the best posture of each block to the blocks beside it, and to the four that it consists of.
+        """From each block's best posture to the adjacent blocks, and to its four quarters.
 
-        An arm with no more joints than the plane has axes has nothing to gain but its other branches: `even`.
+        An arm with no more joints than the plane has axes gains only from its other branches: see `even`.
         """
         if len(self.reach.moving) <= 2:
             return
-        total = len(self.layers) * len(BLOCKS)
-        for k, layer in enumerate(self.layers.values()):
-            for b, block in enumerate(BLOCKS):
-                if b:
-                    for seeds, blocks in self._parents(layer, block):
-                        self._try(layer, seeds, blocks, block)
-                for margin in SWEEPS_LARGE if block >= LARGE else SWEEPS_SMALL:
-                    for seeds, blocks in self._neighbours(layer, block, margin):
-                        self._try(layer, seeds, blocks, block)
-                if progress is not None:
-                    progress((k * len(BLOCKS) + b + 1) / total)
-
-    def _try(self, layer: Layer, seeds: Integers, blocks: Integers, block: int) -> None:
-        """Bring the postures of some cells into the middle of some blocks."""
-        if block == 1:
-            self.offer(layer.q[seeds], cells=blocks)
-        else:
-            self.offer(self.reach.towards(layer.q[seeds], self.grid.centers(blocks, block)))
+        stages = list(itertools.product(self.layers.values(), BLOCKS))
+        for done, (layer, block) in enumerate(stages, start=1):
+            margins = SWEEPS_LARGE if block >= LARGE else SWEEPS_SMALL
+            tries = [self._neighbours(layer, block, margin) for margin in margins]
+            if block != BLOCKS[0]:
+                tries.insert(0, self._parents(layer, block))
+            for seeds, blocks in itertools.chain(*tries):
+                if block == 1:
+                    self.offer(layer.q[seeds], cells=blocks)
+                else:
+                    self.offer(self.reach.towards(layer.q[seeds], self.grid.centers(blocks, block)))
+            if progress is not None:
+                progress(done / len(stages))
 
     def _parents(self, layer: Layer, block: int) -> Iterator[tuple[Integers, Integers]]:
         """(cells, blocks): the best cell of each block twice as large, and its four blocks in turn."""
-        blocks, cells = layer.best_of_blocks(self.grid, 2 * block)
+        blocks, cells = layer.best_of_blocks(2 * block)
         wide, _ = self.grid.shape(2 * block)
         columns, rows = self.grid.shape(block)
+        own = cells // self.grid.columns // block * columns + cells % self.grid.columns // block
         for down, right in np.ndindex(2, 2):
             row, column = blocks // wide * 2 + down, blocks % wide * 2 + right
             children = row * columns + column
-            # The best one's own block has it already.
-            tried = (row < rows) & (column < columns) & (self.grid.blocks(cells, block) != children)
+            tried = (row < rows) & (column < columns) & (own != children)
             yield cells[tried], children[tried]
 
     def _neighbours(self, layer: Layer, block: int, margin: float) -> Iterator[tuple[Integers, Integers]]:
         """(cells, blocks): the best cell of each block, and a block beside it that is worse."""
-        for down, right in BESIDE:
-            columns, rows = self.grid.shape(block)
-            blocks, cells = layer.best_of_blocks(self.grid, block)
+        columns, rows = self.grid.shape(block)
+        for side in BESIDE:
+            blocks, cells = layer.best_of_blocks(block)
             own = np.full(columns * rows, -np.inf)
             own[blocks] = layer.values[cells]
-            row, column = blocks // columns + down, blocks % columns + right
-            inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
-            neighbours = (row * columns + column)[inside]
-            value = layer.values[cells[inside]]
+            inside, neighbours = self.grid.beside(blocks, side, block)
+            seeds = cells[inside]
+            value = layer.values[seeds]
             # Of the worst value, which is kept with its sign changed, better is nearer to zero.
             better = value > own[neighbours] + margin * np.abs(value)
-            yield cells[inside][better], neighbours[better]
+            yield seeds[better], neighbours[better]
 
     def fill(self, progress: Progress | None) -> None:
-        """Reach the cells beside those that are reached, as long as some are found."""
+        """Reach the neighbours of reached cells, as long as some are found."""
         layer = next(iter(self.layers.values()))
         tried = np.zeros(len(layer.values), dtype=np.int64)
         before, rounds = -1, 0
         while before < (before := int(layer.reached.sum())):
             for side in BESIDE:
-                seeds, blank = self._beside(layer.reached, side)
+                reached = np.flatnonzero(layer.reached)
+                inside, blank = self.grid.beside(reached, side)
                 wanted = ~layer.reached[blank] & (tried[blank] < TRIES)
                 tried[blank[wanted]] += 1
-                self.offer(layer.q[seeds[wanted]], cells=blank[wanted])
+                self.offer(layer.q[reached[inside][wanted]], cells=blank[wanted])
             rounds += 1
             if progress is not None:
                 progress(1.0 - 1.0 / (1.0 + rounds))
 
     def even(self, progress: Progress | None) -> None:
-        """Carry on branches of postures, from cell to cell, into cells where these are better.
+        """Continue branches of postures from cell to cell, into cells where they are better.
 
-        What a branch has in a cell is foretold from its two last ones. Where that is more than the cell has,
-        by more than the bending of a smooth branch, the cell was not offered the branch yet, or it ends.
+        A cell much worse than extrapolated from a branch's last two was not offered it, or the branch ends.
         """
         for k, layer in enumerate(self.layers.values()):
             own = between(progress, k / len(self.layers), 1.0 / len(self.layers))
             values = layer.values[layer.reached]
             margin = BENT * float(np.ptp(values)) if len(values) else 0.0
             tried = np.full((len(BESIDE), len(layer.values)), np.nan)
-            seeds, cells = np.empty((2, len(layer.values)), dtype=np.int64)
             for sweep in range(SWEEPS):
                 before = layer.values.copy()
                 for side, seen in zip(BESIDE, tried, strict=True):
-                    count = find_promising(layer.values, self.grid.columns, *side, margin, seen, seeds, cells)
-                    self.offer(layer.q[seeds[:count]], cells=cells[:count].copy())
+                    seeds, cells = layer.promising(side, margin, seen)
+                    self.offer(layer.q[seeds], cells=cells)
                 if own is not None:
                     own((sweep + 1) / SWEEPS)
                 if np.array_equal(before, layer.values):
                     break
 
-    def _beside(self, chosen: Flags, side: tuple[int, int]) -> tuple[Integers, Integers]:
-        """(cells, others): chosen cells and those beside them, on one side."""
-        cells = np.flatnonzero(chosen)
-        row, column = cells // self.grid.columns + side[0], cells % self.grid.columns + side[1]
-        inside = (row >= 0) & (row < self.grid.rows) & (column >= 0) & (column < self.grid.columns)
-        return cells[inside], (row * self.grid.columns + column)[inside]
-
-    def values(self, sign: float) -> dict[str, Array]:
-        """The best (1) or the worst (-1) value of each measure, (rows, columns); NaN: nothing is reached."""
-        columns, rows = self.grid.shape(1)
-        return {
-            name: np.where(layer.reached, layer.sign * layer.values, np.nan).reshape(rows, columns)
-            for (name, own), layer in self.layers.items()
-            if own == sign
-        }
-
-    def postures(self, sign: float) -> dict[str, Array]:
-        """The configurations (rows, columns, n) with these values."""
-        columns, rows = self.grid.shape(1)
-        return {
-            name: layer.q.reshape(rows, columns, -1)
-            for (name, own), layer in self.layers.items()
-            if own == sign
-        }
+    def found(self, sign: float) -> tuple[dict[str, Array], dict[str, Array]]:
+        """By measure the best (1) or the worst (-1) values, (rows, columns), NaN where nothing is reached,
+        and the configurations (rows, columns, n) with them."""
+        values, postures = {}, {}
+        for (name, own), layer in self.layers.items():
+            if own == sign:
+                signed = np.where(layer.reached, layer.sign * layer.values, np.nan)
+                values[name] = signed.reshape(self.grid.rows, -1)
+                postures[name] = layer.q.reshape(self.grid.rows, self.grid.columns, -1)
+        return values, postures

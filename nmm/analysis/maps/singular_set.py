@@ -14,8 +14,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from nmm.analysis.maps.lines import curves_and_points
 from nmm.analysis.singular.singularity import TOLERANCE
 from nmm.arrays import Array, Integers
 from nmm.cores import over_cores
@@ -63,6 +63,12 @@ class SingularSet:
         """Whether no singularity was found."""
         return not (self.lines or len(self.points) or self.everywhere)
 
+    @property
+    def kinds(self) -> list[str]:
+        """What it consists of: "lines", "point" or "points"."""
+        points = ["point" if len(self.points) == 1 else "points"] if len(self.points) else []
+        return [*(["lines"] if self.lines else []), *points]
+
     def text(self) -> str:
         """In words: "lines, 1 point".
 
@@ -70,8 +76,7 @@ class SingularSet:
         """
         if self.everywhere:
             return "everywhere"
-        n = len(self.points)
-        counts = ["lines"] * bool(self.lines) + [f"{n} point{'s' * (n > 1)}"] * bool(n)
+        counts = [kind if kind == "lines" else f"{len(self.points)} {kind}" for kind in self.kinds]
         return ", ".join(counts) or "none found"
 
 
@@ -83,24 +88,17 @@ def singular_set(
     axes: tuple[Array, Array],
     progress: Progress | None = None,
 ) -> SingularSet:
-    """The singular set over two coordinates.
+    """The singular set over two coordinates, `axes` of a grid; J_of : points (N, 2) -> J (N, s, m).
 
-    Parameters
-    ----------
-    J_of : points (N, 2) of the plane -> J (N, s, m)
-    smallness : what comes to zero there, at the grid's nodes, (rows, columns) each: σ_min and w. Beside a
-        valley that is much wider, σ_min does not see a narrow one; w does
-    rank : at the nodes
-    full : the rank of a J that is not singular
-    axes : the grid's coordinates, of the columns and of the rows
+    smallness : σ_min and w, at the nodes (rows, columns): w reveals narrow valleys that σ_min misses
     """
     if np.all(rank < full):
         if _lost_between(J_of, axes):
             return SingularSet(everywhere=True)
         axes, smallness = _finer(J_of, axes)
-    origin = np.array([axes[0][0], axes[1][0]])
-    cell = np.array([axes[0][1] - axes[0][0], axes[1][1] - axes[1][0]])
-    last = np.array([len(axes[0]) - 1.0, len(axes[1]) - 1.0])
+    origin = np.array([axis[0] for axis in axes])
+    cell = np.array([axis[1] - axis[0] for axis in axes])
+    last = np.array([len(axis) - 1.0 for axis in axes])
     rows, columns = np.nonzero(np.any([candidates(values) for values in smallness], axis=0))
     start = np.column_stack([columns, rows]).astype(np.float64)
     found = polish(lambda x: J_of(origin + cell * x), start, progress=progress)
@@ -136,12 +134,12 @@ def candidates(values: Array) -> Array:
     lower = np.where(np.isnan(values), np.inf, values)
     found = np.zeros(values.shape, dtype=bool)
     for axis in (0, 1):
-        before, after = np.full(values.shape, np.inf), np.full(values.shape, np.inf)
-        inner, outer = [slice(None)] * 2, [slice(None)] * 2
-        inner[axis], outer[axis] = slice(1, None), slice(None, -1)
-        before[tuple(inner)], after[tuple(outer)] = lower[tuple(outer)], lower[tuple(inner)]
-        higher = np.where(np.isfinite(before), before, after)
-        higher = np.maximum(higher, np.where(np.isfinite(after), after, before))
+        around = np.pad(lower, [(1, 1) if k == axis else (0, 0) for k in (0, 1)], constant_values=np.inf)
+        count = values.shape[axis]
+        before, after = (around.take(range(first, first + count), axis) for first in (0, 2))
+        higher = np.maximum(
+            np.where(np.isfinite(before), before, after), np.where(np.isfinite(after), after, before)
+        )
         minimum = (lower <= before) & (lower <= after) & ((lower < before) | (lower < after))
         at_edge = ~(np.isfinite(before) & np.isfinite(after))
         with np.errstate(invalid="ignore"):
@@ -156,13 +154,9 @@ def polish(
     steps: int = STEPS,
     progress: Progress | None = None,
 ) -> Array:
-    """The singular points (k, d) to which Gauss-Newton steps lead from `start` (N, d).
+    """The singular points (k, d) to which Gauss-Newton steps of length up to 1 lead from `start` (N, d).
 
-    Parameters
-    ----------
-    J_of : points (N, d) -> J (N, s, m); not a number where there is none
-    start : in units of which a step takes at most one
-    farthest, steps : a point that goes farther from its start, or needs more steps, is given up
+    Points that move beyond `farthest` or need more than `steps` steps are dropped; J_of may give NaN.
     """
     x, done = start.copy(), np.zeros(len(start), dtype=bool)
     going = np.arange(len(start))
@@ -174,8 +168,6 @@ def polish(
             progress(max(k / steps, 1.0 - len(going) / len(start)) if len(start) else 1.0)
         alive = np.isfinite(J).all(axis=(1, 2))
         going, J = going[alive], J[alive]
-        if not len(going):
-            break
         U, values, Vt = np.linalg.svd(J, full_matrices=False)
         singular = values[:, -1] <= TOLERANCE * values[:, 0]
         done[going[singular]] = True
@@ -205,10 +197,9 @@ def polish(
 def _steps(J_of: Callable[[Array], Array], x: Array, U: Array, values: Array, Vt: Array) -> Array:
     """The shortest steps (2, N, d) to where uᵀJ is zero to first order, as a whole and in its leading part.
 
-    u belongs to the singular value that would be zero first along its own gradient. The other singular
-    vectors turn so that they take their own part of uᵀ dJ; only what is outside them counts. A point needs
-    the whole of that. On the way to a curve what is not the leading part tells only how the curve bends, and
-    a step that heeds it goes astray.
+    u belongs to the singular value that reaches zero first along its gradient; the other singular vectors
+    turn with it, so only what lies outside them counts. Singular points need all of uᵀJ; on the way to a
+    curve, the remaining part only describes the curve's bending, and would lead the step astray.
     """
     ways = STEP * np.eye(x.shape[1])
     beside = np.concatenate([*(x + way for way in ways), *(x - way for way in ways)])
@@ -225,7 +216,6 @@ def _steps(J_of: Callable[[Array], Array], x: Array, U: Array, values: Array, Vt
 
 
 def _shortest(rates: Array, U: Array, values: Array, Vt: Array) -> Array:
-    """These steps, from dJ (N, s, m, d)."""
     turned = np.einsum("nai,najk->nijk", U, rates)
     gradients = np.einsum("nijk,nij->nik", turned, Vt)
     steepness = np.linalg.norm(gradients, axis=2)
@@ -239,3 +229,84 @@ def _shortest(rates: Array, U: Array, values: Array, Vt: Array) -> Array:
     residual = values[every, own, np.newaxis] * Vt[every, own]
     ways = [np.linalg.pinv(rate, rcond=rcond) for rcond in (1e-5, 0.99)]
     return np.array([-np.einsum("ndm,nm->nd", way, residual) for way in ways])
+
+
+#: In cells of the grid: points closer than SAME are one; neighbours on a curve are no farther apart than
+#: LINK, also where curves cross and hide each other's minima; a piece shorter than SHORTEST is no curve.
+SAME, LINK, SHORTEST = 0.3, 2.6, 3.5
+#: A curve turns by less than TURN (a cosine) from one point to the next; a crossing, where it steps on no
+#: more than so many points of another curve, it passes straight on.
+TURN, STRAIGHT, CROSSING = 0.93, 0.97, 3
+
+
+def curves_and_points(points: Array) -> tuple[list[Array], Array]:
+    """Curves, each (k, 2) in order, and isolated points (p, 2), of points (N, 2) in cells of their grid."""
+    if not len(points):
+        return [], np.zeros((0, 2))
+    _, first = np.unique(np.round(points / SAME).astype(np.int64), axis=0, return_index=True)
+    points = points[np.sort(first)]
+    tree = cKDTree(points)
+    neighbours = [np.array(near) for near in tree.query_ball_point(points, LINK)]
+    free = np.ones(len(points), dtype=bool)
+    curves: list[Array] = []
+    # The straightest pieces first: there is no doubt how a curve runs there.
+    straightness, directions = _tangents(points, neighbours)
+    for start in np.argsort(-straightness, kind="stable"):
+        if not free[start]:
+            continue
+        forth = _walk(points, neighbours, free, int(start), directions[start])
+        taken = free.copy()
+        taken[forth] = False
+        back = _walk(points, neighbours, taken, int(start), -directions[start])
+        path = [*reversed(back[1:]), *forth]
+        curve = points[path]
+        if float(np.ptp(curve, axis=0).max()) >= SHORTEST:
+            free[path] = False
+            loop = len(curve) > 8 and np.linalg.norm(curve[0] - curve[-1]) <= LINK
+            curves.append(np.vstack([curve, curve[:1]]) if loop else curve)
+    alone = points[free]
+    if curves and len(alone):
+        # Points beside a curve belong to it.
+        distance, _ = cKDTree(np.vstack(curves)).query(alone)
+        alone = alone[distance > LINK]
+    kept = np.zeros((0, 2))
+    for point in alone:  # one of each few that are the same up to a fraction of a cell
+        if np.all(np.linalg.norm(kept - point, axis=1) > 2.0 * SAME):
+            kept = np.vstack([kept, point])
+    return curves, kept
+
+
+def _tangents(points: Array, neighbours: list[Array]) -> tuple[Array, Array]:
+    """How straight the points lie around each (N,), from 0 to 1, and in what direction (N, 2)."""
+    straightness, directions = np.zeros(len(points)), np.zeros((len(points), 2))
+    for i, near in enumerate(neighbours):
+        offsets = points[near] - points[i]
+        values, vectors = np.linalg.eigh(offsets.T @ offsets)
+        if values[1] > 0.0:
+            straightness[i], directions[i] = 1.0 - values[0] / values[1], vectors[:, 1]
+    return straightness, directions
+
+
+def _walk(points: Array, neighbours: list[Array], free: Array, start: int, direction: Array) -> list[int]:
+    """Successive points from `start`, turning little; at a crossing, up to CROSSING of another curve."""
+    path, taken, borrowed = [start], {start}, 0
+    while borrowed <= CROSSING:
+        here = path[-1]
+        near = np.array([i for i in neighbours[here] if i not in taken], dtype=np.int64)
+        offsets = points[near] - points[here]
+        lengths = np.linalg.norm(offsets, axis=1)
+        cosines = offsets @ direction / np.where(lengths == 0.0, 1.0, lengths)
+        ahead = cosines > np.where(free[near], TURN, STRAIGHT)
+        if not ahead.any():
+            break
+        # The nearest; of two that are as near, the one straight on.
+        costs = np.where(ahead, lengths / np.where(ahead, cosines, 1.0) ** 2, np.inf)
+        best = int(near[np.argmin(costs)])
+        step = (points[best] - points[here]) / lengths[np.argmin(costs)]
+        borrowed = 0 if free[best] else borrowed + 1
+        path.append(best)
+        taken.add(best)
+        direction = direction + step
+        direction /= np.linalg.norm(direction)
+    # Up to the other curve, not along it.
+    return path[: len(path) - max(borrowed - 1, 0)]

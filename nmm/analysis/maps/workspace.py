@@ -9,18 +9,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.analysis.maps.coordinates import check_held, checked_range, sample_counts
-from nmm.analysis.maps.evaluation import Evaluator, Judged
-from nmm.analysis.maps.lines import curves_and_points
+from nmm.analysis.maps.measures import Evaluator, Judged
 from nmm.analysis.maps.reach import AXES, Reach
 from nmm.analysis.maps.result import About, Map
 from nmm.analysis.maps.search import Search
-from nmm.analysis.maps.singular_set import SingularSet, polish
+from nmm.analysis.maps.singular_set import SingularSet, curves_and_points, polish
 from nmm.analysis.singular.jacobians import Subject
 from nmm.arrays import Array, Integers, counted
-from nmm.errors import InputError
+from nmm.errors import InputError, expect
 from nmm.progress import Progress, between
 from nmm.robots.frame_path import FramePath
-from nmm.robots.robot import Robot
 
 #: Postures drawn, and how many of them are led to a singular one each to draw these.
 CONFIGURATIONS, SINGULAR_STARTS = 1 << 16, 1 << 9
@@ -55,14 +53,11 @@ def workspace_map(
 
     The platform stands at `at`. Postures are drawn over the joints' limits; from the best of a block of cells
     a step of Newton's leads to one in each smaller block, and so on down to the cells; cells that are left
-    are reached from their neighbours. Each posture is brought to its cell's middle and judged there; only in
-    cells whose middle is out of reach, on the rim, it is as near as it was found to come. So what is shown
-    was found in a posture that is kept; where the arm has more joints than the plane needs, a better one may
-    exist. A plane is a projection: the frame's third coordinate and its orientation are free, unless `height`
-    holds the third one.
-
-    The singular places of the map are those of a sample of singular postures: lines where they lie on curves,
-    else points.
+    are reached from their neighbours. Each posture is brought to its cell's middle and judged there, or on
+    the rim, where that is out of reach, as near as it was found to come. So each value is that of a posture
+    that is kept; where the arm has more joints than the plane needs, a better one may exist. The third
+    coordinate of the frame is free unless `height` holds it, and so is its orientation. The singular places
+    are those of a sample of singular postures: lines where they lie on curves, else points.
 
     Parameters
     ----------
@@ -91,13 +86,12 @@ def workspace_map(
     """
     evaluator = Evaluator(subject, **judged)
     robot = evaluator.robot
-    if not len(robot.arm_coordinates):
-        raise InputError(f"workspace map: expected a robot with an arm, {robot.name} has none")
+    expect(len(robot.arm_coordinates), "workspace map", f"a robot with an arm, {robot.name} has none")
     longest, _ = sample_counts(samples)
     count = counted(configurations, "configurations", 2)
     slab = None if height is None else checked_range(height, "height")
-    if len(plane) != 2 or plane[0] == plane[1] or not set(plane) <= set(AXES):
-        raise InputError(f"plane: expected two of x, y, z, as in 'xy', got {plane!r}")
+    two = len(plane) == 2 and plane[0] != plane[1] and set(plane) <= set(AXES)
+    expect(two, "plane", "two of x, y, z, as in 'xy'", plane)
     held = robot.rest if at is None else robot.q(at)
     robot.check_followers(held)
     frame = _task_frame(evaluator) if frame is None else frame
@@ -107,9 +101,14 @@ def workspace_map(
         check_held(at, [robot.q_names[j] for j in moving], "at", VARIED)
     reach = Reach(robot, frame, plane, slab, held, moving, ranges)
     _check_plane(reach)
-    search = Search(evaluator, reach, longest)
-    drawing, spreading, filling, evening, ours, arms = _shares(progress, spread=len(reach.moving) > 2)
-    search.draw(1 << (count - 1).bit_length(), drawing)
+    # The stages' shares of the progress, as long as they take with three joints.
+    shares = np.array([0.4, 0.35 if len(reach.moving) > 2 else 0.0, 0.05, 0.1, 0.05, 0.05])
+    shares /= shares.sum()
+    ends = zip(shares.cumsum(), shares, strict=True)
+    drawing, spreading, filling, evening, ours, arms = (
+        between(progress, end - one, one) for end, one in ends
+    )
+    search = Search(evaluator, reach, longest, 1 << (count - 1).bit_length(), drawing)
     search.spread(spreading)
     search.fill(filling)
     search.even(evening)
@@ -117,47 +116,33 @@ def workspace_map(
     arm = _singular_places(evaluator, reach, "arm", arms) if evaluator.arm_beside else None
     if progress is not None:
         progress(1.0)
-    columns, rows = search.grid.shape(1)
+    (best, best_q), (worst, worst_q) = search.found(1.0), search.found(-1.0)
     return Map(
         kind="workspace",
         about=About.of(evaluator),
         names=(plane[0], plane[1]),
         units=("m", "m"),
         axes=search.grid.axes,
-        values=search.values(1.0),
-        rank=search.rank.reshape(rows, columns),
+        values=best,
+        rank=search.rank.reshape(search.grid.rows, -1),
         singular=whole,
         arm_singular=arm,
         q=held,
         frame=frame,
         height=slab,
-        worst=search.values(-1.0),
-        best_q=search.postures(1.0),
-        worst_q=search.postures(-1.0),
+        worst=worst,
+        best_q=best_q,
+        worst_q=worst_q,
     )
 
 
 def check_given(given: Iterable[str], subject: Subject, frame: str | None, q: Array, what: str) -> None:
-    """`InputError` for a joint that is given one value and is varied over the map, as `workspace_map` has it.
-
-    Parameters
-    ----------
-    given : coordinates that have a value
-    subject, frame, q (n,) : as `workspace_map`
-    what : said the value
-    """
+    """`InputError` for one of the coordinates `given` a value, in `what`, that `workspace_map` varies."""
     evaluator = Evaluator(subject)
     robot = evaluator.robot
     if any(robot.coordinate(name) >= robot.platform.n_p for name in given):
         moving = _moving(evaluator, _task_frame(evaluator) if frame is None else frame, q)
         check_held(given, [robot.q_names[j] for j in moving], what, VARIED)
-
-
-def _shares(progress: Progress | None, *, spread: bool) -> list[Progress | None]:
-    """Of the progress for each stage, as long as they take with three joints."""
-    shares = np.array([0.4, 0.35 if spread else 0.0, 0.05, 0.1, 0.05, 0.05])
-    shares /= shares.sum()
-    return [between(progress, end - share, share) for end, share in zip(shares.cumsum(), shares, strict=True)]
 
 
 def _task_frame(evaluator: Evaluator) -> str:
@@ -167,7 +152,7 @@ def _task_frame(evaluator: Evaluator) -> str:
         if isinstance(name, str):
             return name
     frames = ", ".join(evaluator.robot.frames)
-    raise InputError(f"frame: expected one, the task speaks of none; available: {frames}")
+    raise InputError(where="frame", expected=f"one, the task speaks of none; available: {frames}")
 
 
 def _moving(evaluator: Evaluator, frame: str, held: Array) -> Integers:
@@ -178,10 +163,10 @@ def _moving(evaluator: Evaluator, frame: str, held: Array) -> Integers:
     q[:, arm] += np.random.default_rng(0).uniform(-1.0, 1.0, (8, len(arm)))
     q = robot.following.placed(q)
     effect = np.abs(np.nan_to_num(evaluator.jacobians.batch(q, evaluator.t)))[:, :, robot.platform.p :]
-    moved = np.max(effect, axis=(0, 1)) > 1e-9
-    moved |= _moves(robot, frame, q)
+    at_frame = np.abs(FramePath(robot, frame).jacobians(q)[1] @ np.array([robot.S(point) for point in q]))
+    moved = (effect.max(axis=(0, 1)) > 1e-9) | (at_frame.max(axis=(0, 1))[robot.platform.p :] > 1e-9)
     if not moved.any():
-        raise InputError(f"workspace map: the arm of {robot.name} moves {frame} in no way")
+        raise InputError(f"the arm of {robot.name} moves {frame} in no way", where="workspace map")
     return np.asarray(arm[moved], dtype=np.int64)
 
 
@@ -194,16 +179,12 @@ def _check_plane(reach: Reach) -> None:
         return  # the search says that nothing moves
     held = ", ".join(f"{AXES[axis]} = {points[0, axis]:.4g} m" for axis in flat)
     if len(flat) > 1:
-        raise InputError(f"workspace map: {reach.frame} moves along a line, {held} only; it fills no plane")
-    where = "a horizontal plane" if AXES[flat[0]] == "z" else "a vertical plane"
-    other = AXES.replace(AXES[flat[0]], "")
+        what = f"{reach.frame} moves along a line, {held} only; it fills no plane"
+        raise InputError(what, where="workspace map")
+    (across,) = (AXES[axis] for axis in flat)
+    where = "a horizontal plane" if across == "z" else "a vertical plane"
+    other = AXES.replace(across, "")
     raise InputError(f"{reach.frame} moves in {where}, {held} only; try --workspace {other}")
-
-
-def _moves(robot: Robot, frame: str, q: Array) -> Array:
-    """Which of the arm's inputs move a frame's origin, (n_m,)."""
-    by_inputs = FramePath(robot, frame).jacobians(q)[1] @ np.array([robot.S(point) for point in q])
-    return np.asarray(np.max(np.abs(by_inputs), axis=(0, 1))[robot.platform.p :] > 1e-9)
 
 
 def _singular_places(evaluator: Evaluator, reach: Reach, part: str, progress: Progress | None) -> SingularSet:

@@ -10,18 +10,23 @@ itself, round one smaller than the trailer's length it turns on and on (Foote, L
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias, Union
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.analysis.redundancy.periods import common_period, expect_periodic
 from nmm.arrays import Array, Integers, counted, positive
 from nmm.control.controller import Controller
-from nmm.errors import InputError, unknown
+from nmm.errors import InputError, expect, no_such
+from nmm.findings import Finding
+from nmm.functions.function import Function
+from nmm.functions.program import evaluate
+from nmm.functions.references import Bearing, Circle, PoseReference
+from nmm.kernels.rotations import exp3
 from nmm.progress import Progress, between
+from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 from nmm.runs.simulation import simulate
 from nmm.runs.trajectory import Outcome, Trajectory
@@ -101,8 +106,8 @@ class Laps:
 
     @property
     def factor(self) -> float | None:
-        """The last lap's drift over that of the lap before (infinite where that was 0); None with fewer than
-        three laps, of which the first holds the transient."""
+        """The last lap's drift over the one before (infinite if that was 0); None with fewer than three laps,
+        of which the first holds the transient."""
         distance = self.distance
         if len(distance) < 3:
             return None
@@ -126,25 +131,24 @@ class Laps:
         return self.closes or falls
 
     @property
-    def winding(self) -> str:
-        """Full turns of the last lap, in words; "" where there is none. Cables wind up with them."""
-        last = self.turns[-1] if len(self.turns) else np.zeros(self.robot.n, dtype=np.int64)
-        turned = [f"{name} {turns:+d}" for name, turns in zip(self.robot.q_names, last, strict=True) if turns]
-        return f"full turns in the last lap: {', '.join(turned)}" if turned else ""
+    def winding(self) -> Finding | None:
+        """Full turns of the last lap, "full_turns"; None where there is none. Cables wind up with them."""
+        last = self.turns[-1:].sum(axis=0).tolist()
+        turned = {name: turns for name, turns in zip(self.robot.q_names, last, strict=True) if turns}
+        return Finding("full_turns", {"turns": turned}) if turned else None
 
     @property
-    def verdict(self) -> str:
-        """A phrase: repeats, converges, drifts, or that too little was seen."""
+    def verdict(self) -> Finding:
+        """Whether the motion repeats itself, converges or drifts, or that too little was seen."""
         if not self.finished:
-            return f"ended in lap {len(self.distance) + 1}: {self.trajectory.message}"
-        last = f"{self.distance[-1]:.2g} in the last lap"
+            values = {"lap": len(self.distance) + 1, "message": str(self.trajectory.message)}
+            return Finding("laps_ended", values)
+        drift = {"drift": float(self.distance[-1])}
         if self.closes:
-            return f"repeats itself: drift {last}"
+            return Finding("laps_repeat", drift)
         if self.factor is None:
-            return f"drift {last}; expected at least 3 laps to tell whether it falls"
-        if self.converges:
-            return f"converges: drift {last}, {self.factor:.2g} times that of the lap before"
-        return f"drifts: {last}, {self.factor:.2g} times that of the lap before"
+            return Finding("laps_too_few", drift)
+        return Finding("laps_converge" if self.converges else "laps_drift", {**drift, "factor": self.factor})
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +174,7 @@ class Repeatability:
         for one in self.laps:
             if one.name == name:
                 return one
-        raise InputError(unknown("resolver", name, [one.name for one in self.laps], "laps"))
+        raise no_such("resolver", name, [one.name for one in self.laps], "laps")
 
     @property
     def complete(self) -> bool:
@@ -178,11 +182,10 @@ class Repeatability:
         return all(one.finished for one in self.laps)
 
     @property
-    def transient(self) -> str:
-        """What to know of the first lap."""
+    def transient(self) -> Finding:
+        """What to know of the first lap, "first_lap"."""
         first = max((float(one.errors[0]) for one in self.laps if len(one.errors)), default=0.0)
-        begins = f"begins {first:.3g} off the path" if first > CLOSED else "begins on the path"
-        return f"lap 1 {begins}, in the posture given: its drift holds the transient"
+        return Finding("first_lap", {"error": first, "on_path": first <= CLOSED})
 
     def text(self) -> str:
         """Drift and verdict of each, for people."""
@@ -231,23 +234,21 @@ def repeatability(
     scenarios: dict[str, Scenario] = {}
     controllers: Mapping[str, Controller]
     if isinstance(subject, Scenario):
-        kinds = list(dict.fromkeys(resolvers))
-        scenarios = {kind: subject.with_resolver(kind) for kind in kinds}
+        scenarios = {kind: subject.with_resolver(kind) for kind in resolvers}
         controllers = {kind: scenario.controller() for kind, scenario in scenarios.items()}
         q0: ArrayLike | Mapping[str, float] = subject.parts.q0
-        step = subject.parts.dt if dt is None else dt
+        dt = subject.parts.dt if dt is None else dt
     elif isinstance(subject, tuple) and len(subject) == 2 and isinstance(subject[0], Mapping):
         controllers, q0 = subject
-        step = 0.005 if dt is None else dt
     else:
-        raise InputError(f"repeatability: expected a Scenario or ({{name: Controller}}, q0), got {subject!r}")
-    if not controllers:
-        raise InputError("resolvers: expected at least one")
+        expected = "a Scenario or ({name: Controller}, q0)"
+        raise InputError(where="repeatability", expected=expected, got=subject)
+    expect(controllers, "resolvers", "at least one")
     start = next(iter(controllers.values())).robot.q(q0)
     T = common_period(controllers.values(), start) if period is None else positive(period, "period")
     for controller in controllers.values():
         expect_periodic(controller, start, T, laps)
-    samples = max(1, math.ceil(T / positive(step, "dt") - 1e-9))
+    samples = max(1, math.ceil(T / positive(0.005 if dt is None else dt, "dt") - 1e-9))
     found = []
     for k, (name, controller) in enumerate(controllers.items()):
         report = between(progress, k / len(controllers), 1.0 / len(controllers))
@@ -257,8 +258,81 @@ def repeatability(
         else:
             trajectory = simulate(controller, q0, laps * T, T / samples, progress=report)
         ends = np.arange(min(laps, (len(trajectory) - 1) // samples) + 1) * samples
-        errors = trajectory.error_norm
-        found.append(Laps(name, trajectory, T, int(laps), trajectory.q[ends], errors[ends]))
+        found.append(Laps(name, trajectory, T, laps, trajectory.q[ends], trajectory.error_norm[ends]))
         if trajectory.outcome is Outcome.INTERRUPTED:
             break
     return Repeatability(tuple(found), T)
+
+
+#: References may differ by this after a period, m and rad.
+SAME = 1e-6
+#: Periods of several references are taken together up to so many of the longest.
+MOST_ROUNDS = 12
+
+
+def common_period(controllers: Iterable[Controller], q: Array) -> float:
+    """The time in which all task references come round, s; those that depend on q are taken at q (n,)."""
+    periods: list[float] = []
+    for controller in controllers:
+        configuration = Configuration(controller.robot, q)
+        for task in (*controller.task, *controller.given.added_task):
+            periods += _periods(task.reference, configuration)
+    if not periods:
+        what = "the task stands still: expected a reference that goes round, as a circle, or period="
+        raise InputError(what, where="period")
+    longest = max(periods)
+    for rounds in range(1, MOST_ROUNDS + 1):
+        T = rounds * longest
+        if all(abs(T / one - round(T / one)) < 1e-9 * T / one for one in periods):
+            return T
+    each = ", ".join(f"{one:.6g} s" for one in dict.fromkeys(periods))
+    what = f"the references go round in {each}, which have no common period"
+    raise InputError(what, where="period", expected="period=")
+
+
+def _periods(reference: Function, configuration: Configuration) -> list[float]:
+    """The periods of what moves in a reference, s; none for what stands still."""
+    if isinstance(reference, Circle):
+        return [2.0 * math.pi / abs(reference.rate)] if reference.rate else []
+    if isinstance(reference, Bearing):
+        return _periods(reference.of, configuration)
+    if isinstance(reference, PoseReference):
+        return _periods(reference.position, configuration) + _periods(reference.orientation, configuration)
+    values = [evaluate(reference, t, configuration).value for t in (0.0, 0.37, 1.7, 7.3, 31.0)]
+    if all(np.array_equal(values[0], value) for value in values[1:]):
+        return []
+    what = f"{type(reference).__name__} does not say its period"
+    raise InputError(what, where="period", expected="period=, the time in which the reference goes round")
+
+
+def expect_periodic(controller: Controller, q: Array, T: float, laps: int) -> None:
+    """`InputError` where a reference is elsewhere a period later, at any time of the laps."""
+    configuration = Configuration(controller.robot, q)
+    starts = T * np.array([0.0, 0.1234, 0.3579, 0.61803, 0.9])
+    for task in (*controller.task, *controller.given.added_task):
+        rows, turns = task.rows(controller.robot), task.function.comparison is not None
+        angular = [row.angular for row in rows]
+        values = [evaluate(task.reference, t, configuration).value for t in starts]
+        first = [_comparable(value, angular, turns) for value in values]
+        for lap in range(1, laps + 1):
+            for k, t in enumerate(starts[:1] if lap == laps else starts):
+                value = evaluate(task.reference, t + lap * T, configuration).value
+                moved = np.abs(_comparable(value, angular, turns) - first[k]).max()
+                if not moved < SAME:
+                    names = ", ".join(row.name for row in rows)
+                    raise InputError(
+                        f"the reference of {names} is not where it was {T:.6g} s before, at "
+                        f"t = {t + lap * T:.4g} s ({moved:.3g} away): "
+                        "expected a path that goes round, and its period",
+                        where="period",
+                    )
+
+
+def _comparable(value: Array, angular: Sequence[bool], turns: bool) -> Array:
+    """The same for the same target: of an angle its cosine and sine, of a turn its matrix."""
+    if turns:
+        R = np.empty((3, 3))
+        exp3(np.ascontiguousarray(value[-3:]), R)
+        return np.concatenate([value[:-3], R.ravel()])
+    parts = [[np.cos(v), np.sin(v)] if is_angle else [v] for v, is_angle in zip(value, angular, strict=True)]
+    return np.concatenate(parts)

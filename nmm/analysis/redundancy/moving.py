@@ -9,37 +9,44 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.analysis.redundancy.following import ALONE, FOLLOW, FOLLOWED, UNDEFINED, Field, follow
 from nmm.analysis.redundancy.motion_words import input_words, motion_text
 from nmm.analysis.redundancy.null_fields import (
+    ALONE,
+    FOLLOW,
+    FOLLOWED,
+    UNDEFINED,
     WORDS,
     Direction,
     Ended,
+    Field,
     direction_at,
     expect_direction,
+    follow,
     null_field,
 )
-from nmm.analysis.singular.jacobians import Jacobians, Subject, checked
-from nmm.analysis.singular.reached import Reached
+from nmm.analysis.singular.jacobians import Jacobians, Reached, Subject, checked
 from nmm.analysis.singular.singularity import TOLERANCE
 from nmm.arrays import Array, positive
 from nmm.control.controller import Controller
 from nmm.control.equations import ControlStep
 from nmm.control.integrators import RK4
 from nmm.control.step import Step
-from nmm.errors import InputError, SingularError
+from nmm.diagnosis.diagnose import lines, noticed
+from nmm.errors import InputError, SingularError, expect
+from nmm.findings import Finding
 from nmm.functions.program import BESIDE, COMPILED, evaluate
 from nmm.functions.references.polynomial import Constant
 from nmm.functions.tasks.task import Stack, Task
 from nmm.kernels.compiled import checked_by_caller
-from nmm.kernels.memory import views
+from nmm.kernels.record_layout import views
 from nmm.resolvers.answer import Status
 from nmm.resolvers.projected_gradient import ProjectedGradient
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 from nmm.runs.recording import Recorder
-from nmm.runs.trajectory import Outcome, Trajectory
-from nmm.words import listed
+from nmm.runs.trajectory import Trajectory
+from nmm.runs.verdict import Outcome, Verdict
+from nmm.text_format import listed
 
 #: How fast the task is brought back from the integrator's drift, 1/s.
 GAIN = 10.0
@@ -109,8 +116,7 @@ def self_motion(
         name, or (m,)
     duration : of the way there, s; that back takes as long
     speed : the largest ‖u‖, m/s and rad/s together
-    dt : s between samples
-    t : s, of the references
+    dt, t : s between samples; s, of the references
 
     Raises
     ------
@@ -130,11 +136,16 @@ def self_motion(
     robot = jacobians.robot
     duration, speed = positive(duration, "duration"), positive(speed, "speed")
     dt = positive(dt, "dt")
-    if dt > duration / 4.0:
-        raise InputError(f"dt: expected at most a quarter of the duration, {duration / 4.0:g} s, got {dt:g}")
+    expect(dt <= duration / 4.0, "dt", f"at most a quarter of the duration, {duration / 4.0:g} s", dt)
     robot.check_limits(q)
     length = 2.0 * speed * duration / np.pi
-    _check_effort(duration, speed, dt, length)
+    if not duration / dt <= MOST_SAMPLES:
+        what = f"{duration:g} s in steps of {dt:g} s are {duration / dt:.3g} samples"
+        raise InputError(what, where="duration", expected=f"at most {MOST_SAMPLES}")
+    strides = length * np.pi / 2.0 / STRIDE
+    if not strides <= MOST_STEPS:
+        way = f"a way of {length:.3g} m and rad (speed {speed:g}, duration {duration:g} s)"
+        raise InputError(f"{way} takes {strides:.3g} steps", where="speed", expected=f"at most {MOST_STEPS}")
     J = jacobians.J(t, q)
     rank = jacobians.rank(J, TOLERANCE)
     expect_direction(robot, J, rank, direction)
@@ -143,33 +154,16 @@ def self_motion(
     steps = max(4, round(duration / dt))
     times = np.linspace(0.0, duration, steps + 1)
     samples, ended = motion.run(times, length)
+    why = ended
     while ended:
         reached = length * (1.0 - np.cos(np.pi * times[len(samples) - 1] / duration)) / 2.0
         if len(samples) < 3 or reached < 1e-3 * 2.0 * speed * duration / np.pi:
             raise SingularError(
                 f"the self-motion cannot begin: {ended} (the other way may be free: the inputs negated)"
             )
-        length = SHORTER * reached
-        why = ended
+        length, why = SHORTER * reached, ended
         samples, ended = motion.run(times, length)
-        if not ended:
-            return motion.there_and_back(samples, times, length, why)
-    return motion.there_and_back(samples, times, length, "")
-
-
-def _check_effort(duration: float, speed: float, dt: float, length: float) -> None:
-    """`InputError` for a way of too many samples or steps."""
-    if not duration / dt <= MOST_SAMPLES:
-        raise InputError(
-            f"duration: {duration:g} s in steps of {dt:g} s are {duration / dt:.3g} samples; expected at "
-            f"most {MOST_SAMPLES}"
-        )
-    steps = length * np.pi / 2.0 / STRIDE
-    if not steps <= MOST_STEPS:
-        raise InputError(
-            f"speed: a way of {length:.3g} m and rad (speed {speed:g}, duration {duration:g} s) takes "
-            f"{steps:.3g} steps; expected at most {MOST_STEPS}"
-        )
+    return motion.there_and_back(samples, times, length, why)
 
 
 def held(jacobians: Jacobians, t: float, q: Array) -> Stack:
@@ -178,13 +172,9 @@ def held(jacobians: Jacobians, t: float, q: Array) -> Stack:
     configuration = Configuration(jacobians.robot, q)
     for task in jacobians.task:
         reference = task.reference
-        moves = not isinstance(reference, Reached) and bool(
-            np.any(evaluate(reference, t, configuration).value_q != 0.0)
-        )
-        if not moves:
-            rows = task.rows(jacobians.robot)
+        if isinstance(reference, Reached) or not np.any(evaluate(reference, t, configuration).value_q):
             value = evaluate(task.function, t, configuration).value
-            reference = Constant(value, rows[0].unit)
+            reference = Constant(value, task.rows(jacobians.robot)[0].unit)
         tasks.append(Task(task.function, reference, GAIN))
     return Stack(tuple(tasks))
 
@@ -204,17 +194,15 @@ def _nearby(jacobians: Jacobians, t: float, q: Array, rank: int) -> Array:
 
 
 class _Motion:
-    """The way there: a field followed with the task held."""
-
     def __init__(self, robot: Robot, task: Stack, t: float, q: Array, field: Field) -> None:
         self.robot, self.t, self.q, self.field = robot, t, q, field
         self.controller = Controller(robot, task, ProjectedGradient(), steering=False, kinematics=COMPILED)
         self.e0 = self.controller.evaluate(t, q).error
         self.angular = np.array([row.angular for row in task.rows(robot)], dtype=bool)
         self.last, self.along = np.zeros(robot.n_u), np.zeros(robot.n_u)
-        self._solve, _ = self.controller.equation_solver()
+        self._solve = self.controller.solver.solve
         self._follow = checked_by_caller(follow, FOLLOW)
-        self._q_dot = views(ControlStep, *self.controller.blocks, BESIDE).q_dot
+        self._q_dot = views(ControlStep, *self.controller.solver.blocks, BESIDE).q_dot
 
     def run(self, times: Array, length: float) -> tuple[list[Step], str]:
         """Samples at the times, or as far as the motion goes, and why it ended."""
@@ -223,8 +211,7 @@ class _Motion:
         self.last[:] = 0.0
 
         def velocity(time: float, q: Array) -> Array:
-            rate = length * np.pi / (2.0 * duration) * math.sin(np.pi * time / duration)
-            return self._velocity(q, rate)
+            return self._velocity(q, length * np.pi / (2.0 * duration) * math.sin(np.pi * time / duration))
 
         samples: list[Step] = []
         q = self.q
@@ -247,7 +234,7 @@ class _Motion:
         """q_dot at q (n,), ‖u‖ being `rate` but for what holds the task."""
         self._solve(self.t, q)
         given = self.field, self.e0, self.angular, self.last, rate, GAIN, self.along
-        found = self._follow(*self.controller.blocks, *given)
+        found = self._follow(*self.controller.solver.blocks, *given)
         if found == UNDEFINED:
             raise Ended(self.robot.platform.problem(q[: self.robot.platform.n_p]) or "the task is undefined")
         if found == ALONE:
@@ -258,21 +245,16 @@ class _Motion:
         return self._q_dot.copy()
 
     def _sample(self, time: float, q: Array) -> Step:
-        """What `_velocity` just found at q."""
         found = self.controller.last(time, q)
-        sample = replace(found, r_d=found.r + found.error, status=Status.SOLVED)
-        self._check(sample)
-        return sample
-
-    def _check(self, sample: Step) -> None:
         lower, upper = self.robot.q_limits.T
-        beyond = np.flatnonzero((sample.q < lower - 1e-9) | (sample.q > upper + 1e-9))
+        beyond = np.flatnonzero((q < lower - 1e-9) | (q > upper + 1e-9))
         names = [self.robot.q_names[i] for i in beyond if i in self.robot.following.independent]
         if names:
             raise Ended(f"{listed(names)} at the limit")
-        problem = self.robot.platform.problem(sample.q[: self.robot.platform.n_p])
+        problem = self.robot.platform.problem(q[: self.robot.platform.n_p])
         if problem is not None:
             raise Ended(problem)
+        return replace(found, r_d=found.r + found.error, status=Status.SOLVED)
 
     def there_and_back(self, samples: list[Step], times: Array, length: float, ended: str) -> SelfMotion:
         """The way there and the same way back: q at mirrored times, the inputs negated."""
@@ -285,11 +267,13 @@ class _Motion:
         for sample in every:
             recorder.add(sample)
         if ended:
-            recorder.warnings.append(f"the self-motion turns back early: {ended}")
+            recorder.findings.append(Finding("turned_back_early", {"text": ended}))
         robot = self.robot
         first = direction_at(samples[0].J, self.field)
         words = input_words(robot, self.q)
         text = motion_text(first / np.abs(first).max(), robot.u_names, robot.u_units, words, robot.platform.p)
-        trajectory = recorder.trajectory(Outcome.COMPLETED, "", float(times[1]), "rk4")
+        trajectory = recorder.trajectory(float(times[1]), "rk4")
+        verdict = Verdict(warnings=lines(noticed(recorder), Outcome.COMPLETED)).after(recorder.findings)
         # The task rests: there is no path that it should follow.
-        return SelfMotion(replace(trajectory, resolver="self-motion", desired=None), text, length, ended)
+        trajectory = replace(trajectory, resolver="self-motion", desired=None, verdict=verdict)
+        return SelfMotion(trajectory, text, length, ended)

@@ -2,28 +2,80 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.analysis.redundancy.motion_words import input_words, motion_text
-from nmm.analysis.redundancy.null_space import readable_null_space
-from nmm.analysis.redundancy.withheld import regained_by_brackets, withheld_motions
+from nmm.analysis.redundancy.motion_words import coordinate_words, input_words, motion_text
+from nmm.analysis.redundancy.null_fields import readable_null_space
 from nmm.analysis.singular.jacobians import Jacobians, Subject, checked
-from nmm.analysis.singular.parts import null_space
+from nmm.analysis.singular.parts import null_space, rank_of
 from nmm.analysis.singular.singularity import TOLERANCE
 from nmm.arrays import Array, positive
 from nmm.control.controller import Controller
 from nmm.control.directions import direction_text
 from nmm.control.idle_inputs import inputs_without_effect
 from nmm.errors import SingularError
-from nmm.functions.function import Function
+from nmm.findings import Finding
 from nmm.functions.program import Program
-from nmm.functions.tasks.comparison import Comparison
+from nmm.functions.tasks.task import Comparison
 from nmm.resolvers.projected_gradient import ProjectedGradient
 from nmm.robots.robot import Robot
+
+#: Singular values of Lie brackets, which are taken by differences, this small beside the largest are zero.
+BRACKET_TOLERANCE = 1e-5
+#: Step of the differences along the fields of the brackets, m and rad.
+STEP = 1e-5
+
+
+def withheld_motions(
+    robot: Robot, q: Array, F: Array, rank_F: int, admitted: Array
+) -> tuple[Array, tuple[str, ...]]:
+    """Self-motions (k, n), with sentences, that complete the rows of `admitted` to null F.
+
+    Sought along the platform's own axes, where few coordinates suffice, and with mimic joints.
+    """
+    n_p, who = robot.platform.n_p, robot.following
+    to_world = np.eye(robot.n_independent)
+    if n_p:
+        c, s = np.cos(q[2]), np.sin(q[2])
+        to_world[:2, :2] = [[c, -s], [s, c]]
+    costs = [1] * n_p + [0] * (robot.n_independent - n_p)
+    given = admitted[:, who.independent] @ to_world
+    own = readable_null_space(F @ who.carried @ to_world, rank_F, costs, given)
+    words = coordinate_words(robot, q)
+    names = [robot.q_names[i] for i in who.independent]
+    units = [f"{robot.q_units[i]}/s" for i in who.independent]
+    texts = tuple(motion_text(one, names, units, words, n_p) for one in own)
+    return own @ to_world.T @ who.carried.T, texts
+
+
+def regained_by_brackets(jacobians: Jacobians, t: float, q: Array, rank: int) -> int | None:
+    """How many directions the brackets of two self-motions add to the self-motions of the inputs.
+
+    The fields are X_a(q) = S(q) P(q) c_a, with P = I - J⁺ J the projector on null J and c_a an orthonormal
+    basis of it at q; [X_a, X_b] = ∂X_b/∂q X_a - ∂X_a/∂q X_b by central differences.
+    """
+    c = null_space(jacobians.J(t, q), rank).T
+
+    def fields(at: Array) -> Array:
+        J = jacobians.J(t, at)
+        if jacobians.rank(J, 1e-8) != rank:
+            raise SingularError("the rank of J changes")
+        N = null_space(J, rank)
+        return np.asarray(jacobians.robot.S(at) @ (N.T @ N) @ c)
+
+    try:
+        here = fields(q)
+        along = [(fields(q + STEP * X) - fields(q - STEP * X)) / (2.0 * STEP) for X in here.T]
+    except SingularError:
+        return None
+    brackets = [along[a][:, b] - along[b][:, a] for a in range(len(along)) for b in range(a)]
+    both = np.column_stack([here, *brackets])
+    return rank_of(both, BRACKET_TOLERANCE) - here.shape[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,13 +128,12 @@ class RedundancyReport:
 
     @property
     def static(self) -> int:
-        """Degree of static redundancy, n - s, without what follows (below zero: the task asks for more than
-        there is)."""
+        """Degree of static redundancy, n - s, without mimic joints; negative if the task asks too much."""
         return self.robot.n_independent - len(self.rows)
 
     @property
     def kinematic(self) -> int:
-        """Degree of kinematic redundancy, p + n_m - s (below zero: the task asks for more than there is)."""
+        """Degree of kinematic redundancy, p + n_m - s; negative if the task asks for too much."""
         return self.robot.n_u - len(self.rows)
 
     @property
@@ -102,91 +153,51 @@ class RedundancyReport:
 
     def text(self) -> str:
         """The report for people."""
-        parts = (self._counts(), self._motions(), self._withheld())
-        return "\n\n".join("\n".join(part) for part in parts if part)
+        return "\n\n".join("\n".join(map(str, part)) for part in self.findings())
 
-    def _counts(self) -> list[str]:
+    def findings(self) -> list[list[Finding]]:
+        """What was found, part by part: counts, the motions left free, those withheld."""
+        return [part for part in (self._counts(), self._motions(), self._withheld()) if part]
+
+    def _counts(self) -> list[Finding]:
         robot, s, n = self.robot, len(self.rows), self.robot.n_independent
-        following = f" (and {robot.n - n} that follow others)" if robot.followers else ""
-        lines = [
-            f"{robot.name}, task {', '.join(self.rows)}",
-            f"n = {_many(n, 'coordinate')}{following}, n_u = {_many(robot.n_u, 'input')}, "
-            f"s = {_many(s, 'row')} of the task",
-            f"static redundancy       n - s = {n} - {s} = {self.static} (configurations)",
-            f"kinematic redundancy  n_u - s = {robot.n_u} - {s} = {self.kinematic} (motions)",
-            "at "
-            + ", ".join(f"{name} = {value:.4g}" for name, value in zip(robot.q_names, self.q, strict=True))
-            + ":",
-            f"  rank of ∂f/∂q {self.rank_F} of {s}: configurations with this task value form a manifold of "
-            f"dimension {self.manifold}",
-            f"  rank of J {self.rank_J} of {s}: {_many(self.free, 'motion')} of the inputs "
-            f"{'leaves' if self.free == 1 else 'leave'} the task at rest",
+        found = [
+            Finding("redundancy_of", {"robot": robot.name, "rows": self.rows}),
+            Finding("redundancy_sizes", {"n": n, "following": robot.n - n, "inputs": robot.n_u, "rows": s}),
+            Finding("static_redundancy", {"n": n, "rows": s, "degree": self.static}),
+            Finding("kinematic_redundancy", {"inputs": robot.n_u, "rows": s, "degree": self.kinematic}),
+            Finding("redundancy_at", {"q": dict(zip(robot.q_names, self.q.tolist(), strict=True))}),
+            Finding("configurations_free", {"rank": self.rank_F, "rows": s, "dimension": self.manifold}),
+            Finding("motions_free", {"rank": self.rank_J, "rows": s, "count": self.free}),
         ]
         if self.rank_J < self.rank_F:
-            lost = self.rank_F - self.rank_J
-            lines.append(
-                f"  {_many(lost, 'direction')} of the task that the coordinates move "
-                f"{'is' if lost == 1 else 'are'} moved by no input here: J is singular, ∂f/∂q is not"
-            )
-        return lines
+            found.append(Finding("singular_inputs", {"lost": self.rank_F - self.rank_J}))
+        return found
 
-    def _motions(self) -> list[str]:
+    def _motions(self) -> list[Finding]:
         if not self.free:
             return []
-        several = self.free > 1
-        lines = [
-            f"the task stays at rest in {'each of these motions' if several else 'this motion'} "
-            f"(--self-motion takes {'their numbers' if several else 'its number'}):"
-        ]
+        found = [Finding("self_motions", {"count": self.free})]
         for k, (vector, text) in enumerate(zip(self.readable, self.texts, strict=True)):
             moved = [name for name, rate in zip(self.robot.u_names, vector, strict=True) if rate]
-            of_it = ""
-            if len(moved) == 1:
-                where = "" if moved[0] in self.without_effect else " here"
-                of_it = f" (without effect on the task{where})"
-            lines.append(f"  {k}  {text}{of_it}")
-        return [*lines, "and in their opposites and combinations" if several else "and in its opposite"]
+            values = {"number": k, "motion": text, "alone": len(moved) == 1}
+            everywhere = moved[0] in self.without_effect
+            found.append(Finding("self_motion", {**values, "everywhere": everywhere}))
+        return [*found, Finding("self_motions_combined", {"count": self.free})]
 
-    def _withheld(self) -> list[str]:
+    def _withheld(self) -> list[Finding]:
         k = len(self.withheld)
         if not k:
-            if self.robot.n_independent == self.robot.n_u:
-                return []
-            return ["the inputs give every motion of the coordinates that leaves the task at rest"]
-        them = "it" if k == 1 else "them"
-        lines = [
-            f"the coordinates could move in {_many(self.manifold, 'independent way')} with the task at rest; "
-            f"the wheels withhold {k} of them, which no input gives:",
-            *(
-                f"  - {text} (q_dot: {coordinates})"
-                for text, coordinates in zip(self.withheld_texts, self.withheld_coordinates, strict=True)
-            ),
-        ]
-        if not self.free:
-            why = "no motion of the inputs leaves the task at rest"
-        elif self.free == 1:
-            why = "only one motion of the inputs leaves the task at rest, and it only leads there and back"
-        elif self.by_brackets is None:
-            return lines
-        elif self.by_brackets == k:
-            return [
-                *lines,
-                f"but a manoeuvre gives {them}, the task at rest all the while: two motions of the inputs in "
-                "turn, there and back (rank of the Lie brackets); so every configuration nearby with this "
-                "task value can be reached",
-            ]
-        else:
-            give = f"give {self.by_brackets} of them" if self.by_brackets else f"do not give {them} either"
-            return [
-                *lines,
-                f"manoeuvres, two motions of the inputs in turn, there and back, {give} (rank of the Lie "
-                "brackets; longer manoeuvres were not looked at)",
-            ]
-        return [*lines, f"nor does a manoeuvre give {them} with the task at rest all the while: {why}"]
-
-
-def _many(count: int, what: str) -> str:
-    return f"{count or 'no'} {what}{'' if count == 1 else 's'}"
+            same = self.robot.n_independent == self.robot.n_u
+            return [] if same else [Finding("nothing_withheld")]
+        found = [Finding("motions_withheld", {"dimension": self.manifold, "count": k})]
+        for text, coordinates in zip(self.withheld_texts, self.withheld_coordinates, strict=True):
+            found.append(Finding("motion_withheld", {"motion": text, "coordinates": coordinates}))
+        if self.free < 2:
+            found.append(Finding("no_manoeuvre", {"free": self.free, "withheld": k}))
+        elif self.by_brackets is not None:
+            found.append(Finding("manoeuvres", {"given": self.by_brackets, "withheld": k}))
+        return found
 
 
 def redundancy(
@@ -221,6 +232,7 @@ def redundancy(
     rank_J, rank_F = jacobians.rank(J, tolerance), jacobians.rank(F @ robot.following.carried, tolerance)
     readable = readable_null_space(J, rank_J, [1] * p + [0] * (robot.n_u - p))
     words = input_words(robot, q)
+    controller = Controller(robot, jacobians.task, ProjectedGradient(), steering=False)
     withheld, texts = withheld_motions(robot, q, F, rank_F, readable @ S.T)
     return RedundancyReport(
         robot=robot,
@@ -235,9 +247,7 @@ def redundancy(
         null=null_space(J, rank_J),
         readable=readable,
         texts=tuple(motion_text(one, robot.u_names, robot.u_units, words, p) for one in readable),
-        without_effect=inputs_without_effect(
-            Controller(robot, jacobians.task, ProjectedGradient(), steering=False), q
-        ),
+        without_effect=inputs_without_effect(controller.solver, q),
         withheld=withheld,
         withheld_texts=texts,
         by_brackets=regained_by_brackets(jacobians, t, q, rank_J) if len(withheld) else 0,
@@ -245,22 +255,13 @@ def redundancy(
 
 
 def coordinate_jacobian(jacobians: Jacobians, t: float, q: Array) -> Array:
-    """F = ∂f/∂q - ∂g/∂q (s, n) at (t, q), so that J = F S; of a pose, minus the derivative of its error.
-
-    Raises
-    ------
-    SingularError : it is not a number there
-    """
-    functions: list[Function] = []
-    for task in jacobians.task:
-        functions += [task.function, task.reference, Comparison(task)]
-    program = Program(jacobians.robot, functions)
+    """F = ∂f/∂q - ∂g/∂q (s, n) at (t, q), so that J = F S; of a pose, minus the derivative of its error."""
+    each = [(task.function, task.reference, Comparison(task)) for task in jacobians.task]
+    program = Program(jacobians.robot, list(itertools.chain(*each)))
     program.lay_out()
     found = program.evaluate(t, q)
-    blocks = []
-    for f, g, error in zip(found[::3], found[1::3], found[2::3], strict=True):
-        blocks.append(-error.value_q if len(error.value) else f.value_q - g.value_q)
-    F = np.vstack(blocks)
+    triples = zip(found[::3], found[1::3], found[2::3], strict=True)
+    F = np.vstack([-e.value_q if len(e.value) else f.value_q - g.value_q for f, g, e in triples])
     if not np.all(np.isfinite(F)):
         raise SingularError(f"at t = {t:g} s: the task or its reference is undefined there")
     return F

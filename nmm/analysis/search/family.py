@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
 from nmm.arrays import Array
-from nmm.words import NEAR_PI, listed, signed_sum, value_text
+from nmm.text_format import NEAR_PI, counted, listed, signed_sum, value_text
 
 #: Values of the same kind that differ by less are the same, rad or m.
 SAME_VALUE = 1e-4
@@ -80,13 +81,11 @@ class SingularFamily:
     constraints : what is pinned, and simple sums that are; all combinations of their values are singular,
         found by a start, or half a turn from one that was and proved by random members
     related : coordinates tied by the equations, those of `constraints` that are sums among them
-    dimension : of this part of the singular set, of `moving` coordinates
-    moving : how many coordinates the search moved
+    dimension, moving : of this part of the singular set, and of how many coordinates the search moved
     rank, full_rank : of J in the family, and elsewhere
     lost : the task's directions that are lost at the first example
-    examples (E, n) : configurations
+    examples (E, n), names : configurations, and the names of their coordinates
     starts : how many starts ended here
-    names : of the coordinates that the examples have, in their order
 
     Examples
     --------
@@ -151,7 +150,8 @@ class SingularFamily:
     def text(self) -> str:
         """One line: "q2 = 0 or ±π; q1 free; loses ee.x; 200 starts"."""
         lost = f"loses {listed(self.lost)}" if len(self.lost) == 1 else f"loses {len(self.lost)} directions"
-        return f"{self.conditions}; {self.free_text}; {lost} (rank {self.rank}); {of_starts(self.starts)}"
+        starts = counted(self.starts, "start")
+        return f"{self.conditions}; {self.free_text}; {lost} (rank {self.rank}); {starts}"
 
     def contains(self, q: Array) -> bool:
         """Whether q (n,) satisfies `constraints`; the equations of what is tied are not looked at."""
@@ -169,11 +169,6 @@ class SingularFamily:
         return self.kind == other.kind and not _different(self, other)
 
 
-def of_starts(count: int) -> str:
-    """ "1 start", "3 starts"."""
-    return f"{count} start{'' if count == 1 else 's'}"
-
-
 def _different(one: SingularFamily, other: SingularFamily) -> list[int]:
     """Which constraints of two families of one kind have different values."""
     pairs = enumerate(zip(one.constraints, other.constraints, strict=True))
@@ -183,17 +178,13 @@ def _different(one: SingularFamily, other: SingularFamily) -> list[int]:
 def merged(families: list[SingularFamily]) -> list[SingularFamily]:
     """Families that differ in the values of one constraint alone become one with all these values."""
     found = list(families)
-    i = 0
-    while i < len(found):
-        for j in range(i + 1, len(found)):
-            both = _together(found[i], found[j])
-            if both is not None:
-                found[i] = both
-                del found[j]
-                i = -1  # from the start: what is one now may go with an earlier one
-                break
-        i += 1
-    return found
+    while True:  # what is one now may go with an earlier one
+        pairs = ((i, j, _together(found[i], found[j])) for i, j in combinations(range(len(found)), 2))
+        merging = next(((i, j, both) for i, j, both in pairs if both is not None), None)
+        if merging is None:
+            return found
+        i, j, found[i] = merging
+        del found[j]
 
 
 def _together(one: SingularFamily, other: SingularFamily) -> SingularFamily | None:

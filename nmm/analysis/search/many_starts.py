@@ -8,19 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.analysis.search.descent import descend
-from nmm.analysis.search.family import SingularFamily, of_starts
-from nmm.analysis.search.measure import Measure
-from nmm.analysis.search.minimum import LocalMinimum, followed, lowest
-from nmm.analysis.search.search import TOLERANCE, Search
+from nmm.analysis.search.descent import LocalMinimum, descend, followed, lowest
+from nmm.analysis.search.family import SingularFamily
 from nmm.analysis.search.sorting import everywhere, families_of
-from nmm.analysis.search.space import search_space
+from nmm.analysis.search.space import TOLERANCE, Measure, Search, search_space
 from nmm.analysis.singular.jacobians import Jacobians, Subject
 from nmm.analysis.singular.parts import WHOLE
-from nmm.arrays import Array, counted, positive, scalar
+from nmm.arrays import Array, counted, scalar
 from nmm.errors import SingularError
 from nmm.progress import Progress, between
-from nmm.words import listed, value_text
+from nmm.text_format import counted as counted_text
+from nmm.text_format import listed, value_text
 
 #: Cheap samples for each start of the better half.
 SAMPLES = 20
@@ -34,17 +32,14 @@ class SingularitySearch:
 
     Attributes
     ----------
-    robot, part : names; the part whose columns of J were searched
-    rows : names of the task's rows
+    robot, part, rows : names; of the part whose columns of J were searched, and of the task's rows
     full_rank : of the part's J, where it is not singular
     families : the thickest first
-    starts, seed : local minimisations, and what drew them
-    converged : how many of them ended at a singular configuration
+    starts, seed, converged : local minimisations, what drew them, and how many ended where J is singular
     smallest : the lowest of the local minima of σ_min that are not singular; None without one
     ranges : (lower, upper) of the coordinates that were searched, m or rad
     indifferent : coordinates that may move and on which J's singular values do not depend: always free
-    fixed : coordinates that did not move, and where they stood
-    units : of all coordinates, rad or m
+    fixed, units : coordinates that did not move, and where they stood; the units of all, rad or m
     tolerance : singular values this small beside the largest are zero
 
     Examples
@@ -90,12 +85,10 @@ class SingularitySearch:
         """One line: how many families, or that none was found, and from how many starts."""
         whose = "J" if self.part == WHOLE else f"J's columns of the {self.part}"
         if self.everywhere:
-            return (
-                f"{whose} lose rank everywhere: {self.families[0].rank}, where rows and inputs allow "
-                f"{self.full_rank}"
-                if self.part != WHOLE
-                else f"J is singular everywhere: rank {self.families[0].rank}, not {self.full_rank}"
-            )
+            rank, full = self.families[0].rank, self.full_rank
+            if self.part == WHOLE:
+                return f"J is singular everywhere: rank {rank}, not {full}"
+            return f"{whose} lose rank everywhere: {rank}, where rows and inputs allow {full}"
         if not self.converged:
             return f"no singular configuration of {whose} found from {self.starts} starts"
         count = len(self.families)
@@ -104,29 +97,35 @@ class SingularitySearch:
             f"(rank below {self.full_rank}), found by {self.converged} of {self.starts} starts"
         )
 
+    def configuration_text(self, q: Array) -> str:
+        """ "q1 = 0, q2 = π/2": q (n,) without the indifferent coordinates."""
+        return ", ".join(
+            f"{name} = {value_text(float(value), unit)}"
+            for (name, unit), value in zip(self.units.items(), q, strict=True)
+            if name not in self.indifferent
+        )
+
     @property
-    def searched_text(self) -> str:
-        """Where was searched: "q1 from -π to π; q2 from 0 to π/2"."""
-        texts = [
+    def remarks(self) -> list[str]:
+        """Lines beside the families: the smallest σ_min that is not zero, and what was searched."""
+        lines = [f"{counted_text(self.unsorted, 'start')} ended where families meet"] if self.unsorted else []
+        if self.smallest is not None:
+            lines.append(f"{self.smallest.text}, at {self.configuration_text(self.smallest.q)}")
+        ranges = [
             f"{name} from {value_text(lower, self.units[name])} to {value_text(upper, self.units[name])}"
             for name, (lower, upper) in self.ranges.items()
         ]
-        return "; ".join(texts) or "nothing that matters may move"
-
-    def text(self) -> str:
-        """Everything, in lines."""
-        lines = [self.summary, *(f"  {family.text}" for family in self.families)]
-        if self.unsorted:
-            lines.append(f"{of_starts(self.unsorted)} ended where families meet")
-        if self.smallest is not None:
-            lines.append(self.smallest.text)
-        lines.append(f"searched: {self.searched_text}")
+        lines.append(f"searched: {'; '.join(ranges) or 'nothing that matters may move'}")
         if self.indifferent:
-            lines.append(f"its singular values do not depend on {listed(self.indifferent)}")
+            lines.append(f"J's singular values do not depend on {', '.join(self.indifferent)}")
         if self.fixed:
             stood = [f"{name} = {value_text(value, self.units[name])}" for name, value in self.fixed.items()]
             lines.append(f"not moved: {listed(stood)}")
-        return "\n".join(lines)
+        return lines
+
+    def text(self) -> str:
+        """Everything, in lines."""
+        return "\n".join([self.summary, *(f"  {family.text}" for family in self.families), *self.remarks])
 
 
 def find_singularities(
@@ -153,8 +152,7 @@ def find_singularities(
     Parameters
     ----------
     subject : a controller, or (robot, task); functions without targets are enough
-    starts : local minimisations
-    seed : of the random numbers
+    starts, seed : local minimisations, and what draws them
     ranges : (lower, upper) by coordinate, m or rad, whatever the limits. Else the limits; where there are
         none, or they make more than a turn, angles from -π to π, and lengths about the robot's reach either
         way from `at`
@@ -186,8 +184,7 @@ def find_singularities(
     rng = np.random.default_rng(seed)
     stand = robot.rest if at is None else robot.q(at)
     robot.check_followers(stand)
-    space = search_space(measure, stand, among, ranges, length, rng)
-    search = Search(measure, space, positive(tolerance, "tolerance"), rng)
+    search = search_space(measure, stand, among, ranges, length, tolerance, rng)
     first, singular = _starts(search, starts)
     families: tuple[SingularFamily, ...]
     if singular:
@@ -213,17 +210,17 @@ def find_singularities(
         seed=seed,
         converged=converged,
         smallest=bottom,
-        ranges={names[j]: (float(space.lower[j]), float(space.upper[j])) for j in space.axes},
+        ranges={names[j]: (float(search.lower[j]), float(search.upper[j])) for j in search.axes},
         units=dict(zip(names, robot.q_units, strict=True)),
-        indifferent=tuple(names[j] for j in space.indifferent),
-        fixed={names[j]: float(stand[j]) for j in robot.following.independent if j not in space.moving},
+        indifferent=tuple(names[j] for j in search.indifferent),
+        fixed={names[j]: float(stand[j]) for j in robot.following.independent if j not in search.moving},
         tolerance=search.tolerance,
     )
 
 
 def _starts(search: Search, starts: int) -> tuple[Array, bool]:
     """Starts (starts, a) that have a J, and whether all samples are singular."""
-    pool = search.space.draw(search.rng, max(SAMPLES * ((starts + 1) // 2), 2 * SAMPLES))
+    pool = search.draw(max(SAMPLES * ((starts + 1) // 2), 2 * SAMPLES))
     sigma, ratio = search.sigma(pool)
     exists = np.isfinite(sigma)
     if not exists.any():

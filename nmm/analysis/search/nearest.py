@@ -8,19 +8,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.analysis.search.descent import descend
+from nmm.analysis.search.descent import FLAT, descend
 from nmm.analysis.search.family import SingularFamily
-from nmm.analysis.search.measure import Measure
-from nmm.analysis.search.search import TOLERANCE, Search
-from nmm.analysis.search.slide import slide
 from nmm.analysis.search.sorting import family_at
-from nmm.analysis.search.space import search_space
+from nmm.analysis.search.space import TOLERANCE, Measure, Search, search_space
 from nmm.analysis.singular.jacobians import Jacobians, Subject, checked
 from nmm.analysis.singular.parts import WHOLE
-from nmm.arrays import Array, counted, positive
+from nmm.arrays import Array, Flags, counted
 from nmm.progress import Progress
-from nmm.words import listed, value_text
+from nmm.text_format import listed, value_text
 
+#: Lengths of a tangent step that are tried.
+FACTORS = np.array([2.0, 1.0, 0.5, 0.1])
+#: A tangent step shorter than this, in units, has arrived.
+ARRIVED = 1e-10
 #: Nearest candidates that are followed to the end.
 KEPT = 8
 #: Changes below this are none, m or rad.
@@ -41,8 +42,7 @@ class SingularPoint:
     length : m that count as 1 rad
     names, units : of the coordinates
     family : what is free, pinned and tied there; None where several families meet and none could be told
-    rank, full_rank : of J at q, and elsewhere
-    lost : the task's directions that are lost at q
+    rank, full_rank, lost : of J at q, and elsewhere; the task's directions that are lost at q
     sigma_min, ratio : smallest singular value at q, and beside the largest of the whole J
     starts, converged : local searches, and how many of them found a singular configuration
 
@@ -92,35 +92,28 @@ class SingularPoint:
         if not self.changes:
             return f"singular already: loses {listed(self.lost)} (rank {self.rank} of {self.full_rank})"
         metric = "" if "m" not in self.units else f" (rad; {self.length:g} m count as 1 rad)"
-        units = dict(zip(self.names, self.units, strict=True))
-        values = dict(zip(self.names, self.q, strict=True))
-        where = [f"{name} = {value_text(values[name], units[name])}" for name in self.changes]
+        at = zip(self.names, self.q, self.units, strict=True)
+        where = [f"{name} = {value_text(value, unit)}" for name, value, unit in at if name in self.changes]
         return f"nearest singular configuration: distance {self.distance:.4g}{metric}, at {listed(where)}"
 
     @property
-    def family_text(self) -> str:
-        """One line: the family that it lies in."""
-        if self.family is None:
-            return "several families of singular configurations meet there"
-        return f"it lies in the family: {self.family.conditions}; {self.family.free_text}"
-
-    @property
-    def proof_text(self) -> str:
-        """One line: that this is what local searches found, and how many."""
-        return (
+    def remarks(self) -> list[str]:
+        """Lines below the summary: what is lost, the family, and that local searches prove nothing."""
+        family = "several families of singular configurations meet there"
+        if self.family is not None:
+            family = f"it lies in the family: {self.family.conditions}; {self.family.free_text}"
+        if not self.changes:
+            return [family]
+        return [
+            f"loses {listed(self.lost)} (rank {self.rank} of {self.full_rank})",
+            family,
             f"the nearest that {self.starts} local searches found ({self.converged} of them found one); "
-            "no proof that there is none nearer"
-        )
+            "no proof that there is none nearer",
+        ]
 
     def text(self) -> str:
         """Everything, in lines."""
-        lines = [self.summary]
-        if self.changes:
-            lines.append(f"  loses {listed(self.lost)} (rank {self.rank} of {self.full_rank})")
-        lines.append(f"  {self.family_text}")
-        if self.changes:
-            lines.append(f"  {self.proof_text}")
-        return "\n".join(lines)
+        return "\n  ".join([self.summary, *self.remarks])
 
 
 def nearest_singularity(
@@ -161,8 +154,8 @@ def nearest_singularity(
     Examples
     --------
     >>> arm = nmm.load("unicycle_2r", platform="fixed")
-    >>> hand = nmm.Position("ee", "xy")
-    >>> point = nmm.analysis.nearest_singularity((arm, hand), {"q1": 0.3, "q2": 0.4}, starts=20)
+    >>> tip = nmm.Position("ee", "xy")
+    >>> point = nmm.analysis.nearest_singularity((arm, tip), {"q1": 0.3, "q2": 0.4}, starts=20)
     >>> round(point.distance, 3), point.q.round(3) + 0.0
     (0.4, array([0.3, 0. ]))
     """
@@ -170,16 +163,15 @@ def nearest_singularity(
     t, given = checked(jacobians, t, q)
     measure, robot = Measure(jacobians, part, length, sizes, t), jacobians.robot
     starts, rng = counted(starts, "starts"), np.random.default_rng(counted(seed, "seed", 0))
-    space = search_space(measure, given, among, ranges, length, rng, around=True)
-    search = Search(measure, space, positive(tolerance, "tolerance"), rng)
-    goal = space.z(given)
+    search = search_space(measure, given, among, ranges, length, tolerance, rng, around=True)
+    goal = search.z(given)
     z, ratio = descend(search, _starts(search, goal, starts))
     found = z[ratio <= search.tolerance]
     if not len(found):
         return None
     best = _nearest(search, found, goal, progress)
     at = best[np.newaxis]
-    where, (sigma, ratio), rank = space.q(at)[0], search.sigma(at), int(search.ranks(at)[0])
+    where, (sigma, ratio), rank = search.q(at)[0], search.sigma(at), int(search.ranks(at)[0])
     return SingularPoint(
         q=where,
         given=given,
@@ -204,8 +196,8 @@ def _starts(search: Search, goal: Array, starts: int) -> Array:
     directions = rng.standard_normal((near, len(goal)))
     directions /= np.maximum(np.linalg.norm(directions, axis=1), 1e-300)[:, np.newaxis]
     around = goal + directions * np.exp(rng.uniform(np.log(0.02), np.log(3.0), near))[:, np.newaxis]
-    drawn = np.concatenate([goal[np.newaxis], around, search.space.draw(rng, 4 * starts)])
-    drawn = search.space.clip(drawn)
+    drawn = np.concatenate([goal[np.newaxis], around, search.draw(4 * starts)])
+    drawn = search.clip(drawn)
     return drawn[np.isfinite(search.sigma(drawn)[0])][:starts]
 
 
@@ -220,3 +212,41 @@ def _nearest(search: Search, z: Array, goal: Array, progress: Progress | None) -
     if progress is not None:
         progress(1.0)
     return z[0]
+
+
+def slide(search: Search, z: Array, goal: Array, rounds: int) -> Array:
+    """Singular points (N, a) that are no farther from the goal (a,) than z (N, a) are, point by point."""
+    z = z.copy()
+    distance = np.linalg.norm(z - goal, axis=1)
+    live = np.ones(len(z), dtype=bool)
+    for _ in range(rounds):
+        at = np.flatnonzero(live)
+        if not len(at) or not z.shape[1]:
+            break
+        step = _towards(search, z[at], goal)
+        tries = z[at][:, np.newaxis] + step[:, np.newaxis] * FACTORS[:, np.newaxis]
+        landed, ratio = descend(search, tries.reshape(-1, z.shape[1]), iterations=12)
+        landed = landed.reshape(tries.shape)
+        far = np.linalg.norm(landed - goal, axis=2)
+        far[ratio.reshape(far.shape) > search.tolerance] = np.inf
+        best = np.argmin(far, axis=1)
+        row = np.arange(len(at))
+        better = far[row, best] < distance[at] - 1e-14
+        z[at[better]] = landed[row, best][better]
+        distance[at[better]] = far[row, best][better]
+        live[at] = better & (np.linalg.norm(step, axis=1) > ARRIVED)
+    return z
+
+
+def _towards(search: Search, z: Array, goal: Array) -> Array:
+    """The part (N, a) of goal - z that is tangent to the singular set and stays inside the bounds."""
+    _, C, values = search.equations(z, 1)
+    floor = FLAT * np.maximum(values[:, :1], 1e-300)
+
+    def step(usable: Flags) -> Array:
+        _, sizes, rows = np.linalg.svd(C * usable[:, np.newaxis], full_matrices=False)
+        normals = np.where((sizes > floor)[..., np.newaxis], rows, 0.0)
+        own = (goal - z) * usable
+        return np.asarray(own - (np.swapaxes(normals, 1, 2) @ (normals @ own[..., np.newaxis]))[..., 0])
+
+    return search.step(z, step)

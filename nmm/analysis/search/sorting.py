@@ -1,17 +1,16 @@
-"""From singular points to families: a walk from one point says what is pinned, others are sorted in."""
+"""From singular points to families: a walk from one point says what is pinned, others are sorted in.
 
-from __future__ import annotations
+Random members prove each family, and those half a turn away that no start has found.
+"""
 
 from collections import Counter
 from dataclasses import replace
 
 import numpy as np
 
+from nmm.analysis.search.descent import Local, localised, shaken, stay_singular, tangents, walk
 from nmm.analysis.search.family import Relation, SingularFamily, merged
-from nmm.analysis.search.local import Local, localised, shaken, tangents, walk
-from nmm.analysis.search.proof import completed, holds
-from nmm.analysis.search.search import Search
-from nmm.analysis.search.space import Space
+from nmm.analysis.search.space import Search
 from nmm.arrays import Array, Flags
 
 #: What spreads less than this along a walk stays, in units.
@@ -22,6 +21,8 @@ WHOLE, NEAR_WHOLE = 6, 1e-3
 SHAKES = (0.05, 0.2, 0.5)
 #: Examples that a family keeps.
 EXAMPLES = 4
+#: Random members that prove a family, and how much less exact than a point that has converged they are.
+MEMBERS, SLACK = 16, 100.0
 
 
 def families_of(search: Search, z: Array) -> tuple[SingularFamily, ...]:
@@ -38,7 +39,7 @@ def families_of(search: Search, z: Array) -> tuple[SingularFamily, ...]:
         if family is None:  # where pieces meet; a neighbour tells more
             waiting = waiting[1:]
             continue
-        members = [j for j in waiting if j == i or _belongs(search.space, family, local, j)]
+        members = [j for j in waiting if j == i or _belongs(search, family, local, j)]
         family = _with_examples(search, family, local, members)
         again = next((k for k, one in enumerate(found) if one.same_as(family)), None)
         if again is None:
@@ -46,16 +47,13 @@ def families_of(search: Search, z: Array) -> tuple[SingularFamily, ...]:
         else:
             found[again] = replace(found[again], starts=found[again].starts + family.starts)
         waiting = [j for j in waiting if j not in members]
-    found = merged(completed(search, found))
+    found = merged(_completed(search, found))
     return tuple(sorted(found, key=lambda family: (-family.dimension, -family.starts)))
 
 
 def family_at(search: Search, z: Array) -> SingularFamily | None:
-    """The family of a singular point z (a,); a larger one beside it where several meet.
-
-    None where what seemed pinned or free at the point does not hold in large random motions.
-    """
-    if not len(search.space.axes):
+    """The family of z (a,), or a larger adjoining one; None where large random motions contradict it."""
+    if not len(search.axes):
         return everywhere(search, z, 1)
     for size in SHAKES:
         tries = shaken(search, np.tile(z, (5, 1)), size)
@@ -71,77 +69,70 @@ def family_at(search: Search, z: Array) -> SingularFamily | None:
 def _family_of(search: Search, local: Local, i: int) -> SingularFamily | None:
     """The family of point i, by a walk from it; None where large random motions contradict it."""
     z, rank, free = local.z[i], int(local.rank[i]), local.free[i]
-    space = search.space
     along = tangents(search, z, rank)
     points = walk(search, z, rank, along)
-    constraints, related = _ties(space, points, free)
+    constraints, related = _ties(search, points, free)
+    free_ones = {*search.indifferent, *search.axes[free]}
     family = replace(
         everywhere(search, z, 1),
-        free=tuple(
-            space.robot.q_names[j] for j in space.moving if j in {*space.indifferent, *space.axes[free]}
-        ),
+        free=tuple(search.robot.q_names[j] for j in search.moving if j in free_ones),
         constraints=constraints,
         related=related,
-        dimension=len(space.indifferent) + len(along),
-        examples=space.fold(space.q(z[np.newaxis])),
+        dimension=len(search.indifferent) + len(along),
+        examples=search.fold(search.q(z[np.newaxis])),
     )
-    return family if holds(search, family, points, free) else None
+    return family if _holds(search, family, points, free) else None
 
 
 def everywhere(search: Search, z: Array, starts: int) -> SingularFamily:
     """The family of all configurations, for a J without full rank anywhere."""
-    measure, space = search.measure, search.space
-    names = space.robot.q_names
-    q = space.q(z[np.newaxis])
+    names = search.robot.q_names
+    q = search.q(z[np.newaxis])
     rank = int(search.ranks(z[np.newaxis])[0])
     return SingularFamily(
-        free=tuple(names[j] for j in space.moving),
+        free=tuple(names[j] for j in search.moving),
         constraints=(),
         related=(),
-        dimension=len(space.moving),
-        moving=len(space.moving),
+        dimension=len(search.moving),
+        moving=len(search.moving),
         rank=rank,
-        full_rank=measure.full_rank,
-        lost=measure.lost_text(q[0], rank),
+        full_rank=search.measure.full_rank,
+        lost=search.measure.lost_text(q[0], rank),
         examples=q,
         starts=starts,
         names=names,
     )
 
 
-def _ties(space: Space, points: Array, free: Flags) -> tuple[tuple[Relation, ...], tuple[str, ...]]:
+def _ties(search: Search, points: Array, free: Flags) -> tuple[tuple[Relation, ...], tuple[str, ...]]:
     """What stays along the walk (N, a): pinned coordinates and sums; and all that are tied but not pinned."""
-    names = [space.robot.q_names[j] for j in space.axes]
-    spread = np.ptp(points, axis=0)
-    pinned = ~free & (spread <= STAYS)
+    pinned = ~free & (np.ptp(points, axis=0) <= STAYS)
     tied = np.flatnonzero(~free & ~pinned)
-    middle = np.median(points, axis=0)
-    found = [_relation(space, {names[j]: 1}, float(middle[j]), int(j)) for j in np.flatnonzero(pinned)]
+    sums = [{int(j): 1} for j in np.flatnonzero(pinned)]
     for row in _whole_rows(points[:, tied] - points[0, tied]):
-        used = [(int(tied[i]), int(number)) for i, number in enumerate(row) if number]
-        units = {space.robot.q_units[space.axes[j]] for j, _ in used}
-        if len(units) > 1:
-            continue  # metres and radians do not add up
-        total = np.median(sum(number * points[:, j] for j, number in used))
-        circular = [j for j, _ in used if space.circular[space.axes[j]]]
-        relation = _relation(
-            space, {names[j]: number for j, number in used}, float(total),
-            used[0][0], circular=len(circular) == len(used),
-        )  # fmt: skip
-        found.append(relation)
-    return tuple(found), tuple(names[j] for j in tied)
+        sums.append({int(j): int(number) for j, number in zip(tied, row, strict=True) if number})
+    # Metres and radians do not add up.
+    units = [{search.robot.q_units[search.axes[j]] for j in used} for used in sums]
+    found = [_relation(search, points, used) for used, own in zip(sums, units, strict=True) if len(own) == 1]
+    return tuple(found), tuple(search.robot.q_names[j] for j in search.axes[tied])
 
 
-def _relation(
-    space: Space, coefficients: dict[str, int], z: float, axis: int, circular: bool | None = None
-) -> Relation:
-    j = space.axes[axis]
-    turn = bool(space.circular[j]) if circular is None else circular
-    value = z * float(space.units[j])
-    if turn:
-        value = float(np.pi - np.mod(np.pi - value, 2.0 * np.pi))
+def _relation(search: Search, points: Array, multiples: dict[int, int]) -> Relation:
+    """That a sum of whole multiples of axes has the value that it has at the points (N, a)."""
+    axes = search.axes[list(multiples)]
+    total = np.median(sum(number * points[:, j] for j, number in multiples.items()))
+    value, circular = float(total) * float(search.units[axes[0]]), bool(search.circular[axes].all())
+    if circular:
+        value = _wrapped(value)
         value = value + 2.0 * np.pi if value < STAYS - np.pi else value
-    return Relation(coefficients, (value,), space.robot.q_units[j], turn)
+    names = [search.robot.q_names[j] for j in axes]
+    coefficients = dict(zip(names, multiples.values(), strict=True))
+    return Relation(coefficients, (value,), search.robot.q_units[axes[0]], circular)
+
+
+def _wrapped(angle: float) -> float:
+    """From -π, exclusive, to π."""
+    return float(np.pi - np.mod(np.pi - angle, 2.0 * np.pi))
 
 
 def _whole_rows(D: Array) -> Array:
@@ -163,7 +154,6 @@ def _whole_rows(D: Array) -> Array:
 
 
 def _echelon(rows: Array) -> Array:
-    """Reduced row echelon form of independent rows."""
     R, row = rows.copy(), 0
     for column in range(R.shape[1]):
         if row == len(R):
@@ -179,33 +169,98 @@ def _echelon(rows: Array) -> Array:
     return R
 
 
-def _belongs(space: Space, family: SingularFamily, local: Local, i: int) -> bool:
+def _belongs(search: Search, family: SingularFamily, local: Local, i: int) -> bool:
     """Whether point i satisfies what is pinned; and is of the same sort, where equations tie the rest."""
-    if local.rank[i] > family.rank or not family.contains(space.q(local.z[i : i + 1])[0]):
+    if local.rank[i] > family.rank or not family.contains(search.q(local.z[i : i + 1])[0]):
         return False
-    names = space.robot.q_names
-    free = {names[j] for j in space.axes[local.free[i]]} | {names[j] for j in space.indifferent}
+    names = search.robot.q_names
+    free = {names[j] for j in search.axes[local.free[i]]} | {names[j] for j in search.indifferent}
     return family.equations == 0 or (local.rank[i] == family.rank and free == set(family.free))
 
 
 def _with_examples(
     search: Search, family: SingularFamily, local: Local, members: list[int]
 ) -> SingularFamily:
-    """With its starts, and with examples: first one whose free coordinates are where `at` has them.
+    """With its starts and examples, first one whose free coordinates are where `at` has them.
 
-    None lies where another family is met: what is lost there, and what brings it back, would be that one's.
+    Examples where another family meets are avoided: what is lost there would be that one's.
     """
-    space = search.space
-    example = space.z(family.examples[:1])
+    example = search.z(family.examples[:1])
     usual = localised(search, example).signature(0)
     z = np.concatenate([example, *(local.z[j : j + 1] for j in members if local.signature(j) == usual)])
-    q = space.fold(space.q(z[:EXAMPLES]))
+    q = search.fold(search.q(z[:EXAMPLES]))
     plain = q[:1].copy()
     for name in family.free:
-        j = space.robot.coordinate(name)
-        plain[0, j] = space.at[j]
-    plain = space.robot.following.placed(plain)
-    there = localised(search, space.z(plain))
+        j = search.robot.coordinate(name)
+        plain[0, j] = search.at[j]
+    plain = search.robot.following.placed(plain)
+    there = localised(search, search.z(plain))
     if there.rank[0] == family.rank and there.signature(0) == usual:
         q = np.concatenate([plain, q[: EXAMPLES - 1]])
     return replace(family, examples=q, starts=len(members), lost=search.measure.lost_text(q[0], family.rank))
+
+
+def _holds(search: Search, family: SingularFamily, points: Array, free: Flags) -> bool:
+    """Whether J's rank is as low at random members, far away: all members, where nothing else ties them."""
+    names = search.robot.q_names
+    named = {name for one in family.constraints for name in one.coefficients} | set(family.free)
+    silent = {names[j] for j in search.moving} - named
+    if family.equations < 0 or (silent and not family.equations) or (family.equations and not family.related):
+        return False
+    drawn = search.draw(MEMBERS)
+    if family.equations:
+        own = points[search.rng.integers(len(points), size=MEMBERS)]
+        q = search.q(np.where(free, drawn, own))
+    else:
+        q = search.q(drawn)
+        for relation in family.constraints:
+            (name, first), *others = relation.coefficients.items()
+            total = relation.values[0] - sum(
+                number * q[:, search.robot.coordinate(other)] for other, number in others
+            )
+            q[:, search.robot.coordinate(name)] = total / first
+    rank = np.full(MEMBERS, family.rank)
+    return bool(np.all(stay_singular(search.looser(SLACK), search.z(q), rank)))
+
+
+def _completed(search: Search, found: list[SingularFamily]) -> list[SingularFamily]:
+    """With the families at opposite values of a pinned angle or sum, also half a turn away.
+
+    Random members prove those that no start found.
+    """
+    every = list(found)
+    for family in every:  # it grows meanwhile
+        for i, relation in enumerate(family.constraints):
+            (own,) = relation.values
+            twins = (-own, own + np.pi, np.pi - own) if relation.circular else ()
+            for value in map(_wrapped, twins):
+                constraints = list(family.constraints)
+                constraints[i] = replace(relation, values=(value,))
+                twin = replace(
+                    family,
+                    constraints=tuple(constraints),
+                    examples=_moved(search, family.examples, relation, value),
+                    starts=0,
+                )
+                if not any(one.same_as(twin) for one in every) and _proved(search, twin):
+                    every.append(twin)
+    return every
+
+
+def _moved(search: Search, q: Array, relation: Relation, value: float) -> Array:
+    """Configurations (N, n) that satisfy a relation with another value, by its first coordinate."""
+    name, number = next(iter(relation.coefficients.items()))
+    moved = q.copy()
+    moved[:, search.robot.coordinate(name)] += (value - relation.values[0]) / number
+    return search.fold(moved)
+
+
+def _proved(search: Search, family: SingularFamily) -> bool:
+    """Whether its examples and random members are singular, with the same freedom and no more."""
+    z = search.z(family.examples)
+    free = np.array([search.robot.q_names[j] in family.free for j in search.axes])
+    if not _holds(search, family, z, free):
+        return False
+    drawn = np.where(free, search.draw(len(z)), z)
+    local = localised(search.looser(SLACK), drawn)
+    return bool(np.all(local.free == free) and np.all(local.rank == family.rank))

@@ -1,15 +1,18 @@
-"""Where to search: the coordinates that may move, their ranges, which matter, and which are circular."""
+"""Where to search: the coordinates that may move, their ranges, which matter, and which are circular; and how
+far from singular J is there: the smallest singular value of a part's J, and its slopes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nmm.analysis.search.measure import Measure
-from nmm.arrays import Array, Flags, Integers, vector
-from nmm.errors import InputError, SingularError
+from nmm.analysis.singular.jacobians import STEP, Jacobians
+from nmm.analysis.singular.parts import expect_inputs, singular_values
+from nmm.arrays import Array, Flags, Integers, positive, vector
+from nmm.control.directions import direction_texts, readable_basis
+from nmm.errors import InputError, SingularError, expect
 from nmm.robots.robot import Robot
 
 TURN = 2.0 * np.pi
@@ -21,24 +24,23 @@ SAME = 1e-9
 PROBES = 24
 #: Longest step, in units.
 LONGEST = 0.6
+#: Singular values this small beside the largest are zero.
+TOLERANCE = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
-class Space:
-    """What is searched.
+class Search:
+    """What is searched: a measure over the points z (N, a) of the coordinates that matter.
 
-    Attributes
-    ----------
-    robot : whose coordinates
-    at (n,) : where the other coordinates stay
-    moving : indices of the coordinates that may move
+    at (n,), moving : where the other coordinates stay; indices of those that may move
     axes (a,) : those of them on which J's singular values depend; the others are free from the start
     lower, upper (n,) : ranges; those of `moving` count
     circular (n,) : angles that make the whole turn and come back to the same J
     units (n,) : what counts as 1 of a coordinate: 1 rad, or the characteristic length in m
+    tolerance : singular values this small beside the largest of the whole J are zero
     """
 
-    robot: Robot
+    measure: Measure
     at: Array
     moving: tuple[int, ...]
     axes: Integers
@@ -46,6 +48,12 @@ class Space:
     upper: Array
     circular: Flags
     units: Array
+    tolerance: float
+    rng: np.random.Generator
+
+    @property
+    def robot(self) -> Robot:
+        return self.measure.robot
 
     @property
     def indifferent(self) -> tuple[int, ...]:
@@ -65,21 +73,14 @@ class Space:
     @property
     def bounds(self) -> tuple[Array, Array]:
         """Lower and upper (a,) of z; infinite for circular ones, which need none."""
-        units, turn = self.units[self.axes], self.circular[self.axes]
-        lower, upper = self.lower[self.axes] / units, self.upper[self.axes] / units
-        return np.where(turn, -np.inf, lower), np.where(turn, np.inf, upper)
+        turn = self.circular[self.axes]
+        return np.where(turn, -np.inf, self.z(self.lower)), np.where(turn, np.inf, self.z(self.upper))
 
     def clip(self, z: Array) -> Array:
-        """z (..., a) within the bounds."""
         return np.asarray(np.clip(z, *self.bounds))
 
     def step(self, z: Array, of: Callable[[Flags], Array]) -> Array:
-        """The step (N, a) from z of the coordinates that may move, without those that would leave the bounds.
-
-        Parameters
-        ----------
-        of : which coordinates may move (N, a) -> the step of these
-        """
+        """The step (N, a) that `of` gives for the coordinates (N, a) that stay within the bounds."""
         lower, upper = self.bounds
         usable = np.ones(z.shape, dtype=bool)
         for _ in range(z.shape[1] + 1):
@@ -91,11 +92,9 @@ class Space:
         size = np.max(np.abs(step), axis=1, initial=0.0)
         return np.asarray(step * np.minimum(1.0, LONGEST / np.maximum(size, 1e-300))[:, np.newaxis])
 
-    def draw(self, rng: np.random.Generator, count: int) -> Array:
+    def draw(self, count: int) -> Array:
         """z (count, a), uniform over the ranges."""
-        units = self.units[self.axes]
-        lower, upper = self.lower[self.axes] / units, self.upper[self.axes] / units
-        return rng.uniform(lower, upper, (count, len(self.axes)))
+        return self.rng.uniform(self.z(self.lower), self.z(self.upper), (count, len(self.axes)))
 
     def fold(self, q: Array) -> Array:
         """q (..., n) with circular coordinates brought into their ranges; the upper end for the lower."""
@@ -106,6 +105,21 @@ class Space:
         return self.robot.following.placed(
             np.where(self.circular, np.clip(turned, self.lower, self.upper), q)
         )
+
+    def sigma(self, z: Array) -> tuple[Array, Array]:
+        """The smallest singular value (N,), and that beside the largest."""
+        return self.measure.sigma(self.q(z))
+
+    def ranks(self, z: Array) -> Integers:
+        """Rank of the part's J (N,)."""
+        return self.measure.ranks(self.q(z), self.tolerance)
+
+    def equations(self, z: Array, corank: int) -> tuple[Array, Array, Array]:
+        """Wᵀ J V, its slopes along z, and the singular values."""
+        return self.measure.equations(self.q(z), self.axes, self.units[self.axes], corank)
+
+    def looser(self, factor: float) -> Search:
+        return replace(self, tolerance=factor * self.tolerance)
 
 
 def reach(robot: Robot) -> float:
@@ -127,24 +141,14 @@ def search_space(
     among: Sequence[str] | None,
     ranges: Mapping[str, tuple[float, float]] | None,
     length: float | None,
+    tolerance: float,
     rng: np.random.Generator,
     *,
     around: bool = False,
-) -> Space:
-    """The space to search.
+) -> Search:
+    """The coordinates to search, as `find_singularities` is told; the others stay `at` (n,).
 
-    Parameters
-    ----------
-    at (n,) : where the coordinates stay that do not move
-    among : coordinates that may move; None for all that follow no other
-    ranges : (lower, upper) by coordinate
-    length : so many m count as 1 rad; 1 m where it is None
-    around : ranges lie around `at`; and what is limited keeps its limits, whole turns too
-
-    Raises
-    ------
-    InputError : an unknown coordinate, an empty range, a range of a coordinate that may not move
-    SingularError : there is no J anywhere in these ranges
+    With `around`, ranges are centred on `at` within the limits. `SingularError` where J exists nowhere.
     """
     robot = measure.robot
     moving = _moving(robot, among)
@@ -152,20 +156,24 @@ def search_space(
     own = robot.limited
     lower = np.where(own[:, 0], robot.q_limits[:, 0], -np.inf)
     upper = np.where(own[:, 1], robot.q_limits[:, 1], np.inf)
-    angle = np.array([unit == "rad" for unit in robot.q_units])
+    angle = np.array(robot.q_units) == "rad"
     units = np.where(angle, 1.0, 1.0 if length is None else float(length))
     span = reach(robot)
     for j in range(robot.n):
-        half, center = (np.pi, 0.0) if angle[j] and not around else (np.pi if angle[j] else span, at[j])
-        window = _default(lower[j], upper[j], center, half, cut=bool(angle[j]) and not around)
+        turn = bool(angle[j]) and not around
+        window = _default(lower[j], upper[j], 0.0 if turn else at[j], np.pi if angle[j] else span, cut=turn)
         lower[j], upper[j] = given.get(j) or window
-    space = Space(robot, at, moving, np.array(moving, dtype=np.int64), lower, upper, ~angle & angle, units)
-    q = _probes(measure, space, rng)
+    tolerance, none = positive(tolerance, "tolerance"), np.zeros(robot.n, dtype=bool)
+    search = Search(measure, at, moving, np.array(moving), lower, upper, none, units, tolerance, rng)
+    q = search.q(search.draw(20 * PROBES))
+    q = q[np.isfinite(measure.sigma(q)[0])][:PROBES]
+    if not len(q):
+        raise SingularError("the wheels cannot roll, or the task is undefined, everywhere in these ranges")
     measure.settle(q)
     wide = angle & (upper - lower >= TURN - DIGITS)
     if around:
         wide &= ~own.any(axis=1)
-    matter, circular = [], np.zeros(robot.n, dtype=bool)
+    matter, circular = [], none.copy()
     for j in moving:
         drawn = q.copy()
         drawn[:, j] = rng.uniform(lower[j], upper[j], len(q))
@@ -174,7 +182,7 @@ def search_space(
         if wide[j]:
             drawn[:, j] = q[:, j] + TURN
             circular[j] = _same(measure, q, drawn)
-    return Space(robot, at, moving, np.array(matter, dtype=np.int64), lower, upper, circular, units)
+    return replace(search, axes=np.array(matter, dtype=np.int64), circular=circular)
 
 
 def _moving(robot: Robot, among: Sequence[str] | None) -> tuple[int, ...]:
@@ -182,8 +190,7 @@ def _moving(robot: Robot, among: Sequence[str] | None) -> tuple[int, ...]:
         return tuple(int(j) for j in robot.following.independent)
     names = [among] if isinstance(among, str) else list(among)
     found = tuple(sorted({robot.independent(name) for name in names}))
-    if not found:
-        raise InputError(f"among: expected coordinates of {', '.join(robot.q_names)}, got none")
+    expect(found, "among", f"coordinates of {', '.join(robot.q_names)}, got none")
     return found
 
 
@@ -194,16 +201,12 @@ def _ranges(
     for name, value in (ranges or {}).items():
         j = robot.independent(name)
         if j not in moving:
-            raise InputError(f"ranges: {name} may not move; among are {', '.join(_names(robot, moving))}")
+            among = ", ".join(robot.q_names[i] for i in moving)
+            raise InputError(f"{name} may not move; among are {among}", where="ranges")
         lower, upper = vector(value, 2, f"range of {name}")
-        if lower >= upper:
-            raise InputError(f"range of {name}: expected (lower, upper), got ({lower:g}, {upper:g})")
+        expect(lower < upper, f"range of {name}", f"(lower, upper), got ({lower:g}, {upper:g})")
         found[j] = (float(lower), float(upper))
     return found
-
-
-def _names(robot: Robot, indices: Sequence[int]) -> list[str]:
-    return [robot.q_names[j] for j in indices]
 
 
 def _default(lower: float, upper: float, center: float, half: float, cut: bool) -> tuple[float, float]:
@@ -220,17 +223,108 @@ def _default(lower: float, upper: float, center: float, half: float, cut: bool) 
     return center - half, center + half
 
 
-def _probes(measure: Measure, space: Space, rng: np.random.Generator) -> Array:
-    """Configurations (PROBES or fewer, n) that have a J."""
-    q = space.q(space.draw(rng, 20 * PROBES))
-    found = q[np.isfinite(measure.sigma(q)[0])][:PROBES]
-    if not len(found):
-        raise SingularError("the wheels cannot roll, or the task is undefined, everywhere in these ranges")
-    return found
-
-
 def _same(measure: Measure, q: Array, other: Array) -> bool:
     """Whether J's singular values are the same at both, row by row; and J exists at both."""
     (a, largest), (b, _) = measure.values(q), measure.values(other)
     with np.errstate(invalid="ignore"):
         return bool(np.all(np.abs(a - b) <= SAME * largest[:, np.newaxis]))
+
+
+#: Singular values beside the largest, at a point that has converged: what is above it is not zero.
+ROUNDING = 1e-13
+#: So many times the usual largest singular value there is no J to speak of.
+BLOWN = 100.0
+#: Components of a unit vector that are too small for a text.
+UNWRITTEN = 1e-4
+
+
+class Measure:
+    """Singular values of some columns of the scaled J, and the equations that make them vanish.
+
+    J has full rank when its k-th singular value σ is not zero, k = min(rows, inputs of the part). Where c
+    vanish, with singular vectors W (rows, rows - k + c) and V (inputs, inputs - k + c) of these and the null
+    spaces, a motion along q_j keeps them at zero, to first order, exactly when Wᵀ (∂J/∂q_j) V = 0.
+    `InputError` for an unknown part, one without inputs, or a wrong size.
+    """
+
+    def __init__(
+        self,
+        jacobians: Jacobians,
+        part: str,
+        length: float | None,
+        sizes: Mapping[str, float] | None,
+        t: float,
+    ) -> None:
+        self.columns = expect_inputs(jacobians.robot, part)
+        self.jacobians, self.robot, self.t = jacobians, jacobians.robot, t
+        row_sizes, _, input_sizes = jacobians.sizes(length, sizes)
+        self._scale = input_sizes / row_sizes[:, np.newaxis]
+        self.rows, self.inputs = len(row_sizes), len(self.columns)
+        self.full_rank = min(self.rows, self.inputs)
+        self.natural = jacobians.natural(row_sizes)
+        self.typical = np.inf
+
+    def settle(self, q: Array) -> None:
+        """Let σ stand beside no more than ten times the usual largest singular value, that at q (N, n)."""
+        values, largest = self.values(q)
+        exists = np.isfinite(values).all(axis=1)
+        self.typical = 10.0 * float(np.median(largest[exists])) if exists.any() else np.inf
+
+    def J(self, q: Array) -> Array:
+        """Scaled J (N, s, inputs) of the part."""
+        return (self.jacobians.batch(q, self.t) * self._scale)[:, :, self.columns]
+
+    def sigma(self, q: Array) -> tuple[Array, Array]:
+        """The k-th singular value (N,), and that beside the largest of the whole J; infinite without a J."""
+        values, largest = self.values(q)
+        return values[:, -1], values[:, -1] / largest
+
+    def values(self, q: Array) -> tuple[Array, Array]:
+        """The part's k singular values (N, k), falling, and their reference (N,).
+
+        That is the whole J's largest, at most ten times its median over the space and at least a row of
+        natural size; where it is far above that, J counts as none.
+        """
+        whole = self.jacobians.batch(q, self.t) * self._scale
+        exists = np.isfinite(whole).all(axis=(1, 2))
+        whole[~exists] = 0.0
+        values = singular_values(whole[:, :, self.columns])[:, : self.full_rank]
+        largest = values[:, 0]
+        if len(self.columns) < whole.shape[2]:
+            largest = singular_values(whole)[:, 0]
+        # Beside the target of a bearing J grows without bound: that takes no rank away.
+        exists &= largest <= BLOWN * self.typical
+        values[~exists] = np.inf
+        beside = np.maximum(np.minimum(largest, self.typical), self.natural)
+        return values, np.asarray(np.where(exists, beside, 1.0))
+
+    def ranks(self, q: Array, tolerance: float) -> Integers:
+        """Rank of the part's J (N,), beside the largest singular value of the whole J."""
+        values, largest = self.values(q)
+        return np.sum(values > tolerance * largest[:, np.newaxis], axis=1, dtype=np.int64)
+
+    def lost_text(self, q: Array, rank: int) -> tuple[str, ...]:
+        """The task's directions that the part does not move at q (n,), in the rows' names."""
+        left = np.linalg.svd(self.J(q[np.newaxis])[0])[0]
+        lost = readable_basis(left[:, rank:].T)
+        return direction_texts(np.where(np.abs(lost) < UNWRITTEN, 0.0, lost), self.jacobians.row_names)
+
+    def equations(self, q: Array, axes: Integers, units: Array, corank: int) -> tuple[Array, Array, Array]:
+        """Wᵀ J V (N, e), derivatives (N, e, a) along `axes` in their `units`, and singular values (N, k).
+
+        Derivatives are central differences; 0 where there is no J beside q.
+        """
+        count, a = len(q), len(axes)
+        steps = np.zeros((2, a, q.shape[1]))
+        steps[0, range(a), axes] = STEP * units
+        steps[1] = -steps[0]
+        around = self.J((q[:, np.newaxis] + steps.reshape(1, 2 * a, -1)).reshape(-1, q.shape[1]))
+        around = around.reshape(count, 2, a, self.rows, self.inputs)
+        slopes = np.nan_to_num((around[:, 0] - around[:, 1]) / (2.0 * STEP))
+        U, values, Vt = np.linalg.svd(np.nan_to_num(self.J(q)))
+        keep = self.full_rank - corank
+        W, V = U[:, :, keep:], np.swapaxes(Vt[:, keep:], 1, 2)
+        C = np.swapaxes(W, 1, 2)[:, np.newaxis] @ slopes @ V[:, np.newaxis]
+        F = np.zeros((count, W.shape[2], V.shape[2]))
+        F[:, range(corank), range(corank)] = values[:, keep:]
+        return F.reshape(count, -1), np.swapaxes(C.reshape(count, a, -1), 1, 2), values

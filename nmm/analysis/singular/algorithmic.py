@@ -20,14 +20,12 @@ class ExtendedSingularity(Ranked):
     ----------
     rows : names of J's rows and of the added task's
     determinant : of J_e, as it is
-    singular_values (m,) : of J_e with the sizes counted in
-    rank : of J_e
-    angle_measure : |det J_e| / sqrt(det J Jᵀ det J_y J_yᵀ), from 0 to 1 (Fischer's inequality): 1 when the
-        added task moves only what the task leaves free, 0 when it asks for what the task already fixes; not a
-        number where J or J_y has itself lost rank
-    lost (m - rank, m) : combinations of the rows that no input moves: what both tasks speak of
-    kinematic : J itself lost rank
-    added_singular : the added task's J_y itself lost rank
+    singular_values (m,), rank : of J_e, scaled by the sizes
+    angle_measure : |det J_e| / sqrt(det J Jᵀ det J_y J_yᵀ), from 0 to 1 (Fischer's inequality): 1 if the
+        added task moves only what the task leaves free, 0 if it asks for what the task already fixes; NaN
+        where J or J_y itself lost rank
+    lost (m - rank, m) : combinations of the rows that no input moves
+    kinematic, added_singular : J itself, or the added task's J_y itself, lost rank
 
     Examples
     --------
@@ -63,8 +61,8 @@ class PartitionSingularities:
     determinants (count,) : det Ja
     ratios (count,) : |det Ja| / sqrt(det J Jᵀ), from 0 to 1 (Cauchy-Binet), RG's measure with automatic
         partitions; zeros where J lost rank
-    singular (count,) : whether Ja lost rank (σ_min(Ja) at most `tolerance` times J's largest singular value
-        or, rows in their natural sizes, times 1)
+    singular (count,) : whether Ja lost rank: with rows in their natural sizes, σ_min(Ja) is at most
+        `tolerance` times J's largest singular value, or times 1 if that is more
     kinematic : J itself lost rank, and with it every Ja
 
     Examples
@@ -115,11 +113,10 @@ def extended_singularity(
     tolerance: float,
     natural: float,
 ) -> ExtendedSingularity:
-    """From J (s, m) and added_J (m - s, m) as they are; sizes of rows, added rows and inputs."""
-    row_sizes, added_sizes, input_sizes = sizes
-    s = len(J)
-    extended = np.vstack([J, added_J])
-    scaled = extended * input_sizes / np.concatenate([row_sizes, added_sizes])[:, np.newaxis]
+    """From J (s, m) and added_J (m - s, m) as they are; `sizes` of rows, added rows and inputs."""
+    *row_sizes, input_sizes = sizes
+    s, extended = len(J), np.vstack([J, added_J])
+    scaled = extended * input_sizes / np.concatenate(row_sizes)[:, np.newaxis]
     values = singular_values(scaled)
     U = np.linalg.svd(scaled)[0]
     rank = int(ranks(values, values[0], tolerance, natural))
@@ -129,15 +126,14 @@ def extended_singularity(
         return len(block) > 0 and int(ranks(own, own[0], tolerance, natural)) < len(block)
 
     kinematic, added_singular = lost_rank(scaled[:s]), lost_rank(scaled[s:])
-    measure = np.nan
-    if not (kinematic or added_singular):
-        measure = float(np.prod(values) / (volume(scaled[:s]) * volume(scaled[s:])))
+    regular = not (kinematic or added_singular)
+    measure = np.prod(values) / (volume(scaled[:s]) * volume(scaled[s:])) if regular else np.nan
     return ExtendedSingularity(
         rows=rows,
         determinant=float(np.linalg.det(extended)),
         singular_values=values,
         rank=rank,
-        angle_measure=measure,
+        angle_measure=float(measure),
         lost=readable_basis(U[:, rank:].T),
         kinematic=kinematic,
         added_singular=added_singular,
@@ -145,18 +141,13 @@ def extended_singularity(
 
 
 def partition_singularities(
-    J: Array,
-    scales: Array,
-    columns: Integers,
-    inputs: tuple[str, ...],
-    kinematic: bool,
-    tolerance: float,
+    J: Array, scales: Array, columns: Integers, inputs: tuple[str, ...], kinematic: bool, tolerance: float
 ) -> PartitionSingularities:
-    """From J (s, m) as it is, the natural sizes of its rows (s,) and the candidates' columns (count, s)."""
+    """From J (s, m) as it is, its rows' natural sizes (s,) and the candidates' columns (count, s)."""
     natural = J / scales[:, np.newaxis]
     values = singular_values(np.moveaxis(natural[:, columns], 1, 0))
     dets = determinants(J, columns)
-    # Judged beside J: a block of nothing but rounding may have a fine condition number of its own.
+    # Judged beside J: a block of pure rounding may itself be well conditioned.
     lost = np.asarray(ranks(values, singular_values(natural)[0], tolerance) < len(J))
     whole = 0.0 if kinematic else float(volume(J))
     return PartitionSingularities(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import permutations, product
 
@@ -11,16 +11,16 @@ from numpy.typing import ArrayLike
 
 from nmm.analysis.singular.parts import WHOLE, columns_of
 from nmm.arrays import Array, array, matrix, positive
-from nmm.errors import InputError
+from nmm.ellipsoid_options import EllipsoidOptions, Sizes
+from nmm.errors import InputError, expect
 from nmm.robots.frame_path import FramePath
-from nmm.robots.loading.tips import first_tip
+from nmm.robots.reach import first_tip
 from nmm.robots.robot import Robot
-from nmm.runs.ellipsoid_options import Sizes
 
-#: Radii nearer to each other than this, beside the largest, are one: their axes are any in that plane.
+#: Radii that differ by less than this fraction of the largest are equal: any axes in their plane will do.
 EQUAL = 1e-9
 
-#: The turns of a cube that keep it right-handed, (24, 3, 3): all ways to name three axes.
+#: The rotations of a cube, (24, 3, 3): all right-handed ways to order and sign three axes.
 _TURNS = np.array(
     [
         turned
@@ -52,10 +52,8 @@ class Ellipses:
         """Closed outlines, (N, points, 2), m, drawn with `scale` metres for each m/s."""
         angles = np.linspace(0.0, 2.0 * np.pi, points)
         circle = np.array([np.cos(angles), np.sin(angles)])
-        drawn: Array = self.center[:, None] + scale * np.swapaxes(
-            (self.axes * self.radii[:, None]) @ circle, 1, 2
-        )
-        return drawn
+        around = np.swapaxes((self.axes * self.radii[:, None]) @ circle, 1, 2)
+        return np.asarray(self.center[:, None] + scale * around)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +68,8 @@ class Ellipsoids:
     frame : the frame whose origin moves; part : "robot", "arm", "platform" or an arm by its name
     inputs : names of the part's k inputs; input_sizes (k,) : how much of each counts as 1, in its unit
     center (N, 3) : the frame's origin, m
-    axes (N, 3, 3) : orthonormal, right-handed columns; at the first sample by falling radius, then each as
-        near as can be to where it was, so that radii may cross but axes neither swap nor flip
+    axes (N, 3, 3) : orthonormal, right-handed columns; by falling radius at the first sample, then each as
+        near as possible to the one before: radii may cross, but axes neither swap nor flip
     radii (N, 3) : m/s along each axis; 0 where the part cannot move the frame, NaN where the wheels cannot
         roll (the axes stay as they were)
 
@@ -110,11 +108,11 @@ class Ellipsoids:
         return self.support(np.eye(3))
 
     def projected(self, directions: ArrayLike = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))) -> Ellipses:
-        """Their shadows on a plane: what can be seen from there, not a section.
+        """Their projections onto a plane, not sections.
 
         Parameters
         ----------
-        directions : two of the plane, (2, 3), of length 1 and at right angles, in world axes
+        directions : (2, 3), orthonormal, in the plane, in world axes
         """
         plane = matrix(directions, (2, 3), "directions of a plane")
         halves = plane @ (self.axes * self.radii[:, None])
@@ -137,9 +135,9 @@ def ellipsoids_along(
     ----------
     frame : the frame; None for the arm's tip, or the root link without an arm
     q : (N, n) m and rad, in the order of time; (n,) or by name for a single configuration
-    part : "robot", "arm", "platform", or an arm by its name: whose inputs move, the others rest
-    sizes : how much of an input counts as 1, by its name: 1 m/s or 1 rad/s where not named; "limits" for the
-        limits of each (`robot.u_limits`)
+    part : "robot", "arm", "platform", or an arm by its name: its inputs move, the others rest
+    sizes : how much of an input counts as 1, by name: 1 m/s or 1 rad/s where not named; "limits" for each
+        input's limit (`robot.u_limits`)
 
     Raises
     ------
@@ -164,26 +162,18 @@ def ellipsoids_along(
 
 
 def velocity_jacobians(robot: Robot, frame: str, q: Array) -> tuple[Array, Array]:
-    """Origin of a frame (N, 3) m and J_v = (∂p/∂q) S (N, 3, m) at q (N, n), world axes.
-
-    Not a task's J: a task has no more rows than there are inputs, and two wheels move a point too.
-    """
+    """Origin of a frame (N, 3) m and J_v = (∂p/∂q) S (N, 3, m) at q (N, n), world axes. Not a task's J, whose
+    rows cannot outnumber the inputs: two wheels move a point too."""
     center, jacobians = FramePath(robot, frame).jacobians(q)
-    J = np.empty((len(q), 3, robot.n_u))
-    n_p = robot.platform.n_p
+    J = np.full((len(q), 3, robot.n_u), np.nan)
     for k, point in enumerate(q):
-        rolls = robot.platform.problem(point[:n_p]) is None
-        J[k] = jacobians[k] @ robot.S(point) if rolls else np.nan
+        if robot.platform.problem(point[: robot.platform.n_p]) is None:
+            J[k] = jacobians[k] @ robot.S(point)
     return center, J
 
 
 def frame_of(robot: Robot, frame: str | None) -> str:
-    """The frame asked for, or the arm's tip, or the platform's root link without an arm.
-
-    Raises
-    ------
-    InputError : there is none of that name
-    """
+    """The frame given, or the arm's tip, or the platform's root link without an arm."""
     if frame is None:
         frame = first_tip(robot) or _root(robot)
     robot.frame_id(frame)
@@ -191,8 +181,8 @@ def frame_of(robot: Robot, frame: str | None) -> str:
 
 
 def carried_frame(robot: Robot, frame: str | None) -> str:
-    """A task's frame where the arm carries it; else as `frame_of` without one: a frame of the platform shows
-    nothing of the arm."""
+    """A task's frame if the arm carries it, else that of `frame_of` without one: a frame of the platform
+    shows nothing of the arm."""
     frame = frame_of(robot, frame)
     joint = robot.model.frames[robot.frame_id(frame)].parentJoint
     below = robot.model.names[joint] in ("universe", *robot.q_names[: robot.platform.n_p])
@@ -209,12 +199,12 @@ def _root(robot: Robot) -> str:
 def input_sizes(robot: Robot, sizes: Sizes, columns: list[int]) -> Array:
     """How much of some inputs counts as 1, (k,), in their units; see `ellipsoids_along`."""
     if isinstance(sizes, str):
-        if sizes != "limits":
-            raise InputError(f"sizes: expected sizes by the inputs' names, or 'limits', got {sizes!r}")
+        expect(sizes == "limits", "sizes", "sizes by the inputs' names, or 'limits'", sizes)
         limits: Array = robot.u_limits[columns]
         free = [robot.u_names[j] for j in columns if not np.isfinite(robot.u_limits[j])]
         if free:
-            raise InputError(f"sizes: {robot.name} has no limits of {', '.join(free)}; give their sizes")
+            problem = f"{robot.name} has no limits of {', '.join(free)}; give their sizes"
+            raise InputError(problem, where="sizes")
         return limits
     found = np.ones(robot.n_u)
     for name, value in (sizes or {}).items():
@@ -223,19 +213,17 @@ def input_sizes(robot: Robot, sizes: Sizes, columns: list[int]) -> Array:
 
 
 def _points(robot: Robot, q: ArrayLike | Mapping[str, float]) -> Array:
-    """Configurations (N, n), checked; one alone as (1, n)."""
+    """Configurations (N, n), checked; a single one as (1, n)."""
     if isinstance(q, Mapping) or np.ndim(q) == 1:
         return robot.q(q)[np.newaxis]
     points = array(q, "q")
-    if points.ndim != 2 or points.shape[1] != robot.n:
-        raise InputError(
-            f"q: expected rows of {robot.n} numbers ({', '.join(robot.q_names)}), got shape {points.shape}"
-        )
+    expected = f"rows of {robot.n} numbers ({', '.join(robot.q_names)}), got shape {points.shape}"
+    expect(points.ndim == 2 and points.shape[1] == robot.n, "q", expected)
     return points
 
 
 def _followed(A: Array) -> tuple[Array, Array]:
-    """Axes (N, 3, 3) and radii (N, 3) of A (N, 3, k), each sample's named as the one's before."""
+    """Axes (N, 3, 3) and radii (N, 3) of A (N, 3, k), ordered and signed as at the sample before."""
     count, known = len(A), np.asarray(np.isfinite(A).all(axis=(1, 2)))
     axes, radii = np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3))
     if A.shape[2]:
@@ -256,15 +244,15 @@ def _followed(A: Array) -> tuple[Array, Array]:
 
 
 def _readable(axes: Array) -> Array:
-    """The same axes with the first two pointing the way of their largest component."""
+    """The same axes, the first two with their largest component positive."""
     signs = np.sign(axes[np.abs(axes).argmax(axis=0), range(3)])
     signs[2] = signs[0] * signs[1]
     return axes * signs
 
 
 def _nearest(axes: Array, radii: Array, before: Array) -> Array:
-    """The axes (3, 3) of the same ellipsoid that are nearest to those before: named, signed, and where
-    radii (3,) are equal turned in their plane."""
+    """Axes (3, 3) of the same ellipsoid nearest to those before: reordered, signed and, where radii (3,) are
+    equal, turned in their plane."""
     # Radii fall: those that are equal are neighbours.
     equal = [bool(gap <= EQUAL * radii[0]) for gap in radii[:-1] - radii[1:]]
     if all(equal):
@@ -274,9 +262,51 @@ def _nearest(axes: Array, radii: Array, before: Array) -> Array:
     if any(equal):
         alone = int(np.abs(turn[2 if equal[0] else 0]).argmax())
         plane = [i for i in range(3) if i != alone]
-        # The turn R in the plane for which the trace of Rᵀ X is largest.
+        # The rotation R in the plane that maximizes the trace of Rᵀ X.
         X = named[:, plane].T @ before[:, plane]
         angle = np.arctan2(X[1, 0] - X[0, 1], X[0, 0] + X[1, 1])
         c, s = np.cos(angle), np.sin(angle)
         named[:, plane] = named[:, plane] @ np.array([[c, -s], [s, c]])
     return named
+
+
+ARM = "arm"
+NAMES = {WHOLE: "whole robot", ARM: "arm alone"}
+
+#: The largest radius is drawn at most as this fraction of the robot's extent.
+SHARE = 1.0 / 3.0
+
+
+def drawn_frame(options: EllipsoidOptions, robot: Robot, frame: str | None) -> str:
+    """The frame in `options`; else the motion's own if the arm carries it, or the arm's tip."""
+    return carried_frame(robot, frame) if options.frame is None else frame_of(robot, options.frame)
+
+
+def drawn_ellipsoids(options: EllipsoidOptions, robot: Robot, frame: str, q: Array) -> dict[str, Ellipsoids]:
+    """Those of the whole robot at q (N, n) and, if a platform moves it too, of the arm alone."""
+    both = robot.platform.p > 0 and robot.n_u > robot.platform.p
+    parts = (WHOLE, ARM) if both else (WHOLE,)
+    return {part: ellipsoids_along(robot, frame, q, part, options.sizes) for part in parts}
+
+
+def drawn_scale(
+    options: EllipsoidOptions, extent: float, ellipsoids: Sequence[Mapping[str, Ellipsoids]]
+) -> float:
+    """Metres drawn for each m/s, for robots of that extent, m."""
+    largest = largest_radius(ellipsoids)
+    if options.scale is not None or not largest > 0.0:
+        return 1.0 if options.scale is None else float(options.scale)
+    most = SHARE * extent / largest
+    power = 10.0 ** np.floor(np.log10(most))
+    # The largest of 1, 2, 3, 4, 5 times a power of ten that is no more.
+    return float(power * max(step for step in range(1, 6) if step * power <= most * (1.0 + 1e-9)))
+
+
+def largest_radius(ellipsoids: Sequence[Mapping[str, Ellipsoids]]) -> float:
+    """The largest radius of all, m/s; 0 where nothing moves."""
+    radii = [one.radii[np.isfinite(one.radii)] for parts in ellipsoids for one in parts.values()]
+    return max((float(known.max(initial=0.0)) for known in radii), default=0.0)
+
+
+def scale_text(scale: float) -> str:
+    return f"1 m/s is drawn as {scale:.3g} m"

@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 
 from nmm.arrays import Array, Integers
-from nmm.errors import InputError, expect_known
+from nmm.errors import InputError, expect, expect_known
 
 #: A minor's columns: names of inputs, or "v, omega, q2".
 Columns: TypeAlias = str | Sequence[str]
@@ -18,28 +18,23 @@ Columns: TypeAlias = str | Sequence[str]
 Choice: TypeAlias = bool | Sequence[Columns]
 
 MOST_MINORS = 20_000
-#: How many numbers may be in the square blocks whose determinants are taken at once.
+#: Most numbers in the square blocks whose determinants are taken at once.
 BLOCK = 4_000_000
 #: A determinant this small beside the product of its columns' lengths (Hadamard's bound) is rounding.
 ROUNDING = 1e-12
-
-
-def minor_name(columns: Sequence[str]) -> str:
-    """ "Δ[v, omega, q2]": how a minor is written."""
-    return f"Δ[{', '.join(columns)}]"
 
 
 class Minors(Mapping[tuple[str, ...], float | Array]):
     """Minors keyed by tuples of input names: `minors["v", "q2"]`, or `minors["v, q2"]`.
 
     A key may name the columns in any order; an odd permutation changes the sign. Unknown keys raise
-    `InputError`, with the names that exist.
+    `InputError`, which lists the names.
 
     Attributes
     ----------
     columns (count, s) : indices of the columns of each minor, in the order of the names
-    array (..., count) : their values, in the product of the rows' units over that of the inputs; with leading
-        axes, such as the samples of a trajectory, an item is an array
+    array (..., count) : values, in the product of the rows' units over that of the inputs'; with leading
+        axes, such as a trajectory's samples, an item is an array
     inputs : names of J's columns
 
     Examples
@@ -61,13 +56,13 @@ class Minors(Mapping[tuple[str, ...], float | Array]):
         """The keys, in order."""
         return tuple(tuple(self.inputs[j] for j in row) for row in self.columns)
 
-    def _find(self, key: Columns) -> tuple[int, float]:
+    def _find(self, key: Columns) -> tuple[int, int]:
         wanted = column_indices(key, self.inputs, self.columns.shape[1])
         place = self._place.get(tuple(sorted(wanted)))
         if place is None:
-            raise InputError(f"minor {', '.join(split(key))}: not among those chosen")
+            raise InputError("not among those chosen", where=f"minor {', '.join(split(key))}")
         own = [int(j) for j in self.columns[place]]
-        return place, _sign([own.index(j) for j in wanted])
+        return place, permutation_sign([own.index(j) for j in wanted])
 
     def __getitem__(self, key: Columns) -> float | Array:
         place, sign = self._find(key)
@@ -88,13 +83,12 @@ class Minors(Mapping[tuple[str, ...], float | Array]):
         return len(self.columns)
 
 
-def _sign(permutation: Sequence[int]) -> float:
-    swaps = sum(a > b for a, b in itertools.combinations(permutation, 2))
-    return -1.0 if swaps % 2 else 1.0
+def permutation_sign(order: Sequence[int]) -> int:
+    swaps = sum(a > b for a, b in itertools.combinations(order, 2))
+    return -1 if swaps % 2 else 1
 
 
 def split(key: Columns) -> tuple[str, ...]:
-    """The names in a key."""
     return tuple(part.strip() for part in key.split(",")) if isinstance(key, str) else tuple(key)
 
 
@@ -103,29 +97,19 @@ def column_indices(key: Columns, inputs: Sequence[str], s: int) -> tuple[int, ..
     names = split(key)
     for name in names:
         expect_known("input", name, inputs, "minor")
-    if len(names) != s or len(set(names)) != s:
-        raise InputError(
-            f"minor: expected {s} different inputs, as many as J has rows, got {', '.join(names)}"
-        )
+    expected = f"{s} different inputs, as many as J has rows, got {', '.join(names)}"
+    expect(len(names) == len(set(names)) == s, "minor", expected)
     return tuple(list(inputs).index(name) for name in names)
 
 
 def chosen_columns(choice: Choice, inputs: Sequence[str], s: int, most: int = MOST_MINORS) -> Integers:
-    """Columns (count, s) of the minors chosen.
-
-    Raises
-    ------
-    InputError : more minors than `most`; a name that is no input
-    """
-    if isinstance(choice, str):
-        raise InputError(f"minors: expected a list of them, as in [{choice!r}], got {choice!r}")
+    """Columns (count, s) of the minors chosen; `InputError` for unknown inputs, or more than `most`."""
+    expect(not isinstance(choice, str), "minors", f"a list of them, as in [{choice!r}]", choice)
     if choice is True:
         count = math.comb(len(inputs), s)
         if count > most:
-            raise InputError(
-                f"minors: J ({s} x {len(inputs)}) has {count}, expected at most {most}; "
-                "list those wanted, or ask for none (minors=False)"
-            )
+            has = f"J ({s} x {len(inputs)}) has {count}, expected at most {most}"
+            raise InputError(f"{has}; list those wanted, or ask for none (minors=False)", where="minors")
         listed = list(itertools.combinations(range(len(inputs)), s))
     else:
         listed = [] if choice is False else [column_indices(key, inputs, s) for key in choice]
@@ -133,7 +117,7 @@ def chosen_columns(choice: Choice, inputs: Sequence[str], s: int, most: int = MO
 
 
 def determinants(J: Array, columns: Integers) -> Array:
-    """det J[:, columns] of each row of columns (count, s), for J (..., s, m): shape (..., count)."""
+    """det J[:, columns] for each row of columns (count, s) and J (..., s, m): (..., count)."""
     s = J.shape[-2]
     flat = J.reshape(-1, s, J.shape[-1])
     found = np.empty((len(flat), len(columns)))
@@ -145,7 +129,7 @@ def determinants(J: Array, columns: Integers) -> Array:
 
 
 def determinant_rates(J: Array, J_u: Array, columns: Integers) -> Array:
-    """Derivatives (k, count) of those determinants along k motions, from J_u (k, s, m), column by column."""
+    """Derivatives (k, count) of those determinants along k motions, from J_u (k, s, m)."""
     A = np.moveaxis(J[:, columns], 1, 0)
     found = np.zeros((len(J_u), len(columns)))
     for k, derivative in enumerate(J_u):
@@ -158,12 +142,9 @@ def determinant_rates(J: Array, J_u: Array, columns: Integers) -> Array:
 
 
 def hadamard_bounds(J: Array, columns: Integers) -> Array:
-    """Product of the lengths of each minor's columns, shape (..., count).
-
-    Entries of J are good to some 1e-14 of the longest column, and minors no better than that times the other
-    columns: with `ROUNDING` beside it, each column counts as at least a hundredth of the longest. A column
-    that is nothing but rounding would otherwise be significant beside itself.
-    """
+    """Product of the lengths of each minor's columns, (..., count), each at least a hundredth of the longest.
+    Entries of J are good to some 1e-14 of the longest column: without this floor, a column of rounding alone
+    would be significant beside itself (see `ROUNDING`)."""
     lengths = np.linalg.norm(J, axis=-2)
     floor = 1e-2 * np.max(lengths, axis=-1, keepdims=True, initial=0.0)
     return np.prod(np.maximum(lengths, floor)[..., columns], axis=-1)

@@ -1,4 +1,4 @@
-"""Where a robot stands with a task: rank, what is lost and how it comes back, at one configuration."""
+"""Where a robot stands with a task at one configuration: rank, what is lost and how it comes back."""
 
 from __future__ import annotations
 
@@ -24,8 +24,16 @@ from nmm.analysis.singular.minors import (
     determinant_rates,
     determinants,
 )
-from nmm.analysis.singular.parts import WHOLE, Part, given_back, groups, part
-from nmm.analysis.singular.restoration import Restoration, restoration
+from nmm.analysis.singular.parts import (
+    WHOLE,
+    Part,
+    Ranked,
+    Restoration,
+    given_back,
+    groups,
+    part,
+    restoration,
+)
 from nmm.arrays import Array, Integers, positive
 from nmm.control.directions import direction_texts
 from nmm.resolvers.partitions import candidate_columns
@@ -37,7 +45,7 @@ TOLERANCE = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
-class SingularityReport:
+class SingularityReport(Ranked):
     """The task's J at (t, q), taken apart. Parts, restorations and lost directions are those of `scaled_J`.
 
     Attributes
@@ -48,6 +56,7 @@ class SingularityReport:
     row_scales (s,) : natural sizes of the rows, in which lost ranks are judged
     row_sizes (s,), input_sizes (m,) : how much of each counts as 1
     parts : "platform", "arm", the arms by name, "robot": who can do what
+    singular_values (s,), rank, lost (s - rank, s) : of all inputs together (see `Part`)
     weakest (s,) : the task's direction that moves least, a left singular vector of σ_min
     given_back (k, s) : directions that the arm has lost and the platform gives back
     minors : of J as it is, by the names of their columns
@@ -77,6 +86,9 @@ class SingularityReport:
     row_sizes: Array
     input_sizes: Array
     parts: Mapping[str, Part]
+    singular_values: Array
+    rank: int
+    lost: Array
     weakest: Array
     given_back: Array
     minors: Minors
@@ -97,39 +109,9 @@ class SingularityReport:
         return self.J * self.input_sizes / self.row_sizes[:, np.newaxis]
 
     @property
-    def rank(self) -> int:
-        """Rank of J."""
-        return self.whole.rank
-
-    @property
     def singular(self) -> bool:
         """Whether J lost rank: a kinematic singularity, for every resolver."""
         return self.rank < len(self.rows)
-
-    @property
-    def singular_values(self) -> Array:
-        """(s,), falling."""
-        return self.whole.singular_values
-
-    @property
-    def sigma_min(self) -> float:
-        """Smallest singular value."""
-        return self.whole.sigma_min
-
-    @property
-    def condition(self) -> float:
-        """Condition number; infinite where J lost rank."""
-        return self.whole.condition
-
-    @property
-    def lost(self) -> Array:
-        """(s - rank, s): orthonormal task directions that no input moves."""
-        return self.whole.lost
-
-    @property
-    def lost_text(self) -> tuple[str, ...]:
-        """`lost` in the rows' names: "0.71 ee.x - 0.71 ee.y"."""
-        return self.whole.lost_text
 
     @property
     def given_back_text(self) -> tuple[str, ...]:
@@ -140,21 +122,10 @@ class SingularityReport:
     def minor_rates(self) -> Minors:
         """Derivatives of the minors along each input, per m or rad: an item is (m,).
 
-        Where J lost one rank, a motion brings it back exactly when some minor of all changes along it.
+        Where J lost one rank, a motion restores it exactly if some minor changes along it.
         """
         rates = determinant_rates(self.J, self.J_u, self.minors.columns)
         return Minors(self.minors.columns, rates, self.inputs)
-
-
-def candidates(jacobians: Jacobians, partitions: Candidates) -> Integers:
-    """Columns (count, s) of RG's candidates: those given, the controller's own, or all."""
-    resolver = jacobians.resolver
-    if partitions is None and isinstance(resolver, ReducedGradient):
-        own = resolver
-    else:
-        own = ReducedGradient(partitions="automatic" if partitions is None else partitions)
-    s, robot = len(jacobians.rows), jacobians.robot
-    return candidate_columns(own.partitions, Dimensions(s, 0, robot.u_names, robot.groups)).reshape(-1, s)
 
 
 def analyse(
@@ -172,11 +143,10 @@ def analyse(
 ) -> SingularityReport:
     """Analyse the task's J_bar at (t, q).
 
-    Singular values compare what different units measure. Without `length` and `sizes`, 1 m, 1 rad, 1 m/s
-    and 1 rad/s count as equal. With a characteristic length L, rows in m and inputs in m/s count in L: the
-    matrix is then free of units, and its σ_min and condition do not depend on the unit of length. A good L
-    is the arm's reach. Rank, minors and which motions restore do not depend on it; lost directions are
-    written in those sizes.
+    Singular values compare different units. Without `length` and `sizes`, 1 m, 1 rad, 1 m/s and 1 rad/s
+    count as equal. With a characteristic length L, such as the arm's reach, rows in m and inputs in m/s
+    count in L: σ_min and condition then do not depend on the unit of length. Rank, minors and which motions
+    restore rank do not depend on L; lost directions are written in those sizes.
 
     Parameters
     ----------
@@ -184,12 +154,12 @@ def analyse(
     q : (n,) m and rad, or by name
     t : s
     length : characteristic length L, m
-    sizes : what counts as 1 of a row or an input, by name, in its unit; before `length`
+    sizes : how much of a row or input counts as 1, by name, in its unit; overrides `length`
     minors : True for all, False for none, or a list of those wanted, ["v, q1", ("v", "omega")]
     most_minors : `InputError` when there are more
     added_task : EJ's added task; None for the controller's own
-    partitions : RG's candidates: lists of inputs or "automatic"; None for those of the controller's RG, or
-        else, those of the minors
+    partitions : RG's candidates: lists of inputs or "automatic"; None for the controller's RG's, or else the
+        minors'
     tolerance : singular values this small beside the largest, or beside a row of natural size, are zero
 
     Raises
@@ -210,7 +180,7 @@ def analyse(
     robot, rows = jacobians.robot, jacobians.row_names
     columns = chosen_columns(minors, robot.u_names, len(rows), most_minors)
     all_sizes = row_sizes, _, input_sizes = jacobians.sizes(length, sizes)
-    blocks = partition_columns(jacobians, partitions, minors, columns)
+    blocks = _candidates(jacobians, partitions, minors, columns)
 
     def scaled(matrix: Array) -> Array:
         return matrix * input_sizes / row_sizes[:, np.newaxis]
@@ -224,6 +194,10 @@ def analyse(
         name: part(name, scaled_J, own, robot, rows, tolerance, natural)
         for name, own in groups(robot).items()
     }
+    extended = None
+    if len(added_J):
+        every = (*rows, *(row.name for row in jacobians.added_rows))
+        extended = extended_singularity(J, added_J, all_sizes, every, tolerance, natural)
     whole = parts[WHOLE]
     singular = whole.rank < len(rows)
     weakest = np.linalg.svd(scaled_J)[0][:, -1]
@@ -240,25 +214,26 @@ def analyse(
         row_sizes=row_sizes,
         input_sizes=input_sizes,
         parts=parts,
+        singular_values=whole.singular_values,
+        rank=whole.rank,
+        lost=whole.lost,
         weakest=weakest * np.sign(weakest[np.argmax(np.abs(weakest))]),
         given_back=given_back(parts["arm"], whole),
         minors=Minors(columns, determinants(J, columns), robot.u_names),
         by_input=restoration(scaled_J, scaled(J_u), robot.u_names, whole.rank),
         by_coordinate=restoration(scaled_J, scaled(J_q), coordinates, whole.rank),
-        extended=extended_singularity(
-            J, added_J, all_sizes, (*rows, *(row.name for row in jacobians.added_rows)), tolerance, natural
-        )
-        if len(added_J)
-        else None,
+        extended=extended,
         partitions=partition_singularities(J, jacobians.scales, blocks, robot.u_names, singular, tolerance),
         tolerance=tolerance,
     )
 
 
-def partition_columns(
-    jacobians: Jacobians, partitions: Candidates, minors: Choice, columns: Integers
-) -> Integers:
-    """RG's candidates; those of the minors listed when neither they nor RG's are given."""
-    if partitions is None and minors is not True and not isinstance(jacobians.resolver, ReducedGradient):
-        return columns
-    return candidates(jacobians, partitions)
+def _candidates(jacobians: Jacobians, partitions: Candidates, minors: Choice, columns: Integers) -> Integers:
+    """Columns (count, s) of RG's candidates: those given, the controller's, the minors', or all."""
+    own = jacobians.resolver
+    if partitions is not None or not isinstance(own, ReducedGradient):
+        if partitions is None and minors is not True:
+            return columns
+        own = ReducedGradient(partitions="automatic" if partitions is None else partitions)
+    s, robot = len(jacobians.rows), jacobians.robot
+    return candidate_columns(own.partitions, Dimensions(s, 0, robot.u_names, robot.groups)).reshape(-1, s)

@@ -1,32 +1,17 @@
-"""Objectives H(t, q), minimised in the null space of the task, one idea a file."""
+"""Objectives H(t, q), minimised in the null space of the task, one file per idea."""
 
-from nmm.functions.objectives.alignment import Alignment
-from nmm.functions.objectives.base import Objective, Sum
-from nmm.functions.objectives.callable_objective import CallableObjective
-from nmm.functions.objectives.clearance import Clearance
-from nmm.functions.objectives.directional_manipulability import DirectionalManipulability
-from nmm.functions.objectives.inverse_condition import InverseCondition
-from nmm.functions.objectives.joint_range import JointRange
-from nmm.functions.objectives.limit_barrier import LimitBarrier
-from nmm.functions.objectives.manipulability import Manipulability, WeighedManipulability
-from nmm.functions.objectives.potential_energy import PotentialEnergy
-from nmm.functions.objectives.preferred_posture import PreferredPosture
-from nmm.functions.objectives.quadratic import Quadratic, Square
-
-__all__ = [
-    "Alignment",
-    "CallableObjective",
-    "Clearance",
-    "DirectionalManipulability",
-    "InverseCondition",
-    "JointRange",
-    "LimitBarrier",
-    "Manipulability",
-    "Objective",
-    "PotentialEnergy",
-    "PreferredPosture",
-    "Quadratic",
-    "Square",
-    "Sum",
-    "WeighedManipulability",
-]
+from nmm.functions.objectives.alignment import Alignment as Alignment
+from nmm.functions.objectives.base import CallableObjective as CallableObjective
+from nmm.functions.objectives.base import Objective as Objective
+from nmm.functions.objectives.base import Sum as Sum
+from nmm.functions.objectives.clearance import Clearance as Clearance
+from nmm.functions.objectives.coordinates import JointRange as JointRange
+from nmm.functions.objectives.coordinates import LimitBarrier as LimitBarrier
+from nmm.functions.objectives.coordinates import PreferredPosture as PreferredPosture
+from nmm.functions.objectives.coordinates import Quadratic as Quadratic
+from nmm.functions.objectives.coordinates import QuadraticTerm as QuadraticTerm
+from nmm.functions.objectives.manipulability import DirectionalManipulability as DirectionalManipulability
+from nmm.functions.objectives.manipulability import InverseCondition as InverseCondition
+from nmm.functions.objectives.manipulability import Manipulability as Manipulability
+from nmm.functions.objectives.manipulability import WeightedManipulability as WeightedManipulability
+from nmm.functions.objectives.potential_energy import PotentialEnergy as PotentialEnergy

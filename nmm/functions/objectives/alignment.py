@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, array, scalar
-from nmm.errors import InputError
-from nmm.functions.function import Function, Stage
+from nmm.errors import InputError, expect
+from nmm.functions.function import Function, Stage, named
 from nmm.functions.objectives.base import Objective
 from nmm.functions.references.polynomial import Constant
-from nmm.functions.tasks.coordinates import Combination, coefficients
+from nmm.functions.tasks.linear_coordinates import Combination, coefficients
 from nmm.functions.tasks.position import Position
 from nmm.kernels.compiled import kernel
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
@@ -24,11 +24,8 @@ ANGLE, DIRECTION, POINT = 0.0, 1.0, 2.0
 
 @kernel(FUNCTION)
 def alignment(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
-    """H = 1 - cos(ψ - ψ_d), ψ = a·q + offset, in place; numbers = [what the rows hold, offset, a...].
-
-    A direction (or point less the platform's place) d has ψ_d = atan2(d_y, d_x); where d = 0 there is none, H
-    is 0 and has no gradient.
-    """
+    """H = 1 - cos(ψ - ψ_d), ψ = a·q + offset, in place; numbers = [what the rows hold, offset, a...]. A
+    direction (or point less the platform's place) d has ψ_d = atan2(d_y, d_x); d = 0 has H = 0, H_q = 0."""
     n = at.q.shape[0]
     heading = numbers[1]
     for k in range(n):
@@ -92,31 +89,29 @@ class Alignment(Objective):
         offset: float = 0.0,
     ) -> None:
         if (along is None) == (at is None):
-            raise InputError("alignment: expected either along, a direction, or at, a point")
+            raise InputError(where="alignment", expected="either along, a direction, or at, a point")
         self.along, self.at = along, at
         self.of = of
         self.offset = scalar(offset, "offset")
         if along is not None:
             self._desired = direction = _function(along, "along")
             if isinstance(direction, Constant) and direction.value.size > 1 and not direction.value[:2].any():
-                raise InputError("along: expected a direction with x or y other than 0")
+                raise InputError(where="along", expected="a direction with x or y other than 0")
         elif at is not None:
             self._desired = Position(at, "xy") if isinstance(at, str) else _function(at, "at")
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
         A = coefficients([self.of], robot)
         rows = self._desired.rows(robot)
-        came = ", ".join(f"{row.name} ({row.unit})" for row in rows)
         if self.along is None:
             kind = POINT
-            if len(rows) not in (2, 3) or any(row.unit == "rad" for row in rows):
-                raise InputError(f"at: expected a point with x and y in m, got {came}")
-            if robot.q_names[:2] != ("x", "y"):
-                raise InputError(f"at: expected a platform with coordinates x and y, {robot.name} has none")
+            point = len(rows) in (2, 3) and all(row.unit != "rad" for row in rows)
+            expect(point, "at", "a point with x and y in m", named(rows))
+            planar = robot.q_names[:2] == ("x", "y")
+            expect(planar, "at", f"a platform with x and y, {robot.name} has none")
         else:
             kind = ANGLE if len(rows) == 1 else DIRECTION
-            if len(rows) > 3:
-                raise InputError(f"along: expected an angle in rad, or a direction in x and y, got {came}")
+            expect(len(rows) <= 3, "along", "an angle in rad, or a direction in x and y", named(rows))
         numbers = np.concatenate([[kind, self.offset], A[0]])
         return (*self._desired.stages(robot), Stage(alignment, min(2, len(rows)), (), numbers))
 

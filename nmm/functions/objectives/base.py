@@ -1,14 +1,47 @@
-"""Objectives H(t, q), minimised: one row each, added and scaled like numbers."""
+"""Objectives H(t, q), minimised: one row each, added and scaled like numbers; and a user's own, in Python."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+from numpy.typing import ArrayLike
+
 from nmm.arrays import Array, scalar
-from nmm.errors import InputError
-from nmm.functions.function import Evaluation, Function, Row, Stage
-from nmm.functions.product import Product
+from nmm.errors import InputError, expect, expect_kind
+from nmm.functions.callbacks import of_configuration
+from nmm.functions.function import Evaluation, Function, Row, Stage, only_row, stacked
 from nmm.functions.program import evaluate
+from nmm.kernels.compiled import kernel
+from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
+
+
+@kernel(FUNCTION)
+def product(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
+    """The first row times the second, in place."""
+    a, b = rows.value[0], rows.value[1]
+    rows.value[0] = a * b
+    rows.value_t[0] = rows.value_t[0] * b + a * rows.value_t[1]
+    for k in range(at.q.shape[0]):
+        rows.value_q[0, k] = rows.value_q[0, k] * b + a * rows.value_q[1, k]
+
+
+class Product(Function):
+    """The product of two functions of one row: a term whose weight changes, usually with time; unitless."""
+
+    def __init__(self, function: Function, weight: Function) -> None:
+        self.function = function
+        self.weight = weight
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        row = only_row(self.function, robot, "function", "a function of one row")
+        only_row(self.weight, robot, "weight", "a function of one row")
+        return (Row(row.name, "1"),)
+
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        self.rows(robot)
+        return (*stacked((self.function, self.weight), robot), Stage(product, 2))
 
 
 class Objective(Function):
@@ -20,9 +53,9 @@ class Objective(Function):
     Examples
     --------
     >>> robot = nmm.load("unicycle_2r")
-    >>> H = nmm.Quadratic(nmm.Square("q1")) + 0.5 * nmm.Quadratic(nmm.Square("q2", 1.0))
+    >>> H = nmm.Quadratic(nmm.QuadraticTerm("q1")) + 0.5 * nmm.Quadratic(nmm.QuadraticTerm("q2", 1.0))
     >>> here = nmm.Configuration(robot, robot.q({"q1": 1.0}))
-    >>> isinstance(H, nmm.Objective), H.value(here), H.gradient(here)
+    >>> isinstance(H, nmm.extending.Objective), H.value(here), H.gradient(here)
     (True, 0.75, array([ 0. ,  0. ,  0. ,  1. , -0.5]))
     """
 
@@ -36,10 +69,7 @@ class Objective(Function):
     def terms_on(self, robot: Robot) -> tuple[tuple[float, Function], ...]:
         """The terms, checked against a robot; `InputError` for one that has more rows than one."""
         for _, function in self.terms():
-            rows = function.rows(robot)
-            if len(rows) != 1:
-                names = ", ".join(row.name for row in rows)
-                raise InputError(f"objective: expected terms of one row, got one with {len(rows)} ({names})")
+            only_row(function, robot, "objective", "terms of one row")
         return self.terms()
 
     def value(self, configuration: Configuration, t: float = 0.0) -> float:
@@ -52,10 +82,7 @@ class Objective(Function):
         return gradient
 
     def rate(self, configuration: Configuration, t: float = 0.0) -> float:
-        """∂H/∂t, 1/s, at a standing configuration: 0 but for weights, targets and directions that move.
-
-        No resolver reads it: they descend H as it is now.
-        """
+        """∂H/∂t, 1/s, at fixed q: 0 unless weights, targets or directions move; resolvers ignore it."""
         return float(self._evaluated(configuration, t).value_t[0])
 
     def _evaluated(self, configuration: Configuration, t: float) -> Evaluation:
@@ -71,7 +98,7 @@ class Objective(Function):
         """So that Python's `sum` of objectives, which begins with 0, is their sum."""
         if other == 0:
             return self
-        raise InputError(f"objective: expected an objective to add, got {other!r}")
+        raise InputError(where="objective", expected="an objective to add", got=other)
 
     def __mul__(self, factor: float | Function) -> Objective:
         return Sum((factor, self))
@@ -86,19 +113,13 @@ class Objective(Function):
 
 
 class Sum(Objective):
-    """A weighted sum of objectives, or of other functions of one row: `Sum((2.0, a), (-1.0, b))`.
-
-    Parameters
-    ----------
-    terms : (weight, function); a weight is a number, or a function of one row itself, of time as a rule
-    """
+    """A weighted sum of objectives, or of other functions of one row: `Sum((2.0, a), (ramp, b))`. Weights are
+    numbers or functions of one row, usually of time."""
 
     def __init__(self, *terms: tuple[float | Function, Function]) -> None:
-        if not terms:
-            raise InputError("sum of objectives: expected at least one")
+        expect(terms, "sum of objectives", "at least one")
         for _, function in terms:
-            if not isinstance(function, Function):
-                raise InputError(f"objective: expected an objective to add, got {function!r}")
+            expect_kind(function, Function, "objective", "an objective to add")
         self._terms = tuple(
             (inner, Product(part, weight))
             if isinstance(weight, Function)
@@ -111,4 +132,33 @@ class Sum(Objective):
         return self._terms
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
-        raise InputError("sum of objectives: expected as an objective, it is no task of its own")
+        raise InputError(where="sum of objectives", expected="as an objective, it is no task of its own")
+
+
+class CallableObjective(Objective):
+    """H from a Python function of a `Configuration`.
+
+    Parameters
+    ----------
+    function : configuration -> H
+    gradient : configuration -> ∂H/∂q, shape (n,); central differences when not given
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> q2 = robot.coordinate("q2")
+    >>> H = nmm.CallableObjective(lambda here: 0.5 * (here.q[q2] - 1) ** 2)
+    >>> H.gradient(nmm.Configuration(robot, robot.rest)).round(3)
+    array([ 0.,  0.,  0.,  0., -1.])
+    """
+
+    def __init__(
+        self,
+        function: Callable[[Configuration], float],
+        gradient: Callable[[Configuration], ArrayLike] | None = None,
+    ) -> None:
+        self.function = function
+        self._gradient = gradient
+
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        return of_configuration(self.function, self._gradient, 1, "callable objective", robot, "gradient")

@@ -12,15 +12,15 @@ import numpy as np
 from nmm.arrays import Array, positive, scalar
 from nmm.collisions.obstacle import Obstacle
 from nmm.collisions.rows import Rows, no_rows
-from nmm.collisions.setting import Setting, set_up
+from nmm.collisions.scene import Scene, set_up
 from nmm.errors import InputError
 from nmm.functions.callbacks import stage
 from nmm.functions.function import Evaluation, Stage
 from nmm.functions.objectives.base import Objective
-from nmm.kernels.memory import Memory, views
-from nmm.robots.ahead import Ahead
+from nmm.kernels.record_layout import Memory, views
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
+from nmm.robots.zero_order_hold import RollingPreview
 
 #: Usual way that is looked ahead with wheels that have to roll to turn, m. What turns on the spot drove
 #: around random obstacles less often with it than without: docs/collisions.md.
@@ -47,12 +47,8 @@ class Distances(Protocol):
 class Clearance(Objective):
     """H = ½ Σ max(0, 1 - (d - distance) / reach)² over the distances d of pairs of shapes; minimise it.
 
-    It is 0 beyond `reach`, ½ for each pair at the distance that is kept. With `ahead`, the mean of the same
-    at three places is added, where the robot is when it has rolled on with its steering as it is: where a
-    car stands, steering changes no distance.
-
-    H is smooth but where nearest points jump (parallel faces): there d has a kink, and its gradient is that
-    of one side.
+    It is 0 beyond `reach`, ½ for each pair at the kept distance. With `ahead`, its mean at three places
+    further on, reached with the steering as it is, is added: steering a car that stands changes no distance.
 
     Parameters
     ----------
@@ -87,12 +83,12 @@ class Clearance(Objective):
     ) -> None:
         for name in ("distance", "obstacles", "ignore", "srdf", "shapes"):
             if collisions is not None and not hasattr(collisions, name):
-                raise InputError(f"clearance: collisions: expected Collisions, got {collisions!r}")
+                raise InputError(where="clearance: collisions", expected="Collisions", got=collisions)
         self.collisions = collisions
         self.reach = positive(reach, "clearance: reach")
         self.own = bool(own)
         self.ahead = None if ahead is None else scalar(ahead, "clearance: ahead")
-        self._setting: Setting | None = None
+        self._setting: Scene | None = None
 
     def among(self, collisions: Distances) -> Self:
         """This objective with the distances of a controller."""
@@ -106,13 +102,11 @@ class Clearance(Objective):
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
         if self.collisions is None:
-            raise InputError("clearance: expected collisions, whose obstacles it keeps off, got none")
+            raise InputError(where="clearance", expected="collisions, whose obstacles it keeps off", got=None)
         if self._setting is None or self._setting.robot is not robot:
             given = self.collisions
             if not self.own and not given.obstacles:
-                raise InputError(
-                    "clearance: expected collisions with obstacles, got none (own: the robot itself)"
-                )
+                raise InputError(where="clearance", expected="obstacles (own: the robot itself)", got=None)
             self._setting = set_up(
                 robot,
                 given.obstacles,
@@ -130,13 +124,13 @@ class Clearance(Objective):
 class _Near:
     """H with its derivatives, measured; the callback of a stage."""
 
-    def __init__(self, setting: Setting, reach: float, ahead: float | None) -> None:
+    def __init__(self, setting: Scene, reach: float, ahead: float | None) -> None:
         self._queries, self._keep, self._reach = setting.queries, setting.distance, reach
         memory = Memory()
         memory.add(no_rows(setting.robot.n, len(setting.names)))
         self._blocks = memory.blocks()
         self._rows = views(Rows, *self._blocks, 0)
-        self._roll = Ahead(setting.robot)
+        self._roll = RollingPreview(setting.robot)
         self._ahead = (AHEAD if self._roll.rolls else 0.0) if ahead is None else ahead
 
     def __call__(self, t: float, configuration: Configuration) -> Evaluation:
@@ -151,7 +145,7 @@ class _Near:
         return Evaluation(np.array([H]), np.array([H_t]), H_q[np.newaxis])
 
     def _at(self, t: float, q: Array) -> tuple[float, float, Array]:
-        """H, ∂H/∂t and ∂H/∂q (n,) of the robot at q, and nowhere ahead."""
+        """H, ∂H/∂t and ∂H/∂q (n,) of the robot at q, without looking ahead."""
         rows = self._rows
         self._queries.update(t, q, *self._blocks, 0)
         used = int(rows.used)

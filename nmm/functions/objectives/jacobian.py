@@ -1,59 +1,47 @@
-"""The Jacobian that objectives speak of, its decomposition, and derivatives of what is made of it.
+"""Objectives of a frame's Jacobian J = D (its rows) S W^-1/2, its decomposition, and gradients.
 
-J = D (rows of a frame's Jacobian) S W^-1/2: D divides rows of metres by a length, S is the platform's and the
-arm's velocity map (or the part asked for), W holds weights of the inputs, a heavy one counting for less.
-Every function φ(J) has the gradient Σ_ij X_ij ∂J_ij/∂q_k, X = ∂φ/∂J: `contract` does that for any X.
-
-numbers = [platform inputs that count p, rows s, arm inputs; the rows; their factors; coordinates that the arm
-inputs move; factors of the inputs; followers (`nmm.kernels.followers`)]: `Header` has their names.
-"""
+D divides rows in metres by a length, S is the velocity map of platform and arm, or of one of them, W weights
+inputs. φ(J) has the gradient Σ_ij X_ij ∂J_ij/∂q_k, X = ∂φ/∂J, which `contract` computes for any X."""
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import ClassVar, Literal, NamedTuple, get_args
 
 import numpy as np
 
 from nmm.arrays import Array, positive, vector
-from nmm.errors import InputError, expect_known
-from nmm.functions.function import natural_size
+from nmm.errors import expect, expect_known
+from nmm.functions.function import Stage, natural_size
 from nmm.functions.objectives.base import Objective
-from nmm.kernels.compiled import compiled, scratch, view
-from nmm.kernels.followers import add_to_leaders
-from nmm.kernels.linear_algebra import orthonormal_rows, pseudoinverse_transposed
+from nmm.kernels.compiled import Kernel, clear, compiled, scratch, view
+from nmm.kernels.linear_algebra import add, orthonormal_rows, pseudoinverse_transposed
 from nmm.kernels.records import At, Frames
+from nmm.kernels.velocity_map import to_coordinates, to_inputs
 from nmm.robots.input_weights import Weights, by_name
 from nmm.robots.robot import Robot
 
 ROWS = {"x": 0, "y": 1, "z": 2, "rx": 3, "ry": 4, "rz": 5}
-#: Whose inputs count.
 Part = Literal["robot", "arm", "platform"]
 #: J has lost rank, to rounding, where `orthonormal_rows` is at most this.
 LOST = 1e-12
 
 
 class Header(NamedTuple):
-    """The numbers that say which Jacobian it is, as views.
-
-    platform : p, how many of the platform's inputs count
-    rows (s,) : of the frame's Jacobian; scales (s,) : D's diagonal, 1/m or 1
-    moved (arm inputs,) : the coordinates that they move
-    factors (m,) : W^-1/2's diagonal
-    followers : see `nmm.kernels.followers`
-    """
+    """A stage's numbers: `platform` is p, how many of its inputs take part; `scales` D's diagonal, 1/m or 1;
+    `factors` W^-1/2's. For `moved` and `mimic_joints` see `nmm.kernels.velocity_map`."""
 
     platform: int
     rows: Array
     scales: Array
     moved: Array
     factors: Array
-    followers: Array
+    mimic_joints: Array
 
 
 @compiled
 def header(numbers: Array) -> Header:
-    """The numbers by their names."""
     p, s, arm = int(numbers[0]), int(numbers[1]), int(numbers[2])
     first = 3 + 2 * s + arm + p + arm
     return Header(
@@ -76,26 +64,17 @@ def shape_of(numbers: Array) -> tuple[int, int]:
 def decomposed(
     at: At, frames: Frames, numbers: Array, J_q: Array, J: Array, order: Array, L: Array, X: Array
 ) -> bool:
-    """J = L Q[order] and X = (J⁺)ᵀ, all (s, m) but L (s, s) and J_q (s, n); whether J has full row rank.
-
-    J_q = D (rows of the frame's Jacobian), with what is by a follower added to its leader's.
-    """
+    """J = L Q[order] and X = (J⁺)ᵀ, all (s, m) but L (s, s), J_q (s, n); whether J has full row rank. J_q = D
+    (rows of the frame's Jacobian), where columns of mimic joints are added to their leaders'."""
     s, m = J.shape
-    n, n_p, frame = at.q.shape[0], at.G.shape[0], frames.slots[0]
+    n, frame = at.q.shape[0], frames.slots[0]
     of = header(numbers)
-    p = of.platform
     plain, Q = scratch(s), scratch((s, m))
     for i in range(s):
         plain[i] = 1.0
         for a in range(n):
             J_q[i, a] = of.scales[i] * frames.jacobians[frame, int(of.rows[i]), a]
-        add_to_leaders(J_q, i, of.followers)
-        for j in range(p):
-            J[i, j] = 0.0
-            for a in range(n_p):
-                J[i, j] += J_q[i, a] * at.G[a, j]
-        for j in range(of.moved.shape[0]):
-            J[i, p + j] = J_q[i, int(of.moved[j])]
+        to_inputs(J_q, i, at.G, of.platform, of.moved, of.mimic_joints, J[i])
         for j in range(m):
             J[i, j] *= of.factors[j]
     if not orthonormal_rows(J, plain, order, L, Q) > LOST:
@@ -106,71 +85,58 @@ def decomposed(
 
 @compiled
 def contract(at: At, frames: Frames, numbers: Array, J_q: Array, X: Array, gradient: Array) -> None:
-    """gradient (n,) += Σ_ij X_ij ∂J_ij/∂q_k, by ∂J/∂q_k = D (H_k S + J_q ∂S/∂q_k) W^-1/2.
-
-    Z = D X W^-1/2 Sᵀ (s, n) meets the frame's Hessian once, whatever the number of inputs.
-    """
+    """gradient (n,) += Σ_ij X_ij ∂J_ij/∂q_k, by ∂J/∂q_k = D (H_k S + J_q ∂S/∂q_k) W^-1/2. Z = D X W^-1/2 Sᵀ
+    (s, n) meets the frame's Hessian once, whatever the number of inputs."""
     n, n_p, frame = at.q.shape[0], at.G.shape[0], frames.slots[0]
     of = header(numbers)
-    p = of.platform
-    z = scratch(n)
+    x, z = scratch(X.shape[1]), scratch(n)
+    clear(z)
     for i in range(X.shape[0]):
         row = int(of.rows[i])
-        for a in range(n):
-            z[a] = 0.0
-        for j in range(p):
-            x = X[i, j] * of.factors[j]
+        for j in range(X.shape[1]):
+            x[j] = X[i, j] * of.factors[j]
+        to_coordinates(x, at.G, of.platform, of.moved, of.mimic_joints, z)
+        for j in range(of.platform):
             for a in range(n_p):
-                z[a] += x * at.G[a, j]
                 for k in range(n_p):
-                    gradient[k] += x * J_q[i, a] * at.G_q[a, j, k]
-        for j in range(of.moved.shape[0]):
-            z[int(of.moved[j])] = X[i, p + j] * of.factors[p + j]
-        for f in range(0, of.followers.shape[0], 4):
-            z[int(of.followers[f])] += of.followers[f + 2] * z[int(of.followers[f + 1])]
+                    gradient[k] += x[j] * J_q[i, a] * at.G_q[a, j, k]
         for a in range(n):
-            x = of.scales[i] * z[a]
-            if x != 0.0:
-                for k in range(n):
-                    gradient[k] += x * frames.hessians[frame, row, a, k]
+            share = of.scales[i] * z[a]
+            if share != 0.0:
+                add(gradient, share, frames.hessians[frame, row, a])
 
 
 class JacobianObjective(Objective):
-    """An objective of s rows of a frame's Jacobian.
-
-    Parameters
-    ----------
-    frame : a frame of the robot
-    rows : rows of its Jacobian: "xy", "xyz", or a list of x, y, z, rx, ry, rz
-    of : whose inputs count
-    weights : of all the robot's inputs; a heavy one counts for less
-
-    Attributes
-    ----------
-    called : the objective's name, for errors
-    selected : the rows' names
-    length : by which rows of metres are divided, m; the robot's reach when None
-
-    Raises
-    ------
-    InputError : rows or inputs of other names; on a robot, more rows than inputs, bad weights
-    """
+    """An objective of s Jacobian rows; `InputError` for unknown names, more rows than inputs, bad weights."""
 
     called: ClassVar[str]
+    #: What rows in metres are divided by, m; the robot's reach when None.
     length: float | None = 1.0
 
-    def __init__(self, frame: str, rows: str | Sequence[str], of: Part, weights: Weights | None) -> None:
+    def __init__(
+        self,
+        frame: str,
+        rows: str | Sequence[str] = "xyz",
+        of: Part = "robot",
+        weights: Weights | None = None,
+    ) -> None:
         self.frame = frame
         self.selected = tuple(rows)
-        if not self.selected or len(set(self.selected)) != len(self.selected):
-            raise InputError(
-                f"{self.called} rows: expected some of {', '.join(ROWS)}, each once, got {rows!r}"
-            )
+        once = self.selected and len(set(self.selected)) == len(self.selected)
+        expect(once, f"{self.called} rows", f"some of {', '.join(ROWS)}, each once", rows)
         for row in self.selected:
             expect_known(f"{self.called} row", row, ROWS)
         expect_known(f"{self.called} of", of, get_args(Part))
         self.of = of
         self.weights = weights
+
+    @property
+    @abstractmethod
+    def measure(self) -> Kernel:
+        """The kernel that computes it."""
+
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        return (Stage(self.measure, 1, (self.frame,), self.numbers(robot), hessians=True),)
 
     def numbers(self, robot: Robot) -> Array:
         """What `header` reads."""
@@ -178,26 +144,14 @@ class JacobianObjective(Objective):
         p = 0 if self.of == "arm" else own
         arm = robot.arm_coordinates[: 0 if self.of == "platform" else None]
         inputs = p + len(arm)
-        if len(self.selected) > inputs:
-            raise InputError(
-                f"{self.called} of the {self.of}: {len(self.selected)} rows with {inputs} inputs is "
-                f"always 0; expected at most {inputs} rows"
-            )
-        counted = [*range(p), *(own + j for j in range(len(arm)))]
+        few = f"at most {inputs} rows: with more it is always 0"
+        expect(len(self.selected) <= inputs, f"{self.called} of the {self.of}", few, self.selected)
+        factors = _factors(self.weights, robot)[[*range(p), *range(own, own + len(arm))]]
         metres = natural_size("m", robot) if self.length is None else self.length
-        return np.array(
-            [
-                p,
-                len(self.selected),
-                len(arm),
-                *(ROWS[row] for row in self.selected),
-                *(1.0 / metres if ROWS[row] < 3 else 1.0 for row in self.selected),
-                *arm,
-                *_factors(self.weights, robot)[counted],
-                *robot.following.table.ravel(),
-            ],
-            dtype=float,
-        )
+        rows = [ROWS[row] for row in self.selected]
+        scales = [1.0 / metres if row < 3 else 1.0 for row in rows]
+        table = robot.following.table.ravel()
+        return np.r_[p, len(rows), len(arm), rows, scales, arm, factors, table].astype(float)
 
 
 def _factors(weights: Weights | None, robot: Robot) -> Array:

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, vector
-from nmm.errors import InputError
+from nmm.arrays import Array, nonzero_vector
 from nmm.functions.function import Stage
 from nmm.functions.objectives.base import Objective
-from nmm.functions.tasks.center_of_mass import CenterOfMass
+from nmm.functions.tasks.position import CenterOfMass
 from nmm.kernels.compiled import kernel
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import CENTER_OF_MASS, Robot
@@ -44,9 +43,7 @@ class PotentialEnergy(Objective):
     """
 
     def __init__(self, gravity: ArrayLike | None = None) -> None:
-        self.gravity = None if gravity is None else vector(gravity, 3, "gravity")
-        if self.gravity is not None and not self.gravity.any():
-            raise InputError("gravity: expected a vector that is not zero")
+        self.gravity = None if gravity is None else nonzero_vector(gravity, 3, "gravity")
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
         CenterOfMass().rows(robot)

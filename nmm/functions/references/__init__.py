@@ -1,27 +1,16 @@
-"""References g(t, q): what a task's function shall follow, one idea a file."""
+"""References g(t, q), which a task's function follows, one file per idea."""
 
-from nmm.functions.references.bearing import Bearing
-from nmm.functions.references.callable_reference import CallableReference
-from nmm.functions.references.circle import Circle
-from nmm.functions.references.orientation import Slerp, Turn, rotation_vector
-from nmm.functions.references.polynomial import Constant, Line, PiecewisePolynomial, Polynomial, Spline
-from nmm.functions.references.pose import PoseReference
-from nmm.functions.references.signal import Signal
-from nmm.functions.references.velocity import Velocity
-
-__all__ = [
-    "Bearing",
-    "CallableReference",
-    "Circle",
-    "Constant",
-    "Line",
-    "PiecewisePolynomial",
-    "Polynomial",
-    "PoseReference",
-    "Signal",
-    "Slerp",
-    "Spline",
-    "Turn",
-    "Velocity",
-    "rotation_vector",
-]
+from nmm.functions.callbacks import CallableReference as CallableReference
+from nmm.functions.references.circle import Bearing as Bearing
+from nmm.functions.references.circle import Circle as Circle
+from nmm.functions.references.circle import VelocityOf as VelocityOf
+from nmm.functions.references.live_target import LiveTarget as LiveTarget
+from nmm.functions.references.orientation import PoseReference as PoseReference
+from nmm.functions.references.orientation import Slerp as Slerp
+from nmm.functions.references.orientation import SteadyTurn as SteadyTurn
+from nmm.functions.references.orientation import rotation_vector as rotation_vector
+from nmm.functions.references.polynomial import Constant as Constant
+from nmm.functions.references.polynomial import Line as Line
+from nmm.functions.references.polynomial import PiecewisePolynomial as PiecewisePolynomial
+from nmm.functions.references.polynomial import Polynomial as Polynomial
+from nmm.functions.references.polynomial import Spline as Spline

@@ -1,4 +1,4 @@
-"""A circle driven at constant speed (paper, eq. 16)."""
+"""The paper's references: a circle (eq. 16), the bearing of a moving point (section VI); and velocities."""
 
 from __future__ import annotations
 
@@ -8,13 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, positive, scalar, vector
-from nmm.errors import InputError
-from nmm.functions.function import Function, Row, Stage
+from nmm.errors import InputError, expect
+from nmm.functions.function import Function, Row, Shown, Stage, named
+from nmm.functions.references.polynomial import PiecewisePolynomial, piecewise_polynomial
 from nmm.kernels.compiled import kernel
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import Robot
-
-AXES = {"x": 0, "y": 1, "z": 2}
 
 
 @kernel(FUNCTION)
@@ -55,11 +54,9 @@ class Circle(Function):
     def __init__(
         self, center: ArrayLike, radius: float, rate: float, phase: float = 0.0, plane: str = "xy"
     ) -> None:
-        self.center = vector(center, None, "center")
-        if self.center.size not in (2, 3):
-            raise InputError(f"center: expected 2 or 3 numbers, got {self.center.size}")
-        if plane not in ("xy", "yz", "zx") or (plane != "xy" and self.center.size == 2):
-            raise InputError(f"plane: expected xy, or yz or zx with a center of 3 numbers, got {plane!r}")
+        self.center = vector(center, (2, 3), "center")
+        there = plane == "xy" or (plane in ("yz", "zx") and self.center.size == 3)
+        expect(there, "plane", "xy, or yz or zx with a center of 3 numbers", plane)
         self.radius = positive(radius, "radius")
         self.rate = scalar(rate, "rate")
         self.phase = scalar(phase, "phase")
@@ -69,6 +66,94 @@ class Circle(Function):
         return tuple(Row(axis, "m") for axis in "xyz"[: self.center.size])
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
-        first, second = (AXES[axis] for axis in self.plane)
+        first, second = ("xyz".index(axis) for axis in self.plane)
         numbers = np.array([self.radius, self.rate, self.phase, first, second, *self.center])
         return (Stage(circle, self.center.size, (), numbers),)
+
+
+class VelocityOf(Function):
+    """∂g/∂t of a reference of time, a row for each of its own; zero where the reference rests.
+
+    Parameters
+    ----------
+    of : a circle, line, polynomial, spline or constant
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> along = nmm.VelocityOf(nmm.Circle([0, 0], radius=2, rate=0.5))
+    >>> nmm.evaluate(along, 0.0, nmm.Configuration(robot, robot.rest)).value.round(3)
+    array([0., 1.])
+    """
+
+    def __init__(self, of: Function) -> None:
+        if not isinstance(of, Circle | PiecewisePolynomial):
+            raise InputError(where="of", expected="a circle, line, polynomial, spline or constant", got=of)
+        self.of = of
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        return tuple(Row(f"{row.name}_dot", f"{row.unit}/s") for row in self.of.rows(robot))
+
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        (stage,) = self.of.stages(robot)
+        if isinstance(self.of, Circle):  # another circle, a quarter ahead, about the origin
+            numbers = stage.numbers.copy()
+            numbers[0] *= self.of.rate
+            numbers[2] += math.pi / 2
+            numbers[5:] = 0.0
+            return (Stage(circle, stage.rows, (), numbers),)
+        breaks, c = self.of.breaks, self.of.coefficients
+        powers = np.arange(len(c) - 1, 0, -1)[:, None, None]
+        slopes = np.zeros((max(1, len(powers)), len(breaks) + 1, stage.rows))  # at rest before and after
+        slopes[:, 1:-1] = c[:-1] * powers if len(powers) else 0.0
+        around = np.concatenate([[breaks[0] - 1.0], breaks, [breaks[-1] + 1.0]])
+        numbers = np.concatenate([[len(breaks) + 1, len(slopes)], around, slopes.transpose(2, 1, 0).ravel()])
+        return (Stage(piecewise_polynomial, stage.rows, (), numbers),)
+
+
+@kernel(FUNCTION)
+def bearing(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
+    """atan2(T - p) by the chain rule, in place: the first two rows hold p and its derivatives."""
+    dx = numbers[0] - rows.value[0]
+    dy = numbers[1] - rows.value[1]
+    square = dx * dx + dy * dy
+    rows.value_t[0] = (dy * rows.value_t[0] - dx * rows.value_t[1]) / square
+    for j in range(at.q.shape[0]):
+        rows.value_q[0, j] = (dy * rows.value_q[0, j] - dx * rows.value_q[1, j]) / square
+    rows.value[0] = math.atan2(dy, dx)
+
+
+class Bearing(Function):
+    """Angle (rad) from the world's x axis at which a fixed point is seen from a moving one.
+
+    Parameters
+    ----------
+    of : the moving point, its first two components x and y: a reference of time (circle, spline, ...;
+        case 2), or a point of the robot (position; case 3), which makes the bearing a function of the
+        configuration
+    towards : the fixed point, 2 numbers, m (a third, z, is only drawn)
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> looks = nmm.Bearing(of=nmm.Position("ee", "xy"), towards=[5.0, 5.0])
+    >>> float(nmm.evaluate(looks, 0.0, nmm.Configuration(robot, robot.rest)).value[0].round(3))
+    0.908
+    """
+
+    def __init__(self, of: Function, towards: ArrayLike) -> None:
+        self.of = of
+        self.towards = vector(towards, (2, 3), "towards")
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        rows = self.of.rows(robot)
+        point = len(rows) >= 2 and all(row.unit == "m" for row in rows[:2])
+        expect(point, "bearing", "the point it is taken from to have x and y in m", named(rows))
+        return (Row("bearing", "rad", angular=True),)
+
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        self.rows(robot)
+        return (*self.of.stages(robot), Stage(bearing, 2, (), np.array(self.towards[:2])))
+
+    def shown(self) -> Shown:
+        return Shown(looks_at=self.towards)

@@ -3,29 +3,24 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, array, positive, vector
-from nmm.errors import InputError, expect_known
+from nmm.arrays import Array, array, increasing, positive, vector
+from nmm.errors import expect, expect_known
 from nmm.functions.function import Function, Row, Stage
 from nmm.kernels.compiled import kernel
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import Robot
 
-if TYPE_CHECKING:  # SciPy is imported where it is used: a third of a second that a circle need not pay
-    from scipy.interpolate import BSpline
-
 
 @kernel(FUNCTION)
 def piecewise_polynomial(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     """Horner's rule in the piece that holds t; at rest before the first and after the last break.
-
-    numbers = [pieces, coefficients a piece, breaks..., coefficients (component, piece, power)],
-    highest power first, in the time since the piece's beginning.
-    """
+    numbers = [pieces, coefficients a piece, breaks..., coefficients (component, piece, power)], highest power
+    first, in the time since the piece's beginning."""
     pieces = int(numbers[0])
     order = int(numbers[1])
     breaks = numbers[2 : 3 + pieces]
@@ -61,7 +56,7 @@ class PiecewisePolynomial(Function):
     >>> from scipy.interpolate import CubicSpline
     >>> robot = nmm.load("unicycle_2r")
     >>> path = CubicSpline([0, 1, 2], [[0, 0], [1, 0], [1, 1]])
-    >>> reference = nmm.PiecewisePolynomial(path.x, path.c)
+    >>> reference = nmm.extending.PiecewisePolynomial(path.x, path.c)
     >>> nmm.evaluate(reference, 1.0, nmm.Configuration(robot, robot.rest)).value.round(3)
     array([1., 0.])
     """
@@ -70,28 +65,19 @@ class PiecewisePolynomial(Function):
         self.unit = unit
         self.breaks = vector(breaks, None, "breaks")
         self.coefficients = array(coefficients, "coefficients")
-        pieces = self.breaks.size - 1
-        if pieces < 1:
-            raise InputError(f"breaks: expected at least 2, got {pieces + 1}")
-        if self.coefficients.ndim != 3 or self.coefficients.shape[1] != pieces or not self.coefficients.size:
-            raise InputError(
-                f"coefficients: expected shape (order, {pieces}, components) for {pieces + 1} breaks, "
-                f"got {self.coefficients.shape}"
-            )
-        if np.any(np.diff(self.breaks) <= 0.0):
-            raise InputError("breaks: expected them to increase")
+        pieces, c = self.breaks.size - 1, self.coefficients
+        expect(pieces >= 1, "breaks", "at least 2", pieces + 1)
+        table = c.ndim == 3 and c.shape[1] == pieces and c.size
+        expect(table, "coefficients", f"shape (order, {pieces}, components) for {pieces + 1} breaks", c)
+        increasing(self.breaks, "breaks")
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         return tuple(Row(f"r{i}", self.unit) for i in range(self.coefficients.shape[2]))
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
         order, pieces, s = self.coefficients.shape
-        numbers = [
-            np.array([pieces, order], dtype=np.float64),
-            self.breaks,
-            self.coefficients.transpose(2, 1, 0).ravel(),
-        ]
-        return (Stage(piecewise_polynomial, s, (), np.concatenate(numbers)),)
+        table = self.coefficients.transpose(2, 1, 0).ravel()
+        return (Stage(piecewise_polynomial, s, (), np.r_[pieces, order, self.breaks, table]),)
 
 
 class Constant(PiecewisePolynomial):
@@ -134,18 +120,16 @@ class Polynomial(PiecewisePolynomial):
 
     def __init__(self, coefficients: ArrayLike, duration: float, unit: str = "m") -> None:
         table = array(coefficients, "coefficients")
-        if table.ndim != 2 or table.size == 0:
-            raise InputError(f"coefficients: expected a table (power, component), got shape {table.shape}")
+        expect(table.ndim == 2 and table.size != 0, "coefficients", "a table (power, component)", table)
         super().__init__([0.0, positive(duration, "duration")], table[::-1, None, :], unit)
 
     @classmethod
     def through(cls, times: ArrayLike, points: ArrayLike, unit: str = "m") -> Polynomial:
         """The polynomial of lowest degree through `points` (k, s) at `times` (k,), the first of them 0."""
-        from scipy.interpolate import KroghInterpolator
+        from scipy.interpolate import KroghInterpolator  # here: a circle need not wait for SciPy
 
         breaks, table = _waypoints(times, points)
-        if breaks[0] != 0.0:
-            raise InputError(f"times: expected the first to be 0, got {breaks[0]:g}")
+        expect(breaks[0] == 0.0, "times", "the first to be 0", breaks[0])
         derivatives = np.atleast_2d(KroghInterpolator(breaks, table).derivatives(0.0, len(breaks)))
         factorials = np.cumprod([1.0, *range(1, len(breaks))])
         return cls(derivatives / factorials[:, None], float(breaks[-1]), unit)
@@ -156,12 +140,7 @@ Profile = Literal["constant", "smooth"]
 
 
 def share_of_way(profile: Profile, T: float) -> list[float]:
-    """Coefficients, of the highest power of t first, of the share of the way gone at t, from 0 to 1 at T.
-
-    Raises
-    ------
-    InputError : an unknown profile
-    """
+    """Coefficients, highest power first, of s(t) from 0 to 1 at T; `InputError` for an unknown profile."""
     profiles = {"constant": [1 / T, 0.0], "smooth": [6 / T**5, -15 / T**4, 10 / T**3, 0.0, 0.0, 0.0]}
     expect_known("profile", profile, profiles)
     return profiles[profile]
@@ -235,33 +214,26 @@ class Spline(PiecewisePolynomial):
         from scipy.interpolate import CubicSpline, make_interp_spline
 
         breaks, table = _waypoints(times, points)
-        if degree not in (3, 5) or (degree == 5 and ends == "periodic"):
-            raise InputError(
-                f"spline: expected degree 3, or 5 with ends rest or natural, got {degree} with {ends}"
-            )
+        known = degree == 3 or (degree == 5 and ends != "periodic")
+        expect(known, "spline: degree", "3, or 5 with other ends", (degree, ends))
         expect_known("ends", ends, ("rest", "natural", "periodic"))
-        if ends == "periodic" and not np.allclose(table[0], table[-1], rtol=0, atol=1e-12):
-            raise InputError("points: expected the last to equal the first for periodic ends")
         if ends == "periodic":
+            closed = np.allclose(table[0], table[-1], rtol=0, atol=1e-12)
+            expect(closed, "points", "the last to equal the first for periodic ends")
             table[-1] = table[0]  # SciPy wants them equal to the last bit
-        if degree == 5 and ends == "natural" and len(breaks) < 3:
-            raise InputError(f"points: expected at least 3 for degree 5 with natural ends, got {len(breaks)}")
         if degree == 3:
             coefficients = CubicSpline(breaks, table, bc_type="clamped" if ends == "rest" else ends).c
         else:
+            enough = ends != "natural" or len(breaks) >= 3
+            expect(enough, "points", "at least 3 for natural ends", len(breaks))
             zero = np.zeros(table.shape[1])
             orders = (1, 2) if ends == "rest" else (3, 4)
             conditions: Any = [(order, zero) for order in orders]  # the stubs know no derivative conditions
             spline = make_interp_spline(breaks, table, k=5, bc_type=(conditions, conditions))
-            coefficients = _pieces(spline, breaks)
+            # As polynomials between the breaks; `PPoly.from_spline` takes one component only.
+            powers = range(spline.k, -1, -1)
+            coefficients = np.array([spline(breaks[:-1], nu=nu) / math.factorial(nu) for nu in powers])
         super().__init__(breaks, coefficients, unit)
-
-
-def _pieces(spline: BSpline, breaks: Array) -> Array:
-    """A B-spline as polynomials between the breaks (`PPoly.from_spline` takes one component only)."""
-    starts = breaks[:-1]
-    taylor = [spline(starts, nu=power) / math.factorial(power) for power in range(spline.k, -1, -1)]
-    return np.array(taylor)
 
 
 def _waypoints(times: ArrayLike, points: ArrayLike) -> tuple[Array, Array]:
@@ -269,11 +241,7 @@ def _waypoints(times: ArrayLike, points: ArrayLike) -> tuple[Array, Array]:
     table = array(points, "points")
     if table.ndim == 1:
         table = table[:, None]
-    if breaks.size < 2 or table.ndim != 2 or len(table) != breaks.size:
-        raise InputError(
-            f"waypoints: expected at least two times and as many points, got {breaks.size} times and "
-            f"points of shape {table.shape}"
-        )
-    if np.any(np.diff(breaks) <= 0.0):
-        raise InputError("times: expected them to increase")
+    even = table.ndim == 2 and len(table) == breaks.size >= 2
+    expect(even, "points", f"as many as times, {breaks.size}, and at least 2", table)
+    increasing(breaks, "times")
     return breaks, table

@@ -9,8 +9,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, one_line, positive, scalar
-from nmm.errors import InputError
+from nmm.arrays import infinite, positive, scalar
+from nmm.errors import InputError, expect, expect_kind
 from nmm.functions.function import Function
 
 
@@ -38,8 +38,7 @@ class Between:
     def __init__(self, start: float = 0.0, end: float = math.inf) -> None:
         self.start = scalar(start, "start")
         self.end = math.inf if np.isposinf(end) else scalar(end, "end")
-        if self.end <= self.start:
-            raise InputError(f"end: expected a time after the start, {self.start:g} s, got {self.end:g}")
+        expect(self.end > self.start, "end", f"a time after the start, {self.start:g} s", self.end)
 
 
 class While:
@@ -74,22 +73,25 @@ class While:
         upper: ArrayLike = math.inf,
         margin: float = 0.01,
     ) -> None:
-        if not isinstance(function, Function):
-            raise InputError(f"while: expected a function of the robot, as Position('ee'), got {function!r}")
+        expect_kind(function, Function, "while", "a function of the robot, as Position('ee')")
         self.function = function
-        self.lower, self.upper = _bound(lower, "lower"), _bound(upper, "upper")
-        self.margin = scalar(margin, "margin")
-        if self.margin < 0.0:
-            raise InputError(f"margin: expected a number from 0, got {self.margin:g}")
+        self.lower = infinite(lower, "lower", "a number, or one a row")
+        self.upper = infinite(upper, "upper", "a number, or one a row")
+        self.margin = scalar(margin, "margin", least=0.0)
+        given = (self.lower, self.upper)
         try:
             above = bool(np.any(self.lower > self.upper))
         except ValueError:
-            came = f"{len(self.lower)} and {len(self.upper)}"
-            raise InputError(f"lower: expected as many numbers as in upper, got {came}") from None
-        if above:
-            raise InputError(f"lower: {one_line(self.lower)} is above upper, {one_line(self.upper)}")
-        if np.all(np.isinf(self.lower)) and np.all(np.isinf(self.upper)):
-            raise InputError("lower: expected a bound, lower or upper: without one it always holds")
+            raise InputError(where="lower", expected="as many numbers as in upper", got=given) from None
+        expect(not above, "lower", "lower below upper", given)
+        bound = np.any(np.isfinite(self.lower)) or np.any(np.isfinite(self.upper))
+        expect(bound, "lower", "a bound, lower or upper: without one it always holds")
+
+
+def by_unit(given: float | Mapping[str, float] | None, name: str) -> dict[str, float]:
+    """Numbers above 0 by unit; one for all has the unit ""."""
+    numbers = given if isinstance(given, Mapping) else {} if given is None else {"": given}
+    return {unit: positive(value, f"{name} {unit}".strip()) for unit, value in numbers.items()}
 
 
 class After:
@@ -121,26 +123,11 @@ class After:
     def __init__(
         self, task: str, within: float | Mapping[str, float] = 0.01, hold: float = 0.1, instead: bool = False
     ) -> None:
-        if not isinstance(task, str) or not task:
-            raise InputError(f"after: expected the name of a task, got {task!r}")
+        expect(isinstance(task, str) and task, "after", "the name of a task", task)
         self.task = task
-        given = within if isinstance(within, Mapping) else {"": within}
-        self.within = {unit: positive(value, f"within {unit}".strip()) for unit, value in given.items()}
-        self.hold = scalar(hold, "hold")
-        if self.hold < 0.0:
-            raise InputError(f"hold: expected a time from 0, s, got {self.hold:g}")
+        self.within = by_unit(within, "within")
+        self.hold = scalar(hold, "hold", least=0.0)
         self.instead = bool(instead)
 
 
 Condition: TypeAlias = Between | While | After
-
-
-def _bound(value: ArrayLike, name: str) -> Array:
-    """(rows,) or (1,), infinite numbers allowed."""
-    try:
-        found = np.atleast_1d(np.array(value, dtype=np.float64))
-    except (TypeError, ValueError):
-        found = np.array([[np.nan]])
-    if found.ndim != 1 or np.any(np.isnan(found)):
-        raise InputError(f"{name}: expected a number, or one a row, got {value!r}")
-    return found

@@ -1,4 +1,4 @@
-"""Pointing an axis of a frame at a point that rests, moves, or is a part of the robot."""
+"""Directions fixed in a frame: their heading about a world axis, and their deviation from a point."""
 
 from __future__ import annotations
 
@@ -7,26 +7,99 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, vector
-from nmm.errors import InputError, expect_known
+from nmm.arrays import Array, nonzero_vector
+from nmm.errors import expect_known
 from nmm.functions.function import Function, Row, Shown, Stage
 from nmm.functions.references.polynomial import Constant
-from nmm.functions.tasks.heading import UNIT
 from nmm.functions.tasks.position import as_point, check_point
 from nmm.kernels.compiled import kernel, scratch
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.kernels.rotations import transposed_times3
 from nmm.robots.robot import Robot
 
+UNIT = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+#: For each world axis, the two that span the plane in which the angle is measured, right-handed.
+PLANES = {"x": ("y", "z"), "y": ("z", "x"), "z": ("x", "y")}
+
+
+@kernel(FUNCTION)
+def heading(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
+    """ψ = atan2(e2·d, e1·d), d = R a, with d_dot = ω × d; numbers = [a, e1, e2]."""
+    frame = frames.slots[0]
+    d = scratch(3)
+    for i in range(3):
+        d[i] = 0.0
+        for j in range(3):
+            d[i] += frames.placements[frame, i, j] * numbers[j]
+    c = 0.0
+    s = 0.0
+    for i in range(3):
+        c += numbers[3 + i] * d[i]
+        s += numbers[6 + i] * d[i]
+    rows.value[0] = math.atan2(s, c)
+    square = c * c + s * s
+    for k in range(at.q.shape[0]):
+        wx = frames.jacobians[frame, 3, k]
+        wy = frames.jacobians[frame, 4, k]
+        wz = frames.jacobians[frame, 5, k]
+        dx = wy * d[2] - wz * d[1]
+        dy = wz * d[0] - wx * d[2]
+        dz = wx * d[1] - wy * d[0]
+        c_q = numbers[3] * dx + numbers[4] * dy + numbers[5] * dz
+        s_q = numbers[6] * dx + numbers[7] * dy + numbers[8] * dz
+        rows.value_q[0, k] = (c * s_q - s * c_q) / square
+
+
+def unit_vector(given: str | ArrayLike, name: str) -> Array:
+    """An axis by its name, x, y or z, or three numbers, as a unit vector (3,)."""
+    if isinstance(given, str):
+        expect_known(name, given, UNIT, name)
+        given = UNIT[given]
+    direction = nonzero_vector(given, 3, name)
+    return np.asarray(direction / float(np.linalg.norm(direction)))
+
+
+class Heading(Function):
+    """Angle ψ (rad, in (-π, π]) of a direction fixed in `frame`, about a world axis.
+
+    For a planar robot's link it is θ + q1 + ... , the link's absolute orientation.
+
+    Parameters
+    ----------
+    frame : a frame of the robot
+    direction : whose angle is taken: x, y, z or three numbers, in the frame's axes
+    about : world axis x, y or z about which the angle is measured, from the next axis in the cyclic order
+        x, y, z (about z: from x towards y)
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> here = nmm.Configuration(robot, robot.q({"theta": 0.5, "q1": 0.2}))
+    >>> nmm.evaluate(nmm.Heading("ee"), 0.0, here).value.round(3)
+    array([0.7])
+    """
+
+    def __init__(self, frame: str, direction: str | ArrayLike = "x", about: str = "z") -> None:
+        self.frame = frame
+        self.direction = unit_vector(direction, "direction")
+        expect_known("axis", about, PLANES, "about")
+        self.about = about
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        robot.frame_id(self.frame)
+        return (Row(f"{self.frame}.heading", "rad", angular=True),)
+
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        e1, e2 = (UNIT[axis] for axis in PLANES[self.about])
+        return (Stage(heading, 1, (self.frame,), np.concatenate([self.direction, e1, e2])),)
+
 
 @kernel(FUNCTION)
 def pointing(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     """y_i = (α / s) s_i by the chain rule, in place: the first three rows hold the point and its derivatives.
-
-    With l, the point as the frame sees it: s_i = b_i·l, s² = s_1² + s_2², c = a·l, α = atan2(s, c);
-    numbers = [a, b_1, b_2]. With k = α/s and r² = s² + c²:
-    dy_i = k ds_i + s_i (m (s_1 ds_1 + s_2 ds_2) - dc / r²), m = (c / r² - k) / s².
-    """
+    With l, the point as the frame sees it: s_i = b_i·l, s² = s_1² + s_2², c = a·l, α = atan2(s, c); numbers =
+    [a, b_1, b_2]. With k = α/s and r² = s² + c²:
+    dy_i = k ds_i + s_i (m (s_1 ds_1 + s_2 ds_2) - dc / r²), m = (c / r² - k) / s²."""
     frame = frames.placements[frames.slots[0]]
     d, seen, x = scratch(3), scratch(3), scratch(3)
     for i in range(3):
@@ -77,15 +150,13 @@ def pointing(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
 
 
 class Pointing(Function):
-    """How far an axis of a frame points past a point: y (2,), rad, 0 when it points at it.
+    """Deviation of a frame's axis from a point: y (2,), rad, 0 where the axis points at it.
 
-    |y| is the angle α between the axis a and the direction from the frame's origin to the point, and y
-    says which way the point lies: along b_1 and b_2, which complete a to right-handed axes of the frame
-    (for a = z: x and y). The turn about a itself is free. As a task: `Task(Pointing(...), [0, 0])`.
-
-    y is smooth wherever α < π. With the point straight behind, y = (π, 0); there, and with the point
-    in the frame's origin, no derivative exists: zeros stand for it, so that resolvers report a singular
-    matrix instead of choosing a way.
+    |y| is the angle α between the axis a and the direction from the frame's origin to the point; the
+    components of y are along b_1 and b_2, which complete a to right-handed axes of the frame (x and y for a =
+    z). The turn about a is free. As a task: `Task(Pointing(...), [0, 0])`. y is smooth for α < π. With the
+    point straight behind, y = (π, 0); there, and with the point in the frame's origin, no derivative exists:
+    it is set to zero, so that resolvers report a singular matrix.
 
     Parameters
     ----------
@@ -105,14 +176,7 @@ class Pointing(Function):
     def __init__(self, frame: str, at: Function | str | ArrayLike, axis: str | ArrayLike = "z") -> None:
         self.frame = frame
         self.at = as_point(at, "at")
-        if isinstance(axis, str):
-            expect_known("axis", axis, UNIT, "axis")
-            axis = UNIT[axis]
-        direction = vector(axis, 3, "axis")
-        length = float(np.linalg.norm(direction))
-        if length == 0.0:
-            raise InputError("axis: expected a vector that is not zero")
-        self.axis = direction / length
+        self.axis = unit_vector(axis, "axis")
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         robot.frame_id(self.frame)

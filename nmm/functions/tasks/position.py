@@ -1,20 +1,22 @@
-"""Position of a frame's origin along any of the world's axes (paper, eq. 14), or of another frame's."""
+"""Position of a frame's origin (paper, eq. 14) or of the centre of mass; distance of a frame from a point."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, vector
-from nmm.errors import InputError
-from nmm.functions.function import Function, Stage
+from nmm.errors import InputError, expect
+from nmm.functions.function import Function, Row, Stage, named
 from nmm.functions.references.polynomial import Constant
-from nmm.functions.tasks.frame_pose import PartsOfPose
-from nmm.kernels.compiled import kernel
+from nmm.functions.tasks.pose import PartsOfPose, frame_pose
+from nmm.kernels.compiled import kernel, scratch
+from nmm.kernels.linear_algebra import copied
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
-from nmm.robots.robot import Robot
+from nmm.robots.robot import CENTER_OF_MASS, Robot
 
 AXES = {"x": 0, "y": 1, "z": 2}
 
@@ -26,15 +28,13 @@ def position(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     for i in range(numbers.shape[0]):
         axis = int(numbers[i])
         rows.value[i] = frames.placements[frame, axis, 3]
-        for j in range(at.q.shape[0]):
-            rows.value_q[i, j] = frames.jacobians[frame, axis, j]
+        copied(frames.jacobians[frame, axis], rows.value_q[i])
 
 
 def picked_axes(axes: str | Sequence[str]) -> tuple[str, ...]:
-    """Some of x, y, z, each once."""
     picked = tuple(axes)
-    if not picked or len(set(picked)) != len(picked) or not set(picked) <= set(AXES):
-        raise InputError(f"axes: expected some of x, y, z, each once (as in 'xy'), got {axes!r}")
+    once = picked and len(set(picked)) == len(picked) and set(picked) <= set(AXES)
+    expect(once, "axes", "some of x, y, z, each once (as in 'xy')", axes)
     return picked
 
 
@@ -57,9 +57,8 @@ class Position(PartsOfPose):
     """
 
     def __init__(self, frame: str, axes: str | Sequence[str] = "xyz", relative_to: str | None = None) -> None:
-        self.frame = frame
+        super().__init__(frame, relative_to)
         self.axes = self.parts = picked_axes(axes)
-        self.relative_to = relative_to
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
         if self.relative_to is not None:
@@ -78,13 +77,104 @@ def as_point(given: Function | str | ArrayLike, name: str) -> Function:
 
 
 def check_point(point: Function, frame: str, robot: Robot, name: str) -> None:
-    """`InputError` when the function has not x, y and z in world axes, or is the origin of `frame` itself."""
+    """`InputError` unless the function has x, y and z in world axes and is not the origin of `frame`."""
     rows = point.rows(robot)
-    if len(rows) != 3 or any(row.unit == "rad" for row in rows):
-        came = ", ".join(f"{row.name} ({row.unit})" for row in rows)
-        raise InputError(f"{name}: expected a point with x, y and z in m, got {came}")
+    spatial = len(rows) == 3 and all(row.unit != "rad" for row in rows)
+    expect(spatial, name, "a point with x, y and z in m", named(rows))
     seen_from = getattr(point, "relative_to", None)
     if seen_from is not None:
-        raise InputError(f"{name}: expected a point in world axes, got one in {seen_from}'s")
+        raise InputError(f"it is in the axes of {seen_from}", where=name, expected="a point in world axes")
     if isinstance(point, Position) and robot.frame_id(point.frame) == robot.frame_id(frame):
-        raise InputError(f"{name}: expected another point than the origin of {frame} itself")
+        raise InputError(where=name, expected=f"another point than the origin of {frame} itself")
+
+
+class CenterOfMass(Function):
+    """Position (m) of the centre of mass of the whole robot, platform included.
+
+    Parameters
+    ----------
+    axes : some of x, y, z in the order wanted: "xy", "xyz", "z"
+    relative_to : a frame of the robot that sees it, from its origin and in its axes (the platform's, to keep
+        it above the wheels); the world when not given
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_3r")
+    >>> over_the_wheels = nmm.CenterOfMass("xy", relative_to="base_footprint")
+    >>> ahead = nmm.Configuration(robot, robot.q({"q2": np.pi / 2}))
+    >>> nmm.evaluate(over_the_wheels, 0.0, ahead).value.round(3) + 0.0
+    array([0.22, 0.  ])
+    """
+
+    def __init__(self, axes: str | Sequence[str] = "xyz", relative_to: str | None = None) -> None:
+        self.axes = picked_axes(axes)
+        self.relative_to = relative_to
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        mass = sum(inertia.mass for inertia in robot.model.inertias)
+        expected = f"a robot with mass, {robot.name} has none (its file states no <inertial>)"
+        expect(mass > 0.0, "centre of mass", expected)
+        where = ""
+        if self.relative_to is not None:
+            robot.frame_id(self.relative_to)
+            where = f" in {self.relative_to}"
+        return tuple(Row(f"com.{axis}{where}", "m") for axis in self.axes)
+
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        self.rows(robot)
+        picked = np.array([float(AXES[axis]) for axis in self.axes])
+        if self.relative_to is None:
+            return (Stage(position, len(picked), (CENTER_OF_MASS,), picked),)
+        return (Stage(frame_pose, len(picked), (CENTER_OF_MASS, self.relative_to), picked),)
+
+
+@kernel(FUNCTION)
+def distance(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
+    """|d|, d = point - p, by the chain rule, in place: the first three rows hold the point."""
+    d = scratch(3)
+    for i in range(3):
+        d[i] = rows.value[i] - frames.placements[frames.slots[0], i, 3]
+    length = math.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+    for i in range(3):  # at 0 no derivative exists
+        d[i] = d[i] / length if length > 0.0 else 0.0
+    rows.value[0] = length
+    rows.value_t[0] = d[0] * rows.value_t[0] + d[1] * rows.value_t[1] + d[2] * rows.value_t[2]
+    for k in range(at.q.shape[0]):
+        rate = 0.0
+        for i in range(3):
+            rate += d[i] * (rows.value_q[i, k] - frames.jacobians[frames.slots[0], i, k])
+        rows.value_q[0, k] = rate
+
+
+class Distance(Function):
+    """Distance (m) of a frame's origin from another frame's, or from a point.
+
+    Its derivative is set to zero at 0, where none exists, so that resolvers report a singular matrix. To make
+    two points meet, use `Position`.
+
+    Parameters
+    ----------
+    frame : a frame of the robot
+    to : the point: the name of another frame (its origin), three numbers (world axes, m), or a function with
+        three rows, of time (circle, spline, ...) or of the configuration (center_of_mass)
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> here = nmm.Configuration(robot, robot.rest)
+    >>> nmm.evaluate(nmm.Distance("base_footprint", to=[3, 4, 0]), 0.0, here).value
+    array([5.])
+    """
+
+    def __init__(self, frame: str, to: Function | str | ArrayLike) -> None:
+        self.frame = frame
+        self.to = as_point(to, "to")
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        robot.frame_id(self.frame)
+        check_point(self.to, self.frame, robot, "to")
+        return (Row(f"{self.frame}.distance", "m"),)
+
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        self.rows(robot)
+        return (*self.to.stages(robot), Stage(distance, 3, (self.frame,)))

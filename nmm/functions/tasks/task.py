@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, array, counted, one_line, positive
-from nmm.errors import InputError, expect_known
-from nmm.functions.function import Function, Row
+from nmm.arrays import Array, array, counted
+from nmm.errors import InputError, expect, expect_kind, expect_known, one_or_several
+from nmm.functions.function import Function, Row, Stage
 from nmm.functions.references.polynomial import Constant
-from nmm.functions.tasks.conditions import After, Between, Condition, While
+from nmm.functions.tasks.conditions import After, Between, Condition, While, by_unit
 from nmm.robots.robot import Robot
 
 
@@ -60,21 +60,16 @@ class Task:
         name: str = "",
         when: Condition | Sequence[Condition] = (),
     ) -> None:
-        if not isinstance(function, Function):
-            raise InputError(f"task: expected a function of the robot, as Position('ee'), got {function!r}")
+        expect_kind(function, Function, "task", "a function of the robot, as Position('ee')")
         self.function = function
         self.reference = reference if isinstance(reference, Function) else Constant(np.atleast_1d(reference))
         self.gain = gain
         self.priority = counted(priority, "priority")
-        self.speed = _by_unit(speed, "speed")
-        self.braking = _by_unit(braking, "braking")
+        self.speed = by_unit(speed, "speed")
+        self.braking = by_unit(braking, "braking")
         self.name = name
-        conditions = (when,) if isinstance(when, Between | While | After) else when
-        if not isinstance(conditions, Sequence) or not all(
-            isinstance(one, Between | While | After) for one in conditions
-        ):
-            raise InputError(f"when: expected Between, While or After, or several of these, got {when!r}")
-        self.when: tuple[Condition, ...] = tuple(conditions)
+        expected = "Between, While or After, or several of these"
+        self.when: tuple[Condition, ...] = one_or_several(when, Between | While | After, "when", expected)
 
     @property
     def always(self) -> Task:
@@ -89,14 +84,12 @@ class Task:
 
     def approach(self, robot: Robot) -> tuple[Array, Array]:
         """Speed and braking for the unit of each row, (s,) each; infinite for none."""
-        rows = self.rows(robot)
-        units = {row.unit for row in rows}
+        units = [row.unit for row in self.rows(robot)]
         for name, given in (("speed", self.speed), ("braking", self.braking)):
-            for unit in given:
-                if unit:
-                    expect_known("unit", unit, sorted(units), name)
+            for unit in filter(None, given):
+                expect_known("unit", unit, sorted(set(units)), name)
         speed, braking = (
-            np.array([given.get(row.unit, given.get("", np.inf)) for row in rows])
+            np.array([given.get(unit, given.get("", np.inf)) for unit in units])
             for given in (self.speed, self.braking)
         )
         return speed, braking
@@ -106,10 +99,10 @@ class Task:
         rows = self.function.rows(robot)
         targets = self.reference.rows(robot)
         if len(targets) != len(rows):
-            raise InputError(
-                f"task {', '.join(row.name for row in rows)}: expected a reference with {len(rows)} "
-                f"components, got {type(self.reference).__name__} with {len(targets)}"
-            )
+            what = f"{type(self.reference).__name__} has {len(targets)}"
+            where = f"task {', '.join(row.name for row in rows)}"
+            expected = f"a reference with {len(rows)} components"
+            raise InputError(what, where=where, expected=expected, got=len(targets))
         return rows
 
     def gain_matrix(self, robot: Robot) -> Array:
@@ -119,27 +112,36 @@ class Task:
         s = len(rows)
         if self.gain is None:
             return np.zeros((s, s))
-        gain = array(self.gain, name)
+        given = gain = array(self.gain, name)
         if gain.ndim == 0:
             gain = gain * np.eye(s)
         elif gain.shape == (s,):
             gain = np.diag(gain)
         elif gain.shape != (s, s):
-            raise InputError(
-                f"{name}: expected a number, {s} numbers or a {s} x {s} matrix, got shape {gain.shape}"
-            )
-        if np.linalg.eigvalsh(gain + gain.T).min() <= 0.0:
-            came = one_line(array(self.gain, name))
-            raise InputError(
-                f"{name}: expected positive definite (above 0; None for planning mode), got {came}"
-            )
+            raise InputError(where=name, expected=f"a number, {s} numbers or a {s} x {s} matrix", got=gain)
+        positive_definite = np.linalg.eigvalsh(gain + gain.T).min() > 0.0
+        expect(positive_definite, name, "positive definite (above 0; None for planning mode)", given)
         return gain
 
 
-def _by_unit(given: float | Mapping[str, float] | None, name: str) -> dict[str, float]:
-    """Numbers by unit; one for all has the unit ""."""
-    numbers = given if isinstance(given, Mapping) else {} if given is None else {"": given}
-    return {unit: positive(value, f"{name} {unit}".strip()) for unit, value in numbers.items()}
+class Comparison(Function):
+    """The error e(t, q) of a task by its function's `comparison`; without one it has no rows. Its stage reads
+    the 2 s rows before its own, so it comes right after the task's function and reference."""
+
+    def __init__(self, task: Task) -> None:
+        self.task = task
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        return () if self.task.function.comparison is None else self.task.rows(robot)
+
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        kernel, s = self.task.function.comparison, len(self.task.rows(robot))
+        if kernel is None:
+            return ()
+        for part in (self.task.function, self.task.reference):
+            found = max(stage.rows for stage in part.stages(robot))
+            expect(found == s, type(part).__name__, f"stages of {s} rows, as many as its components", found)
+        return (Stage(kernel, s, before=2 * s),)
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,9 +150,9 @@ class Stack:
 
     Examples
     --------
-    >>> hand = nmm.Task(nmm.Position("ee", "xy"), [2.0, 1.0])
+    >>> reach = nmm.Task(nmm.Position("ee", "xy"), [2.0, 1.0])
     >>> turn = nmm.Task(nmm.Heading("base_footprint"), [0.0], priority=2)
-    >>> nmm.Stack((hand, turn)).levels(nmm.load("unicycle_2r"))
+    >>> nmm.Stack((reach, turn)).levels(nmm.load("unicycle_2r"))
     (2, 1)
     """
 
@@ -161,9 +163,7 @@ class Stack:
         """A stack from a task, a stack or a sequence of tasks."""
         if isinstance(tasks, Stack):
             return tasks
-        stacked = (tasks,) if isinstance(tasks, Task) else tasks
-        if not isinstance(stacked, Sequence) or not all(isinstance(task, Task) for task in stacked):
-            raise InputError(f"expected a Task or a list of Tasks, got {tasks!r}")
+        stacked = one_or_several(tasks, Task, "task", "a Task or a list of Tasks")
         return cls(tuple(sorted(stacked, key=lambda task: task.priority)))
 
     def __iter__(self) -> Iterator[Task]:

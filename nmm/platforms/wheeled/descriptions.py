@@ -1,34 +1,31 @@
-"""Descriptions of the wheels and hitches that a platform stands on (`WheeledPlatform`).
+"""Wheels and hitches that a platform stands on (`WheeledPlatform`), also from a file.
 
-Positions are in the frame of the body that carries the wheel: x forward, y left, m. Headings are directions
-in which a wheel rolls when it spins in the positive sense, from that body's x axis, rad.
-"""
+Positions, m, are in the frame of the body that carries the wheel: x forward, y left. A heading is the
+direction of rolling with positive spin, from that body's x axis, rad."""
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from nmm.arrays import positive, scalar
-from nmm.errors import InputError
+from nmm.errors import InputError, expect
+from nmm.platforms.wheel_layout import HITCHES, Layout, Pivot, RollingJoint
 
 #: Name of the main body: of the coordinate that turns it.
 MAIN = "theta"
+#: How far a wheel's centre may be from a pivot's axis and count as on it, m.
+_ON_AXIS = 1e-6
 
 
-def _checked_name(value: object, what: str) -> str:
-    if not isinstance(value, str) or not value:
-        raise InputError(f"{what}: expected a name, got {value!r}")
-    return value
+def _check_name(value: object, where: str) -> None:
+    expect(isinstance(value, str) and value, where, "a name", value)
 
 
 def _check_joint(joint: object, lower: float, upper: float, where: str) -> None:
-    """Refuse a joint without a name or without a range."""
-    _checked_name(joint, f"{where}: joint")
-    if np.isnan(lower) or np.isnan(upper) or not lower < upper:
-        raise InputError(f"{where}: expected lower < upper, got {lower} and {upper}")
+    _check_name(joint, f"{where}: joint")
+    expect(lower < upper, where, "lower < upper", (lower, upper))
 
 
 @dataclass(frozen=True)
@@ -80,7 +77,7 @@ class WheelDescription:
     Examples
     --------
     >>> wheel = nmm.FixedWheel("left", x=0.0, y=0.3, radius=0.1)
-    >>> isinstance(wheel, nmm.WheelDescription), wheel.heading, wheel.body
+    >>> isinstance(wheel, nmm.extending.WheelDescription), wheel.heading, wheel.body
     (True, 0.0, 'theta')
     """
 
@@ -92,7 +89,7 @@ class WheelDescription:
     body: str = MAIN
 
     def __post_init__(self) -> None:
-        _checked_name(self.name, "wheel")
+        _check_name(self.name, "wheel")
         for key in ("x", "y", "heading"):
             scalar(getattr(self, key), f"wheel {self.name}: {key}")
         positive(self.radius, f"wheel {self.name}: radius")
@@ -172,10 +169,8 @@ class CasterWheel(WheelDescription):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if scalar(self.trail, f"wheel {self.name}: trail") == 0.0:
-            raise InputError(
-                f"wheel {self.name}: expected a trail other than 0: without one nothing swivels a caster"
-            )
+        where = f"wheel {self.name}: trail"
+        expect(scalar(self.trail, where) != 0.0, where, "other than 0, or nothing swivels a caster", 0.0)
 
 
 @dataclass(frozen=True)
@@ -202,8 +197,55 @@ class OmniWheel(WheelDescription):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if abs(math.cos(scalar(self.roller, f"wheel {self.name}: roller"))) < 1e-6:
-            raise InputError(
-                f"wheel {self.name}: roller angle {math.degrees(self.roller):g} deg: its rollers would turn "
-                "about the wheel's own axis and grip nothing when it spins; expected less than 90 deg"
-            )
+        where = f"wheel {self.name}: roller"
+        grips = abs(math.cos(scalar(self.roller, where))) >= 1e-6
+        expected = "an angle below 90 degrees: at 90 the wheel grips nothing when it spins"
+        expect(grips, where, expected, self.roller)
+
+
+def parts_from(layout: Layout) -> tuple[list[WheelDescription], list[Hitch]]:
+    """A file's wheels and hitches. Pivots named "hitch" or "trailer" are hitches; wheels on their bodies and
+    on the main one are fixed; on pivots named "steer", steered; behind or before other pivots, casters. A
+    file does not show rollers. `InputError` for no wheels, other pivots, casters or steered wheels on
+    pivots."""
+    expected = "wheels, which describe the platform"
+    if not layout.wheels:
+        raise InputError("no wheels found", where=layout.robot, expected=expected)
+    pivots = {pivot.joint: pivot for pivot in layout.pivots}
+    carriers = {wheel.carrier for wheel in layout.wheels} | {pivot.carrier for pivot in layout.pivots}
+    hitches = [
+        Hitch(pivot.joint, pivot.x, pivot.y, pivot.carrier, pivot.lower, pivot.upper)
+        for pivot in layout.pivots
+        if pivot.hitches and pivot.joint in carriers
+    ]
+    bodies = {MAIN, *(hitch.joint for hitch in hitches)}
+    return [_wheel(wheel, pivots, bodies, layout.robot) for wheel in layout.wheels], hitches
+
+
+def _wheel(wheel: RollingJoint, pivots: dict[str, Pivot], bodies: set[str], robot: str) -> WheelDescription:
+    if wheel.carrier in bodies:
+        return FixedWheel(wheel.joint, wheel.x, wheel.y, wheel.radius, wheel.heading, wheel.carrier)
+    where = f"{robot}: wheel {wheel.joint}"
+    if wheel.carrier not in pivots:
+        raise InputError(f"hangs on {wheel.carrier}, which is no upright joint", where=where)
+    pivot = pivots[wheel.carrier]
+    if pivot.carrier not in bodies:
+        what = f"its pivot {pivot.joint} hangs on {pivot.carrier}"
+        expected = f"the main body or a joint with one of {', '.join(HITCHES)} in its name"
+        raise InputError(what, where=where, expected=expected)
+    place = complex(wheel.x, wheel.y)
+    ahead = place * cmath.rect(1.0, -wheel.heading)  # in the wheel's own axes
+    at = (wheel.joint, pivot.x, pivot.y, wheel.radius)
+    if pivot.steers:
+        return SteeredWheel(
+            *at, wheel.heading, pivot.carrier, pivot.joint, -ahead.real, ahead.imag, pivot.lower, pivot.upper
+        )
+    if abs(place) < _ON_AXIS:
+        what = f"it is on the axis of {pivot.joint}, so it is no caster"
+        raise InputError(f"{what}; name the joint with 'steer' if it is steered, or fix it", where=where)
+    if abs(ahead.imag) > 1e-3 * abs(place):
+        what = f"it is {ahead.imag:g} m beside the axis of {pivot.joint}"
+        what += "; name the joint with 'steer' if it is steered"
+        raise InputError(what, where=where, expected="a caster's wheel behind or before its axis")
+    # A caster that looks backwards at zero has its trail ahead.
+    return CasterWheel(*at, math.remainder(wheel.heading, 2 * math.pi), pivot.carrier, -ahead.real)

@@ -5,7 +5,7 @@ None depends on x and y, and theta only turns the main body's axes: M is written
 at the end.
 ∂G/∂q_k = -M⁻¹ (∂M/∂q_k) G.
 
-The packed parameters have these sections, a line each with as many numbers as named:
+The packed parameters begin with the offsets of these sections, a line each with as many numbers as named:
 
 - BODIES: carrier, x, y: the bodies by number, the main one (0) first; body b is turned by coordinate 2 + b
 - TERMS: row, body, x, y, direction, weight: adds weight times the velocity, along a direction, of a point
@@ -19,11 +19,14 @@ An axis is given by: coordinate of its pivot (-1 without), pivot x, y, heading.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+
+import numpy as np
 
 from nmm.arrays import Array
-from nmm.kernels.compiled import PLATFORM, clear, compiled, integer_scratch, kernel, scratch, view
-from nmm.kernels.linear_algebra import eliminate
-from nmm.platforms.wheeled.sections import section
+from nmm.kernels.compiled import PLATFORM, clear, compiled, inlined, integer_scratch, kernel, scratch, view
+from nmm.kernels.linear_algebra import dot, eliminate
+from nmm.kernels.rotations import cross3
 
 BODIES, TERMS, RATES, CLOSURES, COMMON, SIZE = range(6)
 _AXIS = 4
@@ -33,6 +36,20 @@ SINGULAR = 1e-9
 #: Sideways speed of a wheel, as a share of the platform's, above which axes contradict each other. The stages
 #: of an integrator's step leave concurrent axes by the step's square: those are not to be refused.
 CONTRADICTION = 1e-3
+
+
+def pack(sections: Sequence[Array]) -> Array:
+    """[offsets of the sections and of the end, section after section], all flattened."""
+    flat = [section.ravel() for section in sections]
+    ends = len(flat) + 1 + np.cumsum([0, *(len(section) for section in flat)])
+    return np.concatenate([ends.astype(np.float64), *flat])
+
+
+@inlined
+def section(packed: Array, number: int) -> tuple[int, tuple[int]]:
+    """Where one section begins, and its extents, for `view`."""
+    first = int(packed[number])
+    return first, (int(packed[number + 1]) - first,)
 
 
 @compiled
@@ -77,11 +94,8 @@ def terms(qp: Array, bodies: Array, listed: Array, M: Array, M_q: Array) -> None
 
 @compiled
 def no_slip_line(qp: Array, axis: Array, x: float, y: float, length: float, lines: Array) -> int:
-    """A wheel's no-slip row over its carrier's twist (v_x, v_y, length ω) at (x, y).
-
-    lines (2, 3) gets the row and its derivative in the pivot's angle, whose coordinate is returned. The
-    second derivative is minus the row.
-    """
+    """Writes to lines (2, 3) a wheel's no-slip row over its carrier's (v_x, v_y, length ω) at (x, y) and its
+    derivative in the pivot's angle, whose coordinate is returned. The second derivative is minus the row."""
     coordinate = int(axis[0])
     heading = axis[3]
     if coordinate >= 0:
@@ -94,26 +108,9 @@ def no_slip_line(qp: Array, axis: Array, x: float, y: float, length: float, line
 
 
 @compiled
-def cross(a: Array, b: Array, result: Array) -> None:
-    """result = a x b."""
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        result[i] = a[j] * b[k] - a[k] * b[j]
-
-
-@compiled
-def dot(a: Array, b: Array) -> float:
-    """a . b."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@compiled
 def closures(qp: Array, listed: Array, length: float, M: Array, M_q: Array) -> float:
-    """Rows dD/dt = 0 for D = (c₁ x c₂) . c₃, the three axes' lines; returns the largest sideways share.
-
-    D = 0 says that the axes meet in one point (or are parallel). The share is D / ‖c₁ x c₂‖: the third
-    wheel's sideways speed where the first two determine the motion.
-    """
+    """Rows dD/dt = 0 for D = (c₁ x c₂) . c₃ of three axes' lines: at D = 0 they meet or are parallel. Returns
+    the largest D / ‖c₁ x c₂‖: a third wheel's sideways speed where two determine the motion."""
     lines = scratch((3, 2, 3))
     coordinates = integer_scratch(3)
     product = scratch(3)
@@ -125,7 +122,7 @@ def closures(qp: Array, listed: Array, length: float, M: Array, M_q: Array) -> f
             first = width * line + 1 + a * _AXIS
             axis = listed[first : first + _AXIS]
             coordinates[a] = no_slip_line(qp, axis, 0.0, 0.0, length, lines[a])
-        cross(lines[0, 0], lines[1, 0], product)
+        cross3(lines[0, 0], lines[1, 0], product)
         share = abs(dot(product, lines[2, 0])) / math.sqrt(dot(product, product))
         if not share <= worst:  # a share that is no number counts
             worst = share
@@ -133,12 +130,12 @@ def closures(qp: Array, listed: Array, length: float, M: Array, M_q: Array) -> f
             if coordinates[a] < 0:
                 continue
             b, c = (a + 1) % 3, (a + 2) % 3
-            cross(lines[b, 0], lines[c, 0], product)
+            cross3(lines[b, 0], lines[c, 0], product)
             M[row, coordinates[a]] += dot(product, lines[a, 1])
             M_q[row, coordinates[a], coordinates[a] - 2] -= dot(product, lines[a, 0])
             for turned, still in ((b, c), (c, b)):
                 if coordinates[turned] >= 0:
-                    cross(lines[a, 1], lines[turned, 1], product)
+                    cross3(lines[a, 1], lines[turned, 1], product)
                     sign = 1.0 if turned == b else -1.0
                     change = sign * dot(product, lines[still, 0])
                     M_q[row, coordinates[a], coordinates[turned] - 2] += change
@@ -160,7 +157,7 @@ def common_speeds(qp: Array, listed: Array, M: Array, M_q: Array) -> None:
         for a in range(2):
             axis = listed[first + 5 + a * _AXIS : first + 5 + (a + 1) * _AXIS]
             coordinates[a] = no_slip_line(qp, axis, x, y, length, lines[a])
-        cross(lines[0, 0], lines[1, 0], w)
+        cross3(lines[0, 0], lines[1, 0], w)
         norm = sign * math.sqrt(dot(w, w))
         for i in range(3):
             w[i] /= norm
@@ -169,10 +166,7 @@ def common_speeds(qp: Array, listed: Array, M: Array, M_q: Array) -> None:
         for a in range(2):
             if coordinates[a] < 0:
                 continue
-            if a == 0:
-                cross(lines[0, 1], lines[1, 0], change)
-            else:
-                cross(lines[0, 0], lines[1, 1], change)
+            cross3(lines[0, 1 - a], lines[1, a], change)
             along = dot(w, change)
             for i in range(3):
                 change[i] = (change[i] - along * w[i]) / norm

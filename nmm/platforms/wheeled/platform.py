@@ -2,29 +2,49 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Mapping, Sequence
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, vector
-from nmm.errors import InputError
-from nmm.kernels.compiled import Kernel
+from nmm.arrays import Array, scalar, vector
+from nmm.errors import InputError, expect, expect_known
 from nmm.platforms.base import Platform
-from nmm.platforms.layout import Layout
-from nmm.platforms.steering import SteeredAxle
-from nmm.platforms.wheeled.descriptions import MAIN, FixedWheel, Hitch, OmniWheel, WheelDescription
-from nmm.platforms.wheeled.fit import parts_from
-from nmm.platforms.wheeled.geometry import Bodies
+from nmm.platforms.steering import SteeredAxle, SteeringPivot
+from nmm.platforms.wheel_layout import Layout
+from nmm.platforms.wheeled.descriptions import (
+    MAIN,
+    CasterWheel,
+    FixedWheel,
+    Hitch,
+    OmniWheel,
+    SteeredWheel,
+    WheelDescription,
+    parts_from,
+)
+from nmm.platforms.wheeled.geometry import Bodies, Term, rolling_term
 from nmm.platforms.wheeled.inputs import Input
-from nmm.platforms.wheeled.kernel import BODIES, SIZE, wheeled
-from nmm.platforms.wheeled.problem import contradiction, folded, singularity
-from nmm.platforms.wheeled.rates import WheelRate, wheel_rates
-from nmm.platforms.wheeled.sections import pack
-from nmm.platforms.wheeled.steering import steered_axle
-from nmm.platforms.wheeled.structure import Constraint, choose
+from nmm.platforms.wheeled.kernel import BODIES, SIZE, pack, wheeled
+from nmm.platforms.wheeled.structure import Constraint, Structure
+
+
+class WheelRate(NamedTuple):
+    """Spin about the wheel's axis, and turn of its pivot relative to the carrier (0 without), rad/s.
+
+    Examples
+    --------
+    >>> sides = [nmm.FixedWheel(name, 0.0, y, radius=0.1) for name, y in (("left", 0.3), ("right", -0.3))]
+    >>> platform = nmm.WheeledPlatform(sides)
+    >>> rate = platform.wheel_rates([0, 0, 0], [1.0, 0.0])["left"]
+    >>> isinstance(rate, nmm.extending.WheelRate), round(rate.spin, 6), rate.turn
+    (True, 10.0, 0.0)
+    """
+
+    spin: float
+    turn: float
 
 
 class WheeledPlatform(Platform):
@@ -35,17 +55,17 @@ class WheeledPlatform(Platform):
     inputs: smooth in qp wherever the inputs determine the motion.
 
     Wheels that repeat others (the second on an axle) add no row. Steered wheels beyond those that fix the
-    centre of rotation follow: their steering rates are no inputs, and keep the axes concurrent. Steered
-    wheels with a trail are driven casters, which the motion turns, unless their rates are inputs.
+    centre of rotation follow: their steering rates are no inputs, and keep the axes concurrent. Those with a
+    trail are driven casters, which the motion turns, unless their rates are inputs.
 
     Parameters
     ----------
     wheels : their descriptions
     hitches : joints with further bodies
-    inputs : "v", "vx", "vy", "omega", "<joint>_rate", `Speed`, `Spin`, `Spins`, `CommonSpeed`; the steering
-        rates that are missing are added while they are free. By default v and omega where there is an axle,
-        v where it is steered too, vx, vy, omega where no wheel constrains the main body; then the steering
-        rates of wheels without trail
+    inputs : "v", "vx", "vy", "omega", "<joint>_rate", `WheelSpeed`, `WheelSpin`, `WeightedSpins`,
+        `CommonSpeed`; the steering rates that are missing are added while they are free. By default v and
+        omega where there is an axle, v where it is steered too, vx, vy, omega where no wheel constrains the
+        main body; then the steering rates of wheels without trail
     limits : largest absolute value of each input, by name
 
     Raises
@@ -66,6 +86,7 @@ class WheeledPlatform(Platform):
     """
 
     name = "wheeled"
+    velocity_map = wheeled
 
     def __init__(
         self,
@@ -78,11 +99,11 @@ class WheeledPlatform(Platform):
         self.wheels = tuple(wheels)
         self.hitches = tuple(hitches)
         for part, kind in [(w, WheelDescription) for w in self.wheels] + [(h, Hitch) for h in self.hitches]:
-            if not isinstance(part, kind) or type(part) is WheelDescription:
-                raise InputError(f"{self.name}: expected wheels of a kind and hitches, got {part!r}")
+            of_kind = isinstance(part, kind) and type(part) is not WheelDescription
+            expect(of_kind, self.name, "wheels of a kind, and hitches", part)
         _check_distinct([wheel.name for wheel in self.wheels], "wheel")
         self._bodies = Bodies(self.wheels, self.hitches)
-        self._structure = choose(self._bodies, self.wheels, inputs)
+        self._structure = Structure(self._bodies, self.wheels, inputs)
         self.coordinates = ("x", "y", *self._bodies.names)
         self.inputs = tuple(name for name, _, _ in self._structure.inputs)
         self.input_units = tuple(unit for _, unit, _ in self._structure.inputs)
@@ -92,21 +113,18 @@ class WheeledPlatform(Platform):
 
     @classmethod
     def fit(cls, layout: Layout) -> Self:
-        """The platform of a robot's file: see `parts_from` for which joint becomes what.
-
-        Raises
-        ------
-        InputError : as `parts_from`; a body with fixed wheels on two axles, which could not turn
-        """
+        """The platform of a robot's file: see `parts_from` for which joint becomes what, and its errors; a
+        body with fixed wheels on two axles, which could not turn, is one more."""
         platform = cls(*parts_from(layout))
         axles: dict[str, Constraint] = {}
         for constraint in platform._structure.constraints:
             wheel = constraint.wheels[0]
             if isinstance(wheel, FixedWheel) and axles.setdefault(wheel.body, constraint) is not constraint:
                 raise InputError(
-                    f"{layout.robot}: wheels {axles[wheel.body].names} and {constraint.names} are on "
-                    "different axles of one body, which could not turn; if they are omni or mecanum wheels, "
-                    "which a file does not show, or some skid, choose another platform or describe it"
+                    f"wheels {axles[wheel.body].names} and {constraint.names} are on different axles of one "
+                    "body, which could not turn; for omni or mecanum wheels, or some that skid, choose "
+                    "another platform",
+                    where=layout.robot,
                 )
         return platform
 
@@ -117,10 +135,6 @@ class WheeledPlatform(Platform):
     def measured(self, layout: Layout) -> Mapping[str, float]:
         """Of the wheels and hitches that have the names of the file's joints."""
         return _lengths(*parts_from(layout))
-
-    @property
-    def velocity_map(self) -> Kernel:
-        return wheeled
 
     @property
     def parameters(self) -> Array:
@@ -144,14 +158,11 @@ class WheeledPlatform(Platform):
         return self.p - self.mobility
 
     def described(self) -> dict[str, str]:
-        return {
-            **{
-                f"{type(wheel).__name__} {wheel.name}": f"at ({wheel.x:.4g}, {wheel.y:.4g}) m on "
-                f"{wheel.body}, radius {wheel.radius:.4g} m"
-                for wheel in self.wheels
-            },
-            **{f"Hitch {hitch.joint}": f"at ({hitch.x:.4g}, {hitch.y:.4g}) m" for hitch in self.hitches},
-        }
+        found = {}
+        for wheel in self.wheels:
+            at = f"({wheel.x:.4g}, {wheel.y:.4g}) m on {wheel.body}"
+            found[f"{type(wheel).__name__} {wheel.name}"] = f"at {at}, radius {wheel.radius:.4g} m"
+        return found | {f"Hitch {one.joint}": f"at ({one.x:.4g}, {one.y:.4g}) m" for one in self.hitches}
 
     def pfaffian(self, qp: Array) -> Array:
         """No sideways motion of a wheel on each independent axis, and steering that keeps axes concurrent."""
@@ -161,10 +172,10 @@ class WheeledPlatform(Platform):
     def problem(self, qp: ArrayLike) -> str | None:
         """Which wheels' axes contradict each other, or with which wheel an input ceases to say anything."""
         qp = vector(qp, self.n_p, "qp")
-        found = contradiction(self._structure, self._bodies, qp)
+        found = self._structure.contradiction(qp)
         if found is None and not np.all(np.isfinite(self.G(qp))):
-            found = singularity(self._structure, self._bodies, qp)
-        return found or folded(self._bodies, qp)
+            found = self._structure.singularity(qp)
+        return found or self._structure.folded(qp)
 
     def roller(self, x: float, y: float) -> float:
         """Angle γ of the rollers of the main body's wheel that is nearest to (x, y)."""
@@ -173,8 +184,28 @@ class WheeledPlatform(Platform):
         return nearest.roller if isinstance(nearest, OmniWheel) else 0.0
 
     def steered_axle(self, body: str) -> SteeredAxle | None:
-        """The main body's, where one speed and the steering angles say all (mobility 1)."""
-        return steered_axle(self.wheels, self.inputs) if body == MAIN and self.mobility == 1 else None
+        """The main body's, where one speed and the steering angles say all (mobility 1): the point of the
+        fixed axle that is beside the reference point, and the pivots whose rates are inputs.
+
+        Without fixed wheels all wheels steer, and the reference point follows the body's x axis.
+        """
+        if body != MAIN or self.mobility != 1:
+            return None
+        own = [wheel for wheel in self.wheels if wheel.body == MAIN]
+        fixed = next((wheel for wheel in own if isinstance(wheel, FixedWheel)), None)
+        middle, heading = 0j, 0.0
+        if fixed is not None:
+            heading = fixed.heading
+            forward = cmath.rect(1.0, heading)
+            middle = forward * (complex(fixed.x, fixed.y) * forward.conjugate()).real
+        pivots: dict[str, SteeringPivot] = {}
+        for wheel in own:
+            if isinstance(wheel, SteeredWheel) and wheel.centered and f"{wheel.joint}_rate" in self.inputs:
+                at = (complex(wheel.x, wheel.y) - middle) * cmath.rect(1.0, -heading)
+                zero = math.remainder(wheel.heading - heading, math.pi)  # a wheel's line has no front
+                rate = f"{wheel.joint}_rate"
+                pivots[wheel.joint] = SteeringPivot(wheel.joint, rate, at.real, at.imag, zero)
+        return SteeredAxle(tuple(pivots.values()), middle.real, middle.imag, heading) if pivots else None
 
     def wheel_rates(
         self, qp: ArrayLike, up: ArrayLike, swivels: Mapping[str, float] | None = None
@@ -192,14 +223,28 @@ class WheeledPlatform(Platform):
         qp = vector(qp, self.n_p, "qp")
         problem = self.problem(qp)
         if problem is not None:
-            raise InputError(f"{self.name}: {problem}")
+            raise InputError(problem, where=self.name)
         qp_dot = self.G(qp) @ vector(up, self.p, "up")
-        return wheel_rates(self._bodies, self.wheels, qp, qp_dot, swivels or {})
+        angles = swivels or {}
+        casters = [wheel.name for wheel in self.wheels if isinstance(wheel, CasterWheel)]
+        for name in angles:
+            expect_known("caster", name, casters, "swivels")
+        found = {}
+        for wheel in self.wheels:
+            if isinstance(wheel, CasterWheel):
+                angle = scalar(angles.get(wheel.name, 0.0), f"swivel of {wheel.name}")
+                found[wheel.name] = _caster(self._bodies, wheel, qp, qp_dot, angle)
+                continue
+            spin = float(self._bodies.row([rolling_term(self._bodies, wheel)], qp) @ qp_dot)
+            turn = 0.0
+            if isinstance(wheel, SteeredWheel):
+                turn = float(qp_dot[2 + self._bodies.number(wheel.joint)])
+            found[wheel.name] = WheelRate(spin, turn)
+        return found
 
     def _packed(self) -> Array:
-        bodies = [[body.carrier, body.place.real, body.place.imag] for body in self._bodies.all]
         sections: list[list[list[float]]] = [[] for _ in range(SIZE + 1)]
-        sections[BODIES] = bodies
+        sections[BODIES] = [[body.carrier, body.place.real, body.place.imag] for body in self._bodies.all]
         # All closures were given the platform's size.
         sections[SIZE] = [[followed.row.length] for followed in self._structure.followed[:1]] or [[1.0]]
         rows = [*self._structure.pfaffian, *(row for _, _, row in self._structure.inputs)]
@@ -212,10 +257,20 @@ class WheeledPlatform(Platform):
 def _check_distinct(names: Sequence[str], what: str) -> None:
     twice = [name for k, name in enumerate(names) if name in names[:k]]
     if twice:
-        raise InputError(f"{what} {twice[0]}: the name is given twice; {what}s: {', '.join(names)}")
+        raise InputError("the name is given twice", where=f"{what} {twice[0]}", got=tuple(names))
 
 
 def _lengths(wheels: Sequence[WheelDescription], hitches: Sequence[Hitch]) -> dict[str, float]:
     places = {wheel.name: wheel for wheel in wheels} | {hitch.joint: hitch for hitch in hitches}
     found = {f"{axis} of {name}": getattr(at, axis) for name, at in places.items() for axis in ("x", "y")}
     return found | {f"radius of {wheel.name}": wheel.radius for wheel in wheels}
+
+
+def _caster(bodies: Bodies, wheel: CasterWheel, qp: Array, qp_dot: Array, angle: float) -> WheelRate:
+    """The pivot's velocity along the heading rolls the wheel, across it swings the trail: at pivot - trail t,
+    sideways speed n·v - trail (Ω + turn) is 0 for turn = n·v / trail - Ω, Ω the carrier's rate."""
+    pivot = bodies.contact(wheel, angle)
+    sideways = Term(pivot.body, pivot.point, pivot.direction + math.pi / 2)
+    along, across = (float(bodies.row([term], qp) @ qp_dot) for term in (pivot, sideways))
+    carrier = sum(float(qp_dot[2 + body]) for body in bodies.chain(pivot.body))
+    return WheelRate(along / wheel.radius, across / wheel.trail - carrier)

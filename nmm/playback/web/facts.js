@@ -26,7 +26,7 @@
     for (const event of facts.events) {
       event.item = nmm.element(list, "li");
       const button = nmm.element(event.item, "button", { type: "button", title: "Go there" });
-      button.append(nmm.sign("line", event.run.color, event.run.dash), facts.told(event));
+      button.append(nmm.sign("line", event.run.color, event.run.dash), facts.describe(event));
       button.addEventListener("click", () => nmm.player.seek(event.time));
     }
     list.hidden = facts.events.length === 0;
@@ -37,7 +37,7 @@
     });
   };
 
-  facts.told = ({ time, text, run }) =>
+  facts.describe = ({ time, text, run }) =>
     `${nmm.fixed(nmm.stage.start + time, 3)} s ${nmm.runs.length > 1 ? `${run.name}: ` : ""}${text}`;
   facts.shown = () => facts.events.filter(({ run }) => !run.hidden);
 

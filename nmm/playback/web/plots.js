@@ -197,7 +197,7 @@
     const near = drag ? [] : nmm.facts.near(timeAt(event), (6 * span()) / (right() - nmm.curves.LEFT));
     tip.hidden = near.length === 0;
     if (near.length) {
-      tip.replaceChildren(...near.map((one) => Object.assign(document.createElement("div"), { textContent: nmm.facts.told(one) })));
+      tip.replaceChildren(...near.map((one) => Object.assign(document.createElement("div"), { textContent: nmm.facts.describe(one) })));
       place(event);
     }
     if (!drag) return;

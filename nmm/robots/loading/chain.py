@@ -1,10 +1,6 @@
-"""Any Pinocchio model made into one of ours: x, y, theta first, and one number for every joint.
+"""Rebuilds any Pinocchio model joint by joint, with x, y, theta first and one number for every joint.
 
-The model is built again joint by joint, because Pinocchio cannot change a joint's type. Frames keep their
-names, and the model given stays as it is.
-"""
-
-from __future__ import annotations
+Pinocchio cannot change a joint's type. Frames keep their names; the given model is not changed."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,11 +9,22 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from nmm.errors import RobotError
-from nmm.platforms.own_joints import PLANAR as CHAIN
-from nmm.robots.followers import Follower
-from nmm.robots.loading.joint_kinds import is_continuous, is_mimic, is_simple, kind, one_number, value_at
-from nmm.robots.loading.joint_limits import joint_limits, no_limits
+from nmm.errors import RobotError, few
+from nmm.findings import Finding
+from nmm.platforms.base import PLANAR as CHAIN
+from nmm.robots.loading.joint_kinds import (
+    is_continuous,
+    is_mimic,
+    is_simple,
+    joint_limits,
+    kind,
+    no_limits,
+    one_number,
+    reversed_joint,
+    reversed_limits,
+    value_at,
+)
+from nmm.robots.mimic_joints import MimicJoint
 
 Head = Sequence[tuple[str, Any]]
 
@@ -31,18 +38,11 @@ _CHAIN_KINDS = (("PX",), ("PY",), ("RZ", "RUBZ"))
 
 @dataclass(frozen=True)
 class Rebuilt:
-    """A model with the platform's chain, the geometry on it, and what was done.
-
-    Attributes
-    ----------
-    model : joints x, y, theta, then the others, one number each
-    geometries : copies of the geometry models given, on `model`
-    notes : what was done, a sentence each
-    """
+    """A model of joints x, y, theta, then the others, one number each; its geometry, and what was done."""
 
     model: pin.Model
     geometries: tuple[pin.GeometryModel, ...]
-    notes: tuple[str, ...]
+    notes: tuple[Finding, ...]
 
 
 def rebuild(
@@ -52,24 +52,16 @@ def rebuild(
     first: Sequence[str] = (),
     root: pin.SE3 | None = None,
     head: Head = CHAIN_JOINTS,
+    reversed_joints: Sequence[str] = (),
 ) -> Rebuilt:
-    """The same robot on the chain x, y (prismatic, m) and theta (revolute, rad), at zero where it was.
+    """The robot on the chain x, y (prismatic, m), theta (revolute, rad), or on `head`, at zero where it was.
 
-    Parameters
-    ----------
-    source : a fixed-base model (all of it will hang on the chain), one whose first joint is planar or a free
-        flyer (the chain replaces it, with z, roll and pitch at zero), or one that begins with the chain
-    geometries : its geometry models
-    where : what messages call the model
-    first : joints that come before their siblings (the platform's own), in this order
-    root : placement of the root link in the last joint of the chain (in the world without a chain)
-    head : names and joints in the chain's place: another root joint, or none for a fixed base
-
-    Raises
-    ------
-    RobotError : a joint with more than one degree of freedom, or a name that clashes with the chain's
-    """
-    plan = _Plan(source, replaced_joints(source), tuple(head), pin.SE3.Identity() if root is None else root)
+    The chain carries all of a fixed base, replaces a planar or free root (z, roll, pitch zero) or is there.
+    Joints in `first` precede their siblings; `root` places the root link in the chain's last joint (or in the
+    world); `reversed_joints`, which only turn, get the opposite axis and sign. `RobotError` for a joint with
+    several degrees of freedom, or a name of the chain's."""
+    placement = pin.SE3.Identity() if root is None else root
+    plan = _Plan(source, replaced_joints(source), tuple(head), placement, frozenset(reversed_joints))
     _check(plan, where)
     model = pin.Model()
     model.name, model.gravity = source.name, source.gravity
@@ -90,30 +82,29 @@ class _Plan:
     count: int
     head: tuple[tuple[str, Any], ...]
     root: pin.SE3
-
-    @property
-    def is_chain(self) -> bool:
-        """Whether the head is the platform's chain."""
-        return tuple(name for name, _ in self.head) == CHAIN
+    reversed_joints: frozenset[str]
 
     @property
     def keeps_chain(self) -> bool:
-        """Whether the source has the very joints that are asked for."""
-        return self.count == 3 and self.is_chain
+        return self.count == 3 and _is_chain(self.head)
 
     def moved(self, joint: int, placement: pin.SE3) -> pin.SE3:
         """The placement of something on a joint's body: what is on the root's body moves with the root."""
         return self.root * placement if joint == self.count else placement
 
 
-def followers_of(source: pin.Model) -> tuple[Follower, ...]:
+def _is_chain(head: Head) -> bool:
+    return tuple(name for name, _ in head) == CHAIN
+
+
+def mimic_joints_of(source: pin.Model) -> tuple[MimicJoint, ...]:
     """The joints that a model built with `mimic=True` has follow others."""
-    pairs = zip(source.mimicking_joints, source.mimicked_joints, strict=True)
-    found = [(joint, leader, source.joints[joint].extract()) for joint, leader in pairs]
-    return tuple(
-        Follower(str(source.names[joint]), str(source.names[leader]), float(one.scaling), float(one.offset))
-        for joint, leader, one in found
-    )
+    found = []
+    for joint, leader in zip(source.mimicking_joints, source.mimicked_joints, strict=True):
+        one = source.joints[joint].extract()
+        names = str(source.names[joint]), str(source.names[leader])
+        found.append(MimicJoint(*names, float(one.scaling), float(one.offset)))
+    return tuple(found)
 
 
 def replaced_joints(source: pin.Model) -> int:
@@ -131,24 +122,19 @@ def replaced_joints(source: pin.Model) -> int:
 
 def _check(plan: _Plan, where: str) -> None:
     source = plan.source
-    bad = [
-        f"{source.names[i]} ({kind(source.joints[i])})"
-        for i in range(plan.count + 1, source.njoints)
-        if not is_simple(source.joints[i])
-    ]
+    others = ((source.names[i], source.joints[i]) for i in range(plan.count + 1, source.njoints))
+    bad = [f"{name} ({kind(joint)})" for name, joint in others if not is_simple(joint)]
     if bad:
-        raise RobotError(
-            f"{where}: expected joints with one degree of freedom (revolute, continuous, prismatic or "
-            f"helical), got {', '.join(bad)}"
-        )
+        expected = "joints with one degree of freedom (revolute, continuous, prismatic or helical)"
+        raise RobotError(few(bad), where=where, expected=expected)
     names = {*source.names, *(frame.name for frame in source.frames)}
     clashes = [name for name in CHAIN if name in names]
     if clashes and plan.count != 3:
-        raise RobotError(f"{where}: joints or frames have the coordinates' names {', '.join(clashes)}")
+        raise RobotError(f"joints or frames have the coordinates' names {', '.join(clashes)}", where=where)
 
 
 def _add_joints(model: pin.Model, plan: _Plan, first: Sequence[str]) -> dict[int, int]:
-    """Add the chain and the source's joints; returns the new index of each of the source's joints."""
+    """Returns the new index of each of the source's joints."""
     source, count = plan.source, plan.count
     # A root joint that is not at the world's origin keeps its place: x and y count from there.
     placement = source.jointPlacements[1] if count and plan.head else pin.SE3.Identity()
@@ -162,12 +148,15 @@ def _add_joints(model: pin.Model, plan: _Plan, first: Sequence[str]) -> dict[int
     joints |= {joint: joint if plan.keeps_chain else parent for joint in range(1, count + 1)}
     neutral = pin.neutral(source)
     for joint in _order(source, count, first):
+        simple, limits = one_number(source.joints[joint], neutral), joint_limits(source, joint)
+        if source.names[joint] in plan.reversed_joints:
+            simple, limits = reversed_joint(source.joints[joint], neutral), reversed_limits(limits)
         joints[joint] = model.addJoint(
             joints[source.parents[joint]],
-            one_number(source.joints[joint], neutral),
+            simple,
             plan.moved(source.parents[joint], source.jointPlacements[joint]),
             source.names[joint],
-            *joint_limits(source, joint),
+            *limits,
         )
     # Of a replaced root there is nothing to copy, of a kept chain there is.
     for joint in range(1 if plan.keeps_chain else count + 1, source.njoints):
@@ -198,7 +187,7 @@ def _order(source: pin.Model, count: int, first: Sequence[str]) -> list[int]:
 
 
 def _add_frames(model: pin.Model, plan: _Plan, joints: Mapping[int, int]) -> dict[int, int]:
-    """Add the head's and the source's frames; returns the new index of each of the source's frames."""
+    """Returns the new index of each of the source's frames."""
     source, count = plan.source, plan.count
     if not plan.keeps_chain:
         for joint, (name, _) in enumerate(plan.head, start=1):
@@ -246,17 +235,13 @@ def _geometry(
     joints: Mapping[int, int],
     frames: Mapping[int, int],
 ) -> pin.GeometryModel:
-    geometry = pin.GeometryModel()
-    for shape in source.geometryObjects:
-        copied = pin.GeometryObject(shape)
-        copied.placement = plan.moved(shape.parentJoint, shape.placement)
-        joint = copied.parentJoint = joints[shape.parentJoint]
+    geometry = source.copy()
+    for shape in geometry.geometryObjects:
+        shape.placement = plan.moved(shape.parentJoint, shape.placement)
+        joint = shape.parentJoint = joints[shape.parentJoint]
         # A shape made by hand may name no frame: its joint's will do.
         own = model.getFrameId(model.names[joint], pin.FrameType.JOINT) if joint else 0
-        copied.parentFrame = frames.get(shape.parentFrame, own)
-        geometry.addGeometryObject(copied)
-    for pair in source.collisionPairs:
-        geometry.addCollisionPair(pair)
+        shape.parentFrame = frames.get(shape.parentFrame, own)
     return geometry
 
 
@@ -269,20 +254,21 @@ def _add_references(model: pin.Model, plan: _Plan, joints: Mapping[int, int]) ->
             continue
         for joint in range(1 if plan.keeps_chain else plan.count + 1, source.njoints):
             if not is_mimic(source.joints[joint]):
-                q[model.joints[joints[joint]].idx_q] = value_at(source.joints[joint], old)
-        for one in followers_of(source):
+                sign = -1.0 if source.names[joint] in plan.reversed_joints else 1.0
+                q[model.joints[joints[joint]].idx_q] = sign * value_at(source.joints[joint], old)
+        for one in mimic_joints_of(source):
             follower, leader = (model.joints[model.getJointId(name)] for name in (one.joint, one.leader))
             q[follower.idx_q] = one.value(q[leader.idx_q])
         model.referenceConfigurations[entry.key()] = q
 
 
-def _notes(plan: _Plan) -> list[str]:
+def _notes(plan: _Plan) -> list[Finding]:
     source, count, notes = plan.source, plan.count, []
-    if count == 1 and plan.is_chain:
-        notes.append(f"root joint {source.names[1]} ({kind(source.joints[1])}) replaced by x, y, theta")
-    continuous = [
-        source.names[i] for i in range(count + 1, source.njoints) if is_continuous(source.joints[i])
-    ]
+    if count == 1 and _is_chain(plan.head):
+        replaced = {"name": source.names[1], "kind": kind(source.joints[1])}
+        notes.append(Finding("root_replaced", replaced))
+    others = range(count + 1, source.njoints)
+    continuous = [source.names[i] for i in others if is_continuous(source.joints[i])]
     if continuous:
-        notes.append(f"continuous joints as one unbounded angle each: {', '.join(continuous)}")
+        notes.append(Finding("continuous_joints", {"names": continuous}))
     return notes

@@ -1,149 +1,216 @@
-"""Checks a URDF before Pinocchio sees it.
+"""Checks a URDF before Pinocchio sees it: its tree of links and joints, their names, mimic joints.
 
-Pinocchio answers most faults with one and the same sentence and the cause on the C library's standard
-error, and takes others (a cycle beside the tree, a link with two parents, a zero axis) without a word.
-"""
-
-from __future__ import annotations
+Pinocchio answers most faults with the same sentence and accepts others (cycles beside the tree, a link with
+two parents, zero axes) silently."""
 
 import re
+from collections import defaultdict
 from collections.abc import Container
 from dataclasses import dataclass
 from pathlib import Path
 
-from nmm.errors import RobotError, unknown
+from nmm.findings import Finding
 from nmm.platforms import PLATFORMS
-from nmm.robots.followers import Follower
-from nmm.robots.loading.check_joints import check_joint
-from nmm.robots.loading.check_links import FindMesh, check_link, check_material
-from nmm.robots.loading.check_mimics import check_mimics
-from nmm.robots.loading.check_tree import check_names, check_tree, movable_on_root
-from nmm.robots.loading.findings import Findings, Problem, children
-from nmm.robots.loading.xml_tree import Element, XmlError, parse
+from nmm.robots.loading.check_parts import FindMesh, check_joint, check_link, check_material
+from nmm.robots.loading.xml_tree import Attributes, Element, Owner, XmlError, child, children, link_at, parse
+from nmm.robots.mimic_joints import MimicJoint
 
-_SHOWN = 12
 _VERSION = re.compile(r"1\.[012]")
-
-__all__ = ["CheckedUrdf", "Problem", "check", "find_problems"]
+#: Names of frames that the model gets anyway.
+RESERVED = {
+    "x": "a coordinate",
+    "y": "a coordinate",
+    "theta": "a coordinate",
+    "universe": "Pinocchio's world",
+}
 
 
 @dataclass(frozen=True)
 class CheckedUrdf:
-    """A description without problems.
-
-    Attributes
-    ----------
-    root : its <robot> element
-    name : the robot's name
-    meshes : files of its meshes, by the name in the description
-    followers : joints that follow others, each after the one that it follows
-    platform : the kind of platform that it declares, if it does
-    """
+    """A description without problems: its <robot> element and what is said there. `meshes` are files by the
+    name in the description; each mimic joint comes after its leader. `spared` are faults that kinematics does
+    not feel."""
 
     root: Element
     name: str
     meshes: dict[str, Path]
-    followers: tuple[Follower, ...]
+    mimic_joints: tuple[MimicJoint, ...]
     platform: str | None
+    spared: tuple[Finding, ...]
 
 
-def find_problems(
-    xml_text: str, find_mesh: FindMesh | None = None, lock: Container[str] = ()
-) -> list[Problem]:
-    """All that is wrong with a URDF.
-
-    Parameters
-    ----------
-    xml_text : the expanded description
-    find_mesh : the path of a mesh by its name in the file, a sentence that says why there is none, or None
-        to leave its shape out; without it, mesh files are taken to exist
-    lock : names of joints that will not move, so that they follow nobody
-    """
-    return _inspect(xml_text, find_mesh or Path, lock)[1]
-
-
-def check(
-    xml_text: str,
-    where: str,
-    find_mesh: FindMesh | None = None,
-    lock: Container[str] = (),
-    lines: bool = True,
-) -> CheckedUrdf:
-    """The description, if nothing is wrong with it.
-
-    Parameters
-    ----------
-    xml_text, find_mesh, lock : as for `find_problems`
-    where : the file, for the message
-    lines : whether the text's lines are those of the file
-
-    Raises
-    ------
-    RobotError : names the file and every problem in one line
-    """
-    checked, problems = _inspect(xml_text, find_mesh or Path, lock)
-    if checked is not None and not problems:
-        return checked
-    shown = [str(problem) if lines else problem.message for problem in problems[:_SHOWN]]
-    more = [f"and {len(problems) - _SHOWN} more"] if len(problems) > _SHOWN else []
-    raise RobotError(f"{where}: {'; '.join(shown + more)}")
-
-
-def _inspect(
-    text: str, find_mesh: FindMesh, lock: Container[str]
-) -> tuple[CheckedUrdf | None, list[Problem]]:
+def inspect(
+    text: str, find_mesh: FindMesh | None = None, lock: Container[str] = ()
+) -> tuple[CheckedUrdf | None, list[Finding]]:
+    """A URDF's description (None where the text is none) and its faults. Without `find_mesh`, mesh files are
+    taken to exist; joints in `lock` will not move, and so follow none."""
     try:
         root = parse(text)
     except XmlError as error:
-        return None, [Problem(str(error), error.line)]
+        return None, [error.finding]
+    reader = Attributes()
     if root.tag != "robot":
-        return None, [Problem(f"expected <robot> as the root element, got <{root.tag}>", root.line)]
-    # A xacro file is no URDF: whatever else is wrong follows from that.
+        reader.add(root, "not_robot", got=root.tag)
+        return None, reader.found
+    return _check_robot(root, reader, find_mesh or Path, lock), reader.found
+
+
+def _check_robot(root: Element, reader: Attributes, find_mesh: FindMesh, lock: Container[str]) -> CheckedUrdf:
+    spared = Attributes()
     for element in root.iter():
         if element.tag.startswith("xacro:") and isinstance(element, Element):
-            message = f"holds xacro (<{element.tag}>): name the file .xacro, so that it is expanded"
-            return None, [Problem(message, element.line)]
-    findings = Findings()
-    checked = _check_robot(root, findings, find_mesh, lock)
-    return checked, findings.problems
-
-
-def _check_robot(root: Element, findings: Findings, find_mesh: FindMesh, lock: Container[str]) -> CheckedUrdf:
+            spared.add(element, "xacro_left_over", element=element.tag)
     if not root.get("name"):
-        findings.add(root, "<robot> has no name")
+        reader.add(root, "attribute_missing", element="robot", attribute="name")
     version = root.get("version", "1.0")
     if not _VERSION.fullmatch(version):
-        findings.add(root, f"<robot> version: expected 1.0, 1.1 or 1.2, got {version!r}")
+        reader.add(root, "version_unknown", got=version)
     links, joints = children(root, "link"), children(root, "joint")
-    check_names(links, "link", findings)
-    check_names(joints, "joint", findings)
-    check_tree(links, joints, findings)
+    _check_names(links, "link", reader)
+    _check_names(joints, "joint", reader)
+    _check_tree(links, joints, reader)
     materials: set[str] = set()
     for material in children(root, "material"):
-        check_material(material, "robot", findings)
+        check_material(material, {"part": "robot"}, spared)
         name = material.get("name", "")
         if name in materials:
-            findings.add(material, f"two materials named {name!r}")
+            reader.add(material, "name_twice", kind="material", name=name)
         materials.add(name)
     meshes: dict[str, Path] = {}
     for link in links:
-        meshes |= check_link(link, findings, find_mesh)
-    first = movable_on_root(joints)
+        check_link(link, reader, spared, find_mesh, meshes)
+    first = _movable_on_root(joints)
     for joint in joints:
-        check_joint(joint, findings, carries_all=first == [joint])
-    followers = check_mimics(joints, findings, lock)
-    return CheckedUrdf(root, root.get("name") or "", meshes, followers, _declared_platform(root, findings))
+        check_joint(joint, reader, spared, carries_all=first == [joint])
+    mimic_joints = check_mimics(joints, reader, spared, lock)
+    platform, name = _declared_platform(root, reader), root.get("name") or ""
+    return CheckedUrdf(root, name, meshes, mimic_joints, platform, tuple(spared.found))
 
 
-def _declared_platform(root: Element, findings: Findings) -> str | None:
+def _declared_platform(root: Element, reader: Attributes) -> str | None:
     """The platform of `<nmm platform="car"/>` below <robot>: other tools do not look at it."""
     platform: str | None = None
+    owner = {"part": "<nmm>"}
     for element in children(root, "nmm"):
-        for attribute in sorted(set(element.keys()) - {"platform"}):
-            findings.add(element, unknown("attribute", attribute, ["platform"], "<nmm>"))
-        name = findings.text(element, "platform", "robot")
+        for attribute in sorted({*element.keys()}):
+            reader.choice(element, attribute, ("platform",), "attribute", owner)
+        name = reader.text(element, "platform", {"part": "robot"})
         if name is not None and platform is not None:
-            findings.add(element, "robot: a second <nmm>, expected one")
-        elif name is not None and findings.choice(element, name, tuple(PLATFORMS), "platform", "<nmm>"):
+            reader.add(element, "platform_twice", {"part": "robot"})
+        elif name is not None and reader.choice(element, name, tuple(PLATFORMS), "platform", owner):
             platform = name
     return platform
+
+
+def _check_names(elements: list[Element], kind: str, reader: Attributes) -> None:
+    seen: set[str] = set()
+    for element in elements:
+        name = element.get("name")
+        if not name:
+            reader.add(element, "name_missing", kind=kind)
+        elif name in RESERVED:
+            reader.add(element, "name_reserved", kind=kind, name=name, taken_by=RESERVED[name])
+        elif name in seen:
+            reader.add(element, "name_twice", kind=kind, name=name)
+        else:
+            seen.add(name)
+
+
+def _check_tree(links: list[Element], joints: list[Element], reader: Attributes) -> None:
+    names = list(dict.fromkeys(name for link in links if (name := link.get("name"))))
+    if not names:
+        reader.add(None, "no_links")
+        return
+    parents: dict[str, list[str]] = defaultdict(list)
+    for joint in joints:
+        ends = {tag: _end(joint, tag, names, reader) for tag in ("parent", "child")}
+        if ends["parent"] and ends["child"]:
+            parents[ends["child"]].append(ends["parent"])
+            if len(parents[ends["child"]]) == 2:
+                reader.add(joint, "two_parents", name=ends["child"], parents=[*parents[ends["child"]]])
+        elif ends["child"]:
+            # Its parent is wrong, which has been found: it is not a second root as well.
+            parents[ends["child"]].append("")
+    _check_cycles(names, parents, reader)
+    roots = [name for name in names if not parents[name]]
+    if len(roots) > 1:
+        reader.add(None, "several_roots", roots=roots)
+
+
+def _movable_on_root(joints: list[Element]) -> list[Element]:
+    """The movable joints on the root link and on links fixed to it."""
+    ends = [(link_at(joint, "parent"), link_at(joint, "child")) for joint in joints]
+    fixed = [pair for pair, joint in zip(ends, joints, strict=True) if joint.get("type") == "fixed"]
+    grown = {parent for parent, _ in ends} - {below for _, below in ends}
+    body: set[str] = set()
+    while grown != body:
+        body, grown = grown, grown | {below for parent, below in fixed if parent in grown}
+    movable = zip(joints, ends, strict=True)
+    return [joint for joint, (parent, _) in movable if joint.get("type") != "fixed" and parent in body]
+
+
+def _end(joint: Element, tag: str, names: list[str], reader: Attributes) -> str | None:
+    """The parent or child link of a joint, or None with a finding."""
+    owner = {"joint": joint.get("name")}
+    element = child(joint, tag)
+    if element is None:
+        reader.add(joint, "element_missing", owner, element="joint", missing=tag)
+        return None
+    link = reader.text(element, "link", owner)
+    known = link is not None and reader.choice(element, link, names, f"{tag} link", owner)
+    return link if known else None
+
+
+def _check_cycles(names: list[str], parents: dict[str, list[str]], reader: Attributes) -> None:
+    done: set[str] = set()
+    for name in names:
+        path: list[str] = []
+        link = name
+        while link and link not in done and link not in path:
+            path.append(link)
+            link = next(iter(parents[link]), "")
+        if link in path:
+            cycle = path[path.index(link) :]
+            reader.add(None, "cycle", links=[*reversed([*cycle, link])])
+        done.update(path)
+
+
+def check_mimics(
+    joints: list[Element], reader: Attributes, spared: Attributes, lock: Container[str] = ()
+) -> tuple[MimicJoint, ...]:
+    """The mimic joints, each after its leader; a joint in `lock`, or after what is no joint, follows none."""
+    named = {joint.get("name", ""): joint for joint in joints}
+    mimic_joints: dict[str, MimicJoint] = {}
+    for name, joint in named.items():
+        element = child(joint, "mimic")
+        moves = joint.get("type") != "fixed" and name not in lock
+        found = _mimic_joint(element, name, reader) if element is not None and moves else None
+        if found is not None and found.leader in named:
+            mimic_joints[name] = found
+        elif found is not None:
+            spared.add(element, "leader_unknown", {"joint": name}, leader=found.leader)
+    chains = {name: _chain(name, mimic_joints) for name in mimic_joints}
+    for name, chain in chains.items():
+        if chain[-1] in mimic_joints:
+            reader.add(named[name], "mimic_cycle", {"joint": name}, joints=chain)
+    return tuple(sorted(mimic_joints.values(), key=lambda one: len(chains[one.joint])))
+
+
+def _mimic_joint(element: Element, name: str, reader: Attributes) -> MimicJoint | None:
+    owner: Owner = {"joint": name}
+    leader = reader.text(element, "joint", owner)
+    multiplier, offset = (reader.number(element, key, owner) for key in ("multiplier", "offset"))
+    if leader is None:
+        return None
+    return MimicJoint(name, leader, 1.0 if multiplier is None else multiplier, offset or 0.0)
+
+
+def _chain(name: str, mimic_joints: dict[str, MimicJoint]) -> list[str]:
+    """The joint, its leader, and so on; ends with one that follows none, or one met before."""
+    chain = [name]
+    while chain[-1] in mimic_joints:
+        leader = mimic_joints[chain[-1]].leader
+        chain.append(leader)
+        if leader in chain[:-1]:
+            break
+    return chain

@@ -1,116 +1,95 @@
-"""A robot description: the expanded URDF text of a .urdf or .xacro file, and where it came from."""
+"""A robot description: the URDF text of a .urdf or .xacro file, expanded in this process, and its packages.
 
-from __future__ import annotations
+A xacro file is a program (`${...}` are Python expressions): load only files that you would run.
+"""
 
+import io
 import os
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, redirect_stderr
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from nmm.errors import RobotError
+from nmm.errors import RobotError, expect_known
+from nmm.findings import Finding
+from nmm.findings.robot_file import refusal
 from nmm.robots.loading.packages import Packages
-from nmm.robots.loading.text import read_text
-from nmm.robots.loading.xacro_file import expand
-from nmm.robots.loading.xml_tree import XmlError, parse
-from nmm.words import one_line
+from nmm.robots.loading.xml_tree import XmlError, parse, read_text
+from nmm.text_format import one_line
 
 SUFFIXES = (".urdf", ".xacro")
+#: Robots in other languages, by their files' suffixes.
+_OTHERS = {".sdf": "SDF", ".xml": "MJCF", ".mjcf": "MJCF", ".usd": "USD", ".usda": "USD"}
 _LINK = re.compile(r"<link\b")
+_COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
+#: What xacro gives a meaning to in any file; calls of macros alone may be left over.
+_XACRO = re.compile(r"<xacro:(?:include|macro|property|arg|if|unless)\b|\$\((?:find|arg|env|optenv|eval) ")
+# xacro keeps its stacks, arguments and verbosity in module globals.
+_LOCK = threading.RLock()
 
 
 @dataclass(frozen=True)
 class Description:
-    """An expanded description.
-
-    Attributes
-    ----------
-    xml : URDF text
-    path : the file it was read from
-    packages : where its packages and meshes are
-    expanded : whether xacro wrote the text, so that its lines are not the file's
-    arguments : the xacro arguments used, defaults included
-    notes : what xacro warned of
-    """
+    """URDF text read from `path`; `expanded` by xacro, its lines are not the file's. `arguments` are the
+    xacro arguments used, defaults included; `notes` xacro's warnings."""
 
     xml: str
     path: Path
     packages: Packages
-    expanded: bool
-    arguments: Mapping[str, str]
-    notes: tuple[str, ...]
+    expanded: bool = False
+    arguments: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[Finding, ...] = ()
 
 
 def describe(
-    path: str | Path,
-    arguments: Mapping[str, object] | None = None,
-    package_dirs: Sequence[str | Path] = (),
+    path: str | Path, arguments: Mapping[str, object] | None = None, package_dirs: Sequence[str | Path] = ()
 ) -> Description:
-    """Read a .urdf, .xacro or .urdf.xacro file.
-
-    Parameters
-    ----------
-    path : the file
-    arguments : values of its `xacro:arg`s: strings, numbers or booleans
-    package_dirs : folders that are, or hold, the ROS packages that the file speaks of
-
-    Raises
-    ------
-    RobotError : the file cannot be read or expanded, or an argument is unknown
-    """
+    """Reads a .urdf, .xacro or .urdf.xacro file, and expands xacro in any; `RobotError` if unreadable, or for
+    an unknown argument."""
     file = Path(os.path.expanduser(path))  # pathlib's raises when there is no such user
     texts = argument_texts(arguments)
     _check_file(file)
     packages = Packages(file, package_dirs)
-    if file.suffix.lower() == ".xacro":
+    text = None if file.suffix.lower() == ".xacro" else read_text(file)
+    if text is None or _XACRO.search(_COMMENT.sub("", text)):
         xml, used, warnings = expand(file.absolute(), texts, packages)
         if not _LINK.search(xml):
-            _complain_of_macros(file)
-        notes = tuple(f"xacro {warning}" for warning in warnings)
-        return Description(xml, file, packages, True, used, notes)
+            _refuse_macros(file)
+        notes = tuple(Finding("xacro_warned", {"text": text}) for text in warnings)
+        return Description(xml, file, packages, expanded=True, arguments=used, notes=notes)
     if texts:
-        raise RobotError(f"{file}: arguments ({', '.join(texts)}) are for .xacro files, a .urdf has none")
-    return Description(read_text(file), file, packages, False, {}, ())
+        what = f"arguments ({', '.join(texts)}) are for .xacro files, a .urdf has none"
+        raise RobotError(what, where=file)
+    return Description(text, file, packages)
 
 
-def _complain_of_macros(file: Path) -> None:
-    """`RobotError` that names the macros of a file that only defines some."""
+def _refuse_macros(file: Path) -> None:
     try:
         macros = [one for one in parse(read_text(file)).iter("xacro:macro") if one.get("name")]
     except XmlError:
         return
     if macros:
-        told = "; ".join(
-            f"{one.get('name')} ({one.get('params', '').strip() or 'no parameters'})" for one in macros
-        )
-        raise RobotError(
-            f"{file}: holds no robot, only macros: {one_line(told, 400)}; write a .xacro file that includes "
-            f"it and calls one: <xacro:include filename={str(file.name)!r}/> "
-            f"<xacro:{macros[0].get('name', '').removeprefix('xacro:')} .../>"
-        )
+        parameters = {one.get("name", ""): one.get("params", "").strip() for one in macros}
+        raise refusal(file, Finding("only_macros", {"name": file.name, "macros": parameters}))
 
 
 def argument_texts(arguments: Mapping[str, object] | None) -> dict[str, str]:
-    """The arguments as xacro wants them: text, with booleans as true and false.
-
-    Raises
-    ------
-    RobotError : a name that is no string, or a value that is no string, number or boolean
-    """
+    """The arguments as xacro wants them: text, booleans as true and false; `RobotError` for others."""
     if arguments is not None and not isinstance(arguments, Mapping):
-        raise RobotError(f"arguments: expected a value for each name, got {arguments!r}")
+        raise RobotError(where="arguments", expected="a value for each name", got=arguments)
     texts: dict[str, str] = {}
     for name, value in (arguments or {}).items():
         if not isinstance(name, str):
-            raise RobotError(f"arguments: expected names as strings, got {name!r}")
-        if isinstance(value, bool | np.bool_):
-            texts[name] = "true" if value else "false"
-        elif isinstance(value, str | int | float | np.integer | np.floating):
-            texts[name] = str(value)
-        else:
-            raise RobotError(f"arguments: {name}: expected a string, a number or a boolean, got {value!r}")
+            raise RobotError(where="arguments", expected="names as strings", got=name)
+        if not isinstance(value, str | int | float | np.bool_ | np.integer | np.floating):
+            expected = "a string, a number or a boolean"
+            raise RobotError(where=f"arguments: {name}", expected=expected, got=value)
+        texts[name] = str(value).lower() if isinstance(value, bool | np.bool_) else str(value)
     return texts
 
 
@@ -119,10 +98,135 @@ def _check_file(file: Path) -> None:
         exists = file.exists()
     except (OSError, ValueError) as error:  # too long a name, a null character, a locked folder
         reason = (isinstance(error, OSError) and error.strerror) or error
-        raise RobotError(f"{one_line(repr(str(file)), 100)} cannot be read ({reason})") from None
+        raise RobotError(f"cannot be read ({reason})", where=one_line(repr(str(file)), 100)) from None
     if not exists:
-        raise RobotError(f"{file}: no such file")
+        raise RobotError("no such file", where=file)
     if file.is_dir():
-        raise RobotError(f"{file}: expected a .urdf or .xacro file, this is a directory")
+        raise RobotError("this is a directory", where=file, expected="a .urdf or .xacro file")
     if file.suffix.lower() not in SUFFIXES:
-        raise RobotError(f"{file}: expected a name that ends in .urdf or .xacro")
+        kind = _OTHERS.get(file.suffix.lower())
+        what = f"{kind} is not read: give the URDF or xacro file that it was made from" if kind else ""
+        raise RobotError(what, where=file, expected="a name that ends in .urdf or .xacro", got=file.name)
+
+
+def expand(
+    path: Path, arguments: Mapping[str, str], packages: Packages
+) -> tuple[str, dict[str, str], tuple[str, ...]]:
+    """The expanded text of a xacro file, its declared arguments with the values used, and xacro's warnings;
+    `RobotError` with the file and the cause."""
+    import xacro  # 10 ms, and a URDF needs none of it
+    import xacro.substitution_args
+
+    given = _Arguments(arguments)
+    printed = io.StringIO()
+    with _LOCK, _patched(xacro, packages), redirect_stderr(printed):
+        try:
+            document = xacro.process_file(str(path), mappings=given)
+            xml = document.toxml()
+        # Expressions in the file may raise anything, and so may xacro on what they return.
+        except Exception as error:
+            raise _explained(error, path, xacro) from None
+        finally:
+            xacro.substitution_args_context["arg"] = {}
+            xacro.init_stacks(None)
+    for name in arguments:
+        expect_known("xacro argument", name, given.declared, path, RobotError)
+    warnings = [line for line in printed.getvalue().splitlines() if line.startswith("warning: ")]
+    return str(xml), {name: given[name] for name in given.declared}, tuple(dict.fromkeys(warnings))
+
+
+class _Arguments(dict[str, str]):
+    """xacro's table of arguments, which remembers those that the file asks for while xacro expands it."""
+
+    def __init__(self, given: Mapping[str, str]) -> None:
+        super().__init__(given)
+        self.declared: dict[str, None] = {}
+
+    def __contains__(self, name: object) -> bool:
+        # `xacro:arg` asks whether the caller gave a value before it sets the default.
+        self.declared[str(name)] = None
+        return super().__contains__(name)
+
+    def __getitem__(self, name: str) -> str:
+        # `$(arg name)` without `xacro:arg` takes a given value, too.
+        value = super().__getitem__(name)
+        self.declared[name] = None
+        return value
+
+
+@contextmanager
+def _patched(xacro: Any, packages: Packages) -> Iterator[None]:
+    """xacro with our reading of files and package search, and fewer messages."""
+    substitution = xacro.substitution_args
+
+    def find(package: str) -> str:
+        folder = packages.find(package, Path(xacro.filestack[-1] if xacro.filestack else packages.file))
+        if folder is None:
+            lost = packages.missing(package, f"$(find {package})")
+            raise refusal(packages.file, replace(lost, where=_inner(packages.file, xacro)))
+        return str(folder)
+
+    saved = (xacro.parse, substitution._eval_find, xacro.all_includes, xacro.verbosity)
+    xacro.parse, substitution._eval_find = _reader(xacro, packages.file, saved[0]), find
+    xacro.all_includes, xacro.verbosity = [], 0
+    try:
+        yield
+    finally:
+        xacro.parse, substitution._eval_find, xacro.all_includes, xacro.verbosity = saved
+
+
+def _reader(xacro: Any, main: Path, original: Callable[..., Any]) -> Callable[..., Any]:
+    """`xacro.parse`, which reads UTF-8 in any locale and refuses a DOCTYPE before anything is expanded."""
+
+    def read(text: Any, filename: str | None = None) -> Any:
+        if text is not None or filename is None:
+            return original(text, filename)
+        try:
+            content = read_text(Path(filename))
+            parse(content)
+        except FileNotFoundError as error:
+            xacro.filestack.pop()  # as xacro does: the error is the including file's
+            raise xacro.XacroException(
+                f"included file {filename} does not exist", exc=_Missing(error)
+            ) from None
+        except RobotError as error:
+            found = error.findings
+        except XmlError as error:
+            found = (error.finding,)
+        else:
+            return original(content)
+        if Path(filename) != main:
+            found = tuple(replace(one, where={"file": filename, **one.where}) for one in found)
+        raise refusal(main, *found)
+
+    return read
+
+
+class _Missing(OSError):
+    """A missing file; as an OSError, so that xacro can leave out an optional include."""
+
+    def __str__(self) -> str:
+        return ""
+
+
+def _inner(path: Path, xacro: Any) -> dict[str, str]:
+    """The included file that xacro was reading, unless it is the user's own."""
+    inner = xacro.filestack[-1] if xacro.filestack else None
+    return {} if inner is None or Path(inner) == path else {"file": str(inner)}
+
+
+def _explained(error: BaseException, path: Path, xacro: Any) -> RobotError:
+    """The innermost cause in one line; xacro wraps it once for each expression around it."""
+    while isinstance(getattr(error, "exc", None), xacro.XacroException | RobotError):
+        error = error.exc  # type: ignore[attr-defined]  # XacroException has it, as just asked
+    if isinstance(error, RobotError):
+        return error
+    inside = getattr(error, "exc", None)
+    code, values = "xacro_failed", {"reason": one_line(str(error)) or type(error).__name__}
+    if isinstance(inside, xacro.substitution_args.ArgException):
+        code, values = "xacro_argument_missing", {"name": str(inside)}
+    elif isinstance(error, RecursionError) or isinstance(inside, RecursionError):
+        code, values = "xacro_endless", {}
+    elif inside is not None and str(error).startswith("<class "):
+        values = {"reason": one_line(str(inside))}  # what a $(...) raised, which xacro repeats, and its type
+    return refusal(path, Finding(code, values, _inner(path, xacro)))

@@ -9,14 +9,13 @@ from typing import Literal
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from nmm.errors import InputError, RobotError
+from nmm.errors import RobotError, expect_kind
 from nmm.platforms import Platform, platform_by_name
 from nmm.robots.loading.models import Options, robot_from
-from nmm.robots.loading.packages import package_file
-from nmm.robots.loading.postures import with_srdf
-from nmm.robots.loading.source import PACKAGE, path_of, read_file, read_model
+from nmm.robots.loading.packages import PACKAGE, package_file
+from nmm.robots.loading.source import read_file, read_model, source_path
+from nmm.robots.loading.srdf import with_srdf
 from nmm.robots.robot import Robot
-from nmm.words import printable, short_words
 
 
 def load(
@@ -52,12 +51,13 @@ def load(
     platform : the platform, or its name, by which it is measured in the file; by default what the file
         declares, `<nmm platform="car"/>` below <robot>, or a car where two wheels, or one, steer as a car's
         do, or else a unicycle
-    package_dirs : folders that are, or hold, the ROS packages that the file speaks of
+    package_dirs : folders that are, or hold, the ROS packages that the file speaks of; "NAME=FOLDER" is that
+        of the package NAME
     wheels : joints that only roll, or the radius (m) of each; `()` for none. By default those with "wheel"
         in the joint's or link's name, with a level axis and no joint below them; on a fixed base they
         stand still
     lock : joints to fix, and their values (rad or m), within their limits; joints that follow them are fixed
-        with them, and one that is fixed itself follows nobody. A name with * (any letters) or ? (one) stands
+        with them, and one that is fixed itself follows none. A name with * (any letters) or ? (one) stands
         for all joints that match and that no other key names: {"*finger*": 0}
     axle : the platform's reference point in the root link: a frame, whose yaw counts too, or x, y(, z) in m
     name : the robot's name; by default that of the file or model
@@ -84,32 +84,27 @@ def load(
     """
     if isinstance(platform, str):
         platform_by_name(platform)  # before anything is read
-    elif platform is not None and not isinstance(platform, Platform):
-        raise InputError(f"platform: expected a Platform or its name, got {platform!r}")
+    elif platform is not None:
+        expect_kind(platform, Platform, "platform", "a Platform or its name")
     folders = [package_dirs] if isinstance(package_dirs, str | Path) else package_dirs
-    try:
-        if lock is not None and not isinstance(lock, Mapping):
-            raise RobotError(f"lock: expected a value for each joint's name, got {lock!r}")
-        if name is not None and not isinstance(name, str):
-            raise RobotError(f"name: expected a string, got {name!r}")
-        if limits is not None and not isinstance(limits, Mapping):
-            raise RobotError(f"limits: expected a value for each input's name, got {limits!r}")
-        if srdf is not None and not isinstance(srdf, str | Path):
-            raise RobotError(f"srdf: expected a path, got {srdf!r}")
-        if isinstance(srdf, str) and srdf.startswith(PACKAGE):
-            srdf = package_file(srdf, folders)
-        options = Options(platform, wheels, lock or {}, axle, name, limits or {})
-        if isinstance(source, pin.Model):
-            if arguments or folders:
-                raise RobotError("arguments and package_dirs are for files, the source is a pin.Model")
-            model = read_model(source, visual_model, collision_model)
-            return with_srdf(robot_from(model, options), srdf, None, model.name)
-        if visual_model is not None or collision_model is not None:
-            raise RobotError(
-                "visual_model and collision_model are for a pin.Model, a file holds its own shapes"
-            )
-        read = read_file(source, arguments, folders, options.lock, missing_meshes)
-        return with_srdf(robot_from(read, options), srdf, path_of(source, folders), read.name)
-    except RobotError as error:
-        # Names in files and of files may hold anything and be of any length, a message is one line.
-        raise RobotError(short_words(printable(str(error)))) from None
+    for given, kind, argument, expected in (
+        (lock, Mapping, "lock", "a value for each joint's name"),
+        (name, str, "name", "a string"),
+        (limits, Mapping, "limits", "a value for each input's name"),
+        (srdf, str | Path, "srdf", "a path"),
+    ):
+        if given is not None and not isinstance(given, kind):
+            raise RobotError(where=argument, expected=expected, got=given)
+    if isinstance(srdf, str) and srdf.startswith(PACKAGE):
+        srdf = package_file(srdf, folders)
+    options = Options(platform, wheels, lock or {}, axle, name, limits or {})
+    if isinstance(source, pin.Model):
+        if arguments or folders:
+            raise RobotError("they are for files, not for a pin.Model", where="arguments, package_dirs")
+        model = read_model(source, visual_model, collision_model)
+        return with_srdf(robot_from(model, options), srdf, None, model.name)
+    if visual_model is not None or collision_model is not None:
+        what = "they are for a pin.Model: a file holds its own shapes"
+        raise RobotError(what, where="visual_model, collision_model")
+    read = read_file(source, arguments, folders, options.lock, missing_meshes)
+    return with_srdf(robot_from(read, options), srdf, source_path(source, folders), read.name)

@@ -1,41 +1,43 @@
 """From what was read to a `Robot`: joints locked, reference point, platform, wheels, in this order."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
+from nmm.arrays import array
 from nmm.errors import InputError, RobotError, expect_known
-from nmm.platforms import Fixed, Layout, Platform, platform_by_name, usual_platform
-from nmm.robots.loading.added_joint import with_joint
-from nmm.robots.loading.axle import axle_note, axle_placement
+from nmm.findings import Finding
+from nmm.platforms import AddedJoint, FixedBase, Layout, Platform, platform_by_name, usual_platform
 from nmm.robots.loading.chain import CHAIN, Rebuilt, rebuild
-from nmm.robots.loading.collision_pairs import add_pairs
-from nmm.robots.loading.following import among_coordinates, limit_notes
-from nmm.robots.loading.layout import measure_layout
-from nmm.robots.loading.locking import Locked, with_locked
+from nmm.robots.loading.ground import slip_warnings
+from nmm.robots.loading.locking import Locked, add_pairs, among_coordinates, at_zero, limit_notes, with_locked
+from nmm.robots.loading.measured_joints import (
+    Asked,
+    Measured,
+    find_wheels,
+    held_joints,
+    measure_layout,
+    speed_limit,
+)
 from nmm.robots.loading.provenance import Parts
-from nmm.robots.loading.reduction import at_zero
 from nmm.robots.loading.source import Source
 from nmm.robots.loading.virtual_base import VirtualBase, find_virtual_base
-from nmm.robots.loading.wheels import find_wheels, held_joints
 from nmm.robots.robot import Robot
-from nmm.robots.slip import slip_warnings
 from nmm.robots.wheel import Wheel
 
+# How far from upright a frame's z axis may be: files write pi/2 with a few digits.
+_LEVEL = 1e-3
 #: Adds its pairs to the collision shapes on a model.
 AddPairs = Callable[[pin.Model, pin.GeometryModel], None]
 
 
 @dataclass(frozen=True)
 class Options:
-    """What `load` was asked for, of any source."""
-
     platform: Platform | str | None = None
-    wheels: Sequence[str] | Mapping[str, float] | None = None
+    wheels: Asked = None
     lock: Mapping[str, float] = field(default_factory=dict)
     axle: str | ArrayLike | None = None
     name: str | None = None
@@ -44,45 +46,40 @@ class Options:
 
 
 def robot_from(source: Source, options: Options) -> Robot:
-    """The robot that a source makes.
-
-    Raises
-    ------
-    RobotError : a joint that we cannot take, a name that is no joint or frame, a platform that does not fit
-    """
-    where = source.where
+    """`RobotError` for an unusable joint, an unknown joint or frame, a platform that does not fit."""
+    where, is_fixed = source.where, _is_fixed(source, options)
     rebuilt = rebuild(source.model, (source.visual_model, source.collision_model), where)
     rebuilt.model.name = options.name or source.name
     stated = options.platform.coordinates[len(CHAIN) :] if isinstance(options.platform, Platform) else ()
-    locked = with_locked(rebuilt, options.lock, source.followers, where, stated)
-    rebuilt = locked.rebuilt
-    base = find_virtual_base(rebuilt.model, where)
-    if base is not None and not _is_fixed(source, options):
-        locked = _standing(locked, base.joints, where)
-        rebuilt = locked.rebuilt
+    made = with_locked(rebuilt, options.lock, source.mimic_joints, where, stated)
+    base = find_virtual_base(made.rebuilt.model, where)
+    if base is not None and not is_fixed:
+        made = _standing(made, base.joints, where)
+    rebuilt = made.rebuilt
     if options.axle is not None:
-        placement = axle_placement(rebuilt.model, options.axle, where)
+        placement = _axle_placement(rebuilt.model, options.axle, where)
         moved = rebuild(rebuilt.model, rebuilt.geometries, where, root=placement.inverse())
-        rebuilt = replace(moved, notes=(*rebuilt.notes, axle_note(placement)))
+        reached = {"at": placement.translation.tolist(), "yaw": _yaw(placement)}
+        rebuilt = replace(moved, notes=(*rebuilt.notes, Finding("reference_moved", reached)))
     platform, origin, layout, contradictions = _platform(rebuilt, source, options, base)
     if options.limits:
         try:
             platform = platform.with_limits(options.limits)
         except InputError as error:
-            raise RobotError(f"{where}: {error}") from None
+            raise error.at(where, RobotError) from None
+    made = _turned_up(replace(made, rebuilt=rebuilt), platform, where)
+    rebuilt = made.rebuilt
     remarks = [*contradictions]
     if base is not None:
         platform = base.limited(platform)
         remarks.append(base.note(platform))
     added = None if layout is None else platform.added_joint(layout)
     if added is not None:
-        rebuilt = with_joint(rebuilt, added, where)
-    own = _own_joints(platform, rebuilt.model, locked.values, where)
-    made = replace(locked, rebuilt=_on_platform(rebuilt, platform, own, where))
+        rebuilt = _with_joint(rebuilt, added, where)
+    own = _own_joints(platform, rebuilt.model, made.values, where)
+    made = replace(made, rebuilt=_on_platform(rebuilt, platform, own, where))
     if not platform.coordinates:
         made = _with_held_wheels(made, options.wheels, where)
-    display = made.rebuilt
-    notes = (*source.notes, *display.notes, *remarks)
     provenance = replace(
         source.provenance,
         locked=made.values,
@@ -90,20 +87,53 @@ def robot_from(source: Source, options: Options) -> Robot:
         platform=origin,
         contradictions=contradictions,
     )
-    parts = Parts(display.geometries[1], notes, provenance)
+    parts = Parts(made.rebuilt.geometries[1], (*source.notes, *made.rebuilt.notes, *remarks), provenance)
     return _without_wheels(made, platform, own, source, options, parts)
+
+
+def _axle_placement(model: pin.Model, axle: str | ArrayLike, where: str) -> pin.SE3:
+    """Pose of the platform's reference point in the root link (`load`'s `axle`): a position and a yaw."""
+    if isinstance(axle, str):
+        return _level_frame(model, axle, f"{where}: axle")
+    try:
+        point = array(axle, "axle")
+    except InputError as error:
+        raise error.at(where, RobotError) from None
+    if point.shape not in ((2,), (3,)):
+        expected = "a frame, x and y, or x, y and z (m)"
+        raise RobotError(where=f"{where}: axle", expected=expected, got=axle)
+    return pin.SE3(np.eye(3), np.append(point, np.zeros(3 - len(point))))
+
+
+def _level_frame(model: pin.Model, name: str, where: str) -> pin.SE3:
+    """Position and yaw of a level frame of the root link's body."""
+    known = {frame.name: frame for frame in model.frames}
+    fixed = {frame.name: frame for frame in model.frames if frame.parentJoint == len(CHAIN)}
+    if name in known and name not in fixed:
+        joint = model.names[known[name].parentJoint]
+        what = f"frame {name!r} is not on the root link's body: joint {joint} moves it"
+        raise RobotError(what, where=where, got=name)
+    expect_known("frame", name, fixed, where, RobotError)
+    placement = fixed[name].placement
+    if placement.rotation[2, 2] < 1.0 - 0.5 * _LEVEL**2:
+        raise RobotError(f"frame {name!r} is tilted, expected its z axis upwards", where=where, got=name)
+    return pin.SE3(pin.utils.rotate("z", _yaw(placement)), np.array(placement.translation))
+
+
+def _yaw(placement: pin.SE3) -> float:
+    return float(np.arctan2(placement.rotation[1, 0], placement.rotation[0, 0]))
 
 
 def _platform(
     rebuilt: Rebuilt, source: Source, options: Options, base: VirtualBase | None
-) -> tuple[Platform, str, Layout | None, tuple[str, ...]]:
-    """The platform, who chose its kind, what the file's wheels and joints are, and where that differs."""
+) -> tuple[Platform, str, Layout | None, tuple[Finding, ...]]:
+    """The platform, who chose its kind, the file's wheels and joints, and where that differs."""
     given = options.platform
     name, origin = (source.platform, "file") if given is None else (given, "given")
     if name is None and base is not None and base.kind is not None:
         name, origin = base.kind, "base"
     if _is_fixed(source, options):
-        return Fixed(), origin, None, ()  # there is nothing to measure
+        return FixedBase(), origin, None, ()  # there is nothing to measure
     visual, collision = rebuilt.geometries
     try:
         layout = measure_layout(rebuilt.model, (collision, visual), options.wheels, source.where)
@@ -116,33 +146,72 @@ def _platform(
             platform = name
         elif name is None or layout is None:
             platform, origin = usual_platform(layout)
+            if base is not None and origin == "default":
+                origin = "base"
         else:
             platform = platform_by_name(name).fit(layout)
         return platform, origin, layout, () if layout is None else platform.compared(layout)
     except InputError as error:
-        raise RobotError(f"{source.where}: {error}") from None
+        raise error.at(source.where, RobotError) from None
 
 
 def _is_fixed(source: Source, options: Options) -> bool:
     chosen = source.platform if options.platform is None else options.platform
-    return isinstance(chosen, Fixed) or chosen == Fixed.name
+    return isinstance(chosen, FixedBase) or chosen == FixedBase.name
+
+
+def _turned_up(made: Locked, platform: Platform, where: str) -> Locked:
+    """The model in which the platform's own joints whose axes point down have them upwards: platforms count
+    angles to the left."""
+    rebuilt = made.rebuilt
+    measured = Measured(rebuilt.model, (), where)
+    own = [name for name in platform.coordinates[len(CHAIN) :] if name in measured.joints]
+    down = [name for name in own if measured.points_down(measured.joints[name])]
+    if not down:
+        return made
+    turned = rebuild(rebuilt.model, rebuilt.geometries, where, reversed_joints=down)
+    notes = (*rebuilt.notes, Finding("joints_reversed", {"names": down}))
+    mimic_joints = tuple(one.reversed(down) for one in made.mimic_joints)
+    return replace(made, rebuilt=replace(turned, notes=notes), mimic_joints=mimic_joints)
+
+
+def _with_joint(rebuilt: Rebuilt, added: AddedJoint, where: str) -> Rebuilt:
+    """The model with the platform's joint on the root's body; an existing one of that name gets its limits.
+    `RobotError` where a frame that is no joint has the name."""
+    model, name = rebuilt.model.copy(), added.joint
+    if model.existJointName(name):
+        joint = model.joints[model.getJointId(name)]
+        model.lowerPositionLimit[joint.idx_q] = max(model.lowerPositionLimit[joint.idx_q], added.lower)
+        model.upperPositionLimit[joint.idx_q] = min(model.upperPositionLimit[joint.idx_q], added.upper)
+        model.velocityLimit[joint.idx_v] = min(speed_limit(model, model.getJointId(name)), added.velocity)
+        return replace(rebuilt, model=model)
+    if model.existFrame(name):
+        what = (
+            f"a frame is named {name}, as the coordinate that this platform adds: give the frame "
+            "another name, or the platform another for it, as in Car(wheelbase, steering=NAME)"
+        )
+        raise RobotError(what, where=where, got=name)
+    place = pin.SE3(np.eye(3), np.array([added.x, added.y, 0.0]))
+    ends = (-np.inf, np.inf, -added.velocity, added.velocity, added.lower, added.upper, 0.0, 0.0, 0.0)
+    model.addJoint(len(CHAIN), pin.JointModelRZ(), place, name, *(np.full(1, end) for end in ends))
+    note = Finding("joint_added", {"name": name})
+    return replace(rebuilt, model=model, notes=(*rebuilt.notes, note))
 
 
 def _own_joints(
     platform: Platform, model: pin.Model, lock: Mapping[str, float], where: str
 ) -> tuple[str, ...]:
-    """The platform's own joints: its coordinates after x, y, theta."""
     own = platform.coordinates[len(CHAIN) :]
     joints = [str(name) for name in model.names][len(CHAIN) + 1 :]
     for name in own:
         if name in lock:
-            raise RobotError(f"{where}: lock: {name} is a coordinate of the {platform.name} platform")
+            what = f"{name} is a coordinate of the {platform.name} platform"
+            raise RobotError(what, where=f"{where}: lock", got=name)
         expect_known("platform joint", name, joints, where, RobotError)
     return own
 
 
 def _on_platform(rebuilt: Rebuilt, platform: Platform, own: Sequence[str], where: str) -> Rebuilt:
-    """The model with the platform's own joints first; without x, y, theta where the base is fixed."""
     model = rebuilt.model
     if not platform.coordinates:
         made = rebuild(model, rebuilt.geometries, where, root=model.jointPlacements[1], head=())
@@ -155,31 +224,31 @@ def _without_wheels(
     made: Locked, platform: Platform, own: Sequence[str], source: Source, options: Options, parts: Parts
 ) -> Robot:
     """The robot, with its wheels on the display model only."""
-    display = made.rebuilt
-    whole, (shown, solid) = display.model, display.geometries
-    wheels, notes = _wheels(display, platform, own, source.where, options.wheels)
+    whole, (shown, solid) = made.rebuilt.model, made.rebuilt.geometries
+    wheels: tuple[Wheel, ...] = ()
+    notes: list[Finding] = []
+    if platform.coordinates:
+        wheels, notes = find_wheels(whole, (solid, shown), options.wheels, source.where, own, platform)
     names = list(dict.fromkeys(name for wheel in wheels for name in wheel.joints))
     model = whole
     if names:
         turned = [wheel.joint for wheel in wheels]
-        notes.append(f"wheels that only roll, left out of q: {', '.join(turned)}")
+        notes.append(Finding("wheels_left_out", {"names": turned}))
         if swivels := [name for name in names if name not in turned]:
-            notes.append(f"joints that steer them or swivel, left out of q: {', '.join(swivels)}")
+            notes.append(Finding("swivels_left_out", {"names": swivels}))
         model, (solid,) = at_zero(whole, (solid,), names)
     elif source.all_pairs or options.add_pairs:
         solid = solid.copy()
-    followers, more = among_coordinates(made.followers, names, source.where)
+    mimic_joints, more = among_coordinates(made.mimic_joints, names, source.where)
     notes += more
     if model.nq == platform.n_p:
-        notes.append("no arm: the platform is all that moves" if model.nq else "nothing moves")
+        notes.append(Finding("no_arm" if model.nq else "nothing_moves"))
     add = options.add_pairs or (add_pairs if source.all_pairs else None)
     if add is not None:
         add(model, solid)
         if len(solid.collisionPairs):
-            notes.append(
-                f"{len(solid.collisionPairs)} collision pairs: none within a body or across one joint"
-            )
-    model.name = whole.name = options.name or source.name
+            notes.append(Finding("collision_pairs", {"count": len(solid.collisionPairs)}))
+    model.name = whole.name
     robot = Robot(
         name=model.name,
         model=model,
@@ -191,7 +260,7 @@ def _without_wheels(
         source=source.label,
         arguments=dict(source.arguments),
         notes=(*parts.notes, *notes),
-        followers=followers,
+        mimic_joints=mimic_joints,
         parts=replace(parts, provenance=replace(parts.provenance, reduced=tuple(names))),
     )
     remarks = (*limit_notes(robot), *slip_warnings(robot))
@@ -199,33 +268,18 @@ def _without_wheels(
 
 
 def _standing(made: Locked, names: Sequence[str], where: str) -> Locked:
-    """The model with more joints fixed at zero, of which nothing is said, and what follows them."""
-    others = [one for one in made.followers if one.joint not in names]
+    """The model with more joints, and their mimic joints, fixed at zero; no note."""
+    others = [one for one in made.mimic_joints if one.joint not in names]
     still = with_locked(made.rebuilt, {}, others, where, standing=dict.fromkeys(names, 0.0))
     return replace(still, values=made.values, mimicked={**made.mimicked, **still.mimicked})
 
 
-def _with_held_wheels(made: Locked, asked: Sequence[str] | Mapping[str, float] | None, where: str) -> Locked:
-    """The model of a base that does not move, with its wheels fixed, and what follows them."""
+def _with_held_wheels(made: Locked, asked: Asked, where: str) -> Locked:
+    """The model of a base that does not move, with its wheels and their mimic joints fixed."""
     display = made.rebuilt
     names, notes = held_joints(display.model, asked, where)
     if not names:
         return replace(made, rebuilt=replace(display, notes=(*display.notes, *notes)))
     still = _standing(made, names, where)
-    note = f"wheels of a fixed base, which stand still: {', '.join(names)}"
-    notes = (*display.notes, *notes, note, *still.rebuilt.notes[len(display.notes) :])
-    return replace(still, rebuilt=replace(still.rebuilt, notes=notes))
-
-
-def _wheels(
-    display: Rebuilt,
-    platform: Platform,
-    own: Sequence[str],
-    where: str,
-    asked: Sequence[str] | Mapping[str, float] | None,
-) -> tuple[tuple[Wheel, ...], list[str]]:
-    if not platform.coordinates:
-        return (), []
-    shown, solid = display.geometries
-    wheels, notes = find_wheels(display.model, (solid, shown), asked, where, own, platform)
-    return wheels, list(notes)
+    notes += [Finding("wheels_held", {"names": [*names]}), *still.rebuilt.notes[len(display.notes) :]]
+    return replace(still, rebuilt=replace(still.rebuilt, notes=(*display.notes, *notes)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Iterable, Sequence
 from functools import cache
@@ -11,88 +12,110 @@ from pathlib import Path
 from urllib.parse import unquote
 
 from nmm.errors import RobotError
+from nmm.files import named_folder
+from nmm.findings import Finding
+from nmm.findings.robot_file import refusal
+from nmm.robots.loading.xml_tree import read_text
+
+PACKAGE = "package://"
+#: So many folders, from the file's own upwards, are searched for what lies nowhere else.
+_NEAR = 5
 
 
 class Packages:
-    """Finds packages and meshes for one description file, and remembers what it was asked for.
+    """Finds packages and meshes for one description file; `found` records what was asked for, `nearby` what
+    is in none of the places where it should be, but has its name above the file.
 
-    Searched in this order: the caller's folders, ROS_PACKAGE_PATH, AMENT_PREFIX_PATH, the share folder of
-    example-robot-data, and the folders above the file. Each may be a package or hold packages.
-
-    Parameters
-    ----------
-    file : the description file; relative mesh names start in its folder
-    folders : the caller's folders
-
-    Attributes
-    ----------
-    found : the folder of each package that was asked for, or None
-    searched : the folders in which packages are looked for
-
-    Raises
-    ------
-    RobotError : one of the caller's folders does not exist
-    """
+    Searched in order: the caller's folders (`RobotError` for one that does not exist), ROS_PACKAGE_PATH,
+    AMENT_PREFIX_PATH, example-robot-data's share folder, the folders above the file; each may be or hold
+    packages, and the caller's may be NAME=FOLDER. Relative mesh names start in the file's folder."""
 
     def __init__(self, file: Path, folders: Sequence[str | Path] = ()) -> None:
         # os.path answers where pathlib raises: an unknown home, a name too long for the file system.
-        given = [Path(os.path.expanduser(folder)).absolute() for folder in folders]
-        for folder in given:
+        named = [named_folder(str(folder)) for folder in folders]
+        given = [(name, Path(os.path.expanduser(folder)).absolute()) for name, folder in named]
+        for _, folder in given:
             if not os.path.isdir(folder):
-                raise RobotError(f"package_dirs: expected a folder, {folder} is none")
+                raise RobotError(f"{folder} is no folder", where="package_dirs", got=str(folder))
         self.file = file.absolute()
-        self.folders = (*given, *_environment_folders(), *_share_folders())
+        unnamed = [folder for name, folder in given if not name]
+        self.folders = (*unnamed, *_environment_folders(), *_share_folders())
+        self.nearby: dict[str, Path] = {}
         self.searched = (*self.folders, *self.file.parents)
         self.found: dict[str, Path | None] = {}
-        self._folders: dict[str, list[Path]] = {}
+        self._folders = {name: [folder] for name, folder in given if name}
+        self.found.update((name, folder) for name, folder in given if name)
 
-    def find(self, package: str) -> Path | None:
-        """The folder of a package, or None."""
-        return next(iter(self._candidates(package)), None)
+    def find(self, package: str, asking: Path | None = None) -> Path | None:
+        """The folder of a package, or the nearest above the file that asks, with what that names in it."""
+        found = next(iter(self._candidates(package)), None)
+        if found is None and asking is not None:
+            named = re.findall(rf"\$\(find\s+{re.escape(package)}\)/([^\s\"'<>$]+)", read_text(asking))
+            above = asking.absolute().parents[:_NEAR]
+            found = next((one for one in above if any(os.path.isfile(one / tail) for tail in named)), None)
+            if found is not None:
+                self.nearby[package] = self.found[package] = found
+                self._folders[package] = [found]
+        return found
 
-    def mesh(self, name: str) -> Path | str:
-        """The absolute path of a mesh file, or a sentence that says why there is none.
-
-        Parameters
-        ----------
-        name : as in the file: package://, model://, file://, absolute, or relative to the file's folder
-        """
+    def mesh(self, name: str) -> Path | Finding:
+        """The file of a package://, model://, file://, absolute or relative mesh name; or "mesh_missing"."""
         scheme, separator, rest = name.partition("://")
+        paths: Iterable[Path] = ()
+        missing = {"cause": "file"}
         if not separator:
-            return self._plain(name)
-        if scheme in ("package", "model"):
+            # Not the folders above the file: a bare name should not find a file far away by chance.
+            paths = (folder / name for folder in (self.file.parent, *self.folders))
+        elif scheme in ("package", "model"):
             # Some files have three slashes.
             package, _, inside = rest.lstrip("/").partition("/")
             folders = self._candidates(package)
-            if not folders:
-                return f"package {package!r} not found (give its folder in package_dirs, --package-dir)"
-            return _first_file(folder / inside for folder in folders) or "no such file in the package"
-        if scheme == "file":
-            return _first_file((Path(rest), Path(unquote(rest)))) or "no such file"
-        return f"cannot read from {scheme}://"
+            paths = (folder / inside for folder in folders)
+            missing = {"cause": "file_in_package" if folders else "package", "package": package}
+        elif scheme == "file":
+            paths = (Path(rest), Path(unquote(rest)))
+        else:
+            missing = {"cause": "scheme", "scheme": scheme}
+        found = next((path.absolute() for path in paths if os.path.isfile(path)), None)
+        if found is None and missing["cause"] != "scheme":
+            found = self._nearby(name, rest if separator else name)
+        return found or Finding("mesh_missing", {"mesh": name, **missing})
 
-    def _plain(self, name: str) -> Path | str:
-        # Not the folders above the file: a bare name should not find a file far away by chance.
-        folders = (self.file.parent, *self.folders)
-        return _first_file(folder / name for folder in folders) or "no such file"
+    def _nearby(self, name: str, path: str) -> Path | None:
+        """The longest end of a path, of a folder and a file at least, that lies above the description; of a
+        bare name, the file beside it."""
+        parts = [part for part in path.split("/") if part not in ("", ".", "..")]
+        ends = [parts[start:] for start in range(max(1, len(parts) - 1))]
+        above = self.file.parents[: _NEAR if len(parts) > 1 else 1]
+        paths = (folder.joinpath(*end) for end in ends for folder in above)
+        found = next((path for path in paths if os.path.isfile(path)), None)
+        if found is not None:
+            self.nearby[name] = found
+        return found
+
+    @property
+    def notes(self) -> list[Finding]:
+        """What was found nearby only."""
+        first = next(iter(self.nearby.items()), None)
+        if first is None:
+            return []
+        values = {"count": len(self.nearby), "name": first[0], "place": str(first[1])}
+        return [Finding("found_nearby", values)]
+
+    def missing(self, package: str, by: str) -> Finding:
+        searched = [*dict.fromkeys(map(str, self.searched))]
+        return Finding("package_missing", {"package": package, "by": by, "searched": searched})
 
     def _candidates(self, package: str) -> list[Path]:
         """The folders of that name, looked for once: a robot may have a hundred meshes in one package."""
-        folders = self._folders.get(package)
-        if folders is None:
-            folders = self._folders[package] = []
-            if package not in ("", ".", "..") and "/" not in package:
-                for folder in self.searched:
-                    if folder.name == package:
-                        folders.append(folder)
-                    if os.path.isdir(folder / package):
-                        folders.append(folder / package)
-        self.found[package] = folders[0] if folders else None
-        return folders
-
-
-def _first_file(paths: Iterable[Path]) -> Path | None:
-    return next((path.absolute() for path in paths if os.path.isfile(path)), None)
+        if package not in self._folders:
+            searched = () if package in ("", ".", "..") or "/" in package else self.searched
+            places = (path for folder in searched for path in (folder, folder / package))
+            named = (path for path in places if path.name == package)
+            folders = [path for path in named if path in searched or os.path.isdir(path)]
+            self._folders[package] = folders
+            self.found[package] = folders[0] if folders else None
+        return self._folders[package]
 
 
 def _environment_folders() -> list[Path]:
@@ -103,23 +126,14 @@ def _environment_folders() -> list[Path]:
 
 
 def package_file(name: str, folders: Sequence[str | Path] = ()) -> Path:
-    """The file that a name package://PACKAGE/PATH stands for.
-
-    Parameters
-    ----------
-    name : the name
-    folders : the caller's folders
-
-    Raises
-    ------
-    RobotError : no such package or file; lists the folders that were searched
-    """
+    """The file of a name package://PACKAGE/PATH; `RobotError` lists the folders searched, yours first."""
     packages = Packages(Path(os.sep), folders)  # there is no file yet beside which to search
     found = packages.mesh(name)
-    if isinstance(found, str):
-        searched = ", ".join(map(str, packages.searched)) or "none"
-        raise RobotError(f"{name}: {found}; searched: {searched}")
-    return found
+    if isinstance(found, Path):
+        return found
+    if found.values["cause"] == "package":
+        found = packages.missing(found.values["package"], PACKAGE)
+    raise refusal(name, found)
 
 
 @cache

@@ -7,6 +7,7 @@ is the root body's, along its own axes.
 
 from __future__ import annotations
 
+import math
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -14,12 +15,12 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, array
-from nmm.errors import InputError, expect_known, unknown
+from nmm.errors import InputError, expect_known, few, no_such
+from nmm.robots.joint_table import twist
 from nmm.robots.loading.chain import CHAIN_JOINTS, Head, rebuild, replaced_joints
 from nmm.robots.loading.joint_kinds import is_continuous, is_mimic, is_simple, kind
-from nmm.robots.loading.provenance import parts_of
-from nmm.robots.loading.reduction import at_zero
-from nmm.robots.loading.root_layout import ROOTS, ChainRoot, RootLayout
+from nmm.robots.loading.provenance import with_wheels_fixed
+from nmm.robots.loading.root_layout import ROOTS, ChainRoot
 from nmm.robots.meshes import read_meshes
 from nmm.robots.robot import Robot
 
@@ -35,8 +36,10 @@ class PinocchioModels(NamedTuple):
     Examples
     --------
     >>> models = nmm.pinocchio_models(nmm.load("unicycle_2r"))
-    >>> isinstance(models, nmm.PinocchioModels), models.model.nv, len(models.visual_model.geometryObjects) > 0
-    (True, 5, True)
+    >>> isinstance(models, nmm.extending.PinocchioModels), models.model.nv
+    (True, 5)
+    >>> len(models.visual_model.geometryObjects) > 0
+    True
     """
 
     model: pin.Model
@@ -83,18 +86,15 @@ def pinocchio_models(robot: Robot, root: Root | str = "planar") -> PinocchioMode
 
 
 def _models(robot: Robot, root: Root | str) -> PinocchioModels:
-    """The models, whose meshes need not be read yet."""
+    """Their meshes may be unread."""
     expect_known("root", root, ROOTS)
-    rolling = dict.fromkeys(name for wheel in robot.wheels for name in wheel.joints)
-    shapes = robot.shapes.visual_model, parts_of(robot).collision_model
-    model, shapes = at_zero(robot.display_model, shapes, rolling)
+    model, shapes = with_wheels_fixed(robot)
+    joint = ROOTS[root].joint
+    head: Head = CHAIN_JOINTS if joint is None else (("root_joint", joint()),)
     if not robot.platform.coordinates:
-        if root != "chain":
-            raise InputError(f"{robot.name} has a fixed base: expected root 'chain' (none), got {root!r}")
-        head: Head = ()
-    else:
-        joint = ROOTS[root].joint()
-        head = CHAIN_JOINTS if joint is None else (("root_joint", joint),)
+        if joint is not None:
+            raise InputError("has a fixed base", where=robot.name, expected="root 'chain' (none)", got=root)
+        head = ()
     first = robot.platform.coordinates[len(CHAIN_JOINTS) :]
     rebuilt = rebuild(model, shapes, robot.name, first=first, head=head)
     visual, collision = rebuilt.geometries
@@ -107,10 +107,9 @@ def _models(robot: Robot, root: Root | str) -> PinocchioModels:
 class PinocchioLayout:
     """Between a robot's coordinates and a Pinocchio model's configurations.
 
-    Joints are matched by name, continuous ones may be (cos, sin) pairs; the model may have the wheels that
-    the robot leaves out (they stand at zero) and the joints that were locked (they stand where they are
-    locked). Joints that follow others may be without a number in the model (`mimic=True`). The reference
-    point may be elsewhere than the model's root (`axle`): it is found by the frames that both have.
+    Joints are matched by name; continuous ones may be (cos, sin) pairs. The model may have wheels that the
+    robot leaves out (at zero), locked joints (where they are locked), and mimic joints without a number
+    (`mimic=True`). A reference point apart from the model's root (`axle`) is found by common frames.
 
     Parameters
     ----------
@@ -141,41 +140,42 @@ class PinocchioLayout:
         if isinstance(model, str):
             self.model = pinocchio_model(robot, model)
         elif not isinstance(model, pin.Model):
-            raise InputError(f"expected a pin.Model or one of {', '.join(ROOTS)}, got {model!r}")
+            expected = f"a pin.Model or one of {', '.join(ROOTS)}"
+            raise InputError(where="model", expected=expected, got=model)
         self._head = replaced_joints(self.model)
         self._root = self._root_layout()
         self._pairs, self._held = self._matched()
         self._mimics = any(is_mimic(joint) for joint in self.model.joints)
+        self._standing = np.array(pin.neutral(self.model))[np.newaxis]
+        for joint, value in self._held.items():
+            self._write(self._standing, joint, np.full(1, value))
 
     def configuration(self, q: ArrayLike) -> Array:
         """The model's configuration (nq,) at coordinates q (n,); or (N, nq) for a trajectory (N, n)."""
         rows, single = _rows(q, self.robot.n, "q")
-        result = np.tile(np.array(pin.neutral(self.model)), (len(rows), 1))
-        result[:, : self._root.nq] = self._root.configuration(rows[:, : self._n_root])
-        for joint, column in self._pairs:
-            self._write(result, joint, rows[:, column])
-        for joint, value in self._held.items():
-            self._write(result, joint, np.full(len(rows), value))
+        result = np.tile(self._standing, (len(rows), 1))
+        if self._root is not None:
+            result[:, : self._root.nq] = self._root.configuration(rows[:, :3])
+        for joint, column, sign in self._pairs:
+            self._write(result, joint, sign * rows[:, column])
         return result[0] if single else result
 
     def velocity(self, q: ArrayLike, q_dot: ArrayLike) -> Array:
         """The model's velocity (nv,) at coordinates q and their rates q_dot (n,); or (N, nv) for (N, n)."""
         rows, single = _rows(q, self.robot.n, "q")
-        rates, _ = _rows(q_dot, self.robot.n, "q_dot")
-        _same_length(rows, rates, "q_dot")
+        rates, _ = _rows(q_dot, self.robot.n, "q_dot", len(rows))
         result = np.zeros((len(rows), self.model.nv))
-        k = self._n_root
-        result[:, : self._root.nv] = self._root.velocity(rows[:, :k], rates[:, :k])
-        for joint, column in self._pairs:
-            result[:, self.model.joints[joint].idx_v] = rates[:, column]
+        if self._root is not None:
+            result[:, : self._root.nv] = self._root.velocity(rows[:, :3], rates[:, :3])
+        for joint, column, sign in self._pairs:
+            result[:, self.model.joints[joint].idx_v] = sign * rates[:, column]
         return result[0] if single else result
 
     def coordinates(self, configuration: ArrayLike, near: ArrayLike | None = None) -> Array:
         """Coordinates q (n,) of the model's configuration (nq,); or (N, n) of a trajectory (N, nq).
 
-        theta, and joints that the model has as (cos, sin), are known up to full turns: the (first) one is
-        taken nearest to `near`, coordinates (n,), zero by default, and every further one nearest to the one
-        before.
+        theta, and joints that are (cos, sin), are known up to full turns: the first row is taken nearest to
+        `near`, coordinates (n,), zero by default, every further one nearest to the one before.
 
         Raises
         ------
@@ -185,17 +185,20 @@ class PinocchioLayout:
         rows, single = _rows(configuration, self.model.nq, "configuration")
         start = self.robot.q(near if near is not None else np.zeros(self.robot.n))
         for joint, value in self._held.items():
-            off = np.abs(_wrapped(self._read(rows, joint) - value, self._is_angle(joint)))
-            if off.size and off.max() > _HELD:
-                raise InputError(
-                    f"joint {self.model.names[joint]} is locked at {value:g}, the configuration has it "
-                    f"{off.max():g} away"
-                )
+            off = self._read(rows, joint) - value
+            if self._is_angle(joint):
+                off = (off + np.pi) % (2.0 * np.pi) - np.pi
+            far = float(np.abs(off).max(initial=0.0))
+            if far > _HELD:
+                what = f"is locked at {value:g}, the configuration has it {far:g} away"
+                raise InputError(what, where=f"joint {self.model.names[joint]}", got=far)
         result = np.zeros((len(rows), self.robot.n))
-        result[:, : self._n_root] = self._root.coordinates(rows[:, : self._root.nq])
-        turning = [2] if self._n_root else []
-        for joint, column in self._pairs:
-            result[:, column] = self._read(rows, joint)
+        turning = []
+        if self._root is not None:
+            result[:, :3] = self._root.coordinates(rows[:, : self._root.nq])
+            turning.append(2)
+        for joint, column, sign in self._pairs:
+            result[:, column] = sign * self._read(rows, joint)
             if self._is_angle(joint):
                 turning.append(column)
         for column in turning if len(rows) else []:
@@ -213,54 +216,49 @@ class PinocchioLayout:
         InputError : velocities along z or about x or y, or the causes of `coordinates`
         """
         rows, single = _rows(configuration, self.model.nq, "configuration")
-        v, _ = _rows(velocity, self.model.nv, "velocity")
-        _same_length(rows, v, "velocity")
+        v, _ = _rows(velocity, self.model.nv, "velocity", len(rows))
         q = self.coordinates(rows)
         result = np.zeros((len(rows), self.robot.n))
-        k = self._n_root
-        result[:, :k] = self._root.rates(q[:, :k], v[:, : self._root.nv])
-        for joint, column in self._pairs:
-            result[:, column] = v[:, self.model.joints[joint].idx_v]
+        if self._root is not None:
+            result[:, :3] = self._root.rates(q[:, :3], v[:, : self._root.nv])
+        for joint, column, sign in self._pairs:
+            result[:, column] = sign * v[:, self.model.joints[joint].idx_v]
         if self._mimics:
             who = self.robot.following
             result[:, who.columns] = who.multipliers * result[:, who.leaders]
         return result[0] if single else result
 
-    @property
-    def _n_root(self) -> int:
-        """How many coordinates the root stands for: x, y and theta, or none."""
-        return 3 if self.robot.platform.coordinates else 0
-
-    def _root_layout(self) -> RootLayout:
+    def _root_layout(self) -> ChainRoot | None:
+        """How the model has x, y and theta; None for a fixed base."""
         robot, model = self.robot, self.model
         name = {0: "fixed", 3: "chain"}.get(self._head) or kind(model.joints[1]).lower()
-        if not self._n_root or name == "fixed":
-            if self._n_root or name != "fixed":
-                base = "of a fixed base" if not self._n_root else "on a platform"
-                raise InputError(f"{robot.name} is {base}, the model has a {name} root")
-            return ChainRoot(np.zeros(4), count=0)
-        theirs = {
-            f.name: f for f in model.frames if f.parentJoint == self._head and f.type == pin.FrameType.BODY
-        }
+        if bool(robot.platform.coordinates) != (name != "fixed"):
+            base = "on a platform" if name == "fixed" else "of a fixed base"
+            raise InputError(f"is {base}, the model has a {name} root", where=robot.name)
+        if name == "fixed":
+            return None
+        ours, theirs = (
+            {f.name: f for f in one.frames if f.parentJoint == root and f.type == pin.FrameType.BODY}
+            for one, root in ((robot.model, 3), (model, self._head))
+        )
+        shared = next((name for name in ours if name in theirs), None)
         offset = pin.SE3.Identity()
-        for frame in robot.model.frames:
-            if frame.type == pin.FrameType.BODY and frame.parentJoint == 3 and frame.name in theirs:
-                offset = frame.placement * theirs[frame.name].placement.inverse()
-                break
+        if shared is not None:
+            offset = ours[shared].placement * theirs[shared].placement.inverse()
         if not robot.model.jointPlacements[1].isApprox(model.jointPlacements[1], 1e-9):
-            raise InputError(f"{robot.name}: the model's root joint stands elsewhere in the world")
+            raise InputError("the model's root joint stands elsewhere in the world", where=robot.name)
         if offset.rotation[2, 2] < 1.0 - 1e-9:
-            raise InputError(f"{robot.name}: the model's root is tilted against the platform's")
+            raise InputError("the model's root is tilted against the platform's", where=robot.name)
         yaw = np.arctan2(offset.rotation[1, 0], offset.rotation[0, 0])
         return ROOTS[name](np.array([*offset.translation, yaw]))
 
-    def _matched(self) -> tuple[list[tuple[int, int]], dict[int, float]]:
-        """Joints of the model with the columns of q, and those that stand at a value."""
+    def _matched(self) -> tuple[list[tuple[int, int, float]], dict[int, float]]:
+        """Joints of the model with the columns of q and their signs, and those that stand at a value."""
         robot, model = self.robot, self.model
         held = robot.locked
         standing = {name for wheel in robot.wheels for name in wheel.joints}
-        own = list(robot.q_names[self._n_root :])
-        following = [one.joint for one in robot.followers]
+        own = list(robot.q_names[0 if self._root is None else 3 :])
+        following = [one.joint for one in robot.mimic_joints]
         pairs, still = [], {}
         for joint in range(self._head + 1, model.njoints):
             name = str(model.names[joint])
@@ -268,22 +266,30 @@ class PinocchioLayout:
                 own = [other for other in own if other != name]
                 continue
             if not is_simple(model.joints[joint]):
-                raise InputError(f"joint {name} of the model has more than one degree of freedom")
+                raise InputError("has more than one degree of freedom", where=f"the model: joint {name}")
             if name in own:
-                pairs.append((joint, robot.coordinate(name)))
+                pairs.append((joint, robot.coordinate(name), self._sign(joint, name)))
             elif name in held:
                 still[joint] = float(held[name])
             elif name not in standing:
-                raise InputError(unknown("joint", name, own, f"the model, of robot {robot.name}"))
-        names = {str(model.names[joint]) for joint, _ in pairs}
+                raise no_such("joint", name, own, f"the model, of robot {robot.name}")
+        names = {str(model.names[joint]) for joint, _, _ in pairs}
         missing = [name for name in own if name not in names]
         if missing:
             steered = [wheel.swivel for wheel in robot.wheels if wheel.swivel in model.names]
             own = [name for name in missing if name in robot.platform.coordinates and steered]
             why = f": {own[0]} is nmm's own, and {', '.join(steered)} follow it" if own else ""
             hint = "; give a root (planar, freeflyer, chain) for a model made here" if own else ""
-            raise InputError(f"{robot.name}: the model has no joint {', '.join(missing)}{why}{hint}")
+            what = f"the model has no joint {few(missing)}{why}{hint}"
+            raise InputError(what, where=robot.name, got=missing)
         return pairs, still
+
+    def _sign(self, joint: int, name: str) -> float:
+        """-1 where the robot's joint has the opposite axis: a platform's own points up (`load`)."""
+        ours, theirs = self.robot.model, self.model
+        one = twist(ours.joints[ours.getJointId(name)], pin.neutral(ours))
+        other = twist(theirs.joints[joint], pin.neutral(theirs))
+        return math.copysign(1.0, float(np.vdot(one, other)))
 
     def _is_angle(self, joint: int) -> bool:
         return is_continuous(self.model.joints[joint])
@@ -302,18 +308,12 @@ class PinocchioLayout:
         return rows[:, index]
 
 
-def _rows(value: ArrayLike, length: int, name: str) -> tuple[Array, bool]:
-    """N rows of `length` numbers, and whether one was given without the list."""
+def _rows(value: ArrayLike, length: int, name: str, count: int | None = None) -> tuple[Array, bool]:
+    """N rows of `length` numbers, `count` of them; and whether a single row was given."""
     rows = array(value, name)
     if rows.ndim not in (1, 2) or rows.shape[-1] != length:
-        raise InputError(f"{name}: expected {length} numbers, or rows of them, got shape {rows.shape}")
-    return rows.reshape(-1, length), rows.ndim == 1
-
-
-def _same_length(rows: Array, others: Array, name: str) -> None:
-    if len(rows) != len(others):
-        raise InputError(f"{name}: expected {len(rows)} rows, got {len(others)}")
-
-
-def _wrapped(difference: Array, angle: bool) -> Array:
-    return (difference + np.pi) % (2.0 * np.pi) - np.pi if angle else difference
+        raise InputError(where=name, expected=f"{length} numbers, or rows of them", got=rows)
+    found = rows.reshape(-1, length)
+    if count is not None and len(found) != count:
+        raise InputError(where=name, expected=f"{count} rows", got=len(found))
+    return found, rows.ndim == 1

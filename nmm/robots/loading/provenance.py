@@ -1,20 +1,20 @@
-"""What a robot was made from and what was done to it: what `nmm info` tells, and where `mount` starts."""
+"""What a robot was made from and what was done to it: for `nmm info` and `mount`."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import pinocchio as pin
 
 from nmm.errors import RobotError
+from nmm.findings import Finding
+from nmm.robots.loading.locking import at_zero
 from nmm.robots.robot import Robot
-from nmm.robots.slip import slip_warnings
 
 #: Where the kind of platform comes from (`Provenance.platform`), in words; otherwise it was given.
-CHOSEN = {
+PLATFORM_SOURCES = {
     "file": "declared in the file",
     "wheels": "by its wheels",
     "base": "by its base of joints",
@@ -37,7 +37,7 @@ class Provenance:
     prefixed : the prefix of each mounted arm that has one, by the arm's name
     platform : where the kind of platform comes from: "given", "file", "wheels", "base" (of
         joints) or "default"
-    contradictions : where the platform is not what the files' wheels and joints are, a sentence each
+    contradictions : where the platform is not what the files' wheels and joints are
     """
 
     packages: Mapping[str, Path | None] = field(default_factory=dict)
@@ -48,7 +48,7 @@ class Provenance:
     reduced: tuple[str, ...] = ()
     prefixed: Mapping[str, str] = field(default_factory=dict)
     platform: str = "given"
-    contradictions: tuple[str, ...] = ()
+    contradictions: tuple[Finding, ...] = ()
 
     @property
     def held(self) -> Mapping[str, float]:
@@ -57,33 +57,26 @@ class Provenance:
 
     def with_arm(self, arm: Provenance, key: str, prefix: str) -> Provenance:
         """This platform's, with that of an arm mounted under the name `key`."""
+        locked = {prefix + name: value for name, value in arm.locked.items()}
+        mimicked = {prefix + name: (prefix + of, value) for name, (of, value) in arm.mimicked.items()}
         return replace(
             self,
             packages={**arm.packages, **self.packages},
             searched=tuple(dict.fromkeys((*self.searched, *arm.searched))),
             meshes={**self.meshes, **arm.meshes},
-            locked={**self.locked, **{prefix + name: value for name, value in arm.locked.items()}},
-            mimicked={
-                **self.mimicked,
-                **{prefix + name: (prefix + of, value) for name, (of, value) in arm.mimicked.items()},
-            },
+            locked={**self.locked, **locked},
+            mimicked={**self.mimicked, **mimicked},
             prefixed={**self.prefixed, **({key: prefix} if prefix else {})},
         )
 
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """What a `Robot` remembers of its making (`Robot.parts`).
-
-    Attributes
-    ----------
-    collision_model : collision shapes on `display_model`, where the wheels still turn; as in `Robot.shapes`
-    notes : what was done to the files before wheels were taken out of q
-    provenance : what was found
-    """
+    """What a `Robot` remembers of its making. `collision_model` is on `display_model`, where wheels still
+    turn; `notes` say what was done to the files before wheels were taken out of q."""
 
     collision_model: pin.GeometryModel
-    notes: tuple[str, ...] = ()
+    notes: tuple[Finding, ...] = ()
     provenance: Provenance = field(default_factory=Provenance)
 
 
@@ -92,21 +85,18 @@ def provenance_of(robot: Robot) -> Provenance:
     return robot.parts.provenance if isinstance(robot.parts, Parts) else Provenance()
 
 
-def platform_warnings(robot: Robot) -> list[str]:
-    """Where a robot's platform is not what its file holds, and wheels that slide, a sentence each."""
-    return [*provenance_of(robot).contradictions, *slip_warnings(robot)]
-
-
-def parts_of(robot: Robot) -> Parts:
-    """The parts of a robot that was loaded.
-
-    Raises
-    ------
-    RobotError : it was made in another way, and has wheels, so that its shapes cannot be told apart
-    """
-    parts: Any = robot.parts
-    if isinstance(parts, Parts):
-        return parts
+def loaded_parts(robot: Robot) -> Parts:
+    """The parts of a loaded robot; `RobotError` for one made otherwise, with wheels: shapes unknown."""
+    if isinstance(robot.parts, Parts):
+        return robot.parts
     if robot.model.nq == robot.display_model.nq:
         return Parts(robot.shapes.collision_model, robot.notes)
-    raise RobotError(f"{robot.name}: was not made by nmm.load, so that its wheels' shapes are not known")
+    what = "was not made by nmm.load, so that its wheels' shapes are not known"
+    raise RobotError(what, where=robot.name)
+
+
+def with_wheels_fixed(robot: Robot) -> tuple[pin.Model, tuple[pin.GeometryModel, ...]]:
+    """`display_model` and the shapes on it, visual and collision, with wheels and swivels fixed at zero."""
+    rolling = dict.fromkeys(name for wheel in robot.wheels for name in wheel.joints)
+    shapes = robot.shapes.visual_model, loaded_parts(robot).collision_model
+    return at_zero(robot.display_model, shapes, rolling)

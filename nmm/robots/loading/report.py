@@ -1,40 +1,34 @@
-"""`report`: everything there is to say about a URDF or xacro file before it is used."""
+"""`file_report`: everything there is to say about a URDF or xacro file before it is used."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from nmm.errors import InputError, RobotError, expect_known
-from nmm.robots.loading.advice import advice, joints_by_type
-from nmm.robots.loading.check import find_problems
-from nmm.robots.loading.description import Description, argument_texts, describe
-from nmm.robots.loading.findings import Problem, child, children
-from nmm.robots.loading.following import limit_notes
-from nmm.robots.loading.ground import Ground
+from nmm.findings import Finding
+from nmm.findings.robot_file import line_of
+from nmm.robots.loading.check import inspect
+from nmm.robots.loading.check_parts import advice
+from nmm.robots.loading.description import Description, argument_texts, describe, expand
+from nmm.robots.loading.ground import Ground, wheel_advice
 from nmm.robots.loading.load import load
+from nmm.robots.loading.locking import limit_notes
 from nmm.robots.loading.packages import Packages
 from nmm.robots.loading.provenance import provenance_of
-from nmm.robots.loading.second_opinion import second_opinion
-from nmm.robots.loading.wheel_advice import wheel_advice
-from nmm.robots.loading.xacro_file import expand
-from nmm.robots.loading.xml_tree import Element, parse
+from nmm.robots.loading.xml_tree import Element, children, link_at
 from nmm.robots.meshes import read_meshes
 from nmm.robots.robot import Robot
-from nmm.words import counted, one_line, printable
+from nmm.text_format import counted, one_line
 
-_LINE = re.compile(r"(?:.*: )?line (\d+): ", re.DOTALL)
 _NOWHERE = "/(package not found)"
-_FIND = re.compile(r"\$\(find ([^)]*)\)")
 
 
 @dataclass(frozen=True)
-class Report:
+class FileReport:
     """What is wrong with a description, what is odd, and what it holds.
 
     Attributes
@@ -51,29 +45,23 @@ class Report:
     file: Path
     expanded: bool = False
     text: str = ""
-    problems: tuple[Problem, ...] = ()
-    warnings: tuple[Problem, ...] = ()
+    problems: tuple[Finding, ...] = ()
+    warnings: tuple[Finding, ...] = ()
     facts: Mapping[str, str] = field(default_factory=dict)
     robot: Robot | None = None
 
 
-def report(
+def file_report(
     path: str | Path,
     arguments: Mapping[str, object] | None = None,
     package_dirs: Sequence[str | Path] = (),
     **options: Any,
-) -> Report:
+) -> FileReport:
     """Look at a .urdf or .xacro file from all sides; every problem is named, not only the first.
 
     Without problems the file was loaded, with what the warnings say: shapes without their meshes left out.
-
-    Parameters
-    ----------
-    path : the file
-    arguments : values of its `xacro:arg`s
-    package_dirs : folders that are, or hold, the ROS packages that the file speaks of
-    options : platform, lock, wheels, axle, srdf and missing_meshes, with which `load` is tried; meshes that
-        are not there are problems with missing_meshes "error" and else warnings
+    arguments, package_dirs and options (platform, lock, wheels, axle, srdf, missing_meshes) are those of
+    `load`; meshes that are not there are problems with missing_meshes "error" and else warnings.
 
     Raises
     ------
@@ -81,220 +69,150 @@ def report(
     """
     expect_known("missing_meshes", options.get("missing_meshes", "skip"), ("error", "skip"), error=RobotError)
     file = Path(path).expanduser()
+    given: Mapping[str, Any] = {"arguments": arguments, "package_dirs": package_dirs}
     try:
-        description = describe(file, arguments, package_dirs)
+        description = describe(file, **given)
     except RobotError as error:
-        if not file.is_file() or file.suffix.lower() not in (".urdf", ".xacro") or _is_callers(str(error)):
+        if not error.findings:  # what the caller gave is wrong, not what is in the file
             raise
-        return _unread(file, error, arguments, package_dirs)
-    return _Report(description, arguments, package_dirs, options).made()
+        return _unread(file, error.findings, given)
+    return _report(description, {**given, **options})
 
 
-def _is_callers(message: str) -> bool:
-    """Whether an error is about what the caller gave, not about the file."""
-    ours = ("package_dirs: expected", "unknown xacro argument", "are for .xacro files", "arguments: expected")
-    return any(text in message for text in ours)
-
-
-def _unread(
-    file: Path,
-    error: RobotError,
-    arguments: Mapping[str, object] | None,
-    package_dirs: Sequence[str | Path],
-) -> Report:
-    """The report of a file that xacro or the decoder stops at: with every package that is missing."""
-    cause = str(error).removeprefix(f"{file.absolute()}: ").removeprefix(f"{file}: ")
-    line = _LINE.match(cause)
-    problems = [Problem(printable(cause), None)]
-    if line is not None and line.end() < len(cause) and cause.startswith("line "):
-        problems = [Problem(printable(cause[line.end() :]), int(line[1]))]
-    if "$(find " not in cause:
-        return Report(file, problems=tuple(problems))
-    packages = _Going(file, package_dirs)
+def _unread(file: Path, found: tuple[Finding, ...], given: Mapping[str, Any]) -> FileReport:
+    """The report of a file that xacro or the decoder stops at, with every missing package."""
+    if all(one.code != "package_missing" for one in found):
+        return FileReport(file, problems=found)
+    packages = _Going(file, given["package_dirs"])
     description = None
     # What is included from a package that is not there is not there either.
     with suppress(RobotError):
-        xml, used, _ = expand(file.absolute(), argument_texts(arguments), packages)
-        description = Description(xml, file, packages, True, used, ())
-    problems = [
-        _not_found(name, f"$(find {name})", packages)
-        for name, folder in packages.found.items()
-        if folder is None
-    ]
+        xml, used, _ = expand(file.absolute(), argument_texts(given["arguments"]), packages)
+        description = Description(xml, file, packages, expanded=True, arguments=used)
+    lost = [name for name, folder in packages.found.items() if folder is None]
+    problems = [packages.missing(name, f"$(find {name})") for name in lost]
     if description is None:
-        return Report(file, problems=tuple(problems))
-    return _Report(description, arguments, package_dirs).made(problems)
+        return FileReport(file, problems=tuple(problems))
+    return _report(description, given, problems)
 
 
 class _Going(Packages):
-    """Packages of which those that are missing are named at the end, not at the first."""
+    """Packages that collects missing ones instead of stopping at the first."""
 
-    def find(self, package: str) -> Path | None:
-        return super().find(package) or Path(_NOWHERE, package)
+    def find(self, package: str, asking: Path | None = None) -> Path | None:
+        return super().find(package, asking) or Path(_NOWHERE, package)
 
 
-def _not_found(package: str, by: str, packages: Packages) -> Problem:
-    searched = ", ".join(map(str, dict.fromkeys(packages.searched)))
-    return Problem(
-        f"{by}: package {package!r} not found (give its folder in package_dirs, --package-dir); looked in "
-        f"{searched}"
+def _report(description: Description, given: Mapping[str, Any], found: Sequence[Finding] = ()) -> FileReport:
+    """The report of a description that could be read; `given` is for `load`, `found` are its problems."""
+    packages, asked = description.packages, given.get("missing_meshes")
+    meshes: dict[str, Path | Finding] = {}
+
+    def find_mesh(name: str) -> Path | None:
+        mesh = meshes[name] = packages.mesh(name)
+        return mesh if isinstance(mesh, Path) else None
+
+    checked, problems = inspect(description.xml, find_mesh, given.get("lock") or ())
+    warnings, facts = [*description.notes], dict[str, str]()
+    robot = None
+    if checked is not None:
+        root = checked.root
+        missing = {name: mesh for name, mesh in meshes.items() if isinstance(mesh, Finding)}
+        problems += found
+        warnings += [*checked.spared, *packages.notes]
+        (problems if asked == "error" else warnings).extend(_missing_meshes(root, missing, asked))
+        if not isinstance(packages, _Going):
+            lost = [package for package, folder in packages.found.items() if folder is None]
+            warnings += [packages.missing(package, f"package://{package}") for package in lost]
+        facts = _facts_of_file(description, root)
+        facts["meshes"] = f"{len(meshes) - len(missing)} of {len(meshes)} found" if meshes else "none"
+        folders = [f"{name} in {folder}" for name, folder in packages.found.items() if folder is not None]
+        if folders:
+            facts["packages"] = "; ".join(folders)
+    if checked is not None and not problems:
+        warnings += advice(root)
+        robot, problems = _loaded(description.path, given)
+    if robot is not None:
+        top, ground = _top(root), Ground.of(robot) if robot.platform.coordinates else None
+        warnings += [*wheel_advice(robot, top), *limit_notes(robot)]
+        warnings += [*provenance_of(robot).contradictions, *robot.semantics.notes]
+        warnings += [] if ground is None else ground.warnings(robot)
+        facts |= _facts_of_robot(robot, None if ground is None else ground.fact(top))
+    return FileReport(
+        description.path,
+        description.expanded,
+        description.xml,
+        tuple(sorted(problems, key=_by_line)),
+        tuple(sorted(warnings, key=_by_line)),
+        facts,
+        robot,
     )
 
 
-class _Report:
-    """The steps of `report` for a description that could be read."""
-
-    def __init__(
-        self,
-        description: Description,
-        arguments: Mapping[str, object] | None,
-        package_dirs: Sequence[str | Path],
-        options: Mapping[str, Any] = MappingProxyType({}),
-    ) -> None:
-        self.description, self.packages = description, description.packages
-        self.arguments, self.package_dirs, self.options = arguments, package_dirs, options
-        self.meshes: dict[str, Path | str] = {}
-        self.warnings: list[Problem] = [Problem(note) for note in description.notes]
-        self.facts: dict[str, str] = {}
-        self.robot: Robot | None = None
-
-    def made(self, found: Sequence[Problem] = ()) -> Report:
-        """The report, with problems that were found before."""
-        text = self.description.xml
-        problems = find_problems(text, self._mesh, self.options.get("lock") or ())
-        root = None
-        if not any("XML" in p.message for p in problems[:1]):
-            root = _root(text)
-        if root is not None:
-            problems += [*found, *_left_over(root)]
-            self._count(root)
-            problems += self._about_meshes(root)
-            self._about_packages()
-            if not problems:
-                self.warnings += advice(root)
-                problems += self._load(root)
-        return Report(
-            self.description.path,
-            self.description.expanded,
-            text,
-            tuple(sorted(problems, key=_by_line)),
-            tuple(sorted(self.warnings, key=_by_line)),
-            self.facts,
-            self.robot,
-        )
-
-    def _mesh(self, name: str) -> Path | str | None:
-        """A mesh's file; one that is not there leaves its shape out, and is a warning."""
-        self.meshes[name] = found = self.packages.mesh(name)
-        return None if isinstance(found, str) else found
-
-    def _about_meshes(self, root: Element) -> list[Problem]:
-        """Meshes that are not there: problems where they are to be errors, else warnings."""
-        missing: dict[str, Element] = {}
-        for mesh in root.iter("mesh"):
-            name = mesh.get("filename", "")
-            lost = isinstance(self.meshes.get(name), str) and _NOWHERE not in name
-            if lost and isinstance(mesh, Element):
-                missing.setdefault(name, mesh)
-        usual = ": refused unless missing_meshes='skip' (--missing-meshes skip)"
-        asked = self.options.get("missing_meshes", usual)
-        words = {"skip": "; its shape is left out", "error": ""}.get(asked, asked)
-        found = [
-            Problem(f"mesh {name!r}: {self.meshes[name]}{words}", mesh.line) for name, mesh in missing.items()
-        ]
-        if asked == "error":
-            return found
-        self.warnings += found
-        return []
-
-    def _about_packages(self) -> None:
-        """Packages that are not there, and what was found."""
-        for package, folder in self.packages.found.items():
-            if folder is None and not isinstance(self.packages, _Going):
-                self.warnings.append(_not_found(package, f"package://{package}", self.packages))
-        found = sum(isinstance(file, Path) for file in self.meshes.values())
-        self.facts["meshes"] = f"{found} of {len(self.meshes)} found" if self.meshes else "none"
-        folders = [
-            f"{name} in {folder}" for name, folder in self.packages.found.items() if folder is not None
-        ]
-        if folders:
-            self.facts["packages"] = "; ".join(folders)
-
-    def _count(self, root: Element) -> None:
-        kinds = ", ".join(f"{count} {kind}" for kind, count in joints_by_type(root).items())
-        self.facts["robot"] = root.get("name", "")
-        if self.description.arguments:
-            used = ", ".join(f"{name}={value}" for name, value in self.description.arguments.items())
-            self.facts["xacro arguments"] = used
-        self.facts["links"] = str(len(children(root, "link")))
-        self.facts["joints"] = f"{len(children(root, 'joint'))}: {kinds}" if kinds else "none"
-
-    def _load(self, root: Element) -> list[Problem]:
-        """Load it, to see that it loads; what is wrong then."""
-        try:
-            robot = load(
-                self.description.path,
-                arguments=self.arguments,
-                package_dirs=self.package_dirs,
-                **{**self.options, "missing_meshes": "skip"},
-            )
-            for shapes in robot.shapes:
-                read_meshes(shapes.geometryObjects, robot.name)
-        except InputError as error:
-            return [Problem(str(error).removeprefix(f"{self.description.path}: "))]
-        except Exception as error:  # a library's, which `load` did not foresee: a report comes all the same
-            return [Problem(f"cannot be loaded: {type(error).__name__}: {one_line(str(error))}")]
-        self.warnings += [Problem(text) for text in wheel_advice(robot, _top(root))]
-        self.warnings += [Problem(text) for text in limit_notes(robot)]
-        self.warnings += [Problem(text) for text in provenance_of(robot).contradictions]
-        self.warnings += [Problem(f"SRDF: {text}") for text in robot.semantics.notes]
-        self.warnings += [Problem(text) for text in second_opinion(self.description.xml)]
-        self._about(robot, _top(root))
-        self.robot = robot
-        return []
-
-    def _about(self, robot: Robot, root: str) -> None:
-        self.facts["platform"] = robot.platform.name
-        self.facts["coordinates"] = f"{robot.n}: {', '.join(robot.q_names)}"
-        if robot.followers:
-            self.facts["followers"] = ", ".join(map(str, robot.followers))
-        self.facts["wheels"] = ", ".join(wheel.joint for wheel in robot.wheels) or "none"
-        ground = Ground.of(robot) if robot.platform.coordinates else None
-        if ground is not None:
-            self.facts["ground"] = ground.fact(root)
-            self.warnings += [Problem(text) for text in ground.warnings(robot)]
-        if robot.semantics.files:
-            files = ", ".join(map(str, robot.semantics.files))
-            self.facts["SRDF"] = f"{files}: {counted(len(robot.postures), 'posture')}"
-        self.facts["mass"] = f"{sum(inertia.mass for inertia in robot.model.inertias):.4g} kg"
+def _missing_meshes(root: Element, missing: Mapping[str, Finding], asked: str | None) -> list[Finding]:
+    """The missing meshes, each at its first line, and what becomes of their shapes."""
+    becomes = {"shape": {"skip": "left_out", "error": "", None: "refused"}[asked]}
+    found: dict[str, Finding] = {}
+    for mesh in root.iter("mesh"):
+        name = mesh.get("filename", "")
+        lost = missing.get(name)
+        if lost is not None and _NOWHERE not in name and isinstance(mesh, Element):
+            values = {**lost.values, **becomes}
+            found.setdefault(name, replace(lost, values=values, where={"line": mesh.line}))
+    return [*found.values()]
 
 
-def _root(text: str) -> Element | None:
+def _facts_of_file(description: Description, root: Element) -> dict[str, str]:
+    types = sorted(joint.get("type", "") for joint in children(root, "joint"))
+    kinds = ", ".join(f"{types.count(kind)} {kind}" for kind in dict.fromkeys(types))
+    facts = {"robot": root.get("name", "")}
+    if description.arguments:
+        used = ", ".join(f"{name}={value}" for name, value in description.arguments.items())
+        facts["xacro arguments"] = used
+    facts["links"] = str(len(children(root, "link")))
+    facts["joints"] = f"{len(types)}: {kinds}" if kinds else "none"
+    return facts
+
+
+def _loaded(path: Path, given: Mapping[str, Any]) -> tuple[Robot | None, list[Finding]]:
+    """The robot with all its meshes, or what is wrong when it is loaded."""
     try:
-        root = parse(text)
-    except Exception:  # which `find_problems` has named
-        return None
-    return root if root.tag == "robot" and not any(e.tag.startswith("xacro:") for e in root.iter()) else None
+        robot = load(path, **{**given, "missing_meshes": "skip"})
+        for shapes in robot.shapes:
+            read_meshes(shapes.geometryObjects, robot.name)
+    except InputError as error:
+        inner = error.where.removeprefix(str(path)).removeprefix(": ")
+        return None, [*getattr(error, "findings", ())] or [_refused(error.placed(inner))]
+    except Exception as error:  # a library's, which `load` did not foresee: a report comes all the same
+        values = {"error": type(error).__name__, "reason": one_line(str(error))}
+        return None, [Finding("library_failed", values)]
+    return robot, []
 
 
-def _left_over(root: Element) -> list[Problem]:
-    """$(find pkg) that nobody expands: a URDF is taken as it stands."""
-    problems = []
-    for element in root.iter():
-        for value in element.attrib.values():
-            if isinstance(element, Element) and (found := _FIND.search(value)) is not None:
-                message = f"<{element.tag}>: holds xacro, $(find {found[1]}): name the file .xacro"
-                problems.append(Problem(message, element.line))
-    return problems
+def _facts_of_robot(robot: Robot, ground: str | None) -> dict[str, str]:
+    facts = {"platform": robot.platform.name, "coordinates": f"{robot.n}: {', '.join(robot.q_names)}"}
+    if robot.mimic_joints:
+        facts["followers"] = ", ".join(map(str, robot.mimic_joints))
+    facts["wheels"] = ", ".join(wheel.joint for wheel in robot.wheels) or "none"
+    if ground is not None:
+        facts["ground"] = ground
+    if robot.semantics.files:
+        files = ", ".join(map(str, robot.semantics.files))
+        facts["SRDF"] = f"{files}: {counted(len(robot.postures), 'posture')}"
+    facts["mass"] = f"{sum(inertia.mass for inertia in robot.model.inertias):.4g} kg"
+    return facts
+
+
+def _refused(error: InputError) -> Finding:
+    fields = {"what": error.what, "where": error.where, "expected": error.expected}
+    names = {} if error.available is None else {"available": [*error.available]}
+    return Finding("refused", {"text": str(error), **fields, **names})
 
 
 def _top(root: Element) -> str:
-    """The root link's name, in a tree without problems."""
-    below = {
-        end.get("link") for joint in children(root, "joint") if (end := child(joint, "child")) is not None
-    }
+    below = {link_at(joint, "child") for joint in children(root, "joint")}
     return next(name for link in children(root, "link") if (name := link.get("name", "")) not in below)
 
 
-def _by_line(problem: Problem) -> int:
-    return problem.line or 0
+def _by_line(finding: Finding) -> int:
+    return line_of(finding) or 0

@@ -1,12 +1,13 @@
-"""The root's part of a Pinocchio configuration: x, y, θ as a planar joint, a free flyer, or three joints."""
+"""The root's part of a Pinocchio configuration: x, y, θ as three joints, a planar joint, or a free flyer.
 
-from __future__ import annotations
+Points and velocities of the plane are complex numbers.
+"""
 
-from abc import ABC, abstractmethod
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from nmm.arrays import Array
 from nmm.errors import InputError
@@ -15,143 +16,86 @@ from nmm.errors import InputError
 _LEVEL = 1e-6
 
 
-class RootLayout(ABC):
-    """Between (x, y, θ) of the reference point and the root joint of a model, for N rows at once.
+class ChainRoot:
+    """Between (x, y, θ) of the reference point, N rows, and a model's chain x, y, theta.
+    offset : x, y, z (m) and yaw (rad) of the model's root in the axes of the reference point"""
 
-    Parameters
-    ----------
-    offset : x, y, z (m) and yaw (rad) of the model's root in the axes of the reference point
-    """
-
-    nq: int
-    nv: int
+    nq, nv = 3, 3
+    #: Pinocchio's joint; None for the chain.
+    joint: Any = None
 
     def __init__(self, offset: Array) -> None:
-        self._x, self._y, self._z, self._yaw = (float(value) for value in offset)
+        x, y, self._z, self._yaw = (float(value) for value in offset)
+        self._offset = complex(x, y)
+        if self.nq < 7 and abs(self._z) > _LEVEL:
+            expected = "a root as high as the reference point, m: only a free flyer has a height"
+            raise InputError(where="model: z", expected=expected, got=self._z)
 
-    @staticmethod
-    @abstractmethod
-    def joint() -> Any:
-        """Pinocchio's joint; None for the chain."""
-
-    @abstractmethod
     def configuration(self, pose: Array) -> Array:
         """The root's configuration (N, nq) at (x, y, θ) (N, 3)."""
+        return _rows(_plane(pose) + self._lever(pose[:, 2]), pose[:, 2] + self._yaw)
 
-    @abstractmethod
     def coordinates(self, configuration: Array) -> Array:
         """(x, y, θ), (N, 3), of a configuration (N, nq), θ up to full turns."""
+        theta = configuration[:, 2] - self._yaw
+        return _rows(_plane(configuration) - self._lever(theta), theta)
 
-    @abstractmethod
     def velocity(self, pose: Array, rates: Array) -> Array:
         """The root's velocity (N, nv) at (x, y, θ) and their rates, (N, 3)."""
+        return self._moved_rates(pose, rates, 1.0)
 
-    @abstractmethod
     def rates(self, pose: Array, velocity: Array) -> Array:
         """The rates of (x, y, θ), (N, 3), of the root's velocity (N, nv)."""
+        return self._moved_rates(pose, velocity, -1.0)
 
-    def _moved(self, pose: Array) -> Array:
-        """The root's own (x, y, θ)."""
-        return pose + np.column_stack([*self._lever(pose[:, 2]), np.full(len(pose), self._yaw)])
-
-    def _back(self, pose: Array) -> Array:
-        theta = pose[:, 2] - self._yaw
-        lever_x, lever_y = self._lever(theta)
-        return np.column_stack([pose[:, 0] - lever_x, pose[:, 1] - lever_y, theta])
-
-    def _lever(self, theta: Array) -> tuple[Array, Array]:
+    def _lever(self, theta: Array) -> NDArray[np.complex128]:
         """From the reference point to the root, in the world's axes."""
-        cosine, sine = np.cos(theta), np.sin(theta)
-        return cosine * self._x - sine * self._y, sine * self._x + cosine * self._y
+        return self._offset * np.exp(1j * theta)
 
-    def _moved_rates(self, pose: Array, rates: Array) -> Array:
-        """Velocity of the root's own x, y, θ: the lever turns with θ."""
-        lever_x, lever_y = self._lever(pose[:, 2])
-        turn = rates[:, 2]
-        return np.column_stack([rates[:, 0] - turn * lever_y, rates[:, 1] + turn * lever_x, turn])
-
-    def _back_rates(self, pose: Array, rates: Array) -> Array:
-        lever_x, lever_y = self._lever(pose[:, 2])
-        turn = rates[:, 2]
-        return np.column_stack([rates[:, 0] + turn * lever_y, rates[:, 1] - turn * lever_x, turn])
-
-    def _in_body(self, pose: Array, rates: Array) -> Array:
-        """The root's velocity along its own axes, and its turn."""
-        moved = self._moved_rates(pose, rates)
-        theta = pose[:, 2] + self._yaw
-        return np.column_stack([*_turned(-theta, moved[:, 0], moved[:, 1]), moved[:, 2]])
-
-    def _from_body(self, pose: Array, body: Array) -> Array:
-        theta = pose[:, 2] + self._yaw
-        moved = np.column_stack([*_turned(theta, body[:, 0], body[:, 1]), body[:, 2]])
-        return self._back_rates(pose, moved)
+    def _moved_rates(self, pose: Array, rates: Array, sign: float) -> Array:
+        """Velocity of the root's own x, y, θ (the lever turns with θ); with sign -1, the way back."""
+        return _rows(_plane(rates) + sign * 1j * rates[:, 2] * self._lever(pose[:, 2]), rates[:, 2])
 
 
-class ChainRoot(RootLayout):
-    """The chain x, y, theta, or nothing at all (`count` 0)."""
-
-    def __init__(self, offset: Array, count: int = 3) -> None:
-        super().__init__(offset)
-        self.nq = self.nv = count
-        _check_height(self._z)
-
-    @staticmethod
-    def joint() -> Any:
-        return None
-
-    def configuration(self, pose: Array) -> Array:
-        return self._moved(pose) if self.nq else pose
-
-    def coordinates(self, configuration: Array) -> Array:
-        return self._back(configuration) if self.nq else configuration
-
-    def velocity(self, pose: Array, rates: Array) -> Array:
-        return self._moved_rates(pose, rates) if self.nq else rates
-
-    def rates(self, pose: Array, velocity: Array) -> Array:
-        return self._back_rates(pose, velocity) if self.nq else velocity
-
-
-class PlanarRoot(RootLayout):
+class PlanarRoot(ChainRoot):
     """(x, y, cos θ, sin θ); velocity along the body's axes."""
 
     nq, nv = 4, 3
-
-    def __init__(self, offset: Array) -> None:
-        super().__init__(offset)
-        _check_height(self._z)
-
-    @staticmethod
-    def joint() -> Any:
-        return pin.JointModelPlanar()
+    joint = pin.JointModelPlanar
+    #: Those of the root's nv velocities that move it in the plane: along its own x and y, and its turn.
+    planar: tuple[int, int, int] = (0, 1, 2)
 
     def configuration(self, pose: Array) -> Array:
-        moved = self._moved(pose)
+        moved = super().configuration(pose)
         return np.column_stack([moved[:, :2], np.cos(moved[:, 2]), np.sin(moved[:, 2])])
 
     def coordinates(self, configuration: Array) -> Array:
         x, y, cosine, sine = configuration.T
-        _check(np.abs(np.hypot(cosine, sine) - 1.0), "cos θ, sin θ: expected a pair of unit length")
-        return self._back(np.column_stack([x, y, np.arctan2(sine, cosine)]))
+        _check(np.abs(np.hypot(cosine, sine) - 1.0), "cos θ, sin θ", "a pair of unit length")
+        return super().coordinates(np.column_stack([x, y, np.arctan2(sine, cosine)]))
 
     def velocity(self, pose: Array, rates: Array) -> Array:
-        return self._in_body(pose, rates)
+        moved, result = super().velocity(pose, rates), np.zeros((len(pose), self.nv))
+        result[:, self.planar] = _rows(_plane(moved) / self._axes(pose), moved[:, 2])
+        return result
 
     def rates(self, pose: Array, velocity: Array) -> Array:
-        return self._from_body(pose, velocity)
+        body = velocity[:, self.planar]
+        return super().rates(pose, _rows(_plane(body) * self._axes(pose), body[:, 2]))
+
+    def _axes(self, pose: Array) -> NDArray[np.complex128]:
+        return np.exp(1j * (pose[:, 2] + self._yaw))
 
 
-class FreeFlyerRoot(RootLayout):
+class FreeFlyerRoot(PlanarRoot):
     """(x, y, z, quaternion x y z w); velocity along the body's axes, linear and angular."""
 
     nq, nv = 7, 6
-
-    @staticmethod
-    def joint() -> Any:
-        return pin.JointModelFreeFlyer()
+    joint = pin.JointModelFreeFlyer
+    planar = (0, 1, 5)
 
     def configuration(self, pose: Array) -> Array:
-        moved, nothing = self._moved(pose), np.zeros(len(pose))
+        moved, nothing = ChainRoot.configuration(self, pose), np.zeros(len(pose))
         half = 0.5 * moved[:, 2]
         height = np.full(len(pose), self._z)
         return np.column_stack([moved[:, :2], height, nothing, nothing, np.sin(half), np.cos(half)])
@@ -159,39 +103,30 @@ class FreeFlyerRoot(RootLayout):
     def coordinates(self, configuration: Array) -> Array:
         x, y, z, qx, qy, qz, qw = configuration.T
         length = np.linalg.norm(configuration[:, 3:], axis=1)
-        _check(np.abs(length - 1.0), "quaternion: expected one of unit length")
-        _check(np.abs(z - self._z), f"z: expected {self._z:g} m, the platform stays on its plane")
-        _check(np.hypot(qx, qy), "roll and pitch: expected 0, the platform stays upright")
-        return self._back(np.column_stack([x, y, 2.0 * np.arctan2(qz, qw)]))
-
-    def velocity(self, pose: Array, rates: Array) -> Array:
-        body, nothing = self._in_body(pose, rates), np.zeros((len(pose), 3))
-        return np.column_stack([body[:, :2], nothing, body[:, 2]])
+        _check(np.abs(length - 1.0), "quaternion", "one of unit length")
+        _check(np.abs(z - self._z), "z", f"{self._z:g} m: the platform stays on its plane")
+        _check(np.hypot(qx, qy), "roll and pitch", "0: the platform stays upright")
+        return ChainRoot.coordinates(self, np.column_stack([x, y, 2.0 * np.arctan2(qz, qw)]))
 
     def rates(self, pose: Array, velocity: Array) -> Array:
-        _check(
-            np.abs(velocity[:, 2:5]).max(axis=1, initial=0.0), "velocity along z, about x and y: expected 0"
-        )
-        return self._from_body(pose, velocity[:, [0, 1, 5]])
+        off = np.abs(velocity[:, 2:5]).max(axis=1, initial=0.0)
+        _check(off, "velocity along z, about x and y", "0")
+        return super().rates(pose, velocity)
 
 
-ROOTS: dict[str, type[RootLayout]] = {"planar": PlanarRoot, "freeflyer": FreeFlyerRoot, "chain": ChainRoot}
+ROOTS: dict[str, type[ChainRoot]] = {"planar": PlanarRoot, "freeflyer": FreeFlyerRoot, "chain": ChainRoot}
 
 
-def _turned(angle: Array, x: Array, y: Array) -> tuple[Array, Array]:
-    cosine, sine = np.cos(angle), np.sin(angle)
-    return cosine * x - sine * y, sine * x + cosine * y
+def _plane(rows: Array) -> NDArray[np.complex128]:
+    return rows[:, 0] + 1j * rows[:, 1]
 
 
-def _check(off: Array, expected: str) -> None:
+def _rows(plane: NDArray[np.complex128], turn: Array) -> Array:
+    return np.column_stack([plane.real, plane.imag, turn])
+
+
+def _check(off: Array, where: str, expected: str) -> None:
     if off.size and off.max() > _LEVEL:
         row = int(off.argmax())
-        where = f" in row {row}" if off.size > 1 else ""
-        raise InputError(f"{expected}, got {off[row]:g} off{where}")
-
-
-def _check_height(z: float) -> None:
-    if abs(z) > _LEVEL:
-        raise InputError(
-            f"the model's root is {z:g} m above the reference point, and only a free flyer has a height"
-        )
+        place = f"row {row}: {where}" if off.size > 1 else where
+        raise InputError(where=place, expected=f"{expected}, to {_LEVEL:g}", got=float(off[row]))

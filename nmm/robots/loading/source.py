@@ -1,4 +1,6 @@
-"""What is read before anything is done to it: Pinocchio's models of a file, or those given."""
+"""Reads Pinocchio's models of a file, or takes those given.
+
+Reading meshes takes Pinocchio most of its time: each is replaced by a ball, its file kept beside the text."""
 
 from __future__ import annotations
 
@@ -6,41 +8,42 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
+from xml.etree import ElementTree
 
 import pinocchio as pin
 
 from nmm.bundled import bundled_robots
-from nmm.errors import RobotError, expect_known, unknown
-from nmm.robots.followers import Follower
-from nmm.robots.loading.chain import followers_of
-from nmm.robots.loading.check import check
+from nmm.errors import RobotError, expect_known, no_such
+from nmm.findings import Finding
+from nmm.findings.robot_file import refusal
+from nmm.robots.loading import mending
+from nmm.robots.loading.chain import mimic_joints_of
+from nmm.robots.loading.check import CheckedUrdf, inspect
+from nmm.robots.loading.check_parts import mesh_scale, shape_of
 from nmm.robots.loading.description import SUFFIXES, describe
-from nmm.robots.loading.packages import package_file
+from nmm.robots.loading.packages import PACKAGE, package_file
 from nmm.robots.loading.provenance import Provenance
-from nmm.robots.loading.urdf_text import UrdfText, urdf_text
+from nmm.robots.loading.xml_tree import Element, child, children
 from nmm.robots.meshes import leave_unread
-from nmm.words import one_line
+from nmm.robots.mimic_joints import MimicJoint
+from nmm.text_format import one_line
 
-PACKAGE = "package://"
+# What Pinocchio gets of a checked description: kinematics, inertia and shapes. The rest (calibration,
+# safety_controller, mimic of locked joints, transmissions, Gazebo's elements) says nothing to nmm, and
+# Pinocchio's reader would still stumble over it.
+_SHAPES = ("visual", "collision")
+_JOINT_PARTS = ("origin", "parent", "child")
+_MOVING_PARTS = ("axis", "limit", "dynamics")
 
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """A robot's models and what goes with them.
+    """A robot's models, which are not to be changed, and what goes with them.
 
-    Attributes
-    ----------
-    name : the robot's name
-    where : what messages call it
-    label : its file, bundled name, or "pin.Model"
-    model, visual_model, collision_model : Pinocchio's, not to be changed
-    all_pairs : whether the collision pairs are ours to choose
-    arguments : the xacro arguments used
-    followers : joints that follow others, each after the one that it follows
-    platform : the kind of platform that the file declares
-    notes : what was done
-    provenance : what was found
-    """
+    where, label : its name in messages; its file, bundled name, or "pin.Model"
+    all_pairs : whether we choose the collision pairs
+    mimic_joints : each after its leader
+    platform : the kind that the file declares"""
 
     name: str
     where: str
@@ -50,9 +53,9 @@ class Source:
     collision_model: pin.GeometryModel
     all_pairs: bool
     arguments: Mapping[str, str] = field(default_factory=dict)
-    followers: tuple[Follower, ...] = ()
+    mimic_joints: tuple[MimicJoint, ...] = ()
     platform: str | None = None
-    notes: tuple[str, ...] = ()
+    notes: tuple[Finding, ...] = ()
     provenance: Provenance = field(default_factory=Provenance)
 
 
@@ -63,23 +66,23 @@ def read_file(
     lock: Mapping[str, float],
     missing_meshes: Literal["error", "skip"],
 ) -> Source:
-    """The models of a bundled robot or of a file; see `load`."""
     expect_known("missing_meshes", missing_meshes, ("error", "skip"), error=RobotError)
-    description = describe(path_of(source, package_dirs), arguments, package_dirs)
+    description = describe(source_path(source, package_dirs), arguments, package_dirs)
     where, packages = str(source), description.packages
     meshes: dict[str, Path | None] = {}
 
-    def find_mesh(name: str) -> Path | str | None:
+    def find_mesh(name: str) -> Path | Finding | None:
         found = packages.mesh(name)
-        if isinstance(found, str) and missing_meshes == "error":
+        if isinstance(found, Finding) and missing_meshes == "error":
             return found
-        meshes[name] = None if isinstance(found, str) else found
-        return meshes[name]
+        return meshes.setdefault(name, None if isinstance(found, Finding) else found)
 
-    checked = check(description.xml, where, find_mesh, lock, not description.expanded)
-    model, visual, collision = _pinocchio_models(urdf_text(checked, checked.name), where)
+    checked, problems = inspect(description.xml, find_mesh, lock)
+    if checked is None or problems:
+        raise refusal(where, *problems, lines=not description.expanded)
+    model, visual, collision = _pinocchio_models(checked, where)
     missing = [name for name, file in meshes.items() if file is None]
-    left_out = [f"shapes left out, their meshes are missing: {', '.join(missing)}"] if missing else []
+    left_out = [Finding("shapes_left_out", {"names": missing})] if missing else []
     return Source(
         name=checked.name,
         where=where,
@@ -89,11 +92,20 @@ def read_file(
         collision_model=collision,
         all_pairs=True,
         arguments=description.arguments,
-        followers=checked.followers,
+        mimic_joints=checked.mimic_joints,
         platform=checked.platform,
-        notes=(*description.notes, *left_out),
+        notes=(*description.notes, *left_out, *packages.notes, *_spared(checked.spared)),
         provenance=Provenance(dict(packages.found), packages.searched, meshes),
     )
+
+
+def _spared(found: Sequence[Finding]) -> list[Finding]:
+    """Notes on faults that were spared: each joint that follows none, and how many others there are."""
+    told = [one for one in found if one.code == "leader_unknown"]
+    others = [one for one in found if one.code != "leader_unknown"]
+    if others:
+        told.append(Finding("faults_spared", {"count": len(others), "first": str(others[0])}))
+    return told
 
 
 def read_model(
@@ -108,51 +120,98 @@ def read_model(
         visual_model=_shapes(visual_model, "visual_model", model),
         collision_model=_shapes(collision_model, "collision_model", model),
         all_pairs=False,
-        followers=followers_of(model),
+        mimic_joints=mimic_joints_of(model),
     )
 
 
-def path_of(source: str | Path, package_dirs: Sequence[str | Path]) -> Path:
-    """The file of a bundled name, of a package:// name or of a path: a string without folder and suffix is a
-    bundled name."""
+def source_path(source: str | Path, package_dirs: Sequence[str | Path]) -> Path:
+    """The file of a path, of a package:// name, or of a bundled name: a string without folder and suffix."""
     if isinstance(source, Path):
         return source
     if not isinstance(source, str):
-        raise RobotError(f"expected a robot's name, a path or a pin.Model, got {type(source).__name__}")
+        raise RobotError(expected="a robot's name, a path or a pin.Model", got=source)
     if source.startswith(PACKAGE):
         return package_file(source, package_dirs)
     if "/" in source or "\\" in source or source.lower().endswith(SUFFIXES):
         return Path(source)
     robots = bundled_robots()
     if source not in robots:
-        raise RobotError(f"{unknown('robot', source, robots)}; or give the path of a .urdf or .xacro file")
+        error: RobotError = no_such("robot", source, robots, error=RobotError)
+        expected = "a bundled name, or the path of a .urdf or .xacro file"
+        raise RobotError(error.what, expected=expected, got=source, available=robots)
     return robots[source]
 
 
-def _pinocchio_models(urdf: UrdfText, where: str) -> tuple[pin.Model, pin.GeometryModel, pin.GeometryModel]:
-    """Fixed-base model, visual and collision shapes of a checked description; its meshes are not read."""
+#: By "visual" or "collision", and the name that Pinocchio gives the shape: its <mesh> or <capsule>, a mesh's
+#: file.
+_StandIns = Mapping[str, dict[str, tuple[Element, Path | None]]]
+
+
+def _pinocchio_models(
+    checked: CheckedUrdf, where: str
+) -> tuple[pin.Model, pin.GeometryModel, pin.GeometryModel]:
+    """The fixed-base model, visual and collision shapes; meshes are not read."""
+    xml, stand_ins = _for_pinocchio(checked)
     try:
-        model = pin.buildModelFromXML(urdf.xml)
+        model = pin.buildModelFromXML(xml)
         visual, collision = (
-            pin.buildGeomFromUrdfString(model, urdf.xml, kind)
+            pin.buildGeomFromUrdfString(model, xml, kind)
             for kind in (pin.GeometryType.VISUAL, pin.GeometryType.COLLISION)
         )
     except (ValueError, RuntimeError) as error:
-        raise RobotError(f"{where}: Pinocchio cannot read it: {one_line(str(error))}") from None
-    for shapes, kind in ((visual, "visual"), (collision, "collision")):
+        reason = {"error": "Pinocchio", "reason": one_line(str(error))}
+        raise refusal(where, Finding("library_failed", reason)) from None
+    for shapes, stood_for in ((visual, stand_ins["visual"]), (collision, stand_ins["collision"])):
         for shape in shapes.geometryObjects:
-            mesh = urdf.meshes[kind].get(shape.name)
-            if mesh is not None:
-                leave_unread(shape, str(mesh.path), mesh.scale)
+            element, file = stood_for.get(shape.name, (None, None))
+            if element is not None and file is not None:
+                leave_unread(shape, str(file), mesh_scale(element) or (1.0, 1.0, 1.0))
+            elif element is not None:
+                sizes = (float(element.get(size, "")) for size in ("radius", "length"))
+                shape.geometry = pin.hppfcl.Capsule(*sizes)
     return model, visual, collision
+
+
+def _for_pinocchio(checked: CheckedUrdf) -> tuple[str, _StandIns]:
+    """URDF text of a checked description with a ball for every mesh and capsule, and these."""
+    root = ElementTree.Element("robot", name=checked.name)
+    stand_ins: _StandIns = {kind: {} for kind in _SHAPES}
+    for material in mending.materials(checked.root):
+        # One without colour or texture defines nothing, and Pinocchio's reader prints an error for it.
+        if child(material, "color") is not None or child(material, "texture") is not None:
+            root.append(material)
+    for link in children(checked.root, "link"):
+        copied = ElementTree.SubElement(root, "link", name=link.get("name", ""))
+        copied.extend(mending.inertials(link))
+        for kind in _SHAPES:
+            count = 0
+            for part in children(link, kind):
+                shape = shape_of(part)
+                if shape is None or (shape.tag == "mesh" and shape.get("filename") not in checked.meshes):
+                    continue  # it is to be left out
+                stand_in: ElementTree.Element = shape
+                if shape.tag in ("mesh", "capsule"):
+                    file = checked.meshes.get(shape.get("filename", ""))
+                    stand_ins[kind][f"{link.get('name', '')}_{count}"] = shape, file
+                    stand_in = ElementTree.Element("sphere", radius="1")
+                copied.append(mending.with_shape(part, stand_in))
+                count += 1
+    for joint in children(checked.root, "joint"):
+        kind = joint.get("type", "")
+        copied = ElementTree.SubElement(root, "joint", name=joint.get("name", ""), type=kind)
+        for tag in _JOINT_PARTS if kind == "fixed" else _JOINT_PARTS + _MOVING_PARTS:
+            if (found := child(joint, tag)) is not None:
+                copied.append(mending.limit(found) if tag == "limit" else found)
+    return ElementTree.tostring(root, encoding="unicode"), stand_ins
 
 
 def _shapes(shapes: pin.GeometryModel | None, name: str, model: pin.Model) -> pin.GeometryModel:
     if shapes is None:
         return pin.GeometryModel()
     if not isinstance(shapes, pin.GeometryModel):
-        raise RobotError(f"{name}: expected a pin.GeometryModel, got {type(shapes).__name__}")
+        raise RobotError(where=name, expected="a pin.GeometryModel", got=shapes)
     for shape in shapes.geometryObjects:
         if shape.parentJoint >= model.njoints:
-            raise RobotError(f"{name}: shape {shape.name!r} is on a joint that the model does not have")
+            what = f"shape {shape.name!r} is on a joint that the model does not have"
+            raise RobotError(what, where=name, got=shape.name)
     return shapes

@@ -1,37 +1,37 @@
-"""Joints of a file that stand for a base which drives: without limits, one on another, all on the last."""
-
-from __future__ import annotations
+"""Joints of a file that stand for a mobile base: far-reaching, in a chain, carrying all else."""
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
-from nmm.platforms import Fixed, Omnidirectional, Platform
-from nmm.platforms.layout import NEAR
+from nmm.arrays import Array
+from nmm.findings import Finding
+from nmm.platforms import Omnidirectional, Platform
+from nmm.platforms.wheel_layout import NEAR
 from nmm.robots.coordinates import UNLIMITED
+from nmm.robots.joint_table import twist
 from nmm.robots.loading.joint_kinds import kind
-from nmm.robots.loading.layout import Measured, speed_limit
+from nmm.robots.loading.measured_joints import Measured, speed_limit
 
 #: How far the two ways in which a base slides may be from level, rad.
 _LEVEL = 1e-3
+#: Slides with less room than this, m, are those of a table or a gantry.
+_ROOM = 1.0
 
 
 @dataclass(frozen=True)
 class VirtualBase:
-    """A base made of joints.
-
-    Attributes
-    ----------
-    joints : their names, from the root link on
-    drives : whether they are two: one turns the base, and the next slides it ahead
-    speeds : their largest rates, rad/s or m/s, infinite without
-    """
+    """A base made of `joints`, from the root link on; `drives` if one turns it and the next slides it ahead.
+    `speeds` are the joints' largest rates, rad/s or m/s, infinite without; `limits` where they end in the
+    file, rad or m."""
 
     joints: tuple[str, ...]
     drives: bool
     speeds: tuple[float, ...]
+    limits: Mapping[str, tuple[float, float]]
 
     @property
     def kind(self) -> str | None:
@@ -39,78 +39,80 @@ class VirtualBase:
         return None if self.drives else Omnidirectional.name
 
     def limited(self, platform: Platform) -> Platform:
-        """The platform with limits of its own, or with the joints' for v and omega that have none."""
+        """The platform with its own limits or, for v and omega without, the joints'."""
         if not self.drives:
             return platform  # their rates are no inputs
+        own = dict(zip(("omega", "v"), self.speeds, strict=True))
         limits = zip(platform.inputs, platform.input_limits, strict=True)
-        free = [name for name, limit in limits if limit == math.inf]
-        turning, ahead = self.speeds
-        own = {name: speed for name, speed in (("v", ahead), ("omega", turning)) if speed < math.inf}
-        return platform.with_limits({name: own[name] for name in free if name in own})
+        free = [name for name, limit in limits if limit == math.inf and own.get(name, limit) < math.inf]
+        return platform.with_limits({name: own[name] for name in free})
 
-    def note(self, platform: Platform) -> str:
-        """What became of it."""
-        names = ", ".join(self.joints)
-        if isinstance(platform, Fixed):
-            return f"{names} move the whole robot without limits: a base of joints, coordinates like others"
-        return (
-            f"{names} move the whole robot without limits: a base of joints, in whose place is platform "
-            f"{platform.name}; platform fixed keeps them as coordinates"
+    def note(self, platform: Platform) -> Finding:
+        limits = {name: [*ends] for name, ends in self.limits.items()}
+        return Finding(
+            "base_of_joints", {"names": [*self.joints], "platform": platform.name, "limits": limits}
         )
 
 
 def find_virtual_base(model: pin.Model, where: str) -> VirtualBase | None:
-    """The two or three joints next to the root link that turn it about an upright axis or slide it on the
-    ground, without limits, each with all that moves on it; None where there are none.
-
-    Parameters
-    ----------
-    model : on the chain
-    where : what messages call the model
-    """
+    """The joints, if any, by which the root link turns or slides all else on the ground: two or three that
+    are endless, or two long slides and a turn, whatever their limits."""
     measured = Measured(model, (), where)
+    found, ways = _chain(measured, _is_endless)
+    turns_first = len(found) == 2 and len(ways) == 1 and measured.is_upright(found[0])
+    drives = turns_first and abs(ways[0][0]) > 1.0 - _LEVEL
+    if not drives and len(found) + len(ways) < 4:
+        found, ways = _chain(measured, _has_room)
+        if len(found) + len(ways) < 5:
+            return None
+    names = tuple(str(model.names[i]) for i in found)
+    ends = {str(model.names[i]): _ends(model, i) for i in found if not _is_endless(model, i)}
+    return VirtualBase(names, drives, tuple(speed_limit(model, i) for i in found), ends)
+
+
+def _chain(measured: Measured, is_usable: Callable[[pin.Model, int], bool]) -> tuple[list[int], list[Array]]:
+    """Up to three joints at one point that turn or slide all else on the ground, and the slides' ways."""
+    model = measured.model
     found: list[int] = []
-    ways: list[np.ndarray] = []
+    ways: list[Array] = []
     joint = measured.root
-    while len(found) < 3:
-        below = [i for i in measured.joints.values() if int(model.parents[i]) == joint]
-        if len(below) != 1 or not _is_endless(model, below[0]):
-            break
-        (joint,) = below
+    while len(found) < 3 and len(model.children[joint]) == 1:
+        (joint,) = map(int, model.children[joint])
         way = _level_slide(measured, joint)
         moved = np.linalg.norm(model.jointPlacements[joint].translation) > NEAR
         # Real joints are apart, those of a base are at one point.
-        if (found and moved) or (way is None and not measured.is_upright(joint)):
+        if (
+            not is_usable(model, joint)
+            or (found and moved)
+            or (way is None and not measured.is_upright(joint))
+        ):
             break
         if way is not None and any(abs(way @ other) > 1.0 - _LEVEL for other in ways):
             break
         found.append(joint)
         ways += [] if way is None else [way]
-    drives = (
-        len(found) == 2
-        and len(ways) == 1
-        and measured.is_upright(found[0])
-        and abs(ways[0][0]) > 1.0 - _LEVEL
-    )
-    if not drives and len(found) + len(ways) < 4:
-        return None
-    names = tuple(str(model.names[i]) for i in found)
-    return VirtualBase(names, drives, tuple(speed_limit(model, i) for i in found))
+    return found, ways
+
+
+def _ends(model: pin.Model, joint: int) -> tuple[float, float]:
+    index = model.joints[joint].idx_q
+    return float(model.lowerPositionLimit[index]), float(model.upperPositionLimit[index])
 
 
 def _is_endless(model: pin.Model, joint: int) -> bool:
-    index = model.joints[joint].idx_q
-    return bool(
-        -model.lowerPositionLimit[index] >= UNLIMITED and model.upperPositionLimit[index] >= UNLIMITED
-    )
+    lower, upper = _ends(model, joint)
+    return min(-lower, upper) >= UNLIMITED
 
 
-def _level_slide(measured: Measured, joint: int) -> np.ndarray | None:
-    """The level unit vector (3,) along which a joint slides; None where it does something else."""
+def _has_room(model: pin.Model, joint: int) -> bool:
+    lower, upper = _ends(model, joint)
+    return upper - lower >= _ROOM
+
+
+def _level_slide(measured: Measured, joint: int) -> Array | None:
+    """The level unit vector (3,) along which a joint slides, if it does."""
     one = measured.model.joints[joint]
     if not kind(one).startswith("P"):
         return None
-    data = one.createData()
-    one.calc(data, measured.neutral)
-    way = measured.placements[joint].rotation @ np.array(data.S).reshape(6)[:3]
-    return np.asarray(way) if abs(way[2]) < _LEVEL else None
+    way = np.asarray(measured.placements[joint].rotation @ twist(one, measured.neutral)[0])
+    return way if abs(way[2]) < _LEVEL else None

@@ -1,0 +1,172 @@
+"""The records of a compiled step, laid out from a robot's tasks, objective, limits and distances."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from nmm.collisions.rows import no_rows
+from nmm.control.bounded_step import write_clearance, write_limits
+from nmm.control.bounds import Clearance
+from nmm.control.collisions import Collisions
+from nmm.control.equations import Arm, ControlStep
+from nmm.control.equations import step as compiled_step
+from nmm.control.limits import Limits, LimitsOn
+from nmm.control.period_monitor import NOT_CALLED
+from nmm.control.retreat import Retreat, retreat_numbers
+from nmm.control.safety_filter import CUTS, MARGIN, Counts
+from nmm.control.steering import NOTHING, Steered, Steering
+from nmm.control.task_rows import task_functions, task_rows
+from nmm.errors import InputError, expect_kind, expect_known
+from nmm.functions.function import Function, row_scales
+from nmm.functions.objectives.base import Objective
+from nmm.functions.program import BESIDE, COMPILED, PINOCCHIO, Program
+from nmm.functions.tasks.task import Stack
+from nmm.kernels.parallel_compile import compile_in_parallel
+from nmm.kernels.record_layout import views
+from nmm.resolvers.answer import unanswered
+from nmm.resolvers.base import Resolver, State
+from nmm.resolvers.problem import Dimensions, Problem
+from nmm.resolvers.problem_arrays import LOWER, UPPER
+from nmm.resolvers.saturation import limit
+from nmm.robots.robot import Robot
+
+
+class Given(NamedTuple):
+    """The arguments of a controller, in the order of its constructor."""
+
+    robot: Robot
+    task: Stack
+    resolver: Resolver
+    objective: Objective | None
+    added_task: Stack
+    limits: Limits | None
+    dt: float | None
+    retreat: Retreat | None
+    steering: Steering | bool
+    collisions: Collisions | None
+    kinematics: str
+
+
+def checked(given: Given) -> Given:
+    """The same arguments; `InputError` for wrong kinds and combinations."""
+    kinds = {"objective": Objective, "retreat": Retreat, "limits": Limits, "collisions": Collisions}
+    optional = {name: kind for name, kind in kinds.items() if getattr(given, name) is not None}
+    steering = {} if isinstance(given.steering, bool) else {"steering": Steering}
+    for name, kind in ({"robot": Robot, "resolver": Resolver} | optional | steering).items():
+        expect_kind(getattr(given, name), kind, "controller", f"a {kind.__name__} as {name}")
+    expect_known("kinematics", given.kinematics, (PINOCCHIO, COMPILED), "controller")
+    if given.added_task.tasks and not given.resolver.takes_added_task:
+        raise InputError(f"resolver {given.resolver.name} takes none, ej does", where="added_task")
+    return given
+
+
+class LaidOut(NamedTuple):
+    """What a controller computes with.
+
+    program : the functions, in memory; step : what a step reads and writes besides them, as views
+    dimensions, state : of the resolver's problem, and what the resolver remembers
+    kept : the limits
+    terms : the objective's, with weights
+    steered : the steering law, if the equations have room for it
+    """
+
+    program: Program
+    step: ControlStep
+    dimensions: Dimensions
+    state: State
+    kept: LimitsOn
+    terms: tuple[tuple[float, Function], ...]
+    steered: Steered | None
+
+
+def lay_out(given: Given, steered: Steered | None) -> LaidOut:
+    """The memory of a `Controller`; `InputError` for what the robot lacks, or for too many rows."""
+    robot, task, resolver, objective, added_task, limits, *_ = given
+    collisions = given.collisions
+    limited = limits is not None or collisions is not None
+    compile_in_parallel(*([write_limits] if limited else []), compiled_step, resolver.kernel)
+    rows, added_rows = task.rows(robot), added_task.rows(robot)
+    weighted = () if objective is None else objective.terms_on(robot)
+    functions, added = task_functions(task), task_functions(added_task)
+    kept = (Limits(False, False) if limits is None else limits).on(robot)
+    objectives = [function for _, function in weighted]
+    pursued = [] if steered is None else [steered.pursuit]
+    program = Program(robot, [*functions, *added, *objectives, *kept.functions, *pursued], given.kinematics)
+    first = program.first_rows
+    tasks = len(functions) + len(added)
+    after = tasks + len(objectives)
+    s, m = len(rows), robot.n_u
+    # The extended Jacobian needs a row for each steered input to be square.
+    held = np.zeros((0, m))
+    if steered is not None and resolver.takes_added_task:
+        if len(added_rows) + len(steered.inputs) == m - s:
+            held = np.eye(m)[[robot.input(name) for name in steered.inputs]]
+        else:
+            steered = None
+    near = no_rows(robot.n) if collisions is None else no_rows(robot.n, collisions.rows, CUTS)
+    problem = Problem(
+        J=np.zeros((s, m)),
+        rate=np.zeros(s),
+        h=np.zeros(m),
+        inputs=robot.u_names,
+        groups=robot.groups,
+        row_scales=row_scales(rows, robot),
+        levels=task.levels(robot),
+        added_J=np.vstack([np.zeros((len(added_rows), m)), held]),
+        added_rate=np.zeros(len(added_rows) + len(held)),
+        added_row_scales=np.append(row_scales(added_rows, robot), np.ones(len(held))),
+        limit_rows=np.zeros((len(kept.rows) + len(near.d), m)),
+        limit_levels=[*(task.place(priority) for priority in kept.priorities), *(0 for _ in near.d)],
+    )
+    arrays = problem.arrays._replace(limiter=limit.address if limited else 0)
+    numbers = kept.numbers(first[after : after + len(kept.functions)], robot)
+    arrays.stops[m + len(numbers.spin) :] = UPPER + LOWER
+    dimensions = problem.dimensions
+    setup, state = resolver.setup(dimensions), resolver.start(dimensions)
+    program.lay_out(
+        ControlStep(
+            near=near,
+            clearance=_clearance(collisions, len(kept.rows), len(near.d)),
+            task=task_rows(task, robot, first),
+            added=task_rows(added_task, robot, first[len(functions) :]),
+            arm=Arm(robot.arm_coordinates, robot.following.table.ravel()),
+            terms=np.array(first[tasks:after], dtype=np.int64),
+            weights=np.array([weight for weight, _ in weighted]),
+            H=np.array(0.0),
+            problem=arrays,
+            limits=numbers,
+            steering=NOTHING
+            if steered is None
+            else steered.numbers(first[-1], getattr(resolver, "alpha", 1.0)),
+            resolver=resolver.kernel.address,
+            numbers=setup.numbers,
+            options=setup.options,
+            state=state.memory,
+            answer=unanswered(m, len(dimensions.levels)),
+            scale=np.ones(len(dimensions.levels)),
+            q_dot=np.zeros(robot.n),
+            retreat=retreat_numbers(given.retreat, robot, rows),
+            period=NOT_CALLED,
+            step=compiled_step.address,
+            limits_code=write_limits.address if limited else 0,
+            clearance_code=write_clearance.address if len(near.d) else 0,
+        )
+    )
+    step = views(ControlStep, *program.blocks, BESIDE)
+    state.memory = step.state
+    return LaidOut(program, step, dimensions, state, kept, weighted, steered)
+
+
+def _clearance(collisions: Collisions | None, first: int, count: int) -> Clearance:
+    kept = Collisions() if collisions is None else collisions
+    return Clearance(
+        first=np.array(first, dtype=np.int64),
+        distance=np.array(kept.distance),
+        margin=np.array(MARGIN),
+        gain=np.array(kept.gain),
+        recovery=np.array(kept.recovery),
+        braking=np.array(np.nan if kept.braking is None else kept.braking),
+        least=np.full(count, -np.inf),
+        held=np.array(0),
+        counts=np.zeros(len(Counts._fields), dtype=np.int64),
+    )

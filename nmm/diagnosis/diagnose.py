@@ -1,0 +1,204 @@
+"""The verdict on a run that has ended: its legs where tasks come and go, its goal, its limits."""
+
+from collections import defaultdict
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from nmm.control.controller import Controller
+from nmm.control.goal import Goal, error_sizes
+from nmm.control.sequence import Schedule
+from nmm.diagnosis.judgement import Judged, judge
+from nmm.diagnosis.limits import binding, broken_limits, broken_rows, distances_short, not_kept, ran_into
+from nmm.diagnosis.reasons import near_singularity
+from nmm.findings import Finding
+from nmm.runs.clearance import Swept
+from nmm.runs.closed_loop import Leg
+from nmm.runs.recording import Recorder
+from nmm.runs.trajectory import Trajectory
+from nmm.runs.verdict import Awaited, FindingLine, Outcome, Verdict
+
+#: Below this ratio of smallest to largest singular value a run is warned about.
+NEARLY_SINGULAR = 1e-3
+#: Outcomes of runs that reached their end, and those that a goal or a collision decides anew.
+ENDED = (Outcome.COMPLETED, Outcome.MISSED, Outcome.UNSTABLE)
+DECIDED = (Outcome.COMPLETED, Outcome.MISSED)
+
+
+def diagnose(leg: Leg, trajectory: Trajectory, until: Goal | None) -> Verdict | Awaited:
+    before, after = tuple((one,) for one in leg.recorder.findings), [*noticed(leg.recorder)]
+    into = _into(leg.controller, leg.recorder.swept, trajectory)
+    held = tuple(binding(trajectory)) if trajectory.limited else ()
+
+    def finish(verdicts: Sequence[Verdict]) -> Verdict:
+        verdict = _blocked(_reached(verdicts[0], leg, until), leg.recorder)
+        warnings = (*before, *verdict.warnings, *lines(after, verdict.outcome))
+        verdict = _collided(replace(verdict, warnings=warnings), into)
+        if verdict.outcome is Outcome.MISSED:
+            verdict = replace(verdict, reasons=(*verdict.reasons, *held))
+        return verdict
+
+    return _when_read([judge(leg, trajectory.dt, trajectory.method, until)], finish)
+
+
+def diagnose_legs(
+    controller: Controller,
+    schedule: Schedule,
+    legs: Sequence[Leg],
+    trajectory: Trajectory,
+    swept: Swept | None,
+    until: Goal | None,
+) -> Verdict | Awaited:
+    """The verdict on a run of tasks that come and go: the first leg that left its promise decides."""
+    last = legs[-1]
+    judged = [judge(leg, trajectory.dt, trajectory.method, until if leg is last else None) for leg in legs]
+    before = [tuple((one,) for one in leg.recorder.findings) for leg in legs]
+    after = [[*noticed(leg.recorder)] for leg in legs]
+    moment = schedule.settle()
+    never = tuple(schedule.sequence.never_began(moment))
+    into = _into(controller, swept, trajectory)
+    places = [_place(schedule, leg) if len(legs) > 1 else None for leg in legs]
+
+    def finish(verdicts: Sequence[Verdict]) -> Verdict:
+        of_legs = zip(places, legs, before, after, verdicts, strict=True)
+        told = told_once(
+            [
+                (place, leg.recorder.start, (*first, *lines(then, one.outcome), *one.warnings))
+                for place, leg, first, then, one in of_legs
+            ]
+        )
+        verdict = verdicts[-1]
+        if verdict.outcome in ENDED:
+            missed = (
+                replace(one, reasons=_at(place, one.reasons))
+                for place, one in zip(places, verdicts, strict=True)
+                if one.outcome in (Outcome.MISSED, Outcome.UNSTABLE)
+            )
+            verdict = next(missed, verdict)
+        ended, verdict = verdict.outcome in ENDED, replace(verdict, warnings=())
+        if until is not None and ended and (never or not any(last.active)):
+            found = Finding("nothing_to_reach", {"never": [one.values["task"] for one in never]})
+            verdict = Verdict(Outcome.MISSED, (found, *never))
+        elif ended:
+            verdict = _reached(verdict, last, until)
+        verdict = _collided(_blocked(verdict, last.recorder), into)
+        every = (*told, *verdict.warnings, *((found,) for found in never))
+        return replace(verdict, warnings=tuple(one for i, one in enumerate(every) if one not in every[:i]))
+
+    return _when_read(judged, finish)
+
+
+def _when_read(judged: Sequence[Judged], finish: Callable[[Sequence[Verdict]], Verdict]) -> Verdict | Awaited:
+    """`finish` of the legs' verdicts; deferred if some need trials of another dt."""
+    if not any(one.trials for one in judged):
+        return finish([one.verdict(None) for one in judged])
+    known = None if any(one.open for one in judged) else finish([one.verdict(None) for one in judged]).outcome
+    return Awaited(
+        lambda: finish([one.verdict(one.trials.advice() if one.trials else None) for one in judged]), known
+    )
+
+
+def noticed(recorder: Recorder) -> Iterator[tuple[Finding, Collection[Outcome]]]:
+    """Warnings independent of the error, once the trajectory is made, each with the outcomes that show it."""
+    controller, found, t = recorder.controller, recorder.so_far, recorder.t
+    every, setting = tuple(Outcome), controller.solver.scene
+    yield from ((one, every) for one in not_kept(recorder, controller))
+    yield from ((one, {*every} - {Outcome.SINGULAR}) for one in _nearly_singular(recorder))
+    broken = (
+        *broken_limits(controller.robot, t, found.q, found.u),
+        *broken_rows(controller.solver.limits_on, t, found.limited),
+    )
+    yield from ((one, (*DECIDED, Outcome.INTERRUPTED)) for one in broken)
+    if setting is not None and recorder.swept is not None:
+        yield from ((one, every) for one in distances_short(setting, recorder.swept, t, recorder.counts))
+
+
+def lines(found: Iterable[tuple[Finding, Collection[Outcome]]], outcome: Outcome) -> tuple[FindingLine, ...]:
+    return tuple((one,) for one, outcomes in found if outcome in outcomes)
+
+
+def _nearly_singular(recorder: Recorder) -> Iterator[Finding]:
+    values = recorder.singular_values
+    if not len(values):
+        return
+    largest = values[:, 0]
+    ratio = np.divide(values[:, -1], largest, out=np.ones(len(largest)), where=largest > 0.0)
+    k = int(np.argmin(ratio))
+    if ratio[k] < NEARLY_SINGULAR:
+        found, t = recorder.so_far, float(recorder.t[k])
+        inputs = float(np.abs(found.u).max())
+        given = recorder.controller, t, found.q[k], found.J[k], float(ratio[k])
+        yield near_singularity("nearly_singular", *given, largest=inputs)
+
+
+def _reached(verdict: Verdict, leg: Leg, goal: Goal | None) -> Verdict:
+    """The verdict with a goal: by its tolerances, whatever the gain promised."""
+    recorder, rows = leg.recorder, leg.controller.rows
+    if goal is None or verdict.outcome not in ENDED or not len(recorder):
+        return verdict
+    error = recorder.so_far.error[-1]
+    if goal.reached(error, rows):
+        said = (verdict.reasons,) if verdict.reasons else ()
+        found = Finding("reached", {}, {"t": recorder.reached})
+        return Verdict(Outcome.COMPLETED, (found,), (*said, *verdict.warnings))
+    if verdict.outcome is Outcome.UNSTABLE:
+        return verdict
+    m, rad = error_sizes(error, [row.unit for row in rows])
+    found = Finding("not_reached", {"within": recorder.duration, "m": float(m), "rad": float(rad)})
+    return replace(verdict, outcome=Outcome.MISSED, reasons=(found, *verdict.reasons))
+
+
+def _blocked(verdict: Verdict, recorder: Recorder) -> Verdict:
+    """The verdict with the distances that held the robot back at the end of a run that missed its target."""
+    if verdict.outcome is not Outcome.MISSED or not recorder.blocking:
+        return verdict
+    found = Finding("blocked", {"pairs": list(recorder.blocking)})
+    return replace(verdict, reasons=(found, *verdict.reasons))
+
+
+def _into(controller: Controller, swept: Swept | None, trajectory: Trajectory) -> Finding | None:
+    """What a run that keeps distances ran into."""
+    setting = controller.solver.scene
+    return None if setting is None or swept is None else ran_into(setting, swept, trajectory.t)
+
+
+def _collided(verdict: Verdict, into: Finding | None) -> Verdict:
+    """The verdict, not completed if the robot ran into something."""
+    if into is None or verdict.outcome not in DECIDED:
+        return verdict
+    before = () if verdict.outcome is Outcome.COMPLETED else verdict.reasons
+    return replace(verdict, outcome=Outcome.MISSED, reasons=(into, *before))
+
+
+def _place(schedule: Schedule, leg: Leg) -> dict[str, object]:
+    """The leg's tasks, start and end, s."""
+    names = [name for name, on in zip(schedule.sequence.names, leg.active, strict=True) if on]
+    end = leg.end if leg.recorder.goes_on else leg.recorder.reached
+    return {"tasks": names, "start": leg.recorder.start, "end": end}
+
+
+def _at(place: dict[str, object] | None, found: FindingLine) -> FindingLine:
+    """A leg's findings; those of the only leg have no place."""
+    if place is None:
+        return found
+    return tuple(replace(one, where={**one.where, "leg": place}) for one in found)
+
+
+def told_once(
+    legs: Sequence[tuple[dict[str, object] | None, float, Sequence[FindingLine]]],
+) -> list[FindingLine]:
+    """Warnings of all legs (place, start in s, warnings), alike ones once, with the later legs' starts."""
+    alike = defaultdict(list)
+    for place, begins, warnings in legs:
+        for warning in warnings:
+            first = warning[0]
+            kind = first.code, first.values.get("name"), first.values.get("text")
+            alike[kind].append((place, begins, warning))
+    told = []
+    for found in alike.values():
+        place, begins, warning = found[0]
+        others = list(dict.fromkeys(later for _, later, _ in found if later != begins))
+        whole = all(one == warning for *_, one in found) and len(others) + 1 == len(legs)
+        told.append(warning if whole or place is None else _at({**place, "also": others}, warning))
+    return told

@@ -1,0 +1,295 @@
+"""What a run, or a leg of one, amounts to: its error against its gain's promise, its inputs against the task.
+
+Examined at its end, as controller and targets may change later; only a shorter dt, which takes as long as
+several runs, is tried when the verdict is read (`Judged.trials`).
+"""
+
+import copy
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from nmm.control.controller import Controller
+from nmm.control.goal import Goal
+from nmm.diagnosis import reasons
+from nmm.diagnosis.assessment import Assessment, Instability, assess
+from nmm.diagnosis.error_bound import Departure, Samples
+from nmm.diagnosis.jumps import chattering, crossings, moving_otherwise
+from nmm.findings import Finding
+from nmm.runs.closed_loop import Leg, record_run, sample_times
+from nmm.runs.recording import Recorder
+from nmm.runs.residuals import residuals, run_up
+from nmm.runs.verdict import FindingLine, Outcome, Verdict
+
+#: A finding that no shorter dt helps against.
+HOPELESS = "out_of_reach"
+#: So many steps a trial takes at most: half a second,
+MOST_STEPS = 6_000
+#: and so many trials are made.
+MOST_TRIALS = 6
+#: A trial over a shorter stretch than this says nothing, in steps of the run's own dt.
+LEAST = 20
+#: A limit of stability is tried at this share of it; the next dt is between these shares of the last one.
+BELOW, LEAST_SHARE, MOST_SHARE = 0.98, 0.125, 0.6
+#: Errors are as recorded if they differ by no more than this share of 1 + their size.
+SAME = 1e-6
+
+
+class Advice(NamedTuple):
+    """The dt, s, with which a trial behaved, and its start and end, s."""
+
+    dt: float
+    start: float
+    end: float
+
+
+class Trials:
+    """Trials of a run in steps of dt, s, with a copy of its controller. Nothing is tried if the errors differ
+    from those recorded, as a target that is set, or what a function reads, may have changed since."""
+
+    def __init__(self, leg: Leg, dt: float, found: Assessment) -> None:
+        recorder = leg.recorder
+        self._controller: Controller = copy.copy(leg.controller)
+        self._integrator, self._dt, self._end = leg.integrator, dt, leg.end
+        self._t, self._q = recorder.t, recorder.q[: len(recorder)]
+        self._error, self._duration = recorder.so_far.error, recorder.duration
+        self._unstable = found.unstable
+        troubles = [int(np.searchsorted(self._t, one.t)) for one in found.unstable]
+        if found.departure is not None:
+            troubles.append(found.departure.first)
+        self._before = min(troubles, default=0)
+
+    def advice(self) -> Advice | None:
+        """A shorter dt with which the run behaves, if one of a few does."""
+        if not self._same():
+            return None
+        dt = most = self._dt
+        unstable = self._unstable
+        for _ in range(MOST_TRIALS):
+            # Where a run went astray its modes grow ever faster: the slowest of them is believed.
+            limit = max((one.limit for one in unstable), default=0.0)
+            dt = min(max(BELOW * limit, LEAST_SHARE * dt), most)
+            steps = min(MOST_STEPS, int(self._duration / dt) + 1)
+            if steps * dt < min(self._duration, LEAST * self._dt):
+                return None
+            found, unstable = self._try(dt, steps)
+            if found is not None:
+                return found
+            most = MOST_SHARE * dt
+        return None
+
+    def _same(self) -> bool:
+        """Whether the first, middle and last samples have the errors recorded."""
+        some = np.unique([0, len(self._t) // 2, len(self._t) - 1])
+        try:
+            error, _ = self._controller.solver.errors(self._t[some], self._q[some])
+        except Exception:  # a user's function may raise anything, where it was not made for
+            return False
+        off = np.abs(error - self._error[some])
+        return bool(np.all(~(off > SAME * (1.0 + np.abs(error)))))
+
+    def _try(self, dt: float, most: int) -> tuple[Advice | None, list[Instability]]:
+        """What a run of at most `most` steps says of dt, s, and the remaining instabilities."""
+        # The whole run where it fits, else from a little before it went wrong.
+        t, controller = self._t, self._controller
+        fits = t[-1] - t[0] <= most * dt
+        first = 0 if fits else max(0, self._before - int(0.1 * most * dt / self._dt))
+        start = float(t[first])
+        steps = min(most, max(1, math.ceil((self._end - start) / dt - 1e-9)))
+        times = sample_times(start, dt, steps, self._end)
+        try:
+            tried, ended = record_run(controller, self._integrator, times, self._q[first], None)
+            again = assess(controller, tried, self._integrator, dt)
+        except Exception:  # a user's function may raise anything, where it was not made for
+            return None, []
+        if ended.outcome is Outcome.INTERRUPTED:
+            raise KeyboardInterrupt
+        behaves = ended.outcome is Outcome.COMPLETED and not again.unstable and again.departure is None
+        behaves = behaves and passed(tried) is None
+        return Advice(dt, start, tried.reached) if behaves else None, again.unstable
+
+
+def passed(recorder: Recorder) -> Finding | None:
+    robot, found = recorder.controller.robot, recorder.so_far
+    return crossings(recorder.t, found.u, found.side, robot.u_names, robot.u_units)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What was seen of a leg that ended, with outcome and reasons of its integration.
+
+    lost : what nothing moves, at a singular end
+    found : the assessment, if it was made
+    left : the finding that the error left its promise
+    seen : possible causes
+    moved : the finding that the target moved otherwise than its rate says, though the promise was kept
+    trials : shorter dt to be tried; method, dt, s : the run's
+    """
+
+    outcome: Outcome
+    reasons: FindingLine
+    warnings: tuple[FindingLine, ...] = ()
+    lost: FindingLine = ()
+    found: Assessment | None = None
+    left: FindingLine = ()
+    seen: FindingLine = ()
+    moved: FindingLine = ()
+    trials: Trials | None = None
+    method: str = ""
+    dt: float = 0.0
+
+    @property
+    def open(self) -> bool:
+        undecided = self.found is not None and self.found.missed and bool(self.found.unstable)
+        return self.trials is not None and self.outcome is Outcome.COMPLETED and undecided
+
+    def verdict(self, advice: Advice | None) -> Verdict:
+        """The verdict, given a dt with which the run behaves, or None if none was found."""
+        found, seen, warnings = self.found, self.seen, self.warnings
+        if found is None:
+            return Verdict(self.outcome, (*self.reasons, *self.lost), warnings)
+        unstable = self._unstable(found, advice)
+        tried = (Finding("shorter_dt", {"shorter": advice.dt, "dt": self.dt}),) if advice else ()
+        if self.outcome is not Outcome.COMPLETED:
+            why = (unstable or tried) if advice else (*self.lost, *seen)
+            return Verdict(self.outcome, (*self.reasons, *why), warnings)
+        if found.missed:
+            if unstable and advice:
+                return Verdict(Outcome.UNSTABLE, (*unstable, *seen), warnings)
+            # What is read first is short: what chatters, or follows from a target out of reach, comes apart.
+            far = any(one.code == HOPELESS for one in seen)
+            also = tuple(one for one in seen if one.code == "chattering" or (far and one != seen[0]))
+            why = tuple(one for one in seen if one not in also)
+            return Verdict(Outcome.MISSED, (*self.left, *why, *tried), (*warnings, *([also] if also else [])))
+        if 2 * len(found.unstable) > found.examined:
+            return Verdict(Outcome.UNSTABLE, unstable, warnings)
+        if any(one.code == "extended_jacobian_crossed" and "name" in one.values for one in seen):
+            return Verdict(Outcome.MISSED, (*self.left, *seen), warnings)  # inputs jumped over it
+        more = [(*self.left, *seen)] if self.left else [(one,) for one in (*seen, *self.moved)]
+        part = tuple(Finding(one.code, {**one.values, "part": True}, one.where) for one in unstable)
+        return Verdict(self.outcome, self.reasons, (*warnings, *more, *([part] if part else [])))
+
+    def _unstable(self, found: Assessment, advice: Advice | None) -> FindingLine:
+        if not found.unstable:
+            return ()
+        # Of a run that went astray the last modes are monstrous: the one that the advice answers is told.
+        answered = [one for one in found.unstable if advice is not None and one.limit >= advice.dt]
+        mode = max(answered or found.unstable, key=lambda one: one.rate)
+        tried = {} if advice is None else {"tried": advice._asdict()}
+        values = {"rate": mode.rate, "method": self.method, "dt": self.dt, "part": False, **tried}
+        return (Finding("dt_too_long", values, {"t": mode.t}),)
+
+
+def judge(leg: Leg, dt: float, method: str, goal: Goal | None) -> Judged:
+    """Judge a leg; one that reached its goal need not keep its promise. An interrupt only loses findings."""
+    ended = leg.ended
+    try:
+        with leg.controller.solver.sample.aside():  # the controller stays as the run left it
+            return _judged(leg, dt, method, goal)
+    except KeyboardInterrupt:
+        if ended.outcome is Outcome.COMPLETED:
+            return Judged(Outcome.INTERRUPTED, (Finding("interrupted_judging"),))
+        return Judged(ended.outcome, ended.reasons)
+
+
+def _judged(leg: Leg, dt: float, method: str, goal: Goal | None) -> Judged:
+    controller, recorder, (outcome, ended, _, _) = leg.controller, leg.recorder, leg.ended
+    lost = tuple(_lost(leg))
+    if not len(recorder):
+        return Judged(outcome, ended, lost=lost)
+    samples = Samples.of(recorder)
+    warnings = tuple((one,) for one in _unmet(controller, recorder, samples, dt))
+    if outcome is Outcome.INTERRUPTED:
+        return Judged(outcome, ended, warnings)
+    there = goal is not None and goal.reached(samples.error[-1], controller.rows)
+    found = assess(controller, recorder, leg.integrator, dt, held=not there)
+    left = found.departure
+    moved = (Finding("target_jumps", {"steps": found.target}),) if found.target else ()
+    why = *_seen(controller, recorder, samples, left), *(moved if left else ()), passed(recorder)
+    seen = tuple(one for one in why if one is not None)
+    troubled = bool(found.unstable) or found.missed or outcome is Outcome.DIVERGED
+    # A task that distances hold back departs from its promise with any dt, and to try costs many runs.
+    held_back = bool(recorder.blocking) or recorder.avoided
+    hopeless = outcome is Outcome.SINGULAR or any(one.code == HOPELESS for one in seen)
+    return Judged(
+        outcome,
+        ended,
+        warnings,
+        lost,
+        found,
+        left=() if left is None else (_promise_left(samples, left),),
+        seen=seen,
+        moved=() if left else moved,
+        trials=Trials(leg, dt, found) if troubled and not hopeless and not held_back else None,
+        method=method,
+        dt=dt,
+    )
+
+
+def _unmet(controller: Controller, recorder: Recorder, samples: Samples, dt: float) -> Iterator[Finding]:
+    """Findings where inputs fell short of the task, and where the motion differs from its recorded rates."""
+    residual = samples.residual.copy()
+    if controller.limits is not None:  # of a start from rest λ says it
+        residual[: run_up(samples.t, samples.u, controller.solver.limits_on.accelerations, dt)] = 0.0
+    unmet = residuals(samples.t, residual, samples.rate)
+    if unmet.samples:
+        there = {"limits": controller.limits, "distances": controller.solver.scene}
+        kept = [name for name, one in there.items() if one is not None]
+        yield unmet.finding(scale=float(recorder.so_far.scale.min(initial=1.0)), kept=kept)
+    robot, found = controller.robot, recorder.so_far
+    otherwise = moving_otherwise(samples.t, found.q, found.q_dot, robot.q_names, robot.q_units)
+    if otherwise is not None:
+        yield otherwise
+
+
+def _promise_left(samples: Samples, found: Departure) -> Finding:
+    """What was promised and found: at the worst, and at the end if the promise is not kept there."""
+    norm = np.linalg.norm(samples.error, axis=1)
+    last = len(norm) - 1
+    missed = norm[last] > found.bound[last]
+    stays = missed and f"{norm[last]:.3g}" == f"{norm[found.worst]:.3g}"
+    told = [last] if stays or found.worst == last else [found.worst, *([last] if missed else [])]
+    errors = [
+        {"t": float(samples.t[k]), "error": float(norm[k]), "promised": float(found.bound[k])} for k in told
+    ]
+    values = {"initial": float(norm[0]), "errors": errors, "end": float(samples.t[last])}
+    return Finding("promise_left", values, {"t": float(samples.t[found.first])})
+
+
+def _seen(
+    controller: Controller, recorder: Recorder, samples: Samples, left: Departure | None
+) -> Iterator[Finding | None]:
+    """Possible causes where the error left its promise, or at the end of an unfinished run."""
+    chatter = chattering(samples.t, samples.u, controller.robot.u_names)
+    if left is None:
+        yield chatter
+        return
+    q, target = recorder.so_far.q, recorder.so_far.r_d
+    with controller.without_limits():
+        why = [
+            reasons.out_of_reach(controller, q[left.worst], target[left.worst]),
+            reasons.inputs_fell_short(samples, left),
+            reasons.still_moving(controller, samples),
+            *reasons.singularity(controller, samples, q, left),
+            reasons.switching(samples, left),
+            chatter,
+        ]
+        controller.reset()
+    yield from why if any(why) else [reasons.unresolved(samples, left)]
+
+
+def _lost(leg: Leg) -> Iterator[Finding]:
+    """What nothing moves where a run became singular, and whether its target is out of reach."""
+    controller, recorder, ended = leg.controller, leg.recorder, leg.ended
+    if ended.outcome is not Outcome.SINGULAR:
+        return
+    lost = reasons.lost_words(controller, ended.q, ended.J)
+    if lost and not any(lost[0] in one.values.get("lost", ()) for one in ended.reasons):
+        yield Finding("nothing_gives", {"lost": lost})
+    if len(recorder):
+        far = reasons.out_of_reach(controller, ended.q, recorder.so_far.r_d[-1])
+        if far is not None:
+            yield far

@@ -1,0 +1,178 @@
+"""What loading a robot changed, and what is odd about its wheels, platform, mimic joints and SRDF."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+from nmm.errors import few
+from nmm.findings.robot_file import placed
+from nmm.text_format import quoted
+
+#: Why a presumed wheel joint is none, by `why`.
+NO_WHEEL = {
+    "not_turning": "it does not turn",
+    "joint_below": "another joint is below it",
+    "axis_not_level": "its axis is not level",
+    "platforms_own": "it is the platform's own",
+    "not_on_root": "another joint is between it and the root link",
+    "joint_between": "another joint is between it and the root link ({between}); lock that to make it one",
+    "swivel_carries_more": "{swivel}, on which it would swivel, carries {other} too",
+}
+
+
+def _names(words: str) -> Callable[..., str]:
+    """A sentence about `names`, possibly hundreds."""
+
+    return lambda *, names, **given: words.format(names=few(names), **given)
+
+
+def _reference_moved(*, at: Sequence[float], yaw: float, **_: object) -> str:
+    turned = f", turned by {yaw:g} rad" if abs(yaw) > 1e-9 else ""
+    return (
+        f"the platform's reference point is at ({', '.join(f'{x:g}' for x in at)}) m in the root link{turned}"
+    )
+
+
+#: What helps wheels on several axles, by the way they roll (`roll`).
+_ROLLING = {
+    "ahead": "on several axles they cannot all roll in turns: --platform skid_steer "
+    '(platform="skid_steer") is made for that, '
+    "mecanum or omnidirectional for wheels with rollers",
+    "aside": "they do not roll along the root link's x axis: --axle FRAME (axle=FRAME) gives the direction",
+    "apart": 'they are not parallel: with rollers, --platform omnidirectional (platform="omnidirectional")',
+}
+
+
+def _wheels_slide(
+    *, platform: str, speeds: Mapping[str, float], several_axles: bool, roll: str = "ahead", **_: object
+) -> str:
+    names = few([f"{name} ({speed:.3g} m/s for an input of 1)" for name, speed in speeds.items()])
+    why = _ROLLING[roll]
+    if roll == "ahead" and not several_axles:
+        why = "is its reference point on their axle? (axle, --axle X,Y)"
+    return f"wheels slide sideways under platform {platform}: {names}; {why}"
+
+
+def _base_of_joints(
+    *, names: Sequence[str], platform: str, limits: Mapping[str, Sequence[float]] | None = None, **_: object
+) -> str:
+    base = f"{', '.join(names)} move the whole robot{'' if limits else ' without limits'}: a base of joints, "
+    if platform == "fixed":
+        return f"{base}coordinates like others"
+    ends = few([f"{name} from {low:g} to {high:g}" for name, (low, high) in (limits or {}).items()])
+    left_out = f", without their limits ({ends})" if limits else ""
+    return f"{base}in whose place is platform {platform}{left_out}; platform fixed keeps them as coordinates"
+
+
+def _axle_elsewhere(*, root: str, at: Sequence[float], names: Sequence[str], **_: object) -> str:
+    x, y = (f"{value:.4g}" for value in at)
+    return (
+        f"root link {root!r} is not at the wheels' axle, whose midpoint is at ({x}, {y}) m in it "
+        f"({few(names)}): give --axle {x},{y} (axle=({x}, {y})), or the robot turns about the wrong point"
+    )
+
+
+def _posture_beyond(*, posture: str, beyond: Mapping[str, Sequence[float]], **_: object) -> str:
+    far = [f"{name} = {value:g} (from {low:g} to {high:g})" for name, (value, low, high) in beyond.items()]
+    return f"posture {posture} is outside limits: {few(far)}"
+
+
+WORDS = placed(
+    {
+        # ------------------------------------------------------------------ what loading did
+        "root_replaced": "root joint {name} ({kind}) replaced by x, y, theta",
+        "continuous_joints": _names("continuous joints as one unbounded angle each: {names}"),
+        "joint_added": "{name} is no joint of the file: the angle of a wheel midway between those that "
+        "steer, which follow it (Ackermann)",
+        "joints_reversed": _names(
+            "axes that point down turned upwards, since a platform's angles count to the left: {names}; "
+            "angles and limits have the other sign"
+        ),
+        "reference_moved": _reference_moved,
+        "joints_locked": lambda *, values, **_: (
+            f"locked joints: {few([f'{name} at {value:g}' for name, value in values.items()])}"
+        ),
+        "mimics_locked": lambda *, values, **_: (
+            "locked with the joint that they follow: "
+            + few([f"{name} at {at:g} (follows {leader})" for name, (leader, at) in values.items()])
+        ),
+        "mimic_joints": _names("joints that follow others, without an input: {names}"),
+        "mimics_of_ground": _names("turned by the ground, not by the joint that they follow: {names}"),
+        "wheels_left_out": _names("wheels that only roll, left out of q: {names}"),
+        "swivels_left_out": _names("joints that steer them or swivel, left out of q: {names}"),
+        "wheels_held": _names("wheels of a fixed base, which stand still: {names}"),
+        "not_a_wheel": lambda *, name, why, **given: (
+            f"{name} stays a coordinate in spite of its name: {NO_WHEEL[why].format(**given)}"
+        ),
+        "no_wheel": lambda *, name, why, **given: (
+            f"joint {name!r} is no wheel: {NO_WHEEL[why].format(**given)}"
+        ),
+        "radius_unknown": "radius of wheel {name!r} not found: its centre is not above the root link's xy "
+        "plane and it has no cylinder or sphere; give it, --wheels {name}=M,... (wheels={{{name!r}: ...}}), "
+        "or no wheels, --wheels none (wheels=())",
+        "no_arm": "no arm: the platform is all that moves",
+        "nothing_moves": "nothing moves",
+        "collision_pairs": "{count} collision pairs: none within a body or across one joint",
+        "shapes_left_out": _names("shapes left out, their meshes are missing: {names}"),
+        "base_of_joints": _base_of_joints,
+        "arm_mounted": lambda *, name, key, frame, base, prefix, **_: (
+            f"{name} mounted{f' as {key}' if key != name else ''} at {frame} of {base}"
+            f"{f', its names with the prefix {prefix}' if prefix else ''}"
+        ),
+        # ------------------------------------------------------------------ what is odd
+        "mimic_limits_ignored": "{mimic}: its limits, from {lower:g} to {upper:g}, leave {leader} no room "
+        "and do not count",
+        "slides_long": lambda *, rooms, **_: (
+            f"slides longer than an arm's: {few([f'{name} ({room:.3g} m)' for name, room in rooms.items()])}"
+            f"; if they stand for a base that moves, hold them, --lock {next(iter(rooms))}=0 "
+            f"(lock={{{next(iter(rooms))!r}: 0}})"
+        ),
+        "wheels_slide": _wheels_slide,
+        "hitch_unused": "{name} carries wheels and is called a hitch: --platform tractor "
+        '(platform="tractor") has its angle for a coordinate',
+        "wheel_unnamed": "joint {name!r} turns without end about a level axis, with nothing below it: if "
+        "it is a wheel, say so with the others, --wheels {name},... (wheels=[{name!r}, ...]); its name "
+        'holds no "wheel"',
+        "wheels_not_parallel": _names(
+            "wheels that neither steer nor swivel are not parallel: {names}; with rollers, --platform "
+            'omnidirectional (platform="omnidirectional")'
+        ),
+        "wheels_on_several_axles": _names(
+            "wheels that neither steer nor swivel are not on one axle ({names}): the robot slips in turns; "
+            '--platform skid_steer (platform="skid_steer") takes that as its way of turning, and says how '
+            "fast they slide; mecanum and omnidirectional are for wheels with rollers"
+        ),
+        "axle_turned": _names(
+            "the wheels do not roll along the root link's x axis ({names}); --axle FRAME (axle=FRAME) gives "
+            "the direction"
+        ),
+        "axle_elsewhere": _axle_elsewhere,
+        "ground_uneven": lambda *, heights, near, **_: (
+            "the wheels do not touch one level ground: "
+            + few([f"{name} at z = {z:.4g} m" for name, z in heights.items()])
+            + f"; expected within {1e3 * near:.3g} mm of each other. Heights or radii are wrong, or the "
+            "robot stands tilted"
+        ),
+        "footprint_off_ground": lambda *, frame, off, **_: (
+            f"frame {frame!r} is {abs(off):.4g} m {'above' if off > 0.0 else 'below'} the ground that the "
+            "wheels touch: a footprint is on it"
+        ),
+        "platform_misfit": "given by hand, and not what its file holds: {reason}",
+        "platform_length_differs": "platform {platform}: {name} is {given:g} m as given, and "
+        "{measured:.6g} m in the file",
+        "steering_too_narrow": "platform {platform} turns on the spot, for which the file's wheels would "
+        "have to steer to 90 degrees; {name} ends at {lower:.4g} and {upper:.4g} degrees: platform car?",
+        "moves_sideways": "platform {platform} moves sideways, which needs three wheels with rollers or "
+        "more; the file's main body stands on {wheels}",
+        # ------------------------------------------------------------------ an SRDF
+        "srdf_unused": "not used: {reason[text]}",
+        "not_srdf": lambda *, got, **_: (
+            "expected an SRDF (groups, states, pairs of links), this is "
+            + ("a URDF" if got == "robot" else f"<{got}>")
+        ),
+        "state_not_numbers": lambda *, name, got, **_: f"joint {name}: expected numbers, got {quoted(got)}",
+        "posture_joints_unknown": _names("posture {posture}: no such joints: {names}"),
+        "posture_not_one_number": "posture {posture}: {name}: expected one number, got {count}: left out",
+        "posture_locked": "posture {posture}: {name} is locked at {locked:g}, not at {wanted:g}",
+        "posture_follows": "posture {posture}: {name} follows {leader} ({mimic}), not at {wanted:g}",
+        "posture_beyond": _posture_beyond,
+    }
+)

@@ -1,0 +1,231 @@
+"""What a run found: how it ended, why, and warnings; docs/outcomes.md lists the codes."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from nmm.findings.finding import Finding, Words
+from nmm.text_format import counted, listed
+
+
+def line(findings: Sequence[Finding]) -> str:
+    """Related findings on one line; their leg, if any, is named once."""
+    legs = [one.where.get("leg") for one in findings]
+    texts = [
+        f"{_before(leg) if leg and leg != earlier else ''}{one}"
+        for one, leg, earlier in zip(findings, legs, [None, *legs], strict=False)
+    ]
+    if legs and legs[0] and legs[0].get("also"):
+        times = listed([f"{t:.4g}" for t in legs[0]["also"]])
+        texts.append(f"likewise with the tasks from t = {times} s on")
+    return "; ".join(texts)
+
+
+def _before(leg: Mapping[str, Any]) -> str:
+    return f"with {listed(leg['tasks']) or 'no task'} from t = {leg['start']:.4g} to {leg['end']:.4g} s: "
+
+
+def _singular(t: float, meaning: str, lost: Sequence[str], level: int | None, **of: Any) -> str:
+    asks = f", and the task asks for what no input gives: {', '.join(lost)}" if lost else ""
+    above = (
+        f"; level {level} ({listed(of['tasks'])}) asks for what the levels above it decide; pg and dls damp "
+        "it there, ej with singular: damped"
+        if level is not None
+        else ""
+    )
+    undefined = f": {of['undefined']}" if of.get("undefined") else ""
+    platform = f"; {of['platform']}" if of.get("platform") else ""
+    return f"at t = {t:g} s: {meaning}{undefined}{asks}{above}{platform}"
+
+
+def _inputs_unmet(
+    samples: int, share: float, largest: float, relative: float, t: float, scale: float = 1.0, **of: Any
+) -> str:
+    whole = f"{100 * relative:.3g} % of it" if relative <= 1.0 else "more than the rate itself"
+    kept = of.get("kept", ())
+    if scale >= 1.0:
+        scaled = ""
+    elif kept:
+        scaled = f"; under its {' and '.join(kept)} λ falls to {scale:.3g}"
+    else:
+        scaled = f"; its resolver scales the rate on purpose, down to {scale:.3g} of it"
+    return (
+        f"the inputs did not do all that the task asked in {counted(samples, 'sample')} "
+        f"({100 * share:.3g} %): J u differed from the rate by up to {largest:.3g} "
+        f"({whole}), at t = {t:.4g} s{scaled}"
+    )
+
+
+def _promise_left(t: float, initial: float, errors: Sequence[Mapping[str, Any]], end: float, **_: Any) -> str:
+    told = [f"{initial:.3g} at first"]
+    for one in errors:
+        when = "at the end" if one["t"] == end else f"at t = {one['t']:.4g} s"
+        told.append(f"{one['error']:.3g} {when} (promised {one['promised']:.2g})")
+    return f"the error left its gain's promise at t = {t:.4g} s: {', '.join(told)}"
+
+
+def _crossed(steps: Sequence[Sequence[float]], more: int, name: str = "", **of: Any) -> str:
+    when = ", ".join(f"{before:.4g} and {after:.4g} s" for before, after in steps)
+    also = f" and in {more} more steps" if more else ""
+    said = f"J_e was singular between t = {when}{also} (its determinant changes its sign)"
+    if not name:
+        return f"{said}; the inputs go on without a jump"
+    return (
+        f"{said}: there {name} jumps from {of['before']:.3g} to {of['after']:.3g} {of['unit']}, and the "
+        "motion from there on depends on where the samples fall; singular: damped drives through"
+    )
+
+
+def _unstable(t: float, rate: float, method: str, dt: float, part: bool, **of: Any) -> str:
+    said = (
+        f"{'for part of the run ' if part else ''}alpha * dt (or K * dt) is too large: at t = {t:.3g} s a "
+        f"mode of the closed loop decays with {rate:.3g} 1/s, which {method} does not follow with "
+        f"dt = {dt:g} s"
+    )
+    if "tried" not in of:
+        return said
+    tried = of["tried"]
+    return (
+        f"{said}; a dt below {tried['dt']:.3g} s follows it (tried from t = {tried['start']:g} to "
+        f"{tried['end']:g} s)"
+    )
+
+
+def _beyond(one: Mapping[str, Any]) -> str:
+    lower = -math.inf if one["lower"] is None else one["lower"]
+    upper = math.inf if one["upper"] is None else one["upper"]
+    range_ = f"from {lower:.4g} to {upper:.4g}"
+    return f"{one['name']} at {one['t']:.3g} s ({one['value']:.4g} {one['unit']}; {range_})"
+
+
+WORDS: Mapping[str, Words] = {
+    # Ready-made sentences: from a user's function, or a folder older than codes
+    "said": "{text}",
+    # How a run ended
+    "singular": _singular,
+    "diverged": "at t = {t:g} s the motion has diverged: the {what} are beyond {bound:g}",
+    "failed": "{text}",
+    "interrupted": "interrupted after {t:g} s of {end:g} s",
+    "interrupted_judging": "interrupted while the run was judged",
+    "reached": "reached at t = {t:.4g} s",
+    "not_reached": "not reached in {within:.4g} s: {m:.3g} m and {rad:.3g} rad are left",
+    "nothing_to_reach": lambda never, **_: f"not reached{'' if never else ': no task was active at the end'}",
+    "task_never_began": lambda task, missing, **_: (
+        f"task {task} never began: at the end of the run, "
+        f"{', '.join(missing) or 'its conditions did not hold at one time'}"
+    ),
+    "blocked": lambda pairs, **_: f"blocked by the distance of {', '.join(pairs)}",
+    "collided": "{name} ran into each other from t = {t:.3g} s on, by up to {depth:.3g} m",
+    # The error against its promise, and why
+    "promise_left": _promise_left,
+    "shorter_dt": "with dt = {shorter:.3g} s in place of {dt:g} s it kept its promise when tried",
+    "dt_too_long": _unstable,
+    "target_jumps": ("the target moved otherwise than its rate says in {steps} steps, and the error with it"),
+    "out_of_reach": (
+        "the target of {frame} is out of reach: it is {away:.3g} m {side} {joint}, its links add up to "
+        "{length:.3g} m"
+    ),
+    "stretched": "the arm is stretched: {frame} is {away:.3g} m of {length:.3g} m from {joint}",
+    "nothing_gives": lambda lost, **_: f"no input gives: {', '.join(lost)}",
+    "inputs_fell_short": "the inputs did not do all that the task asked (clipped, scaled or damped)",
+    "still_moving": (
+        "the robot has not come to rest: |{name}| is {mean:.3g} {unit} on average over the last "
+        "{duration:.3g} s"
+    ),
+    "near_singularity": (
+        "J is nearly singular at t = {t:.4g} s (condition number {condition:.2g}), nearly lost: {lost}"
+    ),
+    "singularity_passed": (
+        "at t = {t:.4g} s the task error jumped from {before:.3g} to {after:.3g} in one step: a singular "
+        "configuration was passed between two samples, lost there: {lost}"
+    ),
+    "partition_switching": "from there on the partition switched {times} times",
+    "inputs_changed": "along that step the inputs changed by {percent:.0f} % of their size",
+    "chattering": (
+        "the inputs chatter: {input} jumps back and forth between samples {jumps} times from t = {t:.4g} "
+        "s to {end:.4g} s, by up to {size:.3g}"
+    ),
+    "extended_jacobian_crossed": _crossed,
+    "limits_binding": lambda limits, **_: (
+        "limits that bind at λ < 1: "
+        + ", ".join(
+            f"{f'input {name[2:]}' if name.startswith('u_') else name} ({100 * share:.0f} %)"
+            for name, share in limits.items()
+        )
+    ),
+    # Warnings
+    "setting_parted": "{text}",
+    "python_costs": "{text}",
+    "start_outside_limits": lambda outside, recovery, **_: (
+        f"the start is outside limits: {', '.join(outside)}; what is outside comes back at {recovery:g} m/s "
+        "or rad/s"
+    ),
+    "idle_inputs": lambda inputs, **_: (
+        f"without effect on task and objective: {', '.join(inputs)}; at first order nothing moves "
+        f"{'it' if len(inputs) == 1 else 'them'} (an objective can)"
+    ),
+    "no_redundancy": "the task has as many rows as there are inputs: no redundancy is left to resolve",
+    "inputs_unmet": _inputs_unmet,
+    "moves_otherwise": (
+        "{name} moves otherwise than its recorded rate says from t = {t:.4g} s to {end:.4g} s ({moved:.3g} "
+        "{unit}/s where {recorded:.3g} {unit}/s is recorded): the inputs jump within the steps; method zoh "
+        "shows what a sampled controller does"
+    ),
+    "partition_singular": lambda t, inputs, automatic, **_: (
+        f"at t = {t:.3g} s the block Ja of [{', '.join(inputs)}] became singular and no other candidate was "
+        f"better: {'J itself is close to losing rank' if automatic else 'give more partitions'}"
+    ),
+    "nearly_singular": (
+        "at t = {t:.3g} s the task Jacobian is nearly singular (condition number {condition:.2g}), nearly "
+        "lost: {lost}; inputs reach {largest:.3g}"
+    ),
+    "no_answer": lambda samples, t, lost_rank, **_: (
+        f"the resolver had no answer in {counted(samples, 'sample')}, from t = {t:.3g} s on, "
+        f"{'where J has lost rank' if lost_rank else 'within the limits'}: its inputs were those nearest to "
+        "rest"
+    ),
+    "limit_contradicted": lambda name, samples, t, beyond, unit, against, **_: (
+        f"the limit of {name} could not be kept with the others in {counted(samples, 'sample')}, from "
+        f"t = {t:.3g} s on: its rate was beyond what would keep it by up to {beyond:.3g} {unit}"
+        + (f" (what contradicts each other: {', '.join(against)})" if against else "")
+    ),
+    "coordinates_beyond_limits": lambda coordinates, **_: (
+        f"coordinates leave their limits: {', '.join(map(_beyond, coordinates))}"
+    ),
+    "inputs_beyond_limits": lambda inputs, **_: (
+        "inputs exceed their limits: "
+        + ", ".join(
+            f"{one['name']} ({one['largest']:.3g} {one['unit']}; at most {one['limit']:.3g})"
+            for one in inputs
+        )
+    ),
+    "functions_beyond_limits": lambda functions, **_: (
+        "limits of functions are broken: "
+        + "; ".join(
+            f"{_beyond(one)}, by {one['beyond']:.3g} at most, in {one['samples']} of {one['of']} samples"
+            for one in functions
+        )
+    ),
+    "backed_off": lambda times, **_: (
+        f"the error stalled and the robot backed off, at t = {', '.join(f'{t:.3g} s' for t in times)}"
+    ),
+    "added_task_missed": lambda samples, t, end, again, largest, unit, **_: (
+        f"the added task was not done in {counted(samples, 'sample')}, from t = {t:.4g} to {end:.4g} s"
+        f"{', and is done again from there on' if again else ''}: its rate was missed by up to {largest:.3g} "
+        f"{unit}"
+    ),
+    "distances_note": "{text}",
+    "start_too_near": lambda distance, name, clearance, back, **_: (
+        f"the start is nearer than the distance to keep, {distance:g} m: {name}, {clearance:.4g} m; "
+        f"{'not back at the end' if back is None else f'back at t = {back:.3g} s'}"
+    ),
+    "distance_not_kept": lambda distance, samples, name, clearance, t, **_: (
+        f"the distance of {distance:g} m could not be kept in {counted(samples, 'sample')}: {name} came to "
+        f"{clearance:.4g} m at t = {t:.3g} s"
+    ),
+    "braked": lambda samples, in_vain, **_: (
+        f"in {counted(samples, 'sample')} the inputs went towards braking to keep distances"
+        f"{f', {in_vain} of them in vain' if in_vain else ''}"
+    ),
+    "turned_back_early": "the self-motion turns back early: {text}",
+}

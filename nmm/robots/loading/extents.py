@@ -1,0 +1,45 @@
+"""How far shapes reach from an axis."""
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from nmm.arrays import Array
+
+
+def farthest(shape: pin.GeometryObject, point: Array, along: Array) -> float:
+    """The largest distance (m) of a shape's points from an axis through a point, in its joint's frame."""
+    points, around = _points(shape.geometry)
+    placed = points @ shape.placement.rotation.T + shape.placement.translation - point
+    across = placed - np.outer(placed @ along, along)
+    return float(np.linalg.norm(across, axis=1).max(initial=0.0)) + around
+
+
+def width(shape: pin.GeometryObject, along: Array) -> float:
+    """How far (m) a shape reaches from an axis through its joint's origin where it reaches least: the radius
+    of a wheel, also of one that a box stands for."""
+    points, around = _points(shape.geometry)
+    if not len(points):
+        return 0.0
+    placed = points @ shape.placement.rotation.T + shape.placement.translation
+    across = np.linalg.svd(along[np.newaxis])[2][1:]  # two directions at right angles to the axis
+    turns = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
+    ways = np.column_stack([np.cos(turns), np.sin(turns)]) @ across
+    return float((placed @ ways.T).max(axis=0).min()) + around
+
+
+def _points(geometry: Any) -> tuple[Array, float]:
+    """Points (k, 3) of a shape, m, and the radius of balls about them that fill it; none of a box."""
+    match type(geometry).__name__:
+        case "Sphere":
+            return np.zeros((1, 3)), float(geometry.radius)
+        case "Capsule":
+            return np.outer((-1.0, 1.0), (0.0, 0.0, geometry.halfLength)), float(geometry.radius)
+        case "Cylinder":
+            turns = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
+            rim = geometry.radius * np.column_stack([np.cos(turns), np.sin(turns)])
+            ends = [np.column_stack([rim, np.full(72, end * geometry.halfLength)]) for end in (-1.0, 1.0)]
+            return np.vstack(ends), 0.0
+    mesh = getattr(geometry, "vertices", None)
+    return (np.zeros((0, 3)) if mesh is None else np.array(mesh())), 0.0

@@ -1,0 +1,125 @@
+"""Which robot a first scenario is about: its file as it is, or what its file holds on a base."""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from nmm.bundled import bundled_robots
+from nmm.errors import InputError, RobotError, expect
+from nmm.files import named_folder
+from nmm.robots.loading.provenance import PLATFORM_SOURCES, provenance_of
+from nmm.robots.robot import Robot
+from nmm.scenario.keys import first_error
+from nmm.scenario.robot import PACKAGE, MountedPart, RobotPart
+from nmm.scenario.yaml_text import dotted
+
+#: The base of an arm that comes without one: two driven wheels, with v and omega for inputs.
+BASE = "differential_base"
+_BASE_PART = {"source": BASE, "platform": "unicycle"}
+#: Of a robot's keys those that are the arm's where there is one.
+_ARMS = ("lock", "srdf", "missing_meshes")
+
+
+@dataclass(frozen=True, eq=False)
+class Chosen:
+    """A robot, the key `robot` of its scenario, and a line on where its platform comes from."""
+
+    robot: Robot
+    data: Mapping[str, Any]
+    why: str
+
+
+def chosen_robot(
+    source: str,
+    folder: Path,
+    *,
+    arm: str | None = None,
+    at: str | None = None,
+    **keys: Any,
+) -> Chosen:
+    """The robot of a file, with an arm on it where one is named, or on a base where it has no wheels.
+
+    source and arm are bundled names, paths or package://PACKAGE/PATH; paths become relative to the scenario's
+    folder where they lie below it; `at` is the frame that carries the arm; keys are a robot's others
+    (platform, lock, ...)."""
+    given = {key: value for key, value in keys.items() if value not in (None, {}, [], ())}
+    expect(at is None or arm is not None, "at", "an arm, whose place on the robot it is")
+    if arm is not None:
+        own = {key: value for key, value in given.items() if key in (*_ARMS, "package_dirs")}
+        base = {key: value for key, value in given.items() if key not in _ARMS}
+        data = _mounted(_part(source, folder, base), _part(arm, folder, own), at)
+        robot, data = _loaded(data, folder)
+        return Chosen(robot, data, f"{robot.platform.name}, {_origin(robot)}")
+    robot, data = _loaded(_part(source, folder, given), folder)
+    if given.get("platform") or robot.wheels or provenance_of(robot).platform in ("file", "base"):
+        return Chosen(robot, data, f"{robot.platform.name}, {_origin(robot)}")
+    if not robot.q_names[robot.platform.n_p :]:
+        what = "has neither wheels nor movable joints: there is nothing to lead"
+        raise InputError(what, where=source)
+    own = {key: value for key, value in data.items() if key != "axle"}
+    robot, data = _loaded(_mounted(_BASE_PART, own, None), folder)
+    why = (
+        f"{Path(source).name} has no wheels: it stands on the bundled {BASE}. Another base: nmm init BASE "
+        "--arm FILE; none: --platform fixed; its root as a unicycle without wheels: --platform unicycle"
+    )
+    return Chosen(robot, data, why)
+
+
+def _mounted(base: Mapping[str, Any], arm: Mapping[str, Any], at: str | None) -> dict[str, Any]:
+    data = {"platform": dict(base), "arm": dict(arm)}
+    return data if at is None else {**data, "at": at}
+
+
+def _part(source: str, folder: Path, keys: Mapping[str, Any]) -> dict[str, Any]:
+    part: dict[str, Any] = {"source": _written(source, folder), **keys}
+    if "srdf" in part:
+        part["srdf"] = _written(str(part["srdf"]), folder)
+    if "package_dirs" in part:
+        part["package_dirs"] = [_written_package_dir(one, folder) for one in part["package_dirs"]]
+    return part
+
+
+def _written(file: str, folder: Path) -> str:
+    """A path as the scenario has it: relative where the file lies below its folder, else absolute."""
+    if file in bundled_robots() or file.startswith(PACKAGE) or not ("/" in file or "." in file):
+        return file
+    path = os.path.abspath(os.path.expanduser(file))
+    inside = os.path.relpath(path, folder.absolute())
+    return path if inside.startswith(os.pardir) else inside if os.sep in inside else f"./{inside}"
+
+
+def _written_package_dir(given: str | Path, folder: Path) -> str:
+    name, path = named_folder(str(given))
+    written = _written(path, folder)
+    return f"{name}={written}" if name else written
+
+
+def _loaded(data: dict[str, Any], folder: Path) -> tuple[Robot, dict[str, Any]]:
+    """The robot of a key `robot`, which gets `missing_meshes: skip` where the file's are missing."""
+    try:
+        return _built(data, folder), data
+    except RobotError as error:
+        skipping = {**data.get("arm", data), "missing_meshes": "skip"}
+        without = {**data, "arm": skipping} if "arm" in data else skipping
+        try:
+            return _built(without, folder), without
+        except RobotError:
+            raise error from None
+
+
+def _built(data: Mapping[str, Any], folder: Path) -> Robot:
+    try:
+        part = (MountedPart if "arm" in data else RobotPart).model_validate(data)
+    except ValidationError as error:
+        wrong = first_error(error, data)
+        raise wrong.at(dotted(wrong.place), InputError) from None
+    return part.build(lambda file, _: folder / file, ())
+
+
+def _origin(robot: Robot) -> str:
+    made = provenance_of(robot).platform
+    return PLATFORM_SOURCES.get(made, "as asked for")

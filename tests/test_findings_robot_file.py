@@ -1,0 +1,591 @@
+"""The words of what is found in a robot's file and in loading it: an example of each code."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from nmm.errors import RobotError
+from nmm.findings import Finding
+from nmm.findings.robot_file import WORDS as FILE
+from nmm.findings.robot_file import refusal
+from nmm.findings.robot_loading import WORDS as LOADING
+
+#: By code: values, where, and the sentence.
+EXAMPLES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
+    "file_empty": ({}, {}, "the file is empty"),
+    "file_unreadable": ({"reason": "Permission denied"}, {}, "cannot be read (Permission denied)"),
+    "not_text": ({}, {"line": 2}, "not UTF-8 text"),
+    "not_xml": (
+        {"reason": "mismatched tag"},
+        {"file": "part.xacro", "line": 3},
+        "in part.xacro:3: not well-formed XML: mismatched tag",
+    ),
+    "doctype": ({}, {"line": 1}, "holds a DOCTYPE, which is refused (entities are not expanded)"),
+    "nested_too_deep": ({"most": 200}, {"line": 9}, "elements stand more than 200 deep in one another"),
+    "not_robot": ({"got": "sdf"}, {"line": 1}, "expected <robot> as the root element, got <sdf>"),
+    "found_nearby": (
+        {"count": 3, "name": "package://p/m.stl", "place": "/robots/m.stl"},
+        {},
+        "package://p/m.stl leads nowhere, and was found near the file, at /robots/m.stl; so were 2 others",
+    ),
+    "xacro_left_over": (
+        {"element": "xacro:grey"},
+        {"line": 2},
+        "<xacro:grey/> is left over from xacro: left out",
+    ),
+    "leader_unknown": (
+        {"leader": "i"},
+        {"joint": "k", "line": 2},
+        "joint 'k': follows 'i', which is no joint: it moves by itself, with its own input",
+    ),
+    "faults_spared": (
+        {"count": 3, "first": "joint 'k': <limit> has no effort"},
+        {},
+        "3 faults that kinematics does not feel, first: joint 'k': <limit> has no effort (all: nmm check)",
+    ),
+    "only_macros": (
+        {"name": "arm.xacro", "macros": {"xacro:arm": "length", "hand": ""}},
+        {},
+        (
+            "holds no robot, only macros: xacro:arm (length); hand (no parameters); write a .xacro "
+            "file that includes it and calls one: <xacro:include filename='arm.xacro'/> <xacro:arm "
+            ".../>"
+        ),
+    ),
+    "xacro_failed": ({"reason": "division by zero"}, {}, "xacro: division by zero"),
+    "xacro_argument_missing": (
+        {"name": "l1"},
+        {},
+        "xacro argument 'l1' has no default and was not given a value",
+    ),
+    "xacro_endless": (
+        {},
+        {},
+        "xacro: recursion without end (a file that includes itself, or a macro that calls itself)",
+    ),
+    "xacro_warned": (
+        {"text": "warning: redefining global symbol: pi"},
+        {},
+        "xacro warning: redefining global symbol: pi",
+    ),
+    "package_missing": (
+        {"package": "p", "by": "package://p", "searched": ["/a", "/b"]},
+        {},
+        (
+            "package://p: package 'p' not found (give its folder in package_dirs, --package-dir); "
+            "looked in /a, /b"
+        ),
+    ),
+    "refused": (
+        {"text": "platform car expects a steering joint"},
+        {},
+        "platform car expects a steering joint",
+    ),
+    "library_failed": (
+        {"error": "ValueError", "reason": "no such thing"},
+        {},
+        "cannot be loaded: ValueError: no such thing",
+    ),
+    "version_unknown": ({"got": "2.0"}, {"line": 1}, "<robot> version: expected 1.0, 1.1 or 1.2, got '2.0'"),
+    "no_links": ({}, {}, "no links"),
+    "name_missing": ({"kind": "link"}, {"line": 4}, "a link without a name"),
+    "name_reserved": (
+        {"kind": "joint", "name": "x", "taken_by": "a coordinate"},
+        {"line": 4},
+        "joint 'x': the name is taken by a coordinate",
+    ),
+    "name_twice": ({"kind": "link", "name": "c"}, {"line": 4}, "two links named 'c'"),
+    "name_unknown": (
+        {"kind": "parent link", "got": "uper", "available": ["base", "upper"]},
+        {"line": 4, "joint": "elbow"},
+        ("joint 'elbow': unknown parent link 'uper' (did you mean 'upper'?); available: base, upper"),
+    ),
+    "two_parents": ({"name": "c", "parents": ["a", "b"]}, {"line": 4}, "link 'c' has two parents: 'a', 'b'"),
+    "cycle": ({"links": ["a", "b", "a"]}, {}, "the links form a cycle: a -> b -> a"),
+    "several_roots": ({"roots": ["a", "b"]}, {}, "expected one root link, found two: a, b"),
+    "mimic_cycle": (
+        {"joints": ["j", "k", "j"]},
+        {"line": 4, "joint": "j"},
+        "joint 'j': <mimic> follows itself: j -> k -> j",
+    ),
+    "platform_twice": ({}, {"line": 4, "part": "robot"}, "robot: a second <nmm>, expected one"),
+    "element_missing": (
+        {"element": "inertial", "missing": "mass"},
+        {"line": 4, "link": "a"},
+        "link 'a': <inertial> has no <mass>",
+    ),
+    "attribute_missing": (
+        {"element": "box", "attribute": "size"},
+        {"line": 4, "link": "a", "part": "visual"},
+        "link 'a', visual: <box> has no size",
+    ),
+    "not_numbers": (
+        {"element": "axis", "attribute": "xyz", "count": 3, "got": "0 0 z"},
+        {"line": 4, "joint": "j"},
+        "joint 'j': <axis> xyz: expected 3 finite numbers, got '0 0 z'",
+    ),
+    "below_minimum": (
+        {"element": "limit", "attribute": "effort", "minimum": 0.0, "got": -1.5},
+        {"line": 4, "joint": "j"},
+        "joint 'j': <limit> effort: expected 0 or more, got -1.5",
+    ),
+    "negative_length": (
+        {"element": "sphere", "attribute": "radius", "got": "-1"},
+        {"line": 4, "link": "a", "part": "collision"},
+        "link 'a', collision: <sphere> radius: expected lengths of 0 or more (m), got '-1'",
+    ),
+    "colour_beyond": (
+        {"got": "255 0 0 1"},
+        {"line": 4, "part": "robot"},
+        "robot: <color> rgba: expected numbers from 0 to 1, got '255 0 0 1'",
+    ),
+    "shape_missing": (
+        {"available": ["box", "sphere"]},
+        {"line": 4, "link": "a", "part": "visual"},
+        "link 'a', visual: no shape (expected <geometry> with one of box, sphere)",
+    ),
+    "mesh_missing": (
+        {"mesh": "m.stl", "cause": "file", "shape": "refused"},
+        {"line": 4},
+        "mesh 'm.stl': no such file: refused unless missing_meshes='skip' (--missing-meshes skip)",
+    ),
+    "mesh_unreadable": (
+        {"mesh": "/m.stl", "reason": "no triangles"},
+        {"link": "a"},
+        "link 'a': mesh /m.stl cannot be read: no triangles",
+    ),
+    "mesh_format_unknown": (
+        {"mesh": "m.step", "available": [".obj", ".stl"]},
+        {"line": 4, "link": "a", "part": "visual"},
+        "link 'a', visual: mesh 'm.step': unknown format, expected .obj, .stl",
+    ),
+    "joint_type_missing": (
+        {"available": ["revolute", "fixed"]},
+        {"line": 4, "joint": "j"},
+        "joint 'j': no type, expected one of revolute, fixed",
+    ),
+    "joint_helical": (
+        {"kind": "screw", "available": ["revolute", "fixed"]},
+        {"line": 4, "joint": "j"},
+        ("joint 'j': a screw joint is refused: it turns and slides at once; expected one of revolute, fixed"),
+    ),
+    "base_inside_tree": (
+        {"kind": "planar"},
+        {"line": 4, "joint": "j"},
+        (
+            "joint 'j': a planar joint is refused inside the tree: it stands for the platform's x, y "
+            "and theta only where it is the one movable joint on the root link's body"
+        ),
+    ),
+    "base_tilted": (
+        {"axis": [0.0, 1.0, 0.5]},
+        {"line": 4, "joint": "j"},
+        "joint 'j': <axis> of a planar joint: expected it upright, 0 0 1, got 0 1 0.5",
+    ),
+    "axis_zero": ({"got": "0 0 0"}, {"line": 4, "joint": "j"}, "joint 'j': <axis> xyz is zero: '0 0 0'"),
+    "limit_missing": (
+        {"kind": "revolute"},
+        {"line": 4, "joint": "j"},
+        "joint 'j': a revolute joint needs a <limit>, this one has none",
+    ),
+    "limits_crossed": (
+        {"lower": 2.0, "upper": -2.0},
+        {"line": 4, "joint": "j"},
+        "joint 'j': <limit> lower 2 is above upper -2",
+    ),
+    "dynamics_empty": (
+        {},
+        {"line": 4, "joint": "j"},
+        "joint 'j': <dynamics> has neither damping nor friction",
+    ),
+    "mass_large": ({"mass": 5000.0}, {"line": 4, "link": "a"}, "link 'a': a mass of 5000 kg: is that meant?"),
+    "mass_missing": ({}, {"line": 4, "link": "a"}, "link 'a': no mass, but moments of inertia"),
+    "inertia_missing": (
+        {"mass": 2.0},
+        {"line": 4, "link": "a"},
+        "link 'a': a mass of 2 kg, but no moments of inertia",
+    ),
+    "inertia_indefinite": (
+        {"moments": [-1.0, 1.0, 2.0]},
+        {"line": 4, "link": "a"},
+        "link 'a': inertia is not positive definite: principal moments -1, 1, 2 kg m^2",
+    ),
+    "inertia_impossible": (
+        {"moments": [1.0, 1.0, 3.0]},
+        {"line": 4, "link": "a"},
+        (
+            "link 'a': no body has this inertia: of the principal moments 1, 1, 3 kg m^2 the largest "
+            "is above the sum of the others"
+        ),
+    ),
+    "body_without_mass": (
+        {"moved_by": "j", "inertial": False},
+        {"line": 4, "link": "a"},
+        (
+            "link 'a': moves with joint 'j' and has no <inertial>, nor has any link fixed to it: "
+            "dynamics and centre of mass leave it out"
+        ),
+    ),
+    "velocity_unlimited": (
+        {},
+        {"line": 4, "joint": "j"},
+        "joint 'j': no <limit>, so no limit of its velocity",
+    ),
+    "velocity_zero": (
+        {},
+        {"line": 4, "joint": "j"},
+        "joint 'j': <limit> velocity is 0, which is taken as no limit",
+    ),
+    "joint_held": (
+        {"value": 0.0},
+        {"line": 4, "joint": "j"},
+        "joint 'j': <limit> lets it stand at 0 only (both ends are 0 unless given)",
+    ),
+    "name_shared": (
+        {},
+        {"line": 4, "joint": "j"},
+        "joint 'j': a link has that name, too: as a frame, it means the link",
+    ),
+    "root_replaced": (
+        {"name": "root_joint", "kind": "FreeFlyer"},
+        {},
+        "root joint root_joint (FreeFlyer) replaced by x, y, theta",
+    ),
+    "continuous_joints": ({"names": ["a", "b"]}, {}, "continuous joints as one unbounded angle each: a, b"),
+    "joint_added": (
+        {"name": "steering"},
+        {},
+        (
+            "steering is no joint of the file: the angle of a wheel midway between those that steer, "
+            "which follow it (Ackermann)"
+        ),
+    ),
+    "joints_reversed": (
+        {"names": ["steer"]},
+        {},
+        "axes that point down turned upwards, since a platform's angles count to the left: steer; angles and "
+        "limits have the other sign",
+    ),
+    "reference_moved": (
+        {"at": [-0.25, 0.0, 0.0], "yaw": 1.5},
+        {},
+        "the platform's reference point is at (-0.25, 0, 0) m in the root link, turned by 1.5 rad",
+    ),
+    "joints_locked": ({"values": {"head": 0.3, "torso": 0.0}}, {}, "locked joints: head at 0.3, torso at 0"),
+    "mimics_locked": (
+        {"values": {"finger": ["thumb", -0.25]}},
+        {},
+        "locked with the joint that they follow: finger at -0.25 (follows thumb)",
+    ),
+    "mimic_joints": (
+        {"names": ["k = -0.5 j"]},
+        {"arm": "ur5"},
+        "ur5: joints that follow others, without an input: k = -0.5 j",
+    ),
+    "mimics_of_ground": (
+        {"names": ["right_wheel"]},
+        {},
+        "turned by the ground, not by the joint that they follow: right_wheel",
+    ),
+    "wheels_left_out": (
+        {"names": ["left_wheel", "right_wheel"]},
+        {},
+        "wheels that only roll, left out of q: left_wheel, right_wheel",
+    ),
+    "swivels_left_out": (
+        {"names": ["caster"]},
+        {},
+        "joints that steer them or swivel, left out of q: caster",
+    ),
+    "wheels_held": ({"names": ["left_wheel"]}, {}, "wheels of a fixed base, which stand still: left_wheel"),
+    "not_a_wheel": (
+        {"name": "spare_wheel", "why": "axis_not_level"},
+        {},
+        "spare_wheel stays a coordinate in spite of its name: its axis is not level",
+    ),
+    "no_wheel": (
+        {"name": "spare_wheel", "why": "joint_between", "between": "lift"},
+        {},
+        (
+            "joint 'spare_wheel' is no wheel: another joint is between it and the root link (lift); "
+            "lock that to make it one"
+        ),
+    ),
+    "radius_unknown": (
+        {"name": "left_wheel"},
+        {},
+        (
+            "radius of wheel 'left_wheel' not found: its centre is not above the root link's xy "
+            "plane and it has no cylinder or sphere; give it, --wheels left_wheel=M,... "
+            "(wheels={'left_wheel': ...}), or no wheels, --wheels none (wheels=())"
+        ),
+    ),
+    "no_arm": ({}, {}, "no arm: the platform is all that moves"),
+    "nothing_moves": ({}, {}, "nothing moves"),
+    "collision_pairs": ({"count": 10}, {}, "10 collision pairs: none within a body or across one joint"),
+    "shapes_left_out": (
+        {"names": ["package://p/m.stl"]},
+        {},
+        "shapes left out, their meshes are missing: package://p/m.stl",
+    ),
+    "base_of_joints": (
+        {"names": ["px", "py", "rz"], "platform": "omnidirectional", "limits": {}},
+        {},
+        (
+            "px, py, rz move the whole robot without limits: a base of joints, in whose place is "
+            "platform omnidirectional; platform fixed keeps them as coordinates"
+        ),
+    ),
+    "arm_mounted": (
+        {"name": "ur5", "key": "ur5_2", "frame": "top", "base": "cart", "prefix": "ur5_2_"},
+        {},
+        "ur5 mounted as ur5_2 at top of cart, its names with the prefix ur5_2_",
+    ),
+    "mimic_limits_ignored": (
+        {"mimic": "k = -j", "name": "k", "leader": "j", "lower": 0.0, "upper": 1.0},
+        {},
+        "k = -j: its limits, from 0 to 1, leave j no room and do not count",
+    ),
+    "slides_long": (
+        {"rooms": {"root_x": 40.0, "root_y": 60.0}},
+        {},
+        "slides longer than an arm's: root_x (40 m), root_y (60 m); if they stand for a base that moves, "
+        "hold them, --lock root_x=0 (lock={'root_x': 0})",
+    ),
+    "wheels_slide": (
+        {"platform": "unicycle", "speeds": {"left": 0.2}, "several_axles": False},
+        {},
+        (
+            "wheels slide sideways under platform unicycle: left (0.2 m/s for an input of 1); is its "
+            "reference point on their axle? (axle, --axle X,Y)"
+        ),
+    ),
+    "hitch_unused": (
+        {"name": "hitch_1"},
+        {},
+        'hitch_1 carries wheels and is called a hitch: --platform tractor (platform="tractor") has its angle '
+        "for a coordinate",
+    ),
+    "wheel_unnamed": (
+        {"name": "left"},
+        {},
+        (
+            "joint 'left' turns without end about a level axis, with nothing below it: if it is a "
+            "wheel, say so with the others, --wheels left,... (wheels=['left', ...]); its name holds "
+            'no "wheel"'
+        ),
+    ),
+    "wheels_not_parallel": (
+        {"names": ["left", "right"]},
+        {},
+        "wheels that neither steer nor swivel are not parallel: left, right; with rollers, --platform "
+        'omnidirectional (platform="omnidirectional")',
+    ),
+    "wheels_on_several_axles": (
+        {"names": ["left", "right"]},
+        {},
+        (
+            "wheels that neither steer nor swivel are not on one axle (left, right): the robot slips "
+            'in turns; --platform skid_steer (platform="skid_steer") takes that as its way of '
+            "turning, and says how fast they slide; mecanum and omnidirectional are for wheels with rollers"
+        ),
+    ),
+    "axle_turned": (
+        {"names": ["left", "right"]},
+        {},
+        (
+            "the wheels do not roll along the root link's x axis (left, right); --axle FRAME "
+            "(axle=FRAME) gives the direction"
+        ),
+    ),
+    "axle_elsewhere": (
+        {"root": "base", "at": [-0.25, 0.0], "names": ["left", "right"]},
+        {},
+        (
+            "root link 'base' is not at the wheels' axle, whose midpoint is at (-0.25, 0) m in it "
+            "(left, right): give --axle -0.25,0 (axle=(-0.25, 0)), or the robot turns about the "
+            "wrong point"
+        ),
+    ),
+    "ground_uneven": (
+        {"heights": {"left": -0.1, "caster": -0.108}, "near": 0.005},
+        {},
+        (
+            "the wheels do not touch one level ground: left at z = -0.1 m, caster at z = -0.108 m; "
+            "expected within 5 mm of each other. Heights or radii are wrong, or the robot stands "
+            "tilted"
+        ),
+    ),
+    "footprint_off_ground": (
+        {"frame": "base_footprint", "off": -0.05},
+        {},
+        ("frame 'base_footprint' is 0.05 m below the ground that the wheels touch: a footprint is on it"),
+    ),
+    "platform_misfit": (
+        {"platform": "car", "reason": "cart: platform car expects a steering joint"},
+        {},
+        "given by hand, and not what its file holds: cart: platform car expects a steering joint",
+    ),
+    "platform_length_differs": (
+        {"platform": "car", "name": "wheelbase", "given": 0.5, "measured": 0.6},
+        {},
+        "platform car: wheelbase is 0.5 m as given, and 0.6 m in the file",
+    ),
+    "steering_too_narrow": (
+        {"platform": "unicycle", "name": "steer", "lower": -45.0, "upper": 45.0},
+        {},
+        (
+            "platform unicycle turns on the spot, for which the file's wheels would have to steer to "
+            "90 degrees; steer ends at -45 and 45 degrees: platform car?"
+        ),
+    ),
+    "moves_sideways": (
+        {"platform": "omnidirectional", "wheels": "left at (0, 0.3) m, radius 0.1 m"},
+        {},
+        (
+            "platform omnidirectional moves sideways, which needs three wheels with rollers or more; "
+            "the file's main body stands on left at (0, 0.3) m, radius 0.1 m"
+        ),
+    ),
+    "srdf_unused": (
+        {"reason": {"text": "not UTF-8 text"}},
+        {"srdf": "arm.srdf"},
+        "SRDF arm.srdf: not used: not UTF-8 text",
+    ),
+    "not_srdf": ({"got": "robot"}, {}, "expected an SRDF (groups, states, pairs of links), this is a URDF"),
+    "state_not_numbers": (
+        {"name": "elbow", "got": "a b"},
+        {"line": 4},
+        "joint elbow: expected numbers, got 'a b'",
+    ),
+    "posture_joints_unknown": (
+        {"posture": "home", "names": ["j", "k"]},
+        {"srdf": "arm.srdf"},
+        "SRDF arm.srdf: posture home: no such joints: j, k",
+    ),
+    "posture_not_one_number": (
+        {"posture": "home", "name": "j", "count": 2},
+        {"srdf": "arm.srdf"},
+        "SRDF arm.srdf: posture home: j: expected one number, got 2: left out",
+    ),
+    "posture_locked": (
+        {"posture": "home", "name": "j", "locked": 0.0, "wanted": 0.4},
+        {"srdf": "arm.srdf"},
+        "SRDF arm.srdf: posture home: j is locked at 0, not at 0.4",
+    ),
+    "posture_follows": (
+        {"posture": "home", "name": "k", "leader": "j", "mimic": "k = -j", "wanted": 0.4},
+        {"srdf": "arm.srdf"},
+        "SRDF arm.srdf: posture home: k follows j (k = -j), not at 0.4",
+    ),
+    "posture_beyond": (
+        {"posture": "up", "beyond": {"j": [99.0, -1.0, 1.0]}},
+        {"srdf": "arm.srdf"},
+        "SRDF arm.srdf: posture up is outside limits: j = 99 (from -1 to 1)",
+    ),
+}
+
+
+def test_every_code_has_an_example() -> None:
+    assert EXAMPLES.keys() == FILE.keys() | LOADING.keys()
+
+
+@pytest.mark.parametrize("code", EXAMPLES)
+def test_the_words_of_a_code(code: str) -> None:
+    values, where, sentence = EXAMPLES[code]
+    finding = Finding(code, values, where)
+    assert str(finding) == sentence
+    assert Finding.from_json(json.loads(json.dumps(finding.as_json()))) == finding
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"cause": "package", "package": "p"}, "package 'p' not found (give its folder in package_dirs, "
+         "--package-dir)"),
+        ({"cause": "file_in_package", "package": "p"}, "no such file in the package"),
+        ({"cause": "scheme", "scheme": "https"}, "cannot read from https://"),
+        ({"cause": "file", "shape": "left_out"}, "no such file; its shape is left out"),
+    ],
+)  # fmt: skip
+def test_why_a_mesh_is_missing(given: dict[str, str], words: str) -> None:
+    assert str(Finding("mesh_missing", {"mesh": "m", **given})) == f"mesh 'm': {words}"
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"why": "not_turning"}, "it does not turn"),
+        ({"why": "joint_below"}, "another joint is below it"),
+        ({"why": "platforms_own"}, "it is the platform's own"),
+        ({"why": "not_on_root"}, "another joint is between it and the root link"),
+        (
+            {"why": "swivel_carries_more", "swivel": "s", "other": "o"},
+            "s, on which it would swivel, carries o too",
+        ),
+    ],
+)
+def test_why_a_joint_is_no_wheel(given: dict[str, str], words: str) -> None:
+    assert str(Finding("no_wheel", {"name": "j", **given})) == f"joint 'j' is no wheel: {words}"
+
+
+def test_other_words_of_the_same_codes() -> None:
+    assert str(Finding("body_without_mass", {"moved_by": "j", "inertial": True})).startswith(
+        "moves with joint 'j' and has no mass, nor"
+    )
+    slide = {"platform": "unicycle", "speeds": {"left": 0.2}, "several_axles": True}
+    assert "skid_steer" in str(Finding("wheels_slide", slide))
+    assert "--axle FRAME" in str(Finding("wheels_slide", {**slide, "roll": "aside"}))
+    assert "omnidirectional" in str(Finding("wheels_slide", {**slide, "roll": "apart"}))
+    base = {"names": ["px"], "platform": "fixed"}
+    assert str(Finding("base_of_joints", base)).endswith("a base of joints, coordinates like others")
+    base = {"names": ["px", "rz"], "platform": "omnidirectional", "limits": {"px": [-2.0, 3.0]}}
+    assert str(Finding("base_of_joints", base)) == (
+        "px, rz move the whole robot: a base of joints, in whose place is platform omnidirectional, without "
+        "their limits (px from -2 to 3); platform fixed keeps them as coordinates"
+    )
+    assert str(Finding("footprint_off_ground", {"frame": "f", "off": 0.05})).startswith(
+        "frame 'f' is 0.05 m above the ground"
+    )
+    assert str(Finding("not_numbers", {"element": "mass", "attribute": "value", "count": 1, "got": "x"})) == (
+        "<mass> value: expected a finite number, got 'x'"
+    )
+
+
+def test_lists_of_names_are_short() -> None:
+    """A robot of 300 joints: ten of them, and how many more there are."""
+    names = [f"joint_{i}_of_the_left_hand" for i in range(300)]
+    for code in ("continuous_joints", "mimic_joints", "wheels_left_out", "shapes_left_out"):
+        assert str(Finding(code, {"names": names})).endswith("joint_9_of_the_left_hand and 290 more")
+    locked = str(Finding("joints_locked", {"values": dict.fromkeys(names, 0.0)}))
+    assert locked.endswith("and 290 more")
+    assert len(locked) < 500
+
+
+def test_folders_that_were_searched_are_named_in_full() -> None:
+    """Paths of which the end is cut off look alike."""
+    root = "/" + "deep/" * 40
+    searched = [f"{root}{i}" for i in range(20)]
+    found = Finding("package_missing", {"package": "pk", "by": "$(find pk)", "searched": searched})
+    assert str(found).endswith(f"looked in {', '.join(searched)}")
+
+
+def test_a_refusal_names_the_file_and_what_was_found_with_its_lines() -> None:
+    found = [Finding("no_links"), Finding("axis_zero", {"got": "0 0 0"}, {"line": 4, "joint": "j"})]
+    error = refusal("r.urdf", *found)
+    assert (error.where, error.findings) == ("r.urdf", tuple(found))
+    assert str(error) == "r.urdf: no links; line 4: joint 'j': <axis> xyz is zero: '0 0 0'"
+    assert "line" not in str(refusal("r.xacro", *found, lines=False))
+    assert str(refusal("r.urdf", *found * 10)).endswith("and 8 more")
+    outer = error.at("srdf")
+    assert isinstance(outer, RobotError)
+    assert (outer.where, outer.findings) == ("srdf: r.urdf", error.findings)
+
+
+def test_every_code_is_documented() -> None:
+    page = (Path(__file__).parents[1] / "docs/robots.md").read_text(encoding="utf-8")
+    assert [code for code in EXAMPLES if f"`{code}`" not in page] == []

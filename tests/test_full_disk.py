@@ -1,0 +1,84 @@
+"""Every command that writes, on a disk that gets full: a line, the old result or the new one whole."""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from killing import Commands
+from test_killed_commands import CASES, content, files, hidden
+
+import nmm
+
+#: NMM_KILLS=30 fills the disk so often for each command.
+TIMES = max(4, int(os.environ.get("NMM_KILLS", "0")))
+SIZE = 64_000_000
+#: The system counts in pages, and needs one for each folder.
+PAGE = 4096
+
+
+@pytest.fixture(scope="module")
+def disk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A small disk of its own."""
+    place = tmp_path_factory.mktemp("disk")
+    mounted = ["mount", "-t", "tmpfs", "-o", f"size={SIZE}", "tmpfs", str(place)]
+    if sys.platform != "linux" or subprocess.run(mounted, capture_output=True, check=False).returncode:
+        pytest.skip("nobody may mount a disk here")
+    try:
+        yield place
+    finally:
+        subprocess.run(["umount", "-l", str(place)], check=True)
+
+
+@pytest.fixture(scope="module")
+def commands(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Commands]:
+    with Commands(tmp_path_factory.mktemp("scratch")) as found:
+        yield found
+
+
+def filled(disk: Path, room: int) -> Path:
+    """A file that leaves as many bytes."""
+    filler = disk / "filler"
+    with filler.open("wb") as file:
+        os.posix_fallocate(file.fileno(), 0, max(PAGE, shutil.disk_usage(disk).free - room))
+    return filler
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_disk_that_gets_full(disk: Path, commands: Commands, name: str) -> None:
+    rng, case, folder = random.Random(name), CASES[name], disk / name / "here"
+    made = folder / case.made
+    if name == "render":
+        nmm.Scenario.load("unicycle_2r_position").override("duration", 0.2).run().save(disk / name / "run")
+    folder.mkdir(parents=True)
+    before = shutil.disk_usage(disk).used
+    first = commands.run(folder, [*case.arguments], prepared=case.prepared)
+    assert (first.status, first.err) == (0, "")
+    whole, size = files(made), shutil.disk_usage(disk).used - before
+    for k in range(TIMES):
+        if name in ("sweep", "init") or k % 2 == 0:
+            shutil.rmtree(made) if made.is_dir() else made.unlink(missing_ok=True)
+        old, filler = content(made), filled(disk, rng.choice((0, PAGE, rng.randrange(size))))
+        ended = commands.run(folder, [*case.arguments], prepared=case.prepared)
+        filler.unlink()
+        if ended.status == 0:
+            assert files(made) == whole
+        else:
+            assert ended.status in (1, 2)
+            assert ended.err.startswith(f"nmm {name}: ")
+            assert ended.err.count("\n") == 1, ended.err
+            assert "No space left" in ended.err or name == "render"  # its own ffmpeg is silent
+            assert name == "sweep" or content(made) == old
+        assert hidden(folder) == []
+    if name == "init":
+        made.unlink(missing_ok=True)
+    last = commands.run(folder, [*case.arguments], prepared=case.prepared)
+    assert (last.status, last.err) == (0, "")
+    assert files(made) == whole
+    shutil.rmtree(disk / name)

@@ -1,0 +1,105 @@
+"""The wall: packages that use trajectories import of the core only what `nmm` or `nmm.extending` exports."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+import nmm
+
+PACKAGE = Path(nmm.__file__).parent
+#: Below the wall: what makes a trajectory.
+CORE = ("kernels", "platforms", "robots", "functions", "collisions", "resolvers", "control", "runs")
+#: What wings import besides, with the reason.
+EXCEPTIONS = {
+    (
+        "nmm.kernels.parallel_compile",
+        "compile_in_parallel",
+    ): "what a run needs is compiled beforehand, in other processes",
+    (
+        "nmm.runs.compiled_loop",
+        "ADVANCE_SAMPLES",
+    ): "what a run needs is compiled beforehand, in other processes",
+    (
+        "nmm.runs.compiled_loop",
+        "advance_samples",
+    ): "what a run needs is compiled beforehand, in other processes",
+    ("nmm.control.equations", "step"): "what a run needs is compiled beforehand, in other processes",
+    ("nmm.functions.program", "PLACE"): "what a run needs is compiled beforehand, in other processes",
+    ("nmm.functions.program", "place"): "what a run needs is compiled beforehand, in other processes",
+    ("nmm.robots.frame_path", "follow_frame"): "what a run needs is compiled beforehand, in other processes",
+    ("nmm.kernels.spectra", "WRITE_SPECTRA"): "what a run needs is compiled beforehand, in other processes",
+    ("nmm.kernels.spectra", "write_spectra"): "what a run needs is compiled beforehand, in other processes",
+    ("nmm.control.equations", "call_step"): "the linearised step, compiled",
+    ("nmm.resolvers.partitions", "HELD"): "the linearised step holds RG's partition",
+    ("nmm.resolvers.partitions", "MODE"): "the linearised step holds RG's partition",
+    (
+        "nmm.functions.callbacks",
+        "DIFFERENCE_STEP",
+    ): "differences of the same step as those of users' functions",
+    ("nmm.kernels", "records"): "the kernels' records, as a module, traced with symbols",
+    ("nmm.collisions.pairs", "measured_pairs"): "a scenario's draft leaves out pairs that touch",
+    ("nmm.collisions.pairs", "random_configurations"): "a scenario's draft leaves out pairs that touch",
+    ("nmm.collisions.pairs", "HULLS"): "a scenario's draft leaves out pairs that touch",
+    ("nmm.collisions.pairs", "query_shapes"): "a scenario's draft leaves out pairs that touch",
+}
+
+
+def exports() -> dict[str, object]:
+    """The names that `nmm` and `nmm.extending` export, with what they are."""
+    stubs = [(nmm, "__init__.pyi"), (nmm.extending, "extending.pyi")]
+    names = [
+        (m, n)
+        for m, stub in stubs
+        for n in re.findall(r" as (\w+)$", (PACKAGE / stub).read_text("utf-8"), re.M)
+    ]
+    return {name: getattr(module, name) for module, name in names}
+
+
+def crossings() -> Iterator[tuple[str, str, str]]:
+    """(file, module, name) of each import across the wall, by files above it."""
+    shared = {path.stem for path in PACKAGE.glob("*.py")} | {"findings", "templates"}
+    for path in sorted(PACKAGE.rglob("*.py")):
+        part = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+        if part in CORE or part in shared:
+            continue
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("nmm."):
+                if node.module.split(".")[1] in CORE:
+                    yield from (
+                        (path.relative_to(PACKAGE).as_posix(), node.module, one.name) for one in node.names
+                    )
+            elif isinstance(node, ast.Import):
+                for one in node.names:
+                    assert one.name.split(".")[:2] not in [["nmm", part] for part in CORE], path
+
+
+def test_wings_import_what_is_exported() -> None:
+    exported, used = exports(), set()
+    for file, module, name in crossings():
+        if (module, name) in EXCEPTIONS:
+            used.add((module, name))
+            continue
+        assert name in exported, f"{file}: {module}.{name} is no export of nmm or nmm.extending"
+        assert getattr(import_module(module), name) is exported[name], f"{file}: another {name}"
+    assert used == EXCEPTIONS.keys()
+    assert len(EXCEPTIONS) < 20
+
+
+def test_what_is_exported_is_on_the_page() -> None:
+    page = (PACKAGE.parent / "docs" / "api" / "extending.md").read_text("utf-8")
+    for name in nmm.extending.__all__:
+        assert f"`{name}`" in page or f"nmm.extending.{name}" in page, name
+
+
+@pytest.mark.parametrize(("old", "new"), nmm.MOVED.items())
+def test_an_old_name_says_the_new_one(old: str, new: str) -> None:
+    with pytest.raises(AttributeError, match=re.escape(f"nmm.{new}")):
+        getattr(nmm, old)
+    room, _, name = new.rpartition(".")
+    assert hasattr(nmm.extending if room else nmm, name)

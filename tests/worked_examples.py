@@ -1,0 +1,46 @@
+"""The files that docs/architecture.md has to type in, and, as a plugin of pytest, all of them registered.
+
+    PYTHONPATH=tests python -m pytest -p worked_examples tests/test_robot_grid.py
+
+runs a grid with them: it must ask of a new kind no more than the kind declares.
+"""
+
+from __future__ import annotations
+
+import atexit
+import re
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "architecture.md"
+#: The page's code, in its order.
+FILES = ("slope", "damped", "used")
+
+
+def write_examples(folder: Path) -> None:
+    """The page's files, as slope.py, damped.py and used.py."""
+    codes = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL)
+    for name, code in zip(FILES, codes, strict=True):
+        (folder / f"{name}.py").write_text(code, encoding="utf-8")
+
+
+def pytest_configure() -> None:
+    """One line each in `nmm.kinds`, and an example of the function."""
+    folder = tempfile.mkdtemp()
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    write_examples(Path(folder))
+    sys.path.insert(0, folder)
+    import function_grid
+    from damped import DampedLeastSquares
+    from slope import Slope
+    from transposed import JacobianTranspose, LeastNorm
+
+    from nmm.kinds import RESOLVERS, TASKS
+
+    TASKS["slope"] = Slope
+    entry = function_grid.Entry("slope", Slope("base_footprint", "ee"), function_grid.SPATIAL)
+    function_grid.ENTRIES += (entry,)
+    for kind in (DampedLeastSquares, JacobianTranspose, LeastNorm):
+        RESOLVERS[kind.name] = kind
