@@ -50,6 +50,9 @@ class Window:
     requests: list[str] = field(default_factory=list)
 
     def open(self, url: str) -> Page:
+        """The document at `url`, loaded anew also where only what follows # differs."""
+        # Within one document, what the page writes into its own address could come before what was asked for.
+        self.page.goto("about:blank")
         self.page.goto(url)
         self.page.wait_for_function("!document.body.classList.contains('loading')")
         return self.page

@@ -18,8 +18,6 @@ from nmm.playback.extent import corners, robot_boxes
 from nmm.playback.rolling import wheel_angles
 from nmm.robots.robot import Robot
 
-pytestmark = pytest.mark.browser
-
 
 @pytest.fixture(scope="module")
 def robot(tmp_path_factory: pytest.TempPathFactory) -> Robot:
@@ -121,14 +119,10 @@ def test_grid_and_axes_are_hidden_by_button_key_and_address(
     assert page.evaluate(shown) == [False]
     page.keyboard.press("x")
     assert page.evaluate(shown) == [True]
-    page.goto(url + "#grid=off")
-    page.reload()
-    page.wait_for_function("!document.body.classList.contains('loading')")
+    window.open(url + "#grid=off")
     assert page.evaluate(shown) == [False]
     assert page.locator("#grid").get_attribute("aria-pressed") == "false"
-    page.goto(url + "#ghosts=off&paths=off")
-    page.reload()
-    page.wait_for_function("!document.body.classList.contains('loading')")
+    window.open(url + "#ghosts=off&paths=off")
     assert page.evaluate("nmm.address.text()").count("=off") == 2
     # A slider that has the focus has its own keys, and no more.
     page.locator("#slider").evaluate("slider => slider.focus()")
