@@ -1,13 +1,11 @@
 """The collisions of a scenario: which distances a run keeps, and the obstacles, which stand or move."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, create_model
+from pydantic import Field, create_model
 
-from nmm.arrays import Array, scalar
+from nmm.arrays import Array
 from nmm.collisions.obstacle import Obstacle
 from nmm.collisions.shapes import Box, Capsule, ConvexMesh, Cylinder, HalfSpace, Shape, Sphere
 from nmm.control.collisions import Collisions
@@ -17,10 +15,10 @@ from nmm.functions.program import Program
 from nmm.functions.references.orientation import rotation_vector
 from nmm.robots.loading.packages import package_file
 from nmm.robots.robot import Robot
-from nmm.scenario.constructors import FunctionPart
+from nmm.scenario.constructors import FunctionPart, MadePart, keys_of
 from nmm.scenario.functions import REFERENCE_PARTS
 from nmm.scenario.keys import OneOf, Part, at
-from nmm.scenario.numbers import Positive, Whole, number
+from nmm.scenario.numbers import Positive
 from nmm.scenario.robot import PACKAGE, Absolute, FileName, Three
 from nmm.scenario.yaml_text import Place
 
@@ -32,8 +30,8 @@ class ShapePart(Part):
 
     def build(self, absolute: Absolute, place: Place) -> Shape:
         given = self.explicit(absolute, place)
-        kind = given.pop("kind")
-        with self.own_keys(), without(f"{kind}: "):
+        del given["kind"]
+        with self.own_keys():
             return self.makes(**given)
 
     def explicit(self, absolute: Absolute, place: Place) -> dict[str, Any]:
@@ -53,7 +51,7 @@ class MeshPart(ShapePart):
             try:
                 return super().build(absolute, place)
             except InputError as error:  # Mesh names the file, not the key
-                raise error.at("file") from None
+                raise error.placed(error.where.replace("mesh", "file", 1)) from None
 
     def explicit(self, absolute: Absolute, place: Place) -> dict[str, Any]:
         return {**self.model_dump(), "file": str(absolute(self.file, (*place, "file")))}
@@ -91,15 +89,6 @@ SHAPE_PARTS: dict[str, type[ShapePart]] = {
         ),
     )
 } | {"mesh": MeshPart}
-
-
-@contextmanager
-def without(head: str) -> Iterator[None]:
-    """Errors of the block without `head` at the front of their `where`, which their place says already."""
-    try:
-        yield
-    except InputError as error:
-        raise error.placed(f"{error.where}: ".removeprefix(head).removesuffix(": ")) from None
 
 
 #: References that are points of time alone.
@@ -165,51 +154,24 @@ class ObstaclePart(Part):
         return {**self.model_dump(), "shape": self.shape.explicit(absolute, (*place, "shape"))}
 
 
-USUAL = Collisions()
+_SRDF = (
+    bool | FileName | None,
+    "a file of MoveIt's whose disabled pairs are left out, too; relative to the scenario, or "
+    "package://PACKAGE/PATH; true for the robot's own",
+)
+_PAIRS = list[Annotated[list[str], Field(min_length=2, max_length=2)]]
 
 
-class CollisionsPart(Part):
+class CollisionsPart(
+    keys_of(Collisions, MadePart, "obstacles", ignore=_PAIRS, srdf=_SRDF, shapes=Literal["hulls", "capsules"])  # type: ignore[misc]  # made
+):
     """Distances that are never less than a number; `collisions: true` is this with its defaults."""
 
+    makes = Collisions
+    beside = ("obstacles", "ignore", "srdf")
     renamed: ClassVar[dict[str, str]] = {"self": "self_collisions"}
 
-    distance: Annotated[float, BeforeValidator(lambda given: scalar(number(given), "", least=0.0))] = Field(
-        USUAL.distance, description="to keep, m, from 0"
-    )
-    self_collisions: bool = Field(
-        USUAL.self_collisions, description="whether the robot keeps off itself, too"
-    )
     obstacles: list[ObstaclePart] = Field(default_factory=list, description="what it keeps off")
-    ignore: list[Annotated[list[str], Field(min_length=2, max_length=2)]] = Field(
-        default_factory=list,
-        description="pairs of names (links, shapes, obstacles) that are not kept apart, as [[hand, table]]",
-    )
-    srdf: bool | FileName | None = Field(
-        None,
-        description="a file of MoveIt's whose disabled pairs are left out, too; relative to the scenario, or "
-        "package://PACKAGE/PATH; true for the robot's own",
-    )
-    shapes: Literal["hulls", "capsules"] = Field("hulls", description="what stands for the robot's meshes")
-    band: Positive | None = Field(
-        None, description="pairs nearer than this have rows, m; distance and 0.2 m more when not given"
-    )
-    gain: Positive = Field(
-        USUAL.gain, description="a distance falls no faster than this times what is left of it, 1/s"
-    )
-    recovery: Positive = Field(
-        USUAL.recovery, description="speed of the way back where a distance is too small, m/s"
-    )
-    braking: Positive | None = Field(
-        None,
-        description="deceleration of a distance to count on, m/s²; when not given, a quarter of what the "
-        "inputs' accelerations give",
-    )
-    rows: Whole = Field(USUAL.rows, description="most distances that are kept at a time, the nearest ones")
-
-    @contextmanager
-    def own_keys(self) -> Iterator[None]:
-        with super().own_keys(), without("collisions: "):
-            yield
 
     def build_obstacles(self, robot: Robot, absolute: Absolute, place: Place) -> list[Obstacle]:
         obstacles = []
@@ -219,13 +181,12 @@ class CollisionsPart(Part):
         return obstacles
 
     def build(self, robot: Robot, absolute: Absolute, place: Place) -> Collisions:
-        obstacles = self.build_obstacles(robot, absolute, place)
-        given = {key: getattr(self, key) for key in type(self).model_fields}
         with at("srdf"):
-            given["srdf"] = self._srdf(absolute, place)
-        given["ignore"] = [(first, second) for first, second in self.ignore]
+            srdf = self._srdf(absolute, place)
+        obstacles = self.build_obstacles(robot, absolute, place)
+        ignore = [(first, second) for first, second in self.ignore]
+        collisions: Collisions = self.made_with(obstacles=obstacles, srdf=srdf, ignore=ignore)
         with self.own_keys():
-            collisions = Collisions(**{**given, "obstacles": obstacles})
             collisions.on(robot)
         return collisions
 

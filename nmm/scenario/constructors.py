@@ -163,11 +163,18 @@ class MadePart(Part):
     """A part that makes an object of the class `makes`, which checks the values."""
 
     makes: ClassVar[type]
+    #: Parameters that `made_with` is given: what is made of their keys depends on the robot.
+    beside: ClassVar[tuple[str, ...]] = ()
 
     def make(self, unit: str = "m") -> Any:
+        return self.made_with(unit)
+
+    def made_with(self, unit: str = "m", **beside: Any) -> Any:
         listed: list[Any] = []
-        named: dict[str, Any] = {}
+        named = beside
         for parameter in parameters(self.makes):
+            if parameter.name in self.beside:
+                continue
             value = _argument(getattr(self, parameter.key), parameter.key)
             if isinstance(value, dict):
                 value = {name: _argument(one, parameter.key, name) for name, one in value.items()}
@@ -202,6 +209,7 @@ def _argument(value: Any, *place: str) -> Any:
 
 
 P = TypeVar("P", bound=MadePart)
+Q = TypeVar("Q", bound=Part)
 
 
 def part_of(kind: str, makes: type, base: type[P], **spelled: Any) -> type[P]:
@@ -210,14 +218,19 @@ def part_of(kind: str, makes: type, base: type[P], **spelled: Any) -> type[P]:
     The keys of `base` stay; `spelled` has the type, and the text where it is another, of keys that files
     spell in a way of their own.
     """
-    fields: dict[str, Any] = {"kind": (Literal[kind], ...)}
-    for parameter in parameters(makes):
-        if parameter.key not in base.model_fields:
-            fields[parameter.key] = _field(parameter, spelled.get(parameter.key), makes)
-    part = create_model(f"{makes.__name__}Part", __base__=base, __module__=base.__module__, **fields)
+    part = keys_of(makes, base, kind=(Literal[kind], ...), **spelled)
     part.makes = makes
     part.__doc__ = summary(makes)
     return part
+
+
+def keys_of(makes: type, base: type[Q], *without: str, **spelled: Any) -> type[Q]:
+    """`base` with a key for each parameter of a class's constructor but those `without`, as of `part_of`."""
+    fields = {"kind": spelled["kind"]} if "kind" in spelled else {}
+    for parameter in parameters(makes):
+        if parameter.key not in {*without, *base.model_fields}:
+            fields[parameter.key] = _field(parameter, spelled.get(parameter.key), makes)
+    return create_model(f"{makes.__name__}Part", __base__=base, __module__=base.__module__, **fields)
 
 
 def _field(parameter: Parameter, spelled: Any, makes: type) -> tuple[Any, Any]:
@@ -234,6 +247,8 @@ def _field(parameter: Parameter, spelled: Any, makes: type) -> tuple[Any, Any]:
             f"the type of {parameter.name}"
         )
     default = PydanticUndefined if parameter.required else parameter.default
+    if default == ():
+        default = []
     least = 1 if parameter.starred else None
     if parameter.starred:
         kind = Annotated[GenericAlias(list, (kind,)), BeforeValidator(listed)]

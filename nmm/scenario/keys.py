@@ -106,15 +106,17 @@ class Part(BaseModel):
 
     @contextmanager
     def own_keys(self) -> Iterator[None]:
-        """An error of the block whose `where` begins with one of this part's keys is about that key."""
+        """An error of the block is about the key of this part that its `where` begins with, or that stands
+        there behind a name of what is made."""
         try:
             yield
         except KeyedError:
             raise
         except InputError as error:
-            head, _, rest = error.where.partition(": ")
-            if head in type(self).model_fields:
-                raise error.placed(rest, partial(KeyedError, (head,))) from None
+            keys, (first, *rest) = type(self).model_fields, error.where.split(": ")
+            head, *rest = rest if first not in keys and rest else [first, *rest]
+            if head in keys:
+                raise error.placed(": ".join(rest), partial(KeyedError, (head,))) from None
             raise
 
 

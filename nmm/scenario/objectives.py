@@ -20,14 +20,13 @@ from nmm.scenario.constructors import (
     MadePart,
     check_coordinates,
     check_part,
+    keys_of,
     listed,
     part_of,
 )
 from nmm.scenario.functions import REFERENCES_BY_NAME, Reference
 from nmm.scenario.keys import FUNCTION, NUMBER, OneOf, Part, at, each, is_path
 from nmm.scenario.numbers import Number, Positive
-
-USUAL = Clearance()
 
 
 def _spelled(value: object) -> str:
@@ -105,23 +104,12 @@ class QuadraticPart(ObjectivePart):
         return super().build(robot, collisions)
 
 
-class ClearancePart(ObjectivePart):
+class ClearancePart(keys_of(Clearance, ObjectivePart, "collisions")):  # type: ignore[misc]  # made
     """Grows where the robot comes near to the obstacles of `collisions`, so that it turns away early."""
 
     makes = Clearance
+    beside = ("collisions",)
     kind: Literal["clearance"]
-    reach: Positive = Field(
-        USUAL.reach, description="how far beyond the distance to keep a pair of shapes is felt, m"
-    )
-    own: bool = Field(USUAL.own, description="whether the robot keeps off itself, too")
-    ahead: Number | None = Field(
-        None,
-        description="how far ahead the robot is looked at, too, m, below 0 for one that drives backwards; "
-        "when not given, 1 with wheels that have to roll to turn (a car's) and 0 with others",
-    )
-
-    def make(self, unit: str = "m") -> Clearance:
-        return Clearance(None, self.reach, self.own, self.ahead)
 
     def among(self, collisions: Collisions | None) -> Objective:
         return self.make() if collisions is None else self.make().among(collisions)

@@ -112,7 +112,7 @@ class ScenarioPart(Part):
         with at("retreat"):
             goal = None if self.until is None else self.until.make()
             retreat = None if self.retreat is None else self.retreat.build(robot, goal)
-        steering = None if self.steering is None else self.steering.build()
+        steering = None if self.steering is None else self.steering.make()
         with at("resolver"):
             resolver, added = own or self.resolver.make(), None
             rest = (limits, self.dt, retreat, steering or False)

@@ -10,10 +10,10 @@ from nmm.functions.function import Row
 from nmm.functions.tasks.conditions import After, Between, Condition, While
 from nmm.functions.tasks.task import Task
 from nmm.robots.robot import Robot
-from nmm.scenario.constructors import FunctionPart
+from nmm.scenario.constructors import FunctionPart, keys_of
 from nmm.scenario.functions import FUNCTION_PARTS, Reference, with_functions
 from nmm.scenario.keys import OneOf, Part, at, each
-from nmm.scenario.numbers import Number, Numbers, Positive, Speeds, Whole
+from nmm.scenario.numbers import Number, Numbers, Positive, Speeds
 
 
 class ConditionPart(Part):
@@ -60,18 +60,11 @@ class WhilePart(ConditionPart):
             return While(function, **self.given("lower", "upper", "margin"))
 
 
-class AfterPart(ConditionPart):
+class AfterPart(keys_of(After, ConditionPart, within=Speeds)):  # type: ignore[misc]  # made
     """Once the error of another task has stayed within a tolerance; from then on for good."""
 
     makes = After
     kind: Literal["after"]
-    task: str = Field(description="that task's name")
-    within: Speeds = Field(
-        0.01,
-        description="of its error's norm over rows of one unit: a number, or numbers by unit ({m: 0.005})",
-    )
-    hold: Number = Field(0.1, description="how long the error has to stay there, s")
-    instead: bool = Field(False, description="whether that task ends when this one begins")
 
 
 #: The conditions, by kind.
@@ -103,7 +96,16 @@ def listed(value: object) -> object:
     raise InputError(expected="a mapping with a kind, or a list of such", got=value)
 
 
-class TaskPart(FunctionPart):
+_GAIN = (
+    Numbers | None,
+    "K on the task's error, 1/s: a number, a number a row, or a matrix (its symmetric part positive "
+    "definite); null for planning mode, which follows the reference without feedback",
+)
+
+
+class TaskPart(
+    keys_of(Task, FunctionPart, "function", "reference", "when", gain=_GAIN, speed=Speeds, braking=Speeds)  # type: ignore[misc]  # made
+):
     """A function of the robot that follows a reference."""
 
     reference: Reference = Field(
@@ -111,26 +113,6 @@ class TaskPart(FunctionPart):
         "functions of the configuration (position, orientation, heading, coordinates, ...); or another "
         "task's, by its path (task.0.reference)"
     )
-    gain: Numbers | None = Field(
-        1.0,
-        description="K on the task's error, 1/s: a number, a number a row, or a matrix (its symmetric part "
-        "positive definite); null for planning mode, which follows the reference without feedback",
-    )
-
-    priority: Whole = Field(
-        1, description="1, 2, ...: a task gets what those of lower numbers leave, and takes nothing from them"
-    )
-    speed: Speeds | None = Field(
-        None,
-        description="how fast feedback may approach the target: ‖K e‖ at most, a number or numbers by unit "
-        "({m: 1, rad: 2})",
-    )
-    braking: Speeds | None = Field(
-        None,
-        description="deceleration b with which it may come to rest there: ‖K e‖ at most √(2 b ‖e‖), "
-        "a number or numbers by unit",
-    )
-    name: str = Field("", description="for messages, and for tasks that come after it")
     when: Annotated[list[Annotated[ConditionPart, OneOf(CONDITION_PARTS)]], BeforeValidator(listed)] = Field(
         default_factory=list,
         description="a condition of kind between, while or after, or a list of such, which all have to hold, "
