@@ -2,7 +2,7 @@
 
 import math
 from numbers import Integral
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,6 +30,17 @@ def interpolated(times: Array | float, t: Array, values: Array) -> Array:
     """Columns of values (N, k), given at t (N,), linear in between at the times: (k,), or (T, k) for (T,)."""
     columns = np.array([np.interp(times, t, column) for column in values.T])
     return np.ascontiguousarray(columns.T).reshape(*np.shape(times), values.shape[1])
+
+
+def finite(value: Any) -> Any:
+    """Plain data for JSON: arrays and tuples as lists, numpy's numbers as Python's, infinity and NaN None."""
+    if isinstance(value, np.ndarray | np.generic):
+        return finite(value.tolist())
+    if isinstance(value, dict):
+        return {key: finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def infinite(value: ArrayLike, name: str, expected: str) -> Array:

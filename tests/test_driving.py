@@ -23,8 +23,7 @@ from tornado.websocket import websocket_connect
 import nmm
 from nmm.arrays import Array
 from nmm.driving.driven import Driven, Reaching
-from nmm.driving.messages import Aim, Order, Pick, parsed
-from nmm.driving.session import DriveSession
+from nmm.driving.session import Aim, DriveSession, Order, Pick, parsed
 from nmm.driving.setups import DriveSetup, RobotSetup, ScenarioSetup, Settings
 from nmm.errors import InputError, ScenarioError
 from nmm.kinds import RESOLVERS

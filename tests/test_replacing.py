@@ -20,7 +20,7 @@ from nmm.cli.exit_status import status_of
 from nmm.errors import InputError
 from nmm.files import writing
 from nmm.folders import whole
-from nmm.folders.whole import check_folder, has_format, replaced_folder, steady
+from nmm.folders.whole import FolderKind, check_folder, replaced_folder, steady
 
 #: NMM_KILLS=30 kills each command so often; few do not.
 KILLS = int(os.environ.get("NMM_KILLS", "0"))
@@ -28,8 +28,7 @@ MOST = 600.0
 NAMES = tuple("abcdefgh")
 
 
-def ours(folder: Path) -> bool:
-    return has_format(folder / "a", "ours")
+ours = FolderKind("ours", "a")
 
 
 def write(folder: Path, number: int, pause: float = 0.0) -> None:

@@ -17,7 +17,7 @@ import nmm
 from nmm.bundled import bundled_scenarios
 from nmm.errors import NmmError, expect_known
 from nmm.figures import save, stroboscopic
-from nmm.folders.whole import has_format, replaced_folder
+from nmm.folders.whole import FolderKind, replaced_folder
 from nmm.playback.html import page_of, viewer_script
 from nmm.processes import share_out
 from nmm.progress import Progress, between
@@ -80,7 +80,7 @@ def write_gallery(folder: Path, only: Sequence[str] = (), *, jobs: int = 2) -> G
     for name in only:
         expect_known("scenario", name, available, "only")
     names = sorted({*only} or available)
-    with replaced_folder(folder, lambda old: has_format(old / MARKER, FORMAT), patience=1.0) as temporary:
+    with replaced_folder(folder, FolderKind(FORMAT, MARKER), patience=1.0) as temporary:
         (temporary / VIEWER).write_text(viewer_script(), encoding="utf-8")
         found = share_out(_Cards(names, temporary), range(len(names)), jobs, lambda number, fraction: None)
         cards = tuple(found[number] for number in sorted(found))

@@ -2,12 +2,10 @@
 
 import json
 from collections.abc import Iterable, Iterator, Sequence
-from math import isfinite
 from textwrap import fill
 from typing import Any, NamedTuple
 
-import numpy as np
-
+from nmm.arrays import finite
 from nmm.cli.output import console, show_table, show_text
 from nmm.findings import Finding
 from nmm.findings.singularities import number_text
@@ -42,24 +40,13 @@ def show(items: Iterable[Item]) -> None:
 def print_json(data: dict[str, Any], items: Iterable[Item]) -> None:
     """Print the data, a key a line, and the findings among the items, with codes, values and words."""
     found = [item.as_json() for item in items if isinstance(item, Finding)]
-    data = plain({**data, "findings": found})
+    data = finite({**data, "findings": found})
     lines = [f"  {json.dumps(key)}: {json.dumps(value, allow_nan=False)}" for key, value in data.items()]
     print("{\n" + ",\n".join(lines) + "\n}")
 
 
 def fields(found: object, names: str) -> dict[str, Any]:
     return {name: getattr(found, name) for name in names.split()}
-
-
-def plain(value: Any) -> Any:
-    """Arrays and tuples as lists, numpy's numbers as Python's, infinity and NaN as None."""
-    if isinstance(value, np.ndarray | np.generic):
-        return plain(value.tolist())
-    if isinstance(value, dict):
-        return {key: plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    return None if isinstance(value, float) and not isfinite(value) else value
 
 
 def say(text: str = "") -> None:

@@ -12,8 +12,7 @@ from nmm.collisions.obstacle import Obstacle
 from nmm.control.controller import Controller
 from nmm.control.step import Step
 from nmm.diagnosis.reasons import out_of_reach, stretched
-from nmm.driving.setups import Choice, DriveSetup, Settings, named
-from nmm.driving.targets import aimed, targets_of
+from nmm.driving.setups import Choice, DriveSetup, Settings, aimed, named, targets_of
 from nmm.errors import NmmError, expect
 from nmm.playback.rolling import RolledRobot
 from nmm.robots.configuration import Configuration

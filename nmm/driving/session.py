@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 import time
 from collections import deque
@@ -10,12 +9,14 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import asdict
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass
 
+from nmm.arrays import finite
 from nmm.driving.driven import Driven, Look, Made
-from nmm.driving.messages import FAR, Aim, Message, Pick, parsed
 from nmm.driving.setups import Choice, DriveSetup, named
 from nmm.errors import InputError, NmmError
 from nmm.playback.channels import live_channels
@@ -31,6 +32,51 @@ KEPT = int(30 * FPS)
 WAITING = 256
 #: How long a notice is shown, s.
 NOTICE = 5.0
+#: Targets are at most this far away, m or rad.
+FAR = 1e4
+#: The longest message, bytes.
+LONGEST = 2048
+
+_STRICT = ConfigDict(strict=True, extra="forbid")
+_Place = Annotated[float, Field(ge=-FAR, le=FAR)]
+
+
+@dataclass(frozen=True, config=_STRICT)
+class Aim:
+    """Put the target of task number `task` at `value` (s,)."""
+
+    task: Annotated[int, Field(ge=0, lt=1000)]
+    value: Annotated[tuple[_Place, ...], Field(min_length=1, max_length=100)]
+    type: Literal["aim"] = "aim"
+
+
+@dataclass(frozen=True, config=_STRICT)
+class Pick:
+    key: str
+    value: str | bool | float
+    type: Literal["pick"] = "pick"
+
+
+@dataclass(frozen=True, config=_STRICT)
+class Order:
+    what: Literal["pause", "go", "restart"]
+    type: Literal["order"] = "order"
+
+
+Message = Aim | Pick | Order
+_MESSAGES: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator="type")])
+
+
+def parsed(text: str | bytes) -> Message:
+    """A page's message; `InputError` for anything that our pages do not send."""
+    if len(text) > LONGEST:
+        raise InputError(where="message", expected=f"at most {LONGEST} bytes", got=len(text))
+    try:
+        return _MESSAGES.validate_json(text)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        place = " ".join(map(str, first["loc"]))
+        raise InputError(first["msg"], where=f"message {place}".rstrip()) from None
 
 
 def drive(
@@ -91,7 +137,7 @@ class DriveSession(RobotSession):
             "targets",
             targets=[target.for_page() for target in driven.targets],
             values=[target.signal.value.tolist() for target in driven.targets],
-            at=[numbers(at) for at in look.at],
+            at=finite(look.at),
             reach=float(driven.robot.reach),
             far=FAR,
         )
@@ -197,7 +243,7 @@ class DriveSession(RobotSession):
             "type": "drive",
             "t": look.t,
             "targets": [target.signal.value.tolist() for target in driven.targets],
-            "at": [numbers(at) for at in look.at],
+            "at": finite(look.at),
             "paused": self._paused,
             "told": text,
             "wrong": wrong,
@@ -213,7 +259,7 @@ class DriveSession(RobotSession):
             "sigma_min": [look.sigma_min],
             "scale": [step.scale.min(initial=1.0)],
         }
-        return numbers([*(x for one in self._curves for x in known[one.name]), *step.u, *step.q])
+        return finite([*(x for one in self._curves for x in known[one.name]), *step.u, *step.q])
 
     def _state(self, look: Look) -> tuple[str, bool]:
         if self._driven.trouble:
@@ -240,11 +286,6 @@ def _make(driven: Driven, key: str, value: object, making: Future[Made]) -> None
         making.set_result(made)
     except Exception as error:  # the loop reports it
         making.set_exception(error)
-
-
-def numbers(values: Iterable[float]) -> list[float | None]:
-    """JSON's numbers are finite; None for all others."""
-    return [float(value) if math.isfinite(value) else None for value in values]
 
 
 def _kind(choices: Sequence[Choice]) -> str:

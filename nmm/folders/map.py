@@ -10,7 +10,7 @@ import numpy as np
 
 from nmm.analysis.maps.measures import MEASURES
 from nmm.analysis.maps.result import EVERYWHERE, Extreme
-from nmm.arrays import Array, Integers
+from nmm.arrays import Array, Integers, finite
 from nmm.figure_options import PLAIN, FigureOptions
 from nmm.folders.whole import FolderKind, replaced_folder
 from nmm.machine import made_with
@@ -72,7 +72,8 @@ def summary(made: Map) -> dict[str, Any]:
 
 
 def _arrays(made: Map) -> dict[str, Array | Integers]:
-    """The arrays of map.npz; consecutive lines are separated by a row of NaN."""
+    """The arrays of map.npz; a row of NaN is after each line."""
+    gap = np.full((1, 2), np.nan)
     first: dict[str, Any] = {f"axis_{i}": axis for i, axis in enumerate(made.axes)}
     found = {**first, "rank": made.rank, "q": made.q, "q_names": np.array(made.about.q_names), **made.values}
     for prefix, layer in (("worst", made.worst), ("best_q", made.best_q), ("worst_q", made.worst_q)):
@@ -80,14 +81,10 @@ def _arrays(made: Map) -> dict[str, Array | Integers]:
     for prefix, those in (("singular", made.singular), ("arm_singular", made.arm_singular)):
         if those is not None:
             found[f"{prefix}_points"] = those.points
-            found[f"{prefix}_lines"] = _joined(those.lines)
+            found[f"{prefix}_lines"] = np.vstack(
+                [piece for line in those.lines for piece in (line, gap)] or [np.zeros((0, 2))]
+            )
     return found
-
-
-def _joined(lines: tuple[Array, ...]) -> Array:
-    """Curves (k, 2) in one array, with a row of NaN after each."""
-    gap = np.full((1, 2), np.nan)
-    return np.vstack([piece for line in lines for piece in (line, gap)]) if lines else np.zeros((0, 2))
 
 
 def _found(those: SingularSet) -> dict[str, Any]:
@@ -99,13 +96,9 @@ def _ends(found: Mapping[str, Extreme]) -> dict[str, Any]:
     """Extremes in plain data; "on" says whether a cell or a singular set between cells has the value."""
     return {
         end: {
-            "value": _plain(value),
-            "at": None if on == EVERYWHERE else [_plain(x) for x in at],
+            "value": finite(value),
+            "at": None if on == EVERYWHERE else finite(at),
             "on": on or "cell",
         }
         for end, (value, at, on) in found.items()
     }
-
-
-def _plain(value: float) -> float | None:
-    return value if np.isfinite(value) else None

@@ -40,7 +40,11 @@ class FolderKind:
     file: str = "summary.json"
 
     def __call__(self, folder: Path) -> bool:
-        return has_format(folder / self.file, self.format)
+        try:
+            content = json.loads(read_bytes(folder / self.file, MOST))
+        except (OSError, ValueError, RecursionError):
+            return False
+        return isinstance(content, dict) and content.get("format") == self.format
 
     def write(self, folder: Path, content: Mapping[str, Any], *, ensure_ascii: bool = False) -> None:
         """Write the JSON file: the format, what made it unless `content` says so, and the content."""
@@ -159,14 +163,6 @@ def check_folder(folder: Path, is_ours: Callable[[Path], bool]) -> None:
             raise busy(folder)
     except OSError as error:  # a name that is too long
         raise InputError(f"cannot be written: {error.strerror}", where=folder) from None
-
-
-def has_format(file: Path, expected: str) -> bool:
-    try:
-        content = json.loads(read_bytes(file, MOST))
-    except (OSError, ValueError, RecursionError):
-        return False
-    return isinstance(content, dict) and content.get("format") == expected
 
 
 def _identity(folder: Path) -> tuple[int, int] | None:

@@ -55,12 +55,6 @@ def ripple(trajectory: Trajectory) -> float:
     return float(np.ptp(trajectory.objective[t >= 0.5 * (t[0] + t[-1])]))
 
 
-def backing_up(trajectory: Trajectory) -> float:
-    """How long the platform drives backwards from the start, s."""
-    forward = np.flatnonzero(trajectory.u[:, 0] >= 0.0)
-    return float(trajectory.t[forward[0]] if forward.size else trajectory.t[-1])
-
-
 def smallest_determinant(trajectory: Trajectory, controller: Controller) -> float | None:
     """The smallest |det Ja| along RG's motion, Ja the columns of J_bar in use, else None."""
     if np.any(trajectory.partition < 0):
@@ -171,7 +165,8 @@ def _switching(rg: Trajectory, determinant: float, statement: str, source: str) 
 
 
 def _first(rg: Trajectory, pg: Trajectory, determinant: float) -> list[Claim]:
-    backwards = backing_up(rg)
+    forward = np.flatnonzero(rg.u[:, 0] >= 0.0)
+    backwards = float(rg.t[forward[0]] if forward.size else rg.t[-1])
     ripples = [ripple(run) for run in (rg, pg)]
     return [
         Claim(

@@ -79,7 +79,8 @@ def _part(source: str, folder: Path, keys: Mapping[str, Any]) -> dict[str, Any]:
     if "srdf" in part:
         part["srdf"] = _written(str(part["srdf"]), folder)
     if "package_dirs" in part:
-        part["package_dirs"] = [_written_package_dir(one, folder) for one in part["package_dirs"]]
+        named = [named_folder(str(one)) for one in part["package_dirs"]]
+        part["package_dirs"] = [(f"{name}=" if name else "") + _written(path, folder) for name, path in named]
     return part
 
 
@@ -90,12 +91,6 @@ def _written(file: str, folder: Path) -> str:
     path = os.path.abspath(os.path.expanduser(file))
     inside = os.path.relpath(path, folder.absolute())
     return path if inside.startswith(os.pardir) else inside if os.sep in inside else f"./{inside}"
-
-
-def _written_package_dir(given: str | Path, folder: Path) -> str:
-    name, path = named_folder(str(given))
-    written = _written(path, folder)
-    return f"{name}={written}" if name else written
 
 
 def _loaded(data: dict[str, Any], folder: Path) -> tuple[Robot, dict[str, Any]]:

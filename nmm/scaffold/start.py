@@ -48,17 +48,12 @@ def start_for(robot: Robot, hand: Hand) -> Start | None:
     moved = moving_axes({"kind": "position", "frame": hand.frame}, robot)
     look = _Look(robot, hand)
     seen = [look.at(q) for q in _tried(robot, hand)]
-    for axes in _subsets(moved):
+    for axes in ("".join(some) for count in range(len(moved), 0, -1) for some in combinations(moved, count)):
         if len(axes) <= len(look.all):
             found = _posture(look, axes) or _searched(look, seen, axes)
             if found is not None:
                 return found
     return None
-
-
-def _subsets(axes: str) -> Iterator[str]:
-    for count in range(len(axes), 0, -1):
-        yield from ("".join(some) for some in combinations(axes, count))
 
 
 class _Seen(NamedTuple):

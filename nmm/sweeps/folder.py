@@ -11,14 +11,13 @@ from typing import Any
 
 from nmm.errors import InputError
 from nmm.files import taken, whole_file
-from nmm.folders.whole import check_folder, has_format
-from nmm.machine import made_with
+from nmm.folders.whole import FolderKind, check_folder
 from nmm.scenario.numbers import shown
 from nmm.sweeps.definition import Definition
 from nmm.sweeps.rows import Computed, arrow, columns_of, parquet, rows_of
 
-FORMAT = "nmm sweep 1"
-MANIFEST, TABLE = "sweep.json", "rows.parquet"
+is_sweep = FolderKind("nmm sweep 1", "sweep.json")
+TABLE = "rows.parquet"
 #: Rows of a row group in the finished table.
 GROUP = 65_536
 #: Sweeps with fewer rows begin without an estimate.
@@ -28,10 +27,6 @@ MOST_DAYS = 30.0
 DAY = 86_400.0
 #: Bytes of a cell, measured in tables of 10^4 rows.
 CELL = 8.0
-
-
-def is_sweep(folder: Path) -> bool:
-    return has_format(folder / MANIFEST, FORMAT)
 
 
 class SweepFolder:
@@ -53,10 +48,15 @@ class SweepFolder:
 
     def check(self) -> None:
         """`InputError` for a folder with something else or another sweep, or one that cannot be written."""
-        check_folder(self.path, lambda path: is_sweep(path) or _hardly_begun(path))
+        # A sweep killed before it wrote its definition left these alone.
+        begun = (".lock", f".{is_sweep.file}")
+        check_folder(
+            self.path,
+            lambda path: is_sweep(path) or all(file.name.startswith(begun) for file in path.iterdir()),
+        )
         if not is_sweep(self.path):
             return
-        there = json.loads((self.path / MANIFEST).read_text(encoding="utf-8"))["definition"]
+        there = json.loads((self.path / is_sweep.file).read_text(encoding="utf-8"))["definition"]
         difference = _difference(there, self.definition.plain())
         if difference:
             place, was, now = difference
@@ -118,17 +118,14 @@ class SweepFolder:
 
     def _write_manifest(self, *, complete: bool) -> None:
         content = {
-            "format": FORMAT,
-            "made_with": made_with(),
             "name": self.definition.name,
             "complete": complete,
             "rows": self.definition.rows,
             "definition": self.definition.plain(),
             "columns": [column._asdict() for column in columns_of(self.definition)],
         }
-        text = json.dumps(content, indent=2, ensure_ascii=False)
-        with whole_file(self.path / MANIFEST) as temporary:
-            temporary.write_text(text + "\n", encoding="utf-8")
+        with whole_file(self.path / is_sweep.file) as temporary:
+            is_sweep.write(temporary.parent, content)
 
     @staticmethod
     def _write_run(folder: Path, files: dict[str, bytes]) -> None:
@@ -142,11 +139,6 @@ class SweepFolder:
             temporary.rename(folder)
         finally:
             shutil.rmtree(temporary, ignore_errors=True)
-
-
-def _hardly_begun(folder: Path) -> bool:
-    """Whether a sweep was killed in a folder before it wrote its definition."""
-    return all(path.name.startswith((".lock", f".{MANIFEST}")) for path in folder.iterdir())
 
 
 def _difference(there: Any, here: Any, place: str = "") -> tuple[str, Any, Any] | None:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from nmm.arrays import Array
+from nmm.arrays import Array, finite
 from nmm.files import whole_file
 from nmm.sweeps.definition import Definition
 from nmm.sweeps.rows import Column, columns_of, parquet
@@ -190,7 +190,9 @@ def _data(swept: SweepResult) -> dict[str, Any]:
 def _cells(column: Column, values: list[Any], *, exact: bool) -> dict[str, Any]:
     """A column's values, only once if they are all the same, and text as numbers of its levels."""
     if column.kind == "number":
-        values = [_number(value, exact=exact) for value in values]
+        values = finite(values)
+        if not exact:
+            values = [None if value is None else float(f"{value:.{DIGITS}g}") for value in values]
     if all(value == values[0] for value in values):
         return {"same": values[0]}
     if column.kind != "text":
@@ -198,9 +200,3 @@ def _cells(column: Column, values: list[Any], *, exact: bool) -> dict[str, Any]:
     levels = sorted({value for value in values if value is not None})
     codes = {level: k for k, level in enumerate(levels)}
     return {"levels": levels, "codes": [codes.get(value, -1) for value in values]}
-
-
-def _number(value: float | None, *, exact: bool) -> float | None:
-    if value is None or not math.isfinite(value):
-        return None
-    return value if exact else float(f"{value:.{DIGITS}g}")

@@ -79,7 +79,8 @@ class Table:
 
         rows = [["", *map(latex.escaped, self.runs)]]
         for one in self.read:
-            unit = f" ({_latex_unit(one.unit)})" if one.unit else ""
+            unit = re.sub(r"\\textasciicircum\{\}(-?\d+)", r"$^{\1}$", latex.escaped(one.unit))  # m^2 raised
+            unit = unit and f" ({unit})"
             rows.append([one.latex + unit, *map(_latex_value, one.values)])
         head, *body = (" & ".join(row) + r" \\" for row in rows)
         return "\n".join(
@@ -137,11 +138,6 @@ def _latex_value(value: Value) -> str:
     if isinstance(value, str):
         return latex.escaped(value)
     return f"${value}$" if isinstance(value, int) else latex.number(value)
-
-
-def _latex_unit(unit: str) -> str:
-    """ "m^2" with its power raised."""
-    return re.sub(r"\\textasciicircum\{\}(-?\d+)", r"$^{\1}$", latex.escaped(unit))
 
 
 def _plain_value(value: Value) -> str:

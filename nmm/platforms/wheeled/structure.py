@@ -67,8 +67,8 @@ class Structure:
         #: Rates of pivots without trail: inputs, unless others are asked for.
         self._held = [Rate(2 + bodies.number(joint)) for joint in joints]
         for wheel in wheels:
-            if isinstance(wheel, FixedWheel):
-                self._add(self._no_slip(wheel))
+            if isinstance(wheel, FixedWheel) and not self._repeats(constraint := self._no_slip(wheel)):
+                self.constraints.append(constraint)
         self._add_steered(steered)
         self.inputs = self._chosen_inputs()
         self.mobility = self._n - self._rank([*self.pfaffian, *self._held])
@@ -152,11 +152,6 @@ class Structure:
 
     def _no_slip(self, wheel: WheelDescription) -> Constraint:
         return Constraint([wheel], Velocity((self.bodies.contact(wheel, np.pi / 2),)))
-
-    def _add(self, constraint: Constraint) -> None:
-        """Unless it repeats others."""
-        if not self._repeats(constraint):
-            self.constraints.append(constraint)
 
     def _repeats(self, constraint: Constraint) -> bool:
         """Whether a wheel's row follows from the others'; it joins the one that it equals, if any."""
