@@ -25,7 +25,7 @@ from nmm.playback.session import Session
 from nmm.playback.shapes import DrawnRobot
 from nmm.robots.motion import Motion
 from nmm.robots.reach import first_tip, tips
-from nmm.robots.robot import Robot, frame_index
+from nmm.robots.robot import Robot
 from nmm.runs.shown_frame import shown_frame
 
 if TYPE_CHECKING:
@@ -171,13 +171,21 @@ def _frames(robot: Robot, drawn: DrawnRobot, drawing: Drawing) -> Iterator[dict[
     ends = set(tips(robot))
     chosen = {*_joint_links(robot), *ends}
     for i, name in enumerate(robot.frames):
-        if not model.existFrame(name) or name in robot.platform.coordinates[:2]:
+        frame = _frame(model, name)
+        if frame is None or name in robot.platform.coordinates[:2]:
             continue  # x and y are steps on the way to the root
-        frame = model.frames[frame_index(model, name)]
         parent = drawn.paths[frame.parentJoint - 1] if frame.parentJoint else drawn.paths[0].rsplit("/", 1)[0]
         path = f"{parent}/frame {i} {segment(name)}"
         drawing.transform(path, np.array(frame.placement.homogeneous))
         yield {"name": name, "path": path, "shown": name in chosen, "tip": name in ends}
+
+
+def _frame(model: pin.Model, name: str) -> pin.Frame | None:
+    """The display model's frame of that name, chosen as by `Robot.frame_id`."""
+    for kind in (pin.FrameType.BODY, pin.FrameType.OP_FRAME):
+        if model.existFrame(name, kind):
+            return model.frames[model.getFrameId(name, kind)]
+    return model.frames[model.getFrameId(name)] if model.existFrame(name) else None
 
 
 def _joint_links(robot: Robot) -> Iterator[str]:
