@@ -353,7 +353,7 @@ def told(scenarios: list[Scenario]) -> list[dict[str, Any]]:
 
 
 def test_a_scenario_travels_to_a_process_of_its_users(tmp_path: Path) -> None:
-    """All that are bundled, each kind of resolver, one with settings and a loaded robot, and one of one's own."""
+    """All that are bundled, each kind of resolver, one with a loaded robot, and one of one's own."""
     short = scenario(tmp_path, q0__q1=0.5)
     short.robot()
     sent = [Scenario.load(name) for name in bundled_scenarios()]
