@@ -246,3 +246,9 @@ def test_an_interrupt_before_anything_is_read(
     with pytest.raises(SystemExit, match="130"):
         main()
     assert capsys.readouterr().err == "nmm run: interrupted\n"
+
+
+def test_figures_are_drawn_whatever_backend_is_asked_for(tmp_path: Path) -> None:
+    command = "MPLBACKEND=nope nmm run unicycle_2r_position --set duration=0.1 --out o"
+    assert shell(tmp_path, command) == (0, "")
+    assert (tmp_path / "o" / "motion.png").stat().st_size > 0

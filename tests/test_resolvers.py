@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -424,3 +425,36 @@ def test_weights_that_couple_inputs_are_for_pg(rng: np.random.Generator) -> None
     problem = Example((2, 4), rng)
     with refused("weights"):
         problem.given(ReducedGradient(weights=np.eye(4) + 0.1))
+
+
+def exact_miss(problem: Problem, u: Array) -> Fraction:
+    """The largest |J u - rate| without rounding, and without overflow."""
+    rows = zip(np.asarray(problem.J).tolist(), np.asarray(problem.rate).tolist(), strict=True)
+    return max(
+        abs(sum(map(Fraction.__mul__, map(Fraction, row), map(Fraction, u.tolist()))) - Fraction(asked))
+        for row, asked in rows
+    )
+
+
+@pytest.mark.parametrize("limited", ["not", "inputs", "rows"])
+@pytest.mark.parametrize("size", [1e-300, 1e-160, 1e150, 1e160, 1e307])
+def test_numbers_whose_squares_overflow_are_not_called_solved(limited: str, size: float) -> None:
+    """Nor where squares underflow: then more normals than inputs seemed independent, and memory was lost."""
+    rng, s, m = np.random.default_rng(3), 2, 4
+    bounds: dict[str, Any] = {"inputs": {"u_lower": -np.ones(m), "u_upper": np.ones(m)}}.get(limited, {})
+    if limited == "rows":
+        bounds = {"limit_rows": rng.normal(size=(2, m)), "lower": -np.ones(2), "upper": np.ones(2)}
+    given = [["u0", "u1"], ["u1", "u2"], ["u2", "u3"]]
+    damped = ReducedGradient(singular="damped")
+    for _ in range(40):
+        J = rng.normal(size=(s, m))
+        J[rng.random((s, m)) < rng.choice([0.3, 1.0])] *= size
+        rate = 3.6 * rng.normal(size=s) * rng.choice([1.0, 1e-160, 1e160])
+        levels = [[s], [1, s - 1]][rng.integers(2)]
+        for resolver in (*every(), ReducedGradient(partitions=given), damped):
+            added = {"added_J": rng.normal(size=(m - s, m)), "added_rate": rng.normal(size=m - s)}
+            also = added if resolver.takes_added_task else {}
+            problem = Problem(J=J, rate=rate, h=rng.normal(size=m), levels=levels, **bounds, **also)
+            answer = resolver.resolve(problem)
+            if answer.status is Status.SOLVED:
+                assert exact_miss(problem, answer.u) < 1e-7 * (1.0 + np.abs(rate).max())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import multiprocessing
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import yaml
 from findings import refused
 from short_scenario import MINIMAL, scenario
 
+import nmm
 from nmm import Scenario, ScenarioError
 from nmm.bundled import bundled_scenarios
 from nmm.kinds import RESOLVERS
@@ -339,3 +341,23 @@ def test_resolved_holds_every_default_as_plain_data() -> None:
         )
 
     assert plain(data)
+
+
+# Other processes
+
+
+def told(scenarios: list[Scenario]) -> list[dict[str, Any]]:
+    """In a process of its own, found by its name; the last one runs."""
+    assert scenarios[-1].run().complete
+    return [scenario.resolved() for scenario in scenarios]
+
+
+def test_a_scenario_travels_to_a_process_of_its_users(tmp_path: Path) -> None:
+    """All that are bundled, each kind of resolver, one with a loaded robot, and one of one's own."""
+    short = scenario(tmp_path, q0__q1=0.5)
+    short.robot()
+    sent = [Scenario.load(name) for name in bundled_scenarios()]
+    sent += [short.with_resolver(kind) for kind in RESOLVERS if kind != "ej"]
+    sent.append(short.with_resolver(nmm.ProjectedGradient(alpha=3.0)))
+    with multiprocessing.get_context("spawn").Pool(1) as process:
+        assert process.apply(told, (sent,)) == [one.resolved() for one in sent]

@@ -99,6 +99,7 @@ def _open_streams() -> None:
 
 def main() -> NoReturn:
     _open_streams()
+    os.environ["MPLBACKEND"] = "agg"  # ours to choose, and its name may be none that matplotlib knows
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # a terminal that knows no Greek gets "?"

@@ -28,8 +28,11 @@ from nmm.runs.verdict import FindingLine, Outcome, Verdict
 HOPELESS = "out_of_reach"
 #: So many steps a trial takes at most: half a second,
 MOST_STEPS = 6_000
-#: and so many trials are made.
+#: and so many trials are made;
 MOST_TRIALS = 6
+#: all of them together, where Python makes the samples (distances, an adaptive method), at most so many steps
+#: for each sample of the run, or as many as the second number says if that is more.
+PER_SAMPLE, FEW_STEPS = 20, 800
 #: A trial over a shorter stretch than this says nothing, in steps of the run's own dt.
 LEAST = 20
 #: A limit of stability is tried at this share of it; the next dt is between these shares of the last one.
@@ -56,6 +59,9 @@ class Trials:
         self._integrator, self._dt, self._end = leg.integrator, dt, leg.end
         self._t, self._q = recorder.t, recorder.q[: len(recorder)]
         self._error, self._duration = recorder.so_far.error, recorder.duration
+        solver, own = leg.controller.solver, max(FEW_STEPS, PER_SAMPLE * len(self._t))
+        compiled = solver.compiles_runs and solver.scene is None and not leg.integrator.tolerance
+        self._steps = MOST_TRIALS * MOST_STEPS if compiled else own
         self._unstable = found.unstable
         troubles = [int(np.searchsorted(self._t, one.t)) for one in found.unstable]
         if found.departure is not None:
@@ -67,12 +73,14 @@ class Trials:
         if not self._same():
             return None
         dt = most = self._dt
+        left = self._steps
         unstable = self._unstable
         for _ in range(MOST_TRIALS):
             # Where a run went astray its modes grow ever faster: the slowest of them is believed.
             limit = max((one.limit for one in unstable), default=0.0)
             dt = min(max(BELOW * limit, LEAST_SHARE * dt), most)
-            steps = min(MOST_STEPS, int(self._duration / dt) + 1)
+            steps = min(MOST_STEPS, left, int(self._duration / dt) + 1)
+            left -= steps
             if steps * dt < min(self._duration, LEAST * self._dt):
                 return None
             found, unstable = self._try(dt, steps)

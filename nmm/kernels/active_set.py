@@ -92,6 +92,8 @@ def split(basis: Basis, k: int, n: Array) -> float:
             overlap = dot(basis.Q[i], v)
             d[i] += overlap
             add(v, -overlap, basis.Q[i])
+    if k == basis.Q.shape[0]:  # all directions, also where squares underflow
+        return 0.0
     square = dot(v, v)
     return math.sqrt(square) if square > DEPENDENT * DEPENDENT * dot(n, n) else 0.0
 

@@ -153,7 +153,7 @@ class Answer:
 def certified(residual: float, rounding: float, asked: float) -> int:
     """The status for a residual ‖J u - rate‖, part of which rounding may hide; asked = ‖rate‖. Where u is
     about 1e7 times larger than the rate, rounding prevents a certificate: the status is INEXACT, too."""
-    if not math.isfinite(residual):
+    if not math.isfinite(residual + rounding + asked):  # squares that overflow certify nothing
         return NOT_FINITE
     return INEXACT if residual + rounding > EXACT * (1.0 + asked) else SOLVED
 

@@ -74,6 +74,10 @@ class Scenario:
         self._robot: Robot | None = None
         self._own: Resolver | None = None
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled as its text: the classes of its parts are made at run time, and no import finds them."""
+        return Scenario, (self.document,), {"_own": self._own}
+
     @classmethod
     def load(cls, name_or_path: str | Path, overrides: Mapping[str, object] | None = None) -> Scenario:
         """Read a scenario.
