@@ -23,8 +23,8 @@ NOTHING = _Nothing()
 MOST = 300
 #: A longer name is no misspelling; a longer `where` is cut in its middle where the text would be too long.
 LONGEST = 140
-#: As many of the names available are shown.
-SHOWN = 10
+#: As many of the names available are shown, if they have no more characters than this.
+SHOWN, ROOM = 10, 200
 #: As many values of an array.
 FIRST = 6
 
@@ -256,7 +256,8 @@ def _without_middle(where: str, most: int) -> str:
 
 
 def few(names: Sequence[str], near: str = "", shown: int = SHOWN) -> str:
-    """At most ten of the names, those most like `near` first, and a count of the others; "none" for none."""
+    """At most ten of the names, fewer of long ones, those most like `near` first, and a count of the others;
+    "none" for none."""
     if not names:
         return "none"
     if shown == 0:
@@ -271,8 +272,11 @@ def few(names: Sequence[str], near: str = "", shown: int = SHOWN) -> str:
             return -matcher.ratio()
 
         names = sorted(names, key=unlike)
-    listing = ", ".join(one_line(printable(str(name)[:LONGEST]), LONGEST // 2) for name in names[:shown])
-    return listing if len(names) <= shown else f"{listing} and {len(names) - shown} more"
+    texts = [one_line(printable(str(name)[:LONGEST]), LONGEST // 2) for name in names[:shown]]
+    while len(texts) > 1 and len(", ".join(texts)) > ROOM:
+        texts.pop()
+    listing = ", ".join(texts)
+    return listing if len(texts) == len(names) else f"{listing} and {len(names) - len(texts)} more"
 
 
 def no_such(

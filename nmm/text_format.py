@@ -1,6 +1,7 @@
 """Words that sentences for people are made of: lists, sums, values with units, text on one line."""
 
 import re
+import textwrap
 from collections.abc import Iterable, Sequence
 from math import degrees, isfinite, pi
 
@@ -97,6 +98,15 @@ def short_words(text: str, limit: int = 280) -> str:
     """The text with the middle of each longer word left out: a name in a file may be as long as the file."""
     kept = limit // 2 - 1
     return re.sub(rf"\S{{{limit + 1},}}", lambda word: f"{word[0][:kept]}…{word[0][-kept:]}", text)
+
+
+def folded(line: str, limit: int = 300) -> list[str]:
+    """The line or, where it is longer than `limit`, the lines in which it is told, the others indented."""
+    if len(line) <= limit:
+        return [line]
+    return textwrap.wrap(
+        short_words(line, limit - 20), limit, subsequent_indent="    ", break_on_hyphens=False
+    )
 
 
 def quoted(value: object, limit: int = 60) -> str:

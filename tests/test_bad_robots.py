@@ -779,13 +779,13 @@ def test_folder(suffix: str, tmp_path: Path) -> None:
     assert refused(folder).expected == "a .urdf or .xacro file"
 
 
-@pytest.mark.parametrize("name", ["robot.sdf", "robot.urdf.bak", "robot", "robot.xml"])
+@pytest.mark.parametrize("name", ["robot.sdf", "robot.urdf.bak", "robot", "robot.json"])
 def test_other_suffix(name: str, tmp_path: Path) -> None:
     path = write(tmp_path / name, robot(link("a")))
     assert (refused(path).where, refused(path).got) == (str(path), name)
 
 
-@pytest.mark.parametrize(("name", "kind"), [("robot.sdf", "SDF"), ("scene.xml", "MJCF"), ("arm.usda", "USD")])
+@pytest.mark.parametrize(("name", "kind"), [("robot.sdf", "SDF"), ("arm.usda", "USD")])
 def test_other_languages_are_told_what_to_give(name: str, kind: str, tmp_path: Path) -> None:
     error = refused(write(tmp_path / name, "<sdf/>"))
     assert error.what == f"{kind} is not read: give the URDF or xacro file that it was made from"

@@ -155,7 +155,7 @@ def test_bytes_that_are_no_text_are_a_problem(run: Command, tmp_path: Path) -> N
     [
         (["nowhere.urdf"], "nowhere.urdf: no such file"),
         (["."], "directory"),
-        (["notes.txt"], "expected a name that ends in .urdf or .xacro"),
+        (["notes.txt"], "expected a name that ends in .urdf, .xacro, .xml or .mjcf"),
         (["unicycle_2r", "-a", "d"], "--set: expected ARG=VALUE, as in d=0.5, got 'd'"),
         (["unicycle_2r", "-a", "dd=1"], "unknown xacro argument 'dd' (did you mean 'd'?)"),
         (["unicycle_2r", "--package-dir", "nowhere"], "package_dirs: "),

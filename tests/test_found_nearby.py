@@ -92,3 +92,21 @@ def test_info_takes_arguments_of_a_xacro_file(tmp_path: Path, capsys: pytest.Cap
     path = write(tmp_path / "r.urdf.xacro", text)
     assert status_of(["info", str(path), "-a", "n=mast", "--platform", "unicycle"]) == 0
     assert "mast" in capsys.readouterr().out
+
+
+def test_a_file_of_one_macro_is_that_macro_called(tmp_path: Path) -> None:
+    macro = '<xacro:macro name="arm" params="PARAMS"><link name="${side}_a"/></xacro:macro>'
+    path = write(tmp_path / "arm.xacro", robot(macro.replace("PARAMS", "side:=left"), attributes=XACRO))
+    assert "left_a" in nmm.load(path).frames
+    assert "right_a" in nmm.load(path, arguments={"side": "right"}).frames
+    with pytest.raises(nmm.RobotError, match="unknown xacro argument"):
+        nmm.load(path, arguments={"colour": "red"})
+    write(path, robot(macro.replace("PARAMS", "side length"), attributes=XACRO))
+    with pytest.raises(nmm.RobotError) as caught:
+        nmm.load(path)
+    assert holds(caught.value.findings[0], "macro_parameters_missing", missing=["side", "length"])
+    assert "left_a" in nmm.load(path, arguments={"side": "left", "length": 1}).frames
+    write(path, robot(macro, macro.replace('"arm"', '"leg"'), attributes=XACRO))
+    with pytest.raises(nmm.RobotError) as caught:
+        nmm.load(path)
+    assert set(caught.value.findings[0].values["macros"]) == {"arm", "leg"}

@@ -10,7 +10,7 @@ import typer
 
 from nmm.cli.groups import Loading, command
 from nmm.cli.options import ARGUMENT, ROBOT_HELP, arguments_of, option
-from nmm.cli.output import show_table, show_text
+from nmm.cli.output import WIDTH_OF_A_PIPE, show_table, show_text
 from nmm.errors import InputError, few
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from nmm.robots.robot import Robot
     from nmm.robots.wheel import Wheel
 
-#: More frames than these are listed in a table.
+#: More frames than these, and those that need more than a line, are listed in a table.
 _FRAMES_IN_A_LINE = 30
 
 
@@ -123,8 +123,9 @@ def _show(robot: Robot, tasks: Sequence[tuple[str, int]]) -> None:
         show_text(f"group {name}: {few(inputs)}")
     for name, values in robot.postures.items():
         show_text(f"posture {name}: {few([f'{joint} {value:.4g}' for joint, value in values.items()])}")
-    if len(robot.frames) <= _FRAMES_IN_A_LINE:
-        show_text(f"frames: {', '.join(robot.frames)}")
+    frames = f"frames: {', '.join(robot.frames)}"
+    if len(robot.frames) <= _FRAMES_IN_A_LINE and len(frames) <= WIDTH_OF_A_PIPE:
+        show_text(frames)
     else:
         joints = {name: robot.model.frames[robot.frame_id(name)].parentJoint for name in robot.frames}
         moved = [[name, str(robot.model.names[joint]) if joint else "-"] for name, joint in joints.items()]

@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from nmm.text_format import one_line, printable
+from nmm.text_format import folded, one_line, printable
 
 if TYPE_CHECKING:
     from rich.console import Console, JustifyMethod
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 #: Exit statuses.
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
-#: A pipe has no width of its own: lines end where the text does.
-WIDTH_OF_A_PIPE = 500
+#: A pipe has no width of its own: lines end where the text does, or here.
+WIDTH_OF_A_PIPE = 300
 #: Of a message, and of a word in it (a path, or a value), characters.
 LONGEST, LONGEST_WORD = 4000, 500
 
@@ -76,7 +76,9 @@ def print_table(table: PaperTable, form: str, folder: Path) -> None:
 
 def show_text(text: str = "") -> None:
     out = console()
-    out.print(_shown(text), soft_wrap=not out.is_terminal)
+    for line in _shown(text).split("\n"):
+        for part in [line] if out.is_terminal else folded(line):
+            out.print(part, soft_wrap=not out.is_terminal)
 
 
 def _shown(text: str) -> str:
@@ -111,7 +113,7 @@ def warn(text: str) -> None:
 def complain(prefix: str, text: str) -> None:
     """One line on standard error: why the exit status is not 0."""
     with suppress(OSError):  # a full disk; the exit status remains
-        print(f"{prefix}: {readable(text)}", file=sys.stderr, flush=True)
+        print(one_line(f"{prefix}: {readable(text)}", WIDTH_OF_A_PIPE), file=sys.stderr, flush=True)
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from nmm.cli.options import ARGUMENT, ARM, ROBOT_HELP, arguments_of, flag, optio
 from nmm.cli.output import BAD_INPUT, OK, complain, readable, show_table, show_text
 from nmm.errors import InputError, expect
 from nmm.files import PATIENCE, writing
-from nmm.text_format import counted
+from nmm.text_format import counted, folded
 
 if TYPE_CHECKING:
     from nmm.findings import Finding
@@ -75,7 +75,7 @@ def check(
     counts = []
     for kind, found in (("problem", made.problems), ("warning", made.warnings)):
         for line in _lines(shown, found, made, "warning: " if kind == "warning" else ""):
-            print(line)
+            print(*folded(line), sep="\n")
         counts.append(counted(len(found), kind) if found else f"no {kind}s")
     title = f"{file}: {', '.join(counts)}"
     if made.problems:

@@ -63,6 +63,14 @@ def _only_macros(*, name: str, macros: Mapping[str, str], **_: object) -> str:
     )
 
 
+def _macro_parameters_missing(*, macro: str, missing: Sequence[str], name: str, **_: object) -> str:
+    if blocks := [one for one in missing if one.startswith("*")]:
+        cure = f"{blocks[0]} is a block of elements: write a .xacro file that includes {name} and calls it"
+    else:
+        cure = " ".join(f"-a {one}=VALUE" for one in missing[:3])
+    return f"holds no robot but one macro, {macro}, whose parameters {few(missing)} have no default: {cure}"
+
+
 def _path(names: Sequence[str]) -> str:
     """Names in a row, possibly hundreds."""
     left = len(names) - SHOWN - 1
@@ -83,9 +91,16 @@ WORDS = placed(
         "not_xml": "not well-formed XML: {reason}",
         "doctype": "holds a DOCTYPE, which is refused (entities are not expanded)",
         "nested_too_deep": "elements stand more than {most} deep in one another",
-        "not_robot": "expected <robot> as the root element, got <{got}>",
+        "not_robot": "expected <robot> (URDF) or <mujoco> (MJCF) as the root element, got <{got}>",
+        "mjcf_unread": "{what} is not understood, so nothing is read",
+        "mjcf_included_twice": "included twice",
+        "mjcf_several_trees": lambda *, names, **_: (
+            f"expected one robot, found {len(names)} bodies of the world that move: {few(names)}"
+        ),
+        "mjcf_left_out": lambda *, names, **_: f"left out of the MJCF file: {few(names)}",
         "xacro_left_over": "<{element}/> is left over from xacro: left out",
         "only_macros": _only_macros,
+        "macro_parameters_missing": _macro_parameters_missing,
         "xacro_failed": "xacro: {reason}",
         "xacro_argument_missing": "xacro argument {name!r} has no default and was not given a value",
         "xacro_endless": "xacro: recursion without end (a file that includes itself, or a macro that calls "
@@ -100,7 +115,7 @@ WORDS = placed(
         "library_failed": "cannot be loaded: {error}: {reason}",
         # ------------------------------------------------------------------ names, and the tree
         "version_unknown": "<robot> version: expected 1.0, 1.1 or 1.2, got {got!r}",
-        "no_links": "no links",
+        "no_links": "no links (in MJCF: no bodies)",
         "name_missing": "a {kind} without a name",
         "name_reserved": "{kind} {name!r}: the name is taken by {taken_by}",
         "name_twice": "two {kind}s named {name!r}",

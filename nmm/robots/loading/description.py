@@ -12,19 +12,21 @@ from contextlib import contextmanager, redirect_stderr
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
 from nmm.errors import RobotError, expect_known
 from nmm.findings import Finding
 from nmm.findings.robot_file import refusal
+from nmm.robots.loading.mjcf import urdf_of
 from nmm.robots.loading.packages import Packages
 from nmm.robots.loading.xml_tree import XmlError, parse, read_text
-from nmm.text_format import one_line
+from nmm.text_format import listed, one_line
 
-SUFFIXES = (".urdf", ".xacro")
+SUFFIXES = (".urdf", ".xacro", ".xml", ".mjcf")
 #: Robots in other languages, by their files' suffixes.
-_OTHERS = {".sdf": "SDF", ".xml": "MJCF", ".mjcf": "MJCF", ".usd": "USD", ".usda": "USD"}
+_OTHERS = {".sdf": "SDF", ".usd": "USD", ".usda": "USD"}
 _LINK = re.compile(r"<link\b")
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 #: What xacro gives a meaning to in any file; calls of macros alone may be left over.
@@ -58,24 +60,53 @@ def describe(
     text = None if file.suffix.lower() == ".xacro" else read_text(file)
     if text is None or _XACRO.search(_COMMENT.sub("", text)):
         xml, used, warnings = expand(file.absolute(), texts, packages)
-        if not _LINK.search(xml):
-            _refuse_macros(file)
+        call = None if _LINK.search(xml) else _call_of_macro(file, texts)
+        if call is not None:
+            xml, used, warnings = expand(file.absolute(), texts, packages, call)
+            used |= {name: text for name, text in texts.items() if name in call.attrib}
+        for name in texts:
+            expect_known("xacro argument", name, used, file, RobotError)
         notes = tuple(Finding("xacro_warned", {"text": text}) for text in warnings)
         return Description(xml, file, packages, expanded=True, arguments=used, notes=notes)
     if texts:
-        what = f"arguments ({', '.join(texts)}) are for .xacro files, a .urdf has none"
+        what = f"arguments ({', '.join(texts)}) are for .xacro files, others have none"
         raise RobotError(what, where=file)
+    if "<mujoco" in text:
+        try:
+            root = parse(text)
+        except XmlError as error:
+            raise refusal(file, error.finding) from None
+        if root.tag == "mujoco":
+            xml, notes = urdf_of(root, file)
+            return Description(xml, file, packages, expanded=True, notes=notes)
     return Description(text, file, packages)
 
 
-def _refuse_macros(file: Path) -> None:
+def _call_of_macro(file: Path, texts: Mapping[str, str]) -> ElementTree.Element | None:
+    """The call of a file's one macro, with those of the texts that it takes; None without macros.
+    `RobotError` for several, and for parameters without a value."""
+    import xacro
+
     try:
         macros = [one for one in parse(read_text(file)).iter("xacro:macro") if one.get("name")]
     except XmlError:
-        return
-    if macros:
-        parameters = {one.get("name", ""): one.get("params", "").strip() for one in macros}
+        return None
+    parameters = {one.get("name", "").removeprefix("xacro:"): one.get("params", "").strip() for one in macros}
+    if len(parameters) > 1:
         raise refusal(file, Finding("only_macros", {"name": file.name, "macros": parameters}))
+    for macro, rest in parameters.items():
+        given, missing = {}, []
+        while rest:
+            name, default, rest = xacro.parse_macro_arg(rest)
+            if name in texts:
+                given[name] = texts[name]
+            elif default is None:
+                missing.append(name)
+        if missing:
+            values = {"macro": macro, "missing": missing, "name": file.name}
+            raise refusal(file, Finding("macro_parameters_missing", values))
+        return ElementTree.Element(f"xacro:{macro}", given)
+    return None
 
 
 def argument_texts(arguments: Mapping[str, object] | None) -> dict[str, str]:
@@ -106,20 +137,22 @@ def _check_file(file: Path) -> None:
     if file.suffix.lower() not in SUFFIXES:
         kind = _OTHERS.get(file.suffix.lower())
         what = f"{kind} is not read: give the URDF or xacro file that it was made from" if kind else ""
-        raise RobotError(what, where=file, expected="a name that ends in .urdf or .xacro", got=file.name)
+        raise RobotError(
+            what, where=file, expected=f"a name that ends in {listed(SUFFIXES, 'or')}", got=file.name
+        )
 
 
 def expand(
-    path: Path, arguments: Mapping[str, str], packages: Packages
+    path: Path, arguments: Mapping[str, str], packages: Packages, call: ElementTree.Element | None = None
 ) -> tuple[str, dict[str, str], tuple[str, ...]]:
-    """The expanded text of a xacro file, its declared arguments with the values used, and xacro's warnings;
-    `RobotError` with the file and the cause."""
+    """The expanded text of a xacro file, after which a macro of its own may be called; its declared arguments
+    with the values used, and xacro's warnings; `RobotError` with the file and the cause."""
     import xacro  # 10 ms, and a URDF needs none of it
     import xacro.substitution_args
 
     given = _Arguments(arguments)
     printed = io.StringIO()
-    with _LOCK, _patched(xacro, packages), redirect_stderr(printed):
+    with _LOCK, _patched(xacro, packages, call), redirect_stderr(printed):
         try:
             document = xacro.process_file(str(path), mappings=given)
             xml = document.toxml()
@@ -129,8 +162,6 @@ def expand(
         finally:
             xacro.substitution_args_context["arg"] = {}
             xacro.init_stacks(None)
-    for name in arguments:
-        expect_known("xacro argument", name, given.declared, path, RobotError)
     warnings = [line for line in printed.getvalue().splitlines() if line.startswith("warning: ")]
     return str(xml), {name: given[name] for name in given.declared}, tuple(dict.fromkeys(warnings))
 
@@ -155,8 +186,8 @@ class _Arguments(dict[str, str]):
 
 
 @contextmanager
-def _patched(xacro: Any, packages: Packages) -> Iterator[None]:
-    """xacro with our reading of files and package search, and fewer messages."""
+def _patched(xacro: Any, packages: Packages, call: ElementTree.Element | None) -> Iterator[None]:
+    """xacro with our reading of files and package search, a call at the file's end, and fewer messages."""
     substitution = xacro.substitution_args
 
     def find(package: str) -> str:
@@ -167,7 +198,7 @@ def _patched(xacro: Any, packages: Packages) -> Iterator[None]:
         return str(folder)
 
     saved = (xacro.parse, substitution._eval_find, xacro.all_includes, xacro.verbosity)
-    xacro.parse, substitution._eval_find = _reader(xacro, packages.file, saved[0]), find
+    xacro.parse, substitution._eval_find = _reader(xacro, packages.file, saved[0], call), find
     xacro.all_includes, xacro.verbosity = [], 0
     try:
         yield
@@ -175,7 +206,9 @@ def _patched(xacro: Any, packages: Packages) -> Iterator[None]:
         xacro.parse, substitution._eval_find, xacro.all_includes, xacro.verbosity = saved
 
 
-def _reader(xacro: Any, main: Path, original: Callable[..., Any]) -> Callable[..., Any]:
+def _reader(
+    xacro: Any, main: Path, original: Callable[..., Any], call: ElementTree.Element | None
+) -> Callable[..., Any]:
     """`xacro.parse`, which reads UTF-8 in any locale and refuses a DOCTYPE before anything is expanded."""
 
     def read(text: Any, filename: str | None = None) -> Any:
@@ -194,7 +227,15 @@ def _reader(xacro: Any, main: Path, original: Callable[..., Any]) -> Callable[..
         except XmlError as error:
             found = (error.finding,)
         else:
-            return original(content)
+            document = original(content)
+            if call is not None and Path(filename) == main:
+                made = document.createElement(call.tag)
+                for name, value in call.items():
+                    made.setAttribute(name, value)
+                document.documentElement.appendChild(made)
+                if not document.documentElement.getAttribute("name"):
+                    document.documentElement.setAttribute("name", main.stem)
+            return document
         if Path(filename) != main:
             found = tuple(replace(one, where={"file": filename, **one.where}) for one in found)
         raise refusal(main, *found)

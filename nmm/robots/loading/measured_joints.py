@@ -1,6 +1,7 @@
 """Measures a model's wheels and upright joints: where wheels touch the ground, how long a platform is."""
 
 import math
+import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -26,6 +27,7 @@ _LEVEL = 1e-3
 # A centre so near the root link's xy plane lies in it: the plane is then not the ground.
 _ON_PLANE = 1e-6
 _SHAPES = ("Cylinder", "Sphere", "Capsule")
+_SHORT_NAMES = re.compile("caster|(?<![a-z])[lr]w(?![a-z])")
 #: Joints that have to be wheels, or the radius (m) of each; None finds them by their names.
 Asked = Sequence[str] | Mapping[str, float] | None
 #: Why a joint is no wheel's: `why`, a code, and the names in its words; None for a wheel's.
@@ -87,10 +89,11 @@ class Measured:
         return self.is_upright(joint) and self.axis(joint)[2] < 0.0
 
     def is_named_wheel(self, joint: int) -> bool:
-        """Whether its name or its child link's holds "wheel", or "caster" where it can be a wheel's."""
-        names = [str(self.model.names[joint]), *self.links.get(joint, ())]
+        """Whether its name or its child link's holds "wheel" or, where it can be a wheel's, "caster", or is
+        that of a left or right wheel: lw, rw_joint."""
+        names = " ".join([str(self.model.names[joint]), *self.links.get(joint, ())]).lower()
         rolls = self.why_not_rolling(joint) is None
-        return any("wheel" in name.lower() or (rolls and "caster" in name.lower()) for name in names)
+        return "wheel" in names or (rolls and _SHORT_NAMES.search(names) is not None)
 
     def why_not_rolling(self, joint: int) -> NoWheel:
         """Why the joint cannot be a wheel's, wherever it hangs; None when it can."""
@@ -271,7 +274,7 @@ def find_wheels(
     A wheel is a revolute joint with a level axis and no joint below it, on the root link's body, one of the
     platform's own joints or a swivel: an upright joint, not the platform's own, that hangs on one of these
     and carries only wheels. Without `asked`, the joint's or child link's name must hold "wheel" (or
-    "caster"). `RobotError` for no joint, no wheel, or a wheel whose radius cannot be found."""
+    "caster", lw, rw). `RobotError` for no joint, no wheel, or a wheel whose radius cannot be found."""
     measured = Measured(model, geometries, where)
     radii, notes = measured.wheels(asked, own)
     return tuple(_wheel(measured, name, radii[name], own, platform) for name in radii), notes

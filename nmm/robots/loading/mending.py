@@ -6,7 +6,7 @@ from nmm.robots.loading.check_parts import MOMENTS, check_inertial, check_materi
 from nmm.robots.loading.xml_tree import NOBODY, Attributes, Element, child, children
 
 #: A limit that counts as none.
-_NONE = "1.7976931348623157e+308"
+NO_LIMIT = "1.7976931348623157e+308"
 
 
 def inertials(link: Element) -> list[ElementTree.Element]:
@@ -31,7 +31,7 @@ def limit(given: Element) -> ElementTree.Element:
     copied = ElementTree.Element("limit", given.attrib)
     for attribute in ("effort", "velocity"):
         if Attributes().number(given, attribute, minimum=0.0) is None:
-            copied.set(attribute, _NONE)
+            copied.set(attribute, NO_LIMIT)
     return copied
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from nmm.errors import InputError, RobotError, expect_known
+from nmm.errors import InputError, RobotError, expect_known, few
 from nmm.findings import Finding
 from nmm.findings.robot_file import line_of
 from nmm.robots.loading.check import inspect
@@ -190,10 +190,10 @@ def _loaded(path: Path, given: Mapping[str, Any]) -> tuple[Robot | None, list[Fi
 
 
 def _facts_of_robot(robot: Robot, ground: str | None) -> dict[str, str]:
-    facts = {"platform": robot.platform.name, "coordinates": f"{robot.n}: {', '.join(robot.q_names)}"}
+    facts = {"platform": robot.platform.name, "coordinates": f"{robot.n}: {few(robot.q_names)}"}
     if robot.mimic_joints:
-        facts["followers"] = ", ".join(map(str, robot.mimic_joints))
-    facts["wheels"] = ", ".join(wheel.joint for wheel in robot.wheels) or "none"
+        facts["followers"] = few([*map(str, robot.mimic_joints)])
+    facts["wheels"] = few([wheel.joint for wheel in robot.wheels])
     if ground is not None:
         facts["ground"] = ground
     if robot.semantics.files:

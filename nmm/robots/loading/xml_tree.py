@@ -21,6 +21,7 @@ LONGEST = 50_000_000
 
 
 class Element(ElementTree.Element):
+    #: 0 where it is not the file's.
     line: int = 0
 
 
@@ -117,7 +118,7 @@ class Attributes:
     found: list[Finding] = field(default_factory=list)
 
     def add(self, element: Element | None, code: str, owner: Owner = NOBODY, /, **values: Any) -> None:
-        line = {} if element is None else {"line": element.line}
+        line = {} if element is None or not element.line else {"line": element.line}
         self.found.append(Finding(code, values, {**line, **owner}))
 
     def text(self, element: Element, attribute: str, owner: Owner) -> str | None:
