@@ -1,0 +1,166 @@
+"""Whether a motion keeps its distances, by conservative advancement, compiled.
+
+At clearance d no point of the robot may be nearer than d before it has moved that far. So a pair of shapes
+that is d apart needs no look before the motion could have brought the two d nearer to each other, and
+touching between two looks is impossible (B. Mirtich, Impulse-based dynamic simulation of rigid body systems,
+1996, chapter 2).
+
+A *leg* is a motion along which the platform's twist in its own axes and the rates of all joints are constant:
+an arc or a straight line of the base while the arm moves straight in its coordinates. A row of numbers:
+[twist (3), dq (n)], what it goes in all, of which dq has no numbers for x, y and theta.
+"""
+
+import math
+from typing import NamedTuple
+
+from nmm.arrays import Array, Integers
+from nmm.collisions.separation import ConvexShapes, separation
+from nmm.kernels.compiled import compiled, scratch
+from nmm.kernels.kinematics import Joints, compose, place_joints
+from nmm.kernels.linear_algebra import copied
+from nmm.kernels.record_layout import IntegerCell, IntegerVector, Matrix, Vector, views
+from nmm.kernels.velocity_map import place_mimic_joints
+
+#: Pairs within this beyond their distance count as too near, m: else motions along a wall take looks without
+#: end.
+MARGIN = 5e-4
+#: A turn this small along a leg is none, rad.
+STRAIGHT = 1e-9
+
+
+class MovedShapes(NamedTuple):
+    """A robot's shapes among obstacles that stand.
+
+    shapes : the robot's, then the obstacles'; joints, mimic_joints : the robot's
+    planar () : 1 where q begins with x, y, theta
+    carrier (G,), place (G, 12) : a shape's joint, and its place there; an obstacle's is in the world
+    levers (P, 3 + n) : how far a unit of each number of a leg can move the two of a pair to each other, m
+    stems (P, 3 + n) : of a joint between two of the robot's shapes, how far from it the shape that it does
+        not move can reach, m; else infinite
+    kept (P,) : distances to keep, m
+    until (P,), places (G, 12) : while a leg is looked at, how much of it is surely free; where shapes are
+    """
+
+    shapes: ConvexShapes
+    joints: Joints
+    mimic_joints: Vector
+    planar: IntegerCell
+    carrier: IntegerVector
+    place: Matrix
+    levers: Matrix
+    stems: Matrix
+    kept: Vector
+    until: Vector
+    places: Matrix
+
+
+@compiled
+def along(planar: int, q: Array, leg: Array, share: float, mimic_joints: Array, out: Array) -> None:
+    """out (n,): where a share of a leg leads from q."""
+    for i in range(q.shape[0]):
+        out[i] = q[i] + share * leg[3 + i]
+    if planar == 1:
+        turn, c, s = share * leg[2], math.cos(q[2]), math.sin(q[2])
+        x, y = share * leg[0], share * leg[1]
+        if abs(leg[2]) > STRAIGHT:
+            a, b = math.sin(turn) / leg[2], (1.0 - math.cos(turn)) / leg[2]
+            x, y = a * leg[0] - b * leg[1], b * leg[0] + a * leg[1]
+        out[0] = q[0] + c * x - s * y
+        out[1] = q[1] + s * x + c * y
+        out[2] = q[2] + turn
+    place_mimic_joints(out, mimic_joints)
+
+
+@compiled
+def pair_bound(scene: MovedShapes, joints: Array, pair: int, enough: float) -> float:
+    """A lower bound of the distance of a pair where the joints (J, 12) are; rough above `enough`."""
+    shapes, places = scene.shapes, scene.places
+    i, j = shapes.pairs[pair, 0], shapes.pairs[pair, 1]
+    compose(joints, scene.carrier[i], scene.place, i, places, i)
+    compose(joints, scene.carrier[j], scene.place, j, places, j)
+    if j < shapes.planes[()]:
+        square = 0.0
+        for k in range(3):
+            d = places[i, 9 + k] - places[j, 9 + k]
+            for axis in range(3):
+                d += places[i, 3 * axis + k] * shapes.boxes[i, axis]
+                d -= places[j, 3 * axis + k] * shapes.boxes[j, axis]
+            square += d * d
+        apart = math.sqrt(square) - shapes.boxes[i, 6] - shapes.boxes[j, 6]
+        if apart >= enough:
+            return apart
+    return separation(shapes, places, pair, enough)
+
+
+@compiled
+def too_near(scene: MovedShapes, q: Array) -> int:
+    """The first pair that is too near at q, or -1."""
+    joints = scratch((scene.joints.parent.shape[0], 12))
+    place_joints(scene.joints, q, joints)
+    for pair in range(scene.kept.shape[0]):
+        least = scene.kept[pair] + MARGIN
+        if pair_bound(scene, joints, pair, least) < least:
+            return pair
+    return -1
+
+
+@compiled
+def approach(scene: MovedShapes, pair: int, leg: Array, apart: float) -> float:
+    """The most by which a pair, so far apart, can come nearer per share of a leg, m.
+
+    A point that a joint turns moves by its distance from the joint. One that is to come near the other shape
+    is not farther from the joint than that shape reaches, and than the two are apart, together."""
+    rate = scene.levers[pair, 0] * math.hypot(leg[0], leg[1]) + scene.levers[pair, 2] * abs(leg[2])
+    for c in range(3, leg.shape[0]):
+        rate += abs(leg[c]) * min(scene.levers[pair, c], scene.stems[pair, c] + max(apart, 0.0))
+    return rate
+
+
+@compiled
+def leg_blocked(scene: MovedShapes, q: Array, leg: Array) -> int:
+    """The pair that comes too near on a leg from q, which is free itself; -1 where none does."""
+    here, joints = scratch(q.shape[0]), scratch((scene.joints.parent.shape[0], 12))
+    count = scene.kept.shape[0]
+    for pair in range(count):
+        scene.until[pair] = 0.0 if approach(scene, pair, leg, math.inf) > 0.0 else math.inf
+    share = 0.0
+    while True:
+        along(scene.planar[()], q, leg, share, scene.mimic_joints, here)
+        place_joints(scene.joints, here, joints)
+        following = math.inf
+        for pair in range(count):
+            if scene.until[pair] <= share:
+                least = scene.kept[pair]
+                fastest = approach(scene, pair, leg, math.inf)
+                apart = pair_bound(scene, joints, pair, least + MARGIN + fastest * (1.0 - share))
+                if apart < least + MARGIN:
+                    return pair
+                scene.until[pair] = share + (apart - least) / approach(scene, pair, leg, apart)
+            following = min(following, scene.until[pair])
+        if following >= 1.0:
+            return -1
+        share = following
+
+
+@compiled
+def first_blocked(integers: Integers, floats: Array, q: Array, legs: Array, count: int, end: Array) -> int:
+    """The first pair that is too near on the first `count` of legs (L, 3 + n) from q, or -1; end (n,): where
+    they lead."""
+    scene = views(MovedShapes, integers, floats, 0)
+    there = scratch(q.shape[0])
+    copied(q, end)
+    for i in range(count):  # most motions that are blocked are so at the middle or the end of a leg, too
+        for share in (0.5, 1.0):
+            along(scene.planar[()], end, legs[i], share, scene.mimic_joints, there)
+            pair = too_near(scene, there)
+            if pair >= 0:
+                return pair
+        copied(there, end)
+    copied(q, end)
+    for i in range(count):
+        pair = leg_blocked(scene, end, legs[i])
+        if pair >= 0:
+            return pair
+        along(scene.planar[()], end, legs[i], 1.0, scene.mimic_joints, there)
+        copied(there, end)
+    return -1
