@@ -14,7 +14,7 @@ import nmm
 
 PACKAGE = Path(nmm.__file__).parent
 #: Below the wall: what makes a trajectory.
-CORE = ("kernels", "platforms", "robots", "functions", "collisions", "resolvers", "control", "runs")
+CORE = ("kernels", "platforms", "robots", "functions", "collisions", "resolvers", "control", "runs", "plans")
 #: What wings import besides, with the reason.
 EXCEPTIONS = {
     (

@@ -1,0 +1,133 @@
+"""A path of legs: where it leads, shorter ones, and what compiled code says of its pieces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numba import types
+
+from nmm.arrays import Array
+from nmm.collisions.legs_check import along
+from nmm.kernels.compiled import checked_by_caller, compiled
+from nmm.kernels.record_layout import BLOCKS, Blocks, views
+from nmm.plans.tree import PLACE, Trees
+from nmm.plans.ways import LEGS, find_way, leg_time
+
+#: A shorter way saves at least this, s.
+WORTH = 1e-3
+#: Two legs go the same way where their directions differ by less.
+SAME = 1e-9
+
+
+@compiled
+def _find(blocks: Blocks, a: Array, b: Array, legs: Array) -> int:
+    return find_way(views(Trees, blocks.integers, blocks.floats, PLACE).ways, a, b, legs)
+
+
+@compiled
+def _times(blocks: Blocks, legs: Array, out: Array) -> None:
+    ways = views(Trees, blocks.integers, blocks.floats, PLACE).ways
+    for k in range(legs.shape[0]):
+        out[k] = leg_time(ways, legs[k]) + ways.pause[()]
+
+
+_FLAT, _ROWS = types.float64[::1], types.float64[:, ::1]
+_FIND = types.int64(BLOCKS, _FLAT, _FLAT, _ROWS)
+_TIMES = types.void(BLOCKS, _ROWS, _FLAT)
+_ALONG = types.void(types.int64, _FLAT, _FLAT, types.float64, _FLAT, _FLAT)
+
+
+class Guide:
+    """The ways of a robot, as `Trees` in memory have them: legs between configurations, and what they
+    take."""
+
+    def __init__(self, blocks: Blocks, planar: bool, mimic_joints: Array) -> None:
+        self._blocks, self._planar, self._mimic_joints = blocks, int(planar), mimic_joints
+        self._find = checked_by_caller(_find, _FIND)
+        self._times = checked_by_caller(_times, _TIMES)
+        self._along = checked_by_caller(along, _ALONG)
+
+    def way(self, a: Array, b: Array) -> Array:
+        """The legs (L, 3 + n) from a to b (n,)."""
+        legs = np.empty((LEGS, 3 + len(a)))
+        return legs[: self._find(self._blocks, a, b, legs)]
+
+    def times(self, legs: Array) -> Array:
+        """What each leg takes with its stop, (L,), s."""
+        out = np.empty(len(legs))
+        self._times(self._blocks, np.ascontiguousarray(legs), out)
+        return out
+
+    def at(self, q: Array, leg: Array, share: float) -> Array:
+        """Where a share of a leg leads from q (n,)."""
+        out = np.empty_like(q)
+        self._along(self._planar, q, np.ascontiguousarray(leg), share, self._mimic_joints, out)
+        return out
+
+    def corners(self, q: Array, legs: Array) -> Array:
+        """Where the legs lead one after the other from q (n,): (L + 1, n)."""
+        found = [q]
+        for leg in legs:
+            found.append(self.at(found[-1], leg, 1.0))
+        return np.array(found)
+
+    def merged(self, legs: Array) -> Array:
+        """The same motion with legs that go the same way as one."""
+        found: list[Array] = []
+        for leg in legs:
+            size = float(np.linalg.norm(leg))
+            if size == 0.0:
+                continue
+            if found:
+                before = float(np.linalg.norm(found[-1]))
+                if np.abs(found[-1] / before - leg / size).max() < SAME:
+                    found[-1] = found[-1] + leg
+                    continue
+            found.append(leg)
+        return np.array(found).reshape(-1, legs.shape[1])
+
+
+def shortened(
+    guide: Guide,
+    blocked: Callable[[Array, Array], int],
+    start: Array,
+    legs: Array,
+    rounds: int,
+    rng: np.random.Generator,
+    first: int,
+) -> Array:
+    """A shorter path from start (n,): of two random points on it, the way between them in place of the path
+    there, or the platform's path with the arm straight between them (its numbers of a leg begin at
+    `first`)."""
+    for _ in range(rounds):
+        times = guide.times(legs)
+        until = np.cumsum(times)
+        if not len(legs):
+            break
+        early, late = np.sort(rng.uniform(0.0, until[-1], 2))
+        i, j = (int(k) for k in np.minimum(np.searchsorted(until, [early, late]), len(legs) - 1))
+        corners = guide.corners(start, legs[: j + 1])
+        one, two = ((t - until[k] + times[k]) / times[k] for t, k in ((early, i), (late, j)))
+        a, b = guide.at(corners[i], legs[i], one), guide.at(corners[j], legs[j], two)
+        if i == j:
+            continue
+        between = np.vstack([(1.0 - one) * legs[i], legs[i + 1 : j], two * legs[j]])
+        before = float(guide.times(between).sum())
+        for new in (guide.way(a, b), _with_straight_arm(guide, between, first)):
+            if len(new) and before - float(guide.times(new).sum()) > WORTH and blocked(a, new) < 0:
+                parts = [legs[:i], one * legs[i : i + 1], new, (1.0 - two) * legs[j : j + 1], legs[j + 1 :]]
+                legs = guide.merged(np.vstack(parts))
+                break
+    return legs
+
+
+def _with_straight_arm(guide: Guide, legs: Array, first: int) -> Array:
+    found = legs.copy()
+    found[:, first:] = 0.0
+    times = np.abs(found).max(axis=1)
+    if times.sum() > 0.0:
+        found[:, first:] = (times / times.sum())[:, np.newaxis] * legs[:, first:].sum(axis=0)
+    else:
+        found = legs.sum(axis=0, keepdims=True)
+    return found

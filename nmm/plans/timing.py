@@ -1,0 +1,82 @@
+"""When a path of legs is where: as fast along each as the limits of velocity and acceleration allow, at rest
+between."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from nmm.arrays import Array, Integers
+from nmm.control.limits import LimitsOn
+from nmm.plans.path import Guide
+from nmm.robots.robot import Robot
+from nmm.robots.wheel_rates import turning_wheels
+
+
+@dataclass(frozen=True)
+class TimedLegs:
+    """Legs with the time that each takes: its share is 0 to 1, at rest at both ends.
+
+    legs (L, 3 + n); corners (L + 1, n); inputs (L, n_u) : what the inputs add up to on each leg
+    speed, acceleration (L,) : the largest of its share, 1/s and 1/s²; begin (L + 1,) : when each begins, s
+    """
+
+    legs: Array
+    corners: Array
+    inputs: Array
+    speed: Array
+    acceleration: Array
+    begin: Array
+
+    def shares(self, t: Array) -> tuple[Integers, Array, Array]:
+        """The leg at each time (N,), s, how much of it is gone, and its rate, 1/s."""
+        leg = np.clip(np.searchsorted(self.begin, t, side="right") - 1, 0, max(len(self.legs) - 1, 0))
+        after, length = t - self.begin[leg], self.begin[leg + 1] - self.begin[leg]
+        V, A = self.speed[leg], self.acceleration[leg]
+        ramp = np.where(np.isfinite(A), V / np.where(np.isfinite(A), A, 1.0), 0.0)
+        to_end = np.maximum(length - after, 0.0)
+        rising, falling = after < ramp, to_end < ramp
+        A = np.where(np.isfinite(A), A, 0.0)
+        share = V * (after - 0.5 * ramp)
+        share = np.where(rising, 0.5 * A * after**2, np.where(falling, 1.0 - 0.5 * A * to_end**2, share))
+        rate = np.where(rising, A * after, np.where(falling, A * to_end, V))
+        return leg, np.clip(share, 0.0, 1.0), rate
+
+
+def timed(guide: Guide, robot: Robot, start: Array, legs: Array, limits: LimitsOn, usual: Array) -> TimedLegs:
+    """The legs from start (n,), each as fast as the limits allow; usual (n_u,) : speeds of inputs without
+    any."""
+    corners = guide.corners(start, legs)
+    inputs = np.array([_inputs(robot, q, leg) for q, leg in zip(corners[:-1], legs, strict=True)])
+    inputs = inputs.reshape(-1, robot.n_u)
+    top = np.where(np.isfinite(limits.inputs), limits.inputs, np.column_stack([-usual, usual]))
+    reached = np.where(inputs >= 0.0, top[:, 1], -top[:, 0])
+    with np.errstate(divide="ignore"):
+        speed = np.min(reached / np.abs(inputs), axis=1, initial=np.inf)
+        spins = np.maximum(*(_spins(robot, q, inputs, limits) for q in (corners[:-1], corners[1:])))
+        speed = np.minimum(speed, np.min(limits.spin / spins, axis=1, initial=np.inf))
+        acceleration = np.min(limits.accelerations / np.abs(inputs), axis=1, initial=np.inf)
+    # Too short to reach its speed: half of it faster, half slower.
+    speed = np.minimum(speed, np.sqrt(acceleration))
+    ramps = np.where(
+        np.isfinite(acceleration), speed / np.where(np.isfinite(acceleration), acceleration, 1.0), 0.0
+    )
+    return TimedLegs(legs, corners, inputs, speed, acceleration, np.cumsum([0.0, *(1.0 / speed + ramps)]))
+
+
+def _spins(robot: Robot, q: Array, inputs: Array, limits: LimitsOn) -> Array:
+    """How far limited wheels turn on each leg, (L, w), rad: at q (L, n), where it begins or ends."""
+    ways = np.array([robot.S(one) @ u for one, u in zip(q, inputs, strict=True)]).reshape(-1, robot.n)
+    names, rates = turning_wheels(robot, q, ways)
+    return np.abs(rates[:, [names.index(name) for name in limits.rows[: len(limits.spin)]]])
+
+
+def _inputs(robot: Robot, q: Array, leg: Array) -> Array:
+    """What the inputs add up to on a leg from q: its twist in the world and its joints' ways by S⁺ (S u =
+    them)."""
+    way = leg[3:].copy()
+    if robot.platform.n_p >= 3:
+        c, s = np.cos(q[2]), np.sin(q[2])
+        way[:3] = c * leg[0] - s * leg[1], s * leg[0] + c * leg[1], leg[2]
+    return np.asarray(np.linalg.lstsq(robot.S(q), way, rcond=None)[0], dtype=np.float64)
