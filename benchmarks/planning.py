@@ -1,0 +1,218 @@
+"""Plans for random scenes of six kinds:
+
+    python benchmarks/planning.py [INSTANCES] [SEED] [KIND …]
+
+Each plan is checked by what shares no code with the planner: Coal on the exact shapes of the robot at 2,000
+times along it, differences of its coordinates against S(q) u, and the limits. `free` is the least distance
+found less the one to keep, or the start's where that is less.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+import nmm
+
+DISTANCE = 0.03
+UR5 = "package://example-robot-data/robots/ur_description/urdf/ur5_robot.urdf"
+TIAGO = "package://example-robot-data/robots/tiago_description/robots/tiago_no_hand.urdf"
+UP = {"ur5_shoulder_lift_joint": -1.5, "ur5_elbow_joint": 1.5, "ur5_wrist_1_joint": -1.5}
+LIMITS = nmm.Limits(velocity={"platform": 1.0, "arm": 1.5}, acceleration={"platform": 1.0, "arm": 3.0})
+
+
+class Scene(NamedTuple):
+    """What is planned: robot, start, goal, obstacles."""
+
+    robot: nmm.Robot
+    start: dict[str, float]
+    goal: object
+    obstacles: list[nmm.Obstacle]
+
+
+def box(name: str, low: tuple[float, ...], high: tuple[float, ...]) -> nmm.Obstacle:
+    ends = np.array([low, high])
+    return nmm.Obstacle(nmm.Box(ends[1] - ends[0]), ends.mean(axis=0), name=name)
+
+
+@cache
+def ur5_on(base: str) -> nmm.Robot:
+    platform = "unicycle" if base == "differential_base" else None
+    return nmm.mount(nmm.load(base, platform=platform), nmm.load(UR5), prefix="ur5_")
+
+
+@cache
+def tiago() -> nmm.Robot:
+    return nmm.Scenario.load("tiago_shelf").robot()
+
+
+def u_shaped_wall(rng: np.random.Generator) -> Scene:
+    """The robot stands in a U and is to go to a pose behind its closed end."""
+    deep, wide = rng.uniform(1.2, 2.0), rng.uniform(0.9, 1.3)
+    walls = [
+        box("end", (deep, -wide, 0.0), (deep + 0.1, wide, 1.5)),
+        box("left", (0.0, wide, 0.0), (deep + 0.1, wide + 0.1, 1.5)),
+        box("right", (0.0, -wide - 0.1, 0.0), (deep + 0.1, -wide, 1.5)),
+    ]
+    goal = {"x": deep + rng.uniform(1.2, 2.5), "y": rng.uniform(-1, 1), "theta": rng.uniform(-np.pi, np.pi)}
+    return Scene(
+        ur5_on("differential_base"),
+        {"x": rng.uniform(0.2, 0.5), "theta": rng.uniform(-1, 1), **UP},
+        goal,
+        walls,
+    )
+
+
+def door(rng: np.random.Generator) -> Scene:
+    """A door of 0.9 m, and the end-effector's position behind it."""
+    y = rng.uniform(-1.0, 1.0)
+    walls = [
+        box("left", (2.0, y + 0.45, 0.0), (2.1, y + 4.0, 2.0)),
+        box("right", (2.0, y - 4.0, 0.0), (2.1, y - 0.45, 2.0)),
+    ]
+    target = [rng.uniform(3.2, 5.0), y + rng.uniform(-1.5, 1.5), rng.uniform(0.5, 1.1)]
+    task = nmm.Task(nmm.Position("ur5_ee_link"), target)
+    return Scene(ur5_on("differential_base"), {"theta": rng.uniform(-np.pi, np.pi), **UP}, task, walls)
+
+
+def shelf(rng: np.random.Generator) -> Scene:
+    """TIAGo's end-effector between two boards of a shelf."""
+    x, height = rng.uniform(1.5, 2.5), rng.uniform(0.7, 0.9)
+    walls = [
+        box(f"board {k}", (x, -0.6, z), (x + 0.4, 0.6, z + 0.03))
+        for k, z in enumerate((height - 0.2, height + 0.2))
+    ]
+    walls += [
+        box("side", (x, 0.6, 0.0), (x + 0.4, 0.63, 1.6)),
+        box("other", (x, -0.63, 0.0), (x + 0.4, -0.6, 1.6)),
+    ]
+    target = [x + rng.uniform(0.05, 0.2), rng.uniform(-0.4, 0.4), height + rng.uniform(-0.05, 0.05)]
+    start = {
+        "torso_lift_joint": 0.15,
+        "arm_1_joint": 0.3,
+        "arm_2_joint": -1.0,
+        "arm_3_joint": -0.3,
+        "arm_4_joint": 2.0,
+    }
+    return Scene(
+        tiago(), start | {"y": rng.uniform(-1, 1)}, nmm.Task(nmm.Position("arm_tool_link"), target), walls
+    )
+
+
+def park(rng: np.random.Generator) -> Scene:
+    """A car with an arm parks sideways in a gap."""
+    gap = rng.uniform(1.9, 2.3)
+    walls = [
+        box("behind", (-2.5, -0.45, 0.0), (-0.55, 0.45, 0.8)),
+        box("before", (gap - 0.55, -0.45, 0.0), (gap + 1.5, 0.45, 0.8)),
+        box("kerb", (-3.0, -0.75, 0.0), (5.0, -0.6, 0.8)),
+    ]
+    start = {"x": rng.uniform(-1.0, 3.0), "y": rng.uniform(1.5, 2.5), "theta": rng.uniform(-0.5, 0.5), **UP}
+    goal = {"x": 0.5 * (gap - 1.1) - 0.3, "y": 0.0, "theta": 0.0}
+    return Scene(ur5_on("car_base"), start, goal, walls)
+
+
+def table(rng: np.random.Generator) -> Scene:
+    """The end-effector's position under a table."""
+    x, y = rng.uniform(1.8, 3.0), rng.uniform(-0.5, 0.5)
+    top = box("top", (x, y - 0.6, 0.72), (x + 0.9, y + 0.6, 0.75))
+    legs = [
+        box(f"leg {k}", (x + a, y + b, 0.0), (x + a + 0.05, y + b + 0.05, 0.72))
+        for k, (a, b) in enumerate([(0.0, -0.6), (0.85, -0.6), (0.0, 0.55), (0.85, 0.55)])
+    ]
+    target = [x + rng.uniform(0.1, 0.4), y + rng.uniform(-0.3, 0.3), rng.uniform(0.35, 0.55)]
+    task = nmm.Task(nmm.Position("ur5_ee_link"), target)
+    return Scene(ur5_on("differential_base"), {"theta": rng.uniform(-np.pi, np.pi), **UP}, task, [top, *legs])
+
+
+def low_gate(rng: np.random.Generator) -> Scene:
+    """A gate through which the robot fits with its arm folded only."""
+    height = rng.uniform(0.95, 1.1)
+    walls = [
+        box("left", (2.0, 0.5, 0.0), (2.2, 4.0, 2.0)),
+        box("right", (2.0, -4.0, 0.0), (2.2, -0.5, 2.0)),
+        box("above", (2.0, -0.5, height), (2.2, 0.5, 2.0)),
+    ]
+    goal = {"x": rng.uniform(3.5, 5.0), "y": rng.uniform(-1, 1), "theta": rng.uniform(-1, 1), **UP}
+    return Scene(ur5_on("differential_base"), {"theta": rng.uniform(-np.pi, np.pi), **UP}, goal, walls)
+
+
+KINDS: dict[str, Callable[[np.random.Generator], Scene]] = {
+    one.__name__: one for one in (u_shaped_wall, door, shelf, park, table, low_gate)
+}
+
+
+class Checked(NamedTuple):
+    """Of a plan: metres to spare, |q_dot - S u|, limits broken at most."""
+
+    free: float
+    motion: float
+    limits: float
+
+
+def checked(scene: Scene, plan: nmm.Plan, samples: int = 2000) -> Checked:
+    robot, T = scene.robot, plan.duration
+    t = np.linspace(0.0, T, samples)
+    q, _ = plan(t)
+    queries = nmm.Collisions(DISTANCE, obstacles=scene.obstacles).on(robot).queries
+    pairs = range(len(queries.scene.kept))
+    asked = np.minimum(DISTANCE, queries.distances(0.0, q[0], pairs) - 0.002)
+    near = min(float((queries.distances(0.0, one, pairs) - asked).min()) for one in q)
+    h = 1e-6
+    inner = t[(t > h) & (t < T - h)]
+    inner = inner[np.abs(inner[:, np.newaxis] - plan.stops).min(axis=1) > 2.0 * h]
+    here, u = plan(inner)
+    rate = (plan(inner + h)[0] - plan(inner - h)[0]) / (2.0 * h)
+    u_dot = (plan(inner + h)[1] - plan(inner - h)[1]) / (2.0 * h)
+    off = max(float(np.abs(v - robot.S(one) @ w).max()) for v, one, w in zip(rate, here, u, strict=True))
+    on = LIMITS.on(robot)
+    over = [on.inputs[:, 0] - u, u - on.inputs[:, 1], np.abs(u_dot) - on.accelerations - 1e-5]
+    over += [robot.q_limits[:, 0] - q, q - robot.q_limits[:, 1]]
+    return Checked(near, off, max(float(one.max()) for one in over))
+
+
+def main() -> None:
+    instances = int(sys.argv[1]) if len(sys.argv) > 1 else 20
+    seed = int(sys.argv[2]) if len(sys.argv) > 2 else 0
+    print(f"{instances} instances of each, seed {seed}")
+    warm = u_shaped_wall(np.random.default_rng(0))
+    nmm.plan(warm.robot, warm.start, warm.goal, warm.obstacles)  # what is compiled once is no part of a plan
+    print(f"{'':14} found  free   s median   worst  duration  spare mm  |q_dot - S u|  limits")
+    for kind in sys.argv[3:] or KINDS:
+        times, durations, found = [], [], []
+        for k in range(instances):
+            scene = KINDS[kind](np.random.default_rng([seed, k]))
+            begin = time.process_time()
+            try:
+                plan = nmm.plan(
+                    scene.robot,
+                    scene.start,
+                    scene.goal,
+                    scene.obstacles,
+                    nmm.Collisions(DISTANCE),
+                    LIMITS,
+                    seed=k,
+                )
+            except nmm.NmmError as error:
+                print(f"  {kind} {k}: {error} ({time.process_time() - begin:.2f} s)")
+                continue
+            times.append(time.process_time() - begin)
+            durations.append(plan.duration)
+            found.append(checked(scene, plan))
+        if found:
+            least = Checked(*(f(x) for f, x in zip((min, max, max), zip(*found, strict=True), strict=True)))
+            print(
+                f"{kind:14} {len(found):5} {sum(one.free > 0.0 for one in found):5} {np.median(times):10.2f} "
+                f"{max(times):7.2f} {np.median(durations):9.1f} {1e3 * least.free:9.2f} {least.motion:14.1e} "
+                f"{least.limits:7.1e}",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main()
