@@ -76,7 +76,7 @@ def examples(count: int, seed: int = 0) -> Iterator[Example]:
 
 def solved(example: Example, active: np.ndarray | None = None) -> Found:
     y = np.zeros(len(example.target))
-    active = np.zeros(1 + len(example.G), dtype=np.int64) if active is None else active
+    active = np.zeros(2 + len(example.G), dtype=np.int64) if active is None else active
     return Found(nearest_within(example.rows, example.target, 0.0, active, y), y, active)
 
 

@@ -67,6 +67,20 @@ def test_the_active_set_of_a_step_before_changes_nothing_but_the_time() -> None:
             assert np.abs(cold.u - warm.u).max() <= 1e-7 * (1.0 + np.abs(cold.u).max())
 
 
+def test_the_row_that_cut_the_scale_is_kept_and_cuts_it_again() -> None:
+    """Where rows hold λ back, J's normals and those of the limits that are kept are dependent."""
+    kept = count = 0
+    for example, found in some("plain"):
+        if 0.0 < found.scale < 1.0:
+            again = solved(example, found.active.copy())
+            rows = (again.active[1 : 1 + again.active[0]] - 1) % len(example.G)
+            normals = np.vstack([example.J, example.G[rows]])
+            assert again.scale == pytest.approx(found.scale, rel=0, abs=1e-12)
+            kept += np.linalg.matrix_rank(normals, tol=1e-9) < len(normals)
+            count += 1
+    assert kept > 0.9 * count > 40
+
+
 @pytest.mark.parametrize("decade", range(3, 9))
 def test_beside_a_singularity_limits_hold_and_the_task_is_scaled(
     decade: int, rng: np.random.Generator

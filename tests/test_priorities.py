@@ -61,8 +61,24 @@ def test_where_the_step_before_ended_changes_no_answer(if_possible: bool) -> Non
         for _ in range(2):  # the second time from the limits that held the first back
             answer = unanswered(len(cold.u), len(arrays.ends))
             resolver.kernel(arrays, setup.numbers, setup.options, State().memory, answer)
-        assert arrays.active[0] > 0 or cold.status is Status.SOLVED
+        assert arrays.active.any() or cold.status is Status.SOLVED
         np.testing.assert_allclose(answer.u, cold.u, rtol=0, atol=1e-9)
+
+
+def test_each_level_starts_with_the_limits_that_held_it_back_before() -> None:
+    resolver, differ = nmm.ProjectedGradient(alpha=0.5), 0
+    for problem in problems(40, 4, if_possible=False):
+        arrays, setup = problem.arrays, resolver.setup(problem.dimensions)
+        sets = arrays.active.reshape(len(arrays.ends) + 1, -1)  # a view
+        for _ in range(3):
+            before, answer = sets.copy(), unanswered(len(arrays.h), len(arrays.ends))
+            resolver.kernel(arrays, setup.numbers, setup.options, State().memory, answer)
+        for one, other in zip(sets, before, strict=True):
+            assert {*one[1 : 1 + one[0]]} == {*other[1 : 1 + other[0]]}
+        differ += sets[0, 0] > 0 < sets[1, 0] and {*sets[0, 1 : 1 + sets[0, 0]]} != {
+            *sets[1, 1 : 1 + sets[1, 0]]
+        }
+    assert differ > 5
 
 
 def in_turn(problem: Problem, u0: np.ndarray) -> np.ndarray:

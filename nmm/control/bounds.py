@@ -72,19 +72,22 @@ class LimitNumbers(NamedTuple):
 
 
 @compiled
-def approach(room: float, dt: float, acceleration: float, recovery: float) -> float:
-    """The largest speed towards a limit `room` ahead; negative beyond the limit."""
+def approach(room: float, dt: float, acceleration: float, recovery: float, wanted: float = math.inf) -> float:
+    """The largest speed towards a limit `room` ahead; negative beyond the limit. Infinite where it is above
+    `wanted` for certain: it is at least √(2 A room) - A dt / 2, also for a limit that is far away."""
     if math.isinf(room):  # no limit; dt may be unknown
         return room
+    if 2.0 * acceleration * room > (wanted + 0.5 * acceleration * dt) ** 2:
+        return math.inf
     D = room / dt
     if D < 0.0:
         return max(D, -recovery)
-    if math.isinf(acceleration):
-        return D
     a = acceleration * dt
     if a <= 0.0:
         return 0.0
-    N = max(1.0, math.ceil((math.sqrt(1.0 + 8.0 * D / a) - 1.0) / 2.0))
+    if a >= D:
+        return D
+    N = math.ceil((math.sqrt(1.0 + 8.0 * D / a) - 1.0) / 2.0)
     return D / N + 0.5 * a * (N - 1.0)
 
 
@@ -101,8 +104,9 @@ def bound_inputs(limits: LimitNumbers, q: Array, problem: ProblemArrays) -> None
         i = limits.coordinate[j]
         low, high = -math.inf, math.inf
         if i >= 0:
-            high = approach(limits.high[j] - q[i], dt, A, limits.recovery[()])
-            low = -approach(q[i] - limits.low[j], dt, A, limits.recovery[()])
+            recovery = limits.recovery[()]
+            high = approach(limits.high[j] - q[i], dt, A, recovery, max(upper, 0.0))
+            low = -approach(q[i] - limits.low[j], dt, A, recovery, max(-lower, 0.0))
             # The return obeys the velocity limits, and is slow enough to brake at the opposite limit.
             if high < 0.0:
                 high = max(high, min(lower, 0.0), low)

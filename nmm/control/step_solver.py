@@ -73,7 +73,6 @@ class StepSolver:
     period_monitor : the period of the calls
     needs_dt : whether calls are dt apart: some decisions affect the next call
     samples : whether calls make decisions that hold for the stages after them
-    at_hand : arguments of a plain call that bypasses this object; None where a step ends in Python
     busy : one flag, in a list that the controller shares: whether a call is in progress
     """
 
@@ -141,7 +140,7 @@ class StepSolver:
 
         self.linearise: Callable[[float, Array], float] = solve
         self.solve: Callable[[float, Array], float] = solve if self._whole else solve_and_finish
-        self.at_hand = (prepare, step, integers, floats) if self._whole else None
+        self._plain_call = prepare, step, integers, floats
 
     def _finished(self, q: Array) -> float:
         """The status after the resolver's Python part, if any, and what a step does with its inputs."""
@@ -223,6 +222,12 @@ class StepSolver:
     def blocks(self) -> Blocks:
         """Its memory, for compiled code."""
         return self.program.blocks
+
+    @property
+    def at_hand(self) -> tuple[Any, ...] | None:
+        """What `take_sample` calls, with its memory, where that is all it does; else None."""
+        more = self.safety_filter or self.retreat_state or self.step_size or not self._whole
+        return None if more else self._plain_call
 
     @property
     def compiles_steps(self) -> bool:

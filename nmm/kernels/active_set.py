@@ -5,15 +5,16 @@
 by a dual active set (Goldfarb and Idnani 1983) that starts at λ = 1. If no step satisfies a violated row p,
 its normal is a combination of active ones, n_p = Σ r_i n_i with r_i <= 0 on the inequalities, so that
 Σ r_i b_i(λ) >= b_p(λ) is linear in λ, and λ is cut to where equality holds. Each cut bounds every solution,
-so the λ reached is the largest, without weights. The active set survives cuts and starts the next call.
+so the λ reached is the largest, without weights. The active set, and the row of the last cut, start the next
+call.
 """
 
 import math
 from typing import NamedTuple
 
 from nmm.arrays import Array, Integers
-from nmm.kernels.compiled import compiled, integer_scratch, scratch
-from nmm.kernels.linear_algebra import EPSILON, add, copied, dot, less
+from nmm.kernels.compiled import clear, compiled, integer_scratch, scratch
+from nmm.kernels.linear_algebra import EPSILON, add, copied, dot, less, norm, turn
 from nmm.kernels.record_layout import IntegerVector, Matrix, Vector
 
 #: A normal is a combination of others if its part outside their span, over its norm, is below this.
@@ -83,19 +84,22 @@ def bound(rows: Rows, member: int) -> tuple[float, float]:
 @compiled
 def split(basis: Basis, k: int, n: Array) -> float:
     """n = Σ_i d[i] Q[i] + v with v orthogonal to the first k rows; ‖v‖, or 0 where n is their combination."""
-    d, v = basis.d, basis.v
+    d, v, parts, whole, full = basis.d, basis.v, scratch(k), dot(n, n), k == n.shape[0]
     copied(n, v)
     for i in range(k):
         d[i] = 0.0
-    for _ in range(2):  # the second pass corrects rounding
+    square = whole
+    for _ in range(2):  # the second pass corrects rounding where the first has cost more than a digit
+        before = square
         for i in range(k):
-            overlap = dot(basis.Q[i], v)
-            d[i] += overlap
-            add(v, -overlap, basis.Q[i])
-    if k == basis.Q.shape[0]:  # all directions, also where squares underflow
-        return 0.0
-    square = dot(v, v)
-    return math.sqrt(square) if square > DEPENDENT * DEPENDENT * dot(n, n) else 0.0
+            parts[i] = dot(basis.Q[i], v)
+        for i in range(k):
+            d[i] += parts[i]
+            add(v, -parts[i], basis.Q[i])
+        square = dot(v, v)
+        if full or square > 0.01 * before:
+            break
+    return 0.0 if full or square <= DEPENDENT * DEPENDENT * whole else math.sqrt(square)
 
 
 @compiled
@@ -104,8 +108,9 @@ def append(basis: Basis, k: int, member: int, norm: float) -> int:
     for i in range(k):
         basis.R[i, k] = basis.d[i]
     basis.R[k, k] = norm
+    share = 1.0 / norm
     for j in range(basis.v.shape[0]):
-        basis.Q[k, j] = basis.v[j] / norm
+        basis.Q[k, j] = share * basis.v[j]
     basis.members[k] = member
     return k + 1
 
@@ -118,13 +123,18 @@ def join(basis: Basis, k: int, member: int, n: Array) -> int:
 
 
 @compiled
-def drop(rows: Rows, basis: Basis, k: int, dropped: int, n: Array) -> int:
-    """Remove member number `dropped`; returns the number left. n (m,) is overwritten."""
-    kept = dropped
-    for i in range(dropped + 1, k):
-        normal(rows, basis.members[i], n)
-        kept = join(basis, kept, basis.members[i], n)
-    return kept
+def drop(basis: Basis, k: int, dropped: int) -> int:
+    """Remove member number `dropped`; returns the number left."""
+    Q, R = basis.Q, basis.R
+    for i in range(dropped, k - 1):
+        basis.members[i] = basis.members[i + 1]
+        for j in range(i + 2):
+            R[j, i] = R[j, i + 1]
+        length = math.hypot(R[i, i], R[i + 1, i])  # turn rows i and i + 1, so that R[i + 1, i] is 0
+        cosine, sine = R[i, i] / length, -R[i + 1, i] / length
+        turn(Q, i, i + 1, cosine, sine)
+        turn(R, i, i + 1, cosine, sine)
+    return k - 1
 
 
 @compiled
@@ -146,19 +156,23 @@ def nearest(basis: Basis, k: int, ends: Array, target: Array, parts: Array, y: A
         for j in range(i):
             x -= basis.R[j, i] * ends[j]
         ends[i] = x / basis.R[i, i]
-    for again in range(2):  # the second pass corrects rounding where the target is far away
+    missing = scratch(k)
+    for i in range(k):
+        parts[i] = 0.0
+    for _ in range(2):  # the second pass corrects rounding where the target is far away
         for i in range(k):
-            missing = less(ends[i], basis.Q[i], y)
-            add(y, missing, basis.Q[i])
-            parts[i] = missing if again == 0 else parts[i] + missing
+            missing[i] = less(ends[i], basis.Q[i], y)
+        for i in range(k):
+            add(y, missing[i], basis.Q[i])
+            parts[i] += missing[i]
 
 
 @compiled
 def settle(
-    rows: Rows, basis: Basis, k: int, scale: float, target: Array, n: Array, multipliers: Array, y: Array
+    rows: Rows, basis: Basis, k: int, scale: float, target: Array, multipliers: Array, y: Array
 ) -> int:
     """The y nearest to the target with all members at equality, and their multipliers; members of the wrong
-    sign are dropped. Returns the number left; n (m,) is overwritten."""
+    sign are dropped. Returns the number left."""
     while True:
         for i in range(k):
             b0, b1 = bound(rows, basis.members[i])
@@ -171,7 +185,7 @@ def settle(
                 worst, least = i, multipliers[i]
         if worst < 0:
             return k
-        k = drop(rows, basis, k, worst, n)
+        k = drop(basis, k, worst)
 
 
 @compiled
@@ -179,16 +193,14 @@ def most_violated(rows: Rows, scale: float, y: Array, tolerance: float) -> int:
     """The member whose bound is violated by the greatest length; 0 for none beyond rounding."""
     c, found, worst = rows.G.shape[0], 0, 0.0
     for i in range(c):
-        value, square = dot(rows.G[i], y), dot(rows.G[i], rows.G[i])
-        given = (1.0 - scale) * rows.give[i]
+        value, given = dot(rows.G[i], y), (1.0 - scale) * rows.give[i]
         for side in range(2):
             limit = rows.lower[i] - given if side == 0 else rows.upper[i] + given
             missing = limit - value if side == 0 else value - limit
-            if missing <= tolerance * max(1.0, abs(limit)):
-                continue
-            missing /= math.sqrt(square) if square > 0.0 else 1e-300
-            if missing > worst:
-                found, worst = 1 + i + side * c, missing
+            if missing > tolerance * max(1.0, abs(limit)):
+                missing /= max(norm(rows.G[i]), 1e-150)
+                if missing > worst:
+                    found, worst = 1 + i + side * c, missing
     return found
 
 
@@ -206,33 +218,44 @@ def unexplained(rows: Rows, basis: Basis, k: int, member: int, r: Array) -> tupl
 
 
 @compiled
+def first_to_leave(basis: Basis, k: int, multipliers: Array, r: Array) -> tuple[float, int]:
+    """The step along -r at which the first multiplier of a row of G is 0, and its number; -1 for none."""
+    step, first = math.inf, -1
+    for i in range(k):
+        if basis.members[i] > 0 and r[i] > 1e-14:
+            until = max(multipliers[i], 0.0) / r[i]
+            if until < step:
+                step, first = until, i
+    return step, first
+
+
+@compiled
 def nearest_within(rows: Rows, target: Array, least: float, active: Integers, y: Array) -> float:
     """Write y (m,) for the largest λ in [least, 1] and return λ, NaN if there is none (y is then arbitrary).
 
-    active (1 + c,) : the number of active rows of G, and these, kept between calls; reset to [0, ...] where
-        there is no λ
+    active (2 + c,) : the number of active rows of G, and these, kept between calls; last the row that cut λ,
+        which cuts it at once in the next call. Reset to [0, ...] where there is no λ
     """
     c, m = rows.G.shape
     basis = Basis(scratch((m, m)), scratch((m, m)), integer_scratch(m), scratch(m), scratch(m))
-    multipliers, r, n, other = scratch(m), scratch(m), scratch(m), scratch(m)
-    scale, k = 1.0, 0
-    for i in range(rows.E.shape[0]):
-        normal(rows, -1 - i, n)
-        joined = join(basis, k, -1 - i, n)
-        if joined == k:
-            # A combination of earlier rows: satisfied already, or only with a smaller λ.
+    multipliers, r, n = scratch(m), scratch(m), scratch(m)
+    scale, k, e, cutting = 1.0, 0, rows.E.shape[0], 0
+    clear(multipliers)
+    for i in range(e + active[0]):
+        member = -1 - i if i < e else active[1 + i - e]
+        if math.isinf(bound(rows, member)[0]):  # the row has no limit this time
+            continue
+        normal(rows, member, n)
+        joined = join(basis, k, member, n)
+        if joined == k:  # a combination of those before: satisfied already, or only with a smaller λ
             combination(basis, k, basis.d, r)
-            a0, a1, size = unexplained(rows, basis, k, -1 - i, r)
-            if abs(a1) > 1e-7 * size and scale > least:
+            _, blocking = first_to_leave(basis, k, multipliers, r)
+            a0, a1, size = unexplained(rows, basis, k, member, r)
+            if (abs(a1) if member < 0 else a1) > 1e-7 * size and scale > least and blocking < 0:
                 scale = max(least, min(scale, -a0 / a1))
+                cutting = member
         k = joined
-    for i in range(active[0]):
-        if k == m:
-            break
-        if not math.isinf(bound(rows, active[1 + i])[0]):  # else the row has no limit this time
-            normal(rows, active[1 + i], n)
-            k = join(basis, k, active[1 + i], n)
-    k = settle(rows, basis, k, scale, target, other, multipliers, y)
+    k = settle(rows, basis, k, scale, target, multipliers, y)
     active[0] = 0
     cuts, backs, tolerance = 0, 0, FEASIBLE
     for _ in range(STEPS_PER_ROW * (c + m)):
@@ -242,20 +265,21 @@ def nearest_within(rows: Rows, target: Array, least: float, active: Integers, y:
                 if basis.members[i] > 0:
                     active[0] += 1
                     active[active[0]] = basis.members[i]
+                if basis.members[i] == cutting:
+                    cutting = 0
+            if cutting > 0:
+                active[0] += 1
+                active[active[0]] = cutting
             return scale
         normal(rows, p, n)
         b0, b1 = bound(rows, p)
         for _ in range(m + 1):
             norm = split(basis, k, n)
             combination(basis, k, basis.d, r)
-            step, blocking = math.inf, -1
-            for i in range(k):
-                if basis.members[i] > 0 and r[i] > 1e-14:
-                    until = max(multipliers[i], 0.0) / r[i]
-                    if until < step:
-                        step, blocking = until, i
+            step, blocking = first_to_leave(basis, k, multipliers, r)
             if norm == 0.0 and blocking < 0:  # no step satisfies row p: cut λ
                 a0, a1, _ = unexplained(rows, basis, k, p, r)
+                cutting = p
                 cuts += 1
                 if a1 <= 0.0 or cuts > CUTS:
                     return math.nan
@@ -269,24 +293,22 @@ def nearest_within(rows: Rows, target: Array, least: float, active: Integers, y:
                         break
                     backs += 1
                     scale -= back
+                elif met < least - 1e-9:
+                    return math.nan
                 else:
-                    scale = met
-                    if scale < least - 1e-9:
-                        return math.nan
-                    if scale < least:
-                        scale = least
-                k = settle(rows, basis, k, scale, target, other, multipliers, y)
+                    scale = max(met, least)
+                k = settle(rows, basis, k, scale, target, multipliers, y)
                 break
             if norm > 0.0:
                 full = less(b0 + scale * b1, n, y) / (norm * norm)
                 if full <= step:
                     k = append(basis, k, p, norm)
-                    k = settle(rows, basis, k, scale, target, other, multipliers, y)
+                    k = settle(rows, basis, k, scale, target, multipliers, y)
                     break
                 add(y, step, basis.v)
             for i in range(k):
                 multipliers[i] -= step * r[i]
             for i in range(blocking, k - 1):
                 multipliers[i] = multipliers[i + 1]
-            k = drop(rows, basis, k, blocking, other)
+            k = drop(basis, k, blocking)
     return math.nan

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from nmm.arrays import Array
-from nmm.kernels.compiled import clear, compiled, scratch
+from nmm.kernels.compiled import clear, compiled, scratch, view
 
 EPSILON = float(np.finfo(float).eps)
 #: Sweeps end when no pair of rows is rotated, always before this many.
@@ -110,15 +110,30 @@ def project_out(x: Array, Q: Array, count: int) -> None:
 
 
 @compiled
+def diagonal(T: Array) -> bool:
+    """Whether T is diagonal, as the metric of weights for single inputs is."""
+    numbers, others = view(T, 0, (T.size,)), 0
+    for i in range(T.size):  # to the end, as then several are counted at once
+        others += numbers[i] != 0.0
+    for i in range(T.shape[0]):
+        others -= T[i, i] != 0.0
+    return others == 0
+
+
+@compiled
 def times_matrix(A: Array, T: Array, product: Array) -> None:
     """product = A T; A itself where T is (0, 0), which means the identity."""
+    scales = diagonal(T)
     for i in range(A.shape[0]):
         if T.shape[0] == 0:
             copied(A[i], product[i])
-            continue
-        clear(product[i])
-        for k in range(T.shape[0]):
-            add(product[i], A[i, k], T[k])
+        elif scales:
+            for j in range(T.shape[0]):
+                product[i, j] = A[i, j] * T[j, j]
+        else:
+            clear(product[i])
+            for k in range(T.shape[0]):
+                add(product[i], A[i, k], T[k])
 
 
 @compiled
@@ -183,6 +198,28 @@ def eliminate(M: Array, row_scales: Array) -> tuple[float, float]:
     if math.isnan(determinant):
         return math.nan, math.nan
     return determinant, smallest / max(1.0, largest)
+
+
+@compiled
+def solve(T: Array, x: Array, y: Array) -> None:
+    """y = T⁻¹ x; x itself where T is (0, 0), which means the identity."""
+    m = x.shape[0]
+    if T.shape[0] == 0:
+        copied(x, y)
+        return
+    if diagonal(T):
+        for j in range(m):
+            y[j] = x[j] / T[j, j]
+        return
+    M, scales = scratch((m, m + 1)), scratch(m)
+    for i in range(m):
+        scales[i] = 1.0
+        for j in range(m):
+            M[i, j] = T[i, j]
+        M[i, m] = x[i]
+    eliminate(M, scales)
+    for j in range(m):
+        y[j] = M[j, m]
 
 
 @compiled

@@ -8,8 +8,8 @@ from numba import types
 
 from nmm.arrays import Array
 from nmm.kernels.active_set import FEASIBLE
-from nmm.kernels.compiled import caller, compiled, scratch, view
-from nmm.kernels.linear_algebra import dot, times_matrix
+from nmm.kernels.compiled import caller, clear, compiled, scratch, view
+from nmm.kernels.linear_algebra import copied, dot, times_matrix
 from nmm.kernels.record_layout import record_type
 from nmm.resolvers.answer import NOT_FINITE, SINGULAR_J, AnswerArrays
 from nmm.resolvers.problem_arrays import ProblemArrays
@@ -42,8 +42,11 @@ def rows_of_limits(problem: ProblemArrays, T: Array, G: Array) -> None:
     """G = [I; limit_rows] T, (m + l, m); T (0, 0) stands for the identity."""
     m = G.shape[1]
     for i in range(m):
-        for j in range(m):
-            G[i, j] = T[i, j] if T.shape[0] > 0 else 1.0 if i == j else 0.0
+        if T.shape[0] > 0:
+            copied(T[i], G[i])
+            continue
+        clear(G[i])
+        G[i, i] = 1.0
     times_matrix(problem.limit_rows, T, view(G, m * m, problem.limit_rows.shape))
 
 
@@ -88,4 +91,4 @@ def keep_limits(problem: ProblemArrays, answer: AnswerArrays) -> None:
     if may_limit and (answer.status[()] >= SINGULAR_J or not (seen_to or within(problem, answer.u, LEFT))):
         call_limit(problem.limiter, problem, scratch((0, 0)), answer)
     elif not seen_to:
-        problem.active[0] = 0
+        clear(problem.active)

@@ -153,7 +153,8 @@ class Problem:
         ends = np.cumsum(self.levels or (), dtype=np.int64)
         own = {name: np.asarray(getattr(self, name)) for name in ProblemArrays._fields if name not in MEMORY}
         count = len(own["h"]) + len(own["lower"])
-        stops, active = np.zeros(count, dtype=np.int64), np.zeros(1 + count, dtype=np.int64)
+        stops = np.zeros(count, dtype=np.int64)
+        active = np.zeros((len(ends) + 1) * (2 + count), dtype=np.int64)
         limited = len(own["lower"]) > 0 or np.isfinite([own["u_lower"], own["u_upper"]]).any()
         limiter = limit.address if limited else 0
         return ProblemArrays(ends=ends, stops=stops, active=active, limiter=limiter, **own)

@@ -33,7 +33,8 @@ class ProblemArrays(NamedTuple):
     limit_levels (l,) : 0 for rows that are always kept, k for those that are kept before the k-th level
     stops (m + l,) : which bounds, of inputs, then of rows, limit a position, not a speed: UPPER, LOWER or
         both
-    active (1 + m + l,) : those active at the previous step (see `nearest_within`); changed
+    active ((levels + 1) (2 + m + l),) : those active at the previous step, level by level, then after all
+        levels (see `nearest_within`); changed
     before (m,) : the previous inputs
     dt () : how long u will be applied, s; NaN where unknown
     limiter : address of `limit`; 0 without limits

@@ -16,7 +16,7 @@ import math
 from nmm.arrays import Array
 from nmm.kernels.active_set import Rows, nearest_within
 from nmm.kernels.compiled import clear, compiled, integer_scratch, kernel, scratch, view
-from nmm.kernels.linear_algebra import copied, dot, eliminate, norm, residual_norm, times, times_matrix
+from nmm.kernels.linear_algebra import copied, dot, norm, residual_norm, solve, times, times_matrix
 from nmm.resolvers.answer import EXACT, FALLBACK, INEXACT, RELAXED, SINGULAR_J, SOLVED, AnswerArrays, certify
 from nmm.resolvers.limit_check import LIMIT, rows_of_limits, within
 from nmm.resolvers.problem_arrays import ProblemArrays
@@ -45,7 +45,7 @@ def nearest_allowed(problem: ProblemArrays, wanted: Array, u: Array) -> float:
         if problem.limit_levels[i] == 0:
             lower[m + i], upper[m + i] = problem.lower[i], problem.upper[i]
     E, none, y = scratch((0, m)), scratch(0), scratch(m)
-    active = integer_scratch(1 + c)
+    active = integer_scratch(2 + c)
     active[0] = 0
     scale = nearest_within(Rows(E, none, none, G, lower, upper, give), wanted, -math.inf, active, y)
     if math.isnan(scale):
@@ -110,14 +110,15 @@ def limit(problem: ProblemArrays, T: Array, answer: AnswerArrays) -> None:
             rows_of_limits(problem, metric, G)
         for j in range(m):
             difference[j] = aim[j] - rest[j]
-        into_metric(metric, difference, target)
+        solve(metric, difference, target)
         for i in range(end):
             change[i] = dot(JT[i], target) if i >= first else 0.0
         from_rest(problem, low, high, rest, lower, upper)
         rows = Rows(
             view(JT, 0, (end, m)), view(fixed, 0, (end,)), view(change, 0, (end,)), G, lower, upper, give
         )
-        scale = nearest_within(rows, target, 0.0, problem.active, difference)
+        active = view(problem.active, level * (2 + c), (2 + c,))
+        scale = nearest_within(rows, target, 0.0, active, difference)
         if math.isnan(scale) and level == 0:
             fall_back(problem, answer)
             return
@@ -144,7 +145,7 @@ def shortest(problem: ProblemArrays, end: int, given: Array, u: Array) -> None:
     clear(nothing)
     clear(target)
     times(problem.J, given, rates)
-    active = integer_scratch(1)
+    active = integer_scratch(2)
     active[0] = 0
     rows = Rows(view(problem.J, 0, (end, m)), nothing, rates, scratch((0, m)), none, none, none)
     nearest_within(rows, target, 0.0, active, u)
@@ -201,7 +202,7 @@ def keep_if_possible(
         return False
     from_rest(problem, low, high, rest, lower, upper)
     nothing, still, difference, moved = scratch(first), scratch(m), scratch(m), scratch(m)
-    active = integer_scratch(1 + c)
+    active = integer_scratch(2 + c)
     active[0] = 0
     clear(nothing)
     clear(still)
@@ -218,23 +219,6 @@ def keep_if_possible(
         if give[i] > 0.0:
             low[i], high[i] = low[i] - widened, high[i] + widened
     return True
-
-
-@compiled
-def into_metric(T: Array, difference: Array, y: Array) -> None:
-    m = difference.shape[0]
-    if T.shape[0] == 0:
-        copied(difference, y)
-        return
-    M, scales = scratch((m, m + 1)), scratch(m)
-    for i in range(m):
-        scales[i] = 1.0
-        for j in range(m):
-            M[i, j] = T[i, j]
-        M[i, m] = difference[i]
-    eliminate(M, scales)
-    for j in range(m):
-        y[j] = M[j, m]
 
 
 @compiled
