@@ -65,7 +65,7 @@ EXAMPLES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
     "xacro_endless": (
         {},
         {},
-        "xacro: recursion without end (a file that includes itself, or a macro that calls itself)",
+        "xacro: files or macros too deep in one another (does one include or call itself?)",
     ),
     "xacro_warned": (
         {"text": "warning: redefining global symbol: pi"},

@@ -83,13 +83,13 @@ WORDS = placed(
         "not_xml": "not well-formed XML: {reason}",
         "doctype": "holds a DOCTYPE, which is refused (entities are not expanded)",
         "nested_too_deep": "elements stand more than {most} deep in one another",
+        "beyond_bound": "more than {most:,.0f} {what}: no robot needs as many",
         "not_robot": "expected <robot> as the root element, got <{got}>",
         "xacro_left_over": "<{element}/> is left over from xacro: left out",
         "only_macros": _only_macros,
         "xacro_failed": "xacro: {reason}",
         "xacro_argument_missing": "xacro argument {name!r} has no default and was not given a value",
-        "xacro_endless": "xacro: recursion without end (a file that includes itself, or a macro that calls "
-        "itself)",
+        "xacro_endless": "xacro: files or macros too deep in one another (does one include or call itself?)",
         "xacro_warned": "xacro {text}",
         "package_missing": _package_missing,
         "found_nearby": lambda *, count, name, place, **_: (
