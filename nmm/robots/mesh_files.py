@@ -1,5 +1,5 @@
-"""The surfaces in a mesh file, read in Python: whatever a damaged file holds ends in an error, and not, as
-in Coal's reader, with the process. That one also joins faces of a file's second part to corners of its first."""
+"""The surfaces in a mesh file, read in Python: whatever a damaged file holds ends in an error, and not, as in
+Coal's reader, with the process. That one also joins faces of a file's second part to corners of its first."""
 
 from __future__ import annotations
 
