@@ -62,6 +62,11 @@ EXAMPLES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
         {},
         "xacro argument 'l1' has no default and was not given a value",
     ),
+    "beyond_bound": (
+        {"what": "links", "most": 10_000},
+        {},
+        "more than 10,000 links: no robot needs as many",
+    ),
     "xacro_endless": (
         {},
         {},

@@ -145,7 +145,14 @@ def counted_xacro(xacro: Any, budget: Budget) -> list[tuple[Any, str, Any]]:
             raise xacro.XacroException("a quote without end in a macro's params")
         return parse_parameters(given)
 
+    def cloned(node: Any, deep: bool, document: Any) -> Any:
+        budget.step()
+        return clone(node, deep, document)
+
+    minidom = xacro.xml.dom.minidom
+    clone = minidom._clone_node
     return [
+        (minidom, "_clone_node", cloned),
         (xacro, "eval_all", elements),
         (xacro, "eval_text", text),
         (xacro, "safe_eval", lambda given, *names: budget.took(evaluate(given, *names))),
