@@ -84,10 +84,15 @@ EXAMPLES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
         {},
         "xacro argument 'l1' has no default and was not given a value",
     ),
+    "beyond_bound": (
+        {"what": "links", "most": 10_000},
+        {},
+        "more than 10,000 links: no robot needs as many",
+    ),
     "xacro_endless": (
         {},
         {},
-        "xacro: recursion without end (a file that includes itself, or a macro that calls itself)",
+        "xacro: files or macros too deep in one another (does one include or call itself?)",
     ),
     "xacro_warned": (
         {"text": "warning: redefining global symbol: pi"},

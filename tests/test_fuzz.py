@@ -12,7 +12,8 @@ from fuzz.hunting import KEPT, some, tried
 
 #: Cases of each hunt: about ten seconds of it.
 EXAMPLES = {
-    "scenarios": 60, "robots": 80, "folders": 60, "caches": 15, "commands": 40, "films": 12, "problems": 60,
+    "scenarios": 60, "robots": 80, "xacros": 30, "meshes": 60, "folders": 60, "caches": 15, "commands": 40,
+    "films": 12, "problems": 60,
 }  # fmt: skip
 
 

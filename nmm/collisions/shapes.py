@@ -19,7 +19,7 @@ import platformdirs
 from nmm import disk_cache
 from nmm.arrays import Array, Integers, array, nonzero_vector, positive, vector
 from nmm.errors import InputError, expect
-from nmm.robots.meshes import mesh_of
+from nmm.robots.mesh_files import mesh_arrays
 from nmm.text_format import one_line
 
 #: A hull is flat where its volume is below this share of its longest edge cubed.
@@ -170,14 +170,11 @@ class ConvexMesh(Shape):
         file, where = Path(self.file), f"mesh: {self.file}"
         expect(file.is_file(), "mesh", "a file", str(file))
         try:
-            mesh = mesh_of(str(file), np.array(self.scale))
-        except (OSError, ValueError, RuntimeError) as error:
-            said = one_line(str(error)).rpartition("message: ")[2]  # before it, where in Coal's source
-            raise InputError(f"cannot be read: {said}", where=where) from None
-        try:
-            return hull(np.array(mesh.vertices()).reshape(-1, 3))
-        except InputError as error:
-            raise error.at(where) from None
+            return hull(mesh_arrays(str(file), self.scale)[0])
+        except (OSError, ValueError) as error:
+            if isinstance(error, InputError):
+                raise error.at(where) from None
+            raise InputError(f"cannot be read: {one_line(str(error))}", where=where) from None
 
 
 @dataclass(frozen=True, eq=False)

@@ -98,13 +98,13 @@ WORDS = placed(
             f"expected one robot, found {len(names)} bodies of the world that move: {few(names)}"
         ),
         "mjcf_left_out": lambda *, names, **_: f"left out of the MJCF file: {few(names)}",
+        "beyond_bound": "more than {most:,.0f} {what}: no robot needs as many",
         "xacro_left_over": "<{element}/> is left over from xacro: left out",
         "only_macros": _only_macros,
         "macro_parameters_missing": _macro_parameters_missing,
         "xacro_failed": "xacro: {reason}",
         "xacro_argument_missing": "xacro argument {name!r} has no default and was not given a value",
-        "xacro_endless": "xacro: recursion without end (a file that includes itself, or a macro that calls "
-        "itself)",
+        "xacro_endless": "xacro: files or macros too deep in one another (does one include or call itself?)",
         "xacro_warned": "xacro {text}",
         "package_missing": _package_missing,
         "found_nearby": lambda *, count, name, place, **_: (

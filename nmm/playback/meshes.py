@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import manifold3d
@@ -13,6 +12,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from nmm.arrays import Array, Flags, Integers
+from nmm.robots.mesh_files import meshes_of
 
 if TYPE_CHECKING:
     import trimesh
@@ -54,20 +54,13 @@ def mesh_pieces(geometry: pin.GeometryObject) -> list[MeshPiece]:
 
 @lru_cache(maxsize=256)
 def _file_pieces(path: str) -> tuple[MeshPiece, ...]:
-    if not Path(path).is_file():
-        return ()
-    import trimesh
-
     try:
-        scene = trimesh.load_scene(path, process=False)
-        meshes = [mesh for mesh in scene.dump() if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces)]
-    except Exception:  # trimesh's readers raise whatever they meet; Pinocchio's copy of the mesh is at hand
+        meshes = meshes_of(path)
+        ends = np.array([mesh.bounds for mesh in meshes])
+        off = OFF * float(np.linalg.norm(ends[:, 1].max(axis=0) - ends[:, 0].min(axis=0)))
+        return tuple(MeshPiece(*_light(mesh, off), _color(mesh)) for mesh in meshes)
+    except Exception:  # trimesh raises whatever it meets in colours; Pinocchio's copy of the mesh is at hand
         return ()
-    if not meshes:
-        return ()
-    ends = np.array([mesh.bounds for mesh in meshes])
-    off = OFF * float(np.linalg.norm(ends[:, 1].max(axis=0) - ends[:, 0].min(axis=0)))
-    return tuple(MeshPiece(*_light(mesh, off), _color(mesh)) for mesh in meshes)
 
 
 def _light(mesh: trimesh.Trimesh, off: float) -> tuple[Array, Indices]:

@@ -16,6 +16,7 @@ import pinocchio as pin
 
 from nmm.findings import Finding
 from nmm.findings.robot_file import refusal
+from nmm.robots.mesh_files import mesh_arrays
 from nmm.text_format import one_line
 
 # Read by now and in use: a mesh that several shapes or robots have is read once, and goes with the last.
@@ -56,10 +57,8 @@ def read_meshes(shapes: Iterable[pin.GeometryObject], where: str) -> None:
             if is_unread(shape):
                 try:
                     shape.geometry = _mesh(shape.meshPath, shape.meshScale)
-                except (OSError, ValueError, RuntimeError) as error:
-                    # coal puts the place in its own source before the message.
-                    system = isinstance(error, OSError) and error.strerror
-                    cause = system or one_line(str(error).split("message:", 1)[-1])
+                except (OSError, ValueError) as error:
+                    cause = (isinstance(error, OSError) and error.strerror) or one_line(str(error))
                     link = shape.name.rpartition("_")[0]
                     values = {"mesh": shape.meshPath, "reason": cause}
                     problems.append(Finding("mesh_unreadable", values, {"link": link}))
@@ -79,7 +78,13 @@ def _mesh(file: str, scale: np.ndarray) -> Any:
 
 def mesh_of(file: str, scale: np.ndarray) -> Any:
     """The mesh of a file (coal's, with its tree of boxes), its axes stretched by `scale` (3,)."""
-    return pin.hppfcl.MeshLoader().load(file, scale)
+    vertices, faces = mesh_arrays(file, scale)
+    mesh = pin.hppfcl.BVHModelOBBRSS()
+    mesh.beginModel(len(faces), len(vertices))
+    mesh.addVertices(vertices)
+    mesh.addTriangles(faces)
+    mesh.endModel()
+    return mesh
 
 
 class MeshesWhenAsked:

@@ -5,12 +5,13 @@ two parents, zero axes) silently."""
 
 import re
 from collections import defaultdict
-from collections.abc import Container
+from collections.abc import Collection, Container, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from nmm.findings import Finding
 from nmm.platforms import PLATFORMS
+from nmm.robots.loading.budget import MOST_IN_A_ROW, MOST_LINKS, MOST_MOVING
 from nmm.robots.loading.check_parts import FindMesh, check_joint, check_link, check_material
 from nmm.robots.loading.xml_tree import Attributes, Element, Owner, XmlError, child, children, link_at, parse
 from nmm.robots.mimic_joints import MimicJoint
@@ -52,7 +53,32 @@ def inspect(
     if root.tag != "robot":
         reader.add(root, "not_robot", got=root.tag)
         return None, reader.found
+    for what, count, most in _counts(root):
+        if count > most:
+            reader.add(None, "beyond_bound", what=what, most=most)
+            return None, reader.found
     return _check_robot(root, reader, find_mesh or Path, lock), reader.found
+
+
+def _counts(root: Element) -> list[tuple[str, int, int]]:
+    """What there is of all that has a bound: a name, how many, and the bound."""
+    joints = children(root, "joint")
+    above = {link_at(joint, "child"): link_at(joint, "parent") for joint in joints}
+    rows: dict[str, int] = {}
+    for link in above:
+        row = []
+        while link in above and link not in rows:
+            rows[link] = 0  # until it is known; in a cycle it stays
+            row.append(link)
+            link = above[link]
+        for k, one in enumerate(reversed(row), rows.get(link, 0) + 1):
+            rows[one] = k
+    moving = sum(joint.get("type") != "fixed" for joint in joints)
+    return [
+        ("links", max(len(children(root, "link")), len(joints)), MOST_LINKS),
+        ("joints that move", moving, MOST_MOVING),
+        ("links in a row", max(rows.values(), default=0), MOST_IN_A_ROW),
+    ]
 
 
 def _check_robot(root: Element, reader: Attributes, find_mesh: FindMesh, lock: Container[str]) -> CheckedUrdf:
@@ -117,7 +143,7 @@ def _check_names(elements: list[Element], kind: str, reader: Attributes) -> None
 
 
 def _check_tree(links: list[Element], joints: list[Element], reader: Attributes) -> None:
-    names = list(dict.fromkeys(name for link in links if (name := link.get("name"))))
+    names = dict.fromkeys(name for link in links if (name := link.get("name")))
     if not names:
         reader.add(None, "no_links")
         return
@@ -149,7 +175,7 @@ def _movable_on_root(joints: list[Element]) -> list[Element]:
     return [joint for joint, (parent, _) in movable if joint.get("type") != "fixed" and parent in body]
 
 
-def _end(joint: Element, tag: str, names: list[str], reader: Attributes) -> str | None:
+def _end(joint: Element, tag: str, names: Collection[str], reader: Attributes) -> str | None:
     """The parent or child link of a joint, or None with a finding."""
     owner = {"joint": joint.get("name")}
     element = child(joint, tag)
@@ -161,7 +187,7 @@ def _end(joint: Element, tag: str, names: list[str], reader: Attributes) -> str 
     return link if known else None
 
 
-def _check_cycles(names: list[str], parents: dict[str, list[str]], reader: Attributes) -> None:
+def _check_cycles(names: Iterable[str], parents: dict[str, list[str]], reader: Attributes) -> None:
     done: set[str] = set()
     for name in names:
         path: list[str] = []

@@ -19,6 +19,7 @@ import numpy as np
 from nmm.errors import RobotError, expect_known
 from nmm.findings import Finding
 from nmm.findings.robot_file import refusal
+from nmm.robots.loading.budget import STEPS_OF_A_FILE, BeyondBound, Budget, counted_xacro
 from nmm.robots.loading.mjcf import urdf_of
 from nmm.robots.loading.packages import Packages
 from nmm.robots.loading.xml_tree import XmlError, parse, read_text
@@ -28,7 +29,6 @@ SUFFIXES = (".urdf", ".xacro", ".xml", ".mjcf")
 #: Robots in other languages, by their files' suffixes.
 _OTHERS = {".sdf": "SDF", ".usd": "USD", ".usda": "USD"}
 _LINK = re.compile(r"<link\b")
-_COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 #: What xacro gives a meaning to in any file; calls of macros alone may be left over.
 _XACRO = re.compile(r"<xacro:(?:include|macro|property|arg|if|unless)\b|\$\((?:find|arg|env|optenv|eval) ")
 # xacro keeps its stacks, arguments and verbosity in module globals.
@@ -58,7 +58,7 @@ def describe(
     _check_file(file)
     packages = Packages(file, package_dirs)
     text = None if file.suffix.lower() == ".xacro" else read_text(file)
-    if text is None or _XACRO.search(_COMMENT.sub("", text)):
+    if text is None or _XACRO.search(_without_comments(text)):
         xml, used, warnings = expand(file.absolute(), texts, packages)
         call = None if _LINK.search(xml) else _call_of_macro(file, texts)
         if call is not None:
@@ -80,6 +80,11 @@ def describe(
             xml, notes = urdf_of(root, file)
             return Description(xml, file, packages, expanded=True, notes=notes)
     return Description(text, file, packages)
+
+
+def _without_comments(text: str) -> str:
+    first, *others = text.split("<!--")
+    return first + "".join(part.partition("-->")[2] for part in others)
 
 
 def _call_of_macro(file: Path, texts: Mapping[str, str]) -> ElementTree.Element | None:
@@ -150,12 +155,11 @@ def expand(
     import xacro  # 10 ms, and a URDF needs none of it
     import xacro.substitution_args
 
-    given = _Arguments(arguments)
+    given, budget = _Arguments(arguments), Budget()
     printed = io.StringIO()
-    with _LOCK, _patched(xacro, packages, call), redirect_stderr(printed):
+    with _LOCK, _patched(xacro, packages, budget, call), redirect_stderr(printed):
         try:
-            document = xacro.process_file(str(path), mappings=given)
-            xml = document.toxml()
+            xml = budget.took(xacro.process_file(str(path), mappings=given).toxml())
         # Expressions in the file may raise anything, and so may xacro on what they return.
         except Exception as error:
             raise _explained(error, path, xacro) from None
@@ -186,9 +190,10 @@ class _Arguments(dict[str, str]):
 
 
 @contextmanager
-def _patched(xacro: Any, packages: Packages, call: ElementTree.Element | None) -> Iterator[None]:
-    """xacro with our reading of files and package search, a call at the file's end, and fewer messages."""
-    substitution = xacro.substitution_args
+def _patched(
+    xacro: Any, packages: Packages, budget: Budget, call: ElementTree.Element | None
+) -> Iterator[None]:
+    """xacro with our reading of files and packages, a call at the file's end, bounds, fewer messages."""
 
     def find(package: str) -> str:
         folder = packages.find(package, Path(xacro.filestack[-1] if xacro.filestack else packages.file))
@@ -197,25 +202,33 @@ def _patched(xacro: Any, packages: Packages, call: ElementTree.Element | None) -
             raise refusal(packages.file, replace(lost, where=_inner(packages.file, xacro)))
         return str(folder)
 
-    saved = (xacro.parse, substitution._eval_find, xacro.all_includes, xacro.verbosity)
-    xacro.parse, substitution._eval_find = _reader(xacro, packages.file, saved[0], call), find
-    xacro.all_includes, xacro.verbosity = [], 0
+    patches = [
+        *counted_xacro(xacro, budget),
+        (xacro, "parse", _reader(xacro, packages.file, budget, call)),
+        (xacro.substitution_args, "_eval_find", find),
+        (xacro, "all_includes", []),
+        (xacro, "verbosity", 0),
+    ]
+    saved = [(owner, name, vars(owner).get(name)) for owner, name, _ in patches]
+    for owner, name, value in patches:
+        setattr(owner, name, value)
     try:
         yield
     finally:
-        xacro.parse, substitution._eval_find, xacro.all_includes, xacro.verbosity = saved
+        for owner, name, value in saved:
+            delattr(owner, name) if value is None else setattr(owner, name, value)
 
 
-def _reader(
-    xacro: Any, main: Path, original: Callable[..., Any], call: ElementTree.Element | None
-) -> Callable[..., Any]:
+def _reader(xacro: Any, main: Path, budget: Budget, call: ElementTree.Element | None) -> Callable[..., Any]:
     """`xacro.parse`, which reads UTF-8 in any locale and refuses a DOCTYPE before anything is expanded."""
+    original = xacro.parse
 
     def read(text: Any, filename: str | None = None) -> Any:
         if text is not None or filename is None:
             return original(text, filename)
         try:
-            content = read_text(Path(filename))
+            budget.step(STEPS_OF_A_FILE)
+            content = budget.took(read_text(Path(filename)))
             parse(content)
         except FileNotFoundError as error:
             xacro.filestack.pop()  # as xacro does: the error is the including file's
@@ -258,10 +271,12 @@ def _inner(path: Path, xacro: Any) -> dict[str, str]:
 
 def _explained(error: BaseException, path: Path, xacro: Any) -> RobotError:
     """The innermost cause in one line; xacro wraps it once for each expression around it."""
-    while isinstance(getattr(error, "exc", None), xacro.XacroException | RobotError):
+    while isinstance(getattr(error, "exc", None), xacro.XacroException | RobotError | BeyondBound):
         error = error.exc  # type: ignore[attr-defined]  # XacroException has it, as just asked
     if isinstance(error, RobotError):
         return error
+    if isinstance(error, BeyondBound):
+        return refusal(path, replace(error.finding, where=_inner(path, xacro)))
     inside = getattr(error, "exc", None)
     code, values = "xacro_failed", {"reason": one_line(str(error)) or type(error).__name__}
     if isinstance(inside, xacro.substitution_args.ArgException):

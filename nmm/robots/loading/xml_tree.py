@@ -3,7 +3,7 @@
 import math
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
@@ -13,6 +13,7 @@ from xml.parsers import expat
 from nmm.files import read_bytes
 from nmm.findings import Finding
 from nmm.findings.robot_file import refusal
+from nmm.robots.loading.budget import MOST_ELEMENTS
 
 #: How deep elements may stand in one another: what reads them further recurses.
 DEEPEST = 200
@@ -49,7 +50,7 @@ def read_text(path: Path) -> str:
 
 
 def parse(text: str) -> Element:
-    """`XmlError` for empty or malformed text, elements over `DEEPEST` deep, or a DOCTYPE.
+    """`XmlError` for empty or malformed text, too many elements, some over `DEEPEST` deep, or a DOCTYPE.
     Drives expat by hand: it alone stops at a DOCTYPE before any entity (endless, or another file's) is
     defined, gives lines, and needs no import (lxml takes 15 ms)."""
     if not text.strip():
@@ -57,11 +58,13 @@ def parse(text: str) -> Element:
     builder = ElementTree.TreeBuilder(element_factory=Element)
     parser = expat.ParserCreate()
     parser.buffer_text = True
-    depth = 0
+    depth = count = 0
 
     def start(tag: str, attributes: dict[str, str]) -> None:
-        nonlocal depth
-        depth += 1
+        nonlocal depth, count
+        depth, count = depth + 1, count + 1
+        if count > MOST_ELEMENTS:
+            raise XmlError("beyond_bound", what="elements", most=MOST_ELEMENTS)
         if depth > DEEPEST:
             raise XmlError("nested_too_deep", parser.CurrentLineNumber, most=DEEPEST)
         element = cast("Element", builder.start(tag, attributes))
@@ -129,7 +132,9 @@ class Attributes:
             return None
         return value
 
-    def choice(self, element: Element, value: str, available: Sequence[str], kind: str, owner: Owner) -> bool:
+    def choice(
+        self, element: Element, value: str, available: Collection[str], kind: str, owner: Owner
+    ) -> bool:
         """Whether the value is available; if not, adds a finding that lists those that are."""
         if value in available:
             return True
