@@ -239,6 +239,31 @@ def test_the_folder_holds_all_rows_in_order(short: Path, tmp_path: Path) -> None
     assert (tmp_path / "out" / "rows.parquet").stat().st_mtime_ns == before
 
 
+@pytest.mark.parametrize("part", ["head", "middle", "end"])
+def test_a_damaged_part_is_computed_again_and_told(
+    short: Path, tmp_path: Path, run: Command, monkeypatch: pytest.MonkeyPatch, part: str
+) -> None:
+    """Also where its end, with the number of its rows, is whole."""
+    vary_x(short).run(tmp_path / "whole", jobs=1)
+    sweep, kept = vary_x(short), tmp_path / "parts" / "parts" / "000001.parquet"
+
+    def stop(place: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(sweep_folder.SweepFolder, "finish", stop)
+        with pytest.raises(KeyboardInterrupt):
+            sweep.run(tmp_path / "parts", jobs=1)
+    content = bytearray(kept.read_bytes())
+    first = {"head": 0, "middle": len(content) // 3, "end": len(content) - 40}[part]
+    content[first : first + 40] = 40 * b"\x00"
+    kept.write_bytes(content)
+    swept = sweep.run(tmp_path / "parts", jobs=1)
+    assert swept.computed_again == sweep.definition.chunk
+    assert swept.table.equals(nmm.Sweep.run(vary_x(short), tmp_path / "whole", jobs=1).table)
+    assert sweep.run(tmp_path / "parts", jobs=1).computed_again == 0
+
+
 def test_interrupted_anywhere_it_goes_on_to_the_same_bytes(
     short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

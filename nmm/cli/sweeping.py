@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from nmm.cli.options import SetOption, option, settings_of
-from nmm.cli.output import FAILED, OK, bar_of, complain, show_table
+from nmm.cli.output import FAILED, OK, bar_of, complain, show_table, warn
 from nmm.errors import InputError, expect, no_such
 
 if TYPE_CHECKING:
@@ -96,6 +96,8 @@ def sweep(
             share = f"{done} of {total} rollouts are" if done else "nothing is"
             complain("nmm sweep", f"interrupted: {share} in {folder}; the same command goes on there")
             return FAILED
+    if swept.computed_again:
+        warn(f"{swept.computed_again} rollouts in damaged files of {folder} were computed again")
     _show(swept)
     return OK
 

@@ -100,6 +100,11 @@ class SweepFolder:
         sizes = {chunk: len(self.definition.indices(chunk)) for chunk in range(self.definition.chunks)}
         return [chunk for chunk, size in sizes.items() if rows_in(self._part(chunk)) != size]
 
+    def damaged(self, chunks: Sequence[int]) -> int:
+        """Rows of those chunks whose files are there but damaged."""
+        there = [chunk for chunk in chunks if self._part(chunk).exists()]
+        return sum(len(self.definition.indices(chunk)) for chunk in there)
+
     def add(self, chunk: int, found: Computed) -> None:
         for index, files in found.runs.items():
             self._write_run(self.path / f"runs/{index:09d}", files)
@@ -161,9 +166,9 @@ def schema_of(definition: Definition) -> Any:
 
 
 def rows_in(path: Path) -> int:
-    """Rows of a file; -1 if it cannot be read."""
+    """Rows of a file, all of which are read; -1 if they cannot be."""
     try:
-        return int(parquet().read_metadata(path).num_rows)
+        return int(parquet().read_table(path, partitioning=None).num_rows)
     except (OSError, arrow().ArrowException):
         return -1
 

@@ -44,6 +44,7 @@ class SweepResult:
     ----------
     folder : where it is
     definition : what it is
+    computed_again : how many rows were there, in files that are damaged
 
     Examples
     --------
@@ -55,6 +56,7 @@ class SweepResult:
 
     folder: Path
     definition: Definition
+    computed_again: int = 0
 
     @cached_property
     def table(self) -> Any:

@@ -162,6 +162,7 @@ class Sweep:
                 check_size(definition, workers, place.path)
             stack.enter_context(place.opened())
             missing = place.missing()
+            again = place.damaged(missing)
             done = _Done(definition, missing, progress)
             threads = self._threads(local, sum(map(len, map(definition.indices, missing))))
             job = partial(computed, definition=definition)
@@ -175,7 +176,7 @@ class Sweep:
                     place.add(chunk, rows)
                     done.report(chunk, 1.0)
             place.finish()
-            swept = SweepResult(place.path, definition)
+            swept = SweepResult(place.path, definition, again)
             write_page(swept)
         return swept
 
