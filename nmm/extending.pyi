@@ -142,6 +142,7 @@ from .robots.loading.provenance import provenance_of as provenance_of
 from .robots.loading.report import FileReport as FileReport
 from .robots.loading.report import file_report as file_report
 from .robots.loading.source import source_path as source_path
+from .robots.mesh_files import meshes_of as meshes_of
 from .robots.meshes import Shapes as Shapes
 from .robots.meshes import read_meshes as read_meshes
 from .robots.mimic_joints import MimicJoint as MimicJoint

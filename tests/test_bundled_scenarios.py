@@ -70,10 +70,13 @@ def test_every_bundled_scenario_runs_to_its_end(runs: dict[str, nmm.Trajectory])
     assert set(PAPER) | set(DAMPED) <= set(runs)
     for name, run in runs.items():
         assert run.outcome == ("missed" if name == MISSED else "completed"), name
-        assert run.t[-1] == Scenario.load(name).parts.duration, name
         assert run.scenario is not None
         assert run.scenario["title"], name
         assert run.summary()["lateral_slip_max"] <= 1e-12, name
+        if run.resolver == "plan":
+            assert run.error_norm[-1] < 0.005, name
+            continue
+        assert run.t[-1] == Scenario.load(name).parts.duration, name
         if name in DAMPED:
             assert DAMPED[name] in codes(run), name
         elif name in GIVE_WAY:

@@ -314,3 +314,61 @@ def test_a_plan_is_a_run_that_is_saved_and_read(tmp_path):
     read = nmm.Trajectory.load(run.save(tmp_path / "run", figures=False), robot)
     assert np.array_equal(read.q, run.q)
     assert read.resolver == "plan"
+
+
+# Scenarios
+
+
+def test_a_scenario_with_a_plan_reaches_what_a_controller_alone_does_not():
+    scenario = nmm.Scenario.load("behind_the_wall")
+    run = scenario.run()
+    assert (run.resolver, run.complete) == ("plan", True)
+    assert run.error_norm[-1] < 0.005
+    assert run.clearance_between.min() >= 0.03
+    assert np.allclose(run.error, run.r_d - run.r)
+    assert np.array_equal(run.q, nmm.Scenario.load("behind_the_wall").run().q)
+    alone = scenario.override("plan", False).run()
+    assert alone.outcome is nmm.Outcome.MISSED
+    assert alone.error_norm[-1] > 1.0
+
+
+def test_a_plan_in_a_folder_is_read_and_run_again(tmp_path):
+    scenario = nmm.Scenario.load("behind_the_wall")
+    run = scenario.run()
+    folder = run.save(tmp_path / "run", figures=False)
+    assert np.array_equal(nmm.Trajectory.load(folder).q, run.q)
+    again = nmm.Scenario.load(folder / "scenario.yaml").run()
+    assert np.array_equal(again.q, run.q)
+
+
+def test_compare_runs_the_plan_and_each_resolver_without_it(tmp_path, capfd):
+    from nmm.cli.exit_status import status_of
+
+    out = tmp_path / "compared"
+    assert status_of(("compare", "behind_the_wall", "--resolvers", "pg", "--out", str(out))) == 1
+    assert "PG missed" in capfd.readouterr().err
+    runs = [nmm.Trajectory.load(out / name) for name in ("plan", "pg")]
+    assert [run.complete for run in runs] == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("plan", "key"),
+    [
+        ({"to": {"z": 1.0}}, "plan.to"),
+        ({"to": [1.0]}, "plan.to"),
+        ({"through": [{"x": 1.0}, {"w": 1.0}]}, "plan.through.1"),
+        ({"seconds": 0}, "plan.seconds"),
+        ({"seed": "one"}, "plan.seed"),
+        ({"speed": 1}, "plan"),
+    ],
+)
+def test_a_wrong_key_of_a_plan_is_named(plan, key):
+    with pytest.raises(nmm.errors.ScenarioError) as found:
+        nmm.Scenario.load("behind_the_wall", {"plan": plan}).run()
+    assert key in found.value.where
+
+
+def test_a_target_that_moves_is_no_goal_of_a_plan():
+    with pytest.raises(nmm.errors.ScenarioError) as found:
+        nmm.Scenario.load("unicycle_2r_position", {"plan": True}).run()
+    assert "moves" in found.value.what

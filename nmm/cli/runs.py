@@ -90,12 +90,13 @@ def run(
     drawn = figures.options()
     made = _load(scenario, one, changed, limits, of_robot)
     label = "" if one is None else one.label
-    called = label or made.parts.resolver.kind.upper()
+    called = label or _called(made)
     folder = out or Path("runs") / f"{made.name}-{folder_name(called)}"
     check_folder(folder, is_run)
     controller = made.controller()  # complains before there is a progress bar
     shown: AbstractContextManager[LiveRun | None] = nullcontext()
-    if play:
+    planned = made.parts.plan is not None
+    if play and not planned:
         from nmm.playback import LiveRun
 
         title = f"{made.title or made.name}, {called}"
@@ -108,7 +109,13 @@ def run(
         ends = asked_to_end.is_set() or trajectory.outcome == "interrupted"
         if page is not None and len(trajectory) and not ends:
             page.stay(trajectory, ellipsoids=shown_ellipsoids)
+    if play and planned and not ends:
+        trajectory.play(**browser.keywords(), ellipsoids=shown_ellipsoids)
     return status
+
+
+def _called(scenario: Scenario) -> str:
+    return "PLAN" if scenario.parts.plan is not None else scenario.parts.resolver.kind.upper()
 
 
 def _always_written(wanted: bool) -> None:
@@ -132,7 +139,8 @@ def compare(
 ) -> int:
     """Run a scenario with several resolvers, or with one at several settings.
 
-    One table, one figure, one playback.
+    One table, one figure, one playback. A scenario with a plan is run with it, and with each resolver
+    without it.
 
     \b
     nmm compare unicycle_2r_position
@@ -155,13 +163,17 @@ def compare(
     scenarios = [_load(scenario, one, changed, limits, of_robot) for one in several]
     check_different(several, scenarios, "--resolvers")
     name = scenarios[0].name
+    run_labels = [one.label for one in several]
+    if scenarios[0].parts.plan is not None:
+        scenarios = [scenarios[0], *(made.override("plan", False) for made in scenarios)]
+        run_labels = ["", *run_labels]
     folder = out or Path("runs") / f"{name}-compare"
     check_folder(folder, comparison.is_comparison)
     # What is wrong with the last one shows before the first one runs.
     controllers = [made.controller() for made in scenarios]
     trajectories: list[Trajectory] = []
-    for made, controller, one in zip(scenarios, controllers, several, strict=True):
-        trajectories.append(_run(made, controller, label=one.label))
+    for made, controller, label in zip(scenarios, controllers, run_labels, strict=True):
+        trajectories.append(_run(made, controller, label=label))
         if trajectories[-1].outcome == "interrupted":
             break
     with shielded():
@@ -173,7 +185,7 @@ def compare(
         print_table(comparison_table(trajectories), form, folder)
         return _status("nmm compare", trajectories, folder)
     for column, made, trajectory in zip(columns, scenarios, trajectories, strict=False):
-        if len(trajectory):
+        if len(trajectory) and made.parts.plan is None:
             controller = made.controller()
             controller.dt = trajectory.dt
             column["a control step"] = f"{1e6 * step_time(controller, trajectory):.3g} µs here"
@@ -246,7 +258,7 @@ def _run(
     from nmm.findings import Finding
     from nmm.runs.verdict import Outcome, Verdict
 
-    with progress(f"{scenario.name}, {label or scenario.parts.resolver.kind.upper()}") as report:
+    with progress(f"{scenario.name}, {label or _called(scenario)}") as report:
         trajectory = replace(scenario.run(report, controller, watch), label=label)
         try:
             _ = trajectory.findings  # a shorter dt is tried here, where Ctrl-C still ends it

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array
 from nmm.collisions.motion_check import MotionCheck
 from nmm.control.goal import Goal, error_sizes
-from nmm.errors import RunError, few
+from nmm.errors import InputError, RunError, few
 from nmm.functions.program import COMPILED, Program
 from nmm.functions.tasks.task import Comparison, Task
 from nmm.robots.robot import Robot
@@ -70,7 +70,7 @@ class GoalPostures:
     def _reaching(self, wanted: object, start: Array, rng: np.random.Generator) -> Iterator[Array | None]:
         robot = self.robot
         if isinstance(wanted, Task):
-            solve = Reaching(robot, wanted, self.low, self.high, self.tolerance)
+            solve = Reaching(robot, wanted, self.tolerance)
             yield solve(start)
             for _ in range(ATTEMPTS):
                 yield solve(rng.uniform(self.low, self.high))
@@ -96,31 +96,25 @@ class GoalPostures:
 class Reaching:
     """Newton's method (Levenberg and Marquardt's) for a task whose target stands, within limits."""
 
-    def __init__(self, robot: Robot, task: Task, low: Array, high: Array, tolerance: Goal) -> None:
-        self._robot, self._low, self._high = robot, low, high
+    def __init__(self, robot: Robot, task: Task, tolerance: Goal) -> None:
+        self._robot, self._tolerance, following = robot, tolerance, robot.following
         self._units = [row.unit for row in task.rows(robot)]
-        self._sizes = np.array(
-            [{"m": tolerance.m, "rad": tolerance.rad}.get(unit, 1e-3) for unit in self._units]
-        )
-        self._tolerance = tolerance
         self._program = Program(robot, (task.function, task.reference, Comparison(task)), COMPILED)
         self._program.lay_out()
-        if robot.mimic_joints:
-            self._leads = np.zeros((robot.n, robot.n))
-            for i in robot.following.independent:
-                self._leads[i, i] = 1.0
-            self._leads[robot.following.columns] = (
-                robot.following.multipliers[:, np.newaxis] * self._leads[robot.following.leaders]
-            )
-        else:
-            self._leads = np.eye(robot.n)
+        targets = [self._program.evaluate(t, robot.rest)[1].value for t in (0.0, 1.0, np.e)]
+        if not all(np.array_equal(target, targets[0]) for target in targets):
+            raise InputError("its target moves", where="plan: goal", expected="a task whose target stands")
+        # What all coordinates do where those that follow no other move.
+        self._leads = np.eye(robot.n)
+        self._leads[following.columns] = following.multipliers[:, np.newaxis] * self._leads[following.leaders]
 
-    def error(self, q: Array) -> tuple[Array, Array]:
-        """e (s,) and ∂e/∂q (s, n) at q."""
+    def evaluate(self, q: Array) -> tuple[Array, Array, Array, Array]:
+        """Value, target and error e (s,) at q (n,), and ∂e/∂q (s, n)."""
         value, target, compared = self._program.evaluate(0.0, q)
         if len(compared.value):
-            return compared.value, compared.value_q @ self._leads
-        return target.value - value.value, (target.value_q - value.value_q) @ self._leads
+            return value.value, target.value, compared.value, compared.value_q @ self._leads
+        error_q = (target.value_q - value.value_q) @ self._leads
+        return value.value, target.value, target.value - value.value, error_q
 
     def __call__(self, q: Array) -> Array | None:
         """A configuration near q (n,) that reaches the target within a share of the tolerances, or None."""
@@ -130,7 +124,7 @@ class Reaching:
         q = robot.following.placed(np.clip(q, limits[:, 0], limits[:, 1]))
         free = np.ones(robot.n)
         for _ in range(STEPS):
-            e, e_q = self.error(q)
+            _, _, e, e_q = self.evaluate(q)
             sizes = error_sizes(e, self._units)
             rest = np.abs(e)[[unit not in ("m", "rad") for unit in self._units]]
             if (

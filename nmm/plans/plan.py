@@ -20,11 +20,12 @@ from nmm.control.collisions import Collisions
 from nmm.control.goal import Goal
 from nmm.control.limits import Limits, LimitsOn
 from nmm.errors import InputError, RunError, expect_kind
+from nmm.functions.tasks.linear_coordinates import Posture
 from nmm.functions.tasks.task import Task
 from nmm.kernels.compiled import checked_by_caller
 from nmm.kernels.record_layout import views
 from nmm.plans import tree
-from nmm.plans.goals import GoalPostures, Wanted, alternatives, nothing_found
+from nmm.plans.goals import GoalPostures, Reaching, Wanted, alternatives, nothing_found
 from nmm.plans.path import Guide, shortened
 from nmm.plans.timing import TimedLegs, timed
 from nmm.plans.tree import PLACE, Trees
@@ -34,6 +35,7 @@ from nmm.robots.reach import first_tip
 from nmm.robots.robot import Robot
 from nmm.runs.clearance import swept
 from nmm.runs.margins import margin, shares, standing
+from nmm.runs.shown_frame import shown_frame
 from nmm.runs.trajectory import Trajectory
 
 #: Room for configurations in each tree, and rounds of a search between two looks at the clock.
@@ -53,6 +55,7 @@ class Found(NamedTuple):
     guide: Guide
     limits: LimitsOn
     scene: Scene | None
+    goal: object
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,49 +118,64 @@ class Plan:
         return q, timed.inputs[leg] * rate[:, np.newaxis]
 
     def trajectory(self, dt: float = 0.02) -> Trajectory:
-        """The motion sampled every dt, s, and at its end, as a run that follows it without an error: it
-        plays, saves and compares. Its task's rows are the coordinates; inputs are those at each sample."""
+        """The motion sampled every dt, s, and at its end, as a run: it plays, saves and compares. Its task is
+        the goal's or, of a goal of coordinates, that these are where it ends."""
         robot, scene = self.robot, self._found.scene
         times = np.arange(0.0, self.duration - 1e-9, positive(dt, "dt"))
         t = np.append(times, self.duration)
         q, u = self(t)
-        N, n = q.shape
-        names, within = shares(self._found.limits, robot, q, u, np.zeros((N, 0)))
+        S = np.array([robot.S(one) for one in q])
+        task = self._task()
+        rows, drawn = task.rows(robot), shown_frame([task], robot)
+        found = map(np.array, zip(*map(Reaching(robot, task, Goal()).evaluate, q), strict=True))
+        r, r_d, error, error_q = found
+        names, within = shares(self._found.limits, robot, q, u, np.zeros((len(t), 0)))
         distances: dict[str, Any] = {}
         if scene is not None:
             pairs = tuple(" and ".join(pair) for pair in scene.names)
             distances = {"clearance_names": pairs, "clearance_asked": scene.distance}
-            distances |= swept(scene, t, q, u, [scene.places(0.0)] * N).kept
-        frame = first_tip(robot)
+            distances |= swept(scene, t, q, u, [scene.places(0.0)] * len(t)).kept
+        frame = drawn.frame or first_tip(robot)
+        path = None if frame is None else FramePath(robot, frame).positions(q)
         return Trajectory(
             robot=robot,
             t=t,
             q=q,
             u=u,
-            q_dot=np.array([robot.S(one) @ rates for one, rates in zip(q, u, strict=True)]),
-            r=q,
-            r_d=q.copy(),
-            error=np.zeros((N, n)),
-            objective=np.zeros(N),
-            sigma_min=np.ones(N),
-            partition=np.full((N, n), -1),
-            residual=np.zeros(N),
-            scale=np.ones((N, 1)),
-            step_size=np.ones(N),
-            crossed=np.zeros(N, dtype=np.int64),
+            q_dot=np.einsum("kij,kj->ki", S, u),
+            r=r,
+            r_d=r_d,
+            error=error,
+            objective=np.zeros(len(t)),
+            sigma_min=np.linalg.svd(error_q @ S, compute_uv=False)[:, -1],
+            partition=np.full(error.shape, -1),
+            residual=np.zeros(len(t)),
+            scale=np.ones((len(t), 1)),
+            step_size=np.ones(len(t)),
+            crossed=np.zeros(len(t), dtype=np.int64),
             margin=margin(within[:, ~standing(robot, names, within)]),
             shares=within,
             limit_names=names,
             limited=True,
-            r_names=robot.q_names,
-            r_units=robot.q_units,
+            r_names=tuple(row.name for row in rows),
+            r_units=tuple(row.unit for row in rows),
             resolver="plan",
             method="plan",
             dt=dt,
             frame=frame,
-            path=None if frame is None else FramePath(robot, frame).positions(q),
+            path=path,
+            desired=None if path is None or not drawn.rows else drawn.desired(path, r_d),
+            target=drawn.mark(path),
             **distances,
         )
+
+    def _task(self) -> Task:
+        goal, robot = self._found.goal, self.robot
+        if isinstance(goal, Task):
+            return goal
+        named = [name for name in goal if name in robot.q_names] if isinstance(goal, Mapping) else []
+        names = named or [robot.q_names[i] for i in robot.following.independent]
+        return Task(Posture(*names), self.end[[robot.coordinate(name) for name in names]])
 
 
 def plan(
@@ -287,7 +305,7 @@ class Search:
         legs = self.guide.merged(np.vstack(parts))
         motion = timed(self.guide, robot, self.start, legs, self.limits, self.usual)
         motions, postures = (int(count) for count in self.trees.looked)
-        found = Found(motion, self.guide, self.limits, self.check.scene)
+        found = Found(motion, self.guide, self.limits, self.check.scene, self.goals[-1])
         return Plan(robot, motions, postures, found)
 
     def _goals(self, wanted: Wanted, here: Array) -> Array:

@@ -14,7 +14,7 @@ from nmm.scenario.limits import BoundPart, GoalPart, LimitsPart, RetreatPart, St
 from nmm.scenario.objectives import OBJECTIVE_PARTS, TermPart
 from nmm.scenario.resolvers import RESOLVER_PARTS
 from nmm.scenario.robot import ArmPart, MountedPart, RobotPart
-from nmm.scenario.schema import ScenarioPart
+from nmm.scenario.schema import PlanPart, ScenarioPart
 from nmm.scenario.tasks import CONDITION_PARTS, TASK_PARTS
 
 
@@ -41,6 +41,7 @@ def sections() -> Iterator[Section]:
     yield from _kinds("resolver", RESOLVER_PARTS, {kind: RESOLVERS.words(kind) for kind in RESOLVER_PARTS})
     yield _section("until", GoalPart)
     yield _section("retreat", RetreatPart)
+    yield _section("plan", PlanPart)
     yield _section("limits", LimitsPart)
     yield _section("limits.bounds: a task's function and its keys, with these", BoundPart)
     yield _section("collisions", CollisionsPart)

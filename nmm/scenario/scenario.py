@@ -20,6 +20,7 @@ from nmm.scenario.keys import KeyedError, NamedReferences, as_written, at, first
 if TYPE_CHECKING:
     from nmm.collisions.obstacle import Obstacle
     from nmm.control.controller import Controller
+    from nmm.plans.plan import Plan
     from nmm.resolvers.base import Resolver
     from nmm.robots.robot import Robot
     from nmm.runs.recording import Recorder
@@ -166,13 +167,27 @@ class Scenario:
         with self._located(), at("collisions"):
             return tuple(part.build_obstacles(robot, self.absolute, ("collisions",)))
 
+    def plan(self, progress: Progress | None = None) -> Plan:
+        """The planned motion from its start, by the key `plan` or its defaults: see `nmm.plan`.
+
+        Raises
+        ------
+        ScenarioError : as `controller`; a task whose target moves
+        RunError : no way was found
+        """
+        robot = self.robot()
+        with self._located():
+            self.parts.check_start(robot)
+            return self.parts.build_plan(robot, self.absolute, progress)
+
     def run(
         self,
         progress: Progress | None = None,
         controller: Controller | None = None,
         watch: Callable[[Recorder], None] | None = None,
     ) -> Trajectory:
-        """Run it; a run that fails or is interrupted (Ctrl-C) returns what was computed.
+        """Run it; a run that fails or is interrupted (Ctrl-C) returns what was computed. With the key `plan`
+        it is the planned motion; `RunError` where none is found.
 
         Parameters
         ----------
@@ -184,6 +199,8 @@ class Scenario:
         from nmm.runs.simulation import simulate
 
         parts = self.parts
+        if parts.plan is not None:
+            return self._told(self.plan(progress).trajectory(parts.dt))
         with self._located():
             if controller is None:
                 controller = self.controller()
@@ -202,9 +219,12 @@ class Scenario:
                     progress=progress,
                     watch=watch,
                 )
-        return trajectory.with_scenario(
-            self.resolved(), [Finding("setting_parted", {"text": one}) for one in self.warnings]
-        )
+        return self._told(trajectory)
+
+    def _told(self, trajectory: Trajectory) -> Trajectory:
+        """A run with the scenario that it came from."""
+        warnings = [Finding("setting_parted", {"text": one}) for one in self.warnings]
+        return trajectory.with_scenario(self.resolved(), warnings)
 
     def resolved(self) -> dict[str, Any]:
         """Every key as plain data, defaults included, numbers evaluated, files with absolute paths.

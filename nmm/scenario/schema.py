@@ -1,7 +1,7 @@
 """The keys of a scenario, from the top."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 from pydantic import BeforeValidator, Field
 
@@ -11,6 +11,7 @@ from nmm.control.sequenced import SequencedController
 from nmm.errors import InputError, few
 from nmm.functions.tasks.task import Stack
 from nmm.kinds import RESOLVERS
+from nmm.progress import Progress
 from nmm.resolvers.base import Resolver
 from nmm.robots.robot import Robot
 from nmm.robots.semantics import POSTURE
@@ -18,12 +19,15 @@ from nmm.scenario.collisions import CollisionsPart
 from nmm.scenario.functions import REFERENCE_PARTS
 from nmm.scenario.keys import KeyedError, Part, at
 from nmm.scenario.limits import GoalPart, LimitsPart, RetreatPart, SteeringPart, part_or_none
-from nmm.scenario.numbers import Nested, Positive, numbers, numbers_by_name
+from nmm.scenario.numbers import Nested, Positive, Whole, numbers, numbers_by_name
 from nmm.scenario.objectives import ObjectiveList, QuadraticPart, build_objective
 from nmm.scenario.resolvers import AnyResolver, WithAddedTask
 from nmm.scenario.robot import Absolute, RobotChoice
 from nmm.scenario.tasks import TASK_PARTS, TaskList, TaskPart, build_tasks, listed
 from nmm.text_format import listed as in_words
+
+if TYPE_CHECKING:
+    from nmm.plans.plan import Plan
 
 
 def _start(value: object) -> dict[str, Any] | list[Nested]:
@@ -37,6 +41,30 @@ def _start(value: object) -> dict[str, Any] | list[Nested]:
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise KeyedError((POSTURE,), expected="a posture's name, or a list of such", got=named)
     return {POSTURE: named, **numbers_by_name(rest)}
+
+
+def _goal(value: object) -> dict[str, Any]:
+    if not isinstance(value, Mapping):
+        raise InputError(expected="numbers by coordinate, as {x: 2, y: 1, theta: 0}", got=value)
+    return cast("dict[str, Any]", _start(value))
+
+
+Coordinates = Annotated[dict[str, Any], BeforeValidator(_goal)]
+
+
+class PlanPart(Part):
+    """A motion to a goal that is searched, in place of the controller's; `plan: true` is this with its
+    defaults."""
+
+    to: Coordinates | None = Field(
+        None,
+        description="coordinates to be reached, m and rad: by name, others are free; posture: home takes a "
+        "named posture of the robot's SRDF; the target of the scenario's one task when not given",
+    )
+    through: list[Coordinates] = Field(default_factory=list, description="such goals on the way, in order")
+    seconds: Positive = Field(10.0, description="after which the search gives up, s")
+    seed: Whole = Field(1, description="of the random numbers; the same plan comes of the same seed")
+    shorten: Whole = Field(200, description="how often a shorter way between two points of it is tried")
 
 
 class ScenarioPart(Part):
@@ -75,6 +103,11 @@ class ScenarioPart(Part):
     )
     collisions: Annotated[CollisionsPart | None, BeforeValidator(part_or_none)] = Field(
         None, description="what the robot keeps off: true for itself, or a mapping with obstacles"
+    )
+    plan: Annotated[PlanPart | None, BeforeValidator(part_or_none)] = Field(
+        None,
+        description="whether the run is a planned motion, which ends at its goal: true, or a mapping. Task, "
+        "resolver and duration then do not matter, but for the task's target and the tolerances of until",
     )
     until: Annotated[GoalPart | None, BeforeValidator(part_or_none)] = Field(
         None, description="a target to reach: the run ends where the error is within tolerances"
@@ -127,6 +160,43 @@ class ScenarioPart(Part):
                     self._check_added(robot, rows, robot.n_u - s, held)
             with self.resolver.own_keys():
                 return Controller(robot, task, resolver, objective, added, *rest, collisions)
+
+    def build_plan(self, robot: Robot, absolute: Absolute, progress: Progress | None) -> "Plan":
+        """The planned motion; `RunError` where none is found."""
+        from nmm.plans.plan import plan
+
+        part = self.plan or PlanPart.model_validate({})
+        goals = [part.to, *part.through]
+        for k, one in enumerate(goals):
+            with at("plan"), at(*(("to",) if k == 0 else ("through", k - 1))):
+                robot.q(one)
+        goal: Any = part.to
+        if goal is None:
+            with at("task"):
+                stack = build_tasks(self.task, robot)
+                if len(stack) > 1 or any(one.when for one in stack):
+                    raise InputError(expected="one task, as its target is the plan's goal; or plan.to")
+                goal = stack[0]
+        with at("collisions"):
+            place = ("collisions",)
+            collisions = None if self.collisions is None else self.collisions.build(robot, absolute, place)
+        limits = None if self.limits is None else self.limits.build(robot)
+        tolerance = None if self.until is None else self.until.make()
+        given = part.given("through", "seconds", "seed", "shorten")
+        with at("plan"):
+            try:
+                return plan(
+                    robot,
+                    robot.q(self.q0),
+                    goal,
+                    collisions=collisions,
+                    limits=limits,
+                    tolerance=tolerance,
+                    progress=progress,
+                    **given,
+                )
+            except InputError as error:
+                raise error.placed(error.where.removeprefix("plan: ")) from None
 
     def check_start(self, robot: Robot) -> None:
         """`KeyedError` for a q0 that is none of the robot's, or outside limits that are not kept."""
