@@ -30,7 +30,7 @@ class Obstacle:
 
     Parameters
     ----------
-    shape : `Box`, `Sphere`, `Cylinder`, `Capsule`, `Plane` or `Mesh`
+    shape : `Box`, `Sphere`, `Cylinder`, `Capsule`, `HalfSpace`, `Hull` or `ConvexMesh`
     placement : where it is: (3,) its origin, (6,) origin and rotation vector, or a (4, 4) matrix; the world's
         origin when not given
     motion : in its place, where it is at t, s: a function that returns such a placement

@@ -19,7 +19,7 @@ from nmm.collisions.shapes import HalfSpace
 from nmm.control.collisions import Collisions
 from nmm.control.goal import Goal
 from nmm.control.limits import Limits, LimitsOn
-from nmm.errors import InputError, RunError, expect_kind
+from nmm.errors import InputError, RunError, expect_kind, few
 from nmm.functions.tasks.linear_coordinates import Posture
 from nmm.functions.tasks.task import Task
 from nmm.kernels.compiled import checked_by_caller
@@ -235,6 +235,12 @@ def plan(
     expect_kind(limits, Limits, "plan: limits", "Limits")
     if limits.bounds:
         raise InputError("limits of functions are not planned for", where="plan: limits")
+    n_p, ends = robot.platform.n_p, robot.limited.all(axis=1)
+    endless = [robot.q_names[i] for i in range(n_p, robot.n) if robot.q_units[i] == "m" and not ends[i]]
+    if endless:  # nothing bounds how far what it carries is from the joints before it
+        raise InputError(
+            f"{few(endless)}: slides without limits", where="plan: robot", expected="limits of it"
+        )
     search = Search(robot, q, [*through, goal], obstacles, collisions, limits, seed, tolerance or Goal())
     return search.plan(positive(seconds, "seconds"), counted(shorten, "shorten", 0), progress)
 
