@@ -235,7 +235,7 @@ def plan(
     expect_kind(limits, Limits, "plan: limits", "Limits")
     if limits.bounds:
         raise InputError("limits of functions are not planned for", where="plan: limits")
-    n_p, ends = robot.platform.n_p, robot.limited.all(axis=1)
+    n_p, ends = robot.platform.n_p, np.asarray(robot.limited.all(axis=1))
     endless = [robot.q_names[i] for i in range(n_p, robot.n) if robot.q_units[i] == "m" and not ends[i]]
     if endless:  # nothing bounds how far what it carries is from the joints before it
         raise InputError(
