@@ -72,7 +72,7 @@ from .functions.tasks import Stack as Stack
 from .functions.tasks import Task as Task
 from .functions.tasks import While as While
 from .plans.plan import Plan as Plan
-from .plans.plan import plan as plan
+from .plans.search import plan as plan
 from .platforms import Car as Car
 from .platforms import CasterWheel as CasterWheel
 from .platforms import CommonSpeed as CommonSpeed

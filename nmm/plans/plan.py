@@ -1,35 +1,21 @@
-"""A plan: a motion from a start to a goal that keeps distances and limits, and how it is found."""
+"""A plan: a motion from a start to a goal that keeps distances and limits."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from itertools import pairwise
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, counted, positive
-from nmm.collisions.motion_check import MotionCheck
-from nmm.collisions.obstacle import Obstacle
+from nmm.arrays import Array, positive
 from nmm.collisions.scene import Scene
-from nmm.collisions.shapes import HalfSpace
-from nmm.control.collisions import Collisions
 from nmm.control.goal import Goal
-from nmm.control.limits import Limits, LimitsOn
-from nmm.errors import InputError, RunError, expect_kind, few
+from nmm.control.limits import LimitsOn
 from nmm.functions.tasks.linear_coordinates import Posture
 from nmm.functions.tasks.task import Task
-from nmm.kernels.compiled import checked_by_caller
-from nmm.kernels.record_layout import views
-from nmm.plans import tree
-from nmm.plans.goals import GoalPostures, Reaching, Wanted, alternatives, nothing_found
-from nmm.plans.path import Guide, shortened
-from nmm.plans.timing import TimedLegs, timed
-from nmm.plans.tree import PLACE, Trees
-from nmm.plans.ways import LEGS, ways_of
+from nmm.plans.goals import Reaching
 from nmm.robots.frame_path import FramePath
 from nmm.robots.reach import first_tip
 from nmm.robots.robot import Robot
@@ -38,21 +24,31 @@ from nmm.runs.margins import margin, shares, standing
 from nmm.runs.shown_frame import shown_frame
 from nmm.runs.trajectory import Trajectory
 
-#: Room for configurations in each tree, and rounds of a search between two looks at the clock.
-ROOM, ROUNDS = 20_000, 200
-#: Speeds of inputs without limits, m/s and rad/s; the stop between two legs where accelerations have none, s.
-USUAL, PAUSE = 1.0, 0.2
-#: The longest motion by which a tree grows, s.
-STEP = 2.0
-#: Around start, goals and obstacles there is this much room to drive, in sizes of the robot and in m.
-AROUND = 1.0
+
+class Motion(Protocol):
+    """A motion in time.
+
+    stops (K,) : when it begins, rests between and ends, s; corners (K, n) : where it is then
+    """
+
+    @property
+    def stops(self) -> Array: ...
+
+    @property
+    def corners(self) -> Array: ...
+
+    @property
+    def duration(self) -> float: ...
+
+    def at(self, t: Array) -> tuple[Array, Array]:
+        """q (N, n) and u (N, n_u) at times t (N,) from 0 to `duration`, s."""
+        ...
 
 
 class Found(NamedTuple):
-    """What a search leaves to a plan: its legs in time, what follows them, and what they keep."""
+    """What a search leaves to a plan: its motion, and what that keeps."""
 
-    timed: TimedLegs
-    guide: Guide
+    motion: Motion
     limits: LimitsOn
     scene: Scene | None
     goal: object
@@ -84,12 +80,12 @@ class Plan:
     @property
     def stops(self) -> Array:
         """The times at which it begins, rests and ends, (L + 1,), s."""
-        return self._found.timed.begin
+        return self._found.motion.stops
 
     @property
     def corners(self) -> Array:
         """Where it is at its `stops`, (L + 1, n); angles of the platform are not wrapped."""
-        return self._found.timed.corners
+        return self._found.motion.corners
 
     @property
     def end(self) -> Array:
@@ -99,7 +95,7 @@ class Plan:
     @property
     def duration(self) -> float:
         """How long it takes, s."""
-        return float(self.stops[-1])
+        return self._found.motion.duration
 
     @property
     def _found(self) -> Found:
@@ -109,13 +105,7 @@ class Plan:
     def __call__(self, t: ArrayLike) -> tuple[Array, Array]:
         """q (N, n) and u (N, n_u) at times t (N,), s; before it begins and after it ends it stands."""
         times = np.clip(np.atleast_1d(np.asarray(t, dtype=np.float64)), 0.0, self.duration)
-        timed, guide = self._found.timed, self._found.guide
-        if not len(timed.legs):
-            return np.tile(self.end, (len(times), 1)), np.zeros((len(times), self.robot.n_u))
-        leg, share, rate = timed.shares(times)
-        places = zip(leg.tolist(), share.tolist(), strict=True)
-        q = np.array([guide.at(timed.corners[k], timed.legs[k], part) for k, part in places])
-        return q, timed.inputs[leg] * rate[:, np.newaxis]
+        return self._found.motion.at(times)
 
     def trajectory(self, dt: float = 0.02) -> Trajectory:
         """The motion sampled every dt, s, and at its end, as a run: it plays, saves and compares. Its task is
@@ -176,231 +166,3 @@ class Plan:
         named = [name for name in goal if name in robot.q_names] if isinstance(goal, Mapping) else []
         names = named or [robot.q_names[i] for i in robot.following.independent]
         return Task(Posture(*names), self.end[[robot.coordinate(name) for name in names]])
-
-
-def plan(
-    robot: Robot,
-    start: ArrayLike | Mapping[str, float],
-    goal: Wanted,
-    obstacles: Sequence[Obstacle] = (),
-    collisions: Collisions | None = None,
-    limits: Limits | None = None,
-    seconds: float = 10.0,
-    seed: int = 0,
-    *,
-    tolerance: Goal | None = None,
-    through: Sequence[Wanted] = (),
-    shorten: int = 200,
-    progress: Callable[[float], None] | None = None,
-) -> Plan:
-    """A motion from start to goal that keeps every distance and limit.
-
-    Parameters
-    ----------
-    start : (n,) or by name, m and rad
-    goal : a configuration (n,); coordinates by name, of which the others are free; a `Task` whose target
-        stands; or a list of these, of which one is to be reached
-    obstacles : which stand where they are at t = 0
-    collisions : distances to keep, with obstacles of its own; `Collisions()` with the obstacles when not
-        given
-    limits : of velocity, acceleration and position; the robot's own when not given
-    seconds : after which the search gives up
-    seed : of the random numbers; the same plan comes of the same seed
-    tolerance : of a task's goal; `Goal()` when not given
-    through : goals that are reached on the way, in order
-    shorten : how often a shorter way between two points of the motion is tried
-    progress : called with the share of `seconds` that is gone
-
-    Returns
-    -------
-    Plan; it stands between two of its legs, and ends at rest.
-
-    Raises
-    ------
-    InputError : a start that touches something or is outside limits, a goal of another kind, limits of
-        functions, a platform whose ways are not known
-    RunError : no goal configuration was found, or no way there; the text says what was tried
-
-    Examples
-    --------
-    >>> robot = nmm.load("unicycle_3r")
-    >>> wall = nmm.Obstacle(nmm.Box([0.2, 4.0, 2.0]), [3.0, 0.0, 0.5], name="wall")
-    >>> plan = nmm.plan(robot, {"q1": 0.5}, {"x": 6.0, "y": 0.0, "theta": 0.0}, [wall])
-    >>> np.allclose(plan.end[:3], [6.0, 0.0, 0.0], atol=1e-9)
-    True
-    """
-    q = robot.following.placed(robot.q(start))
-    robot.check_limits(q)
-    limits = Limits() if limits is None else limits
-    expect_kind(limits, Limits, "plan: limits", "Limits")
-    if limits.bounds:
-        raise InputError("limits of functions are not planned for", where="plan: limits")
-    n_p, ends = robot.platform.n_p, np.asarray(robot.limited.all(axis=1))
-    endless = [robot.q_names[i] for i in range(n_p, robot.n) if robot.q_units[i] == "m" and not ends[i]]
-    if endless:  # nothing bounds how far what it carries is from the joints before it
-        raise InputError(
-            f"{few(endless)}: slides without limits", where="plan: robot", expected="limits of it"
-        )
-    search = Search(robot, q, [*through, goal], obstacles, collisions, limits, seed, tolerance or Goal())
-    return search.plan(positive(seconds, "seconds"), counted(shorten, "shorten", 0), progress)
-
-
-class Search:
-    """What one plan needs: the trees, the check of distances, and the goals."""
-
-    def __init__(
-        self,
-        robot: Robot,
-        start: Array,
-        goals: Sequence[Wanted],
-        obstacles: Sequence[Obstacle],
-        collisions: Collisions | None,
-        limits: Limits,
-        seed: int,
-        tolerance: Goal,
-    ) -> None:
-        self.robot, self.start, self.goals, self.tolerance = robot, start, goals, tolerance
-        self.rng = np.random.default_rng(seed)
-        given = collisions or Collisions()
-        given = replace(given, obstacles=(*given.obstacles, *obstacles))
-        self.obstacles = tuple(given.obstacles)
-        if any(one.moves for one in self.obstacles):
-            raise InputError("obstacles that move along a path are not planned for", where="plan: obstacles")
-        scene = given.on(robot) if self.obstacles or len(robot.collision_model.collisionPairs) else None
-        self.limits = limits.on(robot)
-        self.usual = np.full(robot.n_u, USUAL)
-        ways = ways_of(
-            robot, self._speeds(), self._pause(), reverses=not np.any(self.limits.inputs[:1, 0] >= 0.0)
-        )
-        self.low, self.high = self._range()
-        trees = Trees(
-            ways=ways,
-            low=self.low,
-            high=self.high,
-            step=np.array(STEP),
-            nodes=np.zeros((2, ROOM, robot.n)),
-            parents=np.zeros((2, ROOM), dtype=np.int64),
-            counts=np.zeros(2, dtype=np.int64),
-            roots=np.zeros(2, dtype=np.int64),
-            random=np.array([1 + seed % (tree.MODULUS - 1)], dtype=np.int64),
-            met=np.zeros(2, dtype=np.int64),
-            looked=np.zeros(2, dtype=np.int64),
-        )
-        self.check = MotionCheck(robot, scene, trees)
-        self.trees = views(Trees, *self.check.blocks, PLACE)
-        self.guide = Guide(self.check.blocks, robot.platform.n_p >= 3, robot.following.table.ravel())
-        self._search = checked_by_caller(tree.search, tree.SEARCH)
-
-    def plan(self, seconds: float, shorten: int, progress: Callable[[float], None] | None) -> Plan:
-        """From the start through all goals; each part ends where the next begins."""
-        robot, self._ends = self.robot, time.monotonic() + seconds
-        self._seconds, self._progress = seconds, progress
-        here, parts = self.start, []
-        self.check.keep(here[np.newaxis])
-        pair = self.check.too_near(here)
-        if pair >= 0 and self.check.scene is not None:
-            what = f"{self.check.scene.words(pair)} touch"
-            raise InputError(what, where="plan: start")
-        for wanted in self.goals:
-            ends = self._goals(wanted, here)
-            legs = self._way(here, ends)
-            first = 3 + (0 if robot.platform.n_p < 3 else robot.platform.n_p)
-            legs = shortened(self.guide, self.check.blocked, here, legs, shorten, self.rng, first)
-            parts.append(legs)
-            here = self.guide.corners(here, legs)[-1]
-        legs = self.guide.merged(np.vstack(parts))
-        motion = timed(self.guide, robot, self.start, legs, self.limits, self.usual)
-        motions, postures = (int(count) for count in self.trees.looked)
-        found = Found(motion, self.guide, self.limits, self.check.scene, self.goals[-1])
-        return Plan(robot, motions, postures, found)
-
-    def _goals(self, wanted: Wanted, here: Array) -> Array:
-        """Free configurations (K, n) that reach a goal."""
-        postures = GoalPostures(self.robot, self.low, self.high, self.check, self.tolerance)
-        found = [q for one in alternatives(wanted) for q in postures.find(one, here, self.rng)]
-        if not found:
-            raise nothing_found(postures)
-        return np.array(found)
-
-    def _way(self, start: Array, goals: Array) -> Array:
-        """Legs from a configuration to one of these, found at once or by search."""
-        for goal in goals:
-            legs = self.guide.way(start, goal)
-            if self.check.blocked(start, legs) < 0:
-                return legs.copy()
-        trees = self.trees
-        trees.counts[:] = trees.roots[:] = 1, len(goals)
-        trees.nodes[0, 0], trees.nodes[1, : len(goals)] = start, goals
-        trees.parents[0, 0], trees.parents[1, : len(goals)] = -1, -1
-        scratch = np.zeros((LEGS, 3 + self.robot.n))
-        while True:
-            found = self._search(*self.check.blocks, ROUNDS, scratch)
-            left = self._ends - time.monotonic()
-            if self._progress is not None:
-                self._progress(min(1.0, 1.0 - left / self._seconds))
-            if found > 0:
-                break
-            if found < 0 or left < 0.0:
-                what = "no room for more configurations" if found < 0 else f"{self._seconds:g} s"
-                raise RunError(
-                    f"no way found in {what}: {trees.looked[1]} configurations and {trees.looked[0]} motions "
-                    "looked at",
-                    where="plan",
-                )
-        nodes = [trees.nodes[k, i] for k in (0, 1) for i in self._chain(k)]
-        return np.vstack([self.guide.way(a, b) for a, b in pairwise(nodes)])
-
-    def _chain(self, k: int) -> list[int]:
-        """The nodes of a tree from its root to where both met, in the motion's order."""
-        chain = [int(self.trees.met[k])]
-        while (parent := int(self.trees.parents[k, chain[-1]])) >= 0:
-            chain.append(parent)
-        return chain[::-1] if k == 0 else chain
-
-    def _speeds(self) -> Array:
-        """How fast each number of a leg goes, (3 + n,), to weigh them."""
-        robot, limits = self.robot, self.limits
-        top = np.minimum(np.abs(limits.inputs).max(axis=1), np.inf)
-        top = np.where(np.isfinite(top), top, USUAL)
-        speeds = np.full(3 + robot.n, np.inf)
-        moved = robot.rate_coordinates
-        for j, i in enumerate(moved):
-            if i >= 0:
-                speeds[3 + i] = top[j]
-        if robot.platform.n_p >= 3:
-            G = robot.platform.G(np.zeros(robot.platform.n_p))[:3]
-            speeds[:3] = [max(float((np.abs(row) * top[: robot.platform.p]).sum()), 1e-3) for row in G]
-            speeds[1] = speeds[0]
-            speeds[2] = speeds[2] if speeds[2] > 1e-3 else USUAL
-        return speeds
-
-    def _pause(self) -> float:
-        finite = self.limits.accelerations[np.isfinite(self.limits.accelerations)]
-        return float(np.clip(USUAL / finite.min(), PAUSE, 2.0)) if len(finite) else PAUSE
-
-    def _range(self) -> tuple[Array, Array]:
-        """Where configurations are drawn, (n,) each: joints within limits, the platform around all that is
-        known."""
-        robot = self.robot
-        low, high = np.where(robot.limited, robot.q_limits, [-np.pi, np.pi]).T.copy()
-        low, high = np.maximum(low, self.start - np.pi), np.minimum(high, self.start + np.pi)
-        if robot.platform.n_p >= 3:
-            points = [self.start[:2]]
-            for obstacle in self.obstacles:
-                geometry, place = obstacle.shape.geometry(), obstacle.at(0.0)
-                if isinstance(obstacle.shape, HalfSpace):
-                    continue
-                geometry.computeLocalAABB()
-                radius = geometry.aabb_radius
-                middle = place.act(geometry.aabb_center)[:2]
-                points += [middle - radius, middle + radius]
-            for goals in self.goals:
-                for one in alternatives(goals):
-                    if isinstance(one, Mapping) and {"x", "y"} <= one.keys():
-                        points.append(np.array([one["x"], one["y"]], dtype=np.float64))
-                    elif not isinstance(one, Mapping | Task):
-                        points.append(robot.q(one)[:2])
-            around = AROUND + 2.0 * robot.reach
-            low[:2], high[:2] = np.min(points, axis=0) - around, np.max(points, axis=0) + around
-            low[2], high[2] = -np.pi, np.pi
-        return low, high

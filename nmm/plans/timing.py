@@ -18,21 +18,36 @@ from nmm.robots.wheel_rates import turning_wheels
 class TimedLegs:
     """Legs with the time that each takes: its share is 0 to 1, at rest at both ends.
 
+    guide : along them
     legs (L, 3 + n); corners (L + 1, n); inputs (L, n_u) : what the inputs add up to on each leg
-    speed, acceleration (L,) : the largest of its share, 1/s and 1/s²; begin (L + 1,) : when each begins, s
+    speed, acceleration (L,) : the largest of its share, 1/s and 1/s²; stops (L + 1,) : when each begins, s
     """
 
+    guide: Guide
     legs: Array
     corners: Array
     inputs: Array
     speed: Array
     acceleration: Array
-    begin: Array
+    stops: Array
+
+    @property
+    def duration(self) -> float:
+        return float(self.stops[-1])
+
+    def at(self, t: Array) -> tuple[Array, Array]:
+        """q (N, n) and u (N, n_u) at times t (N,), s."""
+        if not len(self.legs):
+            return np.tile(self.corners[-1], (len(t), 1)), np.zeros((len(t), self.inputs.shape[1]))
+        leg, share, rate = self.shares(t)
+        places = zip(leg.tolist(), share.tolist(), strict=True)
+        q = np.array([self.guide.at(self.corners[k], self.legs[k], part) for k, part in places])
+        return q, self.inputs[leg] * rate[:, np.newaxis]
 
     def shares(self, t: Array) -> tuple[Integers, Array, Array]:
         """The leg at each time (N,), s, how much of it is gone, and its rate, 1/s."""
-        leg = np.clip(np.searchsorted(self.begin, t, side="right") - 1, 0, max(len(self.legs) - 1, 0))
-        after, length = t - self.begin[leg], self.begin[leg + 1] - self.begin[leg]
+        leg = np.clip(np.searchsorted(self.stops, t, side="right") - 1, 0, max(len(self.legs) - 1, 0))
+        after, length = t - self.stops[leg], self.stops[leg + 1] - self.stops[leg]
         V, A = self.speed[leg], self.acceleration[leg]
         ramp = np.where(np.isfinite(A), V / np.where(np.isfinite(A), A, 1.0), 0.0)
         to_end = np.maximum(length - after, 0.0)
@@ -62,7 +77,9 @@ def timed(guide: Guide, robot: Robot, start: Array, legs: Array, limits: LimitsO
     ramps = np.where(
         np.isfinite(acceleration), speed / np.where(np.isfinite(acceleration), acceleration, 1.0), 0.0
     )
-    return TimedLegs(legs, corners, inputs, speed, acceleration, np.cumsum([0.0, *(1.0 / speed + ramps)]))
+    return TimedLegs(
+        guide, legs, corners, inputs, speed, acceleration, np.cumsum([0.0, *(1.0 / speed + ramps)])
+    )
 
 
 def _spins(robot: Robot, q: Array, inputs: Array, limits: LimitsOn) -> Array:
