@@ -47,12 +47,13 @@ class Motion(Protocol):
 
 
 class Found(NamedTuple):
-    """What a search leaves to a plan: its motion, and what that keeps."""
+    """What a search leaves to a plan: its motion, what that keeps, and what another search is made with."""
 
     motion: Motion
     limits: LimitsOn
     scene: Scene | None
     goal: object
+    asked: Mapping[str, Any]
 
 
 @dataclass(frozen=True, eq=False)

@@ -234,15 +234,15 @@ class ScenarioPart(Part):
         tolerance = None if self.until is None else self.until.make()
         given = part.given("through", "seconds", "seed", "shorten")
         given |= {"limits": limits, "tolerance": tolerance, "progress": progress}
-        start, kept = robot.q(self.q0), []
+        start, farther = robot.q(self.q0), None
         if part.track is not None and part.track.margin > 0.0:
-            wider = collisions or Collisions()
-            kept.append(replace(wider, distance=wider.distance + part.track.margin, band=None))
+            kept = collisions or Collisions()
+            farther = replace(kept, distance=kept.distance + part.track.margin, band=None)
         with at("plan"):
             try:
-                for one in kept:
-                    with suppress(RunError):  # then without the margin
-                        return plan(robot, start, goal, collisions=one, **given)
+                with suppress(RunError):  # then without the margin
+                    if farther is not None:
+                        return plan(robot, start, goal, collisions=farther, **given)
                 return plan(robot, start, goal, collisions=collisions, **given)
             except InputError as error:
                 raise error.placed(error.where.removeprefix("plan: ")) from None
