@@ -104,7 +104,7 @@ def run(
     with shown as page:
         trajectory = _run(made, controller, None if page is None else page.watch, label)
         with shielded() as asked_to_end:
-            _tell_and_save(trajectory, folder, html=html, ellipsoids=shown_ellipsoids, figures=drawn)
+            tell_and_save(trajectory, folder, html=html, ellipsoids=shown_ellipsoids, figures=drawn)
         status = _status("nmm run", [trajectory], folder)
         ends = asked_to_end.is_set() or trajectory.outcome == "interrupted"
         if page is not None and len(trajectory) and not ends:
@@ -268,7 +268,8 @@ def _run(
         return trajectory
 
 
-def _tell_and_save(trajectory: Trajectory, folder: Path, **asked: Any) -> None:
+def tell_and_save(trajectory: Trajectory, folder: Path, **asked: Any) -> None:
+    """Print a run's table and write its folder."""
     from nmm.folders.run import save
 
     width = 0
