@@ -72,6 +72,7 @@ from .functions.tasks import Stack as Stack
 from .functions.tasks import Task as Task
 from .functions.tasks import While as While
 from .plans.plan import Plan as Plan
+from .plans.replan import replan as replan
 from .plans.search import plan as plan
 from .platforms import Car as Car
 from .platforms import CasterWheel as CasterWheel

@@ -330,6 +330,20 @@ EXAMPLES: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
         "samples",
     ),
     (
+        "left_plan",
+        {"m": 0.25, "rad": 0.5, "samples": 9, "back": 4.0, "tube_m": 0.1, "tube_rad": 0.2},
+        {"t": 3.5},
+        "the robot left its plan from t = 3.5 s on, by up to 0.25 m and 0.5 rad (more than 0.1 m or 0.2 "
+        "rad); back at t = 4 s",
+    ),
+    (
+        "left_plan",
+        {"m": 0.25, "rad": 0.5, "samples": 9, "back": None, "tube_m": 0.1, "tube_rad": 0.2},
+        {"t": 3.5},
+        "the robot left its plan from t = 3.5 s on, by up to 0.25 m and 0.5 rad (more than 0.1 m or 0.2 "
+        "rad); not back at the end",
+    ),
+    (
         "backed_off",
         {"times": [1.26, 2.76]},
         {},

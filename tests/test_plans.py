@@ -5,6 +5,7 @@ import time
 
 import numpy as np
 import pytest
+from sliding_arm import sliding
 
 import nmm
 from nmm.plans import words
@@ -315,6 +316,16 @@ def test_bad_input_is_refused(change, where):
     with pytest.raises(nmm.InputError) as found:
         nmm.plan(robot, **given)
     assert found.value.where.startswith(where)
+
+
+@pytest.mark.parametrize("platform", ["fixed", "unicycle"])
+def test_a_slide_without_limits_is_refused_by_name(tmp_path, platform):
+    robot = nmm.load(sliding(tmp_path, -1e9, 1e9), platform=platform)
+    with pytest.raises(nmm.InputError) as found:
+        nmm.plan(robot, robot.rest, {"slide": 1.0})
+    assert "slide" in found.value.what
+    bounded = nmm.load(sliding(tmp_path, -2.0, 2.0), platform=platform)
+    assert nmm.plan(bounded, bounded.rest, {"slide": 1.0}).end[-2] == 1.0
 
 
 # The trajectory

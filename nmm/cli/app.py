@@ -10,6 +10,7 @@ from nmm.cli.descriptions import info
 from nmm.cli.mapping import map_measures
 from nmm.cli.options import flag
 from nmm.cli.output import show_table, show_text
+from nmm.cli.planning import plan
 from nmm.cli.playing import drive, play, render, view
 from nmm.cli.redundancy import laps, redundancy
 from nmm.cli.robot_files import check, init
@@ -95,7 +96,7 @@ def robots() -> None:
     show_table(["robot", "what it is", "arguments (m, rad)"], rows)
 
 
-for _command in (run, compare, paper, play, render, info, init, check, view, drive, singularities):
+for _command in (run, compare, plan, paper, play, render, info, init, check, view, drive, singularities):
     app.command()(_command)
 app.command("map")(map_measures)
 for _command in (redundancy, laps, sweep, scenarios, robots):

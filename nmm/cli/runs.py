@@ -95,7 +95,7 @@ def run(
     check_folder(folder, is_run)
     controller = made.controller()  # complains before there is a progress bar
     shown: AbstractContextManager[LiveRun | None] = nullcontext()
-    planned = made.parts.plan is not None
+    planned = made.parts.is_plan
     if play and not planned:
         from nmm.playback import LiveRun
 
@@ -104,7 +104,7 @@ def run(
     with shown as page:
         trajectory = _run(made, controller, None if page is None else page.watch, label)
         with shielded() as asked_to_end:
-            _tell_and_save(trajectory, folder, html=html, ellipsoids=shown_ellipsoids, figures=drawn)
+            tell_and_save(trajectory, folder, html=html, ellipsoids=shown_ellipsoids, figures=drawn)
         status = _status("nmm run", [trajectory], folder)
         ends = asked_to_end.is_set() or trajectory.outcome == "interrupted"
         if page is not None and len(trajectory) and not ends:
@@ -115,7 +115,7 @@ def run(
 
 
 def _called(scenario: Scenario) -> str:
-    return "PLAN" if scenario.parts.plan is not None else scenario.parts.resolver.kind.upper()
+    return "PLAN" if scenario.parts.is_plan else scenario.parts.resolver.kind.upper()
 
 
 def _always_written(wanted: bool) -> None:
@@ -164,7 +164,7 @@ def compare(
     check_different(several, scenarios, "--resolvers")
     name = scenarios[0].name
     run_labels = [one.label for one in several]
-    if scenarios[0].parts.plan is not None:
+    if scenarios[0].parts.is_plan:
         scenarios = [scenarios[0], *(made.override("plan", False) for made in scenarios)]
         run_labels = ["", *run_labels]
     folder = out or Path("runs") / f"{name}-compare"
@@ -185,7 +185,7 @@ def compare(
         print_table(comparison_table(trajectories), form, folder)
         return _status("nmm compare", trajectories, folder)
     for column, made, trajectory in zip(columns, scenarios, trajectories, strict=False):
-        if len(trajectory) and made.parts.plan is None:
+        if len(trajectory) and not made.parts.is_plan:
             controller = made.controller()
             controller.dt = trajectory.dt
             column["a control step"] = f"{1e6 * step_time(controller, trajectory):.3g} µs here"
@@ -268,7 +268,8 @@ def _run(
         return trajectory
 
 
-def _tell_and_save(trajectory: Trajectory, folder: Path, **asked: Any) -> None:
+def tell_and_save(trajectory: Trajectory, folder: Path, **asked: Any) -> None:
+    """Print a run's table and write its folder."""
     from nmm.folders.run import save
 
     width = 0

@@ -105,6 +105,8 @@ def noticed(recorder: Recorder) -> Iterator[tuple[Finding, Collection[Outcome]]]
     every, setting = tuple(Outcome), controller.solver.scene
     yield from ((one, every) for one in not_kept(recorder, controller))
     yield from ((one, {*every} - {Outcome.SINGULAR}) for one in _nearly_singular(recorder))
+    of_tasks = (one for task in controller.task for one in task.function.noticed(t, found.q))
+    yield from ((one, every) for one in of_tasks)
     broken = (
         *broken_limits(controller.robot, t, found.q, found.u),
         *broken_rows(controller.solver.limits_on, t, found.limited),

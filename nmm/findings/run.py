@@ -164,6 +164,11 @@ WORDS: Mapping[str, Words] = {
         f"without effect on task and objective: {', '.join(inputs)}; at first order nothing moves "
         f"{'it' if len(inputs) == 1 else 'them'} (an objective can)"
     ),
+    "left_plan": lambda m, rad, tube_m, tube_rad, t, back, **_: (
+        f"the robot left its plan from t = {t:.3g} s on, by up to {m:.3g} m and {rad:.3g} rad (more than "
+        f"{tube_m:g} m or {tube_rad:g} rad); "
+        f"{'not back at the end' if back is None else f'back at t = {back:.4g} s'}"
+    ),
     "no_redundancy": "the task has as many rows as there are inputs: no redundancy is left to resolve",
     "inputs_unmet": _inputs_unmet,
     "moves_otherwise": (

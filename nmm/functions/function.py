@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import weakref
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from threading import Lock
 from types import MappingProxyType
@@ -14,6 +14,7 @@ import numpy as np
 
 from nmm.arrays import Array
 from nmm.errors import expect
+from nmm.findings import Finding
 from nmm.kernels.compiled import Kernel, clear, kernel
 from nmm.kernels.linear_algebra import copied
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
@@ -180,7 +181,7 @@ class Function(ABC):
     """φ(t, q). A new function is a kernel and a subclass with two methods: `rows(robot)` returns the
     components' names and units, and raises `InputError` for what the robot lacks; `stages(robot)` returns the
     kernels that compute value, time derivative and Jacobian. One that moves a frame or looks at a point
-    overrides `shown()`.
+    overrides `shown()`, one whose values deserve a warning `noticed()`.
 
     `comparison` is for values that cannot be subtracted (orientations, poses): a kernel of signature
     `records.FUNCTION` that reads the rows [value, target, error], s of each, and writes the error and its
@@ -207,6 +208,10 @@ class Function(ABC):
     def shown(self) -> Shown:
         """What figures and playback draw of it; nothing by default."""
         return Shown()
+
+    def noticed(self, t: Array, q: Array) -> Iterable[Finding]:
+        """What a task of it warns of after a run, by the samples at times (N,), s, and q (N, n)."""
+        return ()
 
 
 def only_row(function: Function, robot: Robot, where: str, expected: str) -> Row:

@@ -15,6 +15,7 @@ from nmm.control.goal import Goal
 from nmm.control.limits import LimitsOn
 from nmm.functions.tasks.linear_coordinates import Posture
 from nmm.functions.tasks.task import Task
+from nmm.plans.following import FromPlan
 from nmm.plans.goals import Reaching
 from nmm.robots.frame_path import FramePath
 from nmm.robots.reach import first_tip
@@ -46,12 +47,13 @@ class Motion(Protocol):
 
 
 class Found(NamedTuple):
-    """What a search leaves to a plan: its motion, and what that keeps."""
+    """What a search leaves to a plan: its motion, what that keeps, and what another search is made with."""
 
     motion: Motion
     limits: LimitsOn
     scene: Scene | None
     goal: object
+    asked: Mapping[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +108,48 @@ class Plan:
         """q (N, n) and u (N, n_u) at times t (N,), s; before it begins and after it ends it stands."""
         times = np.clip(np.atleast_1d(np.asarray(t, dtype=np.float64)), 0.0, self.duration)
         return self._found.motion.at(times)
+
+    def reference(
+        self,
+        gain: float = 2.0,
+        length: float = 0.4,
+        pace: float = 0.8,
+        tube: Goal | None = None,
+        priority: int = 1,
+    ) -> Task:
+        """A task that follows the plan, a row an input: its rates, and feedback from where it leads.
+
+        Limits, distances and priorities hold for it as for any task. Below other tasks it keeps the robot
+        near the plan's posture with the inputs that they leave. Where the controller keeps distances, the
+        plan should keep 0.05 m more: near an obstacle a controller goes slower than a plan.
+
+        Parameters
+        ----------
+        gain : on what each input moved too far, 1/s
+        length : the way along which a platform that is beside its own comes back, about, m
+        pace : share of the plan's speed; below 1 feedback has room where the plan is at its limits. It takes
+            plan.duration / pace
+        tube : how far from the plan is worth a warning; `Goal(m=0.1, rad=0.2)` when not given
+
+        Examples
+        --------
+        >>> robot = nmm.load("unicycle_2r")
+        >>> plan = nmm.plan(robot, robot.rest, {"x": 2.0, "y": 1.0, "theta": 0.0})
+        >>> controller = nmm.Controller(robot, plan.reference(), nmm.ProjectedGradient())
+        >>> run = nmm.simulate(controller, {"y": 0.05, "theta": 0.1}, plan.duration / 0.8 + 2.0, 0.02)
+        >>> bool(np.abs(run.q[-1] - plan.end).max() < 0.001)
+        True
+        """
+        motion, share = self._found.motion, positive(pace, "pace")
+
+        def at(t: Array) -> tuple[Array, Array]:
+            q, u = motion.at(share * t)
+            return q, share * u
+
+        sizes = positive(gain, "gain"), positive(length, "length")
+        tube = Goal(m=0.1, rad=0.2) if tube is None else tube
+        function = FromPlan(self.robot, at, self.stops / share, *sizes, tube)
+        return Task(function, np.zeros(self.robot.n_u), gain, priority, name="plan")
 
     def trajectory(self, dt: float = 0.02) -> Trajectory:
         """The motion sampled every dt, s, and at its end, as a run: it plays, saves and compares. Its task is

@@ -126,6 +126,7 @@ class Search:
         self.rng = np.random.default_rng(seed)
         given = collisions or Collisions()
         given = replace(given, obstacles=(*given.obstacles, *obstacles))
+        self.asked = {"collisions": given, "limits": limits, "tolerance": tolerance}
         self.obstacles = tuple(given.obstacles)
         if any(one.moves for one in self.obstacles):
             raise InputError("obstacles that move along a path are not planned for", where="plan: obstacles")
@@ -156,47 +157,68 @@ class Search:
 
     def plan(self, seconds: float, shorten: int, progress: Callable[[float], None] | None) -> Plan:
         """From the start through all goals; each part ends where the next begins."""
-        robot, self._ends = self.robot, time.monotonic() + seconds
-        self._seconds, self._progress = seconds, progress
+        self.begin(seconds, progress)
         here, parts = self.start, []
-        self.check.keep(here[np.newaxis])
+        for wanted in self.goals:
+            legs = self.shortened(here, self.way(here, self.ends(wanted, here)), shorten)
+            parts.append(legs)
+            here = self.guide.corners(here, legs)[-1]
+        return self.finished(np.vstack(parts))
+
+    def begin(self, seconds: float, progress: Callable[[float], None] | None) -> None:
+        """Start the clock; `InputError` for a start that touches something."""
+        self._ends, self._seconds, self._progress = time.monotonic() + seconds, seconds, progress
+        self.check.keep(self.start[np.newaxis])
         scene = self.check.scene
-        if scene is not None and self.check.too_near(here) >= 0:
-            distances = scene.queries.distances(0.0, here, range(len(scene.names)))
+        if scene is not None and self.check.too_near(self.start) >= 0:
+            distances = scene.queries.distances(0.0, self.start, range(len(scene.names)))
             touch = [scene.words(int(k)) for k in np.flatnonzero(distances < 4.0 * MARGIN)]
             cure = "another start, or Collisions(ignore=[(one, other)]) for links that may touch"
             raise InputError(f"{few(touch)} touch", where="plan: start", expected=cure)
-        for wanted in self.goals:
-            ends = self._goals(wanted, here)
-            legs = self._way(here, ends)
-            first = 3 + (0 if robot.platform.n_p < 3 else robot.platform.n_p)
-            legs = shortened(self.guide, self.check.blocked, here, legs, shorten, self.rng, first)
-            parts.append(legs)
-            here = self.guide.corners(here, legs)[-1]
-        legs = self.guide.merged(np.vstack(parts))
-        motion = timed(self.guide, robot, self.start, legs, self.limits, self.usual)
-        motions, postures = (int(count) for count in self.trees.looked)
-        found = Found(motion, self.limits, self.check.scene, self.goals[-1])
-        return Plan(robot, motions, postures, found)
 
-    def _goals(self, wanted: Wanted, here: Array) -> Array:
-        """Free configurations (K, n) that reach a goal."""
+    def finished(self, legs: Array) -> Plan:
+        """The plan of legs from the start."""
+        legs = self.guide.merged(legs)
+        motion = timed(self.guide, self.robot, self.start, legs, self.limits, self.usual)
+        motions, postures = (int(count) for count in self.trees.looked)
+        found = Found(motion, self.limits, self.check.scene, self.goals[-1], self.asked)
+        return Plan(self.robot, motions, postures, found)
+
+    def shortened(self, start: Array, legs: Array, rounds: int) -> Array:
+        """Shorter legs from a configuration."""
+        first = 3 + (0 if self.robot.platform.n_p < 3 else self.robot.platform.n_p)
+        return shortened(self.guide, self.blocked, start, legs, rounds, self.rng, first)
+
+    def blocked(self, start: Array, legs: Array) -> int:
+        """The number of a pair that comes too near on legs from a free configuration, or -1; counted."""
+        self.trees.looked[0] += 1
+        return self.check.blocked(start, legs)
+
+    def ends(self, wanted: object, here: Array) -> list[Array]:
+        """Free configurations (n,) that reach a goal."""
         postures = GoalPostures(self.robot, self.low, self.high, self.check, self.tolerance)
         found = [q for one in alternatives(wanted) for q in postures.find(one, here, self.rng)]
         if not found:
             raise nothing_found(postures)
-        return np.array(found)
+        return found
 
-    def _way(self, start: Array, goals: Array) -> Array:
-        """Legs from a configuration to one of these, found at once or by search."""
+    def way(
+        self, start: Array, goals: Sequence[Array], ahead: Sequence[Array] = (), behind: Sequence[Array] = ()
+    ) -> Array:
+        """Legs from a configuration to one of these, found at once or by search. Free ways are known from it
+        through those `ahead`, one after the other, and from those `behind` to the first goal."""
         for goal in goals:
             legs = self.guide.way(start, goal)
-            if self.check.blocked(start, legs) < 0:
+            if self.blocked(start, legs) < 0:
                 return legs.copy()
         trees = self.trees
-        trees.counts[:] = trees.roots[:] = 1, len(goals)
-        trees.nodes[0, 0], trees.nodes[1, : len(goals)] = start, goals
-        trees.parents[0, 0], trees.parents[1, : len(goals)] = -1, -1
+        grown: tuple[tuple[Sequence[Array], Sequence[Array]], ...] = (([start], ahead), (goals, behind[::-1]))
+        for k, (roots, chain) in enumerate(grown):
+            count = len(roots) + len(chain)
+            trees.roots[k], trees.counts[k] = len(roots), count
+            trees.nodes[k, :count] = [*roots, *chain]
+            trees.parents[k, : len(roots)] = -1
+            trees.parents[k, len(roots) : count] = [0, *range(len(roots), count - 1)][: len(chain)]
         scratch = np.zeros((LEGS, 3 + self.robot.n))
         while True:
             found = self._search(*self.check.blocks, ROUNDS, scratch)

@@ -130,7 +130,7 @@ def rollout(
         q0 = parts.q0 if q0 is None else q0
         duration, dt = duration or parts.duration, dt or parts.dt
         method = method or parts.method
-        until = parts.until.make() if until is None and parts.until is not None else until
+        until = parts.goal() if until is None else until
         subject = subject.controller()
     controllers = (subject,) if isinstance(subject, Controller) else tuple(subject)
     _check(controllers)

@@ -14,7 +14,7 @@ from nmm.scenario.limits import BoundPart, GoalPart, LimitsPart, RetreatPart, St
 from nmm.scenario.objectives import OBJECTIVE_PARTS, TermPart
 from nmm.scenario.resolvers import RESOLVER_PARTS
 from nmm.scenario.robot import ArmPart, MountedPart, RobotPart
-from nmm.scenario.schema import PlanPart, ScenarioPart
+from nmm.scenario.schema import PlanPart, ScenarioPart, TrackPart
 from nmm.scenario.tasks import CONDITION_PARTS, TASK_PARTS
 
 
@@ -42,6 +42,8 @@ def sections() -> Iterator[Section]:
     yield _section("until", GoalPart)
     yield _section("retreat", RetreatPart)
     yield _section("plan", PlanPart)
+    yield _section("plan.track", TrackPart)
+    yield _section("plan.track", TrackPart)
     yield _section("limits", LimitsPart)
     yield _section("limits.bounds: a task's function and its keys, with these", BoundPart)
     yield _section("collisions", CollisionsPart)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 SUFFIXES = (".yaml", ".yml")
 #: The kind of a resolver that is no kind of ours.
 OWN = "own"
-#: The keys that a controller does not depend on.
+#: The keys that a controller without a plan does not depend on.
 KEYS_OF_A_RUN = ("q0", "duration", "method", "tolerance")
 
 
@@ -137,6 +137,11 @@ class Scenario:
         derived._own = resolver
         return derived
 
+    @property
+    def keys_of_a_run(self) -> tuple[str, ...]:
+        """The keys that its controller does not depend on."""
+        return tuple(key for key in KEYS_OF_A_RUN if key != "q0" or self.parts.plan is None)
+
     def robot(self) -> Robot:
         """The robot, loaded once."""
         if self._robot is None:
@@ -187,19 +192,19 @@ class Scenario:
         watch: Callable[[Recorder], None] | None = None,
     ) -> Trajectory:
         """Run it; a run that fails or is interrupted (Ctrl-C) returns what was computed. With the key `plan`
-        it is the planned motion; `RunError` where none is found.
+        it is the planned motion, or follows it (`plan.track`); `RunError` where none is found.
 
         Parameters
         ----------
         progress : called with the fraction done, about a hundred times
-        controller : one of a scenario that differs in `KEYS_OF_A_RUN` alone, to be used again; a new one when
+        controller : one of a scenario that differs in `keys_of_a_run` alone, to be used again; a new one when
             not given
         watch : as `simulate` takes it
         """
         from nmm.runs.simulation import simulate
 
         parts = self.parts
-        if parts.plan is not None:
+        if parts.is_plan:
             return self._told(self.plan(progress).trajectory(parts.dt))
         with self._located():
             if controller is None:
@@ -207,7 +212,6 @@ class Scenario:
             else:
                 parts.check_start(self.robot())
             with at(), parts.own_keys():
-                until = None if parts.until is None else parts.until.make()
                 trajectory = simulate(
                     controller,
                     parts.q0,
@@ -215,7 +219,7 @@ class Scenario:
                     parts.dt,
                     parts.method,
                     tolerance=parts.tolerance,
-                    until=until,
+                    until=parts.goal(),
                     progress=progress,
                     watch=watch,
                 )

@@ -1,14 +1,18 @@
 """The keys of a scenario, from the top."""
 
 from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 from pydantic import BeforeValidator, Field
 
+from nmm.control.collisions import Collisions
 from nmm.control.controller import Controller
+from nmm.control.goal import Goal
 from nmm.control.sequence import Sequence
 from nmm.control.sequenced import SequencedController
-from nmm.errors import InputError, few
+from nmm.errors import InputError, RunError, expect, few
 from nmm.functions.tasks.task import Stack
 from nmm.kinds import RESOLVERS
 from nmm.progress import Progress
@@ -19,7 +23,7 @@ from nmm.scenario.collisions import CollisionsPart
 from nmm.scenario.functions import REFERENCE_PARTS
 from nmm.scenario.keys import KeyedError, Part, at
 from nmm.scenario.limits import GoalPart, LimitsPart, RetreatPart, SteeringPart, part_or_none
-from nmm.scenario.numbers import Nested, Positive, Whole, numbers, numbers_by_name
+from nmm.scenario.numbers import Nested, Number, Positive, Whole, numbers, numbers_by_name
 from nmm.scenario.objectives import ObjectiveList, QuadraticPart, build_objective
 from nmm.scenario.resolvers import AnyResolver, WithAddedTask
 from nmm.scenario.robot import Absolute, RobotChoice
@@ -52,6 +56,29 @@ def _goal(value: object) -> dict[str, Any]:
 Coordinates = Annotated[dict[str, Any], BeforeValidator(_goal)]
 
 
+class TrackPart(Part):
+    """The plan is the controller's task, with limits and distances as they are; `track: true` is this with
+    its defaults."""
+
+    gain: Positive = Field(2.0, description="on what each input moved too far, 1/s")
+    length: Positive = Field(
+        0.4, description="the way along which a platform that is beside its own comes back, about, m"
+    )
+    pace: Positive = Field(
+        0.8,
+        description="share of the plan's speed; below 1 feedback has room where the plan is at its limits",
+    )
+    margin: Annotated[Number, Field(ge=0.0)] = Field(
+        0.05,
+        description="how much farther than collisions.distance the plan stays from what is near, m, where "
+        "there is such a plan",
+    )
+    tube: GoalPart = Field(
+        GoalPart.model_validate({"m": 0.1, "rad": 0.2}),
+        description="how far from the plan, m and rad, is worth a warning",
+    )
+
+
 class PlanPart(Part):
     """A motion to a goal that is searched, in place of the controller's; `plan: true` is this with its
     defaults."""
@@ -65,6 +92,11 @@ class PlanPart(Part):
     seconds: Positive = Field(10.0, description="after which the search gives up, s")
     seed: Whole = Field(1, description="of the random numbers; the same plan comes of the same seed")
     shorten: Whole = Field(200, description="how often a shorter way between two points of it is tried")
+    track: Annotated[TrackPart | None, BeforeValidator(part_or_none)] = Field(
+        None,
+        description="whether the controller follows the plan, for the scenario's duration: true, or a "
+        "mapping; else the run is the plan itself",
+    )
 
 
 class ScenarioPart(Part):
@@ -106,8 +138,8 @@ class ScenarioPart(Part):
     )
     plan: Annotated[PlanPart | None, BeforeValidator(part_or_none)] = Field(
         None,
-        description="whether the run is a planned motion, which ends at its goal: true, or a mapping. Task, "
-        "resolver and duration then do not matter, but for the task's target and the tolerances of until",
+        description="whether the run is a planned motion, which ends at its goal: true, or a mapping. Then "
+        "only the task's target and the tolerances of until matter; resolver and duration with plan.track",
     )
     until: Annotated[GoalPart | None, BeforeValidator(part_or_none)] = Field(
         None, description="a target to reach: the run ends where the error is within tolerances"
@@ -120,12 +152,30 @@ class ScenarioPart(Part):
         description="what steers a platform where neither task nor objective does: true, false, or a mapping",
     )
 
+    @property
+    def is_plan(self) -> bool:
+        """Whether a run is the planned motion itself."""
+        return self.plan is not None and self.plan.track is None
+
+    def goal(self) -> Goal | None:
+        """The target at which a closed loop ends; one that follows a plan goes on for its duration."""
+        return None if self.until is None or self.plan is not None else self.until.make()
+
     def build(self, robot: Robot, absolute: Absolute, own: Resolver | None = None) -> Controller:
         """The controller, after a check of q0; errors know their key. `absolute` finds the files named, `own`
         is a resolver in the place of the file's."""
         self.check_start(robot)
         with at("task"):
             task = build_tasks(self.task, robot)
+        if self.plan is not None and (track := self.plan.track) is not None:
+            plan = self.build_plan(robot, absolute, None)
+            task = [plan.reference(track.gain, track.length, track.pace, track.tube.make())]
+            with at("duration"):
+                least = plan.duration / track.pace
+                expect(
+                    self.duration >= least, "", f"at least {least:.4g} s, which the plan takes", self.duration
+                )
+        with at("task"):
             sequenced = any(one.when for one in task)
             if sequenced:
                 Sequence(Stack.of(task), robot)
@@ -183,18 +233,17 @@ class ScenarioPart(Part):
         limits = None if self.limits is None else self.limits.build(robot)
         tolerance = None if self.until is None else self.until.make()
         given = part.given("through", "seconds", "seed", "shorten")
+        given |= {"limits": limits, "tolerance": tolerance, "progress": progress}
+        start, farther = robot.q(self.q0), None
+        if part.track is not None and part.track.margin > 0.0:
+            kept = collisions or Collisions()
+            farther = replace(kept, distance=kept.distance + part.track.margin, band=None)
         with at("plan"):
             try:
-                return plan(
-                    robot,
-                    robot.q(self.q0),
-                    goal,
-                    collisions=collisions,
-                    limits=limits,
-                    tolerance=tolerance,
-                    progress=progress,
-                    **given,
-                )
+                with suppress(RunError):  # then without the margin
+                    if farther is not None:
+                        return plan(robot, start, goal, collisions=farther, **given)
+                return plan(robot, start, goal, collisions=collisions, **given)
             except InputError as error:
                 raise error.placed(error.where.removeprefix("plan: ")) from None
 

@@ -25,7 +25,6 @@ from nmm.diagnosis.summary import RUN_NUMBERS
 from nmm.errors import InputError, RunError
 from nmm.progress import Progress
 from nmm.scenario import Scenario
-from nmm.scenario.scenario import KEYS_OF_A_RUN
 from nmm.sweeps.definition import Definition, Listed
 
 if TYPE_CHECKING:
@@ -211,7 +210,7 @@ def _controller_of(
 ) -> tuple[Controller, bool]:
     """A controller for a row's scenario, and whether its steps are compiled as a whole; if so, it is this
     thread's, and used again, as each run resets what the one before left."""
-    others = {key: value for key, value in changes.items() if key.split(".")[0] not in KEYS_OF_A_RUN}
+    others = {key: value for key, value in changes.items() if key.split(".")[0] not in scenario.keys_of_a_run}
     key = definition.digest, json.dumps(others, default=str)
     if not hasattr(_own, "controllers"):
         _own.controllers = OrderedDict()

@@ -1,0 +1,164 @@
+"""plan: a motion to a goal, searched and written as a run."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from nmm.cli.groups import OfRobot, command
+from nmm.cli.options import ROBOT_HELP, SetOption, flag, names_of, option, out_option, settings_of
+from nmm.cli.output import OK, progress, show_table
+from nmm.cli.runs import tell_and_save
+from nmm.errors import InputError
+from nmm.text_format import counted
+
+if TYPE_CHECKING:
+    from nmm.scenario import Scenario
+
+#: How a configuration is written.
+_FORM = "COORDINATE=VALUE,..."
+
+
+@command
+def plan(
+    subject: Annotated[
+        str,
+        typer.Argument(
+            metavar="ROBOT|SCENARIO",
+            help=f"{ROBOT_HELP} Or a scenario, with its start, limits and obstacles.",
+            show_default=False,
+        ),
+    ],
+    *,
+    to: str | None = option(
+        _FORM,
+        "The goal, m or rad: x=6,y=0,theta=pi/2; posture=NAME is one of the SRDF's. Others are free.",
+        show="a scenario's own",
+    ),
+    through: list[str] | None = option(_FORM, "A goal on the way, in the same form. May be repeated."),
+    start: str | None = option(_FORM, "Where it begins.", show="a scenario's start; 0 and the rest"),
+    obstacles: Path | None = option(
+        "FILE", "A YAML file whose key obstacles has a list as in a scenario, or a scenario.", show="none"
+    ),
+    seconds: float | None = option("S", "After which the search gives up.", show="10"),
+    seed: int | None = option("N", "Of the random numbers; a seed gives one plan.", show="1"),
+    settings: SetOption = None,
+    of_robot: OfRobot,
+    out: Annotated[Path | None, out_option("runs/<name>-plan")] = None,
+    html: bool = flag("--html", "Write playback.html too: the motion in 3D, one file, works offline."),
+    as_json: bool = flag("--json", "What was found as JSON on standard output, for scripts."),
+) -> int:
+    """Plan a motion that keeps distances and limits.
+
+    From a start to a goal, round what is in the way; for platforms and goals see docs/plans.md.
+
+    \b
+    nmm plan unicycle_3r --to x=2,y=1,theta=0
+    nmm plan unicycle_3r --to x=6,y=0,theta=0 --obstacles behind_the_wall --html
+    nmm plan car_base --to y=1,x=0,theta=0 --set limits.velocity.v=0.5 --set limits.acceleration=1
+    nmm plan behind_the_wall --seed 3 --json
+
+    The folder is that of a run; its scenario.yaml plans it again. Exit status 1, with what was tried, where
+    none is found.
+    """
+    from nmm.cli.subjects import scenario_with
+    from nmm.folders.run import is_run
+    from nmm.folders.whole import check_folder
+
+    made = _scenario(subject, to, obstacles)
+    changed: dict[str, Any] = {}
+    if not made.parts.is_plan:
+        changed = {"plan": {}} if made.parts.plan is None else {"plan.track": False}
+    if start is not None:
+        changed["q0"] = _coordinates(start, "--start")
+    if to is not None:
+        changed["plan.to"] = _coordinates(to, "--to")
+    if through:
+        changed["plan.through"] = [_coordinates(one, "--through") for one in through]
+    changed |= {
+        f"plan.{key}": value for key, value in (("seconds", seconds), ("seed", seed)) if value is not None
+    }
+    made = made.with_settings({**changed, **settings_of(settings)})
+    made = scenario_with(made, of_robot.keywords())
+    folder = out or Path("runs") / f"{made.name}-plan"
+    check_folder(folder, is_run)
+    with progress(f"{made.name}, plan") as report:
+        found = made.plan(report)
+        trajectory = found.trajectory(made.parts.dt).with_scenario(made.resolved())
+    if as_json:
+        trajectory.save(folder, html=html)
+        said = {
+            "robot": found.robot.name,
+            "duration": found.duration,
+            "end": dict(zip(found.robot.q_names, found.end.tolist(), strict=True)),
+            "stops": found.stops.tolist(),
+            "corners": found.corners.tolist(),
+            "motions": found.motions,
+            "postures": found.postures,
+            "folder": str(folder),
+        }
+        print(json.dumps(said, indent=1))
+    else:
+        tell_and_save(trajectory, folder, html=html)
+        looked = counted(found.motions, "motion"), counted(found.postures, "configuration")
+        show_table(["", ""], [["looked at", " and ".join(looked)]])
+    return OK
+
+
+def _scenario(subject: str, to: str | None, obstacles: Path | None) -> Scenario:
+    """The scenario that is planned: SUBJECT, or one made for a robot, with the obstacles of a file."""
+    from nmm.bundled import bundled_robots, bundled_scenarios
+    from nmm.cli.subjects import is_scenario
+    from nmm.scenario import Scenario
+    from nmm.scenario.document import Document, read_file
+
+    if is_scenario(subject):
+        if obstacles is not None:
+            raise InputError(f"{subject} has its own: --set collisions.obstacles=…", where="--obstacles")
+        return Scenario.load(subject)
+    if to is None:
+        raise InputError(where="--to", expected=f"a goal of the robot, {_FORM}")
+    source = subject
+    if source not in bundled_robots() and not source.startswith("package://"):
+        source = str(Path(source).expanduser().absolute())
+    document, collisions = Document(subject, {}), None
+    if obstacles is not None:
+        document = read_file(bundled_scenarios().get(str(obstacles), obstacles))
+        own = document.data.get("collisions")
+        collisions = own if own is not None else {"obstacles": document.data.get("obstacles")}
+        below = () if own is not None else ("collisions",)
+        document.lines = {
+            (*below, *place): line
+            for place, line in document.lines.items()
+            if place[0] in ("collisions", "obstacles")
+        }
+    # A run of a plan has no use for a task and a resolver: it needs what the goal is, and that is `to`.
+    document.data = {
+        "name": Path(subject).name.split(".")[0],
+        "robot": {"source": source},
+        "q0": {},
+        "duration": "1",
+        "dt": "0.02",
+        "task": {
+            "kind": "coordinates",
+            "of": [names_of(to, "--to")[0].partition("=")[0]],
+            "reference": ["0"],
+        },
+        "resolver": {"kind": "pg"},
+        "collisions": collisions or False,
+    }
+    return Scenario(document)
+
+
+def _coordinates(given: str, where: str) -> dict[str, str]:
+    """Numbers, as text, by coordinate, and a posture's name."""
+    found: dict[str, str] = {}
+    for text in names_of(given, where, f"{_FORM}, as in x=6,y=0"):
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not (name and equals and value) or name in found:
+            raise InputError(where=where, expected=f"{_FORM}, each once, as in x=6,y=0", got=text)
+        found[name] = value
+    return found

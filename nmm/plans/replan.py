@@ -1,0 +1,115 @@
+"""A plan that goes on from where the robot is: what is left of another, joined, or a search grown from it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.arrays import Array, counted, positive, scalar
+from nmm.collisions.obstacle import Obstacle
+from nmm.errors import expect_kind
+from nmm.plans.plan import Plan
+from nmm.plans.search import STEP, Search
+
+#: Times at which the plan's nearest point is looked for, s apart.
+NEAR = 0.05
+
+
+def replan(
+    plan: Plan,
+    q: ArrayLike | Mapping[str, float],
+    obstacles: Sequence[Obstacle] | None = None,
+    t: float | None = None,
+    seconds: float = 10.0,
+    seed: int = 0,
+    *,
+    shorten: int = 50,
+    progress: Callable[[float], None] | None = None,
+) -> Plan:
+    """A plan from where the robot is now to where another leads.
+
+    What is left of the other plan is looked at first: where it is free it is kept, with the way that joins
+    it soonest. Else the search begins with the parts of it that are free. Way-points (`through`) that are
+    still ahead are passed where the plan is kept, and not asked for otherwise.
+
+    Parameters
+    ----------
+    plan : of `nmm.plan` or this
+    q : where the robot is, (n,) or by name, m and rad
+    obstacles : that stand now, in place of all that the plan knew; as they were when None
+    t : how much of the plan is gone, s; that of its point nearest to q when None
+    seconds, seed, shorten, progress : as of `nmm.plan`; a plan that is kept is not shortened
+
+    Returns
+    -------
+    Plan, whose `motions` and `postures` count what was looked at now.
+
+    Raises
+    ------
+    InputError, RunError : as `nmm.plan`
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_3r")
+    >>> wall = nmm.Obstacle(nmm.Box([0.2, 4.0, 2.0]), [3.0, 0.0, 0.5], name="wall")
+    >>> plan = nmm.plan(robot, robot.rest, {"x": 6.0, "y": 0.0, "theta": 0.0}, [wall])
+    >>> (half,), _ = plan(0.5 * plan.duration)
+    >>> on = nmm.replan(plan, half + 0.02)
+    >>> np.allclose(on.end, plan.end), on.duration < plan.duration, on.motions < plan.motions
+    (True, True, True)
+    """
+    expect_kind(plan, Plan, "replan", "a Plan, as nmm.plan returns it")
+    robot, old = plan.robot, plan.found
+    here = robot.following.placed(robot.q(q))
+    robot.check_limits(here)
+    asked = dict(old.asked)
+    if obstacles is not None:
+        asked["collisions"] = replace(asked["collisions"], obstacles=tuple(obstacles))
+    search = Search(robot, here, [old.goal], (), seed=seed, **asked)
+    search.begin(positive(seconds, "seconds"), progress)
+    rest = _rest(plan, here, t)
+    ways = [search.guide.way(a, b) for a, b in pairwise(rest)]
+    free = [search.blocked(a, way) < 0 for a, way in zip(rest, ways, strict=False)]
+    first = free.index(False) if False in free else len(free)
+    last = len(free) - free[::-1].index(False) if False in free else 0
+    # What is joined is what begins free: all of it, or up to where something is in the way.
+    joined, join = _join(search, here, rest[: first + 1], ways)
+    if joined is not None and first == len(free):
+        return search.finished(np.vstack([join, *ways[joined:]]))
+    ahead: list[Array] = [] if joined is None else rest[joined : first + 1]
+    goals, behind = rest[-1:], rest[last:-1]
+    if search.check.too_near(rest[-1]) >= 0:
+        goals, behind = search.ends(old.goal, here), []
+    legs = search.way(here, goals, ahead, behind)
+    return search.finished(search.shortened(here, legs, counted(shorten, "shorten", 0)))
+
+
+def _rest(plan: Plan, q: Array, t: float | None) -> list[Array]:
+    """Configurations (n,) of a plan from a time or its point nearest to q on, to its end: where it stops,
+    and between, at most `STEP` s apart."""
+    if t is None:
+        times = np.arange(0.0, plan.duration + NEAR, NEAR)
+        off = plan(times)[0] - q
+        if plan.robot.platform.n_p >= 3:
+            off[:, 2] -= 2.0 * np.pi * np.round(off[:, 2] / (2.0 * np.pi))
+        t = float(times[np.einsum("ki,ki->k", off, off).argmin()])
+    begin = min(max(scalar(t, "t"), 0.0), plan.duration)
+    stops = [begin, *(one for one in plan.stops if one > begin)]
+    parts = [np.linspace(a, b, 1 + math.ceil((b - a) / STEP))[:-1] for a, b in pairwise(stops)]
+    return list(plan(np.concatenate([*parts, [plan.duration]]))[0])
+
+
+def _join(search: Search, q: Array, rest: Sequence[Array], ways: Sequence[Array]) -> tuple[int | None, Array]:
+    """At which of these configurations, joined by ways, the soonest free way from q joins them, and it."""
+    joins = [search.guide.way(q, one) for one in rest]
+    after = np.cumsum([0.0, *(search.guide.times(way).sum() for way in ways[: len(rest) - 1])])
+    takes = [float(search.guide.times(join).sum()) for join in joins]
+    for k in np.argsort(takes + after[-1] - after):
+        if search.blocked(q, joins[k]) < 0:
+            return int(k), joins[k]
+    return None, joins[0]

@@ -1,0 +1,110 @@
+"""Plans that go on from where the robot is: what is kept, what is searched, and what is saved by it."""
+
+import numpy as np
+import pytest
+from test_plans import BEHIND, LIMITS, WALL, check
+
+import nmm
+
+
+@pytest.fixture(scope="module")
+def plans():
+    robot = nmm.load("unicycle_3r")
+    return [nmm.plan(robot, robot.rest, BEHIND, [WALL], limits=LIMITS, seed=seed) for seed in range(3)]
+
+
+def beside(plan, share=0.4):
+    """A little away from the wall, and turned."""
+    (q,), _ = plan(share * plan.duration)
+    q[:3] += -0.05 if q[0] < 3.0 else 0.05, 0.02 * np.sign(q[1]), 0.05
+    return q
+
+
+def ends_as(one, other):
+    """Whether both end at a configuration, but for whole turns of the platform."""
+    off = one.end - other.end
+    off[2] = np.sin(0.5 * off[2])
+    return np.abs(off).max() < 1e-9
+
+
+def test_a_plan_that_is_free_is_kept_and_joined(plans):
+    for plan in plans:
+        q = beside(plan)
+        on = nmm.replan(plan, q)
+        check(on)
+        assert np.array_equal(on.corners[0], q)
+        assert ends_as(on, plan)
+        assert on.motions < 0.5 * plan.motions
+        assert on.postures == 0
+        assert on.duration < 0.6 * plan.duration + 15.0
+
+
+def test_a_robot_on_its_plan_has_the_rest_of_it(plans):
+    plan = plans[0]
+    t = 0.5 * plan.duration
+    (q,), _ = plan(t)
+    for on in (nmm.replan(plan, q), nmm.replan(plan, q, t=t)):
+        assert on.duration < plan.duration - t + 3.0
+        check(on)
+
+
+def test_what_is_free_of_a_plan_spares_looks_at_motions():
+    """Between two walls a post stands on the plan: the search begins with the parts that are free."""
+    robot, spared, new = nmm.load("unicycle_3r"), 0, 0
+    places = {"one": (2.0, 1.5), "two": (4.0, -1.5)}
+    walls = [nmm.Obstacle(nmm.Box([0.2, 5.0, 2.0]), [*at, 0.5], name=name) for name, at in places.items()]
+    sides = {"north": (3.0, 4.1), "south": (3.0, -4.1)}
+    walls += [nmm.Obstacle(nmm.Box([9.0, 0.2, 2.0]), [*at, 0.5], name=name) for name, at in sides.items()]
+    ends = {"west": (-1.5, 0.0), "east": (7.5, 0.0)}
+    walls += [nmm.Obstacle(nmm.Box([0.2, 8.0, 2.0]), [*at, 0.5], name=name) for name, at in ends.items()]
+    for seed in (0, 1, 3):
+        plan = nmm.plan(robot, robot.rest, {**BEHIND, "theta": 0.0}, walls, limits=LIMITS, seed=seed)
+        q, (x, y, *_) = plan(np.array([0.1, 0.55]) * plan.duration)[0]
+        now = [*walls, nmm.Obstacle(nmm.Cylinder(0.15, 2.0), [x, y, 0.5], name="post")]
+        on = nmm.replan(plan, q, now, seed=seed)
+        check(on)
+        assert any("post" in pair for pair in on.found.scene.names)
+        assert ends_as(on, plan)
+        spared += on.motions
+        new += nmm.plan(robot, q, plan.end, now, limits=LIMITS, seed=seed, shorten=50).motions
+    assert spared < 0.5 * new
+
+
+def test_a_plan_of_a_plan_goes_on(plans):
+    on = nmm.replan(plans[0], beside(plans[0], 0.3))
+    again = nmm.replan(on, on(0.5 * on.duration)[0][0])
+    assert ends_as(again, plans[0])
+    assert again.duration < on.duration
+
+
+def test_an_end_that_is_taken_is_another_posture_or_refused(plans):
+    robot = plans[0].robot
+    hand = nmm.Task(nmm.Position("ee", "xy"), [4.0, 1.0])
+    plan = nmm.plan(robot, robot.rest, hand)
+    x, y = plan.end[:2]
+    post = nmm.Obstacle(nmm.Cylinder(0.1, 0.3), [x, y, 0.1], name="post")
+    on = nmm.replan(plan, robot.rest, [post])
+    check(on, limits=nmm.Limits())
+    reached = nmm.Configuration(robot, on.end).placement("ee").translation[:2]
+    assert np.linalg.norm(reached - [4.0, 1.0]) < 0.005
+    assert np.abs(on.end - plan.end).max() > 0.05
+    there = nmm.Obstacle(nmm.Cylinder(0.1, 0.3), [6.0, 0.0, 0.1], name="there")
+    with pytest.raises(nmm.RunError, match="there"):
+        nmm.replan(plans[0], robot.rest, [WALL, there])
+
+
+@pytest.mark.parametrize(
+    ("given", "where"),
+    [
+        ({"plan": 1.0}, "replan"),
+        ({"q": {"z": 1.0}}, "robot unicycle_3r"),
+        ({"q": {"x": 3.0}}, "plan: start"),
+        ({"seconds": 0.0}, "seconds"),
+        ({"t": np.nan}, "t"),
+    ],
+)
+def test_bad_input_is_refused(plans, given, where):
+    keywords = {"plan": plans[0], "q": plans[0].robot.rest, **given}
+    with pytest.raises(nmm.InputError) as found:
+        nmm.replan(**keywords)
+    assert found.value.where.startswith(where)
