@@ -43,7 +43,6 @@ def sections() -> Iterator[Section]:
     yield _section("retreat", RetreatPart)
     yield _section("plan", PlanPart)
     yield _section("plan.track", TrackPart)
-    yield _section("plan.track", TrackPart)
     yield _section("limits", LimitsPart)
     yield _section("limits.bounds: a task's function and its keys, with these", BoundPart)
     yield _section("collisions", CollisionsPart)
