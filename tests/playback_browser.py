@@ -67,6 +67,7 @@ def browser() -> Iterator[Browser]:
             f"these tests need Chromium (Debian: apt-get install chromium); none of {names} is in PATH"
         )
     options = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+    options += ["--webgl-antialiasing-mode=none"]  # four samples a pixel would double what a picture takes
     with sync_playwright() as playwright:
         chromium = playwright.chromium.launch(executable_path=path, args=options)
         yield chromium

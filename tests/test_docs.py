@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 import typer
 from derivatives import check_function
+from small_pictures import draw_only
 from worked_examples import FILES, write_examples
 
 import nmm
@@ -90,8 +91,11 @@ console = script("console")
 
 
 @pytest.mark.parametrize("page", console.PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
-def test_a_page_that_runs_prints_what_it_says(page: Path, tmp_path: Path) -> None:
+def test_a_page_that_runs_prints_what_it_says(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The same words, and the same numbers but for rounding, counts of starts among them."""
+    draw_only([Path(path).name for path in console.shown(page)], monkeypatch)
     text = page.read_text(encoding="utf-8")
     said, said_numbers = words_and_numbers(console.compared(text))
     printed, printed_numbers = words_and_numbers(console.compared(console.rewritten(text, tmp_path)))
@@ -119,6 +123,7 @@ def test_the_commands_of_the_readme_run(tmp_path: Path, monkeypatch: pytest.Monk
     tutorial = (ROOT / "docs" / "tutorials" / "own_robot.md").read_text(encoding="utf-8")
     robot = re.search(r"^```xml\n(.*?)^```$", tutorial, flags=re.DOTALL | re.MULTILINE)
     assert robot is not None
+    draw_only([], monkeypatch)
     (tmp_path / "my_robot.urdf").write_text(robot[1], encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -147,6 +152,7 @@ def test_the_commands_of_the_other_pages_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     """Each once, in an empty folder."""
+    draw_only([], monkeypatch)
     monkeypatch.chdir(tmp_path)
     lines = {
         shlex.join(arguments): page

@@ -10,6 +10,7 @@ import pytest
 import yaml
 from command_line import Result
 from findings import refused
+from small_pictures import draw_only
 from urdf_parts import joint, link, robot, shape, write
 
 import nmm
@@ -27,6 +28,7 @@ Command = Callable[..., Result]
 @pytest.fixture
 def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Command:
     """Run a command line in an empty folder, in this process."""
+    draw_only([], monkeypatch)
     monkeypatch.chdir(tmp_path)
     return lambda *arguments: Result(status_of(arguments), *capfd.readouterr())
 

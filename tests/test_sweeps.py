@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import re
+import shutil
 import sys
 import time
 from collections.abc import Callable
@@ -239,36 +240,42 @@ def test_the_folder_holds_all_rows_in_order(short: Path, tmp_path: Path) -> None
     assert (tmp_path / "out" / "rows.parquet").stat().st_mtime_ns == before
 
 
-@pytest.mark.parametrize("part", ["head", "middle", "end"])
-def test_a_damaged_part_is_computed_again_and_told(
-    short: Path, tmp_path: Path, run: Command, monkeypatch: pytest.MonkeyPatch, part: str
-) -> None:
-    """Also where its end, with the number of its rows, is whole."""
-    vary_x(short).run(tmp_path / "whole", jobs=1)
-    sweep, kept = vary_x(short), tmp_path / "parts" / "parts" / "000001.parquet"
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A scenario, its sweep in "whole", and in "parts" the same, interrupted when all rows were computed."""
+    folder = tmp_path_factory.mktemp("sweeps")
+    (folder / "short.yaml").write_text(MINIMAL, encoding="utf-8")
+    vary_x(folder / "short.yaml").run(folder / "whole", jobs=1)
 
     def stop(place: object) -> None:
         raise KeyboardInterrupt
 
-    with monkeypatch.context() as patch:
+    with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sweep_folder.SweepFolder, "finish", stop)
         with pytest.raises(KeyboardInterrupt):
-            sweep.run(tmp_path / "parts", jobs=1)
+            vary_x(folder / "short.yaml").run(folder / "parts", jobs=1)
+    return folder
+
+
+@pytest.mark.parametrize("part", ["head", "middle", "end"])
+def test_a_damaged_part_is_computed_again_and_told(folders: Path, tmp_path: Path, part: str) -> None:
+    """Also where its end, with the number of its rows, is whole."""
+    shutil.copytree(folders / "parts", tmp_path / "parts")
+    sweep, kept = vary_x(folders / "short.yaml"), tmp_path / "parts" / "parts" / "000001.parquet"
     content = bytearray(kept.read_bytes())
     first = {"head": 0, "middle": len(content) // 3, "end": len(content) - 40}[part]
     content[first : first + 40] = 40 * b"\x00"
     kept.write_bytes(content)
     swept = sweep.run(tmp_path / "parts", jobs=1)
     assert swept.computed_again == sweep.definition.chunk
-    assert swept.table.equals(nmm.Sweep.run(vary_x(short), tmp_path / "whole", jobs=1).table)
+    assert swept.table.equals(pq.read_table(folders / "whole" / "rows.parquet"))
     assert sweep.run(tmp_path / "parts", jobs=1).computed_again == 0
 
 
 def test_interrupted_anywhere_it_goes_on_to_the_same_bytes(
-    short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    folders: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    sweep = vary_x(short)
-    sweep.run(tmp_path / "whole", jobs=1)
+    sweep = vary_x(folders / "short.yaml")
     computed: list[int] = []
     rollout = sweep_rows._rollout
 
@@ -291,7 +298,7 @@ def test_interrupted_anywhere_it_goes_on_to_the_same_bytes(
     sweep.run(tmp_path / "parts", jobs=1)
     assert sorted(set(computed)) == list(range(60))
     assert len(computed) < 60 + 3 * sweep.definition.chunk + sweep.definition.chunk
-    bytes_of = [(tmp_path / name / "rows.parquet").read_bytes() for name in ("whole", "parts")]
+    bytes_of = [(one / "rows.parquet").read_bytes() for one in (folders / "whole", tmp_path / "parts")]
     assert bytes_of[0] == bytes_of[1]
 
 

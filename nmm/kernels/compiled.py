@@ -74,7 +74,7 @@ class Kernel:
     @cached_property
     def address(self) -> int:
         """The address of its machine code, by which compiled programs call it."""
-        if not is_jitted(self.compiled):  # NUMBA_DISABLE_JIT=1
+        if numba.config.DISABLE_JIT:
             address = id(self.plain)
         elif problem() is None:
             result = self.compiled.overloads[self.signature.args]
