@@ -2,10 +2,10 @@
 
     python benchmarks/crossings.py [INSTANCES] [SEED] [HORIZON …]
 
-Only crossings in which the robot, standing still, would be safe. `hit` counts runs in which something is nearer
-than nothing (Coal's distance at and between samples), `short` those nearer than the distance to keep, `reached`
-those that end at their goal, both with the time that it took (median, s) and the time of a step, as a ratio to
-that with the first horizon.
+Only crossings in which the robot, standing still, would be safe, and is hit without a guard. `hit` counts
+runs that touch (Coal's distance, at samples and between), `short` those that come nearer than the distance to
+keep, `reached` those that end at their goal, `time` what that took (median, s), `step` the processor time of a
+step, as a ratio to that with the first horizon.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Crossing(NamedTuple):
 
 @cache
 def robots() -> list[tuple[nmm.Robot, dict[str, float], str]]:
-    """A UR5 and a small arm on two wheels, the first by v and omega, the second by its wheels; and a planar arm."""
+    """A UR5 on a unicycle, a small arm on two driven wheels, a planar arm on a unicycle."""
     ur5 = nmm.mount(nmm.load("differential_base", platform="unicycle"), nmm.load(UR5), prefix="ur5_")
     small = nmm.mount("differential_base", "small_arm", at="arm_mount")
     return [
@@ -60,14 +60,15 @@ def crossing(rng: np.random.Generator) -> Crossing:
     velocity = speed * np.array([np.cos(turn), np.sin(turn), 0.0])
     middle = np.array([*where, 0.9])
     motion = lambda t: middle + (t - when) * velocity  # noqa: E731
-    body = nmm.Obstacle(nmm.Cylinder(RADIUS, 1.8), motion=motion, velocity=lambda t: velocity, name="cylinder")
+    body = nmm.Obstacle(
+        nmm.Cylinder(RADIUS, 1.8), motion=motion, velocity=lambda t: velocity, name="cylinder"
+    )
     return Crossing(robot, start, frame, goal, body)
 
 
 def controller(one: Crossing, horizon: float) -> nmm.Controller:
     """What drives the robot to its goal."""
-    more = {"horizon": horizon} if horizon else {}
-    keeps = nmm.Collisions(DISTANCE, obstacles=[one.obstacle], self_collisions=False, **more)
+    keeps = nmm.Collisions(DISTANCE, False, [one.obstacle], horizon=horizon)
     task = nmm.Task(nmm.Position(one.frame), one.goal, gain=1.0, speed=0.5)
     at_rest = nmm.PreferredPosture({name: value for name, value in one.start.items() if name != "theta"})
     given = one.robot, task, nmm.ProjectedGradient(), at_rest
@@ -117,9 +118,7 @@ def main() -> None:
         for one in scenes:
             driven = controller(one, horizon)
             begun = time.process_time()
-            run = nmm.simulate(
-                driven, one.robot.q(one.start), DURATION, DT, "zoh", until=nmm.Goal(0.01)
-            )
+            run = nmm.simulate(driven, one.robot.q(one.start), DURATION, DT, "zoh", until=nmm.Goal(0.01))
             spent += time.process_time() - begun
             steps += len(run)
             least = float(run.clearance_between.min())

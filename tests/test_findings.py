@@ -230,8 +230,8 @@ EXAMPLES: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
         "pose_without_feedback",
         {"platform": "car"},
         {},
-        "no smooth feedback brings a car platform to a pose x, y, theta that stands (Brockett 1983); nmm.plan "
-        "(scenario key plan) and the task Parking do",
+        "no smooth feedback brings a car platform to a pose x, y, theta that stands (Brockett 1983); "
+        "nmm.plan (scenario key plan) does",
     ),
     (
         "no_redundancy",

@@ -12,7 +12,16 @@ from nmm.collisions.broad_phase import PairArrays
 from nmm.kernels.compiled import clear, compiled, scratch
 from nmm.kernels.kinematics import Joints, compose, place_joints
 from nmm.kernels.linear_algebra import copied
-from nmm.kernels.record_layout import Blocks, Cell, IntegerCell, IntegerVector, Matrices, Matrix, Vector, views
+from nmm.kernels.record_layout import (
+    Blocks,
+    Cell,
+    IntegerCell,
+    IntegerVector,
+    Matrices,
+    Matrix,
+    Vector,
+    views,
+)
 from nmm.robots.zero_order_hold import Inputs, hold
 
 #: Two looks are no farther apart than this, in m and rad of the coordinates together.
@@ -28,7 +37,7 @@ class SweptMotion(NamedTuple):
 
     joints, inputs : the robot's
     deceleration (m,) : by how much inputs can change per second; infinite where unknown
-    driven (m,), lasts () : inputs towards which those of the sample then change, for so long, s, before braking
+    driven (m,), lasts () : inputs to which those of the sample then change, for so long, s, before braking
     carrier (G,), place (G, 12) : a shape's joint, and its place there; an obstacle's is in the world, now
     path (G,), paths (..., L, 12) : the path of an obstacle, -1 without, and -2 for the robot's shapes; places
     disc (G,) : radius of a cylinder, 0 of others
@@ -36,7 +45,8 @@ class SweptMotion(NamedTuple):
     grid (..., K, 12) : where they are then
     planes (P, 2, 4) : in each shape's axes, direction to the other and extent along it, m; infinite if
     unknown
-    looks () : how many; stands () : the first at which the robot stands; after (L,) : s from now; q (L, n) : where the robot is then
+    looks () : how many; stands () : the first at which the robot stands
+    after (L,) : s from now; q (L, n) : where the robot is then
     weight (L,) : how long the inputs would have taken to get as far, s"""
 
     joints: Joints

@@ -43,7 +43,7 @@ class SweptCheck:
     a path are looked at for `horizon` s."""
 
     def __init__(
-        self, queries: Queries, deceleration: Array, distance: float, target: float, horizon: float
+        self, queries: Queries, deceleration: Array, distance: float, target: float, horizon: float = 0.0
     ) -> None:
         self._queries, self._distance, self._target = queries, distance, target
         self._paths = [one for _, one in queries.moving if one.moves]

@@ -55,8 +55,8 @@ class Collisions:
     braking : deceleration of a distance to rely on, m/s²; None for a quarter of what the inputs'
         accelerations give
     rows : the largest number of distances kept at a time, the smallest ones
-    horizon : for so long ahead, s, obstacles that move along a path are looked at: where the robot can stop
-        they do not come meanwhile; 0 for no longer than it takes to stop
+    horizon : for so long ahead, s, obstacles that move along a path are looked at: the robot waits, or gives
+        way, where they will come; 0 for no longer than it takes to stop
 
     Raises
     ------

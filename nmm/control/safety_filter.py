@@ -5,6 +5,9 @@ sample, or while the robot then brakes (all inputs alike, as hard as acceleratio
 measured along that motion. Where one falls short, a row for its points is added and the problem is solved
 again; after a few rounds the inputs are changed towards braking, as little as possible. That braking motion
 was found clear one sample earlier, so there is always a safe one among standing obstacles.
+
+Obstacles with a path are looked at for longer, while the robot stands after braking. Where it would stand in
+their way whatever it does, it gives way by the first of some motions of the platform that ends clear.
 """
 
 from __future__ import annotations

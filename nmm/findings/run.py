@@ -129,7 +129,7 @@ WORDS: Mapping[str, Words] = {
     "nothing_gives": lambda lost, **_: f"no input gives: {', '.join(lost)}",
     "pose_without_feedback": (
         "no smooth feedback brings a {platform} platform to a pose x, y, theta that stands (Brockett 1983); "
-        "nmm.plan (scenario key plan) and the task Parking do"
+        "nmm.plan (scenario key plan) does"
     ),
     "inputs_fell_short": "the inputs did not do all that the task asked (clipped, scaled or damped)",
     "still_moving": (

@@ -14,10 +14,10 @@ from nmm.arrays import Array
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
 from nmm.control.idle_inputs import idle_inputs
-from nmm.control.standing_pose import standing_pose
 from nmm.control.integrators import Integrator
 from nmm.control.sample import Snapshot
 from nmm.control.sequence import Schedule
+from nmm.control.standing_pose import standing_pose
 from nmm.control.step import Step
 from nmm.errors import DivergedError, RunError, SingularError
 from nmm.findings import Finding
