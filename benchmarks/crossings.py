@@ -4,8 +4,8 @@
 
 Only crossings in which the robot, standing still, would be safe, and is hit without a guard. `hit` counts
 runs that touch (Coal's distance, at samples and between), `short` those that come nearer than the distance to
-keep, `reached` those that end at their goal, `time` what that took (median, s), `step` the processor time of a
-step, as a ratio to that with the first horizon.
+keep, `reached` those that end at their goal, `time` what that took (median, s), `step` the processor time of
+a step, as a ratio to that with the first horizon.
 """
 
 from __future__ import annotations
