@@ -227,6 +227,13 @@ EXAMPLES: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
         "objective can)",
     ),
     (
+        "pose_without_feedback",
+        {"platform": "car"},
+        {},
+        "no smooth feedback brings a car platform to a pose x, y, theta that stands (Brockett 1983); "
+        "nmm.plan (scenario key plan) does",
+    ),
+    (
         "no_redundancy",
         {},
         {},

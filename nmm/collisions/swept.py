@@ -1,4 +1,5 @@
 """The motion that inputs cause, compiled: where the robot will be, and which pairs are surely apart there.
+After it the robot stands, and what moves along a path goes on (`later`).
 
 The gap between parallel planes that separate two convex shapes bounds their distance from below. The last
 direction between nearest points, carried along with either shape, often suffices; else Coal measures."""
@@ -11,13 +12,22 @@ from nmm.collisions.broad_phase import PairArrays
 from nmm.kernels.compiled import clear, compiled, scratch
 from nmm.kernels.kinematics import Joints, compose, place_joints
 from nmm.kernels.linear_algebra import copied
-from nmm.kernels.record_layout import Blocks, IntegerCell, IntegerVector, Matrices, Matrix, Vector, views
+from nmm.kernels.record_layout import (
+    Blocks,
+    Cell,
+    IntegerCell,
+    IntegerVector,
+    Matrices,
+    Matrix,
+    Vector,
+    views,
+)
 from nmm.robots.zero_order_hold import Inputs, hold
 
 #: Two looks are no farther apart than this, in m and rad of the coordinates together.
 APART = 0.01
-#: At most this many looks within the sample, and samples of braking.
-LOOKS, BRAKING = 20, 400
+#: At most this many looks within the sample, and samples of giving way and of braking.
+LOOKS, DRIVEN, BRAKING = 20, 400, 400
 #: A joint's lever changes while others move: it is taken this much longer than it is now.
 LEVERS = 1.1
 
@@ -27,24 +37,33 @@ class SweptMotion(NamedTuple):
 
     joints, inputs : the robot's
     deceleration (m,) : by how much inputs can change per second; infinite where unknown
+    driven (m,), lasts () : inputs to which those of the sample then change, for so long, s, before braking
     carrier (G,), place (G, 12) : a shape's joint, and its place there; an obstacle's is in the world, now
     path (G,), paths (..., L, 12) : the path of an obstacle, -1 without, and -2 for the robot's shapes; places
     disc (G,) : radius of a cylinder, 0 of others
+    later (K,) : times at which obstacles with a path are looked at while the robot stands, s from now
+    grid (..., K, 12) : where they are then
     planes (P, 2, 4) : in each shape's axes, direction to the other and extent along it, m; infinite if
     unknown
-    looks () : how many; after (L,) : s from now; q (L, n) : where the robot is then
+    looks () : how many; stands () : the first at which the robot stands
+    after (L,) : s from now; q (L, n) : where the robot is then
     weight (L,) : how long the inputs would have taken to get as far, s"""
 
     joints: Joints
     inputs: Inputs
     deceleration: Vector
+    driven: Vector
+    lasts: Cell
     carrier: IntegerVector
     place: Matrix
     path: IntegerVector
     paths: Matrices
     disc: Vector
+    later: Vector
+    grid: Matrices
     planes: Matrices
     looks: IntegerCell
+    stands: IntegerCell
     after: Vector
     weight: Vector
     q: Matrix
@@ -61,7 +80,7 @@ def braking_share(deceleration: Array, u: Array, dt: float) -> float:
 
 @compiled
 def lay(way_blocks: Blocks, q: Array, u: Array, dt: float) -> int:
-    """Write the looks along dt with u and the braking after it; returns how many."""
+    """Write the looks along dt with u, the braking after it, and the standing; returns how many."""
     way = views(SweptMotion, way_blocks.integers, way_blocks.floats, 0)
     size = 0.0
     brakes = False
@@ -72,17 +91,35 @@ def lay(way_blocks: Blocks, q: Array, u: Array, dt: float) -> int:
     for i in range(count):
         way.after[i] = way.weight[i] = dt * (i + 1) / count
         hold(way.inputs, q, u, dt * (i + 1) / count, way.q[i])
-    step = braking_share(way.deceleration, u, dt)
     share, gone = 1.0, 0.0
     weight = after = dt
-    here, ahead, slower = scratch(q.shape[0]), scratch(q.shape[0]), scratch(u.shape[0])
+    here, ahead = scratch(q.shape[0]), scratch(q.shape[0])
+    now, slower = scratch(u.shape[0]), scratch(u.shape[0])
     copied(way.q[count - 1], here)
+    copied(u, now)
+    for _ in range(min(DRIVEN, round(way.lasts[()] / dt))):
+        size = 0.0
+        for j in range(u.shape[0]):
+            change = way.deceleration[j] * dt
+            now[j] += min(max(way.driven[j] - now[j], -change), change)
+            size += abs(now[j])
+        hold(way.inputs, here, now, dt, ahead)
+        copied(ahead, here)
+        after += dt
+        weight += dt
+        gone += dt * size
+        if gone > APART:
+            way.after[count], way.weight[count] = after, weight
+            copied(here, way.q[count])
+            count += 1
+            gone = 0.0
+    step = braking_share(way.deceleration, now, dt)
     for _ in range(BRAKING if brakes else 0):
         share -= step
         last = share <= 0.0
         if not last:
             for j in range(u.shape[0]):
-                slower[j] = share * u[j]
+                slower[j] = share * now[j]
             hold(way.inputs, here, slower, dt, ahead)
             copied(ahead, here)
             after += dt
@@ -95,6 +132,12 @@ def lay(way_blocks: Blocks, q: Array, u: Array, dt: float) -> int:
             gone = 0.0
         if last:
             break
+    way.stands[()] = count
+    for k in range(way.later.shape[0]):
+        if way.later[k] > after:
+            way.after[count], way.weight[count] = way.later[k], way.weight[way.stands[()] - 1]
+            copied(way.q[way.stands[()] - 1], way.q[count])
+            count += 1
     way.looks[()] = count
     return count
 
@@ -169,9 +212,13 @@ def unsure(blocks: Blocks, way_blocks: Blocks, listed: int, look: int, first: in
     way = views(SweptMotion, way_blocks.integers, way_blocks.floats, 0)
     joints, ends = scratch((way.joints.parent.shape[0], 12)), scratch((2, 12))
     for i in range(look, way.looks[()]):
-        place_joints(way.joints, way.q[i], joints)
+        stands = i >= way.stands[()]
+        if i == look or not stands:
+            place_joints(way.joints, way.q[i], joints)
         for k in range(first if i == look else 0, listed):
             pair = scene.risky[k]
+            if stands and way.path[scene.pairs[pair, 1]] < 0:
+                continue
             for side in range(2):
                 shape = scene.pairs[pair, side]
                 if way.path[shape] >= 0:
@@ -181,6 +228,26 @@ def unsure(blocks: Blocks, way_blocks: Blocks, listed: int, look: int, first: in
             if gap(scene, way, pair, ends, scene.kept[pair]) < scene.kept[pair]:
                 return i * scene.kept.shape[0] + k
     return -1
+
+
+@compiled
+def stray(scene: PairArrays, way: SweptMotion, places: Array, shape: int) -> float:
+    """The farthest that a point of an obstacle is from where it is now, at any time of `later`, m."""
+    farthest = 0.0
+    box = scene.boxes[shape]
+    for k in range(way.later.shape[0] if way.path[shape] >= 0 else 0):
+        there = way.grid[way.path[shape], k]
+        moved = 0.0
+        turned = 0.0
+        for i in range(3):
+            shift = there[9 + i] - places[shape, 9 + i]
+            for a in range(3):
+                change = there[3 * a + i] - places[shape, 3 * a + i]
+                shift += change * box[a]
+                turned += change * change
+            moved += shift * shift
+        farthest = max(farthest, math.sqrt(moved) + math.sqrt(turned) * box[6])
+    return farthest
 
 
 @compiled
@@ -240,6 +307,9 @@ def list_risky(
             lever = math.sqrt(u * u + v * v + r * r) + turn * radius
             moved[i, c] = LEVERS * abs(q_dot[c]) * time * lever
             total[i] += moved[i, c]
+    strays = scratch(count)
+    for i in range(count):
+        strays[i] = stray(scene, way, places, i)
     for k in range(scene.pairs.shape[0]):
         if scene.watched[k] == 1:
             continue
@@ -260,7 +330,7 @@ def list_risky(
             for a in range(3):
                 square += (places[i, 9 + a] - places[j, 9 + a]) ** 2
             speed += turn * (math.sqrt(square) + 2.0 * scene.boxes[i, 6])
-        if room < max(one, two) + time * speed:
+        if room < max(one, two) + max(time * speed, strays[j]):
             scene.watched[k] = 1
             scene.risky[listed] = k
             listed += 1

@@ -55,6 +55,8 @@ class Collisions:
     braking : deceleration of a distance to rely on, m/s²; None for a quarter of what the inputs'
         accelerations give
     rows : the largest number of distances kept at a time, the smallest ones
+    horizon : for so long ahead, s, obstacles that move along a path are looked at: the robot waits, or gives
+        way, where they will come; 0 for no longer than it takes to stop
 
     Raises
     ------
@@ -84,6 +86,7 @@ class Collisions:
     recovery: float = 0.1
     braking: float | None = None
     rows: int = 40
+    horizon: float = 4.0
 
     def __post_init__(self) -> None:
         if not isinstance(self.self_collisions, bool):  # obstacles given as a positional argument
@@ -114,6 +117,7 @@ class Collisions:
             "recovery": positive(self.recovery, "collisions: recovery"),
             "braking": None if self.braking is None else positive(self.braking, "collisions: braking"),
             "rows": counted(self.rows, "collisions: rows"),
+            "horizon": scalar(self.horizon, "collisions: horizon", least=0.0),
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)

@@ -5,11 +5,15 @@ sample, or while the robot then brakes (all inputs alike, as hard as acceleratio
 measured along that motion. Where one falls short, a row for its points is added and the problem is solved
 again; after a few rounds the inputs are changed towards braking, as little as possible. That braking motion
 was found clear one sample earlier, so there is always a safe one among standing obstacles.
+
+Obstacles with a path are looked at for longer, while the robot stands after braking. Where it would stand in
+their way whatever it does, it gives way by the first of some motions of the platform that ends clear.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +33,8 @@ MARGIN, SLACK = 5e-4, 5e-5
 CUTS, ROUNDS = 8, 5
 #: Then inputs between braking (0) and those wanted (1) are tried, in this order.
 SHARES = (0.75, 0.5, 0.25, 0.1, 0.0)
+#: The platform gives way by motions of these lengths, s, with its inputs at their limits, at most UNLIMITED.
+GIVES_WAY, UNLIMITED = (0.5, 1.0, 2.0), 1.0
 
 
 class Counts(NamedTuple):
@@ -48,13 +54,18 @@ class SafetyFilter:
     """Keeps a controller's distances; again(q) -> status solves the current equations once more."""
 
     def __init__(
-        self, scene: Scene, step: ControlStep, program: Program, again: Callable[[Array], float]
+        self,
+        scene: Scene,
+        step: ControlStep,
+        program: Program,
+        again: Callable[[Array], float],
+        horizon: float,
     ) -> None:
         self._scene, self._queries = scene, scene.queries
         self._near, self._keep, self._step = step.near, step.clearance, step
         self._program, self._again = program, again
         self._lookout = SweptCheck(
-            scene.queries, step.limits.acceleration, scene.distance, scene.distance + SLACK
+            scene.queries, step.limits.acceleration, scene.distance, scene.distance + SLACK, horizon
         )
 
     @property
@@ -84,6 +95,7 @@ class SafetyFilter:
         self._keep.held[()] = 0
         found, dt = self._step, float(self._step.problem.dt)
         u = found.answer.u
+        self._lookout.look_ahead(t)
         if not self._lookout.list_risky(found.q_dot, u, dt, anew=True):
             return
         self._keep.held[()] = 1
@@ -124,6 +136,8 @@ class SafetyFilter:
                 break
             if found.by < least:
                 best, least = tried, found.by
+        if least > 0.0 and self._lookout.sees_paths:
+            best, least = self._give_way(t, q, before, best, least)
         if least > 0.0:
             self._count("short")
         rows = problem.limit_rows @ best
@@ -135,6 +149,29 @@ class SafetyFilter:
         answer.excess[()] = beyond if beyond > LEFT else 0.0
         step.scale[:] = 0.0
         drive(best, self._program.buffers.G, step.arm, step.q_dot)
+
+    def _give_way(self, t: float, q: Array, before: Array, best: Array, least: float) -> tuple[Array, float]:
+        """Where the robot cannot stop without something coming there: the first inputs of a motion of the
+        platform that ends clear, the shortest of some, or else the one that stays clear for longest; with by
+        how much it falls short, 0 or `least`."""
+        problem, limits = self._step.problem, self._step.limits
+        dt, p = float(problem.dt), self._scene.robot.platform.p
+        change = limits.acceleration * dt
+        self._lookout.list_obstacles()
+        stays = np.zeros_like(best)
+        longest = self._lookout.contact(t, q, best, dt, stays, 0.0)
+        for lasts, signs in product(GIVES_WAY, product((0.0, 1.0, -1.0), repeat=p)):
+            driven = stays.copy()
+            sizes = np.where(np.array(signs) < 0.0, -limits.slowest[:p], limits.fastest[:p])
+            driven[:p] = signs * np.minimum(sizes, UNLIMITED)
+            first = before + np.clip(driven - before, -change, change)
+            first = np.clip(first, problem.u_lower, problem.u_upper)
+            clear = self._lookout.contact(t, q, first, dt, driven, lasts)
+            if clear > longest:
+                best, longest = first, clear
+            if np.isinf(clear):
+                return best, 0.0
+        return best, least
 
     def _add_row(self, t: float, q: Array, short: Short) -> bool:
         """Add a row for the points that come too near; False where there is no room for it."""

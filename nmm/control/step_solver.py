@@ -92,8 +92,9 @@ class StepSolver:
         self.sample = SampleState(self.blocks, self.found)
         self.report = LimitReport(robot, self.limits_on, self.scene, self.found, self.program)
         self.safety_filter: SafetyFilter | None = None
-        if self.scene is not None:
-            self.safety_filter = SafetyFilter(self.scene, self.found, self.program, self._again())
+        if self.scene is not None and collisions is not None:
+            given_to = self.scene, self.found, self.program, self._again(), collisions.horizon
+            self.safety_filter = SafetyFilter(*given_to)
         if given.limits is None and collisions is None:
             self.found.limits.mode[()] = OFF
         self.retreat_state = None if retreat is None else RetreatState(retreat, robot, self.found.retreat)

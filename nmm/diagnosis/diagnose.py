@@ -34,7 +34,7 @@ def diagnose(leg: Leg, trajectory: Trajectory, until: Goal | None) -> Verdict | 
     def finish(verdicts: Sequence[Verdict]) -> Verdict:
         verdict = _blocked(_reached(verdicts[0], leg, until), leg.recorder)
         warnings = (*before, *verdict.warnings, *lines(after, verdict.outcome))
-        verdict = _collided(replace(verdict, warnings=warnings), into)
+        verdict = _collided(_explained(replace(verdict, warnings=warnings)), into)
         if verdict.outcome is Outcome.MISSED:
             verdict = replace(verdict, reasons=(*verdict.reasons, *held))
         return verdict
@@ -84,7 +84,8 @@ def diagnose_legs(
             verdict = _reached(verdict, last, until)
         verdict = _collided(_blocked(verdict, last.recorder), into)
         every = (*told, *verdict.warnings, *((found,) for found in never))
-        return replace(verdict, warnings=tuple(one for i, one in enumerate(every) if one not in every[:i]))
+        every = tuple(one for i, one in enumerate(every) if one not in every[:i])
+        return _explained(replace(verdict, warnings=every))
 
     return _when_read(judged, finish)
 
@@ -157,6 +158,15 @@ def _blocked(verdict: Verdict, recorder: Recorder) -> Verdict:
         return verdict
     found = Finding("blocked", {"pairs": list(recorder.blocking)})
     return replace(verdict, reasons=(found, *verdict.reasons))
+
+
+def _explained(verdict: Verdict) -> Verdict:
+    """The verdict on a run that missed its target, with the reason first that no feedback can reach it."""
+    why = [line for line in verdict.warnings if line[0].code == "pose_without_feedback"]
+    if not why or verdict.outcome not in (Outcome.MISSED, Outcome.SINGULAR):
+        return verdict
+    warnings = tuple(line for line in verdict.warnings if line not in why)
+    return replace(verdict, reasons=(*verdict.reasons[:1], *why[0], *verdict.reasons[1:]), warnings=warnings)
 
 
 def _into(controller: Controller, swept: Swept | None, trajectory: Trajectory) -> Finding | None:

@@ -127,6 +127,10 @@ WORDS: Mapping[str, Words] = {
     ),
     "stretched": "the arm is stretched: {frame} is {away:.3g} m of {length:.3g} m from {joint}",
     "nothing_gives": lambda lost, **_: f"no input gives: {', '.join(lost)}",
+    "pose_without_feedback": (
+        "no smooth feedback brings a {platform} platform to a pose x, y, theta that stands (Brockett 1983); "
+        "nmm.plan (scenario key plan) does"
+    ),
     "inputs_fell_short": "the inputs did not do all that the task asked (clipped, scaled or damped)",
     "still_moving": (
         "the robot has not come to rest: |{name}| is {mean:.3g} {unit} on average over the last "

@@ -17,6 +17,7 @@ from nmm.control.idle_inputs import idle_inputs
 from nmm.control.integrators import Integrator
 from nmm.control.sample import Snapshot
 from nmm.control.sequence import Schedule
+from nmm.control.standing_pose import standing_pose
 from nmm.control.step import Step
 from nmm.errors import DivergedError, RunError, SingularError
 from nmm.findings import Finding
@@ -90,7 +91,7 @@ def record_run(
         watch(recorder)
     if len(times) > 1 and not advance.tolerance:  # adaptive steps are shorter than the samples
         controller.dt = float(times[1] - times[0])
-    recorder.findings += _at_start(controller, q)
+    recorder.findings += _at_start(controller, q, times)
     guarded_advance = guarded(advance, controller)
     outcome, reasons = drive_loop(controller, guarded_advance, recorder, times, q, progress, until, leg)
     recorder.blocking = controller.report.blocking()
@@ -100,8 +101,8 @@ def record_run(
     return recorder, Ended(outcome, reasons, last, controller.solver.derivatives[0].copy())
 
 
-def _at_start(controller: Controller, q: Array) -> Iterator[Finding]:
-    """Findings about a run before its first sample at q (n,)."""
+def _at_start(controller: Controller, q: Array, times: Array) -> Iterator[Finding]:
+    """Findings about a run over the times (N,), s, before its first sample at q (n,)."""
     robot, solver = controller.robot, controller.solver
     yield from provenance_of(robot).contradictions
     yield from slip_warnings(robot)
@@ -113,6 +114,8 @@ def _at_start(controller: Controller, q: Array) -> Iterator[Finding]:
             yield Finding("start_outside_limits", {"outside": [*outside.values()], "recovery": recovery})
     if idle := idle_inputs(solver, q):
         yield Finding("idle_inputs", {"inputs": list(idle)})
+    if held := standing_pose(solver, q, times[:: max(1, len(times) // 4)]):
+        yield held
 
 
 def drive_loop(

@@ -1,0 +1,46 @@
+"""Whether tasks hold a platform at a pose to which no smooth feedback brings it."""
+
+import numpy as np
+
+from nmm.arrays import Array
+from nmm.control.step_solver import StepSolver
+from nmm.findings import Finding
+from nmm.functions.program import evaluate
+from nmm.robots.configuration import Configuration
+
+#: Singular values below this share of the largest are zero.
+ZERO = 1e-9
+#: A target that moves less than this per second stands.
+STANDS = 1e-9
+#: A platform whose error is at most this, m and rad, is to stay where it is, which feedback does.
+AT_TARGET = 1e-4
+
+
+def standing_pose(solver: StepSolver, q: Array, times: Array) -> Finding | None:
+    """A finding where the tasks decide x, y and θ of a platform whose inputs span fewer directions of these,
+    whatever the arm does, and their targets stand at all times (N,), s, elsewhere than the robot at q (n,).
+
+    q̇ = S(q) u with fewer inputs than coordinates has no smooth feedback that brings all of them to a point
+    (R. W. Brockett, Asymptotic stability and feedback stabilization, 1983).
+    """
+    robot = solver.robot
+    here = Configuration(robot, q)
+    if robot.platform.n_p < 3 or _rank(here.S[:3]) == 3:
+        return None
+    try:
+        targets = [evaluate(task.reference, float(t), here) for task in solver.task for t in times]
+        J = np.vstack([evaluate(task.function, float(times[0]), here).value_q for task in solver.task])
+        error = solver.errors(times[:1], q[np.newaxis])[0][0]
+    except Exception:  # a user's function may raise anything where it is not defined
+        return None
+    if any(np.abs(one.value_t).max() > STANDS or one.value_q.any() for one in targets):
+        return None
+    left, sizes, _ = np.linalg.svd(J[:, 3:])
+    free = left[:, np.count_nonzero(sizes > ZERO * max(1.0, sizes.max(initial=0.0))) :]
+    if _rank(free.T @ J[:, :3]) < 3 or not np.linalg.norm(free.T @ error) > AT_TARGET:
+        return None
+    return Finding("pose_without_feedback", {"platform": robot.platform.name})
+
+
+def _rank(matrix: Array) -> int:
+    return int(np.linalg.matrix_rank(matrix, ZERO))
