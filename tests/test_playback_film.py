@@ -71,8 +71,9 @@ def test_a_film_shows_each_time(small_robot: Robot, window: Window, tmp_path: Pa
     height, width, _ = own[0].shape
     pictures = decoded(film, width, height)
     assert len(pictures) == 16
+    scene = slice(0, round(0.85 * height))  # above the time in words, by which pictures would differ, too
     for i, k in enumerate(shown):
-        off = [float(np.abs(pictures[k] - picture).mean()) for picture in own]
+        off = [float(np.abs(pictures[k] - picture)[scene].mean()) for picture in own]
         assert int(np.argmin(off)) == i
         assert off[i] < 4.0, off  # of 255: what the codec loses
 
