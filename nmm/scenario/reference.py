@@ -43,7 +43,6 @@ def sections() -> Iterator[Section]:
     yield _section("retreat", RetreatPart)
     yield _section("plan", PlanPart)
     yield _section("plan.track", TrackPart)
-    yield _section("plan.track", TrackPart)
     yield _section("limits", LimitsPart)
     yield _section("limits.bounds: a task's function and its keys, with these", BoundPart)
     yield _section("collisions", CollisionsPart)
@@ -86,6 +85,8 @@ def _text(value: object) -> str:
         return str(value).lower()
     if isinstance(value, SteeringPart):
         return "true"
+    if isinstance(value, GoalPart):
+        return f"{{m: {value.m:g}, rad: {value.rad:g}}}"
     if isinstance(value, list) and value:
         if all(isinstance(item, str) for item in value):
             return "".join(value)
