@@ -77,6 +77,36 @@ def test_a_plan_of_a_plan_goes_on(plans):
     assert again.duration < on.duration
 
 
+def test_a_robot_pushed_out_of_its_tube_replans_and_arrives():
+    """Pushed by 0.4 m and turned, on the way round a wall: a new plan goes on from there."""
+    robot, dt, tube = nmm.load("unicycle_3r"), 0.02, (0.3, 0.5)
+    kept = nmm.Collisions(0.03, obstacles=[WALL])
+    plan = nmm.plan(robot, robot.rest, BEHIND, [WALL], nmm.Collisions(0.08), LIMITS)
+    queries, pairs = plan.found.scene.queries, range(len(plan.found.scene.names))
+
+    def followed(plan):
+        task = plan.reference()
+        given = {"limits": LIMITS, "collisions": kept, "dt": dt, "kinematics": "compiled"}
+        return task, nmm.Controller(robot, task, nmm.ProjectedGradient(), **given)
+
+    (task, controller), q, t, replanned, least = followed(plan), robot.rest, 0.0, 0, np.inf
+    for k in range(5000):
+        q, _ = controller.step(t, q, dt, "zoh")
+        t += dt
+        least = min(least, queries.distances(0.0, q, pairs).min())
+        if k == 150:
+            q[:3] += -0.4, 0.0, 0.8
+        if np.any(task.function.apart([t], [q])[0] > tube):
+            plan, t, replanned = nmm.replan(plan, q), 0.0, replanned + 1
+            task, controller = followed(plan)
+        if t > task.function.duration + 2.0:
+            break
+    assert replanned == 1
+    assert least >= 0.03
+    assert np.abs(q - plan.end).max() < 5e-3
+    assert np.allclose(plan.end[:2], [6.0, 0.0], atol=1e-9)
+
+
 def test_an_end_that_is_taken_is_another_posture_or_refused(plans):
     robot = plans[0].robot
     hand = nmm.Task(nmm.Position("ee", "xy"), [4.0, 1.0])

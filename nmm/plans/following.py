@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from nmm.arrays import Array
 from nmm.control.goal import Goal, error_sizes
@@ -113,9 +114,9 @@ class FromPlan(Function):
         header = [len(self.times), float(robot.platform.n_p >= 3)]
         return (Stage(from_plan, robot.n_u, (), np.concatenate([header, self.times, self._table])),)
 
-    def apart(self, t: Array, q: Array) -> Array:
+    def apart(self, t: ArrayLike, q: ArrayLike) -> Array:
         """How far configurations (N, n) are from the plan at their times (N,), s: (N, 2), m and rad."""
-        off = q - self.at(np.clip(t, 0.0, self.duration))[0]
+        off = np.asarray(q, dtype=np.float64) - self.at(np.clip(np.asarray(t), 0.0, self.duration))[0]
         if self.robot.platform.n_p >= 3:
             off[:, 2] -= 2.0 * np.pi * np.round(off[:, 2] / (2.0 * np.pi))
         return np.array([error_sizes(one, self.robot.q_units) for one in off]).reshape(-1, 2)

@@ -85,6 +85,8 @@ def _text(value: object) -> str:
         return str(value).lower()
     if isinstance(value, SteeringPart):
         return "true"
+    if isinstance(value, GoalPart):
+        return f"{{m: {value.m:g}, rad: {value.rad:g}}}"
     if isinstance(value, list) and value:
         if all(isinstance(item, str) for item in value):
             return "".join(value)
