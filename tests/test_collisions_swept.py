@@ -127,7 +127,7 @@ def test_distances_do_not_depend_on_what_was_asked_before(planar):
 FIRST_CALLS = """
 import gc
 import numpy as np
-import nmm
+from nmm.collisions.swept_check import Short
 from numba.core.dispatcher import Dispatcher
 
 robot = nmm.load("unicycle_3r")
@@ -136,20 +136,25 @@ task = nmm.Task(nmm.Position("ee"), [3.0, 0.3, 0.5], gain=5.0)
 pillar = nmm.Obstacle(nmm.Box([0.3, 0.6, 1.0]), [1.8, 0.1, 0.5])
 keeps = {"limits": nmm.Limits({"platform": 2.0, "arm": 2.4}, acceleration=4.0), "dt": 0.05}
 keeps["collisions"] = nmm.Collisions(0.03, obstacles=[pillar])
-controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), **keeps)
+controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), retreat=RETREAT, **keeps)
 made = [one for one in gc.get_objects() if isinstance(one, Dispatcher)]
 before = [len(one.overloads) for one in made]
 for k in range(60):
     controller(0.05 * k, q)
     q = q + 0.05 * controller.solver.found.q_dot
-controller.safety_filter._lookout.slower(np.ones(robot.n_u), 0.05)
-assert controller.safety_filter.counts.added > 0
+look = controller.safety_filter
+look._lookout.slower(np.ones(robot.n_u), 0.05)
+look._brake(3.0, q, np.zeros(robot.n_u), Short(0, 0.05, 1.0, q, 1.0))
+assert look.counts.added > 0
+assert RETREAT is None or controller.solver.retreat_state.count > 1
 print([one.py_func.__name__ for one, n in zip(made, before) if len(one.overloads) > n])
 """
 
 
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
-def test_the_first_row_added_along_the_way_takes_no_longer_than_others():
+@pytest.mark.parametrize("retreat", ["None", "nmm.Retreat(stalled=0.1, durations=[0.2])"])
+def test_no_call_along_the_way_loads_code(retreat):
     """All that a call may need is loaded when the controller is made: else 25 ms within a control loop."""
-    answer = subprocess.run([sys.executable, "-c", FIRST_CALLS], capture_output=True, text=True, check=True)
+    command = [sys.executable, "-c", f"import nmm\nRETREAT = {retreat}\n{FIRST_CALLS}"]
+    answer = subprocess.run(command, capture_output=True, text=True, check=True)
     assert answer.stdout.strip() == "[]"

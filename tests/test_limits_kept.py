@@ -12,6 +12,7 @@ from findings import codes, the
 from wandering import DT, ROBOTS, beyond, wander, wanderer
 
 import nmm
+from nmm.control import bounds
 from nmm.control.integrators import integrator
 from nmm.resolvers.answer import Status
 from nmm.robots.robot import Robot
@@ -199,6 +200,39 @@ def test_a_joint_outside_its_limits_comes_back_at_the_stated_speed(acceleration:
     assert np.all(cruising >= 0.4 - 1e-9)  # at least: the task may want more
     assert len(outside) <= 0.6 / 0.4 / DT + 30
     assert max(seen[len(outside) :]) <= 0.5 + 1e-12
+
+
+def test_bounds_of_far_limits_need_no_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`approach` is cut short where it exceeds the velocity wanted for certain: the bounds are the same."""
+    rng = np.random.default_rng(3)
+    whole, short = bounds.approach, 0
+    for _ in range(3000):
+        dt, A, samples = 10.0 ** rng.uniform([-3.0, -2.0, -1.0], [0.0, 3.0, 2.0])
+        room = 0.5 * A * (samples * dt) ** 2
+        fastest = A * dt * max(samples - rng.uniform(-0.5, 1.5), 0.0)  # about what can just be braked
+        exact = whole(room, dt, A, 0.1)
+        found = whole(room, dt, A, 0.1, fastest)
+        assert min(found, fastest) == pytest.approx(min(exact, fastest), rel=1e-12, abs=0.0)
+        short += math.isinf(found)
+    assert short > 300
+
+    def every_bound() -> list[Array]:
+        found = []
+        for seed in range(5):
+            stops = {"q1": [-1.0, 0.5], "q2": [-0.3, 2.0], "q3": [0.0, 0.2]}
+            controller = towards((3.0, 2.0), nmm.Limits({"arm": 0.8}, stops, acceleration=2.0))
+            solver, rng = controller.solver, np.random.default_rng(seed)
+            limits, problem = solver.found.limits, solver.found.problem
+            for _ in range(100):
+                solver.before[:] = rng.uniform(-0.9, 0.9, ROBOT.n_u)
+                q = np.append(np.zeros(3), rng.uniform([-1.1, -0.4, -0.1], [0.6, 2.1, 0.3]))
+                bounds.bound_inputs.__wrapped__(limits, q, problem)
+                found.append(np.concatenate([problem.u_lower, problem.u_upper, problem.stops]))
+        return found
+
+    cut = every_bound()
+    monkeypatch.setattr(bounds, "approach", lambda *given: whole(*given[:4]))
+    np.testing.assert_allclose(cut, every_bound(), rtol=1e-12, atol=0.0)
 
 
 def test_the_way_back_is_no_faster_than_the_velocity_limit() -> None:

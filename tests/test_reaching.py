@@ -128,24 +128,39 @@ def test_what_limits_of_acceleration_delay_is_not_stalled() -> None:
     assert "backed_off" not in codes(run)
 
 
-def test_a_retreat_comes_nearer_under_limits_of_acceleration() -> None:
-    """One level for a pose, 5 m away and turned by 120°: λ falls to 0 before the base has turned."""
+@pytest.fixture(scope="module")
+def panda() -> nmm.Robot:
     base = nmm.load("differential_base", platform="unicycle")
-    panda = nmm.load(
-        "package://example-robot-data/robots/panda_description/urdf/panda.urdf",
-        lock={"panda_finger_joint1": 0.02},
-    )
-    robot = nmm.mount(base, panda)
-    target = nmm.PoseReference([2.99, -3.32, 0.63], [1.08, 1.43, 1.01])
+    file = "package://example-robot-data/robots/panda_description/urdf/panda.urdf"
+    return nmm.mount(base, nmm.load(file, lock={"panda_finger_joint1": 0.02}))
+
+
+def far_pose(robot: nmm.Robot, target: nmm.PoseReference, longest: float, **given: object) -> nmm.Trajectory:
+    """One level for a pose that is metres away, to be reached with and without a retreat."""
     bounded = {"speed": {"m": 4.0, "rad": 2.5}, "braking": {"m": 1.5, "rad": 3.0}}
-    task = nmm.Task(nmm.Pose("panda_hand_tcp"), target, gain=2.0, **bounded)
+    retreat = given.pop("retreat", None)
+    task = nmm.Task(nmm.Pose("panda_hand_tcp"), target, **bounded, **given)
     limits = nmm.Limits({"v": 4.0, "omega": 4.0}, acceleration={"platform": 4.0, "arm": 15.0})
-    there = nmm.Controller(robot, task, nmm.ProjectedGradient(), limits=limits, retreat=nmm.Retreat())
+    there = nmm.Controller(robot, task, nmm.ProjectedGradient(), limits=limits, retreat=retreat)
     start = {"panda_joint2": -0.3, "panda_joint4": -2.2, "panda_joint6": 2.0, "panda_joint7": np.pi / 4}
-    run = nmm.simulate(there, robot.q(start), 20.0, 0.05, "zoh", until=nmm.Goal())
+    return nmm.simulate(there, robot.q(start), longest, 0.05, "zoh", until=nmm.Goal())
+
+
+def test_a_retreat_comes_nearer_under_limits_of_acceleration(panda: nmm.Robot) -> None:
+    """5 m away and turned by 120°: λ falls to 0 before the base has turned."""
+    target = nmm.PoseReference([2.99, -3.32, 0.63], [1.08, 1.43, 1.01])
+    run = far_pose(panda, target, 20.0, gain=2.0, retreat=nmm.Retreat())
     assert run.outcome == "completed"
     away = np.linalg.norm(run.q[:, :2] - [2.99, -3.32], axis=1)
     assert away.max() < away[0] + 0.5
+
+
+@pytest.mark.parametrize("retreat", [None, nmm.Retreat()])
+def test_a_far_pose_that_is_reached_is_completed(panda: nmm.Robot, retreat: nmm.Retreat | None) -> None:
+    """Modes are too fast for dt in more than half of its samples, with the default gain."""
+    run = far_pose(panda, nmm.PoseReference([4.32, 1.23, 1.01], [-1.09, -0.64, 2.01]), 60.0, retreat=retreat)
+    assert run.outcome == "completed"
+    assert any(one.code == "dt_too_long" for warning in run.verdict.warnings for one in warning)
 
 
 def test_no_two_retreats_of_a_default_are_alike() -> None:

@@ -34,6 +34,7 @@ from nmm.resolvers.answer import NOT_FINITE, RELAXED, SOLVED, AnswerArrays
 from nmm.resolvers.base import call_resolver
 from nmm.resolvers.limit_check import keep_limits
 from nmm.resolvers.problem_arrays import ProblemArrays
+from nmm.resolvers.saturation import instead
 
 
 class TaskRows(NamedTuple):
@@ -123,8 +124,10 @@ BOUNDS = types.void(types.float64[::1], types.int64[::1], types.float64[::1])
 
 call_bounds = caller(BOUNDS)
 
-#: The signature of `resolve`.
+#: The signatures of `resolve`, `watch_error` and `drive_inputs`; `replace_inputs` has BOUNDS.
 ANSWER = types.float64(types.float64[::1], types.int64[::1], types.float64[::1])
+WATCH = types.boolean(types.int64[::1], types.float64[::1])
+DRIVE = types.void(types.int64[::1], types.float64[::1])
 
 #: In place of the row of a computed error: the error is r_d - r; that of an angle is wrapped.
 PLAIN, WRAPPED = -1, -2
@@ -285,6 +288,22 @@ def step(t: float, q: Array, integers: Integers, floats: Array) -> float:
     if e.limits_code != 0:
         call_bounds(e.limits_code, q, integers, floats)
     return resolve(q, integers, floats)
+
+
+@compiled
+def drive_inputs(integers: Integers, floats: Array) -> None:
+    """Write the q_dot of the inputs in memory."""
+    e = views(ControlStep, integers, floats, BESIDE)
+    drive(e.answer.u, views(LaidOut, integers, floats, 0).buffers.G, e.arm, e.q_dot)
+
+
+@compiled
+def replace_inputs(wanted: Array, integers: Integers, floats: Array) -> None:
+    """Answer with the inputs nearest to `wanted` (m,) within the limits, in place of the resolver's."""
+    e = views(ControlStep, integers, floats, BESIDE)
+    instead(e.problem, wanted, e.answer)
+    write_shares(e.task, e.problem, e.answer, e.scale)
+    drive_inputs(integers, floats)
 
 
 @compiled

@@ -21,8 +21,9 @@ import numpy as np
 from nmm.arrays import Array
 from nmm.collisions.scene import Scene
 from nmm.collisions.swept_check import Short, SweptCheck
-from nmm.control.equations import ControlStep, drive
+from nmm.control.equations import DRIVE, ControlStep, drive_inputs
 from nmm.functions.program import BESIDE, Program
+from nmm.kernels.compiled import checked_by_caller
 from nmm.resolvers.answer import RELAXED, Status
 from nmm.resolvers.limit_check import LEFT
 
@@ -64,6 +65,7 @@ class SafetyFilter:
         self._scene, self._queries = scene, scene.queries
         self._near, self._keep, self._step = step.near, step.clearance, step
         self._program, self._again = program, again
+        self._drive = checked_by_caller(drive_inputs, DRIVE)
         self._lookout = SweptCheck(
             scene.queries, step.limits.acceleration, scene.distance, scene.distance + SLACK, horizon
         )
@@ -148,7 +150,7 @@ class SafetyFilter:
         answer.residual[()] = np.linalg.norm(problem.J @ best - step.task.full)
         answer.excess[()] = beyond if beyond > LEFT else 0.0
         step.scale[:] = 0.0
-        drive(best, self._program.buffers.G, step.arm, step.q_dot)
+        self._drive(*self._program.blocks)
 
     def _give_way(self, t: float, q: Array, before: Array, best: Array, least: float) -> tuple[Array, float]:
         """Where the robot cannot stop without something coming there: the first inputs of a motion of the

@@ -18,7 +18,7 @@ from nmm.arrays import Array, positive, scalar
 from nmm.collisions.scene import Scene
 from nmm.control.bounds import OFF, SAMPLE, STAGE
 from nmm.control.directions import failure
-from nmm.control.equations import ANSWER, STEP, drive, finish, resolve, watch_error, write_shares
+from nmm.control.equations import ANSWER, BOUNDS, STEP, WATCH, finish, replace_inputs, resolve, watch_error
 from nmm.control.equations import step as compiled_step
 from nmm.control.limit_report import LimitReport
 from nmm.control.period_monitor import PeriodMonitor
@@ -38,7 +38,6 @@ from nmm.kernels.compiled import checked_by_caller
 from nmm.kernels.record_layout import Blocks
 from nmm.resolvers.answer import Status
 from nmm.resolvers.base import Resolver, State
-from nmm.resolvers.saturation import instead
 
 #: From this status on there are no inputs.
 FAILED = float(Status.SINGULAR_J)
@@ -97,7 +96,11 @@ class StepSolver:
             self.safety_filter = SafetyFilter(*given_to)
         if given.limits is None and collisions is None:
             self.found.limits.mode[()] = OFF
-        self.retreat_state = None if retreat is None else RetreatState(retreat, robot, self.found.retreat)
+        self.retreat_state: RetreatState | None = None
+        if retreat is not None:
+            self.retreat_state = RetreatState(retreat, robot, self.found.retreat)
+            self._watch_error = checked_by_caller(watch_error, WATCH)
+            self._replace_inputs = checked_by_caller(replace_inputs, BOUNDS)
         self.step_size: StepSize | None = None
         self.needs_dt = (
             self.retreat_state is not None
@@ -181,7 +184,7 @@ class StepSolver:
         self.expect_dt()
         earlier = None if self.safety_filter is None else self.before.copy()
         status = self.solve_whole(t, q)
-        if self.retreat_state is not None and watch_error(*self.blocks):
+        if self.retreat_state is not None and self._watch_error(*self.blocks):
             self._back_off(self.retreat_state, q)
             self.before[:] = self.found.answer.u
         elif status >= FAILED:
@@ -214,10 +217,8 @@ class StepSolver:
 
     def _back_off(self, retreat_state: RetreatState, q: Array) -> None:
         """Replace the resolver's inputs by the retreat's."""
-        found, G = self.found, self.program.buffers.G
-        instead(found.problem, retreat_state.inputs(q, G, found.problem), found.answer)
-        write_shares(found.task, found.problem, found.answer, found.scale)
-        drive(found.answer.u, G, found.arm, found.q_dot)
+        G = self.program.buffers.G
+        self._replace_inputs(retreat_state.inputs(q, G, self.found.problem), *self.blocks)
 
     @property
     def blocks(self) -> Blocks:
