@@ -13,6 +13,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
 from nmm.arrays import Array
@@ -21,7 +22,7 @@ from nmm.figure_options import FORMATS, FigureOptions
 from nmm.files import written_at
 from nmm.resolver_style import BLACK, CYCLE, DASHES, GREEN, PINK, Look
 from nmm.runs.trajectory import Trajectory
-from nmm.text_format import listed, superscript
+from nmm.text_format import listed, printable, superscript
 
 GREY, LIGHT = "#6B7280", "#E5E7EB"
 DPI = 180
@@ -328,6 +329,8 @@ def save(made: Figure, path: str | Path) -> Path:
     kind = path.suffix.lower().removeprefix(".")
     suffixes = listed([f".{name}" for name in FORMATS], "or")
     expect(kind in FORMATS, str(path), f"a file that ends in {suffixes}")
+    for text in made.findobj(Text):  # names in files may hold what no font can draw
+        text.set_text("\n".join(map(printable, text.get_text().split("\n"))))
     with written_at(path):
         if kind == "png":
             made.savefig(path, **_OPTIONS[kind])
