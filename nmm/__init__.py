@@ -6,6 +6,8 @@ names is `__init__.pyi`).
 
 import lazy_loader
 
+from nmm.lazy_call import imported_whole
+
 __version__ = "0.1.0"
 
 #: Names that authors need, which were in front before.
@@ -40,4 +42,5 @@ _loaded, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 def __getattr__(name: str) -> object:
     if name in MOVED:
         raise AttributeError(f"nmm.{name} is now nmm.{MOVED[name]}")
-    return _loaded(name)
+    with imported_whole():
+        return _loaded(name)

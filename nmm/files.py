@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
-from nmm.errors import InputError, expect
+from nmm.errors import InputError, NmmError, RunError, expect
 
 try:
     import fcntl
@@ -67,12 +67,39 @@ def named_folder(text: str) -> tuple[str, str]:
     return (name, folder) if separator and "/" not in name else ("", text)
 
 
+#: What another name would not mend: the disk, a quota, the process's limits.
+_MACHINE = {getattr(errno, name, None) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EIO", "EMFILE", "ENFILE")}
+
+
+class UnwrittenError(RunError):
+    """What was computed could not be written, for want of room: the place itself is right."""
+
+
+@contextmanager
+def written_at(where: object) -> Iterator[None]:
+    """An `OSError` of the block is told as the place's: `UnwrittenError`, also of a part that is written
+    aside, or `InputError`. Not that of a reader of the output who has gone."""
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        lasting = error.errno in _MACHINE
+        reason = os.strerror(error.errno) if error.errno and lasting else error.strerror or error
+        kind: type[NmmError] = UnwrittenError if lasting else InputError
+        raise kind(f"cannot be written: {reason}", where=where) from None
+    except UnwrittenError as error:
+        raise error.placed(str(where)) if ASIDE in error.where else error from None
+
+
 #: Between two looks whether another process is through, s.
 AGAIN = 0.05
 #: How long one waits for another process that writes the same, s.
 PATIENCE = 30.0
 #: In the hidden folder: what is locked, and where the old folder waits where two cannot be exchanged.
 LOCK, OLD = "lock", "old"
+#: How a hidden folder's name ends.
+ASIDE = ".nmm-writing"
 
 
 @contextmanager
@@ -124,7 +151,7 @@ def busy(folder: Path) -> InputError:
 
 
 def _hidden(final: Path) -> Path:
-    return final.parent / f".{final.name}.nmm-writing"
+    return final.parent / f".{final.name}{ASIDE}"
 
 
 def _claimed(hidden: Path) -> IO[bytes] | None:
@@ -135,6 +162,10 @@ def _claimed(hidden: Path) -> IO[bytes] | None:
         lock = (hidden / LOCK).open("ab")
     except FileNotFoundError:  # its writer has just ended
         return None
+    except OSError:  # no room for it: the folder, if it is ours and empty, goes again
+        with suppress(OSError):
+            hidden.rmdir()
+        raise
     try:
         with suppress(FileNotFoundError):
             if taken(lock) is not False and os.path.samestat(os.fstat(lock.fileno()), (hidden / LOCK).stat()):

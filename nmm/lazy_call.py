@@ -4,7 +4,10 @@ Packages that save, draw or play data import the data's package. So that `trajec
 the same, such a method imports its function by name when it is called.
 """
 
-from collections.abc import Callable
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pkgutil import resolve_name
 from typing import Any
 
@@ -12,3 +15,21 @@ from typing import Any
 def lazy_call(name: str) -> Callable[..., Any]:
     """The function "package.module:function", imported now."""
     return resolve_name(name)
+
+
+@contextmanager
+def imported_whole() -> Iterator[None]:
+    """Ctrl-C waits until the block has ended: numba and Pinocchio, interrupted while they are imported, stay
+    broken for as long as Python runs."""
+    before = signal.getsignal(signal.SIGINT)
+    if before is None or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[int] = []
+    signal.signal(signal.SIGINT, lambda number, _: came.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+        if came:
+            signal.raise_signal(signal.SIGINT)

@@ -12,6 +12,7 @@ import importlib
 import json
 import os
 import pkgutil
+import resource
 import signal
 import subprocess
 import sys
@@ -43,6 +44,8 @@ class Request:
     later: float = 0.0
     #: A module, and a function in it that is called before the command begins.
     prepared: tuple[str, str] | None = None
+    #: No file gets longer, bytes; 0 for any.
+    longest: int = 0
 
 
 @dataclass(frozen=True)
@@ -142,7 +145,15 @@ def _begin(request: Request) -> None:
         module, name = request.prepared
         getattr(importlib.import_module(module), name)()
     touching = _Touching(request)
-    atexit.register(lambda: told.write_text("\n".join(touching.touched), encoding="utf-8"))
+    unlimited = resource.getrlimit(resource.RLIMIT_FSIZE)
+
+    def tell() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, unlimited)
+        told.write_text("\n".join(touching.touched), encoding="utf-8")
+
+    atexit.register(tell)
+    if request.longest:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (request.longest, unlimited[1]))
     sys.argv = ["nmm", *request.arguments]
     sys.addaudithook(touching)
     from nmm.cli import main

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import pickle
-import shutil
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +60,11 @@ def one_case() -> None:
             kept.mkdir()
             found = compute(number, progress, kept, figures)
             (kept / "result").write_bytes(pickle.dumps(found))
-        shutil.copytree(kept, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("result"))
+        for path in kept.rglob("*"):  # not `copytree`, whose errors have no number
+            if path.is_file() and path.name != "result":
+                made = folder / path.relative_to(kept)
+                made.parent.mkdir(parents=True, exist_ok=True)
+                made.write_bytes(path.read_bytes())
         return pickle.loads((kept / "result").read_bytes())
 
     compute, share_out = write.run_case, write.share_out

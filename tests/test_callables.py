@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -151,3 +152,12 @@ def test_a_function_that_returns_one_array_again_and_again(robot_2r: Robot) -> N
 def test_one_number_may_come_in_any_shape(value: Any, robot_2r: Robot) -> None:
     objective = nmm.CallableObjective(lambda configuration: value, lambda configuration: np.zeros(5))
     assert objective.value(Configuration(robot_2r, Q)) == float(np.ravel(value)[0])
+
+
+def test_a_rate_whose_square_overflows_warns_nobody(robot_2r: nmm.Robot) -> None:
+    task = nmm.Task(nmm.Position("ee", "xy"), [1e200, 0.0], gain=1.0)
+    controller = nmm.Controller(robot_2r, task, nmm.CallableResolver(lambda problem: np.zeros(4)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        with pytest.raises(nmm.RunError, match="not finite"):
+            controller(0.0, robot_2r.q({"q2": 0.5}))

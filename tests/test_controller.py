@@ -52,7 +52,8 @@ def test_A_G_is_zero(name: str, rng: np.random.Generator) -> None:
             scale *= 10 * np.abs(G).max(initial=1.0)
         np.testing.assert_allclose(A @ G, 0.0, rtol=0, atol=1e-15 * scale)
         # Together they span all velocities: G has every motion that A admits.
-        assert np.linalg.matrix_rank(np.hstack([A.T, G])) == platform.n_p
+        if platform.n_p:  # NumPy 2.0 knows no rank of an empty matrix
+            assert np.linalg.matrix_rank(np.hstack([A.T, G])) == platform.n_p
 
 
 @each_case

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import random
 import signal
 import struct
 import subprocess
+import sys
 import time
 from pathlib import Path
 from unittest.mock import MagicMock
@@ -248,7 +250,51 @@ def test_an_interrupt_before_anything_is_read(
     assert capsys.readouterr().err == "nmm run: interrupted\n"
 
 
-def test_figures_are_drawn_whatever_backend_is_asked_for(tmp_path: Path) -> None:
-    command = "MPLBACKEND=nope nmm run unicycle_2r_position --set duration=0.1 --out o"
-    assert shell(tmp_path, command) == (0, "")
+RUN = "nmm run unicycle_2r_position --set duration=0.1 --out o"
+
+
+@pytest.mark.parametrize("settings", [b"nonsense\nfigure.dpi: many\nfoo: 3\n", b"\xff\xfe\x00"])
+@pytest.mark.parametrize("name", ["matplotlibrc", "elsewhere"])
+def test_figures_are_drawn_whatever_matplotlib_is_told(tmp_path: Path, settings: bytes, name: str) -> None:
+    """A backend that there is not, and settings that are none, here or where a variable says."""
+    (tmp_path / name).write_bytes(settings)
+    assert shell(tmp_path, f"MATPLOTLIBRC=$PWD/{name} MPLBACKEND=nope {RUN}") == (0, "")
     assert (tmp_path / "o" / "motion.png").stat().st_size > 0
+
+
+def test_few_files_may_be_open(tmp_path: Path) -> None:
+    assert shell(tmp_path, f"ulimit -n 20; {RUN}") == (0, "")
+    status, err = shell(tmp_path, f"ulimit -n 6; {RUN}")
+    assert (status, err.count("\n")) == (1, 1)
+    assert err.endswith(f"{os.strerror(errno.EMFILE)}\n")
+
+
+def test_a_working_directory_that_is_gone(tmp_path: Path) -> None:
+    status, err = shell(tmp_path, f"mkdir gone; cd gone; rmdir ../gone; {RUN}")
+    assert (status, err) == (1, f"nmm run: the working directory is gone: {os.strerror(errno.ENOENT)}\n")
+
+
+INTERRUPTED = """
+import signal, sys
+
+class Finder:
+    waiting = True
+
+    def find_spec(self, name, path=None, target=None):
+        if name == "numba.core.types" and self.waiting:
+            self.waiting = False
+            signal.raise_signal(signal.SIGINT)
+
+sys.meta_path.insert(0, Finder())
+import nmm
+try:
+    nmm.Scenario.load("unicycle_2r_position")
+except KeyboardInterrupt:
+    print(len(nmm.Scenario.load("unicycle_2r_position").override("duration", 0.1).run()))
+"""
+
+
+def test_an_interrupted_import_leaves_python_as_it_was() -> None:
+    """Ctrl-C while numba is imported for the first time, and the same call again."""
+    done = subprocess.run([sys.executable, "-c", INTERRUPTED], capture_output=True, text=True, timeout=MOST)
+    assert (done.stdout, done.stderr) == ("21\n", "")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from urdf_parts import joint, link, robot, shape, write
 import nmm
 from nmm.bundled import bundled_robots
 from nmm.cli.exit_status import status_of
+from nmm.figures.style import figure, save
 from nmm.folders.run import is_run
 from nmm.robots.configuration import Configuration
 from nmm.robots.loading.packages import package_file
@@ -176,6 +178,15 @@ def test_names_with_control_characters_are_written_so_that_they_are_read(
     file.write_text(file.read_text(encoding="utf-8").replace('"ee"', '"ee &#x9b;31m"'), encoding="utf-8")
     started(run, str(file), "--platform", "unicycle")
     assert "\x9b" not in Path("first.yaml").read_text(encoding="utf-8")
+
+
+def test_figures_show_control_characters_as_they_are_written(tmp_path: Path) -> None:
+    made = figure(2.0, 1.0)
+    made.text(0.5, 0.5, "ee \x9b31m\nnext")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # "Glyph 155 missing from font"
+        save(made, tmp_path / "a.png")
+    assert made.texts[0].get_text() == "ee \\x9b31m\nnext"
 
 
 @pytest.mark.parametrize("platform", ["fixed", "unicycle"])

@@ -48,8 +48,9 @@ each_example = pytest.mark.parametrize("name", EXAMPLES)
 
 
 def assert_same_span(first: Array, second: Array) -> None:
-    assert np.linalg.matrix_rank(first) == np.linalg.matrix_rank(second) == first.shape[1] == second.shape[1]
-    if first.shape[1]:
+    assert first.shape == second.shape
+    if first.shape[1]:  # NumPy 2.0 knows no rank of a matrix without columns
+        assert np.linalg.matrix_rank(first) == np.linalg.matrix_rank(second) == first.shape[1]
         assert subspace_angles(first, second).max() < 1e-9
 
 

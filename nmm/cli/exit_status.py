@@ -59,7 +59,16 @@ def status_of(arguments: Sequence[str]) -> int:
         if error.filename is None:
             _discard_output()  # it may have been that: nothing of it is tried again at the end
         what = "cannot write or read" if error.filename is None else error.filename
+        if error.errno == errno.ENOENT and not _is_somewhere():
+            what = "the working directory is gone"
         return _complain(prefix, f"{what}: {error.strerror or error}", FAILED)
+
+
+def _is_somewhere() -> bool:
+    try:
+        return bool(os.getcwd())
+    except OSError:
+        return False
 
 
 def _called(arguments: Sequence[str]) -> str:
@@ -99,7 +108,8 @@ def _open_streams() -> None:
 
 def main() -> NoReturn:
     _open_streams()
-    os.environ["MPLBACKEND"] = "agg"  # ours to choose, and its name may be none that matplotlib knows
+    # The figures' look is ours: neither a backend that is none nor faults of the user's settings matter.
+    os.environ["MPLBACKEND"], os.environ["MATPLOTLIBRC"] = "agg", os.devnull
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # a terminal that knows no Greek gets "?"

@@ -151,8 +151,8 @@ class Subject:
         str,
         typer.Argument(
             metavar="SUBJECT",
-            help="A robot (a bundled name, a .urdf or .xacro file, package://PACKAGE/PATH) with --task; a "
-            "scenario; or a run's folder.",
+            help="A robot (a bundled name, a .urdf, .xacro or .xml file, package://PACKAGE/PATH) with "
+            "--task; a scenario; or a run's folder.",
             show_default=False,
         ),
     ]

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from nmm.resolvers.base import Resolver
     from nmm.scenario import Scenario
 
-ROBOT_HELP = "A bundled name (see `nmm robots`), a .urdf or .xacro file, or package://PACKAGE/PATH."
+ROBOT_HELP = "A bundled name (see `nmm robots`), a .urdf, .xacro or .xml file, or package://PACKAGE/PATH."
 
 
 def option(metavar: str, text: str, *names: str, default: Any = None, show: str | bool = True) -> Any:

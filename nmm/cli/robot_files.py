@@ -18,7 +18,7 @@ from nmm.cli.groups import Loading, command
 from nmm.cli.options import ARGUMENT, ARM, ROBOT_HELP, arguments_of, flag, option
 from nmm.cli.output import BAD_INPUT, OK, complain, readable, show_table, show_text
 from nmm.errors import InputError, expect
-from nmm.files import PATIENCE, writing
+from nmm.files import PATIENCE, writing, written_at
 from nmm.text_format import counted, folded
 
 if TYPE_CHECKING:
@@ -173,7 +173,8 @@ def init(
     file = usual_file(robot if arm is None else arm) if out is None else out
     _expect_free(file)
     draft = first_scenario(robot, arm=arm, at=at, file=file, arguments=arguments_of(settings), **given)
-    _write_new(file, draft.text)
+    with written_at(f"--out: {file}"):
+        _write_new(file, draft.text)
     for line in draft.chosen:
         show_text(line)
     show_text(f"wrote {file}; next: nmm run {file} --play")
@@ -197,5 +198,3 @@ def _write_new(file: Path, text: str) -> None:
             os.link(part, file)  # unlike a rename, never in another's place
     except FileExistsError:
         raise InputError("exists, and is left as it is", where=file, expected="another --out") from None
-    except OSError as error:
-        raise InputError(f"cannot be written: {error.strerror}", where=f"--out: {file}") from None

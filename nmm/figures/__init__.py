@@ -1,5 +1,12 @@
 """Figures of runs, drawn with matplotlib's objects alone: no display, no pyplot, no global state."""
 
+import os
+from contextlib import chdir
+
+if os.environ.get("MATPLOTLIBRC") == os.devnull:  # then it would take those that lie in this folder
+    with chdir(os.sep):
+        import matplotlib  # noqa: F401
+
 from nmm.figure_options import FigureOptions
 from nmm.figures.composed import comparison, overview, write_run_figures
 from nmm.figures.curves import coordinates, errors, inputs, singular_values, tracking

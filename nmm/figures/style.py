@@ -13,14 +13,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
 from nmm.arrays import Array
-from nmm.errors import InputError, expect
+from nmm.errors import expect
 from nmm.figure_options import FORMATS, FigureOptions
+from nmm.files import written_at
 from nmm.resolver_style import BLACK, CYCLE, DASHES, GREEN, PINK, Look
 from nmm.runs.trajectory import Trajectory
-from nmm.text_format import listed, superscript
+from nmm.text_format import listed, printable, superscript
 
 GREY, LIGHT = "#6B7280", "#E5E7EB"
 DPI = 180
@@ -327,14 +329,14 @@ def save(made: Figure, path: str | Path) -> Path:
     kind = path.suffix.lower().removeprefix(".")
     suffixes = listed([f".{name}" for name in FORMATS], "or")
     expect(kind in FORMATS, str(path), f"a file that ends in {suffixes}")
-    try:
+    for text in made.findobj(Text):  # names in files may hold what no font can draw
+        text.set_text("\n".join(map(printable, text.get_text().split("\n"))))
+    with written_at(path):
         if kind == "png":
             made.savefig(path, **_OPTIONS[kind])
         else:
             with _WRITING, matplotlib.rc_context(_VECTOR):
                 made.savefig(path, **_OPTIONS[kind])
-    except OSError as error:
-        raise InputError(f"cannot be written: {error.strerror}", where=str(path)) from None
     return path
 
 

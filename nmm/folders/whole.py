@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from nmm.errors import InputError
-from nmm.files import OLD, PATIENCE, at_work, busy, read_bytes, writing
+from nmm.files import OLD, PATIENCE, at_work, busy, read_bytes, writing, written_at
 from nmm.machine import made_with
 
 Read = TypeVar("Read")
@@ -65,7 +65,7 @@ def replaced_folder(
 
     final = Path(os.path.realpath(folder))
     check_replaceable(folder, is_ours)
-    try:
+    with written_at(folder):
         final.parent.mkdir(parents=True, exist_ok=True)
         with writing(final, patience) as hidden:
             temporary = Path(tempfile.mkdtemp(dir=hidden))
@@ -76,10 +76,6 @@ def replaced_folder(
                 _put(temporary, final, hidden / OLD)
             finally:
                 shutil.rmtree(temporary, ignore_errors=True)
-    except BrokenPipeError:  # of what the block prints
-        raise
-    except OSError as error:
-        raise InputError(f"cannot be written: {error.strerror or error}", where=folder) from None
 
 
 def _put(temporary: Path, final: Path, old: Path) -> None:
@@ -136,12 +132,10 @@ def steady(folder: Path, read: Callable[[], Read]) -> Read:
 def check_replaceable(folder: str | Path, is_ours: Callable[[Path], bool]) -> None:
     """InputError if `folder` is neither new, empty nor ours."""
     final = Path(folder)
-    try:
+    with written_at(folder):
         if final.is_dir() and (not any(final.iterdir()) or is_ours(final)):
             return
         exists = final.exists() or final.is_symlink()
-    except OSError as error:
-        raise InputError(f"cannot be written: {error.strerror}", where=folder) from None
     if exists:
         raise InputError(
             "exists and is not what this writes",
@@ -158,11 +152,9 @@ def check_folder(folder: Path, is_ours: Callable[[Path], bool]) -> None:
         parent = parent.parent
     if not parent.is_dir() or not os.access(parent, os.W_OK | os.X_OK):
         raise InputError(f"cannot be written: {parent} is not a folder where you may write", where=folder)
-    try:
+    with written_at(folder):  # a name that is too long
         if at_work(Path(os.path.realpath(folder))):
             raise busy(folder)
-    except OSError as error:  # a name that is too long
-        raise InputError(f"cannot be written: {error.strerror}", where=folder) from None
 
 
 def _identity(folder: Path) -> tuple[int, int] | None:

@@ -18,7 +18,11 @@ from contextlib import suppress
 from functools import cached_property
 from typing import Any
 
-import numba
+from nmm.lazy_call import imported_whole
+
+with imported_whole():
+    import numba
+
 import numpy as np
 from llvmlite import ir
 from numba import types

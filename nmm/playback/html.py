@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from nmm.ellipsoid_options import Wanted
-from nmm.errors import InputError, RunError
-from nmm.files import replaceable, whole_file
+from nmm.errors import RunError
+from nmm.files import replaceable, whole_file, written_at
 from nmm.playback.drawing import Command, encode
 from nmm.playback.scene import Shown, playback_scene
 
@@ -70,12 +70,10 @@ def write_html(
     """
     _, text = page_of(motions, title, ellipsoids, ghosts=ghosts, fps=fps, autoplay=autoplay)
     path, target = Path(path), replaceable(Path(path))
-    try:
+    with written_at(path):
         target.parent.mkdir(parents=True, exist_ok=True)
         with whole_file(target) as temporary:
             temporary.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"cannot be written: {error.strerror}", where=str(path)) from None
     return path
 
 

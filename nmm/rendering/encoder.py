@@ -8,13 +8,16 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from nmm.errors import InputError, RunError, expect
-from nmm.files import replaceable, writing
+from nmm.files import replaceable, writing, written_at
 
 CODECS = {
     ".mp4": ("-c:v", "libx264", "-crf", "20", "-pix_fmt", "yuv420p", "-movflags", "+faststart"),
     ".webm": ("-c:v", "libvpx-vp9", "-crf", "32", "-b:v", "0", "-pix_fmt", "yuv420p", "-row-mt", "1"),
     ".gif": ("-filter_complex", "split[a][b];[a]palettegen=stats_mode=diff[p];[b][p]paletteuse=dither=bayer"),
 }  # fmt: skip
+
+#: A disk that has not even as much room is full, bytes.
+PROBE = 65_536
 
 
 def expect_video(file: Path) -> Path:
@@ -49,7 +52,11 @@ def encode(pictures: Iterable[bytes], file: Path, fps: float) -> None:
     not at all; `InputError` for a file that cannot be written, `RunError` if ffmpeg is missing or fails."""
     target = expect_video(file)
     program = find_ffmpeg()
-    with writing(target, patience=1.0) as hidden, tempfile.TemporaryDirectory(dir=hidden) as folder:
+    with (
+        written_at(file),
+        writing(target, patience=1.0) as hidden,
+        tempfile.TemporaryDirectory(dir=hidden) as folder,
+    ):
         made = Path(folder) / f"made{file.suffix.lower()}"
         log = Path(folder) / "log"
         command = [
@@ -71,8 +78,7 @@ def encode(pictures: Iterable[bytes], file: Path, fps: float) -> None:
             process.wait()
             raise
         if process.wait() != 0:
-            raise RunError(f"ffmpeg: {last_words(log) or 'ended without a word'}")
-        try:
-            made.replace(target)
-        except OSError as error:
-            raise InputError(f"cannot be written: {error.strerror}", where=str(file)) from None
+            words = last_words(log)
+            log.write_bytes(bytes(PROBE))  # where the disk is full, this says so
+            raise RunError(f"ffmpeg: {words or 'ended without a word'}")
+        made.replace(target)

@@ -81,7 +81,7 @@ class CallableResolver(Resolver):
         answer.u[:] = u
         residual, rounding = residual_norm(problem.J, answer.u, problem.rate)
         answer.residual[()] = residual
-        answer.status[()] = certified(residual, rounding, math.sqrt(problem.rate @ problem.rate))
+        answer.status[()] = certified(residual, rounding, math.hypot(*problem.rate))
         if isinstance(found, Answer):
             answer.measure[()] = found.measure
             if found.status is not Status.SOLVED and answer.status[()] < Status.SINGULAR_J:

@@ -1,7 +1,6 @@
 """What is kept of many runs: measures, and quantities in memory or in files, one bounded part at a time."""
 
 import math
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from nmm.arrays import Array
 from nmm.control.quantities import saved
 from nmm.control.recorded import Recorded
 from nmm.errors import InputError, expect_known
+from nmm.files import whole_file, written_at
 from nmm.kernels.compiled import compiled, compiled_without_gil, scratch, view
 from nmm.kernels.spectra import write_spectrum
 from nmm.machine import expect_memory
@@ -89,13 +89,12 @@ class Kept:
         """Write a part as a file, whole or not at all."""
         if self._folder is None:
             return
-        self._folder.mkdir(parents=True, exist_ok=True)
         path = self._folder / f"rollouts-{first:09d}.npz"
-        unfinished = path.with_suffix(".part")
-        with unfinished.open("wb") as file:
-            arrays: dict[str, Any] = {"t": self.t, "first": np.array(first), **room}
-            np.savez(file, **arrays)
-        os.replace(unfinished, path)
+        arrays: dict[str, Any] = {"t": self.t, "first": np.array(first), **room}
+        with written_at(self._folder):
+            self._folder.mkdir(parents=True, exist_ok=True)
+            with whole_file(path) as temporary:
+                np.savez(temporary, **arrays)
         self.files.append(path)
 
 

@@ -62,8 +62,8 @@ class _Dumper(yaml.SafeDumper):
 
 _ABOUT = {
     "title": "A line that says what it shows.",
-    "robot": "The robot: a bundled name (nmm robots), a .urdf or .xacro file, or a mapping with source, "
-    "platform, lock, ... (docs/robots.md).",
+    "robot": "The robot: a bundled name (nmm robots), a .urdf, .xacro or .xml file, or a mapping with "
+    "source, platform, lock, ... (docs/robots.md).",
     "q0": "Where it starts, m and rad, by name, 0 for the rest; posture: NAME takes one of its SRDF "
     "(nmm info tells them).",
     "duration": "How long, s.",

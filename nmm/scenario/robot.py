@@ -91,8 +91,8 @@ class RobotPart(Part):
     """Which robot. A bare name or path in its place is its source."""
 
     source: FileName = Field(
-        description="a bundled name (see `nmm robots`), a .urdf or .xacro file, relative to the scenario, or "
-        "package://PACKAGE/PATH"
+        description="a bundled name (see `nmm robots`), a .urdf, .xacro or .xml file, relative to the "
+        "scenario, or package://PACKAGE/PATH"
     )
     arguments: dict[str, Annotated[str, BeforeValidator(_argument)]] = Field(
         default_factory=dict, description="xacro arguments, as {d: 0.5, l1: 0.6}"

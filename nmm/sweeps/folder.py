@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from nmm.errors import InputError
-from nmm.files import taken, whole_file
+from nmm.files import taken, whole_file, written_at
 from nmm.folders.whole import FolderKind, check_folder
 from nmm.scenario.numbers import shown
 from nmm.sweeps.definition import Definition
@@ -67,18 +67,15 @@ class SweepFolder:
     def opened(self) -> Iterator[None]:
         """The folder, for this process alone; `InputError` as `check`, or where another process uses it."""
         self.check()
-        try:
+        with written_at(self.path):
             self.path.mkdir(parents=True, exist_ok=True)
-            lock = (self.path / ".lock").open("wb")
-        except OSError as error:
-            raise InputError(f"cannot be written: {error.strerror}", where=str(self.path)) from None
-        with lock:
-            if taken(lock) is False:
-                raise InputError("another process is at this sweep", where=str(self.path))
-            self._remove_leftovers()
-            if not is_sweep(self.path):
-                self._write_manifest(complete=False)
-            yield
+            with (self.path / ".lock").open("wb") as lock:
+                if taken(lock) is False:
+                    raise InputError("another process is at this sweep", where=str(self.path))
+                self._remove_leftovers()
+                if not is_sweep(self.path):
+                    self._write_manifest(complete=False)
+                yield
 
     def _remove_leftovers(self) -> None:
         """Remove what a killed process left unfinished."""

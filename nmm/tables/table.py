@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import TypeAlias
 
 from nmm import latex
-from nmm.errors import InputError, expect
+from nmm.errors import expect
+from nmm.files import written_at
 from nmm.text_format import listed, number_text, printable
 
 #: A number, a word, or None where a run has none.
@@ -119,10 +120,8 @@ class Table:
         """
         path = Path(path)
         expect(path.suffix.lower() in _SUFFIXES, path, f"a file that ends in {listed(list(_SUFFIXES), 'or')}")
-        try:
+        with written_at(path):
             path.write_text(FORMS[_SUFFIXES[path.suffix.lower()]](self), encoding="utf-8")
-        except OSError as error:
-            raise InputError(f"cannot be written: {error.strerror}", where=path) from None
         return path
 
 

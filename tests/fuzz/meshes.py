@@ -1,4 +1,3 @@
-# ruff: noqa: E501
 """Mesh files with something changed in them: refused in a line, or a shape that collides and is drawn."""
 
 from __future__ import annotations
@@ -67,7 +66,8 @@ def check(case: Any) -> str:
         shape = f'<geometry><mesh filename="{mesh.name}"/></geometry>'
         robot = Path(folder) / "robot.urdf"
         robot.write_text(
-            f'<robot name="r"><link name="a"><visual>{shape}</visual><collision>{shape}</collision></link></robot>'
+            f'<robot name="r"><link name="a"><visual>{shape}</visual><collision>{shape}</collision></link>'
+            "</robot>"
         )
         made = nmm.load(robot, platform="unicycle")
         try:

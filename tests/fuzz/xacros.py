@@ -1,6 +1,5 @@
-# ruff: noqa: E501
-"""Xacro and URDF that ask for much work: expressions that grow, macros, includes and properties that multiply, long
-rows: refused in a line, or read, soon."""
+"""Xacro and URDF that ask for much work: expressions that grow, macros, includes and properties that
+multiply, long rows: refused in a line, or read, soon."""
 
 from __future__ import annotations
 
@@ -46,7 +45,9 @@ CASES = st.one_of(
     st.fixed_dictionaries({"kind": st.sampled_from(["value", "eval", "scenario"]), "text": EXPRESSIONS}),
     st.fixed_dictionaries(
         {
-            "kind": st.sampled_from(["macros", "blocks", "properties", "includes", "row", "tree", "attributes", "text"]),
+            "kind": st.sampled_from(
+                ["macros", "blocks", "properties", "includes", "row", "tree", "attributes", "text"]
+            ),
             "count": st.sampled_from([1, 2, 3, 10, 40, 300, 1_000, 1_001, 4_000, 20_000]),
             "times": st.integers(1, 4),
         }
@@ -99,7 +100,8 @@ def _row(count: int, times: int, folder: Path) -> str:
 def _tree(count: int, times: int, folder: Path) -> str:
     made = "".join(f'<link name="l{k}"/>' for k in range(count + 1))
     return made + "".join(
-        f'<joint name="j{k}" type="fixed"><parent link="l{k // (times + 1)}"/><child link="l{k + 1}"/></joint>'
+        f'<joint name="j{k}" type="fixed"><parent link="l{k // (times + 1)}"/>'
+        f'<child link="l{k + 1}"/></joint>'
         for k in range(count)
     )
 

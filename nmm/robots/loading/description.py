@@ -1,4 +1,4 @@
-"""A robot description: the URDF text of a .urdf or .xacro file, expanded in this process, and its packages.
+"""A robot description: the URDF text of a .urdf, .xacro or .xml file, expanded here, and its packages.
 
 A xacro file is a program (`${...}` are Python expressions): load only files that you would run.
 """
@@ -138,7 +138,7 @@ def _check_file(file: Path) -> None:
     if not exists:
         raise RobotError("no such file", where=file)
     if file.is_dir():
-        raise RobotError("this is a directory", where=file, expected="a .urdf or .xacro file")
+        raise RobotError("this is a directory", where=file, expected="a .urdf, .xacro or .xml file")
     if file.suffix.lower() not in SUFFIXES:
         kind = _OTHERS.get(file.suffix.lower())
         what = f"{kind} is not read: give the URDF or xacro file that it was made from" if kind else ""

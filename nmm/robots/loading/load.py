@@ -44,9 +44,9 @@ def load(
 
     Parameters
     ----------
-    source : a bundled robot's name, the path of a .urdf or .xacro file, or package://PACKAGE/PATH; or a
-        Pinocchio model: of a fixed base, with a planar or free-flyer root joint (which is replaced), or
-        with joints x, y, theta first
+    source : a bundled robot's name, the path of a .urdf, .xacro or .xml (MJCF) file, or
+        package://PACKAGE/PATH; or a Pinocchio model: of a fixed base, with a planar or free-flyer root joint
+        (which is replaced), or with joints x, y, theta first
     arguments : values of the xacro file's arguments
     platform : the platform, or its name, by which it is measured in the file; by default what the file
         declares, `<nmm platform="car"/>` below <robot>, or a car where two wheels, or one, steer as a car's

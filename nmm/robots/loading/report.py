@@ -57,7 +57,7 @@ def file_report(
     package_dirs: Sequence[str | Path] = (),
     **options: Any,
 ) -> FileReport:
-    """Look at a .urdf or .xacro file from all sides; every problem is named, not only the first.
+    """Look at a .urdf, .xacro or .xml file from all sides; every problem is named, not only the first.
 
     Without problems the file was loaded, with what the warnings say: shapes without their meshes left out.
     arguments, package_dirs and options (platform, lock, wheels, axle, srdf, missing_meshes) are those of

@@ -137,7 +137,7 @@ def source_path(source: str | Path, package_dirs: Sequence[str | Path]) -> Path:
     robots = bundled_robots()
     if source not in robots:
         error: RobotError = no_such("robot", source, robots, error=RobotError)
-        expected = "a bundled name, or the path of a .urdf or .xacro file"
+        expected = "a bundled name, or the path of a .urdf, .xacro or .xml file"
         raise RobotError(error.what, expected=expected, got=source, available=robots)
     return robots[source]
 
