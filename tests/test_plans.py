@@ -179,6 +179,24 @@ def test_wheels_keep_their_limits():
     assert 3.0 - 1e-6 < np.abs(rates).max() <= 3.0 + 1e-11
 
 
+def test_a_platform_whose_inputs_are_rates_of_wheels_drives_a_metre_a_second():
+    metre = nmm.plan(nmm.load("differential_base"), np.zeros(3), {"x": 1.0, "y": 0.0, "theta": 0.0})
+    turned = nmm.plan(nmm.load("omni_base"), np.zeros(3), {"x": 0.0, "y": 0.0, "theta": 1.0})
+    assert metre.duration == pytest.approx(1.0)
+    assert turned.duration == pytest.approx(1.0)
+
+
+def test_links_that_touch_at_the_start_are_named():
+    robot = nmm.load("package://example-robot-data/robots/panda_description/urdf/panda.urdf")
+    with pytest.raises(nmm.InputError) as found:
+        nmm.plan(robot, robot.rest, robot.rest)
+    assert "panda_link5 and panda_hand" in found.value.what
+    assert "ignore" in found.value.expected
+    touching = [("panda_link5", "panda_hand"), ("panda_leftfinger", "panda_rightfinger")]
+    ignored = nmm.Collisions(ignore=touching)
+    assert nmm.plan(robot, robot.rest, robot.rest, collisions=ignored).duration == 0.0
+
+
 def test_what_has_no_words_is_refused_by_name():
     robot = nmm.load("trailer_base")
     with pytest.raises(nmm.InputError) as found:

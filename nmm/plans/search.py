@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, counted, positive
+from nmm.collisions.legs_check import MARGIN
 from nmm.collisions.motion_check import MotionCheck
 from nmm.collisions.obstacle import Obstacle
 from nmm.collisions.shapes import HalfSpace
@@ -32,7 +33,7 @@ from nmm.robots.robot import Robot
 
 #: Room for configurations in each tree, and rounds of a search between two looks at the clock.
 ROOM, ROUNDS = 20_000, 200
-#: Speeds of inputs without limits, m/s and rad/s; the stop between two legs where accelerations have none, s.
+#: Speeds where inputs have no limits, m/s and rad/s; the stop between legs where accelerations have none, s.
 USUAL, PAUSE = 1.0, 0.2
 #: The longest motion by which a tree grows, s.
 STEP = 2.0
@@ -131,7 +132,7 @@ class Search:
             raise InputError("obstacles that move along a path are not planned for", where="plan: obstacles")
         scene = given.on(robot) if self.obstacles or len(robot.collision_model.collisionPairs) else None
         self.limits = limits.on(robot)
-        self.usual = np.full(robot.n_u, USUAL)
+        self.usual = self._usual()
         ways = ways_of(
             robot, self._speeds(), self._pause(), reverses=not np.any(self.limits.inputs[:1, 0] >= 0.0)
         )
@@ -168,9 +169,12 @@ class Search:
         """Start the clock; `InputError` for a start that touches something."""
         self._ends, self._seconds, self._progress = time.monotonic() + seconds, seconds, progress
         self.check.keep(self.start[np.newaxis])
-        pair = self.check.too_near(self.start)
-        if pair >= 0 and self.check.scene is not None:
-            raise InputError(f"{self.check.scene.words(pair)} touch", where="plan: start")
+        scene = self.check.scene
+        if scene is not None and self.check.too_near(self.start) >= 0:
+            distances = scene.queries.distances(0.0, self.start, range(len(scene.names)))
+            touch = [scene.words(int(k)) for k in np.flatnonzero(distances < 4.0 * MARGIN)]
+            cure = "another start, or Collisions(ignore=[(one, other)]) for links that may touch"
+            raise InputError(f"{few(touch)} touch", where="plan: start", expected=cure)
 
     def finished(self, legs: Array) -> Plan:
         """The plan of legs from the start."""
@@ -240,21 +244,29 @@ class Search:
             chain.append(parent)
         return chain[::-1] if k == 0 else chain
 
+    def _usual(self) -> Array:
+        """Speeds (3 + n,) of a leg's numbers whose inputs have no limits: USUAL in the platform's frame, as
+        inputs may be rates of wheels; infinite for the others."""
+        robot, usual = self.robot, np.full(3 + self.robot.n, np.inf)
+        free = np.asarray(np.isinf(self.limits.inputs).any(axis=1))
+        coordinates = np.asarray(robot.rate_coordinates)
+        usual[3 + coordinates[free & (coordinates >= 0)]] = USUAL
+        if robot.platform.n_p >= 3 and np.any(free[: robot.platform.p]):
+            usual[:3] = USUAL
+        return usual
+
     def _speeds(self) -> Array:
         """How fast each number of a leg goes, (3 + n,), to weigh them."""
-        robot, limits = self.robot, self.limits
-        top = np.minimum(np.abs(limits.inputs).max(axis=1), np.inf)
-        top = np.where(np.isfinite(top), top, USUAL)
-        speeds = np.full(3 + robot.n, np.inf)
-        moved = robot.rate_coordinates
-        for j, i in enumerate(moved):
+        robot, speeds = self.robot, self.usual.copy()
+        top = np.abs(self.limits.inputs).max(axis=1)
+        for j, i in enumerate(robot.rate_coordinates):
             if i >= 0:
-                speeds[3 + i] = top[j]
+                speeds[3 + i] = min(speeds[3 + i], top[j])
         if robot.platform.n_p >= 3:
-            G = robot.platform.G(np.zeros(robot.platform.n_p))[:3]
-            speeds[:3] = [max(float((np.abs(row) * top[: robot.platform.p]).sum()), 1e-3) for row in G]
+            G = np.abs(robot.platform.G(np.zeros(robot.platform.n_p))[:3])
+            driven = [np.sum(row[row > 0.0] * top[: robot.platform.p][row > 0.0]) for row in G]
+            speeds[:3] = np.minimum(speeds[:3], [max(driven[0], 1e-3), np.inf, driven[2] or USUAL])
             speeds[1] = speeds[0]
-            speeds[2] = speeds[2] if speeds[2] > 1e-3 else USUAL
         return speeds
 
     def _pause(self) -> float:

@@ -60,15 +60,15 @@ class TimedLegs:
 
 
 def timed(guide: Guide, robot: Robot, start: Array, legs: Array, limits: LimitsOn, usual: Array) -> TimedLegs:
-    """The legs from start (n,), each as fast as the limits allow; usual (n_u,) : speeds of inputs without
-    any."""
+    """The legs from start (n,), each as fast as the limits allow; usual (3 + n,) : speeds of
+    a leg's numbers where inputs have none."""
     corners = guide.corners(start, legs)
     inputs = np.array([_inputs(robot, q, leg) for q, leg in zip(corners[:-1], legs, strict=True)])
     inputs = inputs.reshape(-1, robot.n_u)
-    top = np.where(np.isfinite(limits.inputs), limits.inputs, np.column_stack([-usual, usual]))
-    reached = np.where(inputs >= 0.0, top[:, 1], -top[:, 0])
+    reached = np.where(inputs >= 0.0, limits.inputs[:, 1], -limits.inputs[:, 0])
     with np.errstate(divide="ignore"):
         speed = np.min(reached / np.abs(inputs), axis=1, initial=np.inf)
+        speed = np.minimum(speed, np.min(usual / np.abs(legs), axis=1, initial=np.inf))
         spins = np.maximum(*(_spins(robot, q, inputs, limits) for q in (corners[:-1], corners[1:])))
         speed = np.minimum(speed, np.min(limits.spin / spins, axis=1, initial=np.inf))
         acceleration = np.min(limits.accelerations / np.abs(inputs), axis=1, initial=np.inf)
