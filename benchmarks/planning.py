@@ -165,7 +165,8 @@ def checked(scene: Scene, plan: nmm.Plan, samples: int = 2000) -> Checked:
     near = min(float((queries.distances(0.0, one, pairs) - asked).min()) for one in q)
     h = 1e-6
     inner = t[(t > h) & (t < T - h)]
-    inner = inner[np.abs(inner[:, np.newaxis] - plan.stops).min(axis=1) > 2.0 * h]
+    kinks = plan.found.motion.samples.begin if plan.smooth else plan.stops
+    inner = inner[np.abs(inner[:, np.newaxis] - kinks).min(axis=1) > 2.0 * h]
     here, u = plan(inner)
     rate = (plan(inner + h)[0] - plan(inner - h)[0]) / (2.0 * h)
     u_dot = (plan(inner + h)[1] - plan(inner - h)[1]) / (2.0 * h)
@@ -181,37 +182,39 @@ def main() -> None:
     seed = int(sys.argv[2]) if len(sys.argv) > 2 else 0
     print(f"{instances} instances of each, seed {seed}")
     warm = u_shaped_wall(np.random.default_rng(0))
-    nmm.plan(warm.robot, warm.start, warm.goal, warm.obstacles)  # what is compiled once is no part of a plan
-    print(f"{'':14} found  free   s median   worst  duration  spare mm  |q_dot - S u|  limits")
+    nmm.plan(
+        warm.robot, warm.start, warm.goal, warm.obstacles, smooth=True
+    )  # compiled once: no part of a plan
+    print(f"{'':14} smooth found  free   s median   worst  duration  spare mm  |q_dot - S u|  limits")
     for kind in sys.argv[3:] or KINDS:
-        times, durations, found = [], [], []
-        for k in range(instances):
-            scene = KINDS[kind](np.random.default_rng([seed, k]))
-            begin = time.process_time()
-            try:
-                plan = nmm.plan(
-                    scene.robot,
-                    scene.start,
-                    scene.goal,
-                    scene.obstacles,
-                    nmm.Collisions(DISTANCE),
-                    LIMITS,
-                    seed=k,
-                )
-            except nmm.NmmError as error:
-                print(f"  {kind} {k}: {error} ({time.process_time() - begin:.2f} s)")
-                continue
-            times.append(time.process_time() - begin)
-            durations.append(plan.duration)
-            found.append(checked(scene, plan))
-        if found:
-            least = Checked(*(f(x) for f, x in zip((min, max, max), zip(*found, strict=True), strict=True)))
-            print(
-                f"{kind:14} {len(found):5} {sum(one.free > 0.0 for one in found):5} {np.median(times):10.2f} "
-                f"{max(times):7.2f} {np.median(durations):9.1f} {1e3 * least.free:9.2f} {least.motion:14.1e} "
-                f"{least.limits:7.1e}",
-                flush=True,
-            )
+        for smooth in (False, True):
+            measure(kind, instances, seed, smooth)
+
+
+def measure(kind: str, instances: int, seed: int, smooth: bool) -> None:
+    """Print a line: processor time and motion of the plans of a kind, with rests or smooth."""
+    times, durations, found, smoothed = [], [], [], 0
+    for k in range(instances):
+        scene = KINDS[kind](np.random.default_rng([seed, k]))
+        given = scene.robot, scene.start, scene.goal, scene.obstacles, nmm.Collisions(DISTANCE), LIMITS
+        begin = time.process_time()
+        try:
+            plan = nmm.plan(*given, seed=k, smooth=smooth)
+        except nmm.NmmError as error:
+            print(f"  {kind} {k}: {error} ({time.process_time() - begin:.2f} s)")
+            continue
+        times.append(time.process_time() - begin)
+        durations.append(plan.duration)
+        found.append(checked(scene, plan))
+        smoothed += plan.smooth
+    if found:
+        least = Checked(*(f(x) for f, x in zip((min, max, max), zip(*found, strict=True), strict=True)))
+        print(
+            f"{kind:14} {smoothed:6} {len(found):5} {sum(one.free > 0.0 for one in found):5} "
+            f"{np.median(times):10.2f} {max(times):7.2f} {np.median(durations):9.1f} {1e3 * least.free:9.2f} "
+            f"{least.motion:14.1e} {least.limits:7.1e}",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

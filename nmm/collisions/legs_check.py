@@ -14,9 +14,9 @@ import math
 from typing import NamedTuple
 
 from nmm.arrays import Array, Integers
-from nmm.collisions.separation import ConvexShapes, separation
+from nmm.collisions.separation import ConvexShapes, extreme, separation
 from nmm.kernels.compiled import compiled, scratch
-from nmm.kernels.kinematics import Joints, compose, place_joints
+from nmm.kernels.kinematics import Joints, compose, moved, place_joints
 from nmm.kernels.linear_algebra import copied
 from nmm.kernels.record_layout import IntegerCell, IntegerVector, Matrix, Vector, views
 from nmm.kernels.velocity_map import place_mimic_joints
@@ -72,12 +72,16 @@ def along(planar: int, q: Array, leg: Array, share: float, mimic_joints: Array, 
 
 
 @compiled
-def pair_bound(scene: MovedShapes, joints: Array, pair: int, enough: float) -> float:
-    """A lower bound of the distance of a pair where the joints (J, 12) are; rough above `enough`."""
+def place_shape(scene: MovedShapes, joints: Array, shape: int) -> None:
+    """Where a shape is while the joints (J, 12) are there."""
+    compose(joints, scene.carrier[shape], scene.place, shape, scene.places, shape)
+
+
+@compiled
+def placed_bound(scene: MovedShapes, pair: int, enough: float) -> float:
+    """A lower bound of the distance of a pair where its shapes were placed; rough above `enough`."""
     shapes, places = scene.shapes, scene.places
     i, j = shapes.pairs[pair, 0], shapes.pairs[pair, 1]
-    compose(joints, scene.carrier[i], scene.place, i, places, i)
-    compose(joints, scene.carrier[j], scene.place, j, places, j)
     if j < shapes.planes[()]:
         square = 0.0
         for k in range(3):
@@ -90,6 +94,40 @@ def pair_bound(scene: MovedShapes, joints: Array, pair: int, enough: float) -> f
         if apart >= enough:
             return apart
     return separation(shapes, places, pair, enough)
+
+
+@compiled
+def pair_bound(scene: MovedShapes, joints: Array, pair: int, enough: float) -> float:
+    """`placed_bound` where the joints (J, 12) are."""
+    place_shape(scene, joints, scene.shapes.pairs[pair, 0])
+    place_shape(scene, joints, scene.shapes.pairs[pair, 1])
+    return placed_bound(scene, pair, enough)
+
+
+@compiled
+def write_approach(scene: MovedShapes, joints: Array, twists: Array, pair: int, out: Array) -> None:
+    """Add the derivative of `placed_bound`, just computed, by q to out (n, ...): along the direction that
+    separates the two, of the points farthest along it."""
+    shapes, places, table = scene.shapes, scene.places, scene.joints
+    d, point, v = scratch(3), scratch(3), scratch(3)
+    j = shapes.pairs[pair, 1]
+    for k in range(3):
+        d[k] = shapes.between[pair, k]
+    if j >= shapes.planes[()]:
+        for k in range(3):
+            d[k] = 0.0
+            for i in range(3):
+                d[k] += places[j, 3 * i + k] * shapes.boxes[j, i]
+    for side in range(2):
+        shape = shapes.pairs[pair, side]
+        joint, sign = scene.carrier[shape], 1.0 if side == 0 else -1.0
+        if joint == 0:
+            continue
+        extreme(shapes, places, shape, d, -sign, point)
+        while joint > 0:
+            moved(joints, twists, joint, point[0], point[1], point[2], v)
+            out[table.coordinate[joint]] += sign * (d[0] * v[0] + d[1] * v[1] + d[2] * v[2])
+            joint = table.parent[joint]
 
 
 @compiled
@@ -117,29 +155,40 @@ def approach(scene: MovedShapes, pair: int, leg: Array, apart: float) -> float:
 
 
 @compiled
+def begin_motion(scene: MovedShapes, leg: Array) -> None:
+    """Forget what was known of a motion before; no number changes faster on this one than along the leg."""
+    for pair in range(scene.kept.shape[0]):
+        scene.until[pair] = 0.0 if approach(scene, pair, leg, math.inf) > 0.0 else math.inf
+
+
+@compiled
+def look(scene: MovedShapes, q: Array, leg: Array, share: float, joints: Array) -> float:
+    """Look at the pairs that are due at a share of a motion, which is at q: until where it is surely free, or
+    -1 less the number of a pair that is too near."""
+    place_joints(scene.joints, q, joints)
+    following = math.inf
+    for pair in range(scene.kept.shape[0]):
+        if scene.until[pair] <= share:
+            least = scene.kept[pair]
+            fastest = approach(scene, pair, leg, math.inf)
+            apart = pair_bound(scene, joints, pair, least + MARGIN + fastest * (1.0 - share))
+            if apart < least + MARGIN:
+                return -1.0 - pair
+            scene.until[pair] = share + (apart - least) / approach(scene, pair, leg, apart)
+        following = min(following, scene.until[pair])
+    return following
+
+
+@compiled
 def leg_blocked(scene: MovedShapes, q: Array, leg: Array) -> int:
     """The pair that comes too near on a leg from q, which is free itself; -1 where none does."""
     here, joints = scratch(q.shape[0]), scratch((scene.joints.parent.shape[0], 12))
-    count = scene.kept.shape[0]
-    for pair in range(count):
-        scene.until[pair] = 0.0 if approach(scene, pair, leg, math.inf) > 0.0 else math.inf
+    begin_motion(scene, leg)
     share = 0.0
-    while True:
+    while 0.0 <= share < 1.0:
         along(scene.planar[()], q, leg, share, scene.mimic_joints, here)
-        place_joints(scene.joints, here, joints)
-        following = math.inf
-        for pair in range(count):
-            if scene.until[pair] <= share:
-                least = scene.kept[pair]
-                fastest = approach(scene, pair, leg, math.inf)
-                apart = pair_bound(scene, joints, pair, least + MARGIN + fastest * (1.0 - share))
-                if apart < least + MARGIN:
-                    return pair
-                scene.until[pair] = share + (apart - least) / approach(scene, pair, leg, apart)
-            following = min(following, scene.until[pair])
-        if following >= 1.0:
-            return -1
-        share = following
+        share = look(scene, here, leg, share, joints)
+    return -1 if share >= 0.0 else int(-1.0 - share)
 
 
 @compiled

@@ -60,6 +60,11 @@ class MotionCheck:
         least = np.min([queries.distances(0.0, q, pairs) for q in configurations], axis=0)
         kept[:] = np.clip(least - 4.0 * MARGIN, 0.0, self.scene.distance)
 
+    @property
+    def kept(self) -> Array:
+        """The distance that each pair keeps, (P,), m."""
+        return self._shapes.kept
+
     def too_near(self, q: Array) -> int:
         """The number of a pair that is nearer than its distance at q (n,), or -1."""
         return int(self._near(self.blocks, q))

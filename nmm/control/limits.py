@@ -85,7 +85,8 @@ class LimitsOn:
     inputs (m, 2), coordinates (n, 2) : lower and upper limits; infinite for none
     accelerations (m,) : largest change of inputs per second
     functions : whose values are limited; braking (f,) : of their components
-    spin (w,) : largest rates of the wheels, the first of `rows`, rad/s
+    wheels (w, 9), spin (w,) : rows of `nmm.robots.wheel_rates`, and the wheels' largest rates, the first of
+        `rows`, rad/s
     row_limits, rows : the limits that are rows on the inputs, and their names: first wheels, then functions'
         components
     priorities : of these, None for those that are kept before any task
@@ -98,7 +99,7 @@ class LimitsOn:
         self.accelerations = _per_input(limits.acceleration, robot, "acceleration")
         self.recovery = limits.recovery
         self._moved = robot.rate_coordinates
-        wheels, self._wheels, self.spin = _wheel_limits(limits, robot)
+        wheels, self.wheels, self.spin = _wheel_limits(limits, robot)
         held = [
             Bound(LinearCoordinates(robot.q_names[i]), *self.coordinates[i])
             for i in robot.following.independent
@@ -136,7 +137,7 @@ class LimitsOn:
         return LimitNumbers(
             *(self.inputs[:, 0].copy(), self.inputs[:, 1].copy(), self.accelerations, self._moved),
             *(positions[:, 0].copy(), positions[:, 1].copy(), np.array(self.recovery)),
-            *(self._wheels, self.spin, np.array(rows, dtype=np.int64)),
+            *(self.wheels, self.spin, np.array(rows, dtype=np.int64)),
             *(self._ends[:, 0].copy(), self._ends[:, 1].copy(), self.braking),
             elapsed=np.array(np.nan),
             mode=np.array(SAMPLE, dtype=np.int64),

@@ -17,6 +17,7 @@ from nmm.functions.tasks.linear_coordinates import Posture
 from nmm.functions.tasks.task import Task
 from nmm.plans.following import FromPlan
 from nmm.plans.goals import Reaching
+from nmm.plans.samples import SampledMotion
 from nmm.robots.frame_path import FramePath
 from nmm.robots.reach import first_tip
 from nmm.robots.robot import Robot
@@ -98,6 +99,11 @@ class Plan:
     def duration(self) -> float:
         """How long it takes, s."""
         return self._found.motion.duration
+
+    @property
+    def smooth(self) -> bool:
+        """Whether it goes on without rests, as asked for by `smooth`, but for those at `through`."""
+        return isinstance(self._found.motion, SampledMotion)
 
     @property
     def _found(self) -> Found:

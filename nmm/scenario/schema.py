@@ -92,6 +92,10 @@ class PlanPart(Part):
     seconds: Positive = Field(10.0, description="after which the search gives up, s")
     seed: Whole = Field(1, description="of the random numbers; the same plan comes of the same seed")
     shorten: Whole = Field(200, description="how often a shorter way between two points of it is tried")
+    smooth: bool = Field(
+        False,
+        description="whether it goes on without rests, in about half the time, where such a motion is found",
+    )
     track: Annotated[TrackPart | None, BeforeValidator(part_or_none)] = Field(
         None,
         description="whether the controller follows the plan, for the scenario's duration: true, or a "
@@ -232,7 +236,7 @@ class ScenarioPart(Part):
             collisions = None if self.collisions is None else self.collisions.build(robot, absolute, place)
         limits = None if self.limits is None else self.limits.build(robot)
         tolerance = None if self.until is None else self.until.make()
-        given = part.given("through", "seconds", "seed", "shorten")
+        given = part.given("through", "seconds", "seed", "shorten", "smooth")
         given |= {"limits": limits, "tolerance": tolerance, "progress": progress}
         start, farther = robot.q(self.q0), None
         if part.track is not None and part.track.margin > 0.0:

@@ -1,0 +1,177 @@
+"""Smooth motions: checked by Coal, differences against S(q) u, the limits; derivatives by differences."""
+
+import numpy as np
+import pytest
+
+import nmm
+from nmm.plans.samples import flow
+from nmm.plans.search import USUAL, Search
+from nmm.plans.smoothing import Smoothing
+from nmm.robots.wheel_rates import turning_wheels
+from nmm.robots.zero_order_hold import inputs_of
+
+LIMITS = nmm.Limits(velocity={"platform": 1.0, "arm": 1.5}, acceleration={"platform": 1.0, "arm": 3.0})
+WALL = nmm.Obstacle(nmm.Box([0.2, 4.0, 2.0]), [3.0, 0.0, 0.5], name="wall")
+BEHIND = {"x": 6.0, "y": 0.0, "theta": 0.5}
+START = {"unicycle_3r": {"q1": 0.5, "q2": -0.4}}
+PLATFORMS = [
+    ("unicycle_3r", None),
+    ("unicycle_3r", "omnidirectional"),
+    ("differential_base", None),
+]
+
+
+def planned(name, platform=None, smooth=True, goal=BEHIND, **options):
+    robot = nmm.load(name, platform=platform)
+    start = START.get(name, robot.rest)
+    return nmm.plan(robot, start, goal, [WALL], limits=LIMITS, smooth=smooth, **options)
+
+
+def check(plan, samples=400):
+    """Distances by Coal, S(q) u by differences of order 4 within samples, and the limits."""
+    robot, motion = plan.robot, plan.found.motion
+    t = np.linspace(0.0, plan.duration, samples)
+    q, u = plan(t)
+    queries, pairs = plan.found.scene.queries, range(len(plan.found.scene.names))
+    asked = np.minimum(0.03, queries.distances(0.0, q[0], pairs) - 0.002)
+    for one in q:
+        assert np.all(queries.distances(0.0, one, pairs) >= asked)
+    assert not any(robot.outside(one) for one in q)
+    h, begin = 1e-3, motion.samples.begin
+    inner = t[np.abs(t[:, np.newaxis] - begin).min(axis=1) > 2.0 * h]
+    assert len(inner) > samples / 2
+    near, far = (plan(inner + d)[0] - plan(inner - d)[0] for d in (h, 2.0 * h))
+    rate = (8.0 * near - far) / (12.0 * h)
+    for one, at, inputs in zip(rate, *plan(inner), strict=True):
+        assert np.allclose(one, robot.S(at) @ inputs, rtol=0.0, atol=1e-9)
+    on, (_, ends) = LIMITS.on(robot), plan(begin)
+    for inputs in (u, ends):
+        assert np.all(inputs >= on.inputs[:, 0] - 1e-11)
+        assert np.all(inputs <= on.inputs[:, 1] + 1e-11)
+    assert np.all(np.abs(np.diff(ends, axis=0)) <= (on.accelerations + 1e-11) * np.diff(begin)[:, np.newaxis])
+    # Inputs are straight lines between samples' ends, so that nothing is missed there.
+    middle = plan(0.5 * (begin[1:] + begin[:-1]))[1]
+    assert np.allclose(middle, 0.5 * (ends[1:] + ends[:-1]), rtol=0.0, atol=1e-12)
+    assert np.allclose(plan(plan.stops)[1], 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("name", "platform"), PLATFORMS)
+def test_a_smooth_motion_keeps_all_and_takes_less_time(name, platform):
+    plan, before = (planned(name, platform, smooth) for smooth in (True, False))
+    assert plan.smooth
+    assert not before.smooth
+    assert plan.duration < 0.9 * before.duration
+    assert np.allclose(plan.end, before.end, rtol=0.0, atol=1e-9)
+    assert np.array_equal(plan.corners[0], before.corners[0])
+    check(plan)
+
+
+def test_a_car_is_never_slower_than_with_rests():
+    plan, before = (planned("car_base", "car", smooth) for smooth in (True, False))
+    assert plan.smooth == (plan.duration < before.duration)
+    assert plan.duration <= before.duration
+    assert np.allclose(plan.end, before.end, rtol=0.0, atol=1e-9)
+
+
+def test_what_wheels_bear_is_kept():
+    robot = nmm.load("differential_base", platform="unicycle")
+    limits = nmm.Limits(wheels=3.0, acceleration=1.0)
+    plan = nmm.plan(robot, robot.rest, {"x": 1.0, "y": 1.0, "theta": 0.0}, limits=limits, smooth=True)
+    assert plan.smooth
+    q, u = plan(np.linspace(0.0, plan.duration, 500))
+    _, rates = turning_wheels(robot, q, np.array([robot.S(a) @ b for a, b in zip(q, u, strict=True)]))
+    assert 2.0 < np.abs(rates).max() <= 3.0 + 1e-11
+
+
+def test_a_smooth_motion_rests_at_way_points_alone():
+    by = {"x": 1.5, "y": 3.0, "theta": 0.5}
+    plan = planned("unicycle_3r", through=[by])
+    assert plan.smooth
+    assert len(plan.stops) == 3
+    assert np.allclose(plan.corners[1, :2], (1.5, 3.0), atol=1e-9)
+    check(plan)
+
+
+def test_a_seed_gives_one_smooth_plan():
+    a, b = (planned("unicycle_3r", seed=4) for _ in range(2))
+    t = np.linspace(0.0, a.duration, 50)
+    assert a.duration == b.duration
+    assert np.array_equal(a(t)[0], b(t)[0])
+
+
+def test_where_no_smooth_motion_is_found_the_one_with_rests_stands(monkeypatch):
+    monkeypatch.setattr(Smoothing, "solved", lambda self: False)
+    plan = planned("unicycle_3r")
+    assert not plan.smooth
+    assert plan.duration == planned("unicycle_3r", smooth=False).duration
+
+
+def test_a_motion_that_would_touch_between_samples_is_found():
+    """A post thinner than what is driven in a sample stands on the way between two of them."""
+    plan = planned("unicycle_3r")
+    samples = plan.found.motion.samples
+    k = int(np.linalg.norm(np.diff(samples.q[:, :2], axis=0), axis=1).argmax())
+    (between,), _ = plan([0.5 * (samples.begin[k] + samples.begin[k + 1])])
+    post = nmm.Obstacle(nmm.Cylinder(0.002, 2.0), [*between[:2], 1.0], name="post")
+    smoothing, path = prepared([WALL, post], plan)
+    smoothing.begin(path)
+    N, x = len(samples.a), smoothing.x
+    assert len(x.a) == N
+    x.q[:], x.u[:], x.a[:] = samples.q, samples.u, samples.a
+    x.step[()] = samples.begin[1]
+    assert 0 <= smoothing._first_blocked(*smoothing.check.blocks, *smoothing._own) <= k
+
+
+def prepared(obstacles, plan):
+    """The smoothing of the timed path of a plan's problem."""
+    robot, before = plan.robot, planned("unicycle_3r", smooth=False)
+    search = Search(robot, before.corners[0], [BEHIND], obstacles, None, LIMITS, 0, nmm.Goal(), True)
+    return Smoothing(robot, search.limits, USUAL, search.check), before.found.motion
+
+
+# Derivatives
+
+
+@pytest.mark.parametrize("name", ["unicycle_3r", "car_base", "trailer_base", "omni_base"])
+def test_where_a_sample_leads_is_differentiated_exactly(name):
+    robot, rng = nmm.load(name), np.random.default_rng(3)
+    inputs, n, m = inputs_of(robot), robot.n, robot.n_u
+    x = np.concatenate([0.3 * rng.normal(size=n), rng.normal(size=2 * m)])
+
+    def ahead(x, columns=0):
+        out, D = np.zeros(n), np.zeros((n, columns))
+        flow.py_func(inputs, x[:n].copy(), x[n : n + m], x[n + m :], 0.15, 4, out, D)
+        return out, D
+
+    _, D = ahead(x, n + 2 * m)
+    for i, e in enumerate(1e-6 * np.eye(n + 2 * m)):
+        assert np.allclose((ahead(x + e)[0] - ahead(x - e)[0]) / 2e-6, D[:, i], rtol=0.0, atol=1e-8)
+
+
+def test_distances_are_differentiated_along_the_direction_between_two():
+    plan = planned("unicycle_3r", smooth=False)
+    smoothing, path = prepared([WALL], plan)
+    smoothing.begin(path)
+    assert smoothing.solved()
+    x, queries = smoothing.x, smoothing.check.scene.queries
+    B, w = len(x.column), len(x.spin)
+    pairs, errors = range(len(x.room)), []
+    for k in range(1, len(x.a)):
+        near = np.flatnonzero(np.isfinite(x.c[k, B + 2 * w :]))
+        for i, e in enumerate(1e-6 * np.eye(plan.robot.n)):
+            change = queries.distances(0.0, x.q[k] + e, pairs) - queries.distances(0.0, x.q[k] - e, pairs)
+            errors += list(change[near] / 2e-6 - x.rows[k, 2 * w + near, i])
+    assert len(errors) > 50
+    assert np.median(np.abs(errors)) < 1e-3
+    assert np.mean(np.abs(errors)) < 0.03
+
+
+# Scenarios
+
+
+def test_a_scenario_may_ask_for_a_smooth_plan():
+    scenario = nmm.Scenario.load("behind_the_wall")
+    before = scenario.plan()
+    plan = scenario.override("plan.smooth", True).plan()
+    assert plan.smooth
+    assert plan.duration < before.duration
