@@ -97,7 +97,7 @@ def lay(way_blocks: Blocks, q: Array, u: Array, dt: float) -> int:
     now, slower = scratch(u.shape[0]), scratch(u.shape[0])
     copied(way.q[count - 1], here)
     copied(u, now)
-    for _ in range(min(DRIVEN, int(way.lasts[()] / dt + 0.5))):
+    for _ in range(min(DRIVEN, round(float(way.lasts[()]) / dt))):
         size = 0.0
         for j in range(u.shape[0]):
             change = way.deceleration[j] * dt

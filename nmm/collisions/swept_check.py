@@ -67,8 +67,9 @@ class SweptCheck:
         if not len(later):
             return
         first = int(np.floor(t / EVERY)) + 1
-        known = len(later) - min(abs(first - self._first), len(later)) if self._first is not None else 0
-        known = known if self._first is not None and first >= self._first else 0
+        known = 0  # of the places that are still ahead
+        if self._first is not None and first >= self._first:
+            known = max(0, len(later) - (first - self._first))
         grid[:, :known] = grid[:, len(later) - known :].copy()
         for k in range(known, len(later)):
             for path, obstacle in enumerate(self._paths):

@@ -163,9 +163,9 @@ class SafetyFilter:
         stays = np.zeros_like(best)
         longest = self._lookout.contact(t, q, best, dt, stays, 0.0)
         for lasts, signs in product(GIVES_WAY, product((0.0, 1.0, -1.0), repeat=p)):
-            driven = stays.copy()
-            sizes = np.where(np.array(signs) < 0.0, -limits.slowest[:p], limits.fastest[:p])
-            driven[:p] = signs * np.minimum(sizes, UNLIMITED)
+            driven, sign = stays.copy(), np.array(signs)
+            sizes = np.where(sign < 0.0, -limits.slowest[:p], limits.fastest[:p])
+            driven[:p] = sign * np.minimum(sizes, UNLIMITED)
             first = before + np.clip(driven - before, -change, change)
             first = np.clip(first, problem.u_lower, problem.u_upper)
             clear = self._lookout.contact(t, q, first, dt, driven, lasts)
