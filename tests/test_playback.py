@@ -15,6 +15,7 @@ import trimesh
 from playback_robot import drive, hand_built_robot, straight
 
 from nmm.errors import InputError, RobotError
+from nmm.files import UnwrittenError
 from nmm.platforms import Unicycle
 from nmm.playback import Motion, play, wheel_angles, wheel_rates, write_html
 from nmm.playback.keyframes import LARGEST_TURN, ghost_samples, keyframes
@@ -268,7 +269,7 @@ def test_a_file_that_cannot_be_written_leaves_the_old_one(
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "replace", full)
-    with pytest.raises(InputError, match=r"a\.html: cannot be written: No space left"):
+    with pytest.raises(UnwrittenError, match=r"a\.html: cannot be written: No space left"):
         write_html([drive(robot, duration=1.0)], path)
     assert [p.read_text(encoding="utf-8") for p in tmp_path.iterdir()] == ["old"]
 

@@ -18,7 +18,7 @@ from command_line import NMM
 import nmm
 from nmm.cli.exit_status import status_of
 from nmm.errors import InputError
-from nmm.files import writing
+from nmm.files import UnwrittenError, writing
 from nmm.folders import whole
 from nmm.folders.whole import FolderKind, check_folder, replaced_folder, steady
 
@@ -167,7 +167,7 @@ def test_where_two_folders_cannot_be_exchanged(tmp_path: Path, monkeypatch: pyte
         return rename(self, target)
 
     monkeypatch.setattr(Path, "rename", fails)
-    with pytest.raises(InputError, match=r"o: cannot be written: No space left on device"):
+    with pytest.raises(UnwrittenError, match=r"o: cannot be written: No space left on device"):
         write(folder, 3)
     assert numbers(folder) == {'{"format": "ours", "number": 2}'}
     assert [path.name for path in tmp_path.iterdir()] == ["o"]
