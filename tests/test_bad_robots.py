@@ -776,7 +776,7 @@ def test_folder(suffix: str, tmp_path: Path) -> None:
     folder = tmp_path / f"robot{suffix}"
     folder.mkdir()
     assert refused(folder).where == str(folder)
-    assert refused(folder).expected == "a .urdf or .xacro file"
+    assert refused(folder).expected == "a .urdf, .xacro or .xml file"
 
 
 @pytest.mark.parametrize("name", ["robot.sdf", "robot.urdf.bak", "robot", "robot.json"])

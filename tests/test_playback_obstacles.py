@@ -124,7 +124,7 @@ def test_what_is_set_from_outside_is_recorded_where_it_was() -> None:
 
     clock = nmm.Obstacle(nmm.Sphere(0.01), motion=clockwork, velocity=lambda t: [0.0, 0.0, 0.0], name="clock")
     task = nmm.Task(nmm.Position("ee", "xy"), [1.2, 0.0], gain=1.0, speed=0.5)
-    collisions = nmm.Collisions(0.03, self_collisions=False, obstacles=[clock, ball])
+    collisions = nmm.Collisions(0.03, self_collisions=False, obstacles=[clock, ball], horizon=0.0)
     controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), collisions=collisions, dt=0.02)
     run = nmm.simulate(controller, {"q1": 0.3, "q2": 0.6}, 2.0, 0.02, "zoh")
     ball.move_to([50.0, 0.0, 0.0])  # what comes after the run changes nothing in it

@@ -21,8 +21,8 @@ from nmm.robots.zero_order_hold import inputs_of
 
 #: How many samples a motion has: one for each so many seconds of the path's time, within limits.
 EACH, FEWEST, MOST = 0.27, 24, 80
-#: Rounds of one solution, and of all together.
-ROUNDS, ALL = 25, 120
+#: Rounds of the first solution, of each that begins with one before, and of all together.
+FIRST, ROUNDS, ALL = 100, 25, 200
 #: The next motion takes this share of the time of the one before; after a failure, of the best.
 FASTER, LESS = 0.8, 0.92
 #: Samples' ends keep this much more than the distance, m; ends of one that is blocked between so much more.
@@ -65,7 +65,7 @@ class Smoothing:
         best: SampledMotion | None = None
         share = 1.0
         while self._left > 0:
-            if self.solved():
+            if self.solved(FIRST if best is None else ROUNDS):
                 self._quicken(self._spare())
                 best = self._motion()
                 kept = [one.copy() for one in (x.q, x.u, x.a, x.step)]
@@ -108,12 +108,13 @@ class Smoothing:
         hardest = float(np.max(np.abs(x.a) / limits.accelerations))
         return min(1.0, max(needed, math.sqrt(hardest)) * (1.0 + 1e-8))
 
-    def solved(self) -> bool:
-        """Look for a motion in the time that is set; whether one was found that keeps everything."""
+    def solved(self, most: int = FIRST) -> bool:
+        """Look for a motion in the time that is set; whether one was found that keeps everything. most :
+        rounds of a solution"""
         x = self.x
         while self._left > 0:
             x.s[:], x.z[:], x.duals[:], x.mu[()] = 0.0, 0.0, 0.0, MU
-            rounds = self._shoot(*self.check.blocks, *self._own, min(ROUNDS, self._left))
+            rounds = self._shoot(*self.check.blocks, *self._own, min(most, self._left))
             self._left -= abs(rounds)
             if rounds < 0:
                 return False
