@@ -18,6 +18,8 @@ import nmm
 from nmm.playback.session import FPS
 
 DURATION = 6.0
+#: Whether a page plays what has run; while it is loaded anew it has no script yet.
+PLAYS_IT = "window.nmm?.stage && !nmm.stage.live"
 
 
 def scenario(duration: float = DURATION) -> nmm.Scenario:
@@ -58,7 +60,7 @@ def test_it_grows_and_becomes_the_page_that_plays_it(window: Window) -> None:
         page.evaluate("nmm.seek(0)")  # the clock is the program's
         assert page.evaluate("nmm.player.time") >= t
         page.get_by_role("button", name="Whole run").click()
-        page.wait_for_function("nmm.stage && !nmm.stage.live && nmm.player.time === nmm.stage.duration")
+        page.wait_for_function(f"{PLAYS_IT} && nmm.player.time === nmm.stage.duration")
         assert "shown as it ran" in shown.report()
         page.evaluate("nmm.seek(2.5)")
         k = int(np.searchsorted(made.t, 2.5))
@@ -94,7 +96,7 @@ def test_a_camera_that_somebody_has_moved_stays_where_it_is(window: Window) -> N
         }"""
         before = page.evaluate(beside)
         page.get_by_role("button", name="Whole run").click()
-        page.wait_for_function("nmm.stage && !nmm.stage.live && nmm.player.time === nmm.stage.duration")
+        page.wait_for_function(f"{PLAYS_IT} && nmm.player.time === nmm.stage.duration")
         np.testing.assert_allclose(page.evaluate(beside), before, atol=1e-3)
         assert page.evaluate("nmm.camera.following")
         assert page.locator("#grid").get_attribute("aria-pressed") == "false"
@@ -123,7 +125,7 @@ def test_thirty_pictures_a_second_are_drawn_or_counted(window: Window, browser: 
         reached = page.evaluate("nmm.player.time")
         page.get_by_role("button", name="Whole run").click()
         for one in (page, second):
-            one.wait_for_function("nmm.stage && !nmm.stage.live", timeout=1000.0 * MOST)
+            one.wait_for_function(PLAYS_IT, timeout=1000.0 * MOST)
         wait_for(lambda: shown._over)
         report = shown.report()
         late.close()
