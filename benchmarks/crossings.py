@@ -59,7 +59,10 @@ def crossing(rng: np.random.Generator) -> Crossing:
     turn = np.arctan2(goal[1], goal[0]) + rng.choice([-1, 1]) * rng.uniform(np.pi / 3, 2 * np.pi / 3)
     velocity = speed * np.array([np.cos(turn), np.sin(turn), 0.0])
     middle = np.array([*where, 0.9])
-    motion = lambda t: middle + (t - when) * velocity  # noqa: E731
+
+    def motion(t: float) -> np.ndarray:
+        return middle + (t - when) * velocity
+
     body = nmm.Obstacle(
         nmm.Cylinder(RADIUS, 1.8), motion=motion, velocity=lambda t: velocity, name="cylinder"
     )

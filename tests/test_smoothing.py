@@ -83,6 +83,14 @@ def test_what_wheels_bear_is_kept():
     assert 2.0 < np.abs(rates).max() <= 3.0 + 1e-11
 
 
+def test_rates_of_wheels_without_limits_drive_as_fast_as_with_rests():
+    robot = nmm.load("differential_base")
+    accelerations = nmm.Limits(acceleration=20.0)
+    plan = nmm.plan(robot, robot.rest, BEHIND, [WALL], limits=accelerations, smooth=True)
+    assert plan.smooth
+    assert np.abs(plan(np.linspace(0.0, plan.duration, 300))[1]).max() > 9.0
+
+
 def test_a_smooth_motion_rests_at_way_points_alone():
     by = {"x": 1.5, "y": 3.0, "theta": 0.5}
     plan = planned("unicycle_3r", through=[by])

@@ -5,7 +5,7 @@ from contextlib import chdir
 
 if os.environ.get("MATPLOTLIBRC") == os.devnull:  # then it would take those that lie in this folder
     with chdir(os.sep):
-        import matplotlib  # noqa: F401
+        import matplotlib  # noqa: F401  # reads its settings now, where none of the user's lie
 
 from nmm.figure_options import FigureOptions
 from nmm.figures.composed import comparison, overview, write_run_figures

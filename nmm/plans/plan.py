@@ -16,7 +16,7 @@ from nmm.control.limits import LimitsOn
 from nmm.functions.tasks.linear_coordinates import Posture
 from nmm.functions.tasks.task import Task
 from nmm.plans.following import FromPlan
-from nmm.plans.goals import Reaching
+from nmm.plans.goals import Reaching, Wanted
 from nmm.plans.samples import SampledMotion
 from nmm.robots.frame_path import FramePath
 from nmm.robots.reach import first_tip
@@ -53,7 +53,7 @@ class Found(NamedTuple):
     motion: Motion
     limits: LimitsOn
     scene: Scene | None
-    goal: object
+    goal: Wanted
     asked: Mapping[str, Any]
 
 
@@ -78,17 +78,17 @@ class Plan:
     robot: Robot
     motions: int
     postures: int
-    found: Any = field(repr=False)
+    found: Found = field(repr=False)
 
     @property
     def stops(self) -> Array:
         """The times at which it begins, rests and ends, (L + 1,), s."""
-        return self._found.motion.stops
+        return self.found.motion.stops
 
     @property
     def corners(self) -> Array:
         """Where it is at its `stops`, (L + 1, n); angles of the platform are not wrapped."""
-        return self._found.motion.corners
+        return self.found.motion.corners
 
     @property
     def end(self) -> Array:
@@ -98,22 +98,17 @@ class Plan:
     @property
     def duration(self) -> float:
         """How long it takes, s."""
-        return self._found.motion.duration
+        return self.found.motion.duration
 
     @property
     def smooth(self) -> bool:
         """Whether it goes on without rests, as asked for by `smooth`, but for those at `through`."""
-        return isinstance(self._found.motion, SampledMotion)
-
-    @property
-    def _found(self) -> Found:
-        found: Found = self.found
-        return found
+        return isinstance(self.found.motion, SampledMotion)
 
     def __call__(self, t: ArrayLike) -> tuple[Array, Array]:
         """q (N, n) and u (N, n_u) at times t (N,), s; before it begins and after it ends it stands."""
         times = np.clip(np.atleast_1d(np.asarray(t, dtype=np.float64)), 0.0, self.duration)
-        return self._found.motion.at(times)
+        return self.found.motion.at(times)
 
     def reference(
         self,
@@ -146,7 +141,7 @@ class Plan:
         >>> bool(np.abs(run.q[-1] - plan.end).max() < 0.001)
         True
         """
-        motion, share = self._found.motion, positive(pace, "pace")
+        motion, share = self.found.motion, positive(pace, "pace")
 
         def at(t: Array) -> tuple[Array, Array]:
             q, u = motion.at(share * t)
@@ -160,7 +155,7 @@ class Plan:
     def trajectory(self, dt: float = 0.02) -> Trajectory:
         """The motion sampled every dt, s, and at its end, as a run: it plays, saves and compares. Its task is
         the goal's or, of a goal of coordinates, that these are where it ends."""
-        robot, scene = self.robot, self._found.scene
+        robot, scene = self.robot, self.found.scene
         times = np.arange(0.0, self.duration - 1e-9, positive(dt, "dt"))
         t = np.append(times, self.duration)
         q, u = self(t)
@@ -169,7 +164,7 @@ class Plan:
         rows, drawn = task.rows(robot), shown_frame([task], robot)
         found = map(np.array, zip(*map(Reaching(robot, task, Goal()).evaluate, q), strict=True))
         r, r_d, error, error_q = found
-        names, within = shares(self._found.limits, robot, q, u, np.zeros((len(t), 0)))
+        names, within = shares(self.found.limits, robot, q, u, np.zeros((len(t), 0)))
         distances: dict[str, Any] = {}
         if scene is not None:
             pairs = tuple(" and ".join(pair) for pair in scene.names)
@@ -210,7 +205,7 @@ class Plan:
         )
 
     def _task(self) -> Task:
-        goal, robot = self._found.goal, self.robot
+        goal, robot = self.found.goal, self.robot
         if isinstance(goal, Task):
             return goal
         named = [name for name in goal if name in robot.q_names] if isinstance(goal, Mapping) else []

@@ -47,10 +47,12 @@ class Smoothing:
 
     def __init__(self, robot: Robot, limits: LimitsOn, usual: float, check: MotionCheck) -> None:
         self.robot, self.limits, self.check = robot, limits, check
-        largest = np.full(robot.n_u, usual)  # of inputs without limits; the platform's may be rates of wheels
+        largest = np.full(
+            robot.n_u, usual
+        )  # of inputs without limits; rates of wheels as drive the platform so
         if robot.platform.n_p:
-            G = np.abs(robot.platform.G(np.zeros(robot.platform.n_p)))
-            largest[: robot.platform.p] /= np.maximum(G.max(axis=0), 1e-3)
+            G = robot.platform.G(np.zeros(robot.platform.n_p))
+            largest[: robot.platform.p] *= np.abs(np.linalg.pinv(G)).max(axis=1)
         self.top = np.where(np.isfinite(limits.inputs), limits.inputs, np.column_stack([-largest, largest]))
         self._shoot = checked_by_caller(shoot, types.int64(*BLOCKS.types, *BLOCKS.types, types.int64))
         self._first_blocked = checked_by_caller(
