@@ -291,6 +291,9 @@ def test_guide_shows_the_scenarios_gain_or_the_rate_fitted() -> None:
     assert "K = 2.5 1/s" in guide(trajectory)
     assert "K = 2.5 1/s (fitted)" in guide(replace(trajectory, scenario=None))
     assert "K = 3 1/s" in guide(trajectory, 3.0)
+    followed = {"task": {"gain": 2.5}, "plan": {"track": {"gain": 1.5}}}
+    assert "K = 1.5 1/s" in guide(replace(trajectory, scenario=followed))
+    assert guide(replace(trajectory, resolver="plan")) == "‖e‖"  # planned motions promise no such decay
 
 
 @pytest.mark.parametrize(

@@ -86,7 +86,9 @@ def draw_error_norm(axes: Axes, trajectory: Trajectory, gain: float | None = Non
     gain = _stated_gain(trajectory) if gain is None else gain
     rate = fitted_rate(t, norm) if gain is None else gain
     draw_events(axes, trajectory, named=True)
-    if rate is not None and rate > 0.0 and not trajectory.events:  # what begins later decays from there on
+    # What begins later decays from there on; a planned motion is no feedback.
+    decays = not trajectory.events and trajectory.resolver != "plan"
+    if rate is not None and rate > 0.0 and decays:
         guide = norm[0] * np.exp(-rate * (t - t[0]))
         seen = guide >= lowest * 0.5
         name = f"‖e(0)‖ exp(−K t), K = {rate:.4g} 1/s{' (fitted)' if gain is None else ''}"
@@ -96,8 +98,10 @@ def draw_error_norm(axes: Axes, trajectory: Trajectory, gain: float | None = Non
 
 
 def _stated_gain(trajectory: Trajectory) -> float | None:
-    """The gain K that all tasks of the run's scenario share, 1/s; None where there is no such number."""
-    tasks = (trajectory.scenario or {}).get("task", [])
+    """The gain K with which the run's scenario follows a plan, or that all its tasks share, 1/s; None where
+    there is no such number."""
+    scenario = trajectory.scenario or {}
+    tasks = (scenario.get("plan") or {}).get("track") or scenario.get("task", [])
     gains = [task.get("gain") for task in (tasks if isinstance(tasks, list) else [tasks])]
     stated = bool(gains) and isinstance(gains[0], int | float) and gains.count(gains[0]) == len(gains)
     return float(gains[0]) if stated else None
