@@ -80,6 +80,8 @@ INNER = {
     "nmm.Controller.period_monitor",
     "nmm.extending.LimitReport.__init__",  # made by a controller
     "nmm.Limits.on",
+    "nmm.Plan.__init__",  # made by `nmm.plan`
+    "nmm.Plan.found",
     "nmm.Retreat.on",
     "nmm.Robot.joints",
     "nmm.Scenario.__init__",  # made by load and from_dict
