@@ -17,6 +17,7 @@ from nmm.cli.robot_files import check, init
 from nmm.cli.runs import compare, paper, run
 from nmm.cli.singularities import singularities
 from nmm.cli.sweeping import sweep
+from nmm.cli.torques import torques
 
 app = typer.Typer(
     name="nmm",
@@ -99,5 +100,5 @@ def robots() -> None:
 for _command in (run, compare, plan, paper, play, render, info, init, check, view, drive, singularities):
     app.command()(_command)
 app.command("map")(map_measures)
-for _command in (redundancy, laps, sweep, scenarios, robots):
+for _command in (redundancy, laps, torques, sweep, scenarios, robots):
     app.command()(_command)

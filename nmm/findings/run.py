@@ -168,6 +168,14 @@ WORDS: Mapping[str, Words] = {
         f"without effect on task and objective: {', '.join(inputs)}; at first order nothing moves "
         f"{'it' if len(inputs) == 1 else 'them'} (an objective can)"
     ),
+    "effort_exceeded": lambda actuator, peak, effort, unit, t, **_: (
+        f"{actuator} needs {peak:.3g} {unit} at t = {t:.4g} s, "
+        f"{100 * peak / effort:.0f} % of its {effort:.3g}"
+    ),
+    "tips": lambda margin, edge, t, **_: (
+        f"the robot tips at t = {t:.4g} s: the zero-moment point is {-1e3 * margin:.3g} mm outside the edge "
+        f"from {edge[0]} to {edge[1]}"
+    ),
     "left_plan": lambda m, rad, tube_m, tube_rad, t, back, **_: (
         f"the robot left its plan from t = {t:.3g} s on, by up to {m:.3g} m and {rad:.3g} rad (more than "
         f"{tube_m:g} m or {tube_rad:g} rad); "

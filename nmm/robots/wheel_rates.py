@@ -33,14 +33,19 @@ def wheel_rates(robot: Robot) -> tuple[tuple[str, ...], Array]:
 
 
 @inlined
-def rolling(wheel: Any, theta: Any, delta: Any) -> tuple[Any, Any, Any, Any]:
-    """A row of `wheel_rates` at θ and δ (0 without steering), numbers or arrays: what the rates of x, y, θ
-    and δ add to the wheel's, 1/m and 1."""
-    # The wheel's angle φ follows δ: tan φ = a sin δ / (cos δ - b sin δ).
+def following(wheel: Any, delta: Any) -> tuple[Any, Any, Any]:
+    """Cosine and sine of φ at δ, numbers or arrays, of a wheel's row (see `wheel_rates`), and dφ/dδ."""
     sine = wheel[7] * np.sin(delta)
     cosine = np.cos(delta) - wheel[8] * np.sin(delta)
     length = np.sqrt(cosine * cosine + sine * sine)
-    sine, cosine, slope = sine / length, cosine / length, wheel[7] / (length * length)
+    return cosine / length, sine / length, wheel[7] / (length * length)
+
+
+@inlined
+def rolling(wheel: Any, theta: Any, delta: Any) -> tuple[Any, Any, Any, Any]:
+    """A row of `wheel_rates` at θ and δ (0 without steering), numbers or arrays: what the rates of x, y, θ
+    and δ add to the wheel's, 1/m and 1."""
+    cosine, sine, slope = following(wheel, delta)
     ahead, beside = cosine * wheel[0] - sine * wheel[1], sine * wheel[0] + cosine * wheel[1]
     angle = wheel[2] + np.arctan2(sine, cosine)
     grips, slides = np.cos(angle) / wheel[3], np.sin(angle) / wheel[3]
@@ -49,6 +54,31 @@ def rolling(wheel: Any, theta: Any, delta: Any) -> tuple[Any, Any, Any, Any]:
         np.sin(theta + angle) / wheel[3],
         (ahead + wheel[5]) * slides - (beside + wheel[6]) * grips,
         slope * (ahead * slides - beside * grips),
+    )
+
+
+def following_dot(wheel: Array, delta: Array, delta_dot: Array) -> Array:
+    """The rate of dφ/dδ (N,) as δ moves."""
+    a, b, sine, cosine = wheel[7], wheel[8], np.sin(delta), np.cos(delta)
+    square = (a * sine) ** 2 + (cosine - b * sine) ** 2
+    change = a * a * sine * cosine - (cosine - b * sine) * (sine + b * cosine)
+    return np.asarray(-2.0 * a * change / square**2 * delta_dot)
+
+
+def rolling_dot(
+    wheel: Array, theta: Array, delta: Array, theta_dot: Array, delta_dot: Array
+) -> tuple[Array, Array, Array, Array]:
+    """The rates (N,) of what `rolling` gives, as θ and δ move."""
+    cosine, sine, slope = following(wheel, delta)
+    angle = wheel[2] + np.arctan2(sine, cosine)
+    grips, slides = np.cos(angle) / wheel[3], np.sin(angle) / wheel[3]
+    ahead, beside = cosine * wheel[0] - sine * wheel[1], sine * wheel[0] + cosine * wheel[1]
+    turning = theta_dot + slope * delta_dot
+    return (
+        -np.sin(theta + angle) / wheel[3] * turning,
+        np.cos(theta + angle) / wheel[3] * turning,
+        (wheel[5] * grips + wheel[6] * slides) * slope * delta_dot,
+        following_dot(wheel, delta, delta_dot) * (ahead * slides - beside * grips),
     )
 
 

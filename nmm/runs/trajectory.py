@@ -29,6 +29,9 @@ from nmm.runs.verdict import Outcome as Outcome
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from nmm.dynamics.dynamics import Payload
+    from nmm.dynamics.torques import Torques
+
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
@@ -257,6 +260,13 @@ class Trajectory:
     def plot_ellipses(self, path: str | Path | None = None, options: Wanted = True) -> Figure:
         """The end-effector's path with manipulability ellipses; also as a file (`nmm.figures.ellipses`)."""
         return lazy_call("nmm.figures.ellipses:ellipses")(self, options, path)
+
+    def torques(self, payload: Payload | None = None) -> Torques:
+        """What the motion asks of the motors, with masses carried, kg by frame (see `nmm.Dynamics`)."""
+        found: Torques = lazy_call("nmm.dynamics.torques:torques_along")(
+            self.robot, self.t, self.q, self.u, payload
+        )
+        return found
 
     def motion(self, label: str | None = None) -> Motion:
         """What playback shows of it."""

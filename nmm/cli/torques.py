@@ -1,0 +1,112 @@
+"""torques: what a run asks of the motors, and how near it is to tipping."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import typer
+
+from nmm.cli.groups import Figures, command
+from nmm.cli.interrupts import shielded
+from nmm.cli.options import SetOption, flag, option, out_option, values_of
+from nmm.cli.output import OK, progress, show_table, show_text, warn
+from nmm.errors import InputError
+from nmm.text_format import listed
+
+if TYPE_CHECKING:
+    from nmm.dynamics.torques import Torques
+
+
+@command
+def torques(
+    source: Annotated[
+        str, typer.Argument(metavar="RUN|SCENARIO", help="A run's folder; or a scenario, which is run.")
+    ],
+    *,
+    payload: list[str] | None = option("FRAME=KG", "A mass carried by a frame. May be repeated."),
+    settings: SetOption = None,
+    out: Annotated[Path | None, out_option("runs/<name>-torques")] = None,
+    as_json: bool = flag("--json", "The numbers as JSON on standard output, for scripts."),
+    figures: Figures,
+) -> int:
+    """Say what a run asks of the motors, and how near it is to tipping.
+
+    Rigid bodies on rolling wheels: the peak and RMS of each motor's torque beside its limit in the robot's
+    file, power, energy, and the least distance of the zero-moment point to the polygon of the wheels.
+
+    \b
+    nmm torques runs/ur5_differential_line-rg
+    nmm torques tiago_pose --payload arm_tool_link=1.5
+    nmm torques unicycle_2r_position --json
+
+    Not in it: friction, tyres that scrub, the motors' own inertia, the motion of casters. The folder holds
+    torques.csv, torques.png and summary.json.
+    """
+    from nmm.cli.document import print_json
+    from nmm.cli.subjects import opened
+    from nmm.folders.torques import is_torques, save
+    from nmm.folders.whole import check_folder
+
+    drawn = figures.options()
+    run, scenario, robot = opened(source, settings, {})
+    if run is None and scenario is None:
+        raise InputError(f"{robot.name} is a robot", where=source, expected="a run's folder or a scenario")
+    name = scenario.name if scenario is not None else Path(source).resolve().name
+    folder = out or Path("runs") / f"{name}-torques"
+    check_folder(folder, is_torques)
+    if run is None:
+        with progress(name) as report:
+            run = scenario.run(progress=report)
+    found = run.torques(values_of(payload, "--payload", "FRAME=KG, as in ee=1.5"))
+    with shielded():
+        save(found, folder, figures=drawn)
+    for one in found.findings:
+        warn(str(one))
+    if as_json:
+        print_json({**found.summary(), "folder": str(folder)}, [*found.findings])
+    else:
+        _show(found, folder)
+    return OK
+
+
+def _show(found: Torques, folder: Path) -> None:
+    units, limits = found.dynamics.actuators.units, found.efforts
+    when = np.abs(found.torques).argmax(axis=0)
+    rows = [
+        [
+            name,
+            units[j],
+            f"{found.peaks[j]:.3g}",
+            f"{found.t[when[j]]:.4g} s",
+            f"{found.rms[j]:.3g}",
+            f"{limits[j]:.4g}" if np.isfinite(limits[j]) else "none",
+            f"{100 * found.peaks[j] / limits[j]:.0f} %" if np.isfinite(limits[j]) else "",
+        ]
+        for j, name in enumerate(found.names)
+    ]
+    columns = ["motor", "unit", "peak", "at", "RMS", "limit", "of it"]
+    show_table(columns, rows, numeric=columns[2:])
+    show_text()
+    least = int(found.margins.argmin())
+    tips = "the wheels of its file are too few to say"
+    if np.isfinite(found.margins[least]):
+        where = f"at {found.t[least]:.4g} s, over the edge from {' to '.join(found.edges[least])}"
+        tips = f"{1e3 * found.margins[least]:.3g} mm to tipping, {where}"
+    rows = [
+        ["power", f"{found.power.max():.3g} W at most"],
+        ["energy", f"{found.energy:.4g} J, without what braking gives back"],
+        ["balance", tips],
+    ]
+    if found.jumps.any():
+        times = [f"{t:.4g}" for t in found.t[found.jumps]]
+        rows.append(
+            [
+                "inputs jump",
+                f"at {listed(times[:5])} s{' …' if len(times) > 5 else ''}: no torque is told there",
+            ]
+        )
+    if found.dynamics.left_out:
+        rows.append(["held still", listed(list(found.dynamics.left_out))])
+    show_table(["", ""], [*rows, ["files in", str(folder)]])

@@ -1,0 +1,87 @@
+"""Where a robot stands: the zero-moment point, and how far it is inside the polygon of the wheels."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+from nmm.arrays import Array
+from nmm.robots.loading.ground import Ground
+from nmm.robots.robot import Robot
+
+
+class Support:
+    """The polygon of a robot's wheels on the ground.
+
+    A caster touches the ground on its swivel's axis here: its trail is left out. A robot on fewer than three
+    wheels has no polygon: it keeps its balance by what its file does not say.
+
+    Attributes
+    ----------
+    names : of the K wheels that touch the ground
+    height : the ground's over the platform's reference point, m
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        ground = Ground.of(robot)
+        self.robot, self.height = robot, 0.0 if ground is None else ground.z
+        self._wheels = robot.wheels if len(robot.wheels) >= 3 and robot.platform.n_p >= 3 else ()
+        self.names = tuple(wheel.joint for wheel in self._wheels)
+        self._data = robot.model.createData()
+        #: Whether all of them are on the main body, where the polygon is the same at every q.
+        self._rigid = all(wheel.carrier == "theta" for wheel in self._wheels)
+
+    def points(self, q: Array) -> Array:
+        """Where the wheels touch the ground at q (n,), in the world's level axes, (K, 2) m."""
+        model, data = self.robot.model, self._data
+        pin.forwardKinematics(model, data, q)
+        ground = pin.SE3(model.jointPlacements[1])
+        at = [wheel.pivot if wheel.swivel else wheel.center for wheel in self._wheels]
+        joints = [model.getJointId(wheel.carrier) for wheel in self._wheels]
+        places = [ground.actInv(data.oMi[k].act(point)) for k, point in zip(joints, at, strict=True)]
+        return np.array(places).reshape(-1, 3)[:, :2]
+
+    def zero_moment(self, forces: Array) -> Array:
+        """Where the ground's force (N, 6), about the world's origin, acts on the ground, (N, 2) m."""
+        F, M = forces[:, :3], forces[:, 3:]
+        x = self.height * F[:, 0] - M[:, 1]
+        y = M[:, 0] + self.height * F[:, 1]
+        return np.stack([x, y], axis=1) / F[:, [2]]
+
+    def margins(self, q: Array, points: Array) -> tuple[Array, list[tuple[str, str]]]:
+        """How far points (N, 2) are inside the polygon at q (N, n), (N,) m, below 0 outside it; and the
+        wheels between which the nearest edge runs. Infinite without a polygon."""
+        if not self.names:
+            return np.full(len(q), np.inf), [("", "")] * len(q)
+        found, edges = np.empty(len(q)), []
+        corners: list[int] = []
+        for k, (one, point) in enumerate(zip(q, points, strict=True)):
+            wheels = self.points(one)
+            if not corners or not self._rigid:
+                corners = hull(wheels)
+            begins = wheels[corners]
+            along = np.roll(begins, -1, axis=0) - begins
+            off = point - begins
+            inside = (along[:, 0] * off[:, 1] - along[:, 1] * off[:, 0]) / np.hypot(*along.T)
+            least = int(inside.argmin())
+            found[k] = inside[least]
+            edges.append((self.names[corners[least]], self.names[corners[(least + 1) % len(corners)]]))
+        return found, edges
+
+
+def hull(points: Array) -> list[int]:
+    """Which of points (K, 2) are the corners of their convex hull, counterclockwise (A. M. Andrew, 1979)."""
+    order = np.lexsort(points.T[::-1])
+    corners: list[int] = []
+    for way in (order, order[::-1]):
+        begin = len(corners)
+        for k in way:
+            while len(corners) - begin >= 2:
+                a, b = points[corners[-2]], points[corners[-1]]
+                left = (b[0] - a[0]) * (points[k][1] - a[1]) - (b[1] - a[1]) * (points[k][0] - a[0])
+                if left > 1e-12:
+                    break
+                corners.pop()
+            corners.append(int(k))
+        corners.pop()
+    return corners
