@@ -22,6 +22,7 @@ from .control.retreat import Retreat as Retreat
 from .control.sequenced import SequencedController as SequencedController
 from .control.steering import Steering as Steering
 from .dynamics.dynamics import Dynamics as Dynamics
+from .dynamics.torques import Torques as Torques
 from .errors import DivergedError as DivergedError
 from .errors import InputError as InputError
 from .errors import NmmError as NmmError

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -10,6 +12,7 @@ import pytest
 
 import nmm
 from nmm.arrays import Array
+from nmm.cli.torques import torques
 from nmm.dynamics.support import Support, hull
 from nmm.dynamics.torques import accelerations
 
@@ -146,7 +149,7 @@ def test_free_motion_keeps_its_energy_with_the_order_of_the_integrator(name: str
 
     def energy(x: Array) -> float:
         q, u = x[: robot.n], x[robot.n :]
-        Q = dynamics.motions(q[np.newaxis], u[np.newaxis], 0.0 * u[np.newaxis]).Q[0]
+        Q = dynamics.motions(q[np.newaxis], u[np.newaxis], 0.0 * u[np.newaxis])[0][0]
         return float(0.5 * u @ dynamics.M(q) @ u + pin.computePotentialEnergy(model, data, Q))
 
     start = np.concatenate([robot.rest, np.linspace(0.3, 0.6, robot.n_u)])
@@ -202,7 +205,7 @@ def test_the_zero_moment_point_is_that_of_momentum(name: str, rng: np.random.Gen
     still = np.zeros_like(u)
     found = support.zero_moment(dynamics.forces(q, still, still)[1])
     model, data = dynamics.model, dynamics.model.createData()
-    for k, Q in enumerate(dynamics.motions(q, still, still).Q):
+    for k, Q in enumerate(dynamics.motions(q, still, still)[0]):
         np.testing.assert_allclose(found[k], pin.centerOfMass(model, data, Q)[:2], atol=1e-9)
     found = support.zero_moment(dynamics.forces(q, u, u_dot)[1])
     for k, (Q, Q_dot, Q_ddot) in enumerate(zip(*dynamics.motions(q, u, u_dot), strict=True)):
@@ -268,3 +271,45 @@ def test_a_robot_that_reaches_far_with_a_load_tips() -> None:
     assert [one.code for one in found.findings][-1] == "tips"
     assert found.margins.min() < 0.0
     assert run.torques().findings == ()
+
+
+def test_the_command_writes_what_it_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    settings = ["duration=0.2"]
+    assert torques("unicycle_3r_position", payload=["ee=0.5"], settings=settings, as_json=True) == 0
+    said = json.loads(capsys.readouterr().out)
+    folder = tmp_path / said["folder"]
+    rows = np.loadtxt(folder / "torques.csv", delimiter=",", skiprows=1, encoding="utf-8")
+    names = (folder / "torques.csv").read_text("utf-8").splitlines()[0].split(",")
+    assert names[1] == "left_wheel_joint [N m]"
+    peak = said["actuators"]["left_wheel_joint"]["peak"]
+    assert np.abs(rows[:, 1]).max() == pytest.approx(peak, rel=1e-12)
+    assert json.loads((folder / "summary.json").read_text("utf-8"))["actuators"] == said["actuators"]
+    assert (folder / "torques.png").stat().st_size > 1000
+    run = nmm.Scenario.load("unicycle_3r_position", {"duration": 0.2}).run()
+    assert run.torques(payload={"ee": 0.5}).peaks[0] == pytest.approx(peak, rel=1e-12)
+    assert run.torques().peaks[3] < said["actuators"]["q2"]["peak"]
+    run.save("a_run", figures=False)
+    assert torques("a_run") == 0
+    assert (tmp_path / "runs" / "a_run-torques" / "torques.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("source", "options", "names"),
+    [
+        ("unicycle_3r", {}, "unicycle_3r"),
+        ("no_such_run", {}, "no_such_run"),
+        ("unicycle_2r_position", {"payload": ["ee"]}, "--payload"),
+        ("unicycle_2r_position", {"payload": ["ee=-1"], "settings": ["duration=0.1"]}, "payload: ee"),
+        ("unicycle_2r_position", {"payload": ["eee=1"], "settings": ["duration=0.1"]}, "payload"),
+    ],
+)
+def test_the_command_refuses_in_one_line(
+    source: str, options: dict[str, list[str]], names: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(nmm.InputError, match=names):
+        torques(source, **options)  # type: ignore[arg-type]
+    assert not [*tmp_path.iterdir()]

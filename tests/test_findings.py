@@ -351,6 +351,18 @@ EXAMPLES: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
         "rad); not back at the end",
     ),
     (
+        "effort_exceeded",
+        {"actuator": "left_wheel_joint", "peak": 26.6, "effort": 20.0, "unit": "N m"},
+        {"t": 0.0},
+        "left_wheel_joint needs 26.6 N m at t = 0 s, 133 % of its 20",
+    ),
+    (
+        "tips",
+        {"margin": -0.0125, "edge": ["front", "left"]},
+        {"t": 1.5},
+        "the robot tips at t = 1.5 s: the zero-moment point is 12.5 mm outside the edge from front to left",
+    ),
+    (
         "backed_off",
         {"times": [1.26, 2.76]},
         {},

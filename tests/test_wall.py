@@ -14,7 +14,10 @@ import nmm
 
 PACKAGE = Path(nmm.__file__).parent
 #: Below the wall: what makes a trajectory.
-CORE = ("kernels", "platforms", "robots", "functions", "collisions", "resolvers", "control", "runs", "plans")
+CORE = (
+    "kernels", "platforms", "robots", "dynamics", "functions", "collisions", "resolvers", "control", "runs",
+    "plans",
+)  # fmt: skip
 #: What wings import besides, with the reason.
 EXCEPTIONS = {
     (

@@ -51,12 +51,13 @@ def torques(
 
     drawn = figures.options()
     run, scenario, robot = opened(source, settings, {})
-    if run is None and scenario is None:
-        raise InputError(f"{robot.name} is a robot", where=source, expected="a run's folder or a scenario")
-    name = scenario.name if scenario is not None else Path(source).resolve().name
+    name = scenario.name if run is None and scenario is not None else Path(source).resolve().name
     folder = out or Path("runs") / f"{name}-torques"
     check_folder(folder, is_torques)
     if run is None:
+        if scenario is None:
+            what = f"{robot.name} is a robot"
+            raise InputError(what, where=source, expected="a run's folder or a scenario")
         with progress(name) as report:
             run = scenario.run(progress=report)
     found = run.torques(values_of(payload, "--payload", "FRAME=KG, as in ee=1.5"))

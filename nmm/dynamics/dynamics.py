@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -17,14 +16,6 @@ from nmm.robots.wheel_rates import following, following_dot, rolling, rolling_do
 
 #: A mass, kg, or one with its place in the frame, m.
 Payload = Mapping[str, "float | tuple[float, ArrayLike]"]
-
-
-class Motions(NamedTuple):
-    """All joints of the display model at N samples: angles, rates and accelerations, (N, joints)."""
-
-    Q: Array
-    Q_dot: Array
-    Q_ddot: Array
 
 
 class Dynamics:
@@ -108,7 +99,7 @@ class Dynamics:
         robot = self.robot
         p, n_p, following = robot.platform.p, robot.platform.n_p, robot.following
         motions = self.motions(q, u, u_dot)
-        torques, ground = np.empty_like(motions.Q), np.zeros((len(q), 6))
+        torques, ground = np.empty_like(motions[0]), np.zeros((len(q), 6))
         for k, (Q, Q_dot, Q_ddot) in enumerate(zip(*motions, strict=True)):
             torques[k] = pin.rnea(self.model, self._data, Q, Q_dot, Q_ddot)
             if n_p:
@@ -122,13 +113,13 @@ class Dynamics:
         f[:, p:] = of_q[:, robot.arm_coordinates]
         return f, ground
 
-    def motions(self, q: Array, u: Array, u_dot: Array) -> Motions:
-        """All joints at N samples."""
+    def motions(self, q: Array, u: Array, u_dot: Array) -> tuple[Array, Array, Array]:
+        """All joints of the display model at N samples: angles, rates, accelerations, (N, joints)."""
         q_dot, q_ddot = self._rates(q, u, u_dot)
         T, T_dot = self._through(q), self._through_dot(q, q_dot)
         Q_dot = np.einsum("kij,kj->ki", T, q_dot)
         Q_ddot = np.einsum("kij,kj->ki", T, q_ddot) + np.einsum("kij,kj->ki", T_dot, q_dot)
-        return Motions(self._configuration(q), Q_dot, Q_ddot)
+        return self._configuration(q), Q_dot, Q_ddot
 
     def _rates(self, q: Array, u: Array, u_dot: Array) -> tuple[Array, Array]:
         """q_dot and q_ddot (N, n): S u, and S u_dot + S_dot u."""

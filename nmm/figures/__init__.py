@@ -14,6 +14,7 @@ from nmm.figures.limits import clearance, limits
 from nmm.figures.motion import stroboscopic
 from nmm.figures.objective import objective_comparison
 from nmm.figures.style import save
+from nmm.figures.torques import torques
 
 __all__ = [
     "FigureOptions",
@@ -28,6 +29,7 @@ __all__ = [
     "save",
     "singular_values",
     "stroboscopic",
+    "torques",
     "tracking",
     "write_run_figures",
 ]

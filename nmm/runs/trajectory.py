@@ -29,7 +29,6 @@ from nmm.runs.verdict import Outcome as Outcome
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from nmm.dynamics.dynamics import Payload
     from nmm.dynamics.torques import Torques
 
 
@@ -261,7 +260,7 @@ class Trajectory:
         """The end-effector's path with manipulability ellipses; also as a file (`nmm.figures.ellipses`)."""
         return lazy_call("nmm.figures.ellipses:ellipses")(self, options, path)
 
-    def torques(self, payload: Payload | None = None) -> Torques:
+    def torques(self, payload: Mapping[str, Any] | None = None) -> Torques:
         """What the motion asks of the motors, with masses carried, kg by frame (see `nmm.Dynamics`)."""
         found: Torques = lazy_call("nmm.dynamics.torques:torques_along")(
             self.robot, self.t, self.q, self.u, payload
