@@ -308,6 +308,8 @@ def test_an_impossible_plan_says_what_it_tried():
         ),
         ({"goal": {"z": 1.0}}, "robot unicycle_3r"),
         ({"seconds": 0.0}, "seconds"),
+        ({"seed": -1}, "seed"),
+        ({"seed": 1.5}, "seed"),
     ],
 )
 def test_bad_input_is_refused(change, where):
@@ -388,6 +390,7 @@ def test_compare_runs_the_plan_and_each_resolver_without_it(tmp_path, capfd):
         ({"through": [{"x": 1.0}, {"w": 1.0}]}, "plan.through.1"),
         ({"seconds": 0}, "plan.seconds"),
         ({"seed": "one"}, "plan.seed"),
+        ({"seed": -1}, "plan.seed"),
         ({"speed": 1}, "plan"),
     ],
 )

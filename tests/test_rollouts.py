@@ -196,6 +196,8 @@ def test_the_same_controller_may_stand_there_twice() -> None:
         ({"slip": [1.0, 2.0], "method": "zoh"}, "slip"),
         ({"delay": 0.5, "method": "zoh"}, "delay"),
         ({"slip": np.nan, "method": "zoh"}, "slip"),
+        ({"seed": -1, "noise": 0.1, "method": "zoh"}, "seed"),
+        ({"seed": "a"}, "seed"),
     ],
 )
 def test_bad_input_is_named(given: dict[str, object], where: str) -> None:

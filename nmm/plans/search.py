@@ -131,6 +131,7 @@ class Search:
         smooth: bool,
     ) -> None:
         self.robot, self.start, self.goals, self.tolerance = robot, start, goals, tolerance
+        seed = counted(seed, "seed", 0)
         self.rng = np.random.default_rng(seed)
         given = collisions or Collisions()
         given = replace(given, obstacles=(*given.obstacles, *obstacles))

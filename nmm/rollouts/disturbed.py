@@ -42,7 +42,7 @@ class Plant:
     ) -> None:
         self.noise = _broadcast(noise, (n,), "noise")
         expect(not np.any(self.noise < 0.0), "noise", "standard deviations, at least 0")
-        self.delay, self.seed = counted(delay, "delay", 0), int(seed)
+        self.delay, self.seed = counted(delay, "delay", 0), counted(seed, "seed", 0)
         self.slip = _broadcast(slip, (count, m), "slip")
 
     @property

@@ -90,7 +90,9 @@ class PlanPart(Part):
     )
     through: list[Coordinates] = Field(default_factory=list, description="such goals on the way, in order")
     seconds: Positive = Field(10.0, description="after which the search gives up, s")
-    seed: Whole = Field(1, description="of the random numbers; the same plan comes of the same seed")
+    seed: Annotated[Whole, Field(ge=0)] = Field(
+        1, description="of the random numbers; the same plan comes of the same seed"
+    )
     shorten: Whole = Field(200, description="how often a shorter way between two points of it is tried")
     smooth: bool = Field(
         False,
