@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,6 +24,7 @@ from nmm.functions.tasks.task import Task
 from nmm.kernels.compiled import checked_by_caller
 from nmm.kernels.record_layout import views
 from nmm.plans import tree
+from nmm.plans.effort import efforts_of
 from nmm.plans.goals import GoalPostures, Wanted, alternatives, nothing_found
 from nmm.plans.path import Guide, shortened
 from nmm.plans.plan import Found, Motion, Plan
@@ -57,6 +59,7 @@ def plan(
     through: Sequence[Wanted] = (),
     shorten: int = 200,
     smooth: bool = False,
+    effort: bool | Mapping[str, Any] = False,
     progress: Callable[[float], None] | None = None,
 ) -> Plan:
     """A motion from start to goal that keeps every distance and limit.
@@ -77,6 +80,8 @@ def plan(
     shorten : how often a shorter way between two points of the motion is tried
     smooth : whether to look for one motion without rests, which takes about half the time and 0.1 to 0.5 s
         more to plan; where none is found that keeps everything, the one with rests stands (`Plan.smooth`)
+    effort : whether motors keep the torque limits of the robot's file, or masses that the robot carries then,
+        kg by frame (as `payload` of `nmm.Dynamics`); what needs more is driven slower
     progress : called with the share of `seconds` that is gone
 
     Returns
@@ -110,7 +115,7 @@ def plan(
             f"{few(endless)}: slides without limits", where="plan: robot", expected="limits of it"
         )
     search = Search(
-        robot, q, [*through, goal], obstacles, collisions, limits, seed, tolerance or Goal(), smooth
+        robot, q, [*through, goal], obstacles, collisions, limits, seed, tolerance or Goal(), smooth, effort
     )
     return search.plan(positive(seconds, "seconds"), counted(shorten, "shorten", 0), progress)
 
@@ -129,6 +134,7 @@ class Search:
         seed: int,
         tolerance: Goal,
         smooth: bool,
+        effort: bool | Mapping[str, Any],
     ) -> None:
         self.robot, self.start, self.goals, self.tolerance = robot, start, goals, tolerance
         seed = counted(seed, "seed", 0)
@@ -136,6 +142,7 @@ class Search:
         given = collisions or Collisions()
         given = replace(given, obstacles=(*given.obstacles, *obstacles))
         self.asked = {"collisions": given, "limits": limits, "tolerance": tolerance, "smooth": smooth}
+        self.asked["effort"], self.efforts = effort, efforts_of(robot, effort)
         self.obstacles = tuple(given.obstacles)
         if any(one.moves for one in self.obstacles):
             raise InputError("obstacles that move along a path are not planned for", where="plan: obstacles")
@@ -195,7 +202,8 @@ class Search:
         return Plan(self.robot, motions, postures, found)
 
     def _timed(self, start: Array, legs: Array) -> TimedLegs:
-        return timed(self.guide, self.robot, start, self.guide.merged(legs), self.limits, self.usual)
+        motion = timed(self.guide, self.robot, start, self.guide.merged(legs), self.limits, self.usual)
+        return motion if self.efforts is None else self.efforts.legs(motion)
 
     def _smoothed(self, parts: Sequence[Array]) -> SampledMotion | None:
         """The parts as smooth motions with rests between them; None where one of them is not found."""
@@ -208,7 +216,7 @@ class Search:
                 motion = smoothing(path)
                 if motion is None:
                     return None
-                found.append(motion)
+                found.append(motion if self.efforts is None else self.efforts.samples(motion))
         return joined(found) if found else None
 
     def shortened(self, start: Array, legs: Array, rounds: int) -> Array:

@@ -98,6 +98,11 @@ class PlanPart(Part):
         False,
         description="whether it goes on without rests, in about half the time, where such a motion is found",
     )
+    effort: bool | dict[str, Positive] = Field(
+        False,
+        description="whether motors keep the torque limits of the robot's file; masses that the robot carries "
+        "then, kg by frame",
+    )
     track: Annotated[TrackPart | None, BeforeValidator(part_or_none)] = Field(
         None,
         description="whether the controller follows the plan, for the scenario's duration: true, or a "
@@ -238,7 +243,7 @@ class ScenarioPart(Part):
             collisions = None if self.collisions is None else self.collisions.build(robot, absolute, place)
         limits = None if self.limits is None else self.limits.build(robot)
         tolerance = None if self.until is None else self.until.make()
-        given = part.given("through", "seconds", "seed", "shorten", "smooth")
+        given = part.given("through", "seconds", "seed", "shorten", "smooth", "effort")
         given |= {"limits": limits, "tolerance": tolerance, "progress": progress}
         start, farther = robot.q(self.q0), None
         if part.track is not None and part.track.margin > 0.0:
