@@ -23,8 +23,8 @@ PLACES, KEPT = 24, 0.98
 class Efforts:
     """The torque limits of a robot's motors, and what its motions need of them.
 
-    Torques are those that hold the robot still, and what its motion adds. In a motion that takes k times as long
-    the second are k² times smaller; the first remain.
+    Torques are those that hold the robot still, and what its motion adds. In a motion that takes k times as
+    long the second are k² times smaller; the first remain.
     """
 
     def __init__(self, dynamics: Dynamics) -> None:
@@ -74,8 +74,8 @@ class Efforts:
         return self._dynamics.actuators.torques(q, f)
 
     def _factor(self, held: Array, high: Array, low: Array) -> float:
-        """By how much accelerations shrink, at most 1, so that held + what motion adds (N, A), between low and
-        high, is within the limits; `RunError` where standing still needs more."""
+        """By how much accelerations shrink, at most 1, so that held + what motion adds (N, A), between low
+        and high, is within the limits; `RunError` where standing still needs more."""
         weights = np.abs(held).max(axis=0)
         if np.any(weights >= self._most):
             j = int((weights / self._most).argmax())

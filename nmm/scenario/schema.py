@@ -100,8 +100,8 @@ class PlanPart(Part):
     )
     effort: bool | dict[str, Positive] = Field(
         False,
-        description="whether motors keep the torque limits of the robot's file; masses that the robot carries "
-        "then, kg by frame",
+        description="whether motors keep the torque limits of the robot's file; or masses that the robot "
+        "carries then, kg by frame",
     )
     track: Annotated[TrackPart | None, BeforeValidator(part_or_none)] = Field(
         None,
