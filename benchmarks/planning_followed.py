@@ -86,8 +86,8 @@ def scene_of(k: int, seed: int) -> Scene:
 
 
 def keeps(scene: Scene) -> nmm.Collisions:
-    """Without a Panda's fingers, which touch where they are closed, and a UR5's upper arm beside its mount, which
-    is 29 to 31 mm away in most configurations."""
+    """Without a Panda's fingers, which touch where they are closed, and without a UR5's upper arm beside its
+    mount, which is 31 mm away at most: what is nearer than 30.5 holds a controller back."""
     near = ("p_panda_leftfinger", "p_panda_rightfinger")
     if scene.robot is not panda():
         near = ("arm_mount", "ur5_upper_arm_link")
