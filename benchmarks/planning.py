@@ -1,6 +1,8 @@
-"""Plans for random scenes of six kinds:
+"""Plans for random scenes of six kinds, with rests and smooth:
 
-    python benchmarks/planning.py [INSTANCES] [SEED] [KIND …]
+    python benchmarks/planning.py [INSTANCES] [SEED] [KIND …] [--only rests|smooth]
+
+and to random poses of the platform without obstacles (1000 5 poses_differential poses_car --only rests).
 
 Each plan is checked by what shares no code with the planner: Coal on the exact shapes of the robot at 2,000
 times along it, differences of its coordinates against S(q) u, and the limits. `free` is the least distance
@@ -9,7 +11,7 @@ found less the one to keep, or the start's where that is less.
 
 from __future__ import annotations
 
-import sys
+import argparse
 import time
 from collections.abc import Callable
 from functools import cache
@@ -20,6 +22,8 @@ import numpy as np
 import nmm
 
 DISTANCE = 0.03
+#: No point of a robot here is farther from a joint that moves it, m.
+SIZE = 2.0
 UR5 = "package://example-robot-data/robots/ur_description/urdf/ur5_robot.urdf"
 TIAGO = "package://example-robot-data/robots/tiago_description/robots/tiago_no_hand.urdf"
 UP = {"ur5_shoulder_lift_joint": -1.5, "ur5_elbow_joint": 1.5, "ur5_wrist_1_joint": -1.5}
@@ -142,9 +146,32 @@ def low_gate(rng: np.random.Generator) -> Scene:
     return Scene(ur5_on("differential_base"), {"theta": rng.uniform(-np.pi, np.pi), **UP}, goal, walls)
 
 
+def pose_of(base: str, rng: np.random.Generator) -> Scene:
+    """From anywhere to a pose 5 cm to 10 m away, the arm as it is."""
+    start = {"x": rng.uniform(-5, 5), "y": rng.uniform(-5, 5), "theta": rng.uniform(-np.pi, np.pi)}
+    far, towards = 10.0 ** rng.uniform(-1.3, 1.0), rng.uniform(-np.pi, np.pi)
+    goal = {
+        "x": start["x"] + far * np.cos(towards),
+        "y": start["y"] + far * np.sin(towards),
+        "theta": rng.uniform(-np.pi, np.pi),
+    }
+    return Scene(ur5_on(base), start | UP, goal | UP, [])
+
+
+def poses_differential(rng: np.random.Generator) -> Scene:
+    return pose_of("differential_base", rng)
+
+
+def poses_car(rng: np.random.Generator) -> Scene:
+    return pose_of("car_base", rng)
+
+
 KINDS: dict[str, Callable[[np.random.Generator], Scene]] = {
-    one.__name__: one for one in (u_shaped_wall, door, shelf, park, table, low_gate)
+    one.__name__: one
+    for one in (u_shaped_wall, door, shelf, park, table, low_gate, poses_differential, poses_car)
 }
+#: What is measured where no kind is named.
+SIX = list(KINDS)[:6]
 
 
 class Checked(NamedTuple):
@@ -162,7 +189,15 @@ def checked(scene: Scene, plan: nmm.Plan, samples: int = 2000) -> Checked:
     queries = nmm.Collisions(DISTANCE, obstacles=scene.obstacles).on(robot).queries
     pairs = range(len(queries.scene.kept))
     asked = np.minimum(DISTANCE, queries.distances(0.0, q[0], pairs) - 0.002)
-    near = min(float((queries.distances(0.0, one, pairs) - asked).min()) for one in q)
+    moved = np.abs(np.diff(q, axis=0, prepend=q[:1])) @ np.where(
+        np.array(robot.q_units) == "m", 2.0, 2.0 * SIZE
+    )
+    least, near = np.full(len(pairs), -np.inf), np.inf
+    for one, step in zip(q, moved, strict=True):
+        least -= step  # two shapes come nearer by so much at most: far ones need no look
+        due = np.flatnonzero(least < near)
+        least[due] = queries.distances(0.0, one, due) - asked[due]
+        near = min(near, float(least.min()))
     h = 1e-6
     inner = t[(t > h) & (t < T - h)]
     kinks = plan.found.motion.samples.begin if plan.smooth else plan.stops
@@ -177,23 +212,43 @@ def checked(scene: Scene, plan: nmm.Plan, samples: int = 2000) -> Checked:
     return Checked(near, off, max(float(one.max()) for one in over))
 
 
+def error_of(scene: Scene, q: np.ndarray) -> float:
+    """How far from a task's target q is, m."""
+    parts = scene.goal.function, scene.goal.reference
+    value, target = (nmm.evaluate(one, 0.0, nmm.Configuration(scene.robot, q)).value for one in parts)
+    return float(np.linalg.norm(value - target))
+
+
+def at_goal(scene: Scene, plan: nmm.Plan) -> bool:
+    """Whether its end is the goal, coordinates to 1e-6 and a task's error within the tolerances."""
+    if isinstance(scene.goal, nmm.Task):
+        return error_of(scene, plan.end) <= 0.005
+    names = list(scene.goal)
+    off = plan.end[[scene.robot.coordinate(name) for name in names]] - [scene.goal[name] for name in names]
+    off = [2.0 * np.sin(0.5 * one) if name == "theta" else one for one, name in zip(off, names, strict=True)]
+    return bool(np.abs(off).max() <= 1e-6)
+
+
 def main() -> None:
-    instances = int(sys.argv[1]) if len(sys.argv) > 1 else 20
-    seed = int(sys.argv[2]) if len(sys.argv) > 2 else 0
-    print(f"{instances} instances of each, seed {seed}")
-    warm = u_shaped_wall(np.random.default_rng(0))
-    nmm.plan(
-        warm.robot, warm.start, warm.goal, warm.obstacles, smooth=True
-    )  # compiled once: no part of a plan
-    print(f"{'':14} smooth found  free   s median   worst  duration  spare mm  |q_dot - S u|  limits")
-    for kind in sys.argv[3:] or KINDS:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("instances", type=int, nargs="?", default=20)
+    parser.add_argument("seed", type=int, nargs="?", default=0)
+    parser.add_argument("kinds", nargs="*", choices=[[], *KINDS], default=[])
+    parser.add_argument("--only", choices=["rests", "smooth"])
+    given = parser.parse_args()
+    print(f"{given.instances} instances of each, seed {given.seed}")
+    for kind in (u_shaped_wall, table):  # what is compiled once is no part of a plan
+        nmm.plan(*kind(np.random.default_rng(0)), smooth=True)
+    print(f"{'':18} smooth found   end  free   s median   worst  duration  spare mm  |q_dot - S u|  limits")
+    for kind in given.kinds or SIX:
         for smooth in (False, True):
-            measure(kind, instances, seed, smooth)
+            if given.only in (None, "smooth" if smooth else "rests"):
+                measure(kind, given.instances, given.seed, smooth)
 
 
 def measure(kind: str, instances: int, seed: int, smooth: bool) -> None:
     """Print a line: processor time and motion of the plans of a kind, with rests or smooth."""
-    times, durations, found, smoothed = [], [], [], 0
+    times, durations, found, smoothed, arrived = [], [], [], 0, 0
     for k in range(instances):
         scene = KINDS[kind](np.random.default_rng([seed, k]))
         given = scene.robot, scene.start, scene.goal, scene.obstacles, nmm.Collisions(DISTANCE), LIMITS
@@ -205,12 +260,13 @@ def measure(kind: str, instances: int, seed: int, smooth: bool) -> None:
             continue
         times.append(time.process_time() - begin)
         durations.append(plan.duration)
-        found.append(checked(scene, plan))
+        found.append(checked(scene, plan, 2000 if scene.obstacles else 100))
+        arrived += at_goal(scene, plan)
         smoothed += plan.smooth
     if found:
         least = Checked(*(f(x) for f, x in zip((min, max, max), zip(*found, strict=True), strict=True)))
         print(
-            f"{kind:14} {smoothed:6} {len(found):5} {sum(one.free > 0.0 for one in found):5} "
+            f"{kind:18} {smoothed:6} {len(found):5} {arrived:5} {sum(one.free > 0.0 for one in found):5} "
             f"{np.median(times):10.2f} {max(times):7.2f} {np.median(durations):9.1f} {1e3 * least.free:9.2f} "
             f"{least.motion:14.1e} {least.limits:7.1e}",
             flush=True,

@@ -4,11 +4,20 @@ import numpy as np
 import pytest
 
 import nmm
-from nmm.collisions.legs_check import MovedShapes, along, pair_bound
+from nmm.collisions.legs_check import (
+    MovedShapes,
+    along,
+    approach,
+    begin_motion,
+    bend,
+    look,
+    pair_bound,
+    speed_towards,
+)
 from nmm.collisions.motion_check import MotionCheck
 from nmm.collisions.pairs import random_configurations
 from nmm.collisions.separation import CLOSE
-from nmm.kernels.kinematics import place_joints
+from nmm.kernels.kinematics import axes, place_joints
 from nmm.kernels.record_layout import views
 from nmm.robots.zero_order_hold import HeldInputs
 
@@ -73,6 +82,45 @@ def test_legs_that_are_free_keep_their_distances_everywhere(scene):
         if min(found.values()) >= 8:
             break
     assert min(found.values()) >= 5
+
+
+def test_pairs_come_nearer_no_faster_than_their_speed_and_its_change_say(scene):
+    """distance(s) >= distance(0) - speed s - bend s² / 2, by Coal, and near it: a speed that were too large
+    would be no news."""
+    robot, rng = scene.robot, np.random.default_rng(4)
+    check = MotionCheck(robot, scene)
+    shapes, pairs = views(MovedShapes, *check.blocks, 0), range(len(scene.names))
+    joints, twists = np.zeros((len(shapes.joints.parent), 12)), np.zeros((len(shapes.joints.parent), 6))
+    table, here, gained = robot.following.table.ravel(), np.empty(robot.n), []
+    for q in random_configurations(robot, 12, seed=6):
+        leg = np.concatenate([rng.normal(0.0, 0.4, 3), np.zeros(3), rng.normal(0.0, 0.6, robot.n - 3)])
+        leg[3:] = robot.following.placed(leg[3:]) - robot.following.placed(np.zeros(robot.n))
+        place_joints(shapes.joints, q, joints)
+        axes(shapes.joints, joints, twists)
+        apart = np.array([pair_bound(shapes, joints, k, np.inf) for k in pairs])
+        speed = np.array([speed_towards(shapes, q, leg, joints, twists, k) for k in pairs])
+        change = np.array([bend(shapes, k, leg) for k in pairs])
+        for share in (0.01, 0.1, 0.4, 1.0):
+            along(1, q, leg, share, table, here)
+            left = scene.queries.distances(0.0, here, pairs) - (apart - speed * share)
+            assert np.all(left[apart > 0.0] >= -0.5 * change[apart > 0.0] * share**2 - 1e-6)
+        gained.append(np.median(speed / [approach(shapes, k, leg, np.inf) for k in pairs]))
+    assert np.median(gained) < 0.7
+
+
+def test_along_a_wall_one_look_is_enough():
+    robot = nmm.load("unicycle_3r")
+    wall = nmm.Obstacle(nmm.Box([20.0, 0.2, 2.0]), [0.0, 0.6, 0.5], name="wall")
+    check = MotionCheck(robot, nmm.Collisions(0.03, self_collisions=False, obstacles=[wall]).on(robot))
+    shapes, leg = views(MovedShapes, *check.blocks, 0), np.zeros(3 + robot.n)
+    leg[0] = 3.0
+    until = []
+    for steady in (1, 0):
+        begin_motion(shapes, leg)
+        joints = np.zeros((len(shapes.joints.parent), 12))
+        until.append(look(shapes, robot.rest, leg, 0.0, joints, steady))
+    assert until[0] >= 1.0
+    assert 0.0 < until[1] < 0.5
 
 
 def test_a_thin_wall_is_not_jumped_over():

@@ -3,7 +3,7 @@
 At clearance d no point of the robot may be nearer than d before it has moved that far. So a pair of shapes
 that is d apart needs no look before the motion could have brought the two d nearer to each other, and
 touching between two looks is impossible (B. Mirtich, Impulse-based dynamic simulation of rigid body systems,
-1996, chapter 2).
+1996, chapter 2). Along a leg, how fast the two come nearer now and how much that can change say more.
 
 A *leg* is a motion along which the platform's twist in its own axes and the rates of all joints are constant:
 an arc or a straight line of the base while the arm moves straight in its coordinates. A row of numbers:
@@ -15,9 +15,9 @@ from typing import NamedTuple
 
 from nmm.arrays import Array, Integers
 from nmm.collisions.separation import ConvexShapes, extreme, separation
-from nmm.kernels.compiled import compiled, scratch
-from nmm.kernels.kinematics import Joints, compose, moved, place_joints
-from nmm.kernels.linear_algebra import copied
+from nmm.kernels.compiled import clear, compiled, scratch
+from nmm.kernels.kinematics import Joints, axes, compose, moved, place_joints
+from nmm.kernels.linear_algebra import copied, dot, norm
 from nmm.kernels.record_layout import IntegerCell, IntegerVector, Matrix, Vector, views
 from nmm.kernels.velocity_map import place_mimic_joints
 
@@ -105,19 +105,25 @@ def pair_bound(scene: MovedShapes, joints: Array, pair: int, enough: float) -> f
 
 
 @compiled
+def write_direction(scene: MovedShapes, pair: int, d: Array) -> None:
+    """d (3,): the direction from the second to the first that separates a pair, just looked at."""
+    j = scene.shapes.pairs[pair, 1]
+    for k in range(3):
+        d[k] = scene.shapes.between[pair, k]
+    if j >= scene.shapes.planes[()]:
+        for k in range(3):
+            d[k] = 0.0
+            for i in range(3):
+                d[k] += scene.places[j, 3 * i + k] * scene.shapes.boxes[j, i]
+
+
+@compiled
 def write_approach(scene: MovedShapes, joints: Array, twists: Array, pair: int, out: Array) -> None:
     """Add the derivative of `placed_bound`, just computed, by q to out (n, ...): along the direction that
     separates the two, of the points farthest along it."""
     shapes, places, table = scene.shapes, scene.places, scene.joints
     d, point, v = scratch(3), scratch(3), scratch(3)
-    j = shapes.pairs[pair, 1]
-    for k in range(3):
-        d[k] = shapes.between[pair, k]
-    if j >= shapes.planes[()]:
-        for k in range(3):
-            d[k] = 0.0
-            for i in range(3):
-                d[k] += places[j, 3 * i + k] * shapes.boxes[j, i]
+    write_direction(scene, pair, d)
     for side in range(2):
         shape = shapes.pairs[pair, side]
         joint, sign = scene.carrier[shape], 1.0 if side == 0 else -1.0
@@ -155,6 +161,54 @@ def approach(scene: MovedShapes, pair: int, leg: Array, apart: float) -> float:
 
 
 @compiled
+def bend(scene: MovedShapes, pair: int, leg: Array) -> float:
+    """The most by which the speed of a point of a pair's shapes changes along a leg, m: a joint turns what
+    those before it turn, too."""
+    turned, most = abs(leg[2]) if scene.levers[pair, 2] > 0.0 else 0.0, 0.0
+    most += turned * (scene.levers[pair, 0] * math.hypot(leg[0], leg[1]) + scene.levers[pair, 2] * turned)
+    for c in range(3, leg.shape[0]):
+        if scene.levers[pair, c] > 0.0:
+            rate = abs(leg[c])
+            most += scene.levers[pair, c] * rate * (rate + 2.0 * turned)
+            turned += rate
+    return most
+
+
+@compiled
+def speed_towards(scene: MovedShapes, q: Array, leg: Array, joints: Array, twists: Array, pair: int) -> float:
+    """How fast a pair's points come nearer, at most, along the direction that separates them, at q on a leg:
+    m per share of it. A point's speed along a direction is linear in its place, so one of a shape's
+    extreme points has the largest."""
+    shapes, table = scene.shapes, scene.joints
+    d, turn, point = scratch(3), scratch(3), scratch(3)
+    write_direction(scene, pair, d)
+    fastest = 0.0
+    for side in range(2):
+        shape, sign = shapes.pairs[pair, side], -1.0 if side == 0 else 1.0
+        joint, speed = scene.carrier[shape], 0.0
+        clear(turn)
+        while joint > 0:
+            k = table.coordinate[joint]
+            own = scene.planar[()] == 1 and k < 3
+            rate = leg[k if own else 3 + k]
+            if own and k < 2:  # of the platform's twist in its own axes
+                c, s = math.cos(q[2]), math.sin(q[2])
+                rate = c * leg[0] - s * leg[1] if k == 0 else s * leg[0] + c * leg[1]
+            if scene.levers[pair, k if own else 3 + k] > 0.0:
+                for i in range(3):
+                    # d · (ω × (p - o)) = (p - o) · (d × ω)
+                    a, b = (i + 1) % 3, (i + 2) % 3
+                    across = rate * (d[a] * twists[joint, 3 + b] - d[b] * twists[joint, 3 + a])
+                    turn[i] += across
+                    speed += rate * d[i] * twists[joint, i] - across * joints[joint, 9 + i]
+            joint = table.parent[joint]
+        if scene.carrier[shape] > 0:
+            extreme(shapes, scene.places, shape, turn, sign, point)
+            fastest += sign * (speed + dot(turn, point)) + shapes.rounding[shape] * norm(turn)
+    return fastest
+
+
+@compiled
 def begin_motion(scene: MovedShapes, leg: Array) -> None:
     """Forget what was known of a motion before; no number changes faster on this one than along the leg."""
     for pair in range(scene.kept.shape[0]):
@@ -162,10 +216,14 @@ def begin_motion(scene: MovedShapes, leg: Array) -> None:
 
 
 @compiled
-def look(scene: MovedShapes, q: Array, leg: Array, share: float, joints: Array) -> float:
+def look(scene: MovedShapes, q: Array, leg: Array, share: float, joints: Array, steady: int) -> float:
     """Look at the pairs that are due at a share of a motion, which is at q: until where it is surely free, or
-    -1 less the number of a pair that is too near."""
+    -1 less the number of a pair that is too near. steady: 1 where the motion is along the leg, 0 where its
+    rates are no larger."""
+    twists = scratch((joints.shape[0], 6))
     place_joints(scene.joints, q, joints)
+    if steady == 1:
+        axes(scene.joints, joints, twists)
     following = math.inf
     for pair in range(scene.kept.shape[0]):
         if scene.until[pair] <= share:
@@ -174,7 +232,12 @@ def look(scene: MovedShapes, q: Array, leg: Array, share: float, joints: Array) 
             apart = pair_bound(scene, joints, pair, least + MARGIN + fastest * (1.0 - share))
             if apart < least + MARGIN:
                 return -1.0 - pair
-            scene.until[pair] = share + (apart - least) / approach(scene, pair, leg, apart)
+            free = (apart - least) / approach(scene, pair, leg, apart)
+            if steady == 1 and share + free < 1.0:
+                speed = speed_towards(scene, q, leg, joints, twists, pair)
+                root = math.sqrt(speed * speed + 2.0 * (apart - least) * bend(scene, pair, leg))
+                free = max(free, 2.0 * (apart - least) / max(speed + root, 1e-12))
+            scene.until[pair] = share + free
         following = min(following, scene.until[pair])
     return following
 
@@ -187,7 +250,7 @@ def leg_blocked(scene: MovedShapes, q: Array, leg: Array) -> int:
     share = 0.0
     while 0.0 <= share < 1.0:
         along(scene.planar[()], q, leg, share, scene.mimic_joints, here)
-        share = look(scene, here, leg, share, joints)
+        share = look(scene, here, leg, share, joints, 1)
     return -1 if share >= 0.0 else int(-1.0 - share)
 
 

@@ -60,6 +60,13 @@ class MotionCheck:
         least = np.min([queries.distances(0.0, q, pairs) for q in configurations], axis=0)
         kept[:] = np.clip(least - 4.0 * MARGIN, 0.0, self.scene.distance)
 
+    def widen(self, configurations: Array, margin: float) -> None:
+        """Keep so much more than the scene's distance, m, or as much as these (K, n) have."""
+        if self.scene is not None:
+            pairs = range(len(self.kept))
+            least = np.min([self.scene.queries.distances(0.0, q, pairs) for q in configurations], axis=0)
+            self.kept[:] = np.clip(least - 4.0 * MARGIN, self.kept, self.scene.distance + margin)
+
     @property
     def kept(self) -> Array:
         """The distance that each pair keeps, (P,), m."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import coal
@@ -88,16 +89,26 @@ def touching(
     return dict(zip(pairs, (near / SAMPLES).tolist(), strict=True))
 
 
+@lru_cache(maxsize=8)
+def own_shapes(robot: Robot, meshes: str, distance: float) -> tuple[pin.GeometryModel, frozenset[Pair]]:
+    """`query_shapes`, which are not to be changed, and of the model's pairs those nearer than `distance`, m,
+    in every random configuration."""
+    shapes = query_shapes(robot, meshes)
+    pairs = [(pair.first, pair.second) for pair in robot.collision_model.collisionPairs]
+    return shapes, frozenset(always_near(robot, shapes, pairs, distance))
+
+
 def always_near(
     robot: Robot, shapes: pin.GeometryModel, pairs: Sequence[Pair], distance: float
 ) -> list[Pair]:
     """The pairs nearer than `distance`, m, in every random configuration."""
     left = list(pairs)
+    measure = measured_pairs(robot, shapes, left)
     for q in random_configurations(robot):
         if not left:
             break
-        near = measured_pairs(robot, shapes, left)(q) < distance
-        left = [pair for pair, is_near in zip(left, near, strict=True) if is_near]
+        near = measure(q) < distance
+        left[:] = [pair for pair, is_near in zip(left, near, strict=True) if is_near]
     return left
 
 

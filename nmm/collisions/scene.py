@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from nmm.arrays import Array
 from nmm.collisions.obstacle import Obstacle
-from nmm.collisions.pairs import always_near, link_names, named_pairs, query_shapes, touching
+from nmm.collisions.pairs import always_near, link_names, named_pairs, own_shapes, touching
 from nmm.collisions.queries import Queries
 from nmm.collisions.shapes import HalfSpace
 from nmm.errors import InputError, RobotError, few
@@ -88,7 +88,8 @@ def set_up(
     """`RobotError` without collision shapes or readable meshes; `InputError`: unknown names, no pairs."""
     if not len(robot.collision_model.geometryObjects):
         raise RobotError("it has no collision shapes", where=robot.name)
-    shapes = query_shapes(robot, meshes)
+    own_ones, own_near = own_shapes(robot, meshes, distance)
+    shapes = own_ones.copy()
     count = len(shapes.geometryObjects)
     links = link_names(robot, shapes)
     known: list[tuple[str, ...]] = [
@@ -122,7 +123,8 @@ def set_up(
         notes += [f"{disables}: {few(often)}"] if often else []
         left_out |= found
     wanted = [pair for pair in wanted if pair not in left_out]
-    always = always_near(robot, shapes, wanted, distance)
+    always = [pair for pair in wanted if pair in own_near]
+    always += always_near(robot, shapes, [pair for pair in wanted if pair[1] >= count], distance)
     if always:
         near = list(dict.fromkeys(name(pair) for pair in always))
         notes.append(

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
+from numba import types
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array
+from nmm.arrays import Array, Integers
 from nmm.collisions.motion_check import MotionCheck
-from nmm.control.goal import Goal, error_sizes
+from nmm.control.goal import ANOTHER, Goal, norms, unit_codes
 from nmm.errors import InputError, RunError, few
-from nmm.functions.program import COMPILED, Program
+from nmm.functions.program import BESIDE, COMPILED, LaidOut, Program, run_program
 from nmm.functions.tasks.task import Comparison, Task
+from nmm.kernels.compiled import checked_by_caller, compiled, scratch
+from nmm.kernels.linear_algebra import dot, eliminate
+from nmm.kernels.record_layout import BLOCKS, IntegerCell, IntegerVector, Matrix, Vector, views
+from nmm.kernels.velocity_map import place_mimic_joints
 from nmm.robots.robot import Robot
 
 #: A configuration, coordinates by name, a task with a target that stands, or several of these.
@@ -93,54 +98,121 @@ class GoalPostures:
             yield q
 
 
+class Newton(NamedTuple):
+    """A task to reach, beside its `Program` in memory.
+
+    units (s,) : of its rows (`unit_codes`); met (3,) : errors that are small enough, m, rad and other units
+    compared () : 1 where the rows of the error are the task's own comparison, 0 for target less value
+    limits (2, n) : the least and the largest q; mimic_joints : the robot's; leads (n, n) : what all
+    coordinates do where those that follow no other move
+    error (s,), error_q (s, n) : e and ∂e/∂q; held (n,) : 0 for a joint that a step left at its limit, else 1
+    """
+
+    units: IntegerVector
+    met: Vector
+    compared: IntegerCell
+    limits: Matrix
+    mimic_joints: Vector
+    leads: Matrix
+    error: Vector
+    error_q: Matrix
+    held: Vector
+
+
+@compiled
+def newton_step(t: float, q: Array, moves: int, integers: Integers, floats: Array) -> int:
+    """Write e and ∂e/∂q at q (n,); where it is not reached, and if `moves` is 1, move q by a step of
+    Levenberg's and Marquardt's, within limits. 1 where it is reached."""
+    run_program(t, q, integers, floats)
+    b, own = views(LaidOut, integers, floats, 0).buffers, views(Newton, integers, floats, BESIDE)
+    e, J, s, n, compared = own.error, own.error_q, own.error.shape[0], q.shape[0], own.compared[()] == 1
+    for i in range(s):
+        e[i] = b.value[2 * s + i] if compared else b.value[s + i] - b.value[i]
+        for j in range(n):
+            J[i, j] = 0.0
+            for k in range(n):
+                if own.leads[k, j] != 0.0:
+                    e_q = b.value_q[2 * s + i, k] if compared else b.value_q[s + i, k] - b.value_q[i, k]
+                    J[i, j] += e_q * own.leads[k, j]
+    metres, radians = norms(e, own.units)
+    others = 0.0
+    for i in range(s):
+        if own.units[i] == ANOTHER:
+            others = max(others, abs(e[i]))
+    if metres <= own.met[0] and radians <= own.met[1] and others <= own.met[2]:
+        return 1
+    if moves == 0:
+        return 0
+    M, scales, step = scratch((s, s + 1)), scratch(s), scratch(n)
+    for i in range(s):
+        scales[i] = 1.0
+        for k in range(s):
+            M[i, k] = 1e-6 + 1e-2 * min(1.0, dot(e, e)) if i == k else 0.0
+            for j in range(n):
+                M[i, k] += J[i, j] * own.held[j] * J[k, j]
+        M[i, s] = e[i]
+    eliminate(M, scales)
+    longest = 1e-12
+    for j in range(n):
+        step[j] = 0.0
+        for i in range(s):
+            step[j] -= J[i, j] * own.held[j] * M[i, s]
+        longest = max(longest, abs(step[j]))
+    for j in range(n):
+        # A joint at its limit stays there in the next step; afterwards it is asked again.
+        wanted = q[j] + min(1.0, 0.5 / longest) * step[j]
+        q[j] = min(max(wanted, own.limits[0, j]), own.limits[1, j])
+        own.held[j] = 1.0 if abs(q[j] - wanted) <= 1e-12 else 0.0
+    place_mimic_joints(q, own.mimic_joints)
+    return 0
+
+
+_STEPPED = types.int64(types.float64, types.float64[::1], types.int64, *BLOCKS.types)
+
+
 class Reaching:
-    """Newton's method (Levenberg and Marquardt's) for a task whose target stands, within limits."""
+    """Newton's method for a task whose target stands, within limits."""
 
     def __init__(self, robot: Robot, task: Task, tolerance: Goal) -> None:
-        self._robot, self._tolerance, following = robot, tolerance, robot.following
-        self._units = [row.unit for row in task.rows(robot)]
+        self._robot, following, rows = robot, robot.following, task.rows(robot)
         self._program = Program(robot, (task.function, task.reference, Comparison(task)), COMPILED)
-        self._program.lay_out()
-        targets = [self._program.evaluate(t, robot.rest)[1].value for t in (0.0, 1.0, np.e)]
+        leads = np.eye(robot.n)
+        leads[following.columns] = following.multipliers[:, np.newaxis] * leads[following.leaders]
+        # Angles of a platform and of joints without limits go where they like.
+        self._limits = np.where(robot.limited, robot.q_limits, [-np.inf, np.inf]).T.copy()
+        newton = Newton(
+            units=unit_codes([row.unit for row in rows]),
+            met=np.array([MET * tolerance.m, MET * tolerance.rad, 1e-4]),
+            compared=np.array(int(task.function.comparison is not None), dtype=np.int64),
+            limits=self._limits,
+            mimic_joints=following.table.ravel(),
+            leads=leads,
+            error=np.zeros(len(rows)),
+            error_q=np.zeros((len(rows), robot.n)),
+            held=np.ones(robot.n),
+        )
+        self._program.lay_out(newton)
+        self._own = views(Newton, *self._program.blocks, BESIDE)
+        self._step = checked_by_caller(newton_step, _STEPPED)
+        targets = [self.evaluate(robot.rest, t)[1] for t in (0.0, 1.0, np.e)]
         if not all(np.array_equal(target, targets[0]) for target in targets):
             raise InputError("its target moves", where="plan: goal", expected="a task whose target stands")
-        # What all coordinates do where those that follow no other move.
-        self._leads = np.eye(robot.n)
-        self._leads[following.columns] = following.multipliers[:, np.newaxis] * self._leads[following.leaders]
 
-    def evaluate(self, q: Array) -> tuple[Array, Array, Array, Array]:
+    def evaluate(self, q: Array, t: float = 0.0) -> tuple[Array, Array, Array, Array]:
         """Value, target and error e (s,) at q (n,), and ∂e/∂q (s, n)."""
-        value, target, compared = self._program.evaluate(0.0, q)
-        if len(compared.value):
-            return value.value, target.value, compared.value, compared.value_q @ self._leads
-        error_q = (target.value_q - value.value_q) @ self._leads
-        return value.value, target.value, target.value - value.value, error_q
+        self._program.prepare(t, q)
+        self._step(t, q, 0, *self._program.blocks)
+        s, value = len(self._own.error), self._program.buffers.value
+        return value[:s].copy(), value[s : 2 * s].copy(), self._own.error.copy(), self._own.error_q.copy()
 
     def __call__(self, q: Array) -> Array | None:
         """A configuration near q (n,) that reaches the target within a share of the tolerances, or None."""
-        robot = self._robot
-        limits = np.where(robot.limited, robot.q_limits, [-np.inf, np.inf])
-        # Angles of a platform and of joints without limits go where they like.
-        q = robot.following.placed(np.clip(q, limits[:, 0], limits[:, 1]))
-        free = np.ones(robot.n)
+        q = self._robot.following.placed(np.clip(q, *self._limits))
+        self._own.held[:] = 1.0
         for _ in range(STEPS):
-            _, _, e, e_q = self.evaluate(q)
-            sizes = error_sizes(e, self._units)
-            rest = np.abs(e)[[unit not in ("m", "rad") for unit in self._units]]
-            if (
-                sizes[0] <= MET * self._tolerance.m
-                and sizes[1] <= MET * self._tolerance.rad
-                and np.all(rest < 1e-4)
-            ):
+            self._program.prepare(0.0, q)
+            if self._step(0.0, q, 1, *self._program.blocks):
                 return q
-            J = e_q * free
-            damping = 1e-6 + 1e-2 * min(1.0, float(e @ e))
-            step = -J.T @ np.linalg.solve(J @ J.T + damping * np.eye(len(e)), e)
-            step *= min(1.0, 0.5 / max(float(np.abs(step).max()), 1e-12))
-            new = robot.following.placed(np.clip(q + step, limits[:, 0], limits[:, 1]))
-            # A joint at its limit stays there in the next step; afterwards it is asked again.
-            free = np.where(np.abs(new - q - step) > 1e-12, 0.0, 1.0)
-            q = new
         return None
 
 

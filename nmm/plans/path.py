@@ -100,14 +100,15 @@ def shortened(
     """A shorter path from start (n,): of two random points on it, the way between them in place of the path
     there, or the platform's path with the arm straight between them (its numbers of a leg begin at
     `first`)."""
+    known = False
     for _ in range(rounds):
-        times = guide.times(legs)
-        until = np.cumsum(times)
         if not len(legs):
             break
+        if not known:
+            times, corners, known = guide.times(legs), guide.corners(start, legs), True
+            until = np.cumsum(times)
         early, late = np.sort(rng.uniform(0.0, until[-1], 2))
         i, j = (int(k) for k in np.minimum(np.searchsorted(until, [early, late]), len(legs) - 1))
-        corners = guide.corners(start, legs[: j + 1])
         one, two = ((t - until[k] + times[k]) / times[k] for t, k in ((early, i), (late, j)))
         a, b = guide.at(corners[i], legs[i], one), guide.at(corners[j], legs[j], two)
         if i == j:
@@ -117,7 +118,7 @@ def shortened(
         for new in (guide.way(a, b), _with_straight_arm(guide, between, first)):
             if len(new) and before - float(guide.times(new).sum()) > WORTH and blocked(a, new) < 0:
                 parts = [legs[:i], one * legs[i : i + 1], new, (1.0 - two) * legs[j : j + 1], legs[j + 1 :]]
-                legs = guide.merged(np.vstack(parts))
+                legs, known = guide.merged(np.vstack(parts)), False
                 break
     return legs
 

@@ -179,7 +179,7 @@ def sample_blocked(
     share = 0.0
     while 0.0 <= share < 1.0:
         flow(inputs, q, u, a, share * time, substeps, here, none)
-        share = look(scene, here, leg, share, joints)
+        share = look(scene, here, leg, share, joints, 0)
     return -1 if share >= 0.0 else int(-1.0 - share)
 
 

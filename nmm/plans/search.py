@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -11,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, counted, positive
+from nmm.arrays import Array, counted, positive, scalar
 from nmm.collisions.legs_check import MARGIN
 from nmm.collisions.motion_check import MotionCheck
 from nmm.collisions.obstacle import Obstacle
@@ -60,6 +61,7 @@ def plan(
     shorten: int = 200,
     smooth: bool = False,
     effort: bool | Mapping[str, Any] = False,
+    margin: float = 0.0,
     progress: Callable[[float], None] | None = None,
 ) -> Plan:
     """A motion from start to goal that keeps every distance and limit.
@@ -82,6 +84,8 @@ def plan(
         more to plan; where none is found that keeps everything, the one with rests stands (`Plan.smooth`)
     effort : whether motors keep the torque limits of the robot's file, or masses that the robot carries then,
         kg by frame (as `payload` of `nmm.Dynamics`); what needs more is driven slower
+    margin : so much farther than the distance, m, it keeps off what start and goals leave so much room to,
+        where such a motion is found in half of the time; for a controller that follows it (`Plan.reference`)
     progress : called with the share of `seconds` that is gone
 
     Returns
@@ -115,7 +119,9 @@ def plan(
             f"{few(endless)}: slides without limits", where="plan: robot", expected="limits of it"
         )
     search = Search(
-        robot, q, [*through, goal], obstacles, collisions, limits, seed, tolerance or Goal(), smooth, effort
+        *(robot, q, [*through, goal], obstacles, collisions, limits, seed, tolerance or Goal(), smooth),
+        effort=effort,
+        margin=scalar(margin, "plan: margin", least=0.0),
     )
     return search.plan(positive(seconds, "seconds"), counted(shorten, "shorten", 0), progress)
 
@@ -135,6 +141,7 @@ class Search:
         tolerance: Goal,
         smooth: bool,
         effort: bool | Mapping[str, Any],
+        margin: float = 0.0,
     ) -> None:
         self.robot, self.start, self.goals, self.tolerance = robot, start, goals, tolerance
         seed = counted(seed, "seed", 0)
@@ -143,6 +150,7 @@ class Search:
         given = replace(given, obstacles=(*given.obstacles, *obstacles))
         self.asked = {"collisions": given, "limits": limits, "tolerance": tolerance, "smooth": smooth}
         self.asked["effort"], self.efforts = effort, efforts_of(robot, effort)
+        self.asked["margin"] = self.margin = margin
         self.obstacles = tuple(given.obstacles)
         if any(one.moves for one in self.obstacles):
             raise InputError("obstacles that move along a path are not planned for", where="plan: obstacles")
@@ -174,12 +182,26 @@ class Search:
     def plan(self, seconds: float, shorten: int, progress: Callable[[float], None] | None) -> Plan:
         """From the start through all goals; each part ends where the next begins."""
         self.begin(seconds, progress)
-        here, parts = self.start, []
+        here, parts, kept = self.start, [], self.check.kept.copy()
+        least = kept + self.margin
         for wanted in self.goals:
-            legs = self.shortened(here, self.way(here, self.ends(wanted, here)), shorten)
+            self.check.kept[:] = kept
+            legs = self.shortened(here, self._farther(here, self.ends(wanted, here)), shorten)
             parts.append(legs)
-            here = self.guide.corners(here, legs)[-1]
+            here, least = self.guide.corners(here, legs)[-1], np.minimum(least, self.check.kept)
+        self.check.kept[:] = least
         return self.finished(*parts)
+
+    def _farther(self, here: Array, ends: Sequence[Array]) -> Array:
+        """A way that keeps the margin, too, where one is found in half of the time."""
+        if self.margin > 0.0:
+            kept, last = self.check.kept.copy(), self._ends
+            self._ends = 0.5 * (time.monotonic() + last)
+            self.check.widen(np.array([here, *ends]), self.margin)
+            with suppress(RunError):
+                return self.way(here, ends)
+            self._ends, self.check.kept[:] = last, kept
+        return self.way(here, ends)
 
     def begin(self, seconds: float, progress: Callable[[float], None] | None) -> None:
         """Start the clock; `InputError` for a start that touches something."""

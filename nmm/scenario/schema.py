@@ -1,18 +1,15 @@
 """The keys of a scenario, from the top."""
 
 from collections.abc import Mapping
-from contextlib import suppress
-from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 from pydantic import BeforeValidator, Field
 
-from nmm.control.collisions import Collisions
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
 from nmm.control.sequence import Sequence
 from nmm.control.sequenced import SequencedController
-from nmm.errors import InputError, RunError, expect, few
+from nmm.errors import InputError, expect, few
 from nmm.functions.tasks.task import Stack
 from nmm.kinds import RESOLVERS
 from nmm.progress import Progress
@@ -245,16 +242,11 @@ class ScenarioPart(Part):
         tolerance = None if self.until is None else self.until.make()
         given = part.given("through", "seconds", "seed", "shorten", "smooth", "effort")
         given |= {"limits": limits, "tolerance": tolerance, "progress": progress}
-        start, farther = robot.q(self.q0), None
-        if part.track is not None and part.track.margin > 0.0:
-            kept = collisions or Collisions()
-            farther = replace(kept, distance=kept.distance + part.track.margin, band=None)
+        if part.track is not None:
+            given["margin"] = part.track.margin
         with at("plan"):
             try:
-                with suppress(RunError):  # then without the margin
-                    if farther is not None:
-                        return plan(robot, start, goal, collisions=farther, **given)
-                return plan(robot, start, goal, collisions=collisions, **given)
+                return plan(robot, robot.q(self.q0), goal, collisions=collisions, **given)
             except InputError as error:
                 raise error.placed(error.where.removeprefix("plan: ")) from None
 
