@@ -12,6 +12,7 @@ from nmm.control.limits import Limits
 from nmm.control.quantities import Record, saved
 from nmm.control.recorded import Recorded, room
 from nmm.control.safety_filter import Counts
+from nmm.control.sequence import Event
 from nmm.control.step import Step
 from nmm.findings import Finding
 from nmm.functions.program import COMPILED
@@ -178,6 +179,7 @@ class Recorder:
             resolver=controller.resolver.name,
             method=method,
             dt=dt,
+            events=tuple(Event(*event) for one in controller.solver.program.renewals for event in one.events),
             frame=self._shown.frame,
             kinematics_off=np.nan if three is None else controller.solver.program.kinematics_off(three),
         )

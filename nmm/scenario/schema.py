@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 from pydantic import BeforeValidator, Field
@@ -75,7 +76,11 @@ class TrackPart(Part):
     )
     tube: GoalPart = Field(
         GoalPart.model_validate({"m": 0.1, "rad": 0.2}),
-        description="how far from the plan, m and rad, is worth a warning",
+        description="how far from the plan, m and rad, is worth a warning, or another plan",
+    )
+    replan: bool = Field(
+        False,
+        description="whether the run goes on with another plan where the robot is farther from it than tube",
     )
 
 
@@ -172,8 +177,12 @@ class ScenarioPart(Part):
         with at("task"):
             task = build_tasks(self.task, robot)
         if self.plan is not None and (track := self.plan.track) is not None:
+            from nmm.plans.replan import replan
+
             plan = self.build_plan(robot, absolute, None)
-            task = [plan.reference(track.gain, track.length, track.pace, track.tube.make())]
+            anew = partial(replan, **self.plan.given("seconds", "seed")) if track.replan else None
+            given = track.given("gain", "length", "pace")
+            task = [plan.reference(**given, tube=track.tube.make(), replan=anew)]
             with at("duration"):
                 least = plan.duration / track.pace
                 expect(
