@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, counted, positive
+from nmm.arrays import Array, counted, positive, scalar
 from nmm.collisions.legs_check import MARGIN
 from nmm.collisions.motion_check import MotionCheck
 from nmm.collisions.obstacle import Obstacle
@@ -18,7 +19,7 @@ from nmm.collisions.shapes import HalfSpace
 from nmm.control.collisions import Collisions
 from nmm.control.goal import Goal
 from nmm.control.limits import Limits
-from nmm.errors import InputError, RunError, expect_kind, few
+from nmm.errors import InputError, RunError, expect, expect_kind, few
 from nmm.functions.tasks.task import Task
 from nmm.kernels.compiled import checked_by_caller
 from nmm.kernels.record_layout import views
@@ -57,6 +58,7 @@ def plan(
     through: Sequence[Wanted] = (),
     shorten: int = 200,
     smooth: bool = False,
+    margin: float = 0.0,
     progress: Callable[[float], None] | None = None,
 ) -> Plan:
     """A motion from start to goal that keeps every distance and limit.
@@ -77,6 +79,8 @@ def plan(
     shorten : how often a shorter way between two points of the motion is tried
     smooth : whether to look for one motion without rests, which takes about half the time and 0.1 to 0.5 s
         more to plan; where none is found that keeps everything, the one with rests stands (`Plan.smooth`)
+    margin : how much more than the distance of `collisions` it keeps, m, where there is such a plan (0.05 for
+        one that a controller follows); else it keeps that distance
     progress : called with the share of `seconds` that is gone
 
     Returns
@@ -109,10 +113,15 @@ def plan(
         raise InputError(
             f"{few(endless)}: slides without limits", where="plan: robot", expected="limits of it"
         )
-    search = Search(
-        robot, q, [*through, goal], obstacles, collisions, limits, seed, tolerance or Goal(), smooth
-    )
-    return search.plan(positive(seconds, "seconds"), counted(shorten, "shorten", 0), progress)
+    given = positive(seconds, "seconds"), counted(shorten, "shorten", 0), progress
+    more, kept = scalar(margin, "margin"), collisions or Collisions()
+    expect(more >= 0.0, "margin", "a number of at least 0", margin)
+    rest = limits, seed, tolerance or Goal(), smooth
+    with suppress(RunError):  # then without the margin
+        if more > 0.0:
+            farther = replace(kept, distance=kept.distance + more, band=None)
+            return Search(robot, q, [*through, goal], obstacles, farther, *rest).plan(*given)
+    return Search(robot, q, [*through, goal], obstacles, kept, *rest).plan(*given)
 
 
 class Search:

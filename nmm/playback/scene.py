@@ -93,7 +93,8 @@ def playback_scene(
         tag = look.name if several else ""
         if samples := ghost_samples(motion, (3 if several else 6) if ghosts is None else ghosts):
             texts = [f"{tag}{' ' * several}{motion.t[k]:.3g} s" for k in samples]
-            robot.ghosts(f"{path}/ghosts", motion.q[samples], wheels[i][samples], texts)
+            ghosts_of = robot.ghosts(f"{path}/ghosts", motion.q[samples], wheels[i][samples], texts)
+            drawing.commands.append(ghosts_of)
         # Unlabelled, the page attributes the line to the end-effector.
         label = look.name or ("" if motion.driven is not None else motion.robot.name)
         drawing.add(

@@ -1,19 +1,16 @@
 """The keys of a scenario, from the top."""
 
 from collections.abc import Mapping
-from contextlib import suppress
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 from pydantic import BeforeValidator, Field
 
-from nmm.control.collisions import Collisions
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
 from nmm.control.sequence import Sequence
 from nmm.control.sequenced import SequencedController
-from nmm.errors import InputError, RunError, expect, few
+from nmm.errors import InputError, expect, few
 from nmm.functions.tasks.task import Stack
 from nmm.kinds import RESOLVERS
 from nmm.progress import Progress
@@ -247,16 +244,10 @@ class ScenarioPart(Part):
         tolerance = None if self.until is None else self.until.make()
         given = part.given("through", "seconds", "seed", "shorten", "smooth")
         given |= {"limits": limits, "tolerance": tolerance, "progress": progress}
-        start, farther = robot.q(self.q0), None
-        if part.track is not None and part.track.margin > 0.0:
-            kept = collisions or Collisions()
-            farther = replace(kept, distance=kept.distance + part.track.margin, band=None)
+        given |= {"collisions": collisions, "margin": 0.0 if part.track is None else part.track.margin}
         with at("plan"):
             try:
-                with suppress(RunError):  # then without the margin
-                    if farther is not None:
-                        return plan(robot, start, goal, collisions=farther, **given)
-                return plan(robot, start, goal, collisions=collisions, **given)
+                return plan(robot, robot.q(self.q0), goal, **given)
             except InputError as error:
                 raise error.placed(error.where.removeprefix("plan: ")) from None
 
