@@ -154,4 +154,7 @@ def test_a_scenario_replans_and_its_folder_says_when(tmp_path):
     run.save(tmp_path / "run", html=True)
     again = nmm.Trajectory.load(tmp_path / "run")
     assert again.events == run.events
+    np.testing.assert_array_equal(again.planned, run.planned)
+    at = [run.t.tolist().index(event.t) for event in run.events]
+    np.testing.assert_allclose(run.planned[at], run.q[at], atol=1e-12)  # each begins where the robot is
     assert "is made anew" in (tmp_path / "run" / "playback.html").read_text(encoding="utf-8")

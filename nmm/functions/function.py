@@ -140,6 +140,10 @@ class Renewal(LiveNumbers, ABC):
         """Make others for a sample at t, s, and q (n,), where it needs them."""
 
     @abstractmethod
+    def planned(self, t: Array) -> Array | None:
+        """As of a function, with what took the place of what."""
+
+    @abstractmethod
     def noticed(self, end: float) -> Iterable[Finding]:
         """What happened in a run that ended at a time, s."""
 
@@ -231,6 +235,10 @@ class Function(ABC):
     def shown(self) -> Shown:
         """What figures and playback draw of it; nothing by default."""
         return Shown()
+
+    def planned(self, t: Array) -> Array | None:
+        """The configurations (N, n) of the plan that it follows, at times (N,), s; None for most."""
+        return None
 
     def noticed(self, t: Array, q: Array) -> Iterable[Finding]:
         """What a task of it warns of after a run, by the samples at times (N,), s, and q (N, n)."""

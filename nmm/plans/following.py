@@ -14,9 +14,10 @@ from nmm.arrays import Array, Integers
 from nmm.control.goal import Goal, error_sizes, norms, unit_codes
 from nmm.errors import NmmError, RunError, expect
 from nmm.findings import Finding
-from nmm.functions.function import Function, Renewal, Row, Stage
+from nmm.functions.function import Function, Renewal, Row, Shown, Stage
 from nmm.kernels.compiled import checked_by_caller, compiled, kernel, scratch, view
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
+from nmm.robots.reach import first_tip
 from nmm.robots.robot import Robot
 
 #: Between two knots of a table pass at most so many s.
@@ -170,10 +171,16 @@ class FromPlan(Function):
 
     def apart(self, t: ArrayLike, q: ArrayLike) -> Array:
         """How far configurations (N, n) are from the plan at their times (N,), s: (N, 2), m and rad."""
-        off = np.asarray(q, dtype=np.float64) - self.at(np.clip(np.asarray(t), 0.0, self.duration))[0]
+        off = np.asarray(q, dtype=np.float64) - self.planned(np.asarray(t))
         if self.robot.platform.n_p >= 3:
             off[:, 2] -= 2.0 * np.pi * np.round(off[:, 2] / (2.0 * np.pi))
         return np.array([error_sizes(one, self.robot.q_units) for one in off]).reshape(-1, 2)
+
+    def shown(self) -> Shown:
+        return Shown(turns=first_tip(self.robot))
+
+    def planned(self, t: Array) -> Array:
+        return self.at(np.clip(t, 0.0, self.duration))[0]
 
     def noticed(self, t: Array, q: Array) -> Iterator[Finding]:
         """Where a run left the plan, unless another took its place (`Renewed.noticed`)."""
@@ -202,7 +209,7 @@ class Renewed(Renewal):
         self.begin()
 
     def begin(self) -> None:
-        self._now, self._begun, self._since = self._first, 0.0, -math.inf
+        self._plans, self._since = [(0.0, self._first)], -math.inf
         self._knots = self._first.knots
         self._made: list[dict[str, float]] = []
         self._refused: list[tuple[float, str]] = []
@@ -214,12 +221,13 @@ class Renewed(Renewal):
         return int(self._outside(*at, self.numbers, *self._given, self._since))
 
     def renew(self, t: float, q: Array) -> None:
-        if self._now.anew is None or self.stays(np.array([t]), q[np.newaxis]):
+        begun, now = self._plans[-1]
+        if now.anew is None or self.stays(np.array([t]), q[np.newaxis]):
             return
         self._since = t + WAIT
-        m, rad = self._now.apart([t - self._begun], [q])[0].tolist()
+        m, rad = now.apart([t - begun], [q])[0].tolist()
         try:
-            new = self._now.anew(q)
+            new = now.anew(q)
             if len(new.knots) > self._room:
                 raise RunError(
                     f"the new plan takes {new.duration:.4g} s, which is too long to be put in its place"
@@ -228,16 +236,22 @@ class Renewed(Renewal):
             self._refused.append((t, str(error)))
             return
         # The plan before ends where it was at t.
-        (there,), (u,) = self._now.at(np.array([t - self._begun]))
+        (there,), (u,) = now.at(np.array([t - begun]))
         before = self._knots[self._knots[:, 0] < t - 1e-6]
         end = [t, *there, *(new.robot.S(there) @ u), *self._knots[max(len(before) - 1, 0), 1 + 2 * len(q) :]]
         after = new.knots + t * (np.arange(new.knots.shape[1]) == 0)
         self._knots = np.vstack([before, end, after]) if len(before) else after
-        self._now, self._begun = new, t
+        self._plans.append((t, new))
         self._made.append({"t": t, "m": m, "rad": rad, "duration": new.duration})
         why = f"{m:.3g} m and {rad:.3g} rad from it; another one takes {new.duration:.3g} s"
         self.events.append((t, "plan", "is made anew", why))
         self.set(self._first.table(self._knots[-self._room :], self._room))
+
+    def planned(self, t: Array) -> Array:
+        found = np.empty((len(t), self._first.robot.n))
+        for since, function in self._plans:
+            found[t >= since] = function.planned(t[t >= since] - since)
+        return found
 
     def noticed(self, end: float) -> Iterator[Finding]:
         if self._made:
@@ -245,7 +259,8 @@ class Renewed(Renewal):
         if self._refused:
             t, why = self._refused[0]
             yield Finding("not_replanned", {"times": len(self._refused), "why": why}, {"t": t})
-        left = self._begun + self._now.duration - end
+        begun, last = self._plans[-1]
+        left = begun + last.duration - end
         if self._made and left > KNOT:
             yield Finding("plan_cut", {"left": left}, {"t": end})
 

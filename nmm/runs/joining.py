@@ -75,6 +75,7 @@ def join(
         frame=drawn.frame,
         path=path,
         desired=desired,
+        planned=None,
         target=drawn.mark(path),
         events=tuple(sorted(dict.fromkeys(happened), key=lambda event: event.t)),
         **({} if found is None else found.kept),

@@ -167,16 +167,22 @@ class ScenarioPart(Part):
         """The target at which a closed loop ends; one that follows a plan goes on for its duration."""
         return None if self.until is None or self.plan is not None else self.until.make()
 
-    def build(self, robot: Robot, absolute: Absolute, own: Resolver | None = None) -> Controller:
+    def build(
+        self,
+        robot: Robot,
+        absolute: Absolute,
+        own: Resolver | None = None,
+        progress: Progress | None = None,
+    ) -> Controller:
         """The controller, after a check of q0; errors know their key. `absolute` finds the files named, `own`
-        is a resolver in the place of the file's."""
+        is a resolver in the place of the file's, `progress` is of a plan that is followed."""
         self.check_start(robot)
         with at("task"):
             task = build_tasks(self.task, robot)
         if self.plan is not None and (track := self.plan.track) is not None:
             from nmm.plans.replan import replan
 
-            plan = self.build_plan(robot, absolute, None)
+            plan = self.build_plan(robot, absolute, progress)
             anew = partial(replan, **self.plan.given("seconds", "seed")) if track.replan else None
             given = track.given("gain", "length", "pace")
             task = [plan.reference(**given, tube=track.tube.make(), replan=anew)]
