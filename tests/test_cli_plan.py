@@ -102,6 +102,27 @@ def test_a_refusal_is_one_line(tmp_path, monkeypatch, capsys, arguments, status,
     assert not list(tmp_path.iterdir())
 
 
+def test_a_plan_is_played_when_asked_to(tmp_path, monkeypatch):
+    played = []
+    monkeypatch.setattr(nmm.Trajectory, "play", lambda run, **options: played.append((len(run), options)))
+    given = ("plan", "unicycle_3r", "--to", POSE, "--out", str(tmp_path / "out"))
+    assert status_of((*given, "--no-open")) == 2
+    assert not played
+    assert status_of((*given, "--play", "--no-open")) == 0
+    ((count, options),) = played
+    assert count > 10
+    assert options == {"port": None, "open_browser": False}
+
+
+def test_a_plan_that_is_followed_reports_how_long_it_is_looked_for():
+    """A run plans before its controller is there."""
+    shares = []
+    to = {"to": {"x": 6, "y": 0, "theta": 0}, "track": True}
+    nmm.Scenario.load("behind_the_wall", {"plan": to, "duration": 60}).controller(shares.append)
+    assert shares
+    assert all(0.0 <= share <= 1.0 for share in shares)
+
+
 def test_an_interrupted_search_writes_nothing(tmp_path, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt

@@ -160,6 +160,41 @@ def test_what_is_chosen_changes_the_controller(window: Window, setup: ScenarioSe
         assert kinds.input_value() == "pg"
 
 
+def test_n_plans_round_a_wall_and_the_page_shows_how(window: Window) -> None:
+    """Paths and copies are there while the robot follows; a target that is dragged is planned to again."""
+    with driven(ScenarioSetup(nmm.Scenario.load("behind_the_wall"))) as url:
+        page = opened(window, url)
+        page.keyboard.press("n")
+        page.wait_for_function("nmm.drive.followed === 1", timeout=1000.0 * MOST)
+        drawn = "nmm.node('/nmm/plan').children.length"
+        assert page.evaluate(drawn) == 3  # two ways, and the copies
+        button = page.get_by_role("button", name="Plan", exact=True)
+        page.wait_for_function("document.getElementById('plan').ariaPressed === 'true'")
+        began = np.array(page.evaluate("nmm.drive.targets[0].at"))
+        page.wait_for_function("document.getElementById('told').textContent.includes('follows its plan')")
+        gone = "([x, y]) => Math.hypot(nmm.drive.targets[0].at[0] - x, nmm.drive.targets[0].at[1] - y) > 0.3"
+        page.wait_for_function(gone, arg=began.tolist(), timeout=1000.0 * MOST)
+        page.keyboard.press("r")
+        start = place(page, 0, "", 0.0)
+        before = target(page)
+        drag(page, start, (-40.0, 20.0))
+        assert np.linalg.norm(target(page) - before) > 0.05
+        page.wait_for_function("nmm.drive.followed === 2", timeout=1000.0 * MOST)
+        height = page.get_by_label("ee: z in m, as a number")
+        height.fill("3")
+        height.press("Enter")
+        page.wait_for_function(
+            "document.getElementById('told').classList.contains('bad')", timeout=1000.0 * MOST
+        )
+        assert "No plan" in page.locator("#told").inner_text()
+        assert page.evaluate(drawn) == 0
+        page.set_viewport_size({"width": 420, "height": 800})
+        assert page.evaluate("document.documentElement.scrollWidth") <= 420
+        assert page.evaluate("document.getElementById('plan').getBoundingClientRect().right") <= 420
+        button.click()
+        page.wait_for_function("!nmm.drive.plans")
+
+
 def test_a_second_page_shows_and_moves_the_same_robot(
     browser: Browser, window: Window, setup: ScenarioSetup
 ) -> None:

@@ -23,6 +23,7 @@ from tornado.websocket import websocket_connect
 import nmm
 from nmm.arrays import Array
 from nmm.driving.driven import Driven, Reaching
+from nmm.driving.planning import Planning
 from nmm.driving.session import Aim, DriveSession, Order, Pick, parsed
 from nmm.driving.setups import DriveSetup, RobotSetup, ScenarioSetup, Settings
 from nmm.errors import InputError, ScenarioError
@@ -56,7 +57,7 @@ def test_the_end_effector_goes_where_the_target_is_put() -> None:
     np.testing.assert_allclose(ee(driven), [0.4, -0.6, 0.7], atol=1e-5)
     look = driven.look()
     np.testing.assert_allclose(look.at[0], ee(driven), atol=1e-12)
-    J = driven._controller.evaluate(driven.t, driven.q).J
+    J = driven.reacting.evaluate(driven.t, driven.q).J
     assert look.sigma_min == pytest.approx(np.linalg.svd(J)[1].min(), rel=1e-12)
 
 
@@ -84,7 +85,7 @@ def test_a_resolver_is_changed_while_it_moves(kind: str) -> None:
     driven.use(driven.with_choice("resolver.kind", kind))
     np.testing.assert_array_equal(driven.q, before)
     assert driven.t == t
-    assert driven._controller.resolver.name.lower() == kind
+    assert driven.reacting.resolver.name.lower() == kind
     moved(driven, 14.0)
     np.testing.assert_allclose(ee(driven), [0.4, -0.6, 0.7], atol=1e-4)
 
@@ -93,11 +94,11 @@ def test_a_resolver_that_a_scenario_cannot_do_with_says_why_and_changes_nothing(
     """It is tried when somebody chooses it: the page of a large robot comes without waiting for others."""
     with Loop(scenario("unicycle_3r_spline")) as loop:
         driven = loop.session._driven
-        before, choices = driven._controller, driven.choices
+        before, choices = driven.reacting, driven.choices
         assert next(one.options for one in choices if one.key == "resolver.kind") == tuple(RESOLVERS)
         loop.session.receive('{"type":"pick","key":"resolver.kind","value":"ej"}')
         wait_for(lambda: "added_task" in str(loop.picture()["told"]))
-        assert driven._controller is before
+        assert driven.reacting is before
         assert driven.choices == choices
 
 
@@ -150,10 +151,10 @@ def test_a_weight_is_that_of_the_input() -> None:
     driven.use(driven.with_choice("resolver.weights.omega", 7.0))
     asked = nmm.Scenario.load("tiago_pose", {"resolver.weights": {"torso_lift_joint": 20, "omega": 7}})
     expected = asked.controller().evaluate(0.0, driven.setup.q0)
-    driven._controller.reset()
+    driven.reacting.reset()
     for target, value in zip(driven.targets, [expected.r_d], strict=True):
         target.signal.set(value)
-    found = driven._controller.evaluate(0.0, driven.setup.q0)
+    found = driven.reacting.evaluate(0.0, driven.setup.q0)
     rate = asked.controller().task.tasks[0]
     assert rate.gain == pytest.approx(1.0)
     # The reference is at rest at t = 0: the same problem.
@@ -165,10 +166,10 @@ def test_the_inputs_before_go_over_to_another_controller() -> None:
     driven = Driven(scenario())
     driven.use(driven.with_choice("limits", True))
     moved(driven, 0.1)
-    before = driven._controller.solver.before.copy()
+    before = driven.reacting.solver.before.copy()
     assert np.abs(before).max() > 0.01
     driven.use(driven.with_choice("task.0.gain", 2.0))
-    np.testing.assert_array_equal(driven._controller.solver.before, before)
+    np.testing.assert_array_equal(driven.reacting.solver.before, before)
 
 
 def test_a_robot_without_a_scenario_holds_its_arm_where_it_is() -> None:
@@ -207,7 +208,7 @@ def test_a_target_out_of_reach_is_told_until_it_is_in_reach_again() -> None:
 
 def test_an_error_that_stands_is_told_and_one_that_falls_is_not() -> None:
     driven = Driven(scenario())
-    controller, target = driven._controller, driven.targets[0].signal.value
+    controller, target = driven.reacting, driven.targets[0].signal.value
     step = controller.evaluate(0.0, driven.q)
 
     def list_texts(norms: Callable[[float], float], *, until: float = 3.0, goal: Array = target) -> list[str]:
@@ -302,6 +303,87 @@ def test_a_huge_number_is_out_of_range_and_no_overflow() -> None:
     assert isinstance(pick, Pick)
     with pytest.raises(InputError, match="from"):
         driven.with_choice(pick.key, pick.value)
+
+
+# plans
+
+
+def led(driven: Driven, planning: Planning, until: Callable[[], bool]) -> list[Array]:
+    """Where the robot was, from picture to picture, until something is so."""
+    places = []
+
+    def there() -> bool:
+        planning.attend()
+        for _ in range(25):
+            driven.step()
+        places.append(driven.q.copy())
+        return until()
+
+    wait_for(there)
+    return places
+
+
+def test_a_target_behind_a_wall_is_planned_to_and_again_when_it_moves() -> None:
+    """Its inputs are the plan's, not those of the controller that follows targets; distances by Coal."""
+    driven = Driven(scenario("behind_the_wall"))
+    planning = Planning(driven)
+    moved(driven, 2.0)
+    planning.turn(True)
+    places = led(driven, planning, lambda: planning.number == 1)
+    assert "follows its plan" in planning.words()[0]
+    places += led(driven, planning, lambda: "plan's end" in planning.words()[0])
+    moved(driven, 1.0)
+    assert np.linalg.norm(driven.look().step.error) < 5e-3
+    assert np.linalg.norm(places[-1][:2] - places[0][:2]) > 1.5
+    before = driven.q.copy()
+    planning.aims(0)
+    driven.aim(0, np.array([0.5, 0.5, 0.8]))
+    places += led(driven, planning, lambda: planning.number == 3)  # one is gone, another there
+    np.testing.assert_allclose(places[-2], before, atol=0.02)  # it stood meanwhile
+    places += led(driven, planning, lambda: "plan's end" in planning.words()[0])
+    assert np.linalg.norm(driven.look().step.error) < 5e-2
+    scene = driven.reacting.solver.scene
+    assert scene is not None
+    pairs = range(len(scene.names))
+    assert min(scene.queries.distances(0.0, q, pairs).min() for q in places) >= 0.03
+    planning.turn(False)
+    assert driven._led is driven.reacting
+
+
+def test_a_plan_that_is_refused_is_said_until_the_target_moves() -> None:
+    driven = Driven(scenario("behind_the_wall"))
+    planning = Planning(driven)
+    planning.turn(True)
+    driven.aim(0, np.array([4.5, 0.5, 3.0]))
+    led(driven, planning, lambda: planning.words()[1])
+    q = driven.q.copy()
+    moved(driven, 0.5)
+    np.testing.assert_array_equal(driven.q, q)
+    assert planning.words()[0].startswith("No plan: goal: no free goal posture found")
+    assert planning.number == 0
+    driven.aim(0, np.array([0.5, 0.5, 0.8]))
+    led(driven, planning, lambda: planning.number == 1)
+
+
+def test_a_plan_is_sent_to_pages_once_and_taken_away() -> None:
+    with Loop(scenario("behind_the_wall")) as loop:
+        loop.session.receive('{"type":"order","what":"plan"}')
+        found: list[dict] = []
+
+        def seen(number: int) -> bool:
+            found.extend(json.loads(line) for line in loop.latest().splitlines())
+            return sum(one["type"] == "plan" for one in found) == number
+
+        wait_for(lambda: seen(1))
+        (plan,) = [one for one in found if one["type"] == "plan"]
+        assert len(plan["lines"]) == 2  # of the end-effector and of the platform
+        assert len(plan["ghosts"]["joints"]) > 5
+        wait_for(lambda: loop.picture()["plans"] is True)
+        late = [json.loads(line) for line in loop.session.follow()().splitlines()]
+        assert plan in late
+        loop.session.receive('{"type":"order","what":"react"}')
+        wait_for(lambda: seen(2))
+        assert [one["lines"] for one in found if one["type"] == "plan"][-1] == []
 
 
 # the loop

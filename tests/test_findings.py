@@ -361,6 +361,35 @@ EXAMPLES: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
         {"margin": -0.0125, "edge": ["front", "left"]},
         {"t": 1.5},
         "the robot tips at t = 1.5 s: the zero-moment point is 12.5 mm outside the edge from front to left",
+        "replanned",
+        {"plans": [{"t": 3.5, "m": 0.25, "rad": 0.1, "duration": 9.0}]},
+        {"t": 3.5},
+        "the robot left its plan at t = 3.5 s, by up to 0.25 m and 0.1 rad, and went on with another; the "
+        "last one takes 9 s",
+    ),
+    (
+        "replanned",
+        {
+            "plans": [
+                {"t": 3.5, "m": 0.2, "rad": 0, "duration": 9},
+                {"t": 5, "m": 0.1, "rad": 1, "duration": 8},
+            ]
+        },
+        {"t": 3.5},
+        "the robot left its plan 2 times from t = 3.5 to 5 s, by up to 0.2 m and 1 rad, and went on with "
+        "another; the last one takes 8 s",
+    ),
+    (
+        "not_replanned",
+        {"times": 2, "why": "no way found"},
+        {"t": 3.5},
+        "the robot left its plan, and no other was made, 2 times from t = 3.5 s on: no way found",
+    ),
+    (
+        "plan_cut",
+        {"left": 2.5},
+        {"t": 20.0},
+        "at the end, t = 20 s, the plan that it followed goes on for 2.5 s more",
     ),
     (
         "backed_off",

@@ -160,6 +160,10 @@ def test_a_scenario_follows_its_plan_in_the_closed_loop():
     assert run.resolver == "pg"
     assert np.abs(run.q[-1] - plan.end).max() < 1e-3
     assert run.clearance_between.min() > 0.03
+    np.testing.assert_allclose(run.planned, plan(0.8 * run.t)[0], atol=1e-12)
+    for k in (0, 400, 1000):
+        there = nmm.Configuration(plan.robot, run.planned[k]).placement("ee").translation
+        np.testing.assert_allclose(run.desired[k], there, atol=1e-12)
     assert plan.trajectory(0.05).clearance_between.min() > 0.079
     again = nmm.Scenario.load("behind_the_wall", {"plan.track": {"margin": 0}, "duration": 20}).plan()
     assert again.trajectory(0.05).clearance_between.min() < 0.079

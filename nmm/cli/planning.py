@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from nmm.cli.groups import OfRobot, command
+from nmm.cli.groups import Browser, OfRobot, command
 from nmm.cli.options import ROBOT_HELP, SetOption, flag, names_of, option, out_option, settings_of
 from nmm.cli.output import OK, progress, show_table
 from nmm.cli.runs import tell_and_save
@@ -49,6 +49,8 @@ def plan(
     of_robot: OfRobot,
     out: Annotated[Path | None, out_option("runs/<name>-plan")] = None,
     html: bool = flag("--html", "Write playback.html too: the motion in 3D, one file, works offline."),
+    play: bool = flag("--play", "Then play the motion in the browser; Ctrl-C ends it."),
+    browser: Browser,
     as_json: bool = flag("--json", "What was found as JSON on standard output, for scripts."),
 ) -> int:
     """Plan a motion that keeps distances and limits.
@@ -57,7 +59,7 @@ def plan(
 
     \b
     nmm plan unicycle_3r --to x=2,y=1,theta=0
-    nmm plan unicycle_3r --to x=6,y=0,theta=0 --obstacles behind_the_wall --html
+    nmm plan unicycle_3r --to x=6,y=0,theta=0 --obstacles behind_the_wall --play
     nmm plan car_base --to y=1,x=0,theta=0 --set limits.velocity.v=0.5 --set limits.acceleration=1
     nmm plan behind_the_wall --seed 3 --json
 
@@ -68,6 +70,8 @@ def plan(
     from nmm.folders.run import is_run
     from nmm.folders.whole import check_folder
 
+    if not play:
+        browser.refuse("--play")
     made = _scenario(subject, to, obstacles)
     changed: dict[str, Any] = {}
     if not made.parts.is_plan:
@@ -100,11 +104,13 @@ def plan(
             "postures": found.postures,
             "folder": str(folder),
         }
-        print(json.dumps(said, indent=1))
+        print(json.dumps(said, indent=1), flush=True)
     else:
         tell_and_save(trajectory, folder, html=html)
         looked = counted(found.motions, "motion"), counted(found.postures, "configuration")
         show_table(["", ""], [["looked at", " and ".join(looked)]])
+    if play:
+        trajectory.play(**browser.keywords())
     return OK
 
 

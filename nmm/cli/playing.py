@@ -199,11 +199,13 @@ def drive(subject: Subject, browser: Browser, loading: Loading) -> None:
 
     In 3D, with MeshCat, and with its curves: the target of each task is dragged, typed, or moved with keys
     or a gamepad. Resolver, gains, weights and limits are changed while it moves. A scenario's references are
-    left aside, but for where they begin; a robot holds its arm's end where it is at first. Only this machine
-    can reach it. Ctrl-C ends it.
+    left aside, but for where they begin; a robot holds its arm's end where it is at first. With the button
+    Plan, or the key N, the robot follows plans to the target, round what is in the way (docs/plans.md). Only
+    this machine can reach it. Ctrl-C ends it.
 
     \b
     nmm drive unicycle_3r_position
+    nmm drive behind_the_wall
     nmm drive tiago_pose
     nmm drive my_robot.urdf --platform car --task position:gripper:xyz --at shoulder=pi/4
     """

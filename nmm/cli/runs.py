@@ -93,7 +93,11 @@ def run(
     called = label or _called(made)
     folder = out or Path("runs") / f"{made.name}-{folder_name(called)}"
     check_folder(folder, is_run)
-    controller = made.controller()  # complains before there is a progress bar
+    if made.parts.plan is None or made.parts.is_plan:
+        controller = made.controller()  # complains before there is a progress bar
+    else:
+        with progress(f"{made.name}, plan") as report:
+            controller = made.controller(report)
     shown: AbstractContextManager[LiveRun | None] = nullcontext()
     planned = made.parts.is_plan
     if play and not planned:

@@ -322,6 +322,7 @@ _TABLE = (
     RecordedQuantity("clearance_points", "", "the two nearest points, in the world", "K6", "m", since=6),
     RecordedQuantity("path", "", "the end-effector's path", "N3", "m", optional=True, finite=True),
     RecordedQuantity("desired", "", "its desired path", "N3", "m", optional=True),
+    RecordedQuantity("planned", "", "where its plan was", "Nn", "coordinates", optional=True, finite=True),
     RecordedQuantity("target", "", "the point that a bearing looks at", "3", "m", optional=True, finite=True),
     RecordedQuantity("rate", "ṙ_d + K e", "rate that the task asks for", "Ns", noted=True, saved=False),
     RecordedQuantity("J", "J̄", "matrix of the task", "Nsm", noted=True, saved=False),

@@ -171,7 +171,7 @@ class SequencedController(Controller):
         """Forget all decisions and the previous inputs."""
         self.schedule.reset()
         for one in self._controllers.values():
-            one.reset()
+            one.solver.begin_run()
 
 
 def descent(resolver: Resolver) -> Resolver:

@@ -220,6 +220,12 @@ class StepSolver:
         G = self.program.buffers.G
         self._replace_inputs(retreat_state.inputs(q, G, self.found.problem), *self.blocks)
 
+    def begin_run(self) -> None:
+        """A run begins: nothing is remembered, and numbers that runs replace are the first ones."""
+        self.sample.reset()
+        for one in self.program.renewals:
+            one.begin()
+
     @property
     def blocks(self) -> Blocks:
         """Its memory, for compiled code."""

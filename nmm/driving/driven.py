@@ -2,7 +2,7 @@
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -74,9 +74,17 @@ class Made(NamedTuple):
 
 
 class Driven:
-    """The robot, its time t, s, and its controller; used by one thread. `shown` is the robot at the last
-    look, with its wheels; `choices` has what may be changed and the present values; `trouble` is why it
-    stands still, "" while it moves."""
+    """The robot, its time t, s, and its controller; used by one thread.
+
+    Attributes
+    ----------
+    shown : the robot at the last look, with its wheels
+    reacting : the controller that follows the targets
+    elapsed : the time of the controller that leads it, s, where that is another (`lead`)
+    u (m,) : the last inputs
+    choices : what may be changed, with the present values
+    trouble : why it stands still, "" while it moves
+    """
 
     def __init__(self, setup: DriveSetup) -> None:
         self.setup = setup
@@ -85,7 +93,7 @@ class Driven:
         first = setup.controller({})
         self.targets = targets_of(first, setup.q0, at_robot=setup.at_robot)
         self._began = [target.signal.value for target in self.targets]
-        self._controller = aimed(first, self.targets)
+        self.reacting = self._led = aimed(first, self.targets)
         self._reaching = Reaching()
         self.choices = setup.choices({})
         self.trouble = ""
@@ -94,17 +102,30 @@ class Driven:
 
     @property
     def has_objective(self) -> bool:
-        return self._controller.given.objective is not None
+        return self.reacting.given.objective is not None
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
-        collisions = self._controller.given.collisions
+        collisions = self.reacting.given.collisions
         return () if collisions is None else tuple(collisions.obstacles)
 
     def _stand(self) -> None:
         self.t, self.q = 0.0, self.setup.q0.copy()
         self.shown.stand(self.q)
-        self._controller.reset()
+        self.reacting.reset()
+        self._led, self._since, self.u = self.reacting, 0.0, np.zeros(self.robot.n_u)
+        self.trouble = ""
+
+    @property
+    def elapsed(self) -> float:
+        return self.t - self._since
+
+    def lead(self, controller: Controller | None) -> None:
+        """Go on with a controller whose time begins now, or with the one that follows targets, from the
+        present inputs."""
+        before = self._led.solver.before.copy()
+        self._led, self._since = (self.reacting, 0.0) if controller is None else (controller, self.t)
+        self._led.solver.before[:] = before
         self.trouble = ""
 
     def restart(self) -> None:
@@ -128,17 +149,15 @@ class Driven:
 
     def use(self, made: Made) -> None:
         """Go on with another controller, from this one's inputs."""
-        before = self._controller.solver.before.copy()
-        self._settings, self._controller, self.choices = made
-        self._controller.solver.before[:] = before
-        self.trouble = ""
+        self._settings, self.reacting, self.choices = made
+        self.lead(None)
 
     def step(self) -> bool:
         """One step of the controller's dt; whether it moved. An error becomes `trouble`."""
         if self.trouble:
             return False
         try:
-            q_next, _ = self._controller.step(self.t, self.q, self.setup.dt)
+            q_next, self.u = self._led.step(self.elapsed, self.q, self.setup.dt)
         except NmmError as error:
             self.trouble = str(error)
             return False
@@ -151,7 +170,7 @@ class Driven:
     def look(self) -> Look:
         """The present place and what the controller finds there; wheels have rolled since the last look."""
         self.shown.roll(self.q[np.newaxis])
-        step = self._controller.evaluate(self.t, self.q)
+        step = self.reacting.evaluate(self.t, self.q)
         here = Configuration(self.robot, self.q)
         at = np.full((len(self.targets), 3), np.nan)
         for i, target in enumerate(self.targets):
@@ -161,5 +180,10 @@ class Driven:
         known = bool(np.all(np.isfinite(step.J)))
         sigma = np.linalg.svd(step.J, compute_uv=False).min(initial=math.inf) if known else math.nan
         wanted = np.concatenate([target.signal.value for target in self.targets])
-        against = self._reaching.words(self._controller, self.t, step, wanted)
+        against = ""
+        if self._led is self.reacting:
+            against = self._reaching.words(self.reacting, self.t, step, wanted)
+        else:
+            led = self._led.evaluate(self.elapsed, self.q)
+            step = replace(step, u=led.u, q_dot=led.q_dot, scale=led.scale)
         return Look(self.t, step, float(sigma), at, against)

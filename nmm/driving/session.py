@@ -17,6 +17,7 @@ from pydantic.dataclasses import dataclass
 
 from nmm.arrays import finite
 from nmm.driving.driven import Driven, Look, Made
+from nmm.driving.planning import Planning, later, why
 from nmm.driving.setups import Choice, DriveSetup, named
 from nmm.errors import InputError, NmmError
 from nmm.playback.channels import live_channels
@@ -59,7 +60,7 @@ class Pick:
 
 @dataclass(frozen=True, config=_STRICT)
 class Order:
-    what: Literal["pause", "go", "restart"]
+    what: Literal["pause", "go", "restart", "plan", "react"]
     type: Literal["order"] = "order"
 
 
@@ -117,8 +118,8 @@ def drive(
 
 class DriveSession(RobotSession):
     """A driven robot, its pages' messages and their pictures. Three threads meet here: the loop, the server
-    (`receive`, `follow`), and one that makes a controller. They share what is written in one go: a deque, and
-    references to values that never change."""
+    (`receive`, `follow`), and one that makes a controller or a plan. They share what is written in one go: a
+    deque, and references to values that never change."""
 
     def __init__(self, driven: Driven, *, port: int | None = None) -> None:
         self._driven = driven
@@ -130,6 +131,7 @@ class DriveSession(RobotSession):
         self._paused = False
         self._notice, self._until = "", 0.0
         self._count = 0
+        self._planning, self._plan = Planning(driven), (0, "")
         self._choices: tuple[int, list[Choice]] = (0, driven.choices)
         self._picture: tuple[list[str], dict[str, Any]] | None = None
         targets = Drawing()
@@ -166,10 +168,10 @@ class DriveSession(RobotSession):
         return False
 
     def follow(self) -> Callable[[], str]:
-        seen, version = -1, -1
+        seen, version, plan = -1, -1, 0
 
         def latest() -> str:
-            nonlocal seen, version
+            nonlocal seen, version, plan
             if self._picture is None:  # the page came before the first picture
                 return ""
             lines = []
@@ -178,6 +180,9 @@ class DriveSession(RobotSession):
                 version, color = number, looks([_kind(choices)])[0].color
                 listed = [asdict(choice) for choice in choices]
                 lines.append(encode({"type": "choices", "choices": listed, "color": color}))
+            if plan != self._plan[0]:
+                plan, line = self._plan
+                lines.append(line)
             placed, picture = self._picture
             fresh = [sample for count, sample in tuple(self._samples) if count > seen]
             seen = self._samples[-1][0] if self._samples else seen
@@ -210,10 +215,14 @@ class DriveSession(RobotSession):
             try:
                 if isinstance(message, Aim):
                     self._driven.aim(message.task, np.array(message.value))
+                    self._planning.aims(message.task)
                 elif isinstance(message, Pick):
                     self._picks[message.key] = message.value
                 elif message.what == "restart":
                     self._driven.restart()
+                    self._planning.begin_again()
+                elif message.what in ("plan", "react"):
+                    self._planning.turn(message.what == "plan")
                 else:
                     self._paused = message.what == "pause"
             except InputError:
@@ -221,17 +230,20 @@ class DriveSession(RobotSession):
         if self._making is not None and self._making.done():
             try:
                 self._driven.use(self._making.result())
-            except Exception as error:  # an NmmError says what is wrong; a user's function may raise anything
-                wrong = str(error) if isinstance(error, NmmError) else f"{type(error).__name__}: {error}"
-                self._notice, self._until = wrong, time.monotonic() + NOTICE
+                self._planning.begin_again()
+            except Exception as error:
+                self._notice, self._until = why(error), time.monotonic() + NOTICE
             self._making = None
             # A page whose choice was refused shows the present one again.
             self._choices = (self._choices[0] + 1, self._driven.choices)
         if self._picks and self._making is None:
             key = next(iter(self._picks))
-            self._making = Future()
-            given = self._driven, key, self._picks.pop(key), self._making
-            threading.Thread(target=_make, args=given, daemon=True).start()
+            value = self._picks.pop(key)
+            self._making = later(lambda: _made(self._driven, key, value))
+        self._planning.attend()
+        if self._plan[0] != self._planning.number:
+            line = encode(self._planning.shown(self._drawn, self.shown.now[1]))
+            self._plan = self._planning.number, line
 
     def _publish(self, look: Look) -> None:
         driven = self._driven
@@ -245,6 +257,7 @@ class DriveSession(RobotSession):
             "targets": [target.signal.value.tolist() for target in driven.targets],
             "at": finite(look.at),
             "paused": self._paused,
+            "plans": self._planning.on,
             "told": text,
             "wrong": wrong,
         }
@@ -266,6 +279,9 @@ class DriveSession(RobotSession):
             return "; ".join(filter(None, [f"Stands still: {self._driven.trouble}", look.against])), True
         if time.monotonic() < self._until:
             return self._notice, True
+        if self._planning.on:
+            text, wrong = self._planning.words()
+            return f"t = {look.t:.1f} s. {text}." if not wrong else text, wrong
         if look.against:
             return f"{look.against[0].upper()}{look.against[1:]}.", True
         parts = [f"t = {look.t:.1f} s"]
@@ -276,16 +292,13 @@ class DriveSession(RobotSession):
         return ", ".join(parts), False
 
 
-def _make(driven: Driven, key: str, value: object, making: Future[Made]) -> None:
-    """A controller for a choice, in a thread: a resolver new to this machine has to be compiled."""
-    try:
-        made = driven.with_choice(key, value)
-        with suppress(NmmError):  # the loop meets it again, and reports it
-            made.controller.step(driven.t, driven.q, driven.setup.dt)  # the first call compiles
-        made.controller.reset()
-        making.set_result(made)
-    except Exception as error:  # the loop reports it
-        making.set_exception(error)
+def _made(driven: Driven, key: str, value: object) -> Made:
+    """A controller for a choice; a resolver new to this machine has to be compiled."""
+    made = driven.with_choice(key, value)
+    with suppress(NmmError):  # the loop meets it again, and reports it
+        made.controller.step(driven.t, driven.q, driven.setup.dt)  # the first call compiles
+    made.controller.reset()
+    return made
 
 
 def _kind(choices: Sequence[Choice]) -> str:

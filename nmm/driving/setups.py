@@ -142,7 +142,7 @@ class ScenarioSetup(DriveSetup):
     at_robot = False
 
     def __init__(self, scenario: Scenario, q0: ArrayLike | None = None) -> None:
-        self.scenario = scenario
+        self.scenario = scenario if scenario.parts.plan is None else scenario.override("plan", False)
         self._firsts: dict[str, float] = {}
         self.name = scenario.title or scenario.name
         self.robot = scenario.robot()
@@ -305,3 +305,10 @@ def aimed(controller: Controller, targets: tuple[Target, ...]) -> Controller:
         for task, target in zip(controller.task, targets, strict=True)
     ]
     return Controller(*controller.given._replace(task=Stack.of(tasks), dt=controller.dt, retreat=None))
+
+
+def led_by(controller: Controller, task: Task, resolver: Resolver) -> Controller:
+    """A controller of the same robot, limits and distances that does nothing but a task."""
+    alone: dict[str, Any] = {"objective": None, "added_task": Stack(), "retreat": None, "steering": False}
+    given = controller.given._replace(task=Stack.of(task), resolver=resolver, dt=controller.dt, **alone)
+    return Controller(*given)

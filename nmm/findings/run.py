@@ -25,6 +25,18 @@ def _before(leg: Mapping[str, Any]) -> str:
     return f"with {listed(leg['tasks']) or 'no task'} from t = {leg['start']:.4g} to {leg['end']:.4g} s: "
 
 
+def _replanned(plans: Sequence[Mapping[str, float]], **_: Any) -> str:
+    first, last = plans[0], plans[-1]
+    when = f"at t = {first['t']:.4g} s"
+    if len(plans) > 1:
+        when = f"{len(plans)} times from t = {first['t']:.4g} to {last['t']:.4g} s"
+    m, rad = (max(one[unit] for one in plans) for unit in ("m", "rad"))
+    return (
+        f"the robot left its plan {when}, by up to {m:.3g} m and {rad:.3g} rad, and went on with another; "
+        f"the last one takes {last['duration']:.4g} s"
+    )
+
+
 def _singular(t: float, meaning: str, lost: Sequence[str], level: int | None, **of: Any) -> str:
     asks = f", and the task asks for what no input gives: {', '.join(lost)}" if lost else ""
     above = (
@@ -181,6 +193,12 @@ WORDS: Mapping[str, Words] = {
         f"{tube_m:g} m or {tube_rad:g} rad); "
         f"{'not back at the end' if back is None else f'back at t = {back:.4g} s'}"
     ),
+    "replanned": _replanned,
+    "not_replanned": lambda t, times, why, **_: (
+        f"the robot left its plan, and no other was made, {counted(times, 'time')} from t = {t:.4g} s on: "
+        f"{why}"
+    ),
+    "plan_cut": "at the end, t = {t:.4g} s, the plan that it followed goes on for {left:.3g} s more",
     "no_redundancy": "the task has as many rows as there are inputs: no redundancy is left to resolve",
     "inputs_unmet": _inputs_unmet,
     "moves_otherwise": (

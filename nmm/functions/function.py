@@ -121,6 +121,33 @@ class LiveNumbers:
         return LiveNumbers, (self.numbers.copy(),)
 
 
+class Renewal(LiveNumbers, ABC):
+    """Numbers of a stage that a run itself replaces, at a sample, by what there is then. `events` are those
+    of the run: t, s; the task's name; what happened; why."""
+
+    events: list[tuple[float, str, str, str]]
+
+    @abstractmethod
+    def begin(self) -> None:
+        """A run begins: the numbers are the first ones."""
+
+    @abstractmethod
+    def stays(self, times: Array, q: Array) -> int:
+        """How many samples at times (N,), s, and q (N, n), in order, need no others."""
+
+    @abstractmethod
+    def renew(self, t: float, q: Array) -> None:
+        """Make others for a sample at t, s, and q (n,), where it needs them."""
+
+    @abstractmethod
+    def planned(self, t: Array) -> Array | None:
+        """As of a function, with what took the place of what."""
+
+    @abstractmethod
+    def noticed(self, end: float) -> Iterable[Finding]:
+        """What happened in a run that ended at a time, s."""
+
+
 @dataclass(frozen=True, eq=False)
 class Stage:
     """A kernel with what it reads. The stages of a function run in order on the same rows.
@@ -134,7 +161,7 @@ class Stage:
     numbers : the numbers that it reads
     hessians : whether it reads the frames' kinematic Hessians
     callback : a user's Python function, run before the kernels; its results are the numbers
-    live : sets the numbers from outside, between two steps
+    live : sets the numbers from outside, between two steps, or as a run goes on
 
     Examples
     --------
@@ -208,6 +235,10 @@ class Function(ABC):
     def shown(self) -> Shown:
         """What figures and playback draw of it; nothing by default."""
         return Shown()
+
+    def planned(self, t: Array) -> Array | None:
+        """The configurations (N, n) of the plan that it follows, at times (N,), s; None for most."""
+        return None
 
     def noticed(self, t: Array, q: Array) -> Iterable[Finding]:
         """What a task of it warns of after a run, by the samples at times (N,), s, and q (N, n)."""

@@ -10,7 +10,7 @@ import numpy as np
 from numba import types
 
 from nmm.arrays import Array, Integers
-from nmm.functions.function import Callback, Evaluation, Function, Stage
+from nmm.functions.function import Callback, Evaluation, Function, Renewal, Stage
 from nmm.kernels.compiled import call_platform, clear, compiled, view
 from nmm.kernels.kinematics import Kinematics, place_frames
 from nmm.kernels.record_layout import (
@@ -131,6 +131,7 @@ class Program:
     blocks, buffers : what `run_program` takes, made by `lay_out`, and what it reads and writes, as views
     calls_python : whether users' Python functions are among them
     costs : what makes such functions slow, a sentence each
+    renewals : numbers that a run replaces
     prepare : (t, q) -> None, Pinocchio's part at q and the users' Python functions, or `nothing`
     """
 
@@ -154,6 +155,8 @@ class Program:
             self._rows += max((stage.rows for stage in stages), default=0)
             for stage in stages:  # now, while others may be compiling the step (`kernels/parallel_compile`)
                 _ = stage.kernel.address
+        live = [stage.live for stage, _ in self._stages]
+        self.renewals = tuple(one for one in live if isinstance(one, Renewal))
         self._frames = tuple(dict.fromkeys(frame for stage, _ in self._stages for frame in stage.frames))
 
     def lay_out(self, beside: tuple[Any, ...] | None = None) -> None:

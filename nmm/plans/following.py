@@ -7,55 +7,75 @@ from collections.abc import Callable, Iterator
 from itertools import pairwise
 
 import numpy as np
+from numba import types
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array
-from nmm.control.goal import Goal, error_sizes
-from nmm.errors import expect
+from nmm.arrays import Array, Integers
+from nmm.control.goal import Goal, error_sizes, norms, unit_codes
+from nmm.errors import NmmError, RunError, expect
 from nmm.findings import Finding
-from nmm.functions.function import Function, Row, Stage
-from nmm.kernels.compiled import kernel, scratch
+from nmm.functions.function import Function, Renewal, Row, Shown, Stage
+from nmm.kernels.compiled import checked_by_caller, compiled, kernel, scratch, view
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
+from nmm.robots.reach import first_tip
 from nmm.robots.robot import Robot
 
 #: Between two knots of a table pass at most so many s.
 KNOT = 0.02
 #: Numbers of a table before its knots.
 HEADER = 2
+#: A table that is renewed has room for so many times the plan's knots, and for so many s at least.
+ROOM, ROOM_FOR = 4, 120.0
+#: After another plan was made, or none was found, the next is made so much later at the earliest, s.
+WAIT = 1.0
+
+
+@compiled
+def off_plan(t: float, q: Array, numbers: Array, m: int, off: Array, rate: Array) -> int:
+    """Write q - q_plan(t) (n,), the angle of the platform wrapped, and the plan's q_dot (n,), by a table of
+    `from_plan` for m inputs; returns where the knot before t is in it."""
+    n = q.shape[0]
+    size = 1 + (2 + m) * n
+    k, last = 0, int(numbers[0]) - 2
+    while k < last:  # the last knot that is not after t
+        middle = (k + last + 1) // 2
+        if numbers[HEADER + middle * size] <= t:
+            k = middle
+        else:
+            last = middle - 1
+    a = HEADER + k * size
+    b = a + size
+    h = numbers[b] - numbers[a]
+    share = (t - numbers[a]) / h
+    rests = share < 0.0 or share > 1.0
+    s = min(max(share, 0.0), 1.0)
+    for i in range(n):
+        p, v, v_end = numbers[a + 1 + i], numbers[a + 1 + n + i], numbers[b + 1 + n + i]
+        rise = numbers[b + 1 + i] - p
+        c, d = 3.0 * rise - h * (2.0 * v + v_end), h * (v + v_end) - 2.0 * rise
+        off[i] = q[i] - (p + s * (h * v + s * (c + s * d)))
+        rate[i] = 0.0 if rests else v + s * (2.0 * c + 3.0 * s * d) / h
+    if numbers[1] == 1.0:
+        off[2] -= 2.0 * math.pi * math.floor(0.5 + off[2] / (2.0 * math.pi))
+    return a
 
 
 @kernel(FUNCTION)
 def from_plan(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     """W(t) (q - q_plan(t)), the angle of the platform wrapped; at rest before the first and after the last
-    knot. numbers = [knots, 1 with a platform that turns, times..., then for each knot q (n,), q_dot (n,) and
-    W (n_u, n)]: q is cubic between two knots and W linear."""
-    n, m, count = at.q.shape[0], rows.value.shape[0], int(numbers[0])
-    size = (2 + m) * n
-    k, last = 0, count - 2
-    while k < last:  # the last knot that is not after t
-        middle = (k + last + 1) // 2
-        if numbers[HEADER + middle] <= at.t:
-            k = middle
-        else:
-            last = middle - 1
-    h = numbers[HEADER + k + 1] - numbers[HEADER + k]
-    share = (at.t - numbers[HEADER + k]) / h
+    knot. numbers = [knots, 1 with a platform that turns, then for each knot its time, q (n,), q_dot (n,) and
+    W (n_u, n)]: q is cubic between two knots and W linear. Of two knots at one time the second counts."""
+    n, m = at.q.shape[0], rows.value.shape[0]
+    off, rate = scratch(n), scratch(n)
+    a = off_plan(at.t, at.q, numbers, m, off, rate)
+    size = 1 + (2 + m) * n
+    h = numbers[a + size] - numbers[a]
+    share = (at.t - numbers[a]) / h
     rests = share < 0.0 or share > 1.0
     s = min(max(share, 0.0), 1.0)
-    a = HEADER + count + k * size
-    b = a + size
-    off, rate = scratch(n), scratch(n)
-    for i in range(n):
-        p, p_end, v, v_end = numbers[a + i], numbers[b + i], numbers[a + n + i], numbers[b + n + i]
-        rise = p_end - p
-        c, d = 3.0 * rise - h * (2.0 * v + v_end), h * (v + v_end) - 2.0 * rise
-        off[i] = at.q[i] - (p + s * (h * v + s * (c + s * d)))
-        rate[i] = 0.0 if rests else v + s * (2.0 * c + 3.0 * s * d) / h
-    if numbers[1] == 1.0:
-        off[2] -= 2.0 * math.pi * math.floor(0.5 + off[2] / (2.0 * math.pi))
     for j in range(m):
         for i in range(n):
-            one = a + (2 + j) * n + i
+            one = a + 1 + (2 + j) * n + i
             change = numbers[one + size] - numbers[one]
             W = numbers[one] + s * change
             rows.value[j] += W * off[i]
@@ -63,6 +83,29 @@ def from_plan(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
             if not rests:
                 rows.value_t[j] += change / h * off[i]
             rows.value_q[j, i] = W
+
+
+OUTSIDE = types.int64(
+    *(types.float64[::1], types.float64[:, ::1], types.float64[::1], types.int64, types.int64[::1]),
+    *(types.float64[::1], types.float64),
+)
+
+
+@compiled
+def outside(
+    times: Array, q: Array, numbers: Array, m: int, units: Integers, tube: Array, since: float
+) -> int:
+    """The first of samples at times (N,) and q (N, n), not before `since`, that is farther from the plan than
+    the tube (2,), m and rad, or N."""
+    n = q.shape[1]
+    off, rate = scratch(n), scratch(n)
+    for k in range(times.shape[0]):
+        if times[k] >= since:
+            off_plan(times[k], view(q, k * n, (n,)), numbers, m, off, rate)
+            metres, radians = norms(off, units)
+            if metres > tube[0] or radians > tube[1]:
+                return k
+    return times.shape[0]
 
 
 class FromPlan(Function):
@@ -80,6 +123,7 @@ class FromPlan(Function):
     gain : with which the rows are controlled, 1/s
     length : the way along which a platform comes back from beside it, about, m
     tube : how far from the plan is worth a finding
+    anew : what follows another plan, from q (n,); then a run that is outside the tube goes on with it
     """
 
     def __init__(
@@ -90,19 +134,21 @@ class FromPlan(Function):
         gain: float,
         length: float,
         tube: Goal,
+        anew: Callable[[Array], FromPlan] | None = None,
     ) -> None:
-        self.robot, self.at, self.tube = robot, at, tube
+        self.robot, self.at, self.tube, self.anew = robot, at, tube, anew
         parts = [np.linspace(a, b, 1 + math.ceil((b - a) / KNOT))[:-1] for a, b in pairwise(stops)]
-        self.times = np.concatenate([*parts, [stops[-1], stops[-1] + KNOT]])
-        q, u = at(self.times)
+        times = np.concatenate([*parts, [stops[-1], stops[-1] + KNOT]])
+        q, u = at(times)
         q_dot = np.array([robot.S(one) @ rates for one, rates in zip(q, u, strict=True)])
-        W = left_inverses(robot, self.times, q, u, 1.0 / gain, length)
-        self._table = np.concatenate([q, q_dot, W.reshape(len(q), -1)], axis=1).ravel()
+        W = left_inverses(robot, times, q, u, 1.0 / gain, length)
+        #: Its knots, as `from_plan` reads them.
+        self.knots = np.column_stack([times, q, q_dot, W.reshape(len(q), -1)])
 
     @property
     def duration(self) -> float:
         """Of the plan, s."""
-        return float(self.times[-2])
+        return float(self.knots[-2, 0])
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         same = robot.q_names == self.robot.q_names and robot.u_names == self.robot.u_names
@@ -111,18 +157,35 @@ class FromPlan(Function):
         return tuple(Row(f"plan.{name}", unit) for name, unit in zip(robot.u_names, units, strict=True))
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
-        header = [len(self.times), float(robot.platform.n_p >= 3)]
-        return (Stage(from_plan, robot.n_u, (), np.concatenate([header, self.times, self._table])),)
+        if self.anew is not None:
+            live = Renewed(self)
+            return (Stage(from_plan, robot.n_u, (), live.numbers, live=live),)
+        return (Stage(from_plan, robot.n_u, (), self.table(self.knots)),)
+
+    def table(self, knots: Array, room: int = 0) -> Array:
+        """What `from_plan` reads, of knots, with room for so many."""
+        numbers = np.zeros(HEADER + max(len(knots), room) * knots.shape[1])
+        numbers[:HEADER] = len(knots), self.robot.platform.n_p >= 3
+        numbers[HEADER : HEADER + knots.size] = knots.ravel()
+        return numbers
 
     def apart(self, t: ArrayLike, q: ArrayLike) -> Array:
         """How far configurations (N, n) are from the plan at their times (N,), s: (N, 2), m and rad."""
-        off = np.asarray(q, dtype=np.float64) - self.at(np.clip(np.asarray(t), 0.0, self.duration))[0]
+        off = np.asarray(q, dtype=np.float64) - self.planned(np.asarray(t))
         if self.robot.platform.n_p >= 3:
             off[:, 2] -= 2.0 * np.pi * np.round(off[:, 2] / (2.0 * np.pi))
         return np.array([error_sizes(one, self.robot.q_units) for one in off]).reshape(-1, 2)
 
+    def shown(self) -> Shown:
+        return Shown(turns=first_tip(self.robot))
+
+    def planned(self, t: Array) -> Array:
+        return self.at(np.clip(t, 0.0, self.duration))[0]
+
     def noticed(self, t: Array, q: Array) -> Iterator[Finding]:
-        """Where a run left the plan."""
+        """Where a run left the plan, unless another took its place (`Renewed.noticed`)."""
+        if self.anew is not None:
+            return
         apart = self.apart(t, q)
         (out,) = np.nonzero(np.any(apart > [self.tube.m, self.tube.rad], axis=1))
         if len(out):
@@ -131,6 +194,75 @@ class FromPlan(Function):
             back = None if out[-1] == len(t) - 1 else float(t[out[-1] + 1])
             values = {"m": float(m), "rad": float(rad), "samples": len(out), "back": back, **tube}
             yield Finding("left_plan", values, {"t": float(t[out[0]])})
+
+
+class Renewed(Renewal):
+    """The numbers of `from_plan` along a run in which another plan takes the place of one whose tube the
+    robot has left, from that sample on. What was before stays in the table: it is a function of time."""
+
+    def __init__(self, first: FromPlan) -> None:
+        robot, tube = first.robot, first.tube
+        self._first, self._room = first, max(ROOM * len(first.knots), math.ceil(ROOM_FOR / KNOT))
+        self._given = robot.n_u, unit_codes(robot.q_units), np.array([tube.m, tube.rad])
+        self._outside = checked_by_caller(outside, OUTSIDE)
+        super().__init__(first.table(first.knots, self._room))
+        self.begin()
+
+    def begin(self) -> None:
+        self._plans, self._since = [(0.0, self._first)], -math.inf
+        self._knots = self._first.knots
+        self._made: list[dict[str, float]] = []
+        self._refused: list[tuple[float, str]] = []
+        self.events = []
+        self.set(self._first.table(self._knots, self._room))
+
+    def stays(self, times: Array, q: Array) -> int:
+        at = np.ascontiguousarray(times), np.ascontiguousarray(q)
+        return int(self._outside(*at, self.numbers, *self._given, self._since))
+
+    def renew(self, t: float, q: Array) -> None:
+        begun, now = self._plans[-1]
+        if now.anew is None or self.stays(np.array([t]), q[np.newaxis]):
+            return
+        self._since = t + WAIT
+        m, rad = now.apart([t - begun], [q])[0].tolist()
+        try:
+            new = now.anew(q)
+            if len(new.knots) > self._room:
+                raise RunError(
+                    f"the new plan takes {new.duration:.4g} s, which is too long to be put in its place"
+                )
+        except NmmError as error:
+            self._refused.append((t, str(error)))
+            return
+        # The plan before ends where it was at t.
+        (there,), (u,) = now.at(np.array([t - begun]))
+        before = self._knots[self._knots[:, 0] < t - 1e-6]
+        end = [t, *there, *(new.robot.S(there) @ u), *self._knots[max(len(before) - 1, 0), 1 + 2 * len(q) :]]
+        after = new.knots + t * (np.arange(new.knots.shape[1]) == 0)
+        self._knots = np.vstack([before, end, after]) if len(before) else after
+        self._plans.append((t, new))
+        self._made.append({"t": t, "m": m, "rad": rad, "duration": new.duration})
+        why = f"{m:.3g} m and {rad:.3g} rad from it; another one takes {new.duration:.3g} s"
+        self.events.append((t, "plan", "is made anew", why))
+        self.set(self._first.table(self._knots[-self._room :], self._room))
+
+    def planned(self, t: Array) -> Array:
+        found = np.empty((len(t), self._first.robot.n))
+        for since, function in self._plans:
+            found[t >= since] = function.planned(t[t >= since] - since)
+        return found
+
+    def noticed(self, end: float) -> Iterator[Finding]:
+        if self._made:
+            yield Finding("replanned", {"plans": self._made}, {"t": self._made[0]["t"]})
+        if self._refused:
+            t, why = self._refused[0]
+            yield Finding("not_replanned", {"times": len(self._refused), "why": why}, {"t": t})
+        begun, last = self._plans[-1]
+        left = begun + last.duration - end
+        if self._made and left > KNOT:
+            yield Finding("plan_cut", {"left": left}, {"t": end})
 
 
 def left_inverses(robot: Robot, times: Array, q: Array, u: Array, tau: float, length: float) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
@@ -117,6 +117,7 @@ class Plan:
         pace: float = 0.8,
         tube: Goal | None = None,
         priority: int = 1,
+        replan: Callable[[Plan, Array], Plan] | None = None,
     ) -> Task:
         """A task that follows the plan, a row an input: its rates, and feedback from where it leads.
 
@@ -131,6 +132,9 @@ class Plan:
         pace : share of the plan's speed; below 1 feedback has room where the plan is at its limits. It takes
             plan.duration / pace
         tube : how far from the plan is worth a warning; `Goal(m=0.1, rad=0.2)` when not given
+        replan : another plan where a run of `simulate` or `rollout` is outside the tube, from this one and q
+            (n,): `nmm.replan`, or a function with its own obstacles. The run goes on with it, and makes
+            another at most once a second
 
         Examples
         --------
@@ -141,16 +145,30 @@ class Plan:
         >>> bool(np.abs(run.q[-1] - plan.end).max() < 0.001)
         True
         """
+        tube = Goal(m=0.1, rad=0.2) if tube is None else tube
+        function = self._followed(positive(gain, "gain"), positive(length, "length"), pace, tube, replan)
+        return Task(function, np.zeros(self.robot.n_u), gain, priority, name="plan")
+
+    def _followed(
+        self,
+        gain: float,
+        length: float,
+        pace: float,
+        tube: Goal,
+        replan: Callable[[Plan, Array], Plan] | None,
+    ) -> FromPlan:
         motion, share = self.found.motion, positive(pace, "pace")
 
         def at(t: Array) -> tuple[Array, Array]:
             q, u = motion.at(share * t)
             return q, share * u
 
-        sizes = positive(gain, "gain"), positive(length, "length")
-        tube = Goal(m=0.1, rad=0.2) if tube is None else tube
-        function = FromPlan(self.robot, at, self.stops / share, *sizes, tube)
-        return Task(function, np.zeros(self.robot.n_u), gain, priority, name="plan")
+        def anew(q: Array) -> FromPlan:
+            other = self if replan is None else replan(self, q)
+            return other._followed(gain, length, pace, tube, replan)
+
+        given = self.robot, at, self.stops / share, gain, length, tube
+        return FromPlan(*given, None if replan is None else anew)
 
     def trajectory(self, dt: float = 0.02) -> Trajectory:
         """The motion sampled every dt, s, and at its end, as a run: it plays, saves and compares. Its task is

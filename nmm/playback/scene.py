@@ -93,7 +93,8 @@ def playback_scene(
         tag = look.name if several else ""
         if samples := ghost_samples(motion, (3 if several else 6) if ghosts is None else ghosts):
             texts = [f"{tag}{' ' * several}{motion.t[k]:.3g} s" for k in samples]
-            robot.ghosts(f"{path}/ghosts", motion.q[samples], wheels[i][samples], texts)
+            ghosts_of = robot.ghosts(f"{path}/ghosts", motion.q[samples], wheels[i][samples], texts)
+            drawing.commands.append(ghosts_of)
         # Unlabelled, the page attributes the line to the end-effector.
         label = look.name or ("" if motion.driven is not None else motion.robot.name)
         drawing.add(
@@ -102,10 +103,13 @@ def playback_scene(
         drawn = samples_kept(motion.t, fps)
         for name, points, thick in (
             ("path", motion.driven, 1.0),
-            ("platform", _on_the_floor(motion, size), 0.6),
+            ("platform", _on_the_floor(motion.robot, motion.q, size), 0.6),
         ):
             if points is not None:
                 _line(drawing, f"{path}/{name}", color, points[drawn], motion.t[drawn] - start, thick)
+        planned = None if motion.planned is None else _on_the_floor(motion.robot, motion.planned, size)
+        if planned is not None:
+            _line(drawing, f"{path}/plan", DESIRED, planned[drawn], thick=0.6)
         draw_nearest(drawing, motion, path, color if several else None, start, fps)
         if shown is not None:
             animations += shown.draw(drawing, i, path, color, start)
@@ -238,9 +242,9 @@ def _targets(drawing: Drawing, motions: Sequence[Motion], size: float) -> None:
         drawing.add("target", color=list(TARGET))
 
 
-def _on_the_floor(motion: Motion, size: float) -> Array | None:
-    """The platform's path (N, 3), just above the floor; None if it stays."""
-    at = base_position(motion.robot, motion.q)
+def _on_the_floor(robot: Robot, q: Array, size: float) -> Array | None:
+    """The platform's path (N, 3) along q (N, n), just above the floor; None if it stays."""
+    at = base_position(robot, q)
     if float(np.ptp(at, axis=0).max(initial=0.0)) < 1e-6:
         return None
     return np.column_stack([at, np.full(len(at), 2e-3 * size)])

@@ -71,14 +71,15 @@ class DrawnRobot:
             animations += animation(path, times, {"position": place, "quaternion": turn})
         return animations
 
-    def ghosts(self, path: str, q: Array, wheels: Array, texts: Sequence[str]) -> None:
-        """Transparent copies at q (G, n), texts above them; the page makes them from the robot's geometry."""
+    def ghosts(self, path: str, q: Array, wheels: Array, texts: Sequence[str]) -> Command:
+        """The command for transparent copies at q (G, n), with texts above them, if any; the page makes them
+        from the robot's geometry."""
         matrices = np.array([self.placements.world(*at) for at in zip(q, wheels, strict=True)])
         poses = np.concatenate(position_and_quaternion(matrices), axis=-1)
         joints = [
             {"path": joint, "poses": packed(poses[:, i], np.float64)} for i, joint in enumerate(self.paths)
         ]
-        self._drawing.add("ghosts", path=path, texts=list(texts), joints=joints)
+        return {"type": "ghosts", "path": path, "texts": list(texts), "joints": joints}
 
 
 def _mixed(color: Sequence[float], tint: Rgb | None) -> Rgb:

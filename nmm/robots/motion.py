@@ -76,6 +76,7 @@ class Motion:
     q (N, n), u (N, n_u) : coordinates and inputs, in `robot.q_units` and `robot.u_units`
     path (N, 3) : the end-effector's path, m in the world; computed from `frame` when not given
     desired (M, 3) : the desired path, m in the world
+    planned (N, n) : where its plan was, if it followed one
     target (3,), or (T, 3) : a fixed point to look at or to reach, or several, m in the world
     label : name in the legend, such as "RG"
     frame : the end-effector's frame
@@ -104,6 +105,7 @@ class Motion:
     u: Array
     path: Array | None = None
     desired: Array | None = None
+    planned: Array | None = None
     target: Array | None = None
     label: str = ""
     frame: str | None = None
@@ -120,6 +122,7 @@ class Motion:
             "u": matrix(self.u, (t.size, self.robot.n_u), "u"),
             "path": None if self.path is None else matrix(self.path, (t.size, 3), "path"),
             "desired": None if self.desired is None else _points(self.desired, "desired"),
+            "planned": None if self.planned is None else matrix(self.planned, self.q.shape, "planned"),
             "target": None if self.target is None else _target(self.target),
         }
         for name, value in checked.items():

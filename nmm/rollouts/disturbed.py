@@ -15,7 +15,7 @@ from nmm.control.stepping import hold_inputs
 from nmm.errors import InputError, expect
 from nmm.findings import Finding
 from nmm.functions.program import BESIDE, LaidOut, run_program
-from nmm.kernels.compiled import checked_by_caller, compiled_without_gil, scratch
+from nmm.kernels.compiled import checked_by_caller, compiled_without_gil, scratch, view
 from nmm.kernels.record_layout import Matrix, Vector, record_type, views
 from nmm.resolvers.answer import SINGULAR_J
 from nmm.resolvers.partitions import PartitionState
@@ -67,9 +67,11 @@ def _broadcast(value: ArrayLike, shape: tuple[int, ...], what: str) -> Array:
 
 
 _DRIFT = types.int64(
-    *(types.int64[::1], types.float64[::1], types.float64[::1], types.float64[::1]),
+    *(types.int64[::1], types.float64[::1], types.float64[::1], types.int64, types.int64),
     *(record_type(Disturbed), types.int64, record_type(Recorded)),
 )
+#: Samples in one compiled call, where the run may replace numbers of the controller's functions.
+AT_ONCE = 200
 
 
 @compiled_without_gil
@@ -77,26 +79,25 @@ def drift(
     integers: Integers,
     floats: Array,
     times: Array,
-    start: Array,
+    first: int,
+    last: int,
     disturbed: Disturbed,
     partitioned: int,
     found: Recorded,
 ) -> int:
-    """Sample at all times from q = start, inputs held in between; returns how many samples were recorded. q,
-    r and errors are the robot's, not those that the controller sees; u is what the controller asks for."""
+    """Sample from the time `first` to before `last`, inputs held in between, from q there, which is recorded;
+    returns how many samples were recorded in all. q, r and errors are the robot's, not those that the
+    controller sees; u is what the controller asks for."""
     e = views(ControlStep, integers, floats, BESIDE)
     b = views(LaidOut, integers, floats, 0).buffers
-    n, m = start.shape[0], disturbed.slip.shape[0]
-    q, seen, ahead, acting = scratch(n), scratch(n), scratch(n), scratch(m)
-    for i in range(n):
-        q[i] = start[i]
-    for k in range(times.shape[0]):
+    n, m = found.q.shape[1], disturbed.slip.shape[0]
+    seen, acting = scratch(n), scratch(m)
+    for k in range(first, last):
+        q = view(found.q, k * n, (n,))
         noisy = disturbed.noise.shape[0] > 0
         for i in range(n):
             seen[i] = q[i] + (disturbed.noise[k, i] if noisy else 0.0)
         status = compiled_sample(times[k], times[k - 1] if k > 0 else -math.inf, seen, integers, floats)
-        for i in range(n):
-            found.q[k, i] = q[i]
         if status >= SINGULAR_J or not within_bound(e.answer.u) or not within_bound(q):
             return k
         if noisy:  # the task as it is
@@ -108,23 +109,41 @@ def drift(
                 acting[j] = (
                     disturbed.slip[j] * found.u[k - disturbed.delay, j] if k >= disturbed.delay else 0.0
                 )
+            ahead = view(found.q, (k + 1) * n, (n,))
             hold_inputs(q, acting, times[k + 1] - times[k], integers, floats, ahead)
-            for i in range(n):
-                q[i] = ahead[i]
-    return times.shape[0]
+    return last
 
 
 def driven_disturbed(
     controller: Controller, recorder: Recorder, times: Array, q: Array, disturbed: Disturbed
 ) -> tuple[Outcome, FindingLine]:
-    controller.reset()
-    partitioned, found = int(isinstance(controller.solver.state, PartitionState)), recorder.found
-    with controller.solver.compiled() as blocks:
-        count = checked_by_caller(drift, _DRIFT)(*blocks, times, q, disturbed, partitioned, found)
+    solver, found, renewals = controller.solver, recorder.found, controller.solver.program.renewals
+    solver.begin_run()
+    given = disturbed, int(isinstance(solver.state, PartitionState)), found
+    fly = checked_by_caller(drift, _DRIFT)
+
+    def as_seen(some: slice) -> Array:
+        return found.q[some] + (disturbed.noise[some] if len(disturbed.noise) else 0.0)
+
+    found.q[0] = q
+    count, last = 0, 0
+    with solver.compiled() as blocks:
+        while last < len(times) and count == last:
+            first, last = count, min(count + AT_ONCE, len(times)) if renewals else len(times)
+            for one in renewals:
+                one.renew(float(times[first]), as_seen(slice(first, first + 1))[0])
+            left = solver.sample.snapshot()
+            count = fly(*blocks, times, first, last, *given)
+            for one in renewals:
+                those = slice(first + 1, count)
+                stays = first + 1 + one.stays(times[those], as_seen(those))
+                if stays < count:  # begin again, up to the sample before the one that needs others
+                    solver.sample.restore(left)
+                    count = last = fly(*blocks, times, first, stays, *given)
     recorder.passed_over(count - 1)
     if count == len(times):
         return Outcome.COMPLETED, ()
-    seen = found.q[count] + (disturbed.noise[count] if len(disturbed.noise) else 0.0)
+    (seen,) = as_seen(slice(count, count + 1))
     if controller.solver.failed and np.linalg.norm(seen) < DIVERGED_BEYOND:
         return Outcome.SINGULAR, (finding_in(controller.solver.failure(times[count], seen)),)
     beyond = {"what": "coordinates or inputs", "bound": DIVERGED_BEYOND}

@@ -220,7 +220,11 @@ class _Runs:
         self.kept.put(room, row, recorder.found, count)
         measure(self.times, count, recorder.found, self.measures[i])
         self.samples[i] = count
-        self.outcome[i], self.message[i] = _ended(outcome, recorder, self.until, controller), line(reasons)
+        why = (
+            *reasons,
+            *(one for made in controller.solver.program.renewals for one in made.noticed(recorder.reached)),
+        )
+        self.outcome[i], self.message[i] = _ended(outcome, recorder, self.until, controller), line(why)
 
     def _controller(self, i: int) -> tuple[Controller, Recorder, Integrator]:
         """This thread's own controller, with room for its samples, and the integrator."""

@@ -60,6 +60,10 @@ class Leaving:
     earlier: float
     q: Array | None = None
 
+    def stays(self, times: Array, q: Array) -> int:
+        """How many samples at times (N,), s, and q (N, n) belong to this leg."""
+        return self.schedule.stays(times, q)
+
     def changes(self, t: float, q: Array) -> bool:
         """Whether the sample at t and q belongs to another leg."""
         if self.schedule.changes(t, q):
@@ -95,6 +99,8 @@ def record_run(
     guarded_advance = guarded(advance, controller)
     outcome, reasons = drive_loop(controller, guarded_advance, recorder, times, q, progress, until, leg)
     recorder.blocking = controller.report.blocking()
+    for one in controller.solver.program.renewals:
+        recorder.findings += one.noticed(recorder.reached)
     if controller.safety_filter is not None:
         recorder.counts = controller.safety_filter.counts
     last = recorder.q[len(recorder) - 1] if len(recorder) else q
@@ -129,7 +135,7 @@ def drive_loop(
     leg: Leaving | None = None,
 ) -> tuple[Outcome, FindingLine]:
     if leg is None:
-        controller.reset()
+        controller.solver.begin_run()
     elif controller.solver.retreat_state is not None:  # what the leg before leaves to this one is there
         recorder.backed_off = controller.solver.retreat_state.count
     try:
@@ -176,7 +182,8 @@ class _Loop:
     pass_over: CompiledLoop | None
 
     def __post_init__(self) -> None:
-        self.state, self.kept = self.controller.solver.state, self.controller.solver.sample
+        solver = self.controller.solver
+        self.state, self.kept, self.renewals = solver.state, solver.sample, solver.program.renewals
 
     def run(self, q: Array, progress: Callable[[float], None] | None) -> None:
         recorder, times, steps = self.recorder, self.times, len(self.times) - 1
@@ -216,9 +223,9 @@ class _Loop:
             return k, False
         left = self.kept.snapshot()
         reached, whole = self.pass_over(self.times, k, last, found)
-        if self.leg is not None:
+        for one in (*self.renewals, *(() if self.leg is None else (self.leg,))):
             those = slice(k + 1, reached + 1)
-            stays = k + self.leg.schedule.stays(self.times[those], found.q[those])
+            stays = k + one.stays(self.times[those], found.q[those])
             if stays < reached:  # begin again, up to the sample before the event
                 whole, reached = False, stays
                 self.kept.restore(left)
@@ -275,6 +282,8 @@ class _Loop:
         _within_bound(q, "coordinates", t)
         if t - earlier < (controller.dt or math.nan) * (1.0 - 1e-9):
             self.kept.elapsed = t - earlier
+        for one in self.renewals:
+            one.renew(t, q)
         controller.period_monitor.forget()  # compiled code has made those between
         try:
             controller(t, q)

@@ -61,6 +61,7 @@ def join(
             alone = shown_frame([task], robot)
             if alone.frame == drawn.frame:
                 desired = alone.desired(desired, arrays["r_d"][:, first[i] :])
+    happened = [*schedule.events, *(event for part in parts for event in part.events)]
     more = {name: arrays.pop(name) for name in [*arrays] if name in parts[0].more}
     joined = replace(
         parts[0],
@@ -74,8 +75,9 @@ def join(
         frame=drawn.frame,
         path=path,
         desired=desired,
+        planned=None,
         target=drawn.mark(path),
-        events=tuple(schedule.events),
+        events=tuple(sorted(dict.fromkeys(happened), key=lambda event: event.t)),
         **({} if found is None else found.kept),
     )
     return joined, found

@@ -12,6 +12,7 @@ from nmm.control.limits import Limits
 from nmm.control.quantities import Record, saved
 from nmm.control.recorded import Recorded, room
 from nmm.control.safety_filter import Counts
+from nmm.control.sequence import Event
 from nmm.control.step import Step
 from nmm.findings import Finding
 from nmm.functions.program import COMPILED
@@ -136,6 +137,13 @@ class Recorder:
         if found is not None and (found.code, found.values) not in known:
             self.findings.append(found)
 
+    @property
+    def _planned(self) -> Array | None:
+        """Where the plan that it follows was at the samples, (N, n)."""
+        renewed = [one.planned(self.t) for one in self.controller.solver.program.renewals]
+        found = (*renewed, *(task.function.planned(self.t) for task in self.controller.task))
+        return next((one for one in found if one is not None), None)
+
     def trajectory(self, dt: float, method: str) -> Trajectory:
         found, controller = self.so_far, self.controller
         robot, rows, scene = controller.robot, controller.rows, controller.solver.scene
@@ -151,7 +159,11 @@ class Recorder:
         limited, within = shares(kept, robot, found.q, found.u, found.limited)
         moving = np.flatnonzero(~standing(robot, limited, within))
         path = self._shown.path(robot, found.q)
-        desired = self._shown.desired(path, found.r_d) if path is not None and self._shown.rows else None
+        desired, planned = None, self._planned
+        if path is not None and self._shown.rows:
+            desired = self._shown.desired(path, found.r_d)
+        elif path is not None and planned is not None:
+            desired = self._shown.path(robot, planned)
         worked_out = {
             "t": self.t.copy(),
             "sigma_min": self.singular_values[:, -1],
@@ -160,6 +172,7 @@ class Recorder:
             "shares": within,
             "path": path,
             "desired": desired,
+            "planned": planned,
             "target": self._shown.mark(path),
             **distances,
         }
@@ -178,6 +191,7 @@ class Recorder:
             resolver=controller.resolver.name,
             method=method,
             dt=dt,
+            events=tuple(Event(*event) for one in controller.solver.program.renewals for event in one.events),
             frame=self._shown.frame,
             kinematics_off=np.nan if three is None else controller.solver.program.kinematics_off(three),
         )

@@ -111,6 +111,7 @@ class Trajectory:
     frame: str | None = None
     path: Array | None = None
     desired: Array | None = None
+    planned: Array | None = None
     target: Array | None = None
     unmet: Residuals = NO_RESIDUALS
     limited: bool = False
@@ -277,6 +278,7 @@ class Trajectory:
             u=self.u,
             path=self.path,
             desired=self.moving,
+            planned=self.planned,
             target=self.marks if len(self.marks) else None,
             label=self.called if label is None else label,
             frame=self.frame,

@@ -149,8 +149,8 @@ class Scenario:
                 self._robot = self.parts.robot.build(self.document.absolute, ("robot",))
         return self._robot
 
-    def controller(self) -> Controller:
-        """A new controller; with it, every key has been checked.
+    def controller(self, progress: Progress | None = None) -> Controller:
+        """A new controller; with it, every key has been checked. `progress` is of a plan that it follows.
 
         Raises
         ------
@@ -162,7 +162,7 @@ class Scenario:
         robot = self.robot()
         with self._located():
             own = self._own if self.parts.resolver.kind == OWN else None
-            return self.parts.build(robot, self.absolute, own)
+            return self.parts.build(robot, self.absolute, own, progress)
 
     def obstacles(self, robot: Robot) -> tuple[Obstacle, ...]:
         """What a robot keeps off in it; `ScenarioError` for a mesh that is not there."""

@@ -1,6 +1,7 @@
 """The keys of a scenario, from the top."""
 
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 from pydantic import BeforeValidator, Field
@@ -72,7 +73,11 @@ class TrackPart(Part):
     )
     tube: GoalPart = Field(
         GoalPart.model_validate({"m": 0.1, "rad": 0.2}),
-        description="how far from the plan, m and rad, is worth a warning",
+        description="how far from the plan, m and rad, is worth a warning, or another plan",
+    )
+    replan: bool = Field(
+        False,
+        description="whether the run goes on with another plan where the robot is farther from it than tube",
     )
 
 
@@ -169,15 +174,25 @@ class ScenarioPart(Part):
         """The target at which a closed loop ends; one that follows a plan goes on for its duration."""
         return None if self.until is None or self.plan is not None else self.until.make()
 
-    def build(self, robot: Robot, absolute: Absolute, own: Resolver | None = None) -> Controller:
+    def build(
+        self,
+        robot: Robot,
+        absolute: Absolute,
+        own: Resolver | None = None,
+        progress: Progress | None = None,
+    ) -> Controller:
         """The controller, after a check of q0; errors know their key. `absolute` finds the files named, `own`
-        is a resolver in the place of the file's."""
+        is a resolver in the place of the file's, `progress` is of a plan that is followed."""
         self.check_start(robot)
         with at("task"):
             task = build_tasks(self.task, robot)
         if self.plan is not None and (track := self.plan.track) is not None:
-            plan = self.build_plan(robot, absolute, None)
-            task = [plan.reference(track.gain, track.length, track.pace, track.tube.make())]
+            from nmm.plans.replan import replan
+
+            plan = self.build_plan(robot, absolute, progress)
+            anew = partial(replan, **self.plan.given("seconds", "seed")) if track.replan else None
+            given = track.given("gain", "length", "pace")
+            task = [plan.reference(**given, tube=track.tube.make(), replan=anew)]
             with at("duration"):
                 least = plan.duration / track.pace
                 expect(

@@ -3,7 +3,7 @@
 {
   const THREE = MeshCat.THREE;
   const [WINDOW, KEPT, REDRAW, PATIENCE] = [20, 30, 100, 5000]; // s, s, ms, ms
-  const drive = (nmm.drive = { targets: [], active: 0, time: 0, paused: false });
+  const drive = (nmm.drive = { targets: [], active: 0, time: 0, paused: false, plan: false, followed: 0 });
   const panel = document.createElement("div");
   const parts = {};
   let [drawn, axes, polled] = [0, [], null];
@@ -75,6 +75,8 @@
     nmm.element(head, "h2", {}, "Drive");
     parts.pause = nmm.element(head, "button", { id: "pause", title: "Pause or go on (space)" }, "Pause");
     parts.pause.addEventListener("click", () => order(drive.paused ? "go" : "pause"));
+    parts.plan = nmm.element(head, "button", { id: "plan", "aria-pressed": "false", title: "Plan the way to the target, round what is in the way, and follow it (N)" }, "Plan");
+    parts.plan.addEventListener("click", () => order(drive.plans ? "react" : "plan"));
     const again = nmm.element(head, "button", { id: "again", title: "Robot and targets back where they began (Home)" }, "Begin again");
     again.addEventListener("click", () => order("restart"));
     parts.told = nmm.element(panel, "p", { id: "told", role: "status" });
@@ -98,7 +100,7 @@
     });
     drive.active = Math.max(0, drive.targets.findIndex((target) => target.gizmo));
     parts.choices = nmm.element(panel, "div", { id: "choices" });
-    nmm.element(panel, "p", { class: "quiet" }, "Drag the red ball (Shift: up and down) or an arrow; or arrow keys, Page Up and Page Down, a gamepad's sticks.");
+    nmm.element(panel, "p", { class: "quiet" }, "Drag the red ball (Shift: up and down) or an arrow; or arrow keys, Page Up and Page Down, a gamepad's sticks. N plans the way round what is between.");
     const run = nmm.runs[0];
     axes = Object.keys(run.columns);
     empty(run);
@@ -151,8 +153,26 @@
     run.samples = run.t.length;
   }
 
-  nmm.hooks.drive = ({ t, targets, at, samples, paused, told, wrong }) => {
+  // The plan that it follows: its ways, dashed, and copies of the robot along it.
+  nmm.hooks.plan = ({ lines, ghosts }) => {
+    const before = nmm.node("/nmm/plan");
+    const stays = (one) => {
+      for (let part = one; part; part = part.parent) if (part === before) return false;
+      return true;
+    };
+    for (const kind of ["paths", "desired"]) nmm.scenery[kind] = (nmm.scenery[kind] || []).filter(stays);
+    nmm.ghosts = (nmm.ghosts || []).filter(stays);
+    nmm.viewer.delete_path(nmm.split("/nmm/plan"));
+    lines.forEach((line, i) => nmm.hooks.path({ ...line, path: `/nmm/plan/${i}`, text: "plan" }));
+    if (ghosts !== null) nmm.hooks.ghosts(ghosts);
+    drive.plan = lines.length > 0;
+    if (drive.plan) drive.followed += 1;
+  };
+
+  nmm.hooks.drive = ({ t, targets, at, samples, paused, plans, told, wrong }) => {
     remember(samples);
+    drive.plans = plans;
+    parts.plan.setAttribute("aria-pressed", String(plans));
     drive.time = t;
     drive.paused = paused;
     nmm.stage.duration = Math.max(t, 1e-3);
@@ -253,6 +273,7 @@
     PageDown: (event) => step(event, "z", -1),
     " ": () => order(drive.paused ? "go" : "pause"),
     Home: () => order("restart"),
+    n: () => order(drive.plans ? "react" : "plan"),
   });
   for (const key of ["End", "+", "-", "0", "l"]) delete nmm.keys[key];
 

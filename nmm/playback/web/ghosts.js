@@ -101,7 +101,7 @@
       });
       nmm.viewer.set_object(nmm.split(`${path}/${k}/robot`), group);
       const highest = top(geometry);
-      if (highest) nmm.viewer.set_object(nmm.split(`${path}/${k}/text`), nmm.texts.add(texts[k], highest));
+      if (highest && texts[k]) nmm.viewer.set_object(nmm.split(`${path}/${k}/text`), nmm.texts.add(texts[k], highest));
     }
     nmm.ghosts = (nmm.ghosts || []).concat(nmm.node(path));
   };

@@ -250,7 +250,7 @@
   }
 
   // A path without times is dashed; one with times grows as the robot drives it, over a faint whole.
-  nmm.hooks.path = ({ path, color, points, times, thick }) => {
+  nmm.hooks.path = ({ path, color, points, times, thick, text = "desired path" }) => {
     const radius = 0.0032 * nmm.stage.size * thick;
     const [kept, when] = thinned(points, times, 1.5 * radius);
     if (kept.length < 2) return;
@@ -261,7 +261,7 @@
       const themed = () => [ink.color, ink.emissive].forEach((part) => part.copy(nmm.color(nmm.theme.paint(color))));
       themed();
       nmm.theme.listeners.push(themed);
-      nmm.legend({ kind: "dashed", color, text: "desired path" });
+      nmm.legend({ kind: "dashed", color, text });
     } else {
       const driven = tube(kept, 1.25 * radius);
       const faint = driven.clone();
