@@ -361,6 +361,8 @@ EXAMPLES: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
         {"margin": -0.0125, "edge": ["front", "left"]},
         {"t": 1.5},
         "the robot tips at t = 1.5 s: the zero-moment point is 12.5 mm outside the edge from front to left",
+    ),
+    (
         "replanned",
         {"plans": [{"t": 3.5, "m": 0.25, "rad": 0.1, "duration": 9.0}]},
         {"t": 3.5},
