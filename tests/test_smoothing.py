@@ -209,7 +209,7 @@ def test_a_smooth_plan_goes_on_smooth():
     plan = planned("unicycle_3r")
     (q,), _ = plan(0.4 * plan.duration)
     for obstacles in (None, [WALL, nmm.Obstacle(nmm.Cylinder(0.1, 2.0), [5.0, 1.0, 0.5], name="post")]):
-        on = nmm.replan(plan, q + [0.0, 0.02, 0.05, 0.0, 0.0, 0.0], obstacles)
+        on = nmm.replan(plan, q + np.array([0.0, 0.02, 0.05, 0.0, 0.0, 0.0]), obstacles)
         assert on.smooth
         check(on)
         off = on.end - plan.end
