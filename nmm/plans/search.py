@@ -123,6 +123,9 @@ def plan(
 class Search:
     """What one plan needs: the trees, the check of distances, and the goals."""
 
+    _ends: float
+    asked_kept: Array
+
     def __init__(
         self,
         robot: Robot,
