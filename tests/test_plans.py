@@ -273,12 +273,14 @@ def test_a_seed_gives_one_plan():
 
 
 def test_more_shortening_gives_no_longer_plan():
+    """Where legs are cut the robot stops once more: that counts, too."""
     robot = nmm.load("unicycle_3r")
-    durations = [
-        nmm.plan(robot, robot.rest, BEHIND, [WALL], limits=LIMITS, shorten=count).duration
-        for count in (0, 300)
-    ]
-    assert durations[1] < durations[0]
+    for seed in range(3):
+        durations = [
+            nmm.plan(robot, robot.rest, BEHIND, [WALL], limits=LIMITS, shorten=count, seed=seed).duration
+            for count in (0, 100, 1500)
+        ]
+        assert durations[2] < durations[1] < durations[0]
 
 
 def test_an_impossible_plan_says_what_it_tried():
@@ -404,3 +406,30 @@ def test_a_target_that_moves_is_no_goal_of_a_plan():
     with pytest.raises(nmm.errors.ScenarioError) as found:
         nmm.Scenario.load("unicycle_2r_position", {"plan": True}).run()
     assert "moves" in found.value.what
+
+
+def test_a_margin_is_kept_where_there_is_room_and_less_where_there_is_none():
+    """The wall: 80 mm on the way; a goal 45 mm before it is reached all the same, with what it has."""
+    robot = nmm.load("unicycle_3r")
+    goals = {0.08: {"x": 6.0, "y": 0.0, "theta": 0.0}, 0.043: {"x": 2.4, "y": 0.0, "theta": 0.0, "q1": 3.0}}
+    for least, goal in goals.items():
+        plan = nmm.plan(robot, robot.rest, goal, [WALL], limits=LIMITS, margin=0.05)
+        check(plan, distance=min(least, 0.03))
+        scene = plan.found.scene
+        pairs = [k for k, names in enumerate(scene.names) if "wall" in names]
+        q, _ = plan(np.linspace(0.0, plan.duration, 300))
+        near = min(scene.queries.distances(0.0, one, pairs).min() for one in q)
+        assert least - 1e-3 <= near <= 0.12
+        again = nmm.replan(plan, plan(0.3 * plan.duration)[0][0])
+        q, _ = again(np.linspace(0.0, again.duration, 300))
+        assert min(scene.queries.distances(0.0, one, pairs).min() for one in q) >= least - 1e-3
+    with pytest.raises(nmm.InputError, match="margin"):
+        nmm.plan(robot, robot.rest, goals[0.08], [WALL], margin=-0.1)
+
+
+def test_pairs_that_are_always_near_keep_their_distance_beside_a_margin():
+    """A margin does not leave out what is always nearer than distance and margin together."""
+    robot = nmm.load("unicycle_3r")
+    given = robot, robot.rest, {"x": 2.0, "y": 0.5, "theta": 0.0}, [WALL]
+    names = [nmm.plan(*given, margin=margin).found.scene.names for margin in (0.0, 0.5)]
+    assert names[0] == names[1]

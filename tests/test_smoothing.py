@@ -183,3 +183,35 @@ def test_a_scenario_may_ask_for_a_smooth_plan():
     plan = scenario.override("plan.smooth", True).plan()
     assert plan.smooth
     assert plan.duration < before.duration
+
+
+def test_a_smooth_plan_is_followed_within_its_distances():
+    """From 5 cm beside it, at 0.6 of its speed: at 0.8 it is too fast for its distance from the wall."""
+    plan = planned("unicycle_3r", margin=0.05)
+    assert plan.smooth
+    kept = nmm.Collisions(0.03, obstacles=[WALL])
+    controller = nmm.Controller(
+        *(plan.robot, plan.reference(pace=0.6), nmm.ProjectedGradient()),
+        limits=LIMITS,
+        collisions=kept,
+        dt=0.02,
+        kinematics="compiled",
+    )
+    start = plan.corners[0] + [0.0, 0.05, 0.1, 0.0, 0.0, 0.0]
+    run = nmm.simulate(controller, start, plan.duration / 0.6 + 3.0, 0.02, "zoh")
+    assert run.complete
+    assert run.clearance_between.min() >= 0.03
+    assert np.abs(run.q[-1] - plan.end).max() < 2e-3
+
+
+def test_a_smooth_plan_goes_on_smooth():
+    """From beside it, in less than what is left of it with rests; and round a post that stands on it now."""
+    plan = planned("unicycle_3r")
+    (q,), _ = plan(0.4 * plan.duration)
+    for obstacles in (None, [WALL, nmm.Obstacle(nmm.Cylinder(0.1, 2.0), [5.0, 1.0, 0.5], name="post")]):
+        on = nmm.replan(plan, q + np.array([0.0, 0.02, 0.05, 0.0, 0.0, 0.0]), obstacles)
+        assert on.smooth
+        check(on)
+        off = on.end - plan.end
+        assert np.abs([*off[:2], np.sin(0.5 * off[2]), *off[3:]]).max() < 1e-9
+        assert on.duration < plan.duration

@@ -62,7 +62,7 @@ class MotionCheck:
 
     def widen(self, configurations: Array, margin: float) -> None:
         """Keep so much more than the scene's distance, m, or as much as these (K, n) have."""
-        if self.scene is not None:
+        if self.scene is not None and margin > 0.0:
             pairs = range(len(self.kept))
             least = np.min([self.scene.queries.distances(0.0, q, pairs) for q in configurations], axis=0)
             self.kept[:] = np.clip(least - 4.0 * MARGIN, self.kept, self.scene.distance + margin)

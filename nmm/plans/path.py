@@ -114,11 +114,11 @@ def shortened(
         if i == j:
             continue
         between = np.vstack([(1.0 - one) * legs[i], legs[i + 1 : j], two * legs[j]])
-        before = float(guide.times(between).sum())
         for new in (guide.way(a, b), _with_straight_arm(guide, between, first)):
-            if len(new) and before - float(guide.times(new).sum()) > WORTH and blocked(a, new) < 0:
-                parts = [legs[:i], one * legs[i : i + 1], new, (1.0 - two) * legs[j : j + 1], legs[j + 1 :]]
-                legs, known = guide.merged(np.vstack(parts)), False
+            parts = [legs[:i], one * legs[i : i + 1], new, (1.0 - two) * legs[j : j + 1], legs[j + 1 :]]
+            shorter = guide.merged(np.vstack(parts))  # with the stops where legs were cut
+            if until[-1] - float(guide.times(shorter).sum()) > WORTH and blocked(a, new) < 0:
+                legs, known = shorter, False
                 break
     return legs
 

@@ -73,6 +73,8 @@ def replan(
     search = Search(robot, here, [old.goal], (), seed=seed, **asked)
     search.begin(positive(seconds, "seconds"), progress)
     rest = _rest(plan, here, t)
+    if search.check.too_near(rest[-1]) < 0:
+        search.widen(here, rest[-1])
     ways = [search.guide.way(a, b) for a, b in pairwise(rest)]
     free = [search.blocked(a, way) < 0 for a, way in zip(rest, ways, strict=False)]
     first = free.index(False) if False in free else len(free)
@@ -85,7 +87,7 @@ def replan(
     goals, behind = rest[-1:], rest[last:-1]
     if search.check.too_near(rest[-1]) >= 0:
         goals, behind = search.ends(old.goal, here), []
-    legs = search.way(here, goals, ahead, behind)
+    legs = search.farther(here, goals, ahead, behind)
     return search.finished(search.shortened(here, legs, counted(shorten, "shorten", 0)))
 
 

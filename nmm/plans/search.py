@@ -129,6 +129,9 @@ def plan(
 class Search:
     """What one plan needs: the trees, the check of distances, and the goals."""
 
+    _ends: float
+    asked_kept: Array
+
     def __init__(
         self,
         robot: Robot,
@@ -182,31 +185,37 @@ class Search:
     def plan(self, seconds: float, shorten: int, progress: Callable[[float], None] | None) -> Plan:
         """From the start through all goals; each part ends where the next begins."""
         self.begin(seconds, progress)
-        here, parts, kept = self.start, [], self.check.kept.copy()
-        least = kept + self.margin
+        here, parts, least = self.start, [], self.asked_kept + self.margin
         for wanted in self.goals:
-            self.check.kept[:] = kept
-            legs = self.shortened(here, self._farther(here, self.ends(wanted, here)), shorten)
+            self.check.kept[:] = self.asked_kept
+            legs = self.shortened(here, self.farther(here, self.ends(wanted, here)), shorten)
             parts.append(legs)
             here, least = self.guide.corners(here, legs)[-1], np.minimum(least, self.check.kept)
         self.check.kept[:] = least
         return self.finished(*parts)
 
-    def _farther(self, here: Array, ends: Sequence[Array]) -> Array:
-        """A way that keeps the margin, too, where one is found in half of the time."""
+    def farther(
+        self, here: Array, ends: Sequence[Array], ahead: Sequence[Array] = (), behind: Sequence[Array] = ()
+    ) -> Array:
+        """A `way` that keeps the margin, too, where one is found in half of the time."""
         if self.margin > 0.0:
-            kept, last = self.check.kept.copy(), self._ends
-            self._ends = 0.5 * (time.monotonic() + last)
-            self.check.widen(np.array([here, *ends]), self.margin)
+            last, self._ends = self._ends, 0.5 * (time.monotonic() + self._ends)
+            self.widen(here, *ends)
             with suppress(RunError):
-                return self.way(here, ends)
-            self._ends, self.check.kept[:] = last, kept
-        return self.way(here, ends)
+                return self.way(here, ends, ahead, behind)
+            self._ends, self.check.kept[:] = last, self.asked_kept
+        return self.way(here, ends, ahead, behind)
+
+    def widen(self, *configurations: Array) -> None:
+        """Keep the margin as far as these (n,) do."""
+        self.check.kept[:] = self.asked_kept
+        self.check.widen(np.array(configurations), self.margin)
 
     def begin(self, seconds: float, progress: Callable[[float], None] | None) -> None:
         """Start the clock; `InputError` for a start that touches something."""
         self._ends, self._seconds, self._progress = time.monotonic() + seconds, seconds, progress
         self.check.keep(self.start[np.newaxis])
+        self.asked_kept = self.check.kept.copy()
         scene = self.check.scene
         if scene is not None and self.check.too_near(self.start) >= 0:
             distances = scene.queries.distances(0.0, self.start, range(len(scene.names)))
