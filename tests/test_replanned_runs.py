@@ -99,6 +99,20 @@ def test_slip_is_replanned_in_each_run_of_a_rollout(monkeypatch):
     np.testing.assert_array_equal(shorter, again["q"][:, : shorter.shape[1]])
 
 
+def test_slip_is_replanned_beside_distances_of_the_controller_too():
+    settings = {"plan.track": {"replan": True}, "duration": 30, "dt": 0.04}
+    scenario = nmm.Scenario.load("behind_the_wall", settings)
+    slip = [0.6, 1.0, 1.0, 1.0, 1.0]
+    rolled = nmm.rollout(scenario, slip=slip, keep=["q"])
+    assert "left its plan" in rolled.message[0]
+    made = scenario.controller()
+    scene, end = made.solver.scene, scenario.plan().end
+    pairs = range(len(scene.names))
+    (q,) = rolled["q"]
+    assert min(scene.queries.distances(0.0, one, pairs).min() for one in q[::5]) > 0.03
+    assert np.abs(q[-1] - end).max() < 0.02
+
+
 @pytest.mark.parametrize("method", ["zoh", "rk4"])
 def test_a_rollout_replans_as_a_run_does(method):
     starts = plan().robot.rest + np.array([(0.0, 0.0, 0.0), PUSHED]) @ np.eye(3, 6)

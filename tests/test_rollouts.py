@@ -206,6 +206,21 @@ def test_bad_input_is_named(given: dict[str, object], where: str) -> None:
     assert caught.value.where.split(": ")[0] == where
 
 
+def test_slip_and_delay_are_the_same_in_a_loop_in_python() -> None:
+    """A goal that is never reached keeps a run there."""
+    given = {"method": "zoh", "slip": [0.9, 1.0, 1.0, 0.8], "delay": 3, "keep": ("q", "u", "error")}
+    compiled = nmm.rollout(controller(), starts(2), 1.0, 0.02, **given)
+    python = nmm.rollout(controller(), starts(2), 1.0, 0.02, until=nmm.Goal(1e-12, 1e-12), **given)
+    assert python.outcome == ("missed", "missed")
+    for name in given["keep"]:
+        np.testing.assert_allclose(python[name], compiled[name], atol=1e-12)
+
+
+def test_a_scenario_that_is_a_plan_has_one_start() -> None:
+    with pytest.raises(nmm.InputError, match="track"):
+        nmm.rollout(nmm.Scenario.load("behind_the_wall"), starts(2))
+
+
 def test_what_does_not_fit_in_memory_is_asked_before(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(machine, "free_memory", lambda: 1.8e6)
     with pytest.raises(nmm.InputError, match=r"GB are free; keep less, every so many samples"):

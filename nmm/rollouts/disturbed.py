@@ -1,6 +1,7 @@
 """A sampled controller that sees a robot with noise and acts on it late, while its wheels slip."""
 
 import math
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array, Integers, counted
 from nmm.control.controller import Controller
 from nmm.control.equations import ControlStep, write_equation
+from nmm.control.integrators import Around, Velocity
 from nmm.control.recorded import Recorded, note_sample
 from nmm.control.stepping import hold_inputs
 from nmm.errors import InputError, expect
@@ -34,6 +36,22 @@ class Disturbed(NamedTuple):
     slip: Vector
 
 
+@dataclass(frozen=True)
+class Acting(Around):
+    """Holds the inputs that act: their shares, and those of some samples before."""
+
+    disturbed: Disturbed
+    asked: dict[float, Array] = field(default_factory=dict)
+
+    def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
+        self.asked[t] = u  # once a sample, also where its step is taken again
+        if len(self.asked) > self.disturbed.delay + 1:
+            del self.asked[next(iter(self.asked))]
+        known = len(self.asked) > self.disturbed.delay
+        acting = self.disturbed.slip * next(iter(self.asked.values())) if known else np.zeros(len(u))
+        return self.integrator.advance(velocity, t, q, q_dot, acting, dt)
+
+
 class Plant:
     """What disturbs `count` runs with n coordinates and m inputs, as a user gives it."""
 
@@ -46,12 +64,16 @@ class Plant:
         self.slip = _broadcast(slip, (count, m), "slip")
 
     @property
+    def noisy(self) -> bool:
+        return bool(np.any(self.noise > 0.0))
+
+    @property
     def disturbs(self) -> bool:
-        return bool(np.any(self.noise > 0.0) or self.delay or np.any(self.slip != 1.0))
+        return bool(self.noisy or self.delay or np.any(self.slip != 1.0))
 
     def at(self, i: int, samples: int) -> Disturbed:
         noise = np.zeros((0, len(self.noise)))
-        if np.any(self.noise > 0.0):
+        if self.noisy:
             drawn = np.random.default_rng([self.seed, i]).standard_normal((samples, len(self.noise)))
             noise = drawn * self.noise
         return Disturbed(noise, self.delay, self.slip[i].copy())

@@ -20,7 +20,7 @@ from nmm.control.integrators import Integrator, integrator
 from nmm.cores import cores
 from nmm.errors import InputError, expect, no_such
 from nmm.findings.run import line
-from nmm.rollouts.disturbed import Plant, driven_disturbed
+from nmm.rollouts.disturbed import Acting, Plant, driven_disturbed
 from nmm.rollouts.kept import MEASURES, Kept, measure
 from nmm.runs.clearance import guarded
 from nmm.runs.closed_loop import drive_loop, sample_times
@@ -127,6 +127,12 @@ def rollout(
     """
     if isinstance(subject, Scenario):
         parts = subject.parts
+        if parts.is_plan:
+            raise InputError(
+                "its run is a planned motion, with one start",
+                where="rollout: plan",
+                expected="plan.track: true",
+            )
         q0 = parts.q0 if q0 is None else q0
         duration, dt = duration or parts.duration, dt or parts.dt
         method = method or parts.method
@@ -143,12 +149,13 @@ def rollout(
     starts = checked_starts(controllers, q0)
     count = len(starts)
     plant = Plant(robot.n, robot.n_u, count, noise, delay, slip, seed)
-    if plant.disturbs and (method != "zoh" or until is not None or not controllers[0].solver.compiles_steps):
+    compiled = until is None and all(one.solver.compiles_steps for one in controllers)
+    if plant.disturbs and (method != "zoh" or (plant.noisy and not compiled)):
         raise InputError(
             "of a scenario with a goal, hand over scenario.controller()",
             where="rollout",
-            expected="with noise, delay or slip method zoh, no goal, and controllers without distances, "
-            "retreats, Armijo's rule and Python functions",
+            expected="with noise, delay or slip method zoh, and with noise no goal, and controllers without "
+            "distances, retreats, Armijo's rule and Python functions",
             got=method if until is None else f"{method} and a goal",
         )
     sampled = any(one.solver.samples for one in controllers)
@@ -159,7 +166,7 @@ def rollout(
     where = None if folder is None else Path(folder)
     every = counted(every, "every")
     kept = Kept(keep, times, every, count, Recorder(controllers[0], times).found, where)
-    runs = _Runs(controllers, starts, times, method, until, plant, kept)
+    runs = _Runs(controllers, starts, times, method, until, plant, kept, compiled)
     workers = min(counted(cores() if threads is None else threads, "threads"), count)
     rooms: dict[str, Array] = {}
     with ThreadPoolExecutor(workers) as pool:
@@ -198,6 +205,7 @@ class _Runs:
     until: Goal | None
     plant: Plant
     kept: Kept
+    compiled: bool
 
     def __post_init__(self) -> None:
         self._local, self.stop = threading.local(), threading.Event()
@@ -210,11 +218,13 @@ class _Runs:
         if self.stop.is_set():
             return
         controller, recorder, advance = self._controller(i)
-        if self.plant.disturbs:
-            disturbed = self.plant.at(i, len(self.times))
-            outcome, reasons = driven_disturbed(controller, recorder, self.times, self.starts[i], disturbed)
+        start = self.starts[i].copy()
+        disturbed = self.plant.at(i, len(self.times)) if self.plant.disturbs else None
+        if disturbed is not None and self.compiled:
+            outcome, reasons = driven_disturbed(controller, recorder, self.times, start, disturbed)
         else:
-            start = self.starts[i].copy()
+            if disturbed is not None:
+                advance = Acting(integrator(self.method, controller.robot, 1e-9), disturbed)
             outcome, reasons = drive_loop(controller, advance, recorder, self.times, start, None, self.until)
         count = len(recorder)
         self.kept.put(room, row, recorder.found, count)
