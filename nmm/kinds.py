@@ -63,6 +63,7 @@ TASKS = Kinds(
     center_of_mass="nmm.functions.tasks.position:CenterOfMass",
     coordinates="nmm.functions.tasks.linear_coordinates:LinearCoordinates",
     posture="nmm.functions.tasks.linear_coordinates:Posture",
+    parking="nmm.plans.parking:Parking",
 )
 REFERENCES = Kinds(
     "reference",

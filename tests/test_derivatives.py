@@ -32,6 +32,7 @@ from nmm.functions.tasks.pose import PartsOfPose
 from nmm.functions.tasks.task import Comparison
 from nmm.kinds import OBJECTIVES, REFERENCES, TASKS
 from nmm.plans.following import FromPlan
+from nmm.plans.parking import Parking
 from nmm.resolvers import ProjectedGradient
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
@@ -50,8 +51,8 @@ def test_the_grid_holds_every_function() -> None:
     # wherever the robot is stands still by definition: test_analysis_subjects.py. What parts of a pose share
     # is a base, and the pursuit's angles are values alone: its spring's gradient is in test_steering.py.
     # Distances have kinks and Coal's last digits: test_clearance.py. One from a plan needs the plan:
-    # test_plans_followed.py.
-    apart = {Clearance, Comparison, FromPlan, Reached, PartsOfPose, Pursuit}
+    # test_plans_followed.py. A parking law's rows are velocities: test_parking.py.
+    apart = {Clearance, Comparison, FromPlan, Parking, Reached, PartsOfPose, Pursuit}
     examples = {type(entry.function) for entry in ENTRIES}
     for listed in (TASKS, REFERENCES, OBJECTIVES):
         without = [name for name, kind in listed.items() if kind not in examples | apart]

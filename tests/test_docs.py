@@ -64,11 +64,11 @@ def test_a_new_kind_gets_its_lines_in_the_lists(monkeypatch: pytest.MonkeyPatch)
     stub = lists.STUB.read_text(encoding="utf-8")
     line = "from .functions.tasks.new import NewTask as NewTask\n"
     assert lists.stub(stub).replace(line, "") == stub
-    assert line + "from .plans.plan import Plan as Plan\n" in lists.stub(stub)
+    assert line + "from .plans.parking import Parking as Parking\n" in lists.stub(stub)
     page = (lists.API / "task.md").read_text(encoding="utf-8")
     entry = ".. autoclass:: nmm.NewTask\n"
     assert lists.reference(page, TASKS).replace(entry, "") == page
-    assert ".. autoclass:: nmm.LinearCoordinates\n" + entry in lists.reference(page, TASKS)
+    assert ".. autoclass:: nmm.Parking\n" + entry in lists.reference(page, TASKS)
 
 
 def test_the_gallery_is_that_of_the_scenarios() -> None:

@@ -231,7 +231,7 @@ EXAMPLES: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
         {"platform": "car"},
         {},
         "no smooth feedback brings a car platform to a pose x, y, theta that stands (Brockett 1983); "
-        "nmm.plan (scenario key plan) does",
+        "nmm.Parking (task kind parking) and nmm.plan (scenario key plan) do",
     ),
     (
         "no_redundancy",

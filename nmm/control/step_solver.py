@@ -108,7 +108,7 @@ class StepSolver:
             or resolver.step != "constant"
             or (given.limits is not None and self.limits_on.needs_dt)
         )
-        self.samples = given.limits is not None or self.needs_dt
+        self.samples = given.limits is not None or self.needs_dt or self.program.remembers
         self.period_monitor = PeriodMonitor(self.found.period)
         self.dt: float | None = None
         self.busy = [False]
@@ -206,6 +206,7 @@ class StepSolver:
         mode = self.found.limits.mode
         usual = int(mode)
         mode[()] = STAGE if usual == SAMPLE else usual
+        self.program.stands[()] = 1
         try:
             failed = self.solve(t, q) >= FAILED
             if self.retreat_state is not None and self.retreat_state.now:
@@ -214,6 +215,7 @@ class StepSolver:
                 raise self.failure(t, q)
         finally:
             mode[()] = usual
+            self.program.stands[()] = 0
 
     def _back_off(self, retreat_state: RetreatState, q: Array) -> None:
         """Replace the resolver's inputs by the retreat's."""

@@ -68,6 +68,8 @@ def go_on(
     mode = e.limits.mode[()]
     if mode == SAMPLE:
         e.limits.mode[()] = STAGE
+    stands = views(LaidOut, integers, floats, 0).stands
+    stands[()] = 1
     status = float(SOLVED)
     for k in range(1, stages + 1):
         for i in range(n):
@@ -81,7 +83,7 @@ def go_on(
             status = call_step(e.step, t + method.nodes[k] * dt, stage, integers, floats)
             if status >= SINGULAR_J:
                 break
-    e.limits.mode[()] = mode
+    e.limits.mode[()], stands[()] = mode, 0
     place_mimic_joints(stage, e.arm.mimic_joints)
     for i in range(n):
         q_next[i] = stage[i]

@@ -141,7 +141,7 @@ WORDS: Mapping[str, Words] = {
     "nothing_gives": lambda lost, **_: f"no input gives: {', '.join(lost)}",
     "pose_without_feedback": (
         "no smooth feedback brings a {platform} platform to a pose x, y, theta that stands (Brockett 1983); "
-        "nmm.plan (scenario key plan) does"
+        "nmm.Parking (task kind parking) and nmm.plan (scenario key plan) do"
     ),
     "inputs_fell_short": "the inputs did not do all that the task asked (clipped, scaled or damped)",
     "still_moving": (

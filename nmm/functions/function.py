@@ -162,6 +162,8 @@ class Stage:
     hessians : whether it reads the frames' kinematic Hessians
     callback : a user's Python function, run before the kernels; its results are the numbers
     live : sets the numbers from outside, between two steps, or as a run goes on
+    remembers : whether the kernel writes its numbers: a memory from sample to sample, which is kept and put
+        back with all else that a sample changes. The first is 1 where none may change, between two samples
 
     Examples
     --------
@@ -179,6 +181,7 @@ class Stage:
     callback: Callback | None = None
     before: int = 0
     live: LiveNumbers | None = None
+    remembers: bool = False
 
 
 class Shown(NamedTuple):

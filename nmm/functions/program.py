@@ -21,6 +21,7 @@ from nmm.kernels.record_layout import (
     Matrices,
     Matrix,
     Memory,
+    SampledVector,
     Tensors,
     Vector,
     header_length,
@@ -48,24 +49,30 @@ class Buffers(NamedTuple):
 
 class LaidOut(NamedTuple):
     """A program in memory, the first record there. `kinematics` () is where its record `Kinematics` is, or 0
-    while Pinocchio computes them before the program runs; `stages` is where each `LaidOutStage` is."""
+    while Pinocchio computes them before the program runs; `stands` () is 1 while what functions remember
+    stays as it is; `stages` is where each `LaidOutStage` is."""
 
     buffers: Buffers
     kinematics: IntegerCell
+    stands: IntegerCell
     platform_kernel: int
     platform_numbers: Vector
     stages: IntegerVector
 
 
 class LaidOutStage(NamedTuple):
-    """A stage in memory: its kernel, which rows it sees (from, to), its frames' slots, its numbers."""
+    """A stage in memory: its kernel, which rows it sees (from, to), its frames' slots, its numbers, which are
+    `memory` where the kernel writes them."""
 
     kernel: int
     first_row: int
     end_row: int
     slots: IntegerVector
     numbers: Vector
+    memory: SampledVector
 
+
+NONE = np.zeros(0)
 
 #: What computes the kinematics of a program's frames.
 PINOCCHIO, COMPILED = "pinocchio", "compiled"
@@ -105,7 +112,11 @@ def run_program(t: float, q: Array, integers: Integers, floats: Array) -> None:
             view(b.value_q, first * n, (count, n)),
         )
         frames = Frames(stage.slots, b.placements, b.jacobians, b.hessians)
-        call_function(stage.kernel, at, frames, stage.numbers, rows)
+        if stage.memory.size > 0:
+            stage.memory[0] = float(program.stands[()])
+            call_function(stage.kernel, at, frames, stage.memory, rows)
+        else:
+            call_function(stage.kernel, at, frames, stage.numbers, rows)
 
 
 _TABLES, _TENSORS = types.float64[:, :, ::1], types.float64[:, :, :, ::1]
@@ -128,6 +139,8 @@ class Program:
     Attributes
     ----------
     first_rows : where the rows of each function begin in `buffers.value`
+    remembers : whether some function does
+    stands () : whether what they remember stays as it is, 1 or 0
     blocks, buffers : what `run_program` takes, made by `lay_out`, and what it reads and writes, as views
     calls_python : whether users' Python functions are among them
     costs : what makes such functions slow, a sentence each
@@ -137,6 +150,7 @@ class Program:
 
     blocks: Blocks
     buffers: Buffers
+    stands: Integers
     calls_python: bool
     costs: tuple[str, ...]
     prepare: Callable[[float, Array], None]
@@ -157,6 +171,7 @@ class Program:
                 _ = stage.kernel.address
         live = [stage.live for stage, _ in self._stages]
         self.renewals = tuple(one for one in live if isinstance(one, Renewal))
+        self.remembers = any(stage.remembers for stage, _ in self._stages)
         self._frames = tuple(dict.fromkeys(frame for stage, _ in self._stages for frame in stage.frames))
 
     def lay_out(self, beside: tuple[Any, ...] | None = None) -> None:
@@ -174,18 +189,20 @@ class Program:
         kinematics = np.array(table if self._compiled else 0, dtype=np.int64)
         memory = Memory()
         kernel, numbers = platform.velocity_map.address, platform.parameters
-        memory.add(LaidOut(buffers, kinematics, kernel, numbers, places))
+        stands = np.array(0, dtype=np.int64)
+        memory.add(LaidOut(buffers, kinematics, stands, kernel, numbers, places))
         if beside is not None:
             memory.add(beside)
         for stage, row in self._stages:
             slots = np.array([self._frames.index(frame) for frame in stage.frames], dtype=np.int64)
             bounds = row - stage.before, row + stage.rows
-            memory.add(LaidOutStage(stage.kernel.address, *bounds, slots, stage.numbers))
+            fixed, kept = (NONE, stage.numbers) if stage.remembers else (stage.numbers, NONE)
+            memory.add(LaidOutStage(stage.kernel.address, *bounds, slots, fixed, kept))
         ids = [None if name == CENTER_OF_MASS else robot.frame_id(name) for name in self._frames]
         memory.add(Kinematics(robot.joints, frame_table(robot.model, robot.joint_axes, ids)))
         self.blocks = memory.blocks()
         laid = views(LaidOut, *self.blocks, 0)
-        self._kinematics, self._table = laid.kinematics, table
+        self._kinematics, self._table, self.stands = laid.kinematics, table, laid.stands
         self.buffers = found = laid.buffers
         update = nothing if self._compiled else kinematics_updater(robot, self._frames, *found[:3])
         self._numbers = [views(LaidOutStage, *self.blocks, int(place)).numbers for place in places]
