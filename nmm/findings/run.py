@@ -173,6 +173,10 @@ WORDS: Mapping[str, Words] = {
         f"{tube_m:g} m or {tube_rad:g} rad); "
         f"{'not back at the end' if back is None else f'back at t = {back:.4g} s'}"
     ),
+    "horizon_unsolved": (
+        "no motion ahead was found in {samples} of {of} samples, at t = {t:.4g} s first: the robot went on "
+        "along the last one, which ends at rest"
+    ),
     "no_redundancy": "the task has as many rows as there are inputs: no redundancy is left to resolve",
     "inputs_unmet": _inputs_unmet,
     "moves_otherwise": (

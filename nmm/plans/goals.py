@@ -14,6 +14,7 @@ from nmm.collisions.motion_check import MotionCheck
 from nmm.control.goal import Goal, error_sizes
 from nmm.errors import InputError, RunError, few
 from nmm.functions.program import COMPILED, Program
+from nmm.functions.tasks.linear_coordinates import Posture
 from nmm.functions.tasks.task import Comparison, Task
 from nmm.robots.robot import Robot
 
@@ -93,40 +94,56 @@ class GoalPostures:
             yield q
 
 
-class Reaching:
-    """Newton's method (Levenberg and Marquardt's) for a task whose target stands, within limits."""
+def goal_task(robot: Robot, goal: Any, end: Array) -> Task:
+    """A goal as a task; one of coordinates is that these are where they are at the end (n,)."""
+    if isinstance(goal, Task):
+        return goal
+    named = [name for name in goal if name in robot.q_names] if isinstance(goal, Mapping) else []
+    names = named or [robot.q_names[i] for i in robot.following.independent]
+    return Task(Posture(*names), end[[robot.coordinate(name) for name in names]])
 
-    def __init__(self, robot: Robot, task: Task, tolerance: Goal) -> None:
-        self._robot, self._tolerance, following = robot, tolerance, robot.following
-        self._units = [row.unit for row in task.rows(robot)]
+
+class TaskError:
+    """A task's value, target and error along a motion, without a controller. units : of the rows"""
+
+    def __init__(self, robot: Robot, task: Task) -> None:
+        self.robot, self.units, following = robot, [row.unit for row in task.rows(robot)], robot.following
         self._program = Program(robot, (task.function, task.reference, Comparison(task)), COMPILED)
         self._program.lay_out()
-        targets = [self._program.evaluate(t, robot.rest)[1].value for t in (0.0, 1.0, np.e)]
-        if not all(np.array_equal(target, targets[0]) for target in targets):
-            raise InputError("its target moves", where="plan: goal", expected="a task whose target stands")
         # What all coordinates do where those that follow no other move.
         self._leads = np.eye(robot.n)
         self._leads[following.columns] = following.multipliers[:, np.newaxis] * self._leads[following.leaders]
 
-    def evaluate(self, q: Array) -> tuple[Array, Array, Array, Array]:
-        """Value, target and error e (s,) at q (n,), and ∂e/∂q (s, n)."""
-        value, target, compared = self._program.evaluate(0.0, q)
+    def evaluate(self, q: Array, t: float = 0.0) -> tuple[Array, Array, Array, Array]:
+        """Value, target and error e (e,) at q (n,) and t, s, and ∂e/∂q (e, n)."""
+        value, target, compared = self._program.evaluate(t, q)
         if len(compared.value):
             return value.value, target.value, compared.value, compared.value_q @ self._leads
         error_q = (target.value_q - value.value_q) @ self._leads
         return value.value, target.value, target.value - value.value, error_q
 
+
+class Reaching(TaskError):
+    """Newton's method (Levenberg and Marquardt's) for a task whose target stands, within limits."""
+
+    def __init__(self, robot: Robot, task: Task, tolerance: Goal) -> None:
+        super().__init__(robot, task)
+        self._tolerance = tolerance
+        targets = [self.evaluate(robot.rest, t)[1] for t in (0.0, 1.0, np.e)]
+        if not all(np.array_equal(target, targets[0]) for target in targets):
+            raise InputError("its target moves", where="plan: goal", expected="a task whose target stands")
+
     def __call__(self, q: Array) -> Array | None:
         """A configuration near q (n,) that reaches the target within a share of the tolerances, or None."""
-        robot = self._robot
+        robot = self.robot
         limits = np.where(robot.limited, robot.q_limits, [-np.inf, np.inf])
         # Angles of a platform and of joints without limits go where they like.
         q = robot.following.placed(np.clip(q, limits[:, 0], limits[:, 1]))
         free = np.ones(robot.n)
         for _ in range(STEPS):
             _, _, e, e_q = self.evaluate(q)
-            sizes = error_sizes(e, self._units)
-            rest = np.abs(e)[[unit not in ("m", "rad") for unit in self._units]]
+            sizes = error_sizes(e, self.units)
+            rest = np.abs(e)[[unit not in ("m", "rad") for unit in self.units]]
             if (
                 sizes[0] <= MET * self._tolerance.m
                 and sizes[1] <= MET * self._tolerance.rad
