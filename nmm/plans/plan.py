@@ -13,6 +13,7 @@ from nmm.arrays import Array, positive
 from nmm.collisions.scene import Scene
 from nmm.control.goal import Goal
 from nmm.control.limits import LimitsOn
+from nmm.errors import InputError
 from nmm.functions.tasks.task import Task
 from nmm.plans.following import FromPlan
 from nmm.plans.goals import Wanted, goal_task
@@ -136,7 +137,11 @@ class Plan:
         >>> bool(np.abs(run.q[-1] - plan.end).max() < 0.001)
         True
         """
-        motion, share = self.found.motion, positive(pace, "pace")
+        motion, share, scene = self.found.motion, positive(pace, "pace"), self.found.scene
+        if scene is not None and share != 1.0 and any(one.moves for one in scene.obstacles):
+            raise InputError(
+                "obstacles that move do not wait", where="plan: pace", expected="pace=1", got=pace
+            )
 
         def at(t: Array) -> tuple[Array, Array]:
             q, u = motion.at(share * t)
