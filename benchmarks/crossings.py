@@ -5,7 +5,9 @@
 Only crossings in which the robot, standing still, would be safe, and is hit without a guard. `hit` counts
 runs that touch (Coal's distance, at samples and between), `short` those that come nearer than the distance to
 keep, `reached` those that end at their goal, `time` what that took (median, s), `step` the processor time of
-a step, as a ratio to that with the first horizon.
+a step, as a ratio to that with the first horizon. The last row is `nmm.Horizon`, predictive control, with
+what its calls take (median, 99 of 100, worst; ms) and the share of them that found a motion; the one before
+it `nmm.plan`, with what a plan takes (median, worst; s).
 """
 
 from __future__ import annotations
@@ -132,6 +134,62 @@ def main() -> None:
         median = np.median(times) if times else np.nan
         ratio = spent / steps / first
         print(f"{horizon:8g}{hits:5}{short:7}{len(times):9}{median:7.1f}{ratio:7.2f}", flush=True)
+    planned(scenes)
+    predictive(scenes)
+
+
+def planned(scenes: list[Crossing]) -> None:
+    """The row of plans, which wait on their way; distances by Coal 100 times a second."""
+    nmm.plan(robots()[2][0], [0.0] * 6, {"x": 1.0}, limits=LIMITS)  # compiled, once
+    hits = short = 0
+    times, took = [], []
+    for one in scenes:
+        begun = time.process_time()
+        goal = nmm.Task(nmm.Position(one.frame), one.goal)
+        keeps = nmm.Collisions(DISTANCE, obstacles=[one.obstacle])
+        try:
+            plan = nmm.plan(one.robot, one.start, goal, (), keeps, LIMITS)
+        except nmm.RunError:
+            continue
+        took.append(time.process_time() - begun)
+        t = np.arange(0.0, plan.duration + 1.0, 0.01)
+        queries = nmm.Collisions(DISTANCE, False, [one.obstacle]).on(one.robot).queries
+        least = min(queries.nearest(float(at), q)[0] for at, q in zip(t, plan(t)[0], strict=True))
+        hits, short = hits + (least < 0.0), short + (least < DISTANCE - 1e-4)
+        times.append(plan.duration)
+    print(f"{'plan':>8}{hits:5}{short:7}{len(times):9}{np.median(times):7.1f}", end="")
+    print(f"  {np.median(took):.2f} s, {max(took):.2f} s", flush=True)
+
+
+class Timed(nmm.Horizon):
+    """Notes what its calls take, s, and whether they found a motion."""
+
+    def __call__(self, t: float, q: np.ndarray) -> np.ndarray:
+        begun = time.process_time()
+        u = super().__call__(t, q)
+        spent.append((time.process_time() - begun, self.solved))
+        return u
+
+
+spent: list[tuple[float, bool]] = []
+
+
+def predictive(scenes: list[Crossing]) -> None:
+    """The row of predictive control, called at 20 Hz."""
+    hits = short = 0
+    times = []
+    for one in scenes:
+        task = nmm.Task(nmm.Position(one.frame), one.goal)
+        keeps = nmm.Collisions(DISTANCE, False, [one.obstacle])
+        run = Timed(one.robot, task, keeps, LIMITS).run(one.start, DURATION, nmm.Goal(0.01))
+        least = float(run.clearance_between.min())
+        hits, short = hits + (least < 0.0), short + (least < DISTANCE - 1e-4)
+        if run.complete:
+            times.append(float(run.t[-1]))
+    took, solved = np.array(spent).T
+    print(f"{'Horizon':>8}{hits:5}{short:7}{len(times):9}{np.median(times):7.1f}", end="")
+    ms = 1e3 * np.array([np.median(took), np.quantile(took, 0.99), took.max()])
+    print(f"  {ms.round(1)} ms, {np.mean(solved):.2%} of {len(solved)} solved")
 
 
 if __name__ == "__main__":

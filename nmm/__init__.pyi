@@ -73,6 +73,7 @@ from .functions.tasks import Posture as Posture
 from .functions.tasks import Stack as Stack
 from .functions.tasks import Task as Task
 from .functions.tasks import While as While
+from .plans.horizon import Horizon as Horizon
 from .plans.parking import Parking as Parking
 from .plans.plan import Plan as Plan
 from .plans.replan import replan as replan

@@ -337,6 +337,13 @@ EXAMPLES: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
         "samples",
     ),
     (
+        "horizon_unsolved",
+        {"samples": 3, "of": 80},
+        {"t": 0.5},
+        "no motion ahead was found in 3 of 80 samples, at t = 0.5 s first: the robot went on along the last "
+        "one, which ends at rest",
+    ),
+    (
         "left_plan",
         {"m": 0.25, "rad": 0.5, "samples": 9, "back": 4.0, "tube_m": 0.1, "tube_rad": 0.2},
         {"t": 3.5},

@@ -304,10 +304,6 @@ def test_an_impossible_plan_says_what_it_tried():
     [
         ({"start": {"x": 3.0}}, "plan: start"),
         ({"limits": nmm.Limits(bounds=nmm.Bound(nmm.Position("ee", "z"), 0.2, 2.0))}, "plan: limits"),
-        (
-            {"obstacles": [nmm.Obstacle(nmm.Sphere(0.1), motion=lambda t: [5.0 + t, 5.0, 0.0])]},
-            "plan: obstacles",
-        ),
         ({"goal": {"z": 1.0}}, "robot unicycle_3r"),
         ({"seconds": 0.0}, "seconds"),
         ({"seed": -1}, "seed"),

@@ -29,7 +29,7 @@ STRAIGHT = 1e-9
 
 
 class MovedShapes(NamedTuple):
-    """A robot's shapes among obstacles that stand.
+    """A robot's shapes among obstacles.
 
     shapes : the robot's, then the obstacles'; joints, mimic_joints : the robot's
     planar () : 1 where q begins with x, y, theta
@@ -38,6 +38,7 @@ class MovedShapes(NamedTuple):
     stems (P, 3 + n) : of a joint between two of the robot's shapes, how far from it the shape that it does
         not move can reach, m; else infinite
     kept (P,) : distances to keep, m
+    drift (P,) : how far the obstacle of a pair moves at most during the motion that is looked at, m
     until (P,), places (G, 12) : while a leg is looked at, how much of it is surely free; where shapes are
     """
 
@@ -50,6 +51,7 @@ class MovedShapes(NamedTuple):
     levers: Matrix
     stems: Matrix
     kept: Vector
+    drift: Vector
     until: Vector
     places: Matrix
 
@@ -154,7 +156,11 @@ def approach(scene: MovedShapes, pair: int, leg: Array, apart: float) -> float:
 
     A point that a joint turns moves by its distance from the joint. One that is to come near the other shape
     is not farther from the joint than that shape reaches, and than the two are apart, together."""
-    rate = scene.levers[pair, 0] * math.hypot(leg[0], leg[1]) + scene.levers[pair, 2] * abs(leg[2])
+    rate = (
+        scene.drift[pair]
+        + scene.levers[pair, 0] * math.hypot(leg[0], leg[1])
+        + scene.levers[pair, 2] * abs(leg[2])
+    )
     for c in range(3, leg.shape[0]):
         rate += abs(leg[c]) * min(scene.levers[pair, c], scene.stems[pair, c] + max(apart, 0.0))
     return rate

@@ -72,6 +72,15 @@ class MotionCheck:
         """The distance that each pair keeps, (P,), m."""
         return self._shapes.kept
 
+    def forget(self) -> None:
+        """Forget what separated pairs last, which bounds begin with."""
+        self._shapes.shapes.between[:] = UP
+
+    @property
+    def pairs(self) -> Integers:
+        """The shapes of each pair, (P, 2), obstacles second."""
+        return self._shapes.shapes.pairs
+
     def too_near(self, q: Array) -> int:
         """The number of a pair that is nearer than its distance at q (n,), or -1."""
         return int(self._near(self.blocks, q))
@@ -113,6 +122,7 @@ def moved_shapes(robot: Robot, scene: Scene | None) -> MovedShapes:
         levers=levers,
         stems=stems,
         kept=np.full(len(old.pairs), 0.0 if scene is None else scene.distance),
+        drift=np.zeros(len(old.pairs)),
         until=np.zeros(len(old.pairs)),
         places=np.zeros((len(objects), 12)),
     )

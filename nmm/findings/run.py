@@ -199,6 +199,10 @@ WORDS: Mapping[str, Words] = {
         f"{why}"
     ),
     "plan_cut": "at the end, t = {t:.4g} s, the plan that it followed goes on for {left:.3g} s more",
+    "horizon_unsolved": (
+        "no motion ahead was found in {samples} of {of} samples, at t = {t:.4g} s first: the robot went on "
+        "along the last one, which ends at rest"
+    ),
     "no_redundancy": "the task has as many rows as there are inputs: no redundancy is left to resolve",
     "inputs_unmet": _inputs_unmet,
     "moves_otherwise": (

@@ -15,6 +15,7 @@ from nmm.collisions.motion_check import MotionCheck
 from nmm.control.goal import ANOTHER, Goal, norms, unit_codes
 from nmm.errors import InputError, RunError, few
 from nmm.functions.program import BESIDE, COMPILED, LaidOut, Program, run_program
+from nmm.functions.tasks.linear_coordinates import Posture
 from nmm.functions.tasks.task import Comparison, Task
 from nmm.kernels.compiled import checked_by_caller, compiled, scratch
 from nmm.kernels.linear_algebra import dot, eliminate
@@ -98,6 +99,15 @@ class GoalPostures:
             yield q
 
 
+def goal_task(robot: Robot, goal: Any, end: Array) -> Task:
+    """A goal as a task; one of coordinates is that these are where they are at the end (n,)."""
+    if isinstance(goal, Task):
+        return goal
+    named = [name for name in goal if name in robot.q_names] if isinstance(goal, Mapping) else []
+    names = named or [robot.q_names[i] for i in robot.following.independent]
+    return Task(Posture(*names), end[[robot.coordinate(name) for name in names]])
+
+
 class Newton(NamedTuple):
     """A task to reach, beside its `Program` in memory.
 
@@ -170,18 +180,19 @@ def newton_step(t: float, q: Array, moves: int, integers: Integers, floats: Arra
 _STEPPED = types.int64(types.float64, types.float64[::1], types.int64, *BLOCKS.types)
 
 
-class Reaching:
-    """Newton's method for a task whose target stands, within limits."""
+class TaskError:
+    """A task's value, target and error along a motion, without a controller. units : of the rows"""
 
-    def __init__(self, robot: Robot, task: Task, tolerance: Goal) -> None:
-        self._robot, following, rows = robot, robot.following, task.rows(robot)
+    def __init__(self, robot: Robot, task: Task, tolerance: Goal | None = None) -> None:
+        rows, following, tolerance = task.rows(robot), robot.following, tolerance or Goal()
+        self.robot, self.units = robot, [row.unit for row in rows]
         self._program = Program(robot, (task.function, task.reference, Comparison(task)), COMPILED)
         leads = np.eye(robot.n)
         leads[following.columns] = following.multipliers[:, np.newaxis] * leads[following.leaders]
         # Angles of a platform and of joints without limits go where they like.
         self._limits = np.where(robot.limited, robot.q_limits, [-np.inf, np.inf]).T.copy()
         newton = Newton(
-            units=unit_codes([row.unit for row in rows]),
+            units=unit_codes(self.units),
             met=np.array([MET * tolerance.m, MET * tolerance.rad, 1e-4]),
             compared=np.array(int(task.function.comparison is not None), dtype=np.int64),
             limits=self._limits,
@@ -194,20 +205,27 @@ class Reaching:
         self._program.lay_out(newton)
         self._own = views(Newton, *self._program.blocks, BESIDE)
         self._step = checked_by_caller(newton_step, _STEPPED)
-        targets = [self.evaluate(robot.rest, t)[1] for t in (0.0, 1.0, np.e)]
-        if not all(np.array_equal(target, targets[0]) for target in targets):
-            raise InputError("its target moves", where="plan: goal", expected="a task whose target stands")
 
     def evaluate(self, q: Array, t: float = 0.0) -> tuple[Array, Array, Array, Array]:
-        """Value, target and error e (s,) at q (n,), and ∂e/∂q (s, n)."""
+        """Value, target and error e (s,) at q (n,) and t, s, and ∂e/∂q (s, n)."""
         self._program.prepare(t, q)
         self._step(t, q, 0, *self._program.blocks)
         s, value = len(self._own.error), self._program.buffers.value
         return value[:s].copy(), value[s : 2 * s].copy(), self._own.error.copy(), self._own.error_q.copy()
 
+
+class Reaching(TaskError):
+    """Newton's method for a task whose target stands, within limits."""
+
+    def __init__(self, robot: Robot, task: Task, tolerance: Goal) -> None:
+        super().__init__(robot, task, tolerance)
+        targets = [self.evaluate(robot.rest, t)[1] for t in (0.0, 1.0, np.e)]
+        if not all(np.array_equal(target, targets[0]) for target in targets):
+            raise InputError("its target moves", where="plan: goal", expected="a task whose target stands")
+
     def __call__(self, q: Array) -> Array | None:
         """A configuration near q (n,) that reaches the target within a share of the tolerances, or None."""
-        q = self._robot.following.placed(np.clip(q, *self._limits))
+        q = self.robot.following.placed(np.clip(q, *self._limits))
         self._own.held[:] = 1.0
         for _ in range(STEPS):
             self._program.prepare(0.0, q)

@@ -13,17 +13,13 @@ from nmm.arrays import Array, positive
 from nmm.collisions.scene import Scene
 from nmm.control.goal import Goal
 from nmm.control.limits import LimitsOn
-from nmm.functions.tasks.linear_coordinates import Posture
+from nmm.errors import InputError
 from nmm.functions.tasks.task import Task
 from nmm.plans.following import FromPlan
-from nmm.plans.goals import Reaching, Wanted
+from nmm.plans.goals import Wanted, goal_task
+from nmm.plans.recorded import recorded
 from nmm.plans.samples import SampledMotion
-from nmm.robots.frame_path import FramePath
-from nmm.robots.reach import first_tip
 from nmm.robots.robot import Robot
-from nmm.runs.clearance import swept
-from nmm.runs.margins import margin, shares, standing
-from nmm.runs.shown_frame import shown_frame
 from nmm.runs.trajectory import Trajectory
 
 
@@ -145,7 +141,11 @@ class Plan:
         >>> bool(np.abs(run.q[-1] - plan.end).max() < 0.001)
         True
         """
-        tube = Goal(m=0.1, rad=0.2) if tube is None else tube
+        scene, tube = self.found.scene, Goal(m=0.1, rad=0.2) if tube is None else tube
+        if scene is not None and pace != 1.0 and any(one.moves for one in scene.obstacles):
+            raise InputError(
+                "obstacles that move do not wait", where="plan: pace", expected="pace=1", got=pace
+            )
         function = self._followed(positive(gain, "gain"), positive(length, "length"), pace, tube, replan)
         return Task(function, np.zeros(self.robot.n_u), gain, priority, name="plan")
 
@@ -173,59 +173,7 @@ class Plan:
     def trajectory(self, dt: float = 0.02) -> Trajectory:
         """The motion sampled every dt, s, and at its end, as a run: it plays, saves and compares. Its task is
         the goal's or, of a goal of coordinates, that these are where it ends."""
-        robot, scene = self.robot, self.found.scene
         times = np.arange(0.0, self.duration - 1e-9, positive(dt, "dt"))
         t = np.append(times, self.duration)
-        q, u = self(t)
-        S = np.array([robot.S(one) for one in q])
-        task = self._task()
-        rows, drawn = task.rows(robot), shown_frame([task], robot)
-        found = map(np.array, zip(*map(Reaching(robot, task, Goal()).evaluate, q), strict=True))
-        r, r_d, error, error_q = found
-        names, within = shares(self.found.limits, robot, q, u, np.zeros((len(t), 0)))
-        distances: dict[str, Any] = {}
-        if scene is not None:
-            pairs = tuple(" and ".join(pair) for pair in scene.names)
-            distances = {"clearance_names": pairs, "clearance_asked": scene.distance}
-            distances |= swept(scene, t, q, u, [scene.places(0.0)] * len(t)).kept
-        frame = drawn.frame or first_tip(robot)
-        path = None if frame is None else FramePath(robot, frame).positions(q)
-        return Trajectory(
-            robot=robot,
-            t=t,
-            q=q,
-            u=u,
-            q_dot=np.einsum("kij,kj->ki", S, u),
-            r=r,
-            r_d=r_d,
-            error=error,
-            objective=np.zeros(len(t)),
-            sigma_min=np.linalg.svd(error_q @ S, compute_uv=False)[:, -1],
-            partition=np.full(error.shape, -1),
-            residual=np.zeros(len(t)),
-            scale=np.ones((len(t), 1)),
-            step_size=np.ones(len(t)),
-            crossed=np.zeros(len(t), dtype=np.int64),
-            margin=margin(within[:, ~standing(robot, names, within)]),
-            shares=within,
-            limit_names=names,
-            limited=True,
-            r_names=tuple(row.name for row in rows),
-            r_units=tuple(row.unit for row in rows),
-            resolver="plan",
-            method="plan",
-            dt=dt,
-            frame=frame,
-            path=path,
-            desired=None if path is None or not drawn.rows else drawn.desired(path, r_d),
-            target=drawn.mark(path),
-            **distances,
-        )
-
-    def _task(self) -> Task:
-        goal, robot = self.found.goal, self.robot
-        if isinstance(goal, Task):
-            return goal
-        named = [name for name in goal if name in robot.q_names] if isinstance(goal, Mapping) else []
-        names = named or [robot.q_names[i] for i in robot.following.independent]
-        return Task(Posture(*names), self.end[[robot.coordinate(name) for name in names]])
+        task = goal_task(self.robot, self.found.goal, self.end)
+        return recorded(self.robot, t, *self(t), dt, task, self.found.limits, self.found.scene, "plan")

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, counted, positive, scalar
 from nmm.collisions.obstacle import Obstacle
-from nmm.errors import expect_kind
+from nmm.errors import InputError, expect_kind
 from nmm.plans.plan import Plan
 from nmm.plans.search import STEP, Search
 
@@ -70,6 +70,8 @@ def replan(
     asked = dict(old.asked)
     if obstacles is not None:
         asked["collisions"] = replace(asked["collisions"], obstacles=tuple(obstacles))
+    if any(one.moves for one in asked["collisions"].obstacles):
+        raise InputError("obstacles that move along a path are not replanned for", where="replan: obstacles")
     search = Search(robot, here, [old.goal], (), seed=seed, **asked)
     search.begin(positive(seconds, "seconds"), progress)
     rest = _rest(plan, here, t)

@@ -13,7 +13,6 @@ import numpy as np
 from numba import types
 
 from nmm.arrays import Array, Integers
-from nmm.collisions.legs_check import MovedShapes, begin_motion, look
 from nmm.kernels.compiled import call_platform, checked_by_caller, clear, compiled, scratch, view
 from nmm.kernels.linear_algebra import copied
 from nmm.kernels.record_layout import BLOCKS, IntegerCell, Matrix, Memory, Vector, views
@@ -164,23 +163,6 @@ def write_fastest(
                 change[i] = max(change[i], time * abs(now[i] - before[i]))
     for i in range(3 + n):
         leg[i] += change[i]
-
-
-@compiled
-def sample_blocked(
-    scene: MovedShapes, inputs: Inputs, q: Array, u: Array, a: Array, time: float, substeps: int
-) -> int:
-    """The pair that comes too near within a sample from q, or -1."""
-    n = q.shape[0]
-    here, joints, leg = scratch(n), scratch((scene.joints.parent.shape[0], 12)), scratch(3 + n)
-    none = scratch((n, 0))
-    write_fastest(inputs, q, u, a, time, substeps, leg)
-    begin_motion(scene, leg)
-    share = 0.0
-    while 0.0 <= share < 1.0:
-        flow(inputs, q, u, a, share * time, substeps, here, none)
-        share = look(scene, here, leg, share, joints, 0)
-    return -1 if share >= 0.0 else int(-1.0 - share)
 
 
 class Samples(NamedTuple):

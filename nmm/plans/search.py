@@ -33,6 +33,7 @@ from nmm.plans.samples import SampledMotion, joined
 from nmm.plans.smoothing import Smoothing
 from nmm.plans.timing import TimedLegs, timed
 from nmm.plans.tree import PLACE, Trees
+from nmm.plans.waiting import waited
 from nmm.plans.ways import LEGS, ways_of
 from nmm.robots.robot import Robot
 
@@ -71,7 +72,8 @@ def plan(
     start : (n,) or by name, m and rad
     goal : a configuration (n,); coordinates by name, of which the others are free; a `Task` whose target
         stands; or a list of these, of which one is to be reached
-    obstacles : which stand where they are at t = 0
+    obstacles : those with a `motion` are waited for: the way is looked for among the others, which stand
+        where they are at t = 0
     collisions : distances to keep, with obstacles of its own; `Collisions()` with the obstacles when not
         given
     limits : of velocity, acceleration and position; the robot's own when not given
@@ -155,9 +157,15 @@ class Search:
         self.asked["effort"], self.efforts = effort, efforts_of(robot, effort)
         self.asked["margin"] = self.margin = margin
         self.obstacles = tuple(given.obstacles)
-        if any(one.moves for one in self.obstacles):
-            raise InputError("obstacles that move along a path are not planned for", where="plan: obstacles")
-        scene = given.on(robot) if self.obstacles or len(robot.collision_model.collisionPairs) else None
+        known = bool(self.obstacles) or len(robot.collision_model.collisionPairs) > 0
+        self.scene = given.on(robot) if known else None
+        movers, scene = [one for one in self.obstacles if one.moves], self.scene
+        self.movers = None
+        if movers:  # the way is looked for among what stands, and its timing among what moves
+            self.movers = replace(given, obstacles=movers, self_collisions=False).on(robot)
+            stands = [one for one in self.obstacles if not one.moves]
+            own = given.self_collisions and len(robot.collision_model.collisionPairs) > 0
+            scene = replace(given, obstacles=stands).on(robot) if stands or own else None
         self.limits = limits.on(robot)
         self.usual = self._usual()
         ways = ways_of(
@@ -225,11 +233,14 @@ class Search:
 
     def finished(self, *parts: Array) -> Plan:
         """The plan of legs from the start; a smooth one rests between the parts."""
-        motion: Motion = self._timed(self.start, np.vstack(parts))
-        if self.asked["smooth"]:
-            motion = self._smoothed(parts) or motion
+        path = self._timed(self.start, np.vstack(parts))
+        motion: Motion = path
+        if self.movers is not None:
+            motion = waited(path, self.robot, self.movers)
+        elif self.asked["smooth"]:
+            motion = self._smoothed(parts) or path
         motions, postures = (int(count) for count in self.trees.looked)
-        found = Found(motion, self.limits, self.check.scene, self.goals[-1], self.asked)
+        found = Found(motion, self.limits, self.scene, self.goals[-1], self.asked)
         return Plan(self.robot, motions, postures, found)
 
     def _timed(self, start: Array, legs: Array) -> TimedLegs:

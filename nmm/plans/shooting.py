@@ -1,21 +1,27 @@
-"""The smoothest motion of samples to a configuration in a given time, within all limits, compiled.
+"""Motions of samples within all limits, as a problem of multiple shooting, compiled: what it asks for.
 
-Multiple shooting: the unknowns are q and u at the samples' ends and the constant rate a = du/dt within each.
-Every round is one step of Newton's method on the conditions of a primal-dual interior point: limits and
-distances c ≥ 0 have slacks s and multipliers z with s z → μ (J. Nocedal, S. J. Wright, Numerical
-Optimization, 2006, chapter 19). What couples the samples is solved from the end to the beginning, as in
-differential dynamic programming (D. H. Jacobson, D. Q. Mayne, 1970), and so takes a time in proportion to
-their number. The end is reached by multipliers, too.
+The unknowns are q and u at the samples' ends and the constant rate a = du/dt within each; gaps between the
+samples close while it is solved (`nmm.plans.interior`).
 """
 
 import math
 from typing import NamedTuple
 
+from numba import types
+
 from nmm.arrays import Array, Integers
-from nmm.collisions.legs_check import MovedShapes, place_shape, placed_bound, write_approach
+from nmm.collisions.legs_check import (
+    MovedShapes,
+    begin_motion,
+    look,
+    place_shape,
+    placed_bound,
+    write_approach,
+)
 from nmm.kernels.compiled import call_platform, clear, compiled, compiled_without_gil, scratch, view
 from nmm.kernels.kinematics import axes, place_joints
 from nmm.kernels.record_layout import (
+    BLOCKS,
     Cell,
     IntegerCell,
     IntegerVector,
@@ -24,22 +30,14 @@ from nmm.kernels.record_layout import (
     Vector,
     views,
 )
-from nmm.plans.samples import flow, sample_blocked
+from nmm.plans.samples import flow, write_fastest
 from nmm.robots.wheel_rates import rolling
 from nmm.robots.zero_order_hold import Inputs
 
-#: Distances are looked at within this beyond those to keep, m; the longest step of a round, m and rad.
-NEAR, STEP = 0.08, 0.3
-#: Weight of the end's error.
-END = 1e5
-#: The share of the way to a bound that a round goes at most.
-BEFORE = 0.99
-#: What is left of gaps between samples and of the end's error when a motion is found.
-EXACT = 1e-11
-#: The least slack to begin with, and the least product of slacks and multipliers.
-SLACK, LEAST = 1e-2, 1e-4
-#: Gaps this small are closed by the least change, in so many rounds.
-SMALL, CLOSING = 3e-3, 8
+#: Distances are looked at within this beyond those to keep, m.
+NEAR = 0.08
+#: The least slack to begin with.
+SLACK = 1e-2
 
 
 class Shooting(NamedTuple):
@@ -48,8 +46,13 @@ class Shooting(NamedTuple):
     inputs : what they move; step (), substeps () : of each sample, s
     column (B,), sign (B,), offset (B,) : bounds offset + sign [q u a][column] ≥ 0
     wheels (w, 9), spin (w,) : see `nmm.robots.wheel_rates`, and the largest rates, rad/s
-    weights (2 m,) : of u and a; goal (n,)
+    weights (2 m,) : of u and a; goal (n,), ends (n + m,) : weights of the end's error in q and u, 0 where it
+        is free
+    aims (N + 1, e, n), aimed (N + 1, e), pull (N + 1, e) : the motion costs pull (aims q - aimed)² / 2
+    movers (M,), tracks (N + 1, M, 12) : shapes that move, and where they are at each sample's beginning
+    drift (N, P) : how far the obstacle of a pair moves in each sample at most, m
     room (P,), margin (N + 1,) : what each pair and each sample's beginning keep beyond the distance at most
+    loose () : distances that lack no more than this are good enough, m
     q (N + 1, n), u (N + 1, m), a (N, m) : the motion; moves (N + 1, n + 2 m) : what a round changes of it
     gaps (N, n), D (N, n, n + 2 m) : where a sample leads less the next one's beginning, and its derivative
     c, s, z, ds, dz (N + 1, R) : the R = B + 2 w + P constraints of each sample's beginning; c is infinite for
@@ -69,8 +72,16 @@ class Shooting(NamedTuple):
     spin: Vector
     weights: Vector
     goal: Vector
+    ends: Vector
+    aims: Matrices
+    aimed: Matrix
+    pull: Matrix
+    movers: IntegerVector
+    tracks: Matrices
+    drift: Matrix
     room: Vector
     margin: Vector
+    loose: Cell
     q: Matrix
     u: Matrix
     a: Matrix
@@ -92,18 +103,28 @@ class Shooting(NamedTuple):
 
 
 @compiled
+def place_movers(scene: MovedShapes, x: Shooting, k: int, share: float) -> None:
+    """Put the obstacles that move where they are at a share of sample k; turned as at its beginning."""
+    for i in range(x.movers.shape[0]):
+        for c in range(12):
+            scene.place[x.movers[i], c] = x.tracks[k, i, c]
+            if c >= 9 and share > 0.0:
+                scene.place[x.movers[i], c] += share * (x.tracks[k + 1, i, c] - x.tracks[k, i, c])
+
+
+@compiled
 def write_constraints(scene: MovedShapes, joints: Array, twists: Array, x: Shooting, k: int) -> None:
-    """c and rows at the beginning of sample k; at the first and the last only those of a count."""
+    """c and rows at the beginning of sample k; at the first, and at a last that is given, of a alone."""
     n, m, B, w = x.q.shape[1], x.u.shape[1], x.column.shape[0], x.spin.shape[0]
     N = x.a.shape[0]
-    inner = 0 < k < N
+    inner = 0 < k < N or (k == N and x.ends[0] == 0.0)
     for r in range(B):
         i = x.column[r]
         x.c[k, r] = math.inf
         if i >= n + m:
             if k < N:
                 x.c[k, r] = x.offset[r] + x.sign[r] * x.a[k, i - n - m]
-        elif inner:
+        elif inner and (i < n or k < N):
             value = x.q[k, i] if i < n else x.u[k, i - n]
             x.c[k, r] = x.offset[r] + x.sign[r] * value
     P = scene.kept.shape[0]
@@ -136,6 +157,7 @@ def write_constraints(scene: MovedShapes, joints: Array, twists: Array, x: Shoot
                 x.rows[k, r, b] = sign * row[b]
     place_joints(scene.joints, q, joints)
     axes(scene.joints, joints, twists)
+    place_movers(scene, x, k, 0.0)
     for shape in range(scene.carrier.shape[0]):
         place_shape(scene, joints, shape)
     for pair in range(P):
@@ -161,14 +183,14 @@ def write_all(scene: MovedShapes, x: Shooting) -> float:
         for i in range(n):
             x.gaps[k, i] = ahead[i] - x.q[k + 1, i]
             worst = max(worst, abs(x.gaps[k, i]))
-    for i in range(n):
-        worst = max(worst, abs(x.q[N, i] - x.goal[i]))
-    for j in range(x.u.shape[1]):
-        worst = max(worst, abs(x.u[N, j]))
+    for i in range(x.ends.shape[0]):
+        if x.ends[i] > 0.0:
+            worst = max(worst, abs(x.q[N, i] - x.goal[i] if i < n else x.u[N, i - n]))
     for k in range(N + 1):
         write_constraints(scene, joints, twists, x, k)
         for r in range(x.c.shape[1]):
-            worst = max(worst, -x.c[k, r])
+            far = r >= x.c.shape[1] - x.drift.shape[1]
+            worst = max(worst, -x.c[k, r] - (x.loose[()] if far else 0.0))
             if x.c[k, r] < math.inf and x.s[k, r] == 0.0:
                 x.s[k, r] = max(x.c[k, r], SLACK)
                 x.z[k, r] = x.mu[()] / x.s[k, r]
@@ -178,225 +200,21 @@ def write_all(scene: MovedShapes, x: Shooting) -> float:
 
 
 @compiled
-def add_row(Q: Array, row: Array, weight: float, push: float) -> None:
-    """Add weight row rowᵀ to Q's square, and push row to its last column."""
-    last = Q.shape[1] - 1
-    for i in range(row.shape[0]):
-        if row[i] != 0.0:
-            for j in range(row.shape[0]):
-                Q[i, j] += weight * row[i] * row[j]
-            Q[i, last] += push * row[i]
-
-
-@compiled
-def add_constraints(x: Shooting, k: int, closing: int) -> None:
-    """Add the constraints at the beginning of sample k to its quadratic model Q."""
-    B, last = x.column.shape[0], x.Q.shape[1] - 1
-    for r in range(x.c.shape[1]):
-        if x.c[k, r] == math.inf:
-            continue
-        weight = x.z[k, r] / x.s[k, r]
-        push = 0.0 if closing else weight * (x.c[k, r] - x.s[k, r]) - x.mu[()] / x.s[k, r]
-        if r < B:
-            i = x.column[r]
-            x.Q[i, i] += weight
-            x.Q[i, last] += push * x.sign[r]
-        else:
-            add_row(x.Q, x.rows[k, r - B], weight, push)
-
-
-@compiled
-def solve_backward(x: Shooting, closing: int) -> int:
-    """K of all samples, from the last to the first, `closing`: for the least change that closes the gaps;
-    0 where a matrix is not positive definite."""
-    N, n, m = x.a.shape[0], x.q.shape[1], x.u.shape[1]
-    h, size, last = x.step[()], x.q.shape[1] + x.u.shape[1], x.Q.shape[1] - 1
-    V, Q, W = x.V, x.Q, x.W
-    clear(V)
-    for i in range(size):
-        V[i, i] = END
-        off = x.q[N, i] - x.goal[i] if i < n else x.u[N, i - n]
-        V[i, size] = (0.0 if closing else x.duals[i]) + END * off
-    L = scratch((m, m))
-    for k in range(N - 1, -1, -1):
-        clear(Q)
-        clear(W)
-        # W = V T with T = [D; 0 I h], then Q = Tᵀ W and its last column Tᵀ (V gap + v).
-        for i in range(n):
-            for c in range(size + m):
-                d = x.D[k, i, c]
-                if d != 0.0:
-                    for r in range(size):
-                        W[r, c] += V[r, i] * d
-        for j in range(m):
-            for r in range(size):
-                W[r, n + j] += V[r, n + j]
-                W[r, size + j] += h * V[r, n + j]
-        for r in range(size):
-            push = V[r, size]
-            for i in range(n):
-                push += V[r, i] * x.gaps[k, i]
-            if r < n:
-                for c in range(size + m):
-                    d = x.D[k, r, c]
-                    if d != 0.0:
-                        for other in range(size + m):
-                            Q[c, other] += d * W[r, other]
-                        Q[c, last] += d * push
-            else:
-                for other in range(size + m):
-                    Q[r, other] += W[r, other]
-                    Q[r + m, other] += h * W[r, other]
-                Q[r, last] += push
-                Q[r + m, last] += h * push
-        for j in range(2 * m):
-            value = x.u[k, j] if j < m else x.a[k, j - m]
-            Q[n + j, n + j] += x.weights[j]
-            Q[n + j, last] += 0.0 if closing else x.weights[j] * value
-        add_constraints(x, k, closing)
-        # Qaa = L Lᵀ, then K = -Qaa⁻¹ [Qax, qa] and V = Qxx + Qxa K.
-        for i in range(m):
-            for j in range(i + 1):
-                value = Q[size + i, size + j]
-                for b in range(j):
-                    value -= L[i, b] * L[j, b]
-                if i == j:
-                    if not value > 0.0:
-                        return 0
-                    L[i, i] = math.sqrt(value)
-                else:
-                    L[i, j] = value / L[j, j]
-        K = x.K[k]
-        for c in range(size + 1):
-            source = c if c < size else last
-            for i in range(m):
-                value = -Q[size + i, source]
-                for b in range(i):
-                    value -= L[i, b] * K[b, c]
-                K[i, c] = value / L[i, i]
-        for i in range(size):
-            for c in range(size + 1):
-                value = Q[i, c if c < size else last]
-                for b in range(m):
-                    value -= K[b, i] * K[b, c]
-                V[i, c] = value
-        for c in range(size + 1):
-            for i in range(m - 1, -1, -1):
-                value = K[i, c]
-                for b in range(i + 1, m):
-                    value -= L[b, i] * K[b, c]
-                K[i, c] = value / L[i, i]
-    return 1
-
-
-@compiled
-def solve_forward(x: Shooting) -> None:
-    """What the round changes, from the first sample to the last, and of slacks and multipliers."""
-    N, n, m, B = x.a.shape[0], x.q.shape[1], x.u.shape[1], x.column.shape[0]
-    size = n + m
-    clear(x.moves)
-    for k in range(N + 1):
-        d = x.moves[k]
-        if k < N:
-            for j in range(m):
-                d[size + j] = x.K[k, j, size]
-                for i in range(size):
-                    d[size + j] += x.K[k, j, i] * d[i]
-            then = x.moves[k + 1]
-            for i in range(n):
-                then[i] = x.gaps[k, i]
-                for c in range(size + m):
-                    then[i] += x.D[k, i, c] * d[c]
-            for j in range(m):
-                then[n + j] = d[n + j] + x.step[()] * d[size + j]
-        for r in range(x.c.shape[1]):
-            if x.c[k, r] == math.inf:
-                continue
-            change = 0.0
-            if r < B:
-                change = x.sign[r] * d[x.column[r]]
-            else:
-                for i in range(size):
-                    change += x.rows[k, r - B, i] * d[i]
-            x.ds[k, r] = x.c[k, r] - x.s[k, r] + change
-            x.dz[k, r] = (x.mu[()] - x.z[k, r] * x.ds[k, r]) / x.s[k, r] - x.z[k, r]
-
-
-@compiled
-def add_moves(x: Shooting, share: float) -> None:
-    """Change the motion by a share of the moves."""
-    N, n, m = x.a.shape[0], x.q.shape[1], x.u.shape[1]
-    for k in range(N + 1):
-        for i in range(n):
-            x.q[k, i] += share * x.moves[k, i]
-        for j in range(m):
-            x.u[k, j] += share * x.moves[k, n + j]
-            if k < N:
-                x.a[k, j] += share * x.moves[k, n + m + j]
-
-
-@compiled
-def step_forward(x: Shooting) -> float:
-    """Go on by what a round found, before slacks and multipliers are used up; returns the share of it."""
-    N, n = x.a.shape[0], x.q.shape[1]
-    share, share_z, longest = 1.0, 1.0, 0.0
-    for k in range(N + 1):
-        for i in range(n):
-            longest = max(longest, abs(x.moves[k, i]))
-        for r in range(x.c.shape[1]):
-            if x.c[k, r] < math.inf:
-                if x.ds[k, r] < 0.0:
-                    share = min(share, -BEFORE * x.s[k, r] / x.ds[k, r])
-                if x.dz[k, r] < 0.0:
-                    share_z = min(share_z, -BEFORE * x.z[k, r] / x.dz[k, r])
-    if not longest < math.inf:
-        return -1.0
-    if share * longest > STEP:
-        share = STEP / longest
-    add_moves(x, share)
-    total, count = 0.0, 0
-    for k in range(N + 1):
-        for r in range(x.c.shape[1]):
-            if x.c[k, r] < math.inf:
-                x.s[k, r] += share * x.ds[k, r]
-                x.z[k, r] += share_z * x.dz[k, r]
-                total += x.s[k, r] * x.z[k, r]
-                count += 1
-    for i in range(x.duals.shape[0]):
-        off = x.q[N, i] - x.goal[i] if i < n else x.u[N, i - n]
-        x.duals[i] += END * off
-    less = min(share, share_z)
-    x.mu[()] = max(total / max(count, 1) * max(0.1, (1.0 - less) ** 2), LEAST)
-    return share
-
-
-@compiled_without_gil
-def shoot(integers: Integers, floats: Array, own_integers: Integers, own_floats: Array, rounds: int) -> int:
-    """Rounds until the motion is allowed: how many it took, or less 0 where it is not after them."""
-    scene = views(MovedShapes, integers, floats, 0)
-    x = views(Shooting, own_integers, own_floats, 0)
-    short = 0
-    k = 0
-    while k < rounds:
-        off = write_all(scene, x)
-        k += 1
-        for _ in range(CLOSING):
-            if off <= EXACT:
-                return k
-            if off > SMALL or solve_backward(x, 1) == 0:
-                break
-            solve_forward(x)
-            add_moves(x, 1.0)
-            off = write_all(scene, x)
-            k += 1
-        if solve_backward(x, 0) == 0:
-            return -k
-        solve_forward(x)
-        share = step_forward(x)
-        short = short + 1 if share < 0.02 else 0
-        if share < 0.0 or short > 8:
-            return -k
-    return -k
+def sample_blocked(scene: MovedShapes, x: Shooting, k: int) -> int:
+    """The pair that comes too near within sample k, or -1."""
+    n, q, u, a, time = x.q.shape[1], x.q[k], x.u[k], x.a[k], x.step[()]
+    here, joints, leg = scratch(n), scratch((scene.joints.parent.shape[0], 12)), scratch(3 + n)
+    none = scratch((n, 0))
+    write_fastest(x.inputs, q, u, a, time, x.substeps[()], leg)
+    for pair in range(x.drift.shape[1]):
+        scene.drift[pair] = x.drift[k, pair]
+    begin_motion(scene, leg)
+    share = 0.0
+    while 0.0 <= share < 1.0:
+        flow(x.inputs, q, u, a, share * time, x.substeps[()], here, none)
+        place_movers(scene, x, k, share)
+        share = look(scene, here, leg, share, joints, 0)
+    return -1 if share >= 0.0 else int(-1.0 - share)
 
 
 @compiled_without_gil
@@ -405,7 +223,9 @@ def first_blocked_sample(integers: Integers, floats: Array, own_integers: Intege
     scene = views(MovedShapes, integers, floats, 0)
     x = views(Shooting, own_integers, own_floats, 0)
     for k in range(x.a.shape[0]):
-        pair = sample_blocked(scene, x.inputs, x.q[k], x.u[k], x.a[k], x.step[()], x.substeps[()])
-        if pair >= 0:
+        if sample_blocked(scene, x, k) >= 0:
             return k
     return -1
+
+
+LOOK = types.int64(*BLOCKS.types, *BLOCKS.types)

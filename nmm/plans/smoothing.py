@@ -5,19 +5,19 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import types
 
 from nmm.arrays import Array
 from nmm.collisions.motion_check import MotionCheck
 from nmm.control.limits import LimitsOn
 from nmm.kernels.compiled import checked_by_caller
-from nmm.kernels.record_layout import BLOCKS, Memory, views
+from nmm.kernels.record_layout import Memory, views
+from nmm.plans.interior import SHOOT, shoot
+from nmm.plans.problem import MU, TURN, largest_inputs, shooting_problem
 from nmm.plans.samples import SampledMotion, Samples
-from nmm.plans.shooting import Shooting, first_blocked_sample, shoot
+from nmm.plans.shooting import LOOK, Shooting, first_blocked_sample
 from nmm.plans.timing import TimedLegs
 from nmm.robots.robot import Robot
 from nmm.robots.wheel_rates import turning_wheels
-from nmm.robots.zero_order_hold import inputs_of
 
 #: How many samples a motion has: one for each so many seconds of the path's time, within limits.
 EACH, FEWEST, MOST = 0.27, 24, 80
@@ -25,16 +25,10 @@ EACH, FEWEST, MOST = 0.27, 24, 80
 FIRST, ROUNDS, ALL = 100, 25, 200
 #: The next motion takes this share of the time of the one before; after a failure, of the best.
 FASTER, LESS = 0.8, 0.92
-#: Samples' ends keep this much more than the distance, m; ends of one that is blocked between so much more.
-MARGIN, MORE = 0.005, 0.015
-#: The most that the platform turns in one step of its integration, rad.
-TURN = 0.1
-#: Wheels and joints keep this share of their limits between the ends of samples.
-WITHIN = 0.99
-#: Weight of inputs beside that of their rates, both as shares of their limits.
-EFFORT = 0.3
-#: Products of slacks and multipliers to begin with.
-MU = 1e-2
+#: Samples' ends that are blocked between keep so much more than the distance, m.
+MORE = 0.015
+#: What is left of gaps between samples and of the end's error when a motion is found.
+EXACT = 1e-11
 
 
 class Smoothing:
@@ -47,17 +41,9 @@ class Smoothing:
 
     def __init__(self, robot: Robot, limits: LimitsOn, usual: float, check: MotionCheck) -> None:
         self.robot, self.limits, self.check = robot, limits, check
-        largest = np.full(
-            robot.n_u, usual
-        )  # of inputs without limits; rates of wheels as drive the platform so
-        if robot.platform.n_p:
-            G = robot.platform.G(np.zeros(robot.platform.n_p))
-            largest[: robot.platform.p] *= np.abs(np.linalg.pinv(G)).max(axis=1)
-        self.top = np.where(np.isfinite(limits.inputs), limits.inputs, np.column_stack([-largest, largest]))
-        self._shoot = checked_by_caller(shoot, types.int64(*BLOCKS.types, *BLOCKS.types, types.int64))
-        self._first_blocked = checked_by_caller(
-            first_blocked_sample, types.int64(*BLOCKS.types, *BLOCKS.types)
-        )
+        self.top = largest_inputs(robot, limits, usual)
+        self._shoot = checked_by_caller(shoot, SHOOT)
+        self._first_blocked = checked_by_caller(first_blocked_sample, LOOK)
 
     def __call__(self, path: TimedLegs) -> SampledMotion | None:
         """A motion that takes less time than a path, or None where none is found that keeps everything."""
@@ -87,7 +73,9 @@ class Smoothing:
         q, u = path.at(np.linspace(0.0, path.duration, N + 1))
         u[0] = u[-1] = 0.0
         memory = Memory()
-        memory.add(self._shooting(q, u, path.duration / N))
+        memory.add(
+            shooting_problem(self.robot, self.limits, self.top, self.check, q, u, path.duration / N, True)
+        )
         self._own = memory.blocks()
         self.x = views(Shooting, *self._own, 0)
         self._left = ALL
@@ -116,7 +104,7 @@ class Smoothing:
         x = self.x
         while self._left > 0:
             x.s[:], x.z[:], x.duals[:], x.mu[()] = 0.0, 0.0, 0.0, MU
-            rounds = self._shoot(*self.check.blocks, *self._own, min(most, self._left))
+            rounds = self._shoot(*self.check.blocks, *self._own, 0, min(most, self._left), EXACT)
             self._left -= abs(rounds)
             if rounds < 0:
                 return False
@@ -154,68 +142,3 @@ class Smoothing:
         names, turning = turning_wheels(self.robot, q, q_dot)
         turning = turning[:, [names.index(name) for name in limits.rows[: len(limits.spin)]]]
         return bool(np.all(np.abs(turning) <= limits.spin))
-
-    def _shooting(self, q: Array, u: Array, step: float) -> Shooting:
-        """The problem, with a motion to begin with: q (N + 1, n) and u (N + 1, m) every step, s."""
-        robot, limits, zeros = self.robot, self.limits, np.zeros
-        n, m, N = robot.n, robot.n_u, len(q) - 1
-        hardest = limits.accelerations
-        # Between two ends of samples a joint can go farther than at both, while it turns round.
-        room = np.minimum(q[[0, -1]] - limits.coordinates[:, 0], limits.coordinates[:, 1] - q[[0, -1]])
-        over = np.zeros(n)
-        moved = robot.rate_coordinates
-        over[moved[moved >= 0]] = (np.where(np.isfinite(hardest), hardest, 0.0) * step * step / 8.0)[
-            moved >= 0
-        ]
-        over = np.minimum(over, 0.5 * np.maximum(room.min(axis=0), 0.0))
-        ends = np.vstack(
-            [
-                limits.coordinates + np.column_stack([over, -over]),
-                self.top,
-                np.column_stack([-hardest, hardest]),
-            ]
-        )
-        column, side = np.nonzero(np.isfinite(ends))
-        sign = np.where(side == 0, 1.0, -1.0)
-        largest = np.abs(self.top).max(axis=1)
-        hardest = np.where(np.isfinite(hardest), hardest, 10.0 * largest)
-        scene, kept = self.check.scene, self.check.kept
-        spare = zeros(0)
-        if scene is not None:
-            pairs = range(len(kept))
-            apart = np.minimum(*(scene.queries.distances(0.0, one, pairs) for one in q[[0, -1]]))
-            spare = np.maximum(0.5 * (apart - kept), 0.0)
-        R = len(column) + 2 * len(limits.spin) + len(kept)
-        turn = float(np.abs(np.diff(q[:, 2 : robot.platform.n_p], axis=0)).max(initial=0.0))
-        return Shooting(
-            inputs=inputs_of(robot),
-            step=np.array(step),
-            substeps=np.array(max(2, math.ceil(turn / TURN)), dtype=np.int64),
-            column=column.astype(np.int64),
-            sign=sign,
-            offset=-sign * ends[column, side],
-            wheels=limits.wheels,
-            spin=WITHIN * limits.spin,
-            weights=np.concatenate([EFFORT / largest**2, 1.0 / hardest**2]),
-            goal=q[-1],
-            room=spare,
-            margin=np.full(N + 1, MARGIN),
-            q=q,
-            u=u,
-            a=np.diff(u, axis=0) / step,
-            moves=zeros((N + 1, n + 2 * m)),
-            gaps=zeros((N, n)),
-            D=zeros((N, n, n + 2 * m)),
-            c=zeros((N + 1, R)),
-            s=zeros((N + 1, R)),
-            z=zeros((N + 1, R)),
-            ds=zeros((N + 1, R)),
-            dz=zeros((N + 1, R)),
-            rows=zeros((N + 1, R - len(column), n + m)),
-            K=zeros((N, m, n + m + 1)),
-            V=zeros((n + m, n + m + 1)),
-            Q=zeros((n + 2 * m, n + 2 * m + 1)),
-            W=zeros((n + m, n + 2 * m)),
-            duals=zeros(n + m),
-            mu=np.array(MU),
-        )
