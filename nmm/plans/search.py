@@ -145,7 +145,7 @@ class Search:
         seed: int,
         tolerance: Goal,
         smooth: bool,
-        effort: bool | Mapping[str, Any],
+        effort: bool | Mapping[str, Any] = False,
         margin: float = 0.0,
     ) -> None:
         self.robot, self.start, self.goals, self.tolerance = robot, start, goals, tolerance

@@ -1,6 +1,7 @@
 """A sampled controller that sees a robot with noise and acts on it late, while its wheels slip."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array, Integers, counted
 from nmm.control.controller import Controller
 from nmm.control.equations import ControlStep, write_equation
-from nmm.control.integrators import Around, Velocity
+from nmm.control.integrators import Around
 from nmm.control.recorded import Recorded, note_sample
 from nmm.control.stepping import hold_inputs
 from nmm.errors import InputError, expect
@@ -43,7 +44,9 @@ class Acting(Around):
     disturbed: Disturbed
     asked: dict[float, Array] = field(default_factory=dict)
 
-    def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
+    def advance(
+        self, velocity: Callable[[float, Array], Array], t: float, q: Array, q_dot: Array, u: Array, dt: float
+    ) -> Array:
         self.asked[t] = u  # once a sample, also where its step is taken again
         if len(self.asked) > self.disturbed.delay + 1:
             del self.asked[next(iter(self.asked))]
