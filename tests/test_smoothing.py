@@ -158,21 +158,32 @@ def test_where_a_sample_leads_is_differentiated_exactly(name):
 
 
 def test_distances_are_differentiated_along_the_direction_between_two():
-    plan = planned("unicycle_3r", smooth=False)
-    smoothing, path = prepared([WALL], plan)
-    smoothing.begin(path)
-    assert smoothing.solved()
+    """Of a motion past a post, which stands beside it here and there."""
+    plan, errors = planned("unicycle_3r", smooth=False), []
+    (places, _) = plan(plan.duration * np.array([0.2, 0.4, 0.6, 0.8]))
+    for x, y, theta in places[:, :3]:
+        beside = [x - 0.6 * np.sin(theta), y + 0.6 * np.cos(theta), 1.0]
+        post = nmm.Obstacle(nmm.Cylinder(0.1, 2.0), beside, name="post")
+        smoothing, path = prepared([WALL, post], plan)
+        smoothing.begin(path)
+        assert smoothing.solved()
+        errors += derivative_errors(smoothing, plan.robot)
+    assert len(errors) > 50
+    assert np.median(np.abs(errors)) < 1e-3
+    assert np.mean(np.abs(errors)) < 0.03
+
+
+def derivative_errors(smoothing, robot):
+    """Derivatives of the distances of near pairs less their differences by Coal, at the samples' ends."""
     x, queries = smoothing.x, smoothing.check.scene.queries
     B, w = len(x.column), len(x.spin)
     pairs, errors = range(len(x.room)), []
     for k in range(1, len(x.a)):
         near = np.flatnonzero(np.isfinite(x.c[k, B + 2 * w :]))
-        for i, e in enumerate(1e-6 * np.eye(plan.robot.n)):
+        for i, e in enumerate(1e-6 * np.eye(robot.n)):
             change = queries.distances(0.0, x.q[k] + e, pairs) - queries.distances(0.0, x.q[k] - e, pairs)
             errors += list(change[near] / 2e-6 - x.rows[k, 2 * w + near, i])
-    assert len(errors) > 50
-    assert np.median(np.abs(errors)) < 1e-3
-    assert np.mean(np.abs(errors)) < 0.03
+    return errors
 
 
 # Scenarios
