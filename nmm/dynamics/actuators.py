@@ -8,7 +8,7 @@ import numpy as np
 
 from nmm.arrays import Array
 from nmm.robots.robot import Robot
-from nmm.robots.wheel_rates import rolling
+from nmm.robots.wheel_rates import wheel_shares
 
 
 class Actuators:
@@ -67,10 +67,5 @@ class Actuators:
         """R (N, platform's, p): rates of the wheels and of steering, R u_p."""
         platform = self.robot.platform
         G = np.array([platform.G(one[: platform.n_p]) for one in q])
-        R = np.zeros((len(q), len(self._rows), platform.p))
-        for k, wheel in enumerate(self._rows):
-            steer = int(wheel[4])
-            shares = rolling(wheel, q[:, 2], q[:, steer] if steer >= 0 else np.zeros(len(q)))
-            for i, share in zip((0, 1, 2, steer) if steer >= 0 else (0, 1, 2), shares, strict=False):
-                R[:, k] += np.asarray(share)[:, np.newaxis] * G[:, i]
+        R = wheel_shares(self._rows, q)[:, :, : platform.n_p] @ G
         return np.hstack([R, np.tile(np.eye(platform.p)[self._own], (len(q), 1, 1))])

@@ -12,7 +12,15 @@ from nmm.arrays import Array, array, positive, vector
 from nmm.dynamics.actuators import Actuators
 from nmm.errors import InputError, expect, no_such
 from nmm.robots.robot import Robot, frame_index
-from nmm.robots.wheel_rates import following, following_dot, rolling, rolling_dot, wheel_rates
+from nmm.robots.wheel_rates import (
+    following,
+    following_dot,
+    moved_by,
+    rolling_dot,
+    steered_by,
+    wheel_rates,
+    wheel_shares,
+)
 
 #: A mass, kg, or one with its place in the frame, m.
 Payload = Mapping[str, "float | tuple[float, ArrayLike]"]
@@ -148,10 +156,7 @@ class Dynamics:
         """T (N, joints, n) at q (N, n): Q_dot = T q_dot."""
         T = np.zeros((len(q), self.model.nv, self.robot.n))
         T[:, self._at_q, range(self.robot.n)] = 1.0
-        for at, wheel in zip(self._at_wheels, self._wheels, strict=True):
-            at_wheel, delta, _ = _moving(wheel, q, q)
-            for i, share in zip(at_wheel, rolling(wheel, q[:, 2], delta), strict=False):
-                T[:, at, i] = share
+        T[:, self._at_wheels] = wheel_shares(self._wheels, q)
         for at, k, turn in zip(self._at_knuckles, self._knuckles, self._turns, strict=True):
             wheel = self._wheels[k]
             T[:, at, int(wheel[4])] = turn * following(wheel, q[:, int(wheel[4])])[2]
@@ -161,9 +166,9 @@ class Dynamics:
         """T's rate (N, joints, n) at q and q_dot (N, n)."""
         T_dot = np.zeros((len(q), self.model.nv, self.robot.n))
         for at, wheel in zip(self._at_wheels, self._wheels, strict=True):
-            at_wheel, delta, delta_dot = _moving(wheel, q, q_dot)
+            delta, delta_dot = steered_by(wheel, q), steered_by(wheel, q_dot)
             rates = rolling_dot(wheel, q[:, 2], delta, q_dot[:, 2], delta_dot)
-            for i, rate in zip(at_wheel, rates, strict=False):
+            for i, rate in zip(moved_by(wheel), rates, strict=False):
                 T_dot[:, at, i] = rate
         for at, k, turn in zip(self._at_knuckles, self._knuckles, self._turns, strict=True):
             wheel, steer = self._wheels[k], int(self._wheels[k][4])
@@ -192,14 +197,6 @@ def _loaded(robot: Robot, payload: Payload) -> pin.Model:
         inertia = pin.Inertia(positive(mass, f"{where}: mass, kg"), lever, np.zeros((3, 3)))
         model.inertias[frame.parentJoint] = model.inertias[frame.parentJoint] + inertia
     return model
-
-
-def _moving(wheel: Array, q: Array, q_dot: Array) -> tuple[tuple[int, ...], Array, Array]:
-    """The coordinates that a wheel's row speaks of, and δ with its rate, (N,): 0 without steering."""
-    steer = int(wheel[4])
-    if steer < 0:
-        return (0, 1, 2), np.zeros(len(q)), np.zeros(len(q))
-    return (0, 1, 2, steer), q[:, steer], q_dot[:, steer]
 
 
 def _upright(model: pin.Model, name: str) -> float:

@@ -57,6 +57,26 @@ def rolling(wheel: Any, theta: Any, delta: Any) -> tuple[Any, Any, Any, Any]:
     )
 
 
+def moved_by(wheel: Array) -> tuple[int, ...]:
+    """The coordinates whose rates a wheel's row adds up: x, y, θ and, where there is one, δ."""
+    return (0, 1, 2) if wheel[4] < 0.0 else (0, 1, 2, int(wheel[4]))
+
+
+def steered_by(wheel: Array, x: Array) -> Array:
+    """δ of a wheel's row at q, or its rate at q_dot, of x (N, n): (N,), 0 without steering."""
+    return np.zeros(len(x)) if wheel[4] < 0.0 else x[:, int(wheel[4])]
+
+
+def wheel_shares(rows: Array, q: Array) -> Array:
+    """What the coordinates' rates add to the wheels', (N, w, n), at q (N, n): see `rolling`."""
+    shares = np.zeros((len(q), len(rows), q.shape[1]))
+    for k, wheel in enumerate(rows):
+        found = rolling(wheel, q[:, 2], steered_by(wheel, q))
+        for i, share in zip(moved_by(wheel), found, strict=False):
+            shares[:, k, i] = share
+    return shares
+
+
 def following_dot(wheel: Array, delta: Array, delta_dot: Array) -> Array:
     """The rate of dφ/dδ (N,) as δ moves."""
     a, b, sine, cosine = wheel[7], wheel[8], np.sin(delta), np.cos(delta)
@@ -85,15 +105,7 @@ def rolling_dot(
 def turning_wheels(robot: Robot, q: Array, q_dot: Array) -> tuple[tuple[str, ...], Array]:
     """The wheels of `wheel_rates`, and how fast they turn, (N, w) rad/s, at q and q_dot, (N, n)."""
     names, rows = wheel_rates(robot)
-    rates = np.zeros((len(q), len(names)))
-    for k, wheel in enumerate(rows):
-        steer = int(wheel[4])
-        steered = (q[:, steer], q_dot[:, steer]) if steer >= 0 else (np.zeros(len(q)), 0.0)
-        for share, rate in zip(
-            rolling(wheel, q[:, 2], steered[0]), (*q_dot[:, :3].T, steered[1]), strict=True
-        ):
-            rates[:, k] += share * rate
-    return names, rates
+    return names, np.einsum("kwi,ki->kw", wheel_shares(rows, q), q_dot)
 
 
 def inputs_held_by(robot: Robot, wheels: Collection[str]) -> list[str]:
