@@ -14,7 +14,7 @@ import nmm
 from nmm.arrays import Array
 from nmm.cli.torques import torques
 from nmm.dynamics.support import Support, hull
-from nmm.dynamics.torques import accelerations
+from nmm.dynamics.torques import accelerations, torques_along
 
 UR5 = "package://example-robot-data/robots/ur_description/urdf/ur5_robot.urdf"
 G = 9.81
@@ -294,6 +294,15 @@ def test_the_command_writes_what_it_says(
     run.save("a_run", figures=False)
     assert torques("a_run") == 0
     assert (tmp_path / "runs" / "a_run-torques" / "torques.csv").exists()
+
+
+@pytest.mark.parametrize("name", ["unicycle_3r", "differential_base+ur5", "small_arm"])
+def test_the_figures_last_panel_names_its_time(name: str) -> None:
+    robot, t = robot_of(name), np.linspace(0.0, 1.0, 11)
+    q = np.tile(robot.rest, (11, 1))
+    figure = torques_along(robot, t, q, np.zeros((11, robot.n_u))).plot()
+    labels = [axes.get_xlabel() for axes in figure.axes]
+    assert labels == [*[""] * (len(labels) - 1), "time t [s]"]
 
 
 @pytest.mark.parametrize(

@@ -72,43 +72,35 @@ def torques(
 
 
 def _show(found: Torques, folder: Path) -> None:
-    import numpy as np  # here: `nmm --help` would pay
-
-    units, limits = found.dynamics.actuators.units, found.efforts
-    when = np.abs(found.torques).argmax(axis=0)
+    said = found.summary()
     rows = [
         [
             name,
-            units[j],
-            f"{found.peaks[j]:.3g}",
-            f"{found.t[when[j]]:.4g} s",
-            f"{found.rms[j]:.3g}",
-            f"{limits[j]:.4g}" if np.isfinite(limits[j]) else "none",
-            f"{100 * found.peaks[j] / limits[j]:.0f} %" if np.isfinite(limits[j]) else "",
+            one["unit"],
+            f"{one['peak']:.3g}",
+            f"{one['t']:.4g} s",
+            f"{one['rms']:.3g}",
+            "none" if one["effort"] is None else f"{one['effort']:.4g}",
+            "" if one["effort"] is None else f"{100 * one['share']:.0f} %",
         ]
-        for j, name in enumerate(found.names)
+        for name, one in said["actuators"].items()
     ]
     columns = ["motor", "unit", "peak", "at", "RMS", "limit", "of it"]
     show_table(columns, rows, numeric=columns[2:])
     show_text()
-    least = int(found.margins.argmin())
-    tips = "the wheels of its file are too few to say"
-    if np.isfinite(found.margins[least]):
-        where = f"at {found.t[least]:.4g} s, over the edge from {' to '.join(found.edges[least])}"
-        tips = f"{1e3 * found.margins[least]:.3g} mm to tipping, {where}"
+    balance, least = "the wheels of its file are too few to say", said["tipping"]
+    if least is not None:
+        where = f"at {least['t']:.4g} s, over the edge from {' to '.join(least['edge'])}"
+        balance = f"{1e3 * least['margin']:.3g} mm to tipping, {where}"
     rows = [
-        ["power", f"{found.power.max():.3g} W at most"],
-        ["energy", f"{found.energy:.4g} J, without what braking gives back"],
-        ["balance", tips],
+        ["power", f"{said['power_peak']:.3g} W at most"],
+        ["energy", f"{said['energy']:.4g} J, without what braking gives back"],
+        ["balance", balance],
     ]
-    if found.jumps.any():
-        times = [f"{t:.4g}" for t in found.t[found.jumps]]
-        rows.append(
-            [
-                "inputs jump",
-                f"at {listed(times[:5])} s{' …' if len(times) > 5 else ''}: no torque is told there",
-            ]
-        )
-    if found.dynamics.left_out:
-        rows.append(["held still", listed(list(found.dynamics.left_out))])
+    if said["jumps"]:
+        times = [f"{t:.4g}" for t in said["jumps"]]
+        more = " …" if len(times) > 5 else ""
+        rows.append(["inputs jump", f"after {listed(times[:5])} s{more}: what that takes is not in it"])
+    if said["left_out"]:
+        rows.append(["held still", listed(said["left_out"])])
     show_table(["", ""], [*rows, ["files in", str(folder)]])

@@ -33,12 +33,13 @@ def torques(found: Torques, *, width: float = style.PAGE) -> Figure:
     made, panels = style.stack([1.8] * len(shown) + [1.2] * tips, [*legends, *([[]] if tips else [])], width)
     broken = found.jumps[:, np.newaxis]
     for axes, (name, columns), names in zip(panels, shown.items(), legends, strict=False):
+        last = axes is panels[-1]
         style.columns(axes, found.t, np.where(broken, np.nan, shares[:, columns]), names, zero=True)
         if name == "limited":
             most = float(np.abs(shares[:, columns]).max())
             for end in (-1.0, 1.0) if most > 0.5 else ():
                 axes.axhline(end, color=resolver_style.BLACK, linewidth=1.0, zorder=1)
-        style.finish(axes, found.t, heads[name], named=False, ticks=False)
+        style.finish(axes, found.t, heads[name], named=last, ticks=False)
     if tips:
         style.curve(panels[-1], found.t, found.margins, None, resolver_style.VERMILLION)
         panels[-1].set_ylim(min(0.0, 1.1 * float(found.margins.min())), None)
