@@ -23,6 +23,7 @@ import numpy as np
 from planning import DISTANCE, KINDS, LIMITS, SIX, Scene, checked
 
 import nmm
+from nmm.plans.plan import Asked
 from nmm.plans.search import Search
 
 #: What OMPL may take, s.
@@ -57,8 +58,8 @@ def of_ompl(scene: Scene, seed: int) -> nmm.Plan:
     from ompl import base, geometric
 
     robot, start = scene.robot, scene.robot.q(scene.start)
-    keeps = nmm.Collisions(DISTANCE)
-    search = Search(robot, start, [scene.goal], scene.obstacles, keeps, LIMITS, seed, nmm.Goal(), False)
+    asked = Asked(nmm.Collisions(DISTANCE, obstacles=scene.obstacles), LIMITS, nmm.Goal())
+    search = Search(robot, start, [scene.goal], asked, seed)
     search.begin(SECONDS, None)
     goals, n_p, ways = search.ends(scene.goal, start), robot.platform.n_p, search.trees.ways
 

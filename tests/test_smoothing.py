@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 import nmm
+from nmm.plans.plan import Asked
 from nmm.plans.samples import flow
-from nmm.plans.search import USUAL, Search
+from nmm.plans.search import Search
+from nmm.plans.search_space import USUAL
 from nmm.plans.smoothing import Smoothing
 from nmm.robots.wheel_rates import turning_wheels
 from nmm.robots.zero_order_hold import inputs_of
@@ -134,7 +136,8 @@ def test_a_motion_that_would_touch_between_samples_is_found():
 def prepared(obstacles, plan):
     """The smoothing of the timed path of a plan's problem."""
     robot, before = plan.robot, planned("unicycle_3r", smooth=False)
-    search = Search(robot, before.corners[0], [BEHIND], obstacles, None, LIMITS, 0, nmm.Goal(), True)
+    asked = Asked(nmm.Collisions(obstacles=obstacles), LIMITS, nmm.Goal(), smooth=True)
+    search = Search(robot, before.corners[0], [BEHIND], asked)
     return Smoothing(robot, search.limits, USUAL, search.check), before.found.motion
 
 

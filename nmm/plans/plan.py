@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, positive
 from nmm.collisions.scene import Scene
+from nmm.control.collisions import Collisions
 from nmm.control.goal import Goal
-from nmm.control.limits import LimitsOn
+from nmm.control.limits import Limits, LimitsOn
 from nmm.errors import InputError
 from nmm.functions.tasks.task import Task
 from nmm.plans.following import FromPlan
@@ -43,6 +44,18 @@ class Motion(Protocol):
         ...
 
 
+@dataclass(frozen=True)
+class Asked:
+    """What a plan is to keep, and how it is made: see `nmm.plan`."""
+
+    collisions: Collisions
+    limits: Limits
+    tolerance: Goal
+    smooth: bool = False
+    effort: bool | Mapping[str, Any] = False
+    margin: float = 0.0
+
+
 class Found(NamedTuple):
     """What a search leaves to a plan: its motion, what that keeps, and what another search is made with."""
 
@@ -50,7 +63,7 @@ class Found(NamedTuple):
     limits: LimitsOn
     scene: Scene | None
     goal: Wanted
-    asked: Mapping[str, Any]
+    asked: Asked
 
 
 @dataclass(frozen=True, eq=False)

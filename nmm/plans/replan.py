@@ -67,12 +67,12 @@ def replan(
     robot, old = plan.robot, plan.found
     here = robot.following.placed(robot.q(q))
     robot.check_limits(here)
-    asked = dict(old.asked)
+    asked = old.asked
     if obstacles is not None:
-        asked["collisions"] = replace(asked["collisions"], obstacles=tuple(obstacles))
-    if any(one.moves for one in asked["collisions"].obstacles):
+        asked = replace(asked, collisions=replace(asked.collisions, obstacles=tuple(obstacles)))
+    if any(one.moves for one in asked.collisions.obstacles):
         raise InputError("obstacles that move along a path are not replanned for", where="replan: obstacles")
-    search = Search(robot, here, [old.goal], (), seed=seed, **asked)
+    search = Search(robot, here, [old.goal], asked, seed)
     search.begin(positive(seconds, "seconds"), progress)
     rest = _rest(plan, here, t)
     if search.check.too_near(rest[-1]) < 0:

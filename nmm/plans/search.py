@@ -16,20 +16,19 @@ from nmm.arrays import Array, counted, positive, scalar
 from nmm.collisions.legs_check import MARGIN
 from nmm.collisions.motion_check import MotionCheck
 from nmm.collisions.obstacle import Obstacle
-from nmm.collisions.shapes import HalfSpace
 from nmm.control.collisions import Collisions
 from nmm.control.goal import Goal
 from nmm.control.limits import Limits
 from nmm.errors import InputError, RunError, expect_kind, few
-from nmm.functions.tasks.task import Task
 from nmm.kernels.compiled import checked_by_caller
 from nmm.kernels.record_layout import views
 from nmm.plans import tree
 from nmm.plans.effort import efforts_of
 from nmm.plans.goals import GoalPostures, Wanted, alternatives, nothing_found
 from nmm.plans.path import Guide, shortened
-from nmm.plans.plan import Found, Motion, Plan
+from nmm.plans.plan import Asked, Found, Motion, Plan
 from nmm.plans.samples import SampledMotion, joined
+from nmm.plans.search_space import USUAL, drawn_within, leg_speeds, pause_between, usual_speeds
 from nmm.plans.smoothing import Smoothing
 from nmm.plans.timing import TimedLegs, timed
 from nmm.plans.tree import PLACE, Trees
@@ -39,12 +38,8 @@ from nmm.robots.robot import Robot
 
 #: Room for configurations in each tree, and rounds of a search between two looks at the clock.
 ROOM, ROUNDS = 20_000, 200
-#: Speeds where inputs have no limits, m/s and rad/s; the stop between legs where accelerations have none, s.
-USUAL, PAUSE = 1.0, 0.2
 #: The longest motion by which a tree grows, s.
 STEP = 2.0
-#: Around start, goals and obstacles there is this much room to drive, in sizes of the robot and in m.
-AROUND = 1.0
 
 
 def plan(
@@ -120,11 +115,16 @@ def plan(
         raise InputError(
             f"{few(endless)}: slides without limits", where="plan: robot", expected="limits of it"
         )
-    search = Search(
-        *(robot, q, [*through, goal], obstacles, collisions, limits, seed, tolerance or Goal(), smooth),
+    kept = collisions or Collisions()
+    asked = Asked(
+        collisions=replace(kept, obstacles=(*kept.obstacles, *obstacles)),
+        limits=limits,
+        tolerance=tolerance or Goal(),
+        smooth=smooth,
         effort=effort,
         margin=scalar(margin, "plan: margin", least=0.0),
     )
+    search = Search(robot, q, [*through, goal], asked, seed)
     return search.plan(positive(seconds, "seconds"), counted(shorten, "shorten", 0), progress)
 
 
@@ -139,23 +139,13 @@ class Search:
         robot: Robot,
         start: Array,
         goals: Sequence[Wanted],
-        obstacles: Sequence[Obstacle],
-        collisions: Collisions | None,
-        limits: Limits,
-        seed: int,
-        tolerance: Goal,
-        smooth: bool,
-        effort: bool | Mapping[str, Any] = False,
-        margin: float = 0.0,
+        asked: Asked,
+        seed: int = 0,
     ) -> None:
-        self.robot, self.start, self.goals, self.tolerance = robot, start, goals, tolerance
+        self.robot, self.start, self.goals, self.asked = robot, start, goals, asked
         seed = counted(seed, "seed", 0)
         self.rng = np.random.default_rng(seed)
-        given = collisions or Collisions()
-        given = replace(given, obstacles=(*given.obstacles, *obstacles))
-        self.asked = {"collisions": given, "limits": limits, "tolerance": tolerance, "smooth": smooth}
-        self.asked["effort"], self.efforts = effort, efforts_of(robot, effort)
-        self.asked["margin"] = self.margin = margin
+        self.efforts, given = efforts_of(robot, asked.effort), asked.collisions
         self.obstacles = tuple(given.obstacles)
         known = bool(self.obstacles) or len(robot.collision_model.collisionPairs) > 0
         self.scene = given.on(robot) if known else None
@@ -166,12 +156,11 @@ class Search:
             stands = [one for one in self.obstacles if not one.moves]
             own = given.self_collisions and len(robot.collision_model.collisionPairs) > 0
             scene = replace(given, obstacles=stands).on(robot) if stands or own else None
-        self.limits = limits.on(robot)
-        self.usual = self._usual()
-        ways = ways_of(
-            robot, self._speeds(), self._pause(), reverses=not np.any(self.limits.inputs[:1, 0] >= 0.0)
-        )
-        self.low, self.high = self._range()
+        self.limits = asked.limits.on(robot)
+        self.usual = usual_speeds(robot, self.limits)
+        speeds, reverses = leg_speeds(robot, self.limits, self.usual), self.limits.inputs[:1, 0] < 0.0
+        ways = ways_of(robot, speeds, pause_between(self.limits), reverses=bool(np.all(reverses)))
+        self.low, self.high = drawn_within(robot, start, goals, self.obstacles)
         trees = Trees(
             ways=ways,
             low=self.low,
@@ -193,7 +182,7 @@ class Search:
     def plan(self, seconds: float, shorten: int, progress: Callable[[float], None] | None) -> Plan:
         """From the start through all goals; each part ends where the next begins."""
         self.begin(seconds, progress)
-        here, parts, least = self.start, [], self.asked_kept + self.margin
+        here, parts, least = self.start, [], self.asked_kept + self.asked.margin
         for wanted in self.goals:
             self.check.kept[:] = self.asked_kept
             legs = self.shortened(here, self.farther(here, self.ends(wanted, here)), shorten)
@@ -206,7 +195,7 @@ class Search:
         self, here: Array, ends: Sequence[Array], ahead: Sequence[Array] = (), behind: Sequence[Array] = ()
     ) -> Array:
         """A `way` that keeps the margin, too, where one is found in half of the time."""
-        if self.margin > 0.0:
+        if self.asked.margin > 0.0:
             last, self._ends = self._ends, 0.5 * (time.monotonic() + self._ends)
             self.widen(here, *ends)
             with suppress(RunError):
@@ -217,7 +206,7 @@ class Search:
     def widen(self, *configurations: Array) -> None:
         """Keep the margin as far as these (n,) do."""
         self.check.kept[:] = self.asked_kept
-        self.check.widen(np.array(configurations), self.margin)
+        self.check.widen(np.array(configurations), self.asked.margin)
 
     def begin(self, seconds: float, progress: Callable[[float], None] | None) -> None:
         """Start the clock; `InputError` for a start that touches something."""
@@ -237,7 +226,7 @@ class Search:
         motion: Motion = path
         if self.movers is not None:
             motion = waited(path, self.robot, self.movers)
-        elif self.asked["smooth"]:
+        elif self.asked.smooth:
             motion = self._smoothed(parts) or path
         motions, postures = (int(count) for count in self.trees.looked)
         found = Found(motion, self.limits, self.scene, self.goals[-1], self.asked)
@@ -273,7 +262,7 @@ class Search:
 
     def ends(self, wanted: object, here: Array) -> list[Array]:
         """Free configurations (n,) that reach a goal."""
-        postures = GoalPostures(self.robot, self.low, self.high, self.check, self.tolerance)
+        postures = GoalPostures(self.robot, self.low, self.high, self.check, self.asked.tolerance)
         found = [q for one in alternatives(wanted) for q in postures.find(one, here, self.rng)]
         if not found:
             raise nothing_found(postures)
@@ -320,59 +309,3 @@ class Search:
         while (parent := int(self.trees.parents[k, chain[-1]])) >= 0:
             chain.append(parent)
         return chain[::-1] if k == 0 else chain
-
-    def _usual(self) -> Array:
-        """Speeds (3 + n,) of a leg's numbers whose inputs have no limits: USUAL in the platform's frame, as
-        inputs may be rates of wheels; infinite for the others."""
-        robot, usual = self.robot, np.full(3 + self.robot.n, np.inf)
-        free = np.asarray(np.isinf(self.limits.inputs).any(axis=1))
-        coordinates = np.asarray(robot.rate_coordinates)
-        usual[3 + coordinates[free & (coordinates >= 0)]] = USUAL
-        if robot.platform.n_p >= 3 and np.any(free[: robot.platform.p]):
-            usual[:3] = USUAL
-        return usual
-
-    def _speeds(self) -> Array:
-        """How fast each number of a leg goes, (3 + n,), to weigh them."""
-        robot, speeds = self.robot, self.usual.copy()
-        top = np.abs(self.limits.inputs).max(axis=1)
-        for j, i in enumerate(robot.rate_coordinates):
-            if i >= 0:
-                speeds[3 + i] = min(speeds[3 + i], top[j])
-        if robot.platform.n_p >= 3:
-            G = np.abs(robot.platform.G(np.zeros(robot.platform.n_p))[:3])
-            driven = [np.sum(row[row > 0.0] * top[: robot.platform.p][row > 0.0]) for row in G]
-            speeds[:3] = np.minimum(speeds[:3], [max(driven[0], 1e-3), np.inf, driven[2] or USUAL])
-            speeds[1] = speeds[0]
-        return speeds
-
-    def _pause(self) -> float:
-        finite = self.limits.accelerations[np.isfinite(self.limits.accelerations)]
-        return float(np.clip(USUAL / finite.min(), PAUSE, 2.0)) if len(finite) else PAUSE
-
-    def _range(self) -> tuple[Array, Array]:
-        """Where configurations are drawn, (n,) each: joints within limits, the platform around all that is
-        known."""
-        robot = self.robot
-        low, high = np.where(robot.limited, robot.q_limits, [-np.pi, np.pi]).T.copy()
-        low, high = np.maximum(low, self.start - np.pi), np.minimum(high, self.start + np.pi)
-        if robot.platform.n_p >= 3:
-            points = [self.start[:2]]
-            for obstacle in self.obstacles:
-                geometry, place = obstacle.shape.geometry(), obstacle.at(0.0)
-                if isinstance(obstacle.shape, HalfSpace):
-                    continue
-                geometry.computeLocalAABB()
-                radius = geometry.aabb_radius
-                middle = place.act(geometry.aabb_center)[:2]
-                points += [middle - radius, middle + radius]
-            for goals in self.goals:
-                for one in alternatives(goals):
-                    if isinstance(one, Mapping) and {"x", "y"} <= one.keys():
-                        points.append(np.array([one["x"], one["y"]], dtype=np.float64))
-                    elif not isinstance(one, Mapping | Task):
-                        points.append(robot.q(one)[:2])
-            around = AROUND + 2.0 * robot.reach
-            low[:2], high[:2] = np.min(points, axis=0) - around, np.max(points, axis=0) + around
-            low[2], high[2] = -np.pi, np.pi
-        return low, high

@@ -1,0 +1,82 @@
+"""How fast legs are taken to be, and where configurations are drawn, when a plan is searched."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from nmm.arrays import Array
+from nmm.collisions.obstacle import Obstacle
+from nmm.collisions.shapes import HalfSpace
+from nmm.control.limits import LimitsOn
+from nmm.functions.tasks.task import Task
+from nmm.plans.goals import Wanted, alternatives
+from nmm.robots.robot import Robot
+
+#: Speeds where inputs have no limits, m/s and rad/s; the stop between legs where accelerations have none, s.
+USUAL, PAUSE = 1.0, 0.2
+#: Around start, goals and obstacles there is this much room to drive, in sizes of the robot and in m.
+AROUND = 1.0
+
+
+def usual_speeds(robot: Robot, limits: LimitsOn) -> Array:
+    """Speeds (3 + n,) of a leg's numbers whose inputs have no limits: USUAL in the platform's frame, as
+    inputs may be rates of wheels; infinite for the others."""
+    usual = np.full(3 + robot.n, np.inf)
+    free = np.asarray(np.isinf(limits.inputs).any(axis=1))
+    coordinates = np.asarray(robot.rate_coordinates)
+    usual[3 + coordinates[free & (coordinates >= 0)]] = USUAL
+    if robot.platform.n_p >= 3 and np.any(free[: robot.platform.p]):
+        usual[:3] = USUAL
+    return usual
+
+
+def leg_speeds(robot: Robot, limits: LimitsOn, usual: Array) -> Array:
+    """How fast each number of a leg goes, (3 + n,), to weigh them."""
+    speeds = usual.copy()
+    top = np.abs(limits.inputs).max(axis=1)
+    for j, i in enumerate(robot.rate_coordinates):
+        if i >= 0:
+            speeds[3 + i] = min(speeds[3 + i], top[j])
+    if robot.platform.n_p >= 3:
+        G = np.abs(robot.platform.G(np.zeros(robot.platform.n_p))[:3])
+        driven = [np.sum(row[row > 0.0] * top[: robot.platform.p][row > 0.0]) for row in G]
+        speeds[:3] = np.minimum(speeds[:3], [max(driven[0], 1e-3), np.inf, driven[2] or USUAL])
+        speeds[1] = speeds[0]
+    return speeds
+
+
+def pause_between(limits: LimitsOn) -> float:
+    """What a stop between two legs takes, about, s."""
+    finite = limits.accelerations[np.isfinite(limits.accelerations)]
+    return float(np.clip(USUAL / finite.min(), PAUSE, 2.0)) if len(finite) else PAUSE
+
+
+def drawn_within(
+    robot: Robot, start: Array, goals: Sequence[Wanted], obstacles: Sequence[Obstacle]
+) -> tuple[Array, Array]:
+    """Where configurations are drawn, (n,) each: joints within limits, the platform around all that is
+    known."""
+    low, high = np.where(robot.limited, robot.q_limits, [-np.pi, np.pi]).T.copy()
+    low, high = np.maximum(low, start - np.pi), np.minimum(high, start + np.pi)
+    if robot.platform.n_p >= 3:
+        points = [start[:2]]
+        for obstacle in obstacles:
+            geometry, place = obstacle.shape.geometry(), obstacle.at(0.0)
+            if isinstance(obstacle.shape, HalfSpace):
+                continue
+            geometry.computeLocalAABB()
+            radius = geometry.aabb_radius
+            middle = place.act(geometry.aabb_center)[:2]
+            points += [middle - radius, middle + radius]
+        for wanted in goals:
+            for one in alternatives(wanted):
+                if isinstance(one, Mapping) and {"x", "y"} <= one.keys():
+                    points.append(np.array([one["x"], one["y"]], dtype=np.float64))
+                elif not isinstance(one, Mapping | Task):
+                    points.append(robot.q(one)[:2])
+        around = AROUND + 2.0 * robot.reach
+        low[:2], high[:2] = np.min(points, axis=0) - around, np.max(points, axis=0) + around
+        low[2], high[2] = -np.pi, np.pi
+    return low, high
