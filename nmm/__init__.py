@@ -6,7 +6,7 @@ names is `__init__.pyi`).
 
 import lazy_loader
 
-from nmm.lazy_call import imported_whole
+from nmm.lazy_call import interrupts_wait
 
 __version__ = "0.1.0"
 
@@ -42,5 +42,5 @@ _loaded, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 def __getattr__(name: str) -> object:
     if name in MOVED:
         raise AttributeError(f"nmm.{name} is now nmm.{MOVED[name]}")
-    with imported_whole():
+    with interrupts_wait():
         return _loaded(name)

@@ -18,9 +18,9 @@ def lazy_call(name: str) -> Callable[..., Any]:
 
 
 @contextmanager
-def imported_whole() -> Iterator[None]:
+def interrupts_wait() -> Iterator[None]:
     """Ctrl-C waits until the block has ended: numba and Pinocchio, interrupted while they are imported, stay
-    broken for as long as Python runs."""
+    broken for as long as Python runs; a process whose start is interrupted ends in a traceback."""
     before = signal.getsignal(signal.SIGINT)
     if before is None or threading.current_thread() is not threading.main_thread():
         yield

@@ -16,6 +16,7 @@ from multiprocessing.context import SpawnProcess
 from typing import Any, Protocol, TypeVar
 
 from nmm.errors import NmmError, RunError
+from nmm.lazy_call import interrupts_wait
 from nmm.progress import Progress
 
 Result = TypeVar("Result", covariant=True)
@@ -97,7 +98,7 @@ def _children(job: Job[Any], count: int) -> Iterator[dict[Connection, SpawnProce
     context = multiprocessing.get_context("spawn")
     children: dict[Connection, SpawnProcess] = {}
     try:
-        with _interrupts_wait():
+        with interrupts_wait(), _interrupts_masked():
             for _ in range(count):
                 ours, theirs = context.Pipe()
                 process = context.Process(target=_serve, args=(theirs, job), daemon=True)
@@ -118,10 +119,11 @@ def _children(job: Job[Any], count: int) -> Iterator[dict[Connection, SpawnProce
 
 
 @contextmanager
-def _interrupts_wait() -> Iterator[None]:
-    """Ctrl-C waits until the block has ended; processes started in it never hear of it.
+def _interrupts_masked() -> Iterator[None]:
+    """Processes started in the block never hear of Ctrl-C.
 
     They inherit the signal mask from their first instruction on; a handler of their own would come too late.
+    The mask is this thread's: others (numba's, BLAS's) still hear of it, for this one.
     """
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield

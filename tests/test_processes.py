@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import multiprocessing.resource_tracker
+import multiprocessing.util
 import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -107,6 +111,36 @@ def is_anybody_left(group: int) -> bool:
             return False
         time.sleep(0.05)
     return True
+
+
+def test_an_interrupt_that_another_thread_takes_waits_until_all_have_started(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A signal goes to any thread that does not block it; a process that has started and not been told what
+    it is would end in a traceback."""
+    started: list[int] = []
+    ended = threading.Event()
+    spawn: Any = multiprocessing.util.spawnv_passfds
+
+    def spawned(*given: Any) -> int:
+        started.append(spawn(*given))
+        if len(started) == 1:
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.1)
+        return started[-1]
+
+    multiprocessing.resource_tracker.ensure_running()
+    monkeypatch.setattr(multiprocessing.util, "spawnv_passfds", spawned)
+    other = threading.Thread(target=ended.wait)
+    other.start()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            share_out(square, [3, 4], 2, nothing)
+    finally:
+        ended.set()
+        other.join()
+    assert len(started) == 2
+    assert capfd.readouterr() == ("", "")
 
 
 @pytest.mark.parametrize("after", [0.0, 0.1])

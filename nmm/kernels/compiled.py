@@ -18,9 +18,9 @@ from contextlib import suppress
 from functools import cached_property
 from typing import Any
 
-from nmm.lazy_call import imported_whole
+from nmm.lazy_call import interrupts_wait
 
-with imported_whole():
+with interrupts_wait():
     import numba
 
 import numpy as np
