@@ -171,9 +171,7 @@ class FromPlan(Function):
 
     def apart(self, t: ArrayLike, q: ArrayLike) -> Array:
         """How far configurations (N, n) are from the plan at their times (N,), s: (N, 2), m and rad."""
-        off = np.asarray(q, dtype=np.float64) - self.planned(np.asarray(t))
-        if self.robot.platform.n_p >= 3:
-            off[:, 2] -= 2.0 * np.pi * np.round(off[:, 2] / (2.0 * np.pi))
+        off = differences(self.robot, np.asarray(q, dtype=np.float64), self.planned(np.asarray(t)))
         return np.array([error_sizes(one, self.robot.q_units) for one in off]).reshape(-1, 2)
 
     def shown(self) -> Shown:
@@ -263,6 +261,14 @@ class Renewed(Renewal):
         left = begun + last.duration - end
         if self._made and left > KNOT:
             yield Finding("plan_cut", {"left": left}, {"t": end})
+
+
+def differences(robot: Robot, q: Array, there: Array) -> Array:
+    """q - there (N, n), the angle of a platform wrapped; one of the two may be a single (n,)."""
+    off = q - there
+    if robot.platform.n_p >= 3:
+        off[:, 2] -= 2.0 * np.pi * np.round(off[:, 2] / (2.0 * np.pi))
+    return np.asarray(off)
 
 
 def left_inverses(robot: Robot, times: Array, q: Array, u: Array, tau: float, length: float) -> Array:

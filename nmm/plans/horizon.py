@@ -18,6 +18,7 @@ from nmm.findings import Finding
 from nmm.functions.tasks.task import Task
 from nmm.kernels.compiled import checked_by_caller
 from nmm.kernels.record_layout import Memory, views
+from nmm.plans.following import differences
 from nmm.plans.goals import TaskError, goal_task
 from nmm.plans.interior import SHOOT, shoot
 from nmm.plans.plan import Plan
@@ -255,20 +256,13 @@ class Horizon:
                 x.aims[k], x.aimed[k] = -error_q, error - error_q @ q
             return
         near = np.minimum(self._along + np.linspace(0.0, WINDOW, POINTS), self.plan.duration)
-        off = self._off(self.plan(near)[0], x.q[0])
+        off = differences(self.robot, self.plan(near)[0], x.q[0])
         self._along = float(near[np.einsum("ki,ki->k", off, off).argmin()])
         x.aims[:], x.pull[:] = np.eye(n), ALONG
         wanted = self.plan(self._along + self._times)[0]
-        x.aimed[:] = wanted + (self._off(wanted[:1], x.q[0]) - (wanted[0] - x.q[0]))
+        x.aimed[:] = wanted + (differences(self.robot, wanted[:1], x.q[0]) - (wanted[0] - x.q[0]))
         x.goal[:] = x.aimed[-1]
         x.ends[:n] = END * (self._along + NEAR * self._times[-1] > self.plan.duration)
-
-    def _off(self, q: Array, here: Array) -> Array:
-        """Differences of q (K, n) to one (n,), the angle of a platform wrapped."""
-        off = q - here
-        if self.robot.platform.n_p >= 3:
-            off[:, 2] -= 2.0 * np.pi * np.round(off[:, 2] / (2.0 * np.pi))
-        return off
 
     def _check_steered(self) -> None:
         """Refuse what is steered only by turning to and fro: no cost of distances shows the way there."""

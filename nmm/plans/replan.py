@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array, counted, positive, scalar
 from nmm.collisions.obstacle import Obstacle
 from nmm.errors import InputError, expect_kind
+from nmm.plans.following import differences
 from nmm.plans.plan import Plan
 from nmm.plans.search import STEP, Search
 
@@ -98,9 +99,7 @@ def _rest(plan: Plan, q: Array, t: float | None) -> list[Array]:
     and between, at most `STEP` s apart."""
     if t is None:
         times = np.arange(0.0, plan.duration + NEAR, NEAR)
-        off = plan(times)[0] - q
-        if plan.robot.platform.n_p >= 3:
-            off[:, 2] -= 2.0 * np.pi * np.round(off[:, 2] / (2.0 * np.pi))
+        off = differences(plan.robot, plan(times)[0], q)
         t = float(times[np.einsum("ki,ki->k", off, off).argmin()])
     begin = min(max(scalar(t, "t"), 0.0), plan.duration)
     stops = [begin, *(one for one in plan.stops if one > begin)]
