@@ -1,12 +1,14 @@
 """Plans followed in the closed loop, in random scenes where control that reacts is stuck:
 
-    python benchmarks/planning_followed.py [SCENES] [SEED] [--smooth]
+    python benchmarks/planning_followed.py [SCENES] [SEED] [--smooth] [--replan] [--horizon] [--poses]
 
 A UR5 and a Panda on a differential base by turns; a U-shaped trap, a wall with a way round, a low box, a
 table to go under; the goal is a position of the end-effector. The plan keeps 50 mm more than the
 controller's 30 mm where it can (as `plan.track` in a scenario does), and is tracked at 0.8 of its speed by a
 controller with limits and distances, inputs held for 20 ms. `reached` is within 5 mm at the end; `least` the
-least distance between any two samples, by Coal.
+least distance between any two samples, by Coal. With `--replan` a run that leaves its plan goes on by
+another. With `--horizon` predictive control follows the plan (`nmm.Horizon`, at 10 Hz). With `--poses` the
+goals are random poses of a platform and a car within 3 m; `reached` is then within 10 mm and 0.02 rad.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ import time
 from functools import cache
 
 import numpy as np
-from planning import DISTANCE, LIMITS, UP, Scene, box, error_of, ur5_on
+from planning import DISTANCE, LIMITS, UP, Scene, box, error_of, poses_car, poses_differential, ur5_on
 
 import nmm
 
@@ -98,16 +100,43 @@ def planned(scene: Scene, seed: int, smooth: bool) -> nmm.Plan:
     return nmm.plan(*scene[:3], (), keeps(scene), LIMITS, seed=seed, smooth=smooth, margin=MARGIN)
 
 
-def followed(scene: Scene, plan: nmm.Plan) -> nmm.Trajectory:
+def pose(k: int, seed: int) -> Scene:
+    """To a pose within 3 m, a unicycle and a car by turns."""
+    rng = np.random.default_rng([seed, k])
+    while True:
+        scene = (poses_differential, poses_car)[k % 2](rng)
+        if np.hypot(*(scene.goal[name] - scene.start[name] for name in "xy")) <= 3.0:
+            return scene
+
+
+def off_goal(scene: Scene, q: np.ndarray) -> tuple[float, float]:
+    """How far q is from the goal, m and rad."""
+    if isinstance(scene.goal, nmm.Task):
+        return error_of(scene, q), 0.0
+    off = {name: q[scene.robot.coordinate(name)] - value for name, value in scene.goal.items()}
+    turned = [np.abs(np.angle(np.exp(1j * value))) for name, value in off.items() if name not in ("x", "y")]
+    return float(np.hypot(off["x"], off["y"])), float(max(turned))
+
+
+def predicted(scene: Scene, plan: nmm.Plan) -> nmm.Trajectory:
+    within = nmm.Goal(0.005) if scene.obstacles else nmm.Goal(0.01, 0.02)
+    return nmm.Horizon(scene.robot, plan, keeps(scene), LIMITS, dt=0.1).run(
+        scene.start, 2.0 * plan.duration + 5.0, within
+    )
+
+
+def followed(scene: Scene, plan: nmm.Plan, replan: bool) -> nmm.Trajectory:
     controller = nmm.Controller(
         scene.robot,
-        plan.reference(pace=PACE),
+        plan.reference(pace=PACE, replan=nmm.replan if replan else None),
         nmm.ProjectedGradient(),
         limits=LIMITS,
         collisions=keeps(scene),
         dt=DT,
     )
-    return nmm.simulate(controller, scene.start, plan.duration / PACE + 3.0, DT, "zoh")
+    # Another plan may be a longer one.
+    duration = 2.0 * plan.duration + 10.0 if replan else plan.duration / PACE + 3.0
+    return nmm.simulate(controller, scene.start, duration, DT, "zoh")
 
 
 def main() -> None:
@@ -115,23 +144,30 @@ def main() -> None:
     parser.add_argument("scenes", type=int, nargs="?", default=30)
     parser.add_argument("seed", type=int, nargs="?", default=0)
     parser.add_argument("--smooth", action="store_true")
+    parser.add_argument("--replan", action="store_true")
+    parser.add_argument("--horizon", action="store_true")
+    parser.add_argument("--poses", action="store_true")
     given = parser.parse_args()
     reached, kept = [], []
     for k in range(given.scenes):
-        scene, begin = scene_of(k, given.seed), time.process_time()
-        name = f"{k:3} {KINDS[k % len(KINDS)].__name__:8} {scene.robot.name:28}"
+        scene, begin = (pose if given.poses else scene_of)(k, given.seed), time.process_time()
+        kind = "pose" if given.poses else KINDS[k % len(KINDS)].__name__
+        name = f"{k:3} {kind:8} {scene.robot.name:28}"
         try:
             plan = planned(scene, k, given.smooth)
         except nmm.NmmError as error:
             print(f"{name} {error}")
             continue
-        took, run = time.process_time() - begin, followed(scene, plan)
-        off, least = error_of(scene, run.q[-1]), float(run.clearance_between.min())
-        reached.append(off <= 0.005)
+        took = time.process_time() - begin
+        run = predicted(scene, plan) if given.horizon else followed(scene, plan, given.replan)
+        (off, turned), least = off_goal(scene, run.q[-1]), float(run.clearance_between.min())
+        reached.append(off <= (0.01 if given.poses else 0.005) and turned <= 0.02)
         kept.append(least >= DISTANCE - 1e-4)
-        why = [f"{one.code} {one.where}" for one in run.findings if one.code in ("left_plan", "blocked")]
+        told = ("left_plan", "blocked", "replanned", "not_replanned", "horizon_unsolved")
+        why = [f"{one.code} {one.values} {one.where}" for one in run.findings if one.code in told]
         print(
-            f"{name} {took:6.2f} {plan.duration:5.1f} s; {1e3 * off:8.2f} mm off, least {1e3 * least:6.2f}",
+            f"{name} {took:6.2f} {plan.duration:5.1f} s, run {run.t[-1]:5.1f} s; {1e3 * off:8.2f} mm off, "
+            f"least {1e3 * least:6.2f}",
             "" if reached[-1] and kept[-1] else why,
             flush=True,
         )

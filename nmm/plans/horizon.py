@@ -35,9 +35,11 @@ from nmm.runs.verdict import Verdict
 USUAL = 1.0
 #: What a square metre or radian of a task's error costs in each sample, and of the distance to a plan, where
 #: an input at its limit costs `problem.EFFORT`; the last error counts so many times.
-PULL, ALONG, LAST = 10.0, 100.0, 5.0
-#: Products of slacks and multipliers to begin with; rounds at least and at most; gaps that are left, m, rad.
-MU, LEAST, ROUNDS, EXACT = 10.0, 4, 25, 1e-5
+PULL, ALONG, LAST = 10.0, 1000.0, 5.0
+#: Products of slacks and multipliers to begin with; rounds at most; gaps that are left, m, rad.
+MU, ROUNDS, EXACT = 10.0, 25, 1e-5
+#: Rounds at least, to a task and along a plan: after fewer, what is near pushes away from the plan's end.
+LEAST, LEAST_ALONG = 4, 8
 #: Looks at samples between their ends, of which one that is blocked keeps so much more, m.
 LOOKS, MORE = 3, 0.015
 #: A run is recorded about so often, s.
@@ -128,7 +130,7 @@ class Horizon:
                 self.limits,
                 largest_inputs(robot, self.limits, USUAL),
                 self._check,
-                np.tile(robot.rest, (N + 1, 1)),
+                np.tile(robot.rest if self.plan is None else self.plan.end, (N + 1, 1)),
                 np.zeros((N + 1, robot.n_u)),
                 float(self._times[1]),
                 False,
@@ -138,7 +140,8 @@ class Horizon:
         )
         self._blocks = memory.blocks()
         self._x = views(Shooting, *self._blocks, 0)
-        self._x.room[:] = np.inf
+        if self.plan is None:  # else what pairs keep beyond the distance is less where its end is near
+            self._x.room[:] = np.inf
         self._shoot = checked_by_caller(shoot, SHOOT)
         self._first_blocked = checked_by_caller(first_blocked_sample, LOOK)
         self.reset()
@@ -223,8 +226,9 @@ class Horizon:
     def _found(self) -> bool:
         """Whether a motion was found that keeps everything at the samples' ends, and distances between."""
         blocks = (*self._check.blocks, *self._blocks)
+        least = LEAST if self.plan is None else LEAST_ALONG
         for _ in range(LOOKS):
-            if self._shoot(*blocks, LEAST, ROUNDS, EXACT) < 0:
+            if self._shoot(*blocks, least, ROUNDS, EXACT) < 0:
                 return False
             blocked = self._first_blocked(*blocks)
             if blocked < 0:
