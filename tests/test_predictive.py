@@ -72,6 +72,24 @@ def test_the_end_of_a_plan_is_reached_exactly(robot):
     assert np.abs(off).max() < 0.004
 
 
+@pytest.mark.parametrize("spare", [0.002, 0.02])
+def test_the_end_of_a_plan_is_reached_where_a_post_is_near(robot, spare):
+    """Nearer than what is kept in motion beyond the distance, and farther."""
+    end = robot.q(START | {"x": 1.0, "y": 0.3})
+    tip = nmm.Configuration(robot, end).placement("ee").translation
+    post, out = nmm.Obstacle(nmm.Cylinder(0.1, 1.0), name="post"), 0.0
+    scene = nmm.Collisions(0.03, False, [post]).on(robot)
+    for _ in range(60):
+        post.move_to([tip[0] + out, *tip[1:]])
+        out += 0.03 + spare - scene.queries.distances(0.0, end, range(len(scene.names))).min()
+    keeps = nmm.Collisions(0.03, False, [post])
+    plan = nmm.plan(robot, START, dict(zip(robot.q_names, end, strict=True)), (), keeps, LIMITS)
+    horizon = nmm.Horizon(robot, plan, keeps, LIMITS, dt=0.1)
+    run = horizon.run(START, 2.0 * plan.duration, nmm.Goal(0.002, 0.002))
+    assert run.complete
+    check(run)
+
+
 def test_what_cannot_be_escaped_is_told(robot):
     """At 20 m/s it runs over the robot within half a second; no inputs lead out of its way."""
     bullet = nmm.Obstacle(nmm.Sphere(1.0), motion=lambda t: [10.0 - 20.0 * t, 0.0, 0.3], name="bullet")
