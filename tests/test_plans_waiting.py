@@ -75,6 +75,19 @@ def test_where_no_timing_works_it_is_refused(robot, motion):
         nmm.plan(robot, START, GOAL, [post], limits=LIMITS)
 
 
+def test_another_way_is_taken_where_one_is_blocked_for_ever(robot):
+    def moves_in_and_stays(t):
+        return [3.0, max(1.5, 6.0 - 0.5 * t), 0.9]
+
+    gate = nmm.Obstacle(nmm.Box([0.2, 2.0, 2.0]), [3.0, 4.0, 0.5], name="gate")
+    stays = nmm.Obstacle(nmm.Box([0.3, 3.2, 1.8]), motion=moves_in_and_stays, name="stays")
+    plan = nmm.plan(robot, START, GOAL, [WALL, gate, stays], limits=LIMITS)
+    assert least(plan, [WALL, gate, stays]) >= 0.03
+    assert np.allclose(plan.end[:3], [6.0, 0.0, 0.0], atol=1e-9)
+    again = nmm.plan(robot, START, GOAL, [WALL, gate, stays], limits=LIMITS)
+    assert np.array_equal(plan.corners, again.corners)
+
+
 def test_it_comes_to_its_goal_when_it_can_stay_there(robot):
     later = nmm.Obstacle(nmm.Cylinder(0.3, 1.8), motion=lambda t: [6.0, 30.0 - t, 0.9], name="later")
     plan = nmm.plan(robot, START, GOAL, [later], limits=LIMITS)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,10 +16,11 @@ from nmm.arrays import Array, counted, positive, scalar
 from nmm.collisions.legs_check import MARGIN
 from nmm.collisions.motion_check import MotionCheck
 from nmm.collisions.obstacle import Obstacle
+from nmm.collisions.scene import Scene
 from nmm.control.collisions import Collisions
 from nmm.control.goal import Goal
 from nmm.control.limits import Limits
-from nmm.errors import InputError, RunError, expect_kind, few
+from nmm.errors import InputError, NmmError, RunError, expect_kind, few
 from nmm.kernels.compiled import checked_by_caller
 from nmm.kernels.record_layout import views
 from nmm.plans import tree
@@ -32,7 +33,7 @@ from nmm.plans.search_space import USUAL, drawn_within, leg_speeds, pause_betwee
 from nmm.plans.smoothing import Smoothing
 from nmm.plans.timing import TimedLegs, timed
 from nmm.plans.tree import PLACE, Trees
-from nmm.plans.waiting import waited
+from nmm.plans.waiting import LONG, waited
 from nmm.plans.ways import LEGS, ways_of
 from nmm.robots.robot import Robot
 
@@ -40,6 +41,8 @@ from nmm.robots.robot import Robot
 ROOM, ROUNDS = 20_000, 200
 #: The longest motion by which a tree grows, s.
 STEP = 2.0
+#: Ways that are tried among obstacles that move, and how often each but the first is shortened.
+WAYS, SHORTEN = 8, 50
 
 
 def plan(
@@ -68,7 +71,7 @@ def plan(
     goal : a configuration (n,); coordinates by name, of which the others are free; a `Task` whose target
         stands; or a list of these, of which one is to be reached
     obstacles : those with a `motion` are waited for: the way is looked for among the others, which stand
-        where they are at t = 0
+        where they are at t = 0; where no timing of it works, other ways are tried
     collisions : distances to keep, with obstacles of its own; `Collisions()` with the obstacles when not
         given
     limits : of velocity, acceleration and position; the robot's own when not given
@@ -143,7 +146,7 @@ class Search:
         seed: int = 0,
     ) -> None:
         self.robot, self.start, self.goals, self.asked = robot, start, goals, asked
-        seed = counted(seed, "seed", 0)
+        self.seed = seed = counted(seed, "seed", 0)
         self.rng = np.random.default_rng(seed)
         self.efforts, given = efforts_of(robot, asked.effort), asked.collisions
         self.obstacles = tuple(given.obstacles)
@@ -225,12 +228,42 @@ class Search:
         path = self._timed(self.start, np.vstack(parts))
         motion: Motion = path
         if self.movers is not None:
-            motion = waited(path, self.robot, self.movers)
+            motion = self._waited(path, self.movers)
         elif self.asked.smooth:
             motion = self._smoothed(parts) or path
         motions, postures = (int(count) for count in self.trees.looked)
         found = Found(motion, self.limits, self.scene, self.goals[-1], self.asked)
         return Plan(self.robot, motions, postures, found)
+
+    def _waited(self, path: TimedLegs, movers: Scene) -> TimedLegs:
+        """The path, or another way, with a timing among what moves; `RunError` where none of them has one."""
+        timed, looked = waited(path, self.robot, movers)
+        ways = 1
+        for k in range(1, WAYS):
+            left = self._ends - time.monotonic()
+            if timed is not None or left <= 0.0:
+                break
+            at = None if k % 2 == 0 else LONG if k == 1 else float(self.rng.uniform(0.0, path.duration))
+            with suppress(NmmError):  # what stands there may touch the start, the goal, or leave no way
+                other = self._another_way(at, k, left / (WAYS - k))
+                timed, more = waited(other, self.robot, movers)
+                ways, looked = ways + 1, looked + more
+        if timed is None:
+            names = few(sorted({one.name for one in movers.obstacles}))
+            tried = f"{ways} ways and {looked} timings of their parts looked at"
+            raise RunError(f"{tried}: none keeps its distance of {names}", where="plan")
+        return timed
+
+    def _another_way(self, at: float | None, k: int, seconds: float) -> TimedLegs:
+        """The way of another seed, with what moves standing where it is at a time, s; without it at None."""
+        given = self.asked.collisions
+        kept = [one for one in self.obstacles if not one.moves]
+        if at is not None:
+            moves = [one for one in self.obstacles if one.moves]
+            kept += [Obstacle(one.shape, one.placement(at), name=one.name) for one in moves]
+        asked = replace(self.asked, collisions=replace(given, obstacles=tuple(kept)), smooth=False)
+        other = Search(self.robot, self.start, self.goals, asked, self.seed + k)
+        return cast(TimedLegs, other.plan(seconds, SHORTEN, None).found.motion)
 
     def _timed(self, start: Array, legs: Array) -> TimedLegs:
         motion = timed(self.guide, self.robot, start, self.guide.merged(legs), self.limits, self.usual)

@@ -20,7 +20,6 @@ from nmm.collisions.legs_check import MovedShapes
 from nmm.collisions.motion_check import MotionCheck
 from nmm.collisions.obstacle import shifts
 from nmm.collisions.scene import Scene
-from nmm.errors import RunError, few
 from nmm.kernels.record_layout import views
 from nmm.plans.timing import TimedLegs
 from nmm.robots.joint_table import as_row
@@ -48,11 +47,13 @@ class Drive(NamedTuple):
     passes: Array
 
 
-def waited(path: TimedLegs, robot: Robot, scene: Scene) -> TimedLegs:
-    """The path as soon as may be, without coming too near to the obstacles of a scene, which move; `RunError`
-    where no timing is found. At its end it may stay for as long as is looked at."""
+def waited(path: TimedLegs, robot: Robot, scene: Scene) -> tuple[TimedLegs | None, int]:
+    """The path as soon as may be, without coming too near to the obstacles of a scene, which move; None where
+    no timing is found. At its end it may stay for as long as is looked at. And how many timings of drives
+    between two places to rest were looked at."""
+    looked = 0
     if not len(path.legs):
-        return path
+        return path, looked
     rooms = _Rooms(robot, scene, LONG + TIMES * path.duration)
     rests = [(0, 0.0)]
     cells: list[tuple[int, Array]] = []  # between two places to rest: the leg, and shares of it
@@ -80,15 +81,13 @@ def waited(path: TimedLegs, robot: Robot, scene: Scene) -> TimedLegs:
         for j, drive in _drives(path, cells, i):
             free = rooms.free(np.vstack(taken[i:j]), drive.passes)
             after = int(np.ceil(drive.passes[-1] / STEP - 1e-9))
+            looked += int(np.count_nonzero(reached[i, : K - after]))
             begins = np.flatnonzero(reached[i, : K - after] & free[: K - after])
             for k in begins[~reached[j, begins + after]].tolist():
                 reached[j, k + after], before[j, k + after] = True, (i, k, drive)
     stays = np.append(~np.logical_or.accumulate(still[-1][::-1])[::-1], True)
     (ends,) = np.nonzero(reached[-1] & stays)
-    if not len(ends):
-        names = sorted({one.name for one in scene.obstacles})
-        raise RunError(f"no timing of the way found keeps its distance of {few(names)}", where="plan")
-    return _timing(path, before, len(rests) - 1, int(ends[0]))
+    return (_timing(path, before, len(rests) - 1, int(ends[0])) if len(ends) else None), looked
 
 
 def _at(path: TimedLegs, leg: int, share: float) -> Array:
