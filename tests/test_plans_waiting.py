@@ -77,7 +77,7 @@ def test_where_no_timing_works_it_is_refused(robot, motion):
 
 def test_another_way_is_taken_where_one_is_blocked_for_ever(robot):
     def moves_in_and_stays(t):
-        return [3.0, max(1.5, 6.0 - 0.5 * t), 0.9]
+        return [3.0, max(1.5, 6.0 - 3.0 * t), 0.9]
 
     gate = nmm.Obstacle(nmm.Box([0.2, 2.0, 2.0]), [3.0, 4.0, 0.5], name="gate")
     stays = nmm.Obstacle(nmm.Box([0.3, 3.2, 1.8]), motion=moves_in_and_stays, name="stays")

@@ -250,7 +250,7 @@ class Search:
                 ways, looked = ways + 1, looked + more
         if timed is None:
             names = few(sorted({one.name for one in movers.obstacles}))
-            tried = f"{ways} ways and {looked} timings of their parts looked at"
+            tried = f"{ways} way{'s'[: ways > 1]} and {looked} timings of their parts looked at"
             raise RunError(f"{tried}: none keeps its distance of {names}", where="plan")
         return timed
 
