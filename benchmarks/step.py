@@ -8,6 +8,7 @@ unfused   the same controller with every kernel run as plain Python (NUMBA_DISAB
 callable  fused, with the objective as a user's own Python function in the middle
 limits    a step without limits, with all of velocity, position and acceleration, and with some that bind;
           of tasks in one level, and of position before orientation
+order 2   u_dot beside u, as bundled and with compiled kinematics
 """
 
 from __future__ import annotations
@@ -127,6 +128,22 @@ def limited(name: str, free: nmm.Controller, q: np.ndarray, q_dot: float) -> tup
     return min(times[0]), min(times[1]), min(times[2])
 
 
+def both_orders(controller: nmm.Controller, q: np.ndarray) -> tuple[float, float, float]:
+    """Times of order 1, as bundled and with compiled kinematics, and of order 2 (interleaved)."""
+    given = controller.given._replace(dt=controller.dt)
+    first, compiled, second = (
+        nmm.Controller(*one)
+        for one in (given, given._replace(kinematics="compiled"), given._replace(order=2))
+    )
+    u = 0.1 * np.arange(controller.robot.n_u)
+    calls = (lambda: first(T, q), lambda: compiled(T, q), lambda: second(T, q, u))
+    times: list[list[float]] = [[], [], []]
+    for _ in range(5):
+        for call, found in zip(calls, times, strict=True):
+            found.append(microseconds(call, 0.2))
+    return min(times[0]), min(times[1]), min(times[2])
+
+
 def main() -> int:
     """Print the table; exit status 1 when a fused step takes more than 1.8 times its floor."""
     found = controllers()
@@ -153,6 +170,11 @@ def main() -> int:
             f"{name:24s}{free:8.2f}{every:8.2f}{every / free:8.2f}{binding:9.2f}{binding / free:8.2f}"
             f"  (aims: {of_all} for all, {of_binding} for binding)"
         )
+    print(f"\n{'order 2':24s}{'order 1':>8s}{'compiled':>10s}{'order 2':>9s}{'ratio':>8s}{'ratio':>8s}")
+    for name in ("unicycle_2r_position", "unicycle_3r_position", "ur5_unicycle_pose", "tiago_pose"):
+        bundled, compiled, second = both_orders(*of_scenario(name))
+        ratios = f"{second / bundled:8.2f}{second / compiled:8.2f}"
+        print(f"{name:24s}{bundled:8.2f}{compiled:10.2f}{second:9.2f}{ratios}  (aim: 2)")
     return int(worst > 1.8)
 
 

@@ -125,6 +125,13 @@ EXAMPLES: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
         "which rk4 does not follow with dt = 0.01 s; a dt below 0.005 s follows it (tried from t = 0 to 2 s)",
     ),
     (
+        "rate_jumps",
+        {"jumps": 2, "size": 1.5, "servo": 5.0},
+        {"t": 0.5},
+        "the rate that tasks ask for jumps 2 times, by up to 1.5 (m/s, rad/s), first at t = 0.5 s: the "
+        "inputs follow it at 5 1/s, with bounded accelerations",
+    ),
+    (
         "target_jumps",
         {"steps": 12},
         {},

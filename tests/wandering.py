@@ -1,8 +1,9 @@
 """Long random motions under limits of position, velocity and acceleration, and by how much they broke them.
 
     python -m tests.wandering 100000
+    python -m tests.wandering 100000 2
 
-goes so many steps with each robot and prints it.
+goes so many steps with each robot, at first or second order, and prints it.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 import nmm
-from nmm.control.integrators import integrator
+from nmm.control.integrators import Accelerated, integrator
 
 #: Scenario, frame and resolver.
 ROBOTS = {
@@ -37,7 +38,7 @@ class Broken(NamedTuple):
     acceleration: float
 
 
-def wanderer(name: str) -> tuple[nmm.Controller, np.ndarray]:
+def wanderer(name: str, order: int = 1) -> tuple[nmm.Controller, np.ndarray]:
     """A controller whose target is to be set from outside, and where it begins."""
     frame, resolver = ROBOTS[name]
     scenario = nmm.Scenario.load(name)
@@ -45,7 +46,7 @@ def wanderer(name: str) -> tuple[nmm.Controller, np.ndarray]:
     task = nmm.Task(nmm.Position(frame), nmm.LiveTarget([0.0, 0.0, 0.0]), gain=2.0)
     objective = nmm.Quadratic(*(nmm.QuadraticTerm(name) for name in robot.u_names[robot.platform.p :]))
     limits = nmm.Limits({"platform": 1.0, "arm": 1.5}, acceleration={"platform": 2.0, "arm": 4.0})
-    controller = nmm.Controller(robot, task, resolver, objective, limits=limits, dt=DT)
+    controller = nmm.Controller(robot, task, resolver, objective, limits=limits, dt=DT, order=order)
     return controller, robot.q(scenario.parts.q0)
 
 
@@ -57,7 +58,9 @@ def wander(
     robot, kept = controller.robot, controller.solver.limits_on
     (task,) = controller.task
     signal = task.reference
-    advance = integrator(method, robot, 1e-9)
+    advance, solver = integrator(method, robot, 1e-9), controller.solver
+    if solver.second:
+        advance = Accelerated(advance, robot, solver.before, solver.found.second.u_dot)
     controller.dt = DT
     q, before = q0.copy(), np.zeros(robot.n_u)
     controller.reset()
@@ -68,6 +71,9 @@ def wander(
             signal.set(rng.uniform(-3.0, 3.0, len(controller.rows)))
         u = controller(k * DT, q)
         step = controller.last(k * DT, q)
+        if not np.isfinite(u).all():
+            raise SystemExit(f"no answer at step {k}")
+        u = step.u
         worst[0] = max(worst[0], beyond(q[own], kept.coordinates[own]))
         worst[1] = max(worst[1], beyond(u, kept.inputs))
         rate = kept.accelerations * DT
@@ -84,11 +90,11 @@ def beyond(x: np.ndarray, limits: np.ndarray) -> float:
     return float(max(((lower - x) / size[0]).max(initial=0.0), ((x - upper) / size[1]).max(initial=0.0), 0.0))
 
 
-def main(steps: int) -> None:
+def main(steps: int, order: int = 1) -> None:
     for name in ROBOTS:
-        controller, q0 = wanderer(name)
-        print(name, wander(controller, q0, steps))
+        controller, q0 = wanderer(name, order)
+        print(name, wander(controller, q0, steps), flush=True)
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]))
+    main(*map(int, sys.argv[1:]))

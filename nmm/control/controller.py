@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, positive
+from nmm.arrays import Array, positive, vector
 from nmm.control.collisions import Collisions
 from nmm.control.idle_inputs import idle_inputs, inputs_without_effect
 from nmm.control.integrators import integrator
@@ -21,7 +22,7 @@ from nmm.control.safety_filter import SafetyFilter
 from nmm.control.sequence import Schedule
 from nmm.control.steering import Steered, Steering
 from nmm.control.step import Step
-from nmm.control.step_layout import Given, checked
+from nmm.control.step_layout import SERVO, Given, checked
 from nmm.control.step_solver import FAILED, StepSolver
 from nmm.control.stepping import ADVANCE, advance, tableau
 from nmm.errors import InputError
@@ -53,7 +54,11 @@ class Controller:
     steering : the steering law for a platform whose steering does not affect the task (`Steering`): True for
         the default, False for none
     collisions : distances to keep, which need dt; None for none
-    kinematics : "pinocchio", or "compiled": nmm's own, equal up to rounding and several times as fast
+    kinematics : "pinocchio", or "compiled": nmm's own, equal up to rounding and several times as fast; of
+        order 2 they are compiled
+    order : 1 for u = controller(t, q); 2 for u_dot = controller(t, q, u): inputs that accelerate
+    servo : k of order 2, 1/s, with which u follows what the resolver answers, so that
+        e_ddot + (k + K) e_dot + k K e = 0
 
     Attributes
     ----------
@@ -67,7 +72,8 @@ class Controller:
     Raises
     ------
     InputError : a frame, coordinate or input that the robot lacks; more rows than inputs; an added task with
-        a resolver that takes none, or none with one that needs it; a step "armijo" without an objective
+        a resolver that takes none, or none with one that needs it; a step "armijo" without an objective; at
+        order 2 collisions, a retreat, a step "armijo", or limits with a servo above 1 / dt
 
     Examples
     --------
@@ -79,6 +85,8 @@ class Controller:
     {'v': 5.333, 'omega': 2.506, 'q1': -0.0, 'q2': -0.0}
     """
 
+    #: k of order 2, 1/s, unless given.
+    SERVO: ClassVar[float] = SERVO
     #: Which tasks are active; None where all of them always are.
     schedule: Schedule | None = None
 
@@ -95,10 +103,14 @@ class Controller:
         steering: Steering | bool = True,
         collisions: Collisions | None = None,
         kinematics: str = PINOCCHIO,
+        order: int = 1,
+        servo: float = SERVO,
     ) -> None:
         added = Stack() if added_task is None else Stack.of(added_task)
         given = (robot, Stack.of(task), resolver, objective, added)
-        self.given = checked(Given(*given, limits, dt, retreat, steering, collisions, kinematics))
+        self.given = checked(
+            Given(*given, limits, dt, retreat, steering, collisions, kinematics, order, servo)
+        )
         for one in (*self.given.task, *added):
             if one.when:
                 raise InputError("is for a SequencedController", where=f"task {one.called(robot)}: when")
@@ -106,6 +118,8 @@ class Controller:
         solver = self.solver = StepSolver(self.given, law.on(robot, self.given.task) if law else None)
         solver.choose_steering(self._unfelt)
         self._u, self._q_dot, self._shape = solver.found.answer.u, solver.found.q_dot, (robot.n,)
+        if order == 2:
+            self._u = solver.found.second.u_dot
         self._busy, self._at_hand, self._needs_dt = solver.busy, solver.at_hand, solver.needs_dt
         self._steppers: dict[str, Callable[[float, Array, float], tuple[Array, Array]]] = {}
         self.dt = dt
@@ -175,10 +189,18 @@ class Controller:
         """Copies and pickles are built anew, as views of memory and addresses of kernels cannot be copied."""
         return type(self), tuple(self.given._replace(dt=self.dt))
 
-    def __call__(self, t: float, q: ArrayLike) -> Array:
-        """Inputs u (m,) at time t (s) and configuration q (n,), in the units of `robot.u_units`.
+    @property
+    def order(self) -> int:
+        """1 where it gives u, 2 where it gives u_dot."""
+        return self.given.order
 
-        With limits each call is a sample, dt after the previous one.
+    def __call__(self, t: float, q: ArrayLike, u: ArrayLike | None = None) -> Array:
+        """Inputs u (m,) at time t (s) and configuration q (n,), in the units of `robot.u_units`; at order 2
+        their accelerations u_dot (m,), from the inputs u (m,) at t, in those per second; without u from those
+        of the call before, after a `reset` from rest.
+
+        With limits each call is a sample, dt after the previous one. At order 2 u_dot is then held for dt,
+        and the next u is u + dt u_dot: not a measured one, which lags behind.
 
         Raises
         ------
@@ -203,6 +225,8 @@ class Controller:
                 called[()] = t
                 if solver.dt is None:
                     solver.expect_dt()
+            if u is not None:
+                self._move(u)
             if self._at_hand is None:
                 solver.take_sample(t, q)
             else:  # `take_sample` written out: some calls and lookups fewer save a tenth of a step
@@ -213,6 +237,15 @@ class Controller:
             return self._u.copy()
         finally:
             busy[0] = False
+
+    def _move(self, u: ArrayLike) -> None:
+        """The robot moves with the inputs u (m,)."""
+        before = self.solver.before
+        if not self.solver.second:
+            raise InputError(where="u", expected="none at order 1, whose answer it is", got=u)
+        if type(u) is not np.ndarray or u.dtype != FLOAT64 or u.shape != before.shape:
+            u = vector(u, self.robot.n_u, "u")
+        before[:] = u
 
     def step(self, t: float, q: ArrayLike, dt: float, method: str = "rk4") -> tuple[Array, Array]:
         """One sample of the closed loop: q (n,) at t + dt, and the inputs u (m,) at t.
@@ -231,6 +264,8 @@ class Controller:
         """
         if type(q) is not np.ndarray or q.dtype != FLOAT64 or q.shape != self._shape or not q.flags.carray:
             q = self._copied(q)
+        if self.solver.second:
+            raise InputError("is not known at order 2", where="step", expected="u_dot = controller(t, q, u)")
         if not 0.0 < dt < math.inf:
             positive(dt, "dt")
         if self.solver.samples and dt != self.solver.dt:
@@ -273,8 +308,9 @@ class Controller:
 
         return compiled
 
-    def evaluate(self, t: float, q: ArrayLike) -> Step:
-        """All quantities at (t, q); a singular matrix is reported in `status`, not raised.
+    def evaluate(self, t: float, q: ArrayLike, u: ArrayLike | None = None) -> Step:
+        """All quantities at (t, q), at order 2 with the inputs u (m,), or those of the last sample; a
+        singular matrix is reported in `status`, not raised.
 
         The controller's state, what the resolver remembers included, is left as it was.
         """
@@ -282,13 +318,16 @@ class Controller:
         solver.expect_dt()
         q = self._copied(q)
         with solver.alone(), solver.sample.aside():
+            if u is not None:
+                self._move(u)
             solver.solve_whole(float(t), q)
             return solver.last(t, q)
 
     def velocity(self, t: float, q: ArrayLike) -> Array:
         """q_dot = S(q) u (n,) of the closed loop at (t, q); raises as a call does.
 
-        At the stages of a sample the last call's decisions hold: bounds, the step size, a retreat.
+        At the stages of a sample the last call's decisions hold: bounds, the step size, a retreat, and at
+        order 2 the inputs.
         """
         solver, busy = self.solver, self._busy
         if self._needs_dt:

@@ -16,14 +16,13 @@ from nmm.control.bounds import SAMPLE, Clearance, LimitNumbers, gathers_speed
 from nmm.control.period_monitor import PeriodNumbers
 from nmm.control.retreat import RetreatNumbers, stalls
 from nmm.control.steering import SteeringNumbers, steer
+from nmm.control.step_records import SecondOrder, TaskRows
 from nmm.functions.program import BESIDE, Buffers, LaidOut, run_program
 from nmm.kernels.compiled import caller, compiled, kernel, scratch
 from nmm.kernels.linear_algebra import dot, residual_norm
 from nmm.kernels.record_layout import (
     Cell,
-    IntegerMatrix,
     IntegerVector,
-    Matrix,
     SampledIntegerVector,
     SampledVector,
     Vector,
@@ -35,28 +34,6 @@ from nmm.resolvers.base import call_resolver
 from nmm.resolvers.limit_check import keep_limits
 from nmm.resolvers.problem_arrays import ProblemArrays
 from nmm.resolvers.saturation import instead
-
-
-class TaskRows(NamedTuple):
-    """The s rows of a stack of tasks.
-
-    rows (s, 3) : the program's rows of f, g and e; for e, PLAIN or WRAPPED where no function computes it
-    gain (s, s) : K
-    speed, braking (s,) : ‖K e‖ <= speed, ‖K e‖² <= 2 braking ‖e‖ over the rows of a group
-    group (s,) : the group of each row
-    full (s,) : ∂g/∂t + K e without these bounds
-    r, r_d, error (s,) : value, desired value and error, written by a step
-    """
-
-    rows: IntegerMatrix
-    gain: Matrix
-    speed: Vector
-    braking: Vector
-    group: IntegerVector
-    full: Vector
-    r: Vector
-    r_d: Vector
-    error: Vector
 
 
 class Arm(NamedTuple):
@@ -85,7 +62,8 @@ class ControlStep(NamedTuple):
     scale (levels,) : λ, the share of each level's rate that was given
     q_dot (n,) : S u
     retreat, period : the retreat from a stalled error, and the times of calls
-    step : address of `step`, for compiled loops, which contain no copy of it
+    second : what a controller of second order computes with
+    step : address of `step`, or of `accelerate`, for compiled loops, which contain no copy of it
     limits_code, clearance_code : addresses of `write_limits` and `write_clearance`; 0 where not used
     """
 
@@ -109,6 +87,7 @@ class ControlStep(NamedTuple):
     q_dot: SampledVector
     retreat: RetreatNumbers
     period: PeriodNumbers
+    second: SecondOrder
     step: int
     limits_code: int
     clearance_code: int
@@ -234,7 +213,7 @@ def finish(q: Array, integers: Integers, floats: Array) -> None:
     write_shares(e.task, e.problem, e.answer, e.scale)
     if e.steering.on[()] == 1:
         steer(e.steering, q, b.value, b.G, e.problem, e.answer.u)
-    if e.limits.mode[()] == SAMPLE:
+    if e.limits.mode[()] == SAMPLE and e.second.u_dot.shape[0] == 0:
         for j in range(e.answer.u.shape[0]):
             e.problem.before[j] = e.answer.u[j]
     drive(e.answer.u, b.G, e.arm, e.q_dot)
@@ -261,9 +240,9 @@ def resolve(q: Array, integers: Integers, floats: Array) -> float:
     return float(answer.status[()])
 
 
-@kernel(STEP)
-def step(t: float, q: Array, integers: Integers, floats: Array) -> float:
-    """One control step: functions (except Pinocchio's), equations, gradient, inputs; returns the status."""
+@compiled
+def write_problem(t: float, q: Array, integers: Integers, floats: Array) -> None:
+    """Functions (except Pinocchio's), equations and the gradient at (t, q)."""
     run_program(t, q, integers, floats)
     b = views(LaidOut, integers, floats, 0).buffers
     e = views(ControlStep, integers, floats, BESIDE)
@@ -285,6 +264,13 @@ def step(t: float, q: Array, integers: Integers, floats: Array) -> float:
         for j in range(n):
             gradient[0, j] += e.steering.spring[()] * b.value_q[spring, j]
     times_S(gradient, 0, b.G, e.arm, problem.h)
+
+
+@kernel(STEP)
+def step(t: float, q: Array, integers: Integers, floats: Array) -> float:
+    """One control step: functions, equations, gradient, inputs; returns the status."""
+    write_problem(t, q, integers, floats)
+    e = views(ControlStep, integers, floats, BESIDE)
     if e.limits_code != 0:
         call_bounds(e.limits_code, q, integers, floats)
     return resolve(q, integers, floats)

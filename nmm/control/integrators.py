@@ -155,6 +155,37 @@ class WithMimicJoints(Around):
         return self.robot.following.placed(self.integrator.advance(velocity, t, q, q_dot, u, dt))
 
 
+class Accelerated(Integrator):
+    """An integrator of (q, u) with u_dot: at second order.
+
+    inputs, u_dot (m,) : views of what a call of the controller reads and writes; afterwards the inputs are
+        those at the end of the step
+    """
+
+    def __init__(self, integrator: Integrator, robot: Robot, inputs: Array, u_dot: Array) -> None:
+        inner = integrator.integrator if isinstance(integrator, WithMimicJoints) else integrator
+        self._inner, self._robot, self._inputs, self._u_dot = inner, robot, inputs, u_dot
+        self.order, self.tolerance, self.stability = inner.order, inner.tolerance, inner.stability
+        self._held = HeldInputs(robot)
+        self.plain = integrator
+
+    def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
+        n, inputs, u_dot = q.size, self._inputs, self._u_dot
+        if isinstance(self._inner, ZeroOrderHold):
+            q_next = self._held(q, inputs, dt, u_dot)
+            inputs += dt * u_dot
+            return q_next
+
+        def flow(t: float, z: Array) -> Array:
+            inputs[:] = z[n:]
+            return np.concatenate([velocity(t, z[:n].copy()), u_dot])
+
+        both = np.concatenate([q, inputs]), np.concatenate([q_dot, u_dot])
+        z = self._inner.advance(flow, t, *both, u, dt)
+        inputs[:] = z[n:]
+        return self._robot.following.placed(z[:n])
+
+
 METHODS = ("rk4", "midpoint", "euler", "zoh", "adaptive")
 
 

@@ -44,7 +44,7 @@ class LimitReport:
         """The limits of wheels and functions that the last call's inputs violate, and by what rate."""
         problem = self._step.problem
         rates = problem.limit_rows @ self._step.answer.u
-        excess = np.maximum(rates - problem.upper, problem.lower - rates)
+        excess = self._step.second.share * np.maximum(rates - problem.upper, problem.lower - rates)
         found: dict[str, float] = {}
         for name, by in zip(self._row_names, excess, strict=True):
             if by > 1e-9:

@@ -189,6 +189,11 @@ _TABLE = (
         "u", "u", "inputs", "Nm", "inputs", noted=True, finite=True, column="u_{}",
         curve=Curve("inputs", "Inputs", 7, opens_below=np.inf),
     ),
+    RecordedQuantity(
+        "u_dot", "u̇", "accelerations of the inputs at order 2, per second", "Nm", "inputs", since=8,
+        noted=True, optional=True,
+        curve=Curve("accelerations", "Accelerations of the inputs", 12),
+    ),
     RecordedQuantity("q_dot", "q̇", "S(q) u, per second", "Nn", "coordinates", noted=True, finite=True),
     RecordedQuantity("r", "r", "value of the task", "Ns", "rows", noted=True, column="r_{}"),
     RecordedQuantity("r_d", "r_d", "target of the task", "Ns", "rows", noted=True, column="r_d_{}"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -54,13 +55,15 @@ def note_sample(
     for i in range(n):
         found.q[k, i] = q[i]
         found.q_dot[k, i] = e.q_dot[i]
+    second = e.second.u_dot.shape[0] > 0
     for j in range(m):
-        found.u[k, j] = e.answer.u[j]
+        found.u[k, j] = e.problem.before[j] if second else e.answer.u[j]
+        found.u_dot[k, j] = e.second.u_dot[j] if second else math.nan
     for i in range(s):
         found.r[k, i] = e.task.r[i]
         found.r_d[k, i] = e.task.r_d[i]
         found.error[k, i] = e.task.error[i]
-        found.rate[k, i] = e.task.full[i]
+        found.rate[k, i] = e.task.full[i] - e.second.lead[i] if second else e.task.full[i]
         found.partition[k, i] = e.state[COLUMNS + i] if partitioned == 1 else -1
         for j in range(m):
             found.J[k, i, j] = e.problem.J[i, j]
@@ -77,7 +80,7 @@ def note_sample(
     for i in range(w):
         found.limited[k, i] = 0.0
         for j in range(m):
-            found.limited[k, i] += e.problem.limit_rows[i, j] * e.answer.u[j]
+            found.limited[k, i] += e.problem.limit_rows[i, j] * found.u[k, j]
     for i in range(w, found.limited.shape[1]):
         found.limited[k, i] = b.value[e.limits.rows[i - w]]
 

@@ -26,6 +26,7 @@ class SampleState:
         self._integers, self._floats = sampled(*blocks)
         self._limits: LimitNumbers = step.limits
         self._active, self._dt = step.problem.active, step.problem.dt
+        self._inputs = step.problem.before[: step.second.u_dot.size]  # none at first order
         self._new = self.snapshot()
 
     def snapshot(self) -> Snapshot:
@@ -39,10 +40,11 @@ class SampleState:
         self.restore(self._new)
 
     def end_stages(self, snapshot: Snapshot) -> None:
-        """`restore` after an integrator's stages, except the active bounds, where the next search begins."""
-        active = self._active.copy()
+        """`restore` after an integrator's stages, except the active bounds, where the next search begins, and
+        the inputs that second order integrates."""
+        active, inputs = self._active.copy(), self._inputs.copy()
         self.restore(snapshot)
-        self._active[:] = active
+        self._active[:], self._inputs[:] = active, inputs
 
     @property
     def elapsed(self) -> float:

@@ -14,7 +14,7 @@ from nmm.control.limits import Limits
 from nmm.control.retreat import Retreat
 from nmm.control.sequence import Event, Moment, Schedule, Sequence
 from nmm.control.steering import Steering
-from nmm.control.step_layout import Given, checked
+from nmm.control.step_layout import SERVO, Given, checked
 from nmm.control.step_solver import StepSolver
 from nmm.errors import InputError, RunError
 from nmm.functions.objectives.base import Objective
@@ -40,7 +40,8 @@ class SequencedController(Controller):
 
     Parameters
     ----------
-    robot, task, resolver, objective, limits, dt, retreat, steering, collisions, kinematics : see `Controller`
+    robot, task, resolver, objective, limits, dt, retreat, steering, collisions, kinematics, order,
+    servo : see `Controller`
 
     Attributes
     ----------
@@ -75,12 +76,14 @@ class SequencedController(Controller):
         steering: Steering | bool = True,
         collisions: Collisions | None = None,
         kinematics: str = PINOCCHIO,
+        order: int = 1,
+        servo: float = SERVO,
     ) -> None:
         tasks = Stack.of(task)
         if not tasks.tasks:
             raise InputError(where="task", expected="at least one")
         given = (robot, tasks, resolver, objective, Stack(), limits, dt, retreat, steering)
-        self.given = checked(Given(*given, collisions, kinematics))
+        self.given = checked(Given(*given, collisions, kinematics, order, servo))
         if resolver.takes_added_task:
             raise InputError(
                 "its added task has as many rows as the tasks leave, which changes where tasks come and go",
@@ -149,12 +152,12 @@ class SequencedController(Controller):
             self.current = new
         return new
 
-    def __call__(self, t: float, q: ArrayLike) -> Array:
-        """Inputs u (m,) at time t (s) and configuration q (n,); decides which tasks are active."""
+    def __call__(self, t: float, q: ArrayLike, u: ArrayLike | None = None) -> Array:
+        """As for `Controller`; decides which tasks are active."""
         q = self.robot.q(q)
         if self.schedule.changes(float(t), q):
             self.switch()
-        return self.current(t, q)
+        return self.current(t, q, u)
 
     def step(self, t: float, q: ArrayLike, dt: float, method: str = "rk4") -> tuple[Array, Array]:
         """As for `Controller`; decides which tasks are active, for the whole step."""

@@ -22,6 +22,7 @@ class Step:
     u (m,), q_dot = S u (n,); status, scale (levels,), residual ‖J u - rate‖, measure, excess: see `Answer`;
     partition (s,) the columns of Ja, -1 for none; retreats so far; step_size, the share of α used;
     added_residual, of the added task's rows, 0 where rounding hides it;
+    u_dot (m,) at order 2, not numbers at order 1;
     side, the sign of det J_e where the extended Jacobian inverted it, else 0;
     more, further recorded quantities by name: `step[name]` is any of them.
 
@@ -55,6 +56,7 @@ class Step:
     step_size: float = 1.0
     added_residual: float = 0.0
     side: int = 0
+    u_dot: Array = field(default_factory=lambda: np.zeros(0))
 
     robot: Robot = field(kw_only=True, repr=False)
     more: dict[str, Any] = field(default_factory=dict, kw_only=True, repr=False)

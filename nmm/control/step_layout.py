@@ -4,7 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from nmm.arrays import positive
 from nmm.collisions.rows import no_rows
+from nmm.control.acceleration import accelerate, write_next_limits
 from nmm.control.bounded_step import write_clearance, write_limits
 from nmm.control.bounds import Clearance
 from nmm.control.collisions import Collisions
@@ -15,11 +17,12 @@ from nmm.control.period_monitor import NOT_CALLED
 from nmm.control.retreat import Retreat, retreat_numbers
 from nmm.control.safety_filter import CUTS, MARGIN, Counts
 from nmm.control.steering import NOTHING, Steered, Steering
+from nmm.control.step_records import SecondOrder, TaskRows
 from nmm.control.task_rows import task_functions, task_rows
 from nmm.errors import InputError, expect_kind, expect_known
 from nmm.functions.function import Function, row_scales
 from nmm.functions.objectives.base import Objective
-from nmm.functions.program import BESIDE, COMPILED, PINOCCHIO, Program
+from nmm.functions.program import BESIDE, COMPILED, PINOCCHIO, Buffers, Program
 from nmm.functions.tasks.task import Stack
 from nmm.kernels.parallel_compile import compile_in_parallel
 from nmm.kernels.record_layout import views
@@ -45,6 +48,14 @@ class Given(NamedTuple):
     steering: Steering | bool
     collisions: Collisions | None
     kinematics: str
+    order: int
+    servo: float
+
+
+#: Steps of second order's differences along the motion, s: of compiled rows, and of users' Python functions.
+BESIDE_BY, BESIDE_BY_IN_PYTHON = 1e-6, 1e-4
+#: k of second order, 1/s, unless given.
+SERVO = 5.0
 
 
 def checked(given: Given) -> Given:
@@ -57,6 +68,19 @@ def checked(given: Given) -> Given:
     expect_known("kinematics", given.kinematics, (PINOCCHIO, COMPILED), "controller")
     if given.added_task.tasks and not given.resolver.takes_added_task:
         raise InputError(f"resolver {given.resolver.name} takes none, ej does", where="added_task")
+    if given.order not in (1, 2):
+        raise InputError(where="order", expected="1, for inputs u, or 2, for u_dot", got=given.order)
+    if given.order == 2:
+        positive(given.servo, "servo")
+        step = getattr(given.resolver, "step", "constant")
+        there = {
+            "collisions": given.collisions,
+            "retreat": given.retreat,
+            f"resolver {given.resolver.name}: step": None if step == "constant" else step,
+        }
+        for name, one in there.items():
+            if one is not None:
+                raise InputError("is not known at order 2", where=name, expected="order 1, or none")
     return given
 
 
@@ -84,17 +108,21 @@ def lay_out(given: Given, steered: Steered | None) -> LaidOut:
     robot, task, resolver, objective, added_task, limits, *_ = given
     collisions = given.collisions
     limited = limits is not None or collisions is not None
-    compile_in_parallel(*([write_limits] if limited else []), compiled_step, resolver.kernel)
+    second = given.order == 2
+    code, limits_code = (accelerate, write_next_limits) if second else (compiled_step, write_limits)
+    compile_in_parallel(*([limits_code] if limited else []), code, resolver.kernel)
     rows, added_rows = task.rows(robot), added_task.rows(robot)
     weighted = () if objective is None else objective.terms_on(robot)
     functions, added = task_functions(task), task_functions(added_task)
     kept = (Limits(False, False) if limits is None else limits).on(robot)
     objectives = [function for _, function in weighted]
     pursued = [] if steered is None else [steered.pursuit]
-    program = Program(robot, [*functions, *added, *objectives, *kept.functions, *pursued], given.kinematics)
+    # At second order the rows that are differenced come first; their kinematics are compiled.
+    listed = [*functions, *added, *kept.functions, *objectives, *pursued]
+    program = Program(robot, listed, COMPILED if second else given.kinematics)
     first = program.first_rows
-    tasks = len(functions) + len(added)
-    after = tasks + len(objectives)
+    after = len(functions) + len(added)
+    objective_at = after + len(kept.functions)
     s, m = len(rows), robot.n_u
     # The extended Jacobian needs a row for each steered input to be square.
     held = np.zeros((0, m))
@@ -123,6 +151,7 @@ def lay_out(given: Given, steered: Steered | None) -> LaidOut:
     arrays.stops[m + len(numbers.spin) :] = UPPER + LOWER
     dimensions = problem.dimensions
     setup, state = resolver.setup(dimensions), resolver.start(dimensions)
+    differenced = len(kept.rows) + s + len(added_rows), objective_at
     program.lay_out(
         ControlStep(
             near=near,
@@ -130,7 +159,7 @@ def lay_out(given: Given, steered: Steered | None) -> LaidOut:
             task=task_rows(task, robot, first),
             added=task_rows(added_task, robot, first[len(functions) :]),
             arm=Arm(robot.arm_coordinates, robot.following.table.ravel()),
-            terms=np.array(first[tasks:after], dtype=np.int64),
+            terms=np.array(first[objective_at : objective_at + len(objectives)], dtype=np.int64),
             weights=np.array([weight for weight, _ in weighted]),
             H=np.array(0.0),
             problem=arrays,
@@ -147,14 +176,50 @@ def lay_out(given: Given, steered: Steered | None) -> LaidOut:
             q_dot=np.zeros(robot.n),
             retreat=retreat_numbers(given.retreat, robot, rows),
             period=NOT_CALLED,
-            step=compiled_step.address,
-            limits_code=write_limits.address if limited else 0,
+            second=_second(given, program, first, differenced) if second else _first(),
+            step=code.address,
+            limits_code=limits_code.address if limited else 0,
             clearance_code=write_clearance.address if len(near.d) else 0,
         )
     )
     step = views(ControlStep, *program.blocks, BESIDE)
+    if second and program.calls_python:
+        step.second.h[()] = BESIDE_BY_IN_PYTHON
     state.memory = step.state
     return LaidOut(program, step, dimensions, state, kept, weighted, steered)
+
+
+def _second(given: Given, program: Program, first: list[int], differenced: tuple[int, int]) -> SecondOrder:
+    robot, (rows, functions) = given.robot, differenced
+    n, m = robot.n, robot.n_u
+    stages, buffers = program.rows_of(functions)
+    return SecondOrder(
+        servo=np.array(float(given.servo)),
+        h=np.array(BESIDE_BY),
+        share=np.array(1.0),
+        stages=stages,
+        buffers=buffers,
+        task=task_rows(given.task, robot, first),
+        added=task_rows(given.added_task, robot, first[len(task_functions(given.task)) :]),
+        beside=np.zeros(n),
+        y=np.zeros((3, rows)),
+        D=np.zeros(rows),
+        lead=np.zeros(sum(given.task.levels(robot))),
+        lower=np.full(m, -np.inf),
+        upper=np.full(m, np.inf),
+        u_dot=np.zeros(m),
+    )
+
+
+def _first() -> SecondOrder:
+    """What takes the place of a record of second order at first order: nothing."""
+    shapes = [(0, 3, 4), (0, 6, 0), (0, 6, 0, 0), (0, 0), (0, 0, 0), (0,), (0,), (0, 0)]
+    none, cell = np.zeros(0), np.array(1.0)
+    integers = np.zeros(0, dtype=np.int64)
+    rows = TaskRows(integers.reshape(0, 3), np.zeros((0, 0)), none, none, integers, *(none for _ in range(4)))
+    buffers = Buffers(*(np.zeros(shape) for shape in shapes))
+    y = np.zeros((3, 0))
+    return SecondOrder(cell, cell, cell, 0, buffers, rows, rows, none, y, *(none for _ in range(5)))
 
 
 def _clearance(collisions: Collisions | None, first: int, count: int) -> Clearance:

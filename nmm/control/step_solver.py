@@ -16,6 +16,16 @@ import numpy as np
 
 from nmm.arrays import Array, positive, scalar
 from nmm.collisions.scene import Scene
+from nmm.control.acceleration import (
+    AHEAD,
+    BEHIND,
+    accelerate,
+    answer_led,
+    follow_answer,
+    go_beside,
+    look_beside,
+    look_here,
+)
 from nmm.control.bounds import OFF, SAMPLE, STAGE
 from nmm.control.directions import failure
 from nmm.control.equations import ANSWER, BOUNDS, STEP, WATCH, finish, replace_inputs, resolve, watch_error
@@ -94,6 +104,7 @@ class StepSolver:
         if self.scene is not None and collisions is not None:
             given_to = self.scene, self.found, self.program, self._again(), collisions.horizon
             self.safety_filter = SafetyFilter(*given_to)
+        self.second = given.order == 2
         if given.limits is None and collisions is None:
             self.found.limits.mode[()] = OFF
         self.retreat_state: RetreatState | None = None
@@ -106,7 +117,7 @@ class StepSolver:
             self.retreat_state is not None
             or self.safety_filter is not None
             or resolver.step != "constant"
-            or (given.limits is not None and self.limits_on.needs_dt)
+            or (given.limits is not None and (self.second or self.limits_on.needs_dt))
         )
         self.samples = given.limits is not None or self.needs_dt or self.program.remembers
         self.period_monitor = PeriodMonitor(self.found.period)
@@ -130,7 +141,8 @@ class StepSolver:
 
     def _solve_calls(self) -> None:
         """Define `solve(t, q)` -> status, and `linearise`, which omits the resolver's Python part."""
-        step, (integers, floats) = checked_by_caller(compiled_step.compiled, STEP), self.blocks
+        code = accelerate if self.second else compiled_step
+        step, (integers, floats) = checked_by_caller(code.compiled, STEP), self.blocks
         prepare = self.program.prepare if self.safety_filter is None else self._measured(self.safety_filter)
 
         def solve(t: float, q: Array) -> float:
@@ -138,13 +150,31 @@ class StepSolver:
                 prepare(t, q)
             return step(t, q, integers, floats)
 
+        python = self.second and prepare is not nothing
+        one: Callable[[float, Array], float] = self._beside_by_python(prepare) if python else solve
+
         def solve_and_finish(t: float, q: Array) -> float:
-            solve(t, q)
+            one(t, q)
             return self._finished(q)
 
-        self.linearise: Callable[[float, Array], float] = solve
-        self.solve: Callable[[float, Array], float] = solve if self._whole else solve_and_finish
+        self.linearise: Callable[[float, Array], float] = one
+        self.solve: Callable[[float, Array], float] = one if self._whole else solve_and_finish
         self._plain_call = prepare, step, integers, floats
+
+    def _beside_by_python(self, prepare: Callable[[float, Array], None]) -> Callable[[float, Array], float]:
+        """`accelerate` with users' Python functions, which are called at each of its three places."""
+        beside, blocks = self.found.second.beside, self.blocks
+
+        def solve(t: float, q: Array) -> float:
+            prepare(t, q)
+            look_here(t, q, *blocks)
+            for side in (BEHIND, AHEAD):
+                there = t + go_beside(q, side, *blocks)
+                prepare(there, beside.copy())
+                look_beside(there, q, side, *blocks)
+            return float(answer_led(q, *blocks))
+
+        return solve
 
     def _finished(self, q: Array) -> float:
         """The status after the resolver's Python part, if any, and what a step does with its inputs."""
@@ -152,6 +182,8 @@ class StepSolver:
         if not self._whole:
             self.resolver.finish(self.found.problem, self._dimensions, answer)
             finish(q, *self.blocks)
+            if self.second:
+                follow_answer(*self.blocks)
         return float(answer.status[()])
 
     def _measured(self, safety_filter: SafetyFilter) -> Callable[[float, Array], None]:
@@ -237,6 +269,7 @@ class StepSolver:
     def at_hand(self) -> tuple[Any, ...] | None:
         """What `take_sample` calls, with its memory, where that is all it does; else None."""
         more = self.safety_filter or self.retreat_state or self.step_size or not self._whole
+        more = more or (self.second and self.program.calls_python)
         return None if more else self._plain_call
 
     @property
@@ -281,6 +314,10 @@ class StepSolver:
     def keep_dt(self, dt: float | None) -> None:
         """Set the time between two calls, s."""
         self.dt = None if dt is None else positive(dt, "dt")
+        if self.second and self.needs_dt and dt is not None and dt * self.found.second.servo > 1.0:
+            raise InputError(
+                where="servo", expected=f"at most 1 / dt, {1 / dt:g} 1/s", got=float(self.found.second.servo)
+            )
         self.found.problem.dt[()] = math.nan if self.dt is None else self.dt
         self.period_monitor.keep(dt)
 

@@ -16,7 +16,7 @@ from nmm.kernels.compiled import compiled, compiled_without_gil, integer_scratch
 from nmm.kernels.record_layout import Matrix, Vector, keep, kept, put_back, record_type, views
 from nmm.kernels.velocity_map import place_mimic_joints
 from nmm.resolvers.answer import SINGULAR_J, SOLVED
-from nmm.robots.zero_order_hold import Inputs, hold
+from nmm.robots.zero_order_hold import Inputs, hold_rates
 
 
 class Tableau(NamedTuple):
@@ -44,12 +44,16 @@ def tableau(integrator: Integrator) -> Tableau | None:
 
 @compiled
 def hold_inputs(q: Array, u: Array, dt: float, integers: Integers, floats: Array, q_next: Array) -> None:
-    """q_next (n,): q after dt with the inputs u (m,)."""
+    """q_next (n,): q after dt with the inputs u (m,); at second order with the u_dot of the sample just made,
+    and u is then what they come to."""
     laid = views(LaidOut, integers, floats, 0)
-    arm = views(ControlStep, integers, floats, BESIDE).arm
+    e = views(ControlStep, integers, floats, BESIDE)
+    arm, u_dot = e.arm, e.second.u_dot
     n_p = laid.buffers.G.shape[0]
     inputs = Inputs(laid.platform_kernel, laid.platform_numbers, n_p, arm.moved, arm.mimic_joints)
-    hold(inputs, q, u, dt, q_next)
+    hold_rates(inputs, q, u, u_dot, dt, q_next)
+    for j in range(u_dot.shape[0]):
+        u[j] += dt * u_dot[j]
 
 
 @compiled
@@ -59,12 +63,14 @@ def go_on(
     """q_next (n,): q at t + dt, from the sample just made at (t, q); returns the first failed stage's status,
     else SOLVED. Stages keep the sample's bounds and previous inputs; `end_stages` restores the rest."""
     e = views(ControlStep, integers, floats, BESIDE)
-    n = q.shape[0]
+    n, m = q.shape[0], e.second.u_dot.shape[0]
     stages = method.weights.shape[0]
     if stages == 0:
-        hold_inputs(q, e.answer.u, dt, integers, floats, q_next)
+        hold_inputs(q, e.problem.before if m > 0 else e.answer.u, dt, integers, floats, q_next)
         return SOLVED
-    slopes, stage = scratch((stages, n)), scratch(n)
+    slopes, stage, start = scratch((stages, n + m)), scratch(n), scratch(m)
+    for j in range(m):
+        start[j] = e.problem.before[j]
     mode = e.limits.mode[()]
     if mode == SAMPLE:
         e.limits.mode[()] = STAGE
@@ -79,6 +85,12 @@ def go_on(
             for a in range(k):
                 total += (method.weights[a] if k == stages else method.matrix[k, a]) * slopes[a, i]
             stage[i] = q[i] + dt * total
+        for j in range(m):  # at second order the inputs are integrated, too
+            slopes[k - 1, n + j] = e.second.u_dot[j]
+            total = 0.0
+            for a in range(k):
+                total += (method.weights[a] if k == stages else method.matrix[k, a]) * slopes[a, n + j]
+            e.problem.before[j] = start[j] + dt * total
         if k < stages:
             status = call_step(e.step, t + method.nodes[k] * dt, stage, integers, floats)
             if status >= SINGULAR_J:
@@ -92,13 +104,18 @@ def go_on(
 
 @compiled
 def end_stages(integers: Integers, floats: Array, left_integers: Integers, left: Array) -> None:
+    """Restore what the sample left, but the active bounds and, at second order, the inputs."""
     e = views(ControlStep, integers, floats, BESIDE)
-    active = integer_scratch(e.problem.active.shape[0])
+    active, inputs = integer_scratch(e.problem.active.shape[0]), scratch(e.second.u_dot.shape[0])
+    for j in range(inputs.shape[0]):
+        inputs[j] = e.problem.before[j]
     for i in range(active.shape[0]):
         active[i] = e.problem.active[i]
     put_back(integers, floats, left_integers, left)
     for i in range(active.shape[0]):
         e.problem.active[i] = active[i]
+    for j in range(inputs.shape[0]):
+        e.problem.before[j] = inputs[j]
 
 
 @compiled_without_gil

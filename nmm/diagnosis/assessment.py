@@ -115,7 +115,7 @@ def instabilities(
     controller: Controller, times: Array, q: Array, dt: float, stability: tuple[float, ...]
 ) -> list[Instability]:
     """At each of times (K,) and q (K, n) the fastest mode that dt is too long for, if any."""
-    if not stability:
+    if not stability or controller.given.order == 2:  # whose modes are those of (q, u)
         return []
     F = linearisations(controller, times, q)
     known = np.flatnonzero(np.isfinite(F).all(axis=(1, 2)))

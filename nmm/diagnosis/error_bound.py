@@ -79,6 +79,7 @@ class Samples(NamedTuple):
     residual: Array
     partition: Integers
     feedback: Feedback
+    servo: float = 0.0
 
     @classmethod
     def of(cls, recorder: Recorder) -> Samples:
@@ -89,7 +90,17 @@ class Samples(NamedTuple):
         if feedback.has_bounds:
             rate = rate - error @ feedback.K.T + feedback.rates(error)
             residual = np.linalg.norm(np.einsum("kij,kj->ki", J, u) - rate, axis=1)
-        return cls(recorder.t, error, rate, J, u, residual, found.partition, feedback)
+        servo = float(controller.given.servo) if controller.given.order == 2 else 0.0
+        return cls(recorder.t, error, rate, J, u, residual, found.partition, feedback, servo)
+
+    def lag(self) -> tuple[Array, Array]:
+        """At order 2, what J u may lack of the rate at the samples, as y_dot = -k y promises, and what it
+        lacks more, (N,) each; zeros at order 1."""
+        if not self.servo:
+            return np.zeros(len(self.t)), np.zeros(len(self.t))
+        lacks = np.linalg.norm(np.einsum("kij,kj->ki", self.J, self.u) - self.rate, axis=1)
+        expected = lacks[0] * np.exp(-self.servo * (self.t - self.t[0]))
+        return expected, np.maximum(lacks - expected, 0.0)
 
 
 class Departure(NamedTuple):
@@ -127,6 +138,10 @@ def departure(
     if target is not None:
         bound = bound + accumulated(target, decays)
     short = np.where(differs(samples.residual, samples.rate), samples.residual, 0.0)
+    if samples.servo:
+        lags, more = samples.lag()
+        bound = bound + accumulated(np.diff(t) * lags[:-1], decays)
+        short = np.where(np.cumsum(short) > 0.0, more, 0.0)
     unmet = accumulated(np.diff(t) * np.maximum(short[1:], short[:-1]), decays)
     excess = norm - bound
     ends_off = not goes_on and norm[-1] > RETURNED * bound[-1] + ENDS * size
@@ -191,7 +206,7 @@ def _steps(t: Array) -> tuple[Array, Integers]:
 
 def step_errors(samples: Samples, order: int) -> Array:
     """The error that a method of that order may make along each step, (N - 1,); 0 for unresolved steps."""
-    t, error, rate, J, u, _, partition, feedback = samples
+    t, error, rate, J, u, _, partition, feedback, _ = samples
     fed, K, found = feedback.rates(error), feedback.K, np.empty(len(t) - 1)
     again = np.ascontiguousarray(fed @ K.T)  # K² e
     size = float(np.linalg.norm(K, 2))

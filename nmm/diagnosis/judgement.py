@@ -231,7 +231,7 @@ def _judged(leg: Leg, dt: float, method: str, goal: Goal | None) -> Judged:
         left=() if left is None else (_promise_left(samples, left),),
         seen=seen,
         moved=() if left else moved,
-        trials=Trials(leg, dt, found) if troubled and not hopeless and not held_back else None,
+        trials=Trials(leg, dt, found) if troubled and not (hopeless or held_back or samples.servo) else None,
         method=method,
         dt=dt,
     )

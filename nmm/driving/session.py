@@ -144,7 +144,9 @@ class DriveSession(RobotSession):
             far=FAR,
         )
         names, units = zip(*(row for target in driven.targets for row in target.rows), strict=True)
-        hidden = {"residual"} if driven.has_objective else {"residual", "objective"}
+        hidden = {"residual", "u_dot"} | (
+            set() if driven.has_objective else {"objective"}
+        )  # it drives at order 1
         self._curves, channels = live_channels(Axes(driven.robot, names, units, 1), hidden)
         super().__init__(
             driven.shown,

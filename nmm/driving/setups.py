@@ -147,6 +147,8 @@ class ScenarioSetup(DriveSetup):
         self.name = scenario.title or scenario.name
         self.robot = scenario.robot()
         self.q0, self.dt = self.robot.q(scenario.parts.q0 if q0 is None else q0), scenario.parts.dt
+        if scenario.parts.order == 2:
+            raise InputError("cannot be driven at order 2", where=scenario.name, expected="order: 1")
         if any(part.when for part in scenario.parts.task):
             raise InputError(
                 "has tasks that come and go (when), which cannot be driven",

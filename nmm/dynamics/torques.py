@@ -29,8 +29,9 @@ SMALL = 1e-3
 class Torques:
     """Motor torques, the ground's force and the margin against tipping, at the N samples of a motion.
 
-    The accelerations are differences of the recorded inputs. Where these jump (RG changes its partition, a
-    task begins) they have none: `jumps` says where, and torques are those on either side.
+    The accelerations are those recorded at order 2, or differences of the recorded inputs. Where these jump
+    (RG changes its partition, a task begins) they have none: `jumps` says where, and torques are those on
+    either side.
 
     Attributes
     ----------
@@ -159,10 +160,22 @@ class Torques:
         return lazy_call("nmm.figures.torques:torques")(self)
 
 
-def torques_along(robot: Robot, t: Array, q: Array, u: Array, payload: Payload | None = None) -> Torques:
-    """Of a motion q (N, n), u (N, n_u) at times (N,), s; `payload` as of `Dynamics`."""
+def torques_along(
+    robot: Robot,
+    t: Array,
+    q: Array,
+    u: Array,
+    payload: Payload | None = None,
+    *,
+    u_dot: Array | None = None,
+) -> Torques:
+    """Of a motion q (N, n), u (N, n_u) at times (N,), s; `payload` as of `Dynamics`. Accelerations that were
+    recorded, u_dot (N, n_u), take the place of differences of u."""
     dynamics, support = Dynamics(robot, payload), Support(robot)
-    u_dot, jumps = accelerations(t, u)
+    if u_dot is None:
+        u_dot, jumps = accelerations(t, u)
+    else:
+        jumps = np.zeros(len(t), dtype=bool)
     f, ground = dynamics.forces(q, u, u_dot)
     acts = support.zero_moment(ground) if robot.platform.n_p else np.zeros((len(t), 2))
     margins, edges = support.margins(q, acts)

@@ -132,6 +132,10 @@ WORDS: Mapping[str, Words] = {
     "promise_left": _promise_left,
     "shorter_dt": "with dt = {shorter:.3g} s in place of {dt:g} s it kept its promise when tried",
     "dt_too_long": _unstable,
+    "rate_jumps": (
+        "the rate that tasks ask for jumps {jumps} times, by up to {size:.3g} (m/s, rad/s), first at "
+        "t = {t:.4g} s: the inputs follow it at {servo:g} 1/s, with bounded accelerations"
+    ),
     "target_jumps": ("the target moved otherwise than its rate says in {steps} steps, and the error with it"),
     "out_of_reach": (
         "the target of {frame} is out of reach: it is {away:.3g} m {side} {joint}, its links add up to "

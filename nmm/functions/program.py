@@ -90,7 +90,13 @@ def run_program(t: float, q: Array, integers: Integers, floats: Array) -> None:
     """Evaluate the platform and every stage at (t, q), into the program's buffers; the kinematics of the
     frames are there already, unless they are compiled."""
     program = views(LaidOut, integers, floats, 0)
-    b = program.buffers
+    run_stages(t, q, integers, floats, program.buffers, program.stages.size)
+
+
+@compiled
+def run_stages(t: float, q: Array, integers: Integers, floats: Array, b: Buffers, count: int) -> None:
+    """Evaluate the platform and the first `count` stages at (t, q), as `run_program`, into buffers."""
+    program = views(LaidOut, integers, floats, 0)
     n = q.shape[0]
     if program.kinematics[()] > 0:
         here = views(Kinematics, integers, floats, int(program.kinematics[()]))
@@ -102,14 +108,14 @@ def run_program(t: float, q: Array, integers: Integers, floats: Array) -> None:
     clear(b.value_q)
     call_platform(program.platform_kernel, view(q, 0, (b.G.shape[0],)), program.platform_numbers, b.G, b.G_q)
     at = At(t, view(q, 0, (n,)), b.G, b.G_q)
-    for i in range(program.stages.size):
+    for i in range(count):
         stage = views(LaidOutStage, integers, floats, program.stages[i])
         first = stage.first_row
-        count = stage.end_row - first
+        rows_here = stage.end_row - first
         rows = Rows(
-            view(b.value, first, (count,)),
-            view(b.value_t, first, (count,)),
-            view(b.value_q, first * n, (count, n)),
+            view(b.value, first, (rows_here,)),
+            view(b.value_t, first, (rows_here,)),
+            view(b.value_q, first * n, (rows_here, n)),
         )
         frames = Frames(stage.slots, b.placements, b.jacobians, b.hessians)
         if stage.memory.size > 0:
@@ -174,18 +180,29 @@ class Program:
         self.remembers = any(stage.remembers for stage, _ in self._stages)
         self._frames = tuple(dict.fromkeys(frame for stage, _ in self._stages for frame in stage.frames))
 
+    def rows_of(self, functions: int) -> tuple[int, Buffers]:
+        """How many stages the first so many functions have, and buffers for them alone."""
+        last = self.first_rows[functions] if functions < len(self.first_rows) else self._rows
+        some = [stage for stage, row in self._stages if row < last]
+        return len(some), self._room(any(stage.hessians for stage in some))
+
+    def _room(self, hessians: bool) -> Buffers:
+        n, n_p, p, k, rows = (
+            *(self.robot.n, self.robot.platform.n_p, self.robot.platform.p),
+            *(len(self._frames), self._rows),
+        )
+        shapes: list[tuple[int, ...]] = [(k, 3, 4), (k, 6, n), (k if hessians else 0, 6, n, n)]
+        shapes += [(n_p, p), (n_p, p, n_p), (rows,), (rows,), (rows, n)]
+        return Buffers(*(np.zeros(shape) for shape in shapes))
+
     def lay_out(self, beside: tuple[Any, ...] | None = None) -> None:
         """Allocate, with a record of the caller's, whose place is `BESIDE`."""
         robot, platform = self.robot, self.robot.platform
-        n, n_p, p, k, rows = robot.n, platform.n_p, platform.p, len(self._frames), self._rows
-        with_hessians = k if any(stage.hessians for stage, _ in self._stages) else 0
         length = header_length(LaidOutStage)
         first = BESIDE + (0 if beside is None else header_length(type(beside)))
         places = first + length * np.arange(len(self._stages))
         table = first + length * len(self._stages)
-        shapes: list[tuple[int, ...]] = [(k, 3, 4), (k, 6, n), (with_hessians, 6, n, n)]
-        shapes += [(n_p, p), (n_p, p, n_p), (rows,), (rows,), (rows, n)]
-        buffers = Buffers(*(np.zeros(shape) for shape in shapes))
+        buffers = self._room(any(stage.hessians for stage, _ in self._stages))
         kinematics = np.array(table if self._compiled else 0, dtype=np.int64)
         memory = Memory()
         kernel, numbers = platform.velocity_map.address, platform.parameters

@@ -130,7 +130,11 @@ def _drawn(run: Trajectory, one: RecordedQuantity, curve: Curve) -> bool:
     if curve.if_true:
         return bool(getattr(run, curve.if_true))
     values = run[one.name]
-    return len(values) == len(run) and (np.isnan(one.fill) or bool(np.any(values != one.fill)))
+    return (
+        values is not None
+        and len(values) == len(run)
+        and (np.isnan(one.fill) or bool(np.any(values != one.fill)))
+    )
 
 
 def _limits_kept(run: Trajectory) -> dict[str, tuple[float, float]]:

@@ -28,32 +28,46 @@ class Inputs(NamedTuple):
 @compiled
 def hold(inputs: Inputs, q: Array, u: Array, dt: float, ahead: Array) -> None:
     """ahead (n,): q after dt with u held constant; RK4 on the platform's part, the joints' is exact."""
+    hold_rates(inputs, q, u, scratch(0), dt, ahead)
+
+
+@compiled
+def hold_rates(inputs: Inputs, q: Array, u: Array, u_dot: Array, dt: float, ahead: Array) -> None:
+    """As `hold`, with u_dot (m,) held constant, from u on; (0,) for inputs that are constant."""
     n_p, p = inputs.coordinates, u.shape[0] - inputs.moved.shape[0]
     G, G_q, stage, slope = scratch((n_p, p)), scratch((n_p, p, n_p)), scratch(n_p), scratch(n_p)
     copied(q, ahead)
     for k in range(4):
         for i in range(n_p):
             stage[i] = q[i] + (0.0 if k == 0 else (dt if k == 3 else 0.5 * dt) * slope[i])
+        later = 0.0 if k == 0 else (dt if k == 3 else 0.5 * dt)
         clear(G)
         clear(G_q)
         call_platform(inputs.platform, stage, inputs.parameters, G, G_q)
         for i in range(n_p):
             slope[i] = 0.0
             for j in range(p):
-                slope[i] += G[i, j] * u[j]
+                rate = u[j] + later * u_dot[j] if u_dot.shape[0] > 0 else u[j]
+                slope[i] += G[i, j] * rate
             ahead[i] += dt * slope[i] / (6.0 if k == 0 or k == 3 else 3.0)
     for j in range(inputs.moved.shape[0]):
         ahead[inputs.moved[j]] += dt * u[p + j]
+        if u_dot.shape[0] > 0:
+            ahead[inputs.moved[j]] += 0.5 * dt * dt * u_dot[p + j]
     place_mimic_joints(ahead, inputs.mimic_joints)
 
 
 @compiled
-def _hold(integers: Integers, floats: Array, q: Array, u: Array, dt: float, ahead: Array) -> None:
-    hold(views(Inputs, integers, floats, 0), q, u, dt, ahead)
+def _hold(
+    integers: Integers, floats: Array, q: Array, u: Array, u_dot: Array, dt: float, ahead: Array
+) -> None:
+    hold_rates(views(Inputs, integers, floats, 0), q, u, u_dot, dt, ahead)
 
 
 _FLAT = types.float64[::1]
-_HOLD = types.void(types.int64[::1], _FLAT, _FLAT, _FLAT, types.float64, _FLAT)
+_HOLD = types.void(types.int64[::1], _FLAT, _FLAT, _FLAT, _FLAT, types.float64, _FLAT)
+#: Of inputs that are constant.
+NO_RATES = np.zeros(0)
 
 
 def inputs_of(robot: Robot) -> Inputs:
@@ -74,12 +88,12 @@ class HeldInputs:
         self._blocks = memory.blocks()
         self._hold = checked_by_caller(_hold, _HOLD)
 
-    def __call__(self, q: Array, u: Array, dt: float) -> Array:
-        """q (n,) after dt, s, with the inputs u (m,)."""
+    def __call__(self, q: Array, u: Array, dt: float, u_dot: Array = NO_RATES) -> Array:
+        """q (n,) after dt, s, with the inputs u (m,), or with u_dot (m,) from u on."""
         q = np.ascontiguousarray(q, dtype=np.float64)
         u = np.ascontiguousarray(u, dtype=np.float64)
         ahead = np.empty_like(q)
-        self._hold(*self._blocks, q, u, dt, ahead)
+        self._hold(*self._blocks, q, u, u_dot, dt, ahead)
         return ahead
 
 

@@ -256,6 +256,8 @@ def _check(controllers: Sequence[Controller]) -> None:
         raise InputError("tasks that come and go are run by simulate alone", where="rollout")
     made = controllers and all(isinstance(one, Controller) for one in controllers)
     expect(made, "rollout", "a controller, a scenario or a list of controllers")
+    if any(one.order == 2 for one in controllers):
+        raise InputError("rollouts are not known at order 2", where="order", expected="1, or nmm.simulate")
     first = controllers[0]
     for k, one in enumerate(controllers):
         same = one.robot.q_names == first.robot.q_names and one.robot.u_names == first.robot.u_names

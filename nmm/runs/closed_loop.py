@@ -14,7 +14,7 @@ from nmm.arrays import Array
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
 from nmm.control.idle_inputs import idle_inputs
-from nmm.control.integrators import Integrator
+from nmm.control.integrators import Accelerated, Integrator
 from nmm.control.sample import Snapshot
 from nmm.control.sequence import Schedule
 from nmm.control.standing_pose import standing_pose
@@ -97,7 +97,12 @@ def record_run(
         controller.dt = float(times[1] - times[0])
     recorder.findings += _at_start(controller, q, times)
     guarded_advance = guarded(advance, controller)
+    if controller.solver.second:
+        own = controller.solver
+        guarded_advance = Accelerated(advance, controller.robot, own.before, own.found.second.u_dot)
     outcome, reasons = drive_loop(controller, guarded_advance, recorder, times, q, progress, until, leg)
+    if controller.solver.second:
+        recorder.findings += rate_jumps(recorder, follows=leg is not None and math.isfinite(leg.earlier))
     recorder.blocking = controller.report.blocking()
     for one in controller.solver.program.renewals:
         recorder.findings += one.noticed(recorder.reached)
@@ -105,6 +110,33 @@ def record_run(
         recorder.counts = controller.safety_filter.counts
     last = recorder.q[len(recorder) - 1] if len(recorder) else q
     return recorder, Ended(outcome, reasons, last, controller.solver.derivatives[0].copy())
+
+
+#: A task's rate has jumped that changes by so many times what it changes by before and after,
+JUMP = 10.0
+#: if by more than this share of its largest size.
+SMALL = 1e-2
+
+
+def rate_jumps(recorder: Recorder, *, follows: bool) -> Iterator[Finding]:
+    """Where the rate that tasks ask for jumps, which inputs of second order follow with bounded
+    accelerations; `follows`: other tasks were active before."""
+    found, t, k = recorder.so_far, recorder.t, float(recorder.controller.given.servo)
+    if not len(t):
+        return
+    short = np.linalg.norm(found.rate - np.einsum("kij,kj->ki", found.J, found.u), axis=1)
+    least = SMALL * max(1.0, float(np.linalg.norm(found.rate, axis=1).max()))
+    where = []
+    if follows and short[0] > least:
+        where.append(0)
+    if len(t) > 3:
+        size = np.linalg.norm(np.diff(found.rate, axis=0), axis=1)
+        beside = np.maximum(np.append(size[1:], np.inf), np.append(np.inf, size[:-1]))
+        where += (1 + np.flatnonzero((size > JUMP * beside) & (size > least))).tolist()
+    if where:
+        times = [float(t[i]) for i in where]
+        size_of = float(max(short[i] for i in where))
+        yield Finding("rate_jumps", {"jumps": len(times), "size": size_of, "servo": k}, {"t": times[0]})
 
 
 def _at_start(controller: Controller, q: Array, times: Array) -> Iterator[Finding]:
@@ -240,6 +272,8 @@ class _Loop:
         if not stands:
             self.kept.restore(earlier)
             self.state.reset()
+            if self.controller.solver.second:
+                self.controller.solver.before[:] = sample.u
             sample = self._sample(sample.t, sample.q)
             self.recorder.replace_last(sample)
             before, here = self.state.memory.copy(), self.kept.snapshot()

@@ -16,7 +16,7 @@ from nmm.arrays import Array, Integers
 from nmm.control.controller import Controller
 from nmm.control.equations import ControlStep, call_step, watch_error
 from nmm.control.goal import Goal, norms, unit_codes
-from nmm.control.integrators import Integrator
+from nmm.control.integrators import Accelerated, Integrator
 from nmm.control.recorded import Recorded, note_sample
 from nmm.control.step_size import Descent, call_shorten, shorten
 from nmm.control.stepping import Tableau, end_stages, go_on, tableau
@@ -155,7 +155,7 @@ def advance_samples(
             e.state[MODE] = FREE
         if not fine:
             break
-        if method.weights.shape[0] > 1:
+        if method.weights.shape[0] > 1 or e.second.u_dot.shape[0] > 0:
             end_stages(integers, floats, now_integers, now)
             keep(integers, floats, now_integers, now)
         whole = whole_alpha(e, choice)
@@ -208,7 +208,7 @@ class CompiledLoop:
 
 def compiled_loop(controller: Controller, advance: Integrator, until: Goal | None) -> CompiledLoop | None:
     """The loop of a controller that compiles as a whole, else None."""
-    method = tableau(advance)
+    method = tableau(advance.plain if isinstance(advance, Accelerated) else advance)
     plain = type(controller.solver.state) in (State, PartitionState) and type(until) in (Goal, type(None))
     if method is None or not (plain and controller.solver.compiles_runs):
         return None

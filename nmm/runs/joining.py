@@ -76,6 +76,7 @@ def join(
         path=path,
         desired=desired,
         planned=None,
+        u_dot=None if parts[0].u_dot is None else np.concatenate([part.u_dot for part in parts]),
         target=drawn.mark(path),
         events=tuple(sorted(dict.fromkeys(happened), key=lambda event: event.t)),
         **({} if found is None else found.kept),

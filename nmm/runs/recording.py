@@ -166,6 +166,7 @@ class Recorder:
             desired = self._shown.path(robot, planned)
         worked_out = {
             "t": self.t.copy(),
+            "u_dot": found.u_dot.copy() if controller.order == 2 else None,
             "sigma_min": self.singular_values[:, -1],
             "crossed": crossed(found.side),
             "margin": margin(within[:, moving]),

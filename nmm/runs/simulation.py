@@ -38,7 +38,8 @@ def simulate(
     until: Goal | None = None,
     watch: Callable[[Recorder], None] | None = None,
 ) -> Trajectory:
-    """Integrate q_dot = S(q) u(t, q) from q0 over `duration`, sampled every dt.
+    """Integrate q_dot = S(q) u(t, q) from q0 over `duration`, sampled every dt; at order 2 also
+    u_dot(t, q, u), from rest.
 
     What a resolver decides from call to call (the reduced gradient's partition) is decided at the samples
     and kept between them, as a sampled controller does, so that an integration step sees one smooth
@@ -96,6 +97,13 @@ def simulate(
             "limits, distances, a retreat and a step by Armijo's rule are kept from sample to sample",
             where="method",
             expected="rk4, midpoint, euler or zoh",
+            got=method,
+        )
+    if controller.given.order == 2 and controller.limits is not None and method != "zoh":
+        raise InputError(
+            "at order 2 limits hold for a u_dot that is held over a sample",
+            where="method",
+            expected="zoh",
             got=method,
         )
     advance = integrator(method, robot, positive(tolerance, "tolerance"))

@@ -41,6 +41,7 @@ class Trajectory:
     robot : the robot that moved
     t (N,) s; q (N, n); u (N, n_u): times, coordinates, inputs, in `robot.q_units`, `robot.u_units`
     q_dot (N, n): S(q) u, per second
+    u_dot (N, n_u): accelerations of the inputs, per second, at order 2, else None
     r, r_d, error (N, s): task value, target and error (angles wrapped), in `r_units`; not a number where a
         task that comes and goes is not active
     objective (N,): H(q)
@@ -112,6 +113,7 @@ class Trajectory:
     path: Array | None = None
     desired: Array | None = None
     planned: Array | None = None
+    u_dot: Array | None = None
     target: Array | None = None
     unmet: Residuals = NO_RESIDUALS
     limited: bool = False
@@ -155,6 +157,11 @@ class Trajectory:
     def __repr__(self) -> str:
         end = f"{self.t[-1]:g} s in {len(self)} samples" if len(self) else "no samples"
         return f"Trajectory({self.robot.name}, {self.resolver}, {self.outcome}, {end})"
+
+    @property
+    def order(self) -> int:
+        """2 where the run has accelerations of the inputs, u_dot, else 1."""
+        return 1 if self.u_dot is None else 2
 
     @property
     def outcome(self) -> Outcome:
@@ -264,7 +271,7 @@ class Trajectory:
     def torques(self, payload: Mapping[str, Any] | None = None) -> Torques:
         """What the motion asks of the motors, with masses carried, kg by frame (see `nmm.Dynamics`)."""
         found: Torques = lazy_call("nmm.dynamics.torques:torques_along")(
-            self.robot, self.t, self.q, self.u, payload
+            self.robot, self.t, self.q, self.u, payload, u_dot=self.u_dot
         )
         return found
 

@@ -21,7 +21,7 @@ from nmm.scenario.collisions import CollisionsPart
 from nmm.scenario.functions import REFERENCE_PARTS
 from nmm.scenario.keys import KeyedError, Part, at
 from nmm.scenario.limits import GoalPart, LimitsPart, RetreatPart, SteeringPart, part_or_none
-from nmm.scenario.numbers import Nested, Number, Positive, Whole, numbers, numbers_by_name
+from nmm.scenario.numbers import Nested, Number, Positive, Whole, integer, numbers, numbers_by_name
 from nmm.scenario.objectives import ObjectiveList, QuadraticPart, build_objective
 from nmm.scenario.resolvers import AnyResolver, WithAddedTask
 from nmm.scenario.robot import Absolute, RobotChoice
@@ -143,6 +143,12 @@ class ScenarioPart(Part):
         description=f"how the redundancy is resolved: kind {in_words(list(RESOLVERS), 'or')}, with its keys"
     )
 
+    order: Annotated[Literal[1, 2], BeforeValidator(integer)] = Field(
+        1, description="1 for inputs u, 2 for inputs that accelerate: u_dot from t, q and u, from rest"
+    )
+    servo: Positive = Field(
+        Controller.SERVO, description="of order 2: k with which u follows what the resolver answers, 1/s"
+    )
     limits: Annotated[LimitsPart | None, BeforeValidator(part_or_none)] = Field(
         None, description="what the inputs are kept within: true for the robot's own limits, or a mapping"
     )
@@ -222,8 +228,9 @@ class ScenarioPart(Part):
         with at("resolver"):
             resolver, added = own or self.resolver.make(), None
             rest = (limits, self.dt, retreat, steering or False)
+            second: Any = {"order": self.order, "servo": self.servo} if self.order == 2 else {}
             if sequenced:
-                return SequencedController(robot, task, resolver, objective, *rest)
+                return SequencedController(robot, task, resolver, objective, *rest, **second)
             if isinstance(self.resolver, WithAddedTask):
                 with at("added_task"):
                     added = build_tasks(self._added_task(self.resolver), robot)
@@ -232,7 +239,7 @@ class ScenarioPart(Part):
                     held = 0 if law is None else len(law.inputs)
                     self._check_added(robot, rows, robot.n_u - s, held)
             with self.resolver.own_keys():
-                return Controller(robot, task, resolver, objective, added, *rest, collisions)
+                return Controller(robot, task, resolver, objective, added, *rest, collisions, **second)
 
     def build_plan(self, robot: Robot, absolute: Absolute, progress: Progress | None) -> "Plan":
         """The planned motion; `RunError` where none is found."""
