@@ -56,7 +56,7 @@ def same(flown: nmm.Trajectory, stepped: nmm.Trajectory, tolerance: float = 1e-1
     assert flown.warnings == stepped.warnings
 
 
-@pytest.mark.parametrize("method", ["rk4", "midpoint", "euler", "zoh"])
+@pytest.mark.parametrize("method", ["rk4", "midpoint", "euler", "zoh", "zoh_midpoint"])
 @pytest.mark.parametrize(
     "name",
     ["unicycle_2r_position", "unicycle_2r_switching", "tiago_tray", "kinova_car", "panda_mecanum_pose"],

@@ -143,7 +143,7 @@ limits:
             "expected true, false or a mapping (key: value), got '0.01'",
         ),
         ("  velocity: true\nsteering: 3", "8: steering", "expected true, false or a mapping"),
-        ("  velocity: true\nmethod: adaptive", "8: method", "expected rk4, midpoint, euler or zoh"),
+        ("  velocity: true\nmethod: adaptive", "8: method", "got 'adaptive'"),
     ],
 )
 def test_a_scenario_names_file_and_key(

@@ -36,7 +36,11 @@ def towards(
 
 
 @pytest.mark.parametrize(
-    ("name", "method"), [*((name, "zoh") for name in ROBOTS), (next(iter(ROBOTS)), "rk4")]
+    ("name", "method"),
+    [
+        *((name, "zoh") for name in ROBOTS),
+        *((next(iter(ROBOTS)), method) for method in ("rk4", "zoh_midpoint")),
+    ],
 )
 def test_a_random_motion_keeps_position_velocity_and_acceleration(name: str, method: str) -> None:
     controller, q0 = wanderer(name)

@@ -83,7 +83,10 @@ def test_alpha_dt_too_large_is_reported_as_such(robot_2r: Robot) -> None:
     assert fine.warnings == ()
 
 
-@pytest.mark.parametrize(("method", "limit"), [("euler", 2.0), ("midpoint", 2.0), ("rk4", 2.785)])
+@pytest.mark.parametrize(
+    ("method", "limit"),
+    [("euler", 2.0), ("midpoint", 2.0), ("zoh_midpoint", 2.0), ("rk4", 2.785)],
+)
 def test_the_stability_limit_is_the_textbooks(robot_2r: Robot, method: str, limit: float) -> None:
     """H = ½ q2² with a task that leaves q2 alone decays with exactly alpha: the limit is z = -alpha dt."""
     task = nmm.Task(nmm.LinearCoordinates("theta", "q1"), [0.0, 0.0])

@@ -8,6 +8,7 @@ import itertools
 import numpy as np
 import pytest
 import yaml
+from findings import refused
 
 import nmm
 from nmm.control.integrators import integrator
@@ -201,16 +202,17 @@ def stepping(resolver: nmm.extending.Resolver) -> nmm.extending.Resolver:
         (lambda: bare(nmm.ProjectedGradient(step="armijo"))(0.0, Q0), "dt: expected a number"),
         (lambda: bare(nmm.ProjectedGradient(step="armijo")).velocity(0.0, Q0), "dt: expected a number"),
         (lambda: bare(nmm.ProjectedGradient(step="armijo")).evaluate(0.0, Q0), "dt: expected a number"),
-        (
-            lambda: nmm.simulate(bare(nmm.ProjectedGradient(step="armijo")), Q0, 1.0, DT, "adaptive"),
-            "a step by Armijo's rule are kept from sample to sample; expected rk4",
-        ),
     ],
 )
 def test_what_cannot_be_is_said(made: object, text: str) -> None:
     with pytest.raises(nmm.InputError) as error:
         made()  # type: ignore[operator]
     assert text in str(error.value)
+
+
+def test_a_step_that_holds_for_a_sample_needs_samples() -> None:
+    with refused("method", got="adaptive"):
+        nmm.simulate(bare(nmm.ProjectedGradient(step="armijo")), Q0, 1.0, DT, "adaptive")
 
 
 def scenario(tmp_path: object, **resolver: object) -> nmm.Scenario:

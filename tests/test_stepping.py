@@ -10,7 +10,7 @@ from findings import refused
 import nmm
 
 SCENARIOS = ["unicycle_2r_position", "unicycle_3r_position", "tiago_pose", "kinova_car"]
-METHODS = ["rk4", "midpoint", "euler", "zoh"]
+METHODS = ["rk4", "midpoint", "euler", "zoh", "zoh_midpoint"]
 
 
 def with_kinematics(controller: nmm.Controller, kinematics: str) -> nmm.Controller:

@@ -69,16 +69,19 @@ def wander(
     for k in range(steps):
         if k % 100 == 0:
             signal.set(rng.uniform(-3.0, 3.0, len(controller.rows)))
-        u = controller(k * DT, q)
-        step = controller.last(k * DT, q)
-        if not np.isfinite(u).all():
+        answer = controller(k * DT, q)
+        if not np.isfinite(answer).all():
             raise SystemExit(f"no answer at step {k}")
-        u = step.u
+        step, left = controller.last(k * DT, q), controller.solver.sample.snapshot()
+        u = advance.inputs(controller.solver.inputs_at, k * DT, q, step.q_dot, step.u, DT)
         worst[0] = max(worst[0], beyond(q[own], kept.coordinates[own]))
         worst[1] = max(worst[1], beyond(u, kept.inputs))
         rate = kept.accelerations * DT
         worst[2] = max(worst[2], beyond(u - before, np.column_stack([-rate, rate])))
         q = advance.advance(controller.velocity, k * DT, q, step.q_dot, u, DT)
+        if u is not step.u:
+            controller.solver.sample.end_stages(left)
+            controller.solver.count_from(u)
         before = u
     return Broken(*worst)
 

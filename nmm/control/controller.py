@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array, positive, vector
 from nmm.control.collisions import Collisions
 from nmm.control.idle_inputs import idle_inputs, inputs_without_effect
-from nmm.control.integrators import integrator
+from nmm.control.integrators import STEPPING, integrator
 from nmm.control.limit_report import LimitReport
 from nmm.control.limits import Limits
 from nmm.control.period_monitor import PeriodMonitor
@@ -33,6 +33,7 @@ from nmm.functions.tasks.task import Stack, Task
 from nmm.kernels.compiled import checked_by_caller
 from nmm.resolvers.base import Resolver
 from nmm.robots.robot import Robot
+from nmm.text_format import listed
 
 FLOAT64 = np.dtype(np.float64)
 
@@ -248,7 +249,8 @@ class Controller:
         before[:] = u
 
     def step(self, t: float, q: ArrayLike, dt: float, method: str = "rk4") -> tuple[Array, Array]:
-        """One sample of the closed loop: q (n,) at t + dt, and the inputs u (m,) at t.
+        """One sample of the closed loop: q (n,) at t + dt, and the inputs u (m,) at t; of "zoh_midpoint"
+        those at t + dt/2, q + dt/2 S u, which are to be held over dt.
 
         It is one compiled call unless it involves users' Python functions, distances, a retreat or a step by
         Armijo's rule, if the kinematics are compiled, too, or the method has one stage ("euler", "zoh").
@@ -256,11 +258,11 @@ class Controller:
         Parameters
         ----------
         dt : s; also becomes the controller's dt where it needs one
-        method : "rk4", "midpoint", "euler" or "zoh"
+        method : "rk4", "midpoint", "euler", "zoh" or "zoh_midpoint"
 
         Raises
         ------
-        SingularError, InputError : as a call
+        SingularError, InputError : as a call; "zoh_midpoint" with distances, which the sample's inputs keep
         """
         if type(q) is not np.ndarray or q.dtype != FLOAT64 or q.shape != self._shape or not q.flags.carray:
             q = self._copied(q)
@@ -278,7 +280,14 @@ class Controller:
         solver = self.solver
         integrates = integrator(method, self.robot, 1e-9)
         if integrates.tolerance:
-            raise InputError(where="method", expected="rk4, midpoint, euler or zoh for one step", got=method)
+            raise InputError(where="method", expected=listed(STEPPING, "or"), got=method)
+        if method == "zoh_midpoint" and self.safety_filter is not None:
+            raise InputError(
+                "a step with distances holds the inputs that keep them, the sample's",
+                where="method",
+                expected="zoh",
+                got=method,
+            )
         found, prepare = tableau(integrates), solver.program.prepare
         stages = found is None or len(found.weights) > 1
         # What Python prepares is valid at (t, q) only, but methods with stages evaluate elsewhere, too.
@@ -288,11 +297,13 @@ class Controller:
                 u, q_dot = self(t, q), self._q_dot.copy()
                 if not stages:
                     return integrates.advance(self.velocity, t, q, q_dot, u, dt), u
-                left = solver.sample.snapshot()
+                left, held = solver.sample.snapshot(), u
                 try:
-                    return integrates.advance(self.velocity, t, q, q_dot, u, dt), u
+                    held = integrates.inputs(solver.inputs_at, t, q, q_dot, u, dt)
+                    return integrates.advance(self.velocity, t, q, q_dot, held, dt), held
                 finally:
                     solver.sample.end_stages(left)
+                    solver.count_from(held)
 
             return from_python
         run, blocks = checked_by_caller(advance, ADVANCE), solver.blocks
@@ -338,10 +349,7 @@ class Controller:
             solver.begin()
         busy[0] = True
         try:
-            if solver.samples:
-                solver.solve_stage(float(t), q)
-            elif solver.solve(float(t), q) >= FAILED:
-                raise solver.failure(t, q)
+            solver.at_stage(float(t), q)
         finally:
             busy[0] = False
         return self._q_dot.copy()

@@ -19,6 +19,8 @@ from nmm.robots.robot import Robot
 from nmm.robots.zero_order_hold import HeldInputs
 
 Velocity = Callable[[float, Array], Array]
+#: The inputs (m,) at a stage, t and q (n,).
+Inputs = Callable[[float, Array], Array]
 
 
 class Integrator(ABC):
@@ -29,15 +31,21 @@ class Integrator(ABC):
     order : the error of a step dt is of order dt^(order + 1)
     tolerance : bound on the error of an adaptive step, m and rad; 0 for constant steps
     stability : coefficients c of the stability polynomial R(z) = Σ c_k z^k, lowest first; () if steps adapt
+    at_middle : whether a step's inputs are those of its middle, t + dt/2, q + dt/2 S u
     """
 
     order: int
     tolerance = 0.0
     stability: tuple[float, ...] = ()
+    at_middle = False
+
+    def inputs(self, stage: Inputs, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
+        """The inputs (m,) of the step, from q, q_dot and u at t: u where the method takes no others."""
+        return u
 
     @abstractmethod
     def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
-        """q at t + dt, from q, q_dot and u at t."""
+        """q at t + dt, from q and q_dot at t and the step's inputs u."""
 
 
 @allocating
@@ -125,10 +133,16 @@ class Adaptive(Integrator):
 class ZeroOrderHold(Integrator):
     """Constant inputs over dt, as on a robot with a sampled controller; the arm's motion is exact."""
 
-    order, stability = 1, (1.0, 1.0)
+    def __init__(self, robot: Robot, at_middle: bool = False) -> None:
+        self._held, self.at_middle = HeldInputs(robot), at_middle
+        like = MIDPOINT if at_middle else EULER
+        self.order, self.stability = like.order, like.stability
 
-    def __init__(self, robot: Robot) -> None:
-        self._held = HeldInputs(robot)
+    def inputs(self, stage: Inputs, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
+        if not self.at_middle:
+            return u
+        _, matrix, _ = MIDPOINT.tableau
+        return stage(t + 0.5 * dt, combined(q, dt, matrix[1, :1].copy(), q_dot[np.newaxis]))
 
     def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
         return self._held(q, u, dt)
@@ -141,8 +155,11 @@ class Around(Integrator):
     integrator: Integrator
 
     def __post_init__(self) -> None:
-        for name in ("order", "tolerance", "stability"):
+        for name in ("order", "tolerance", "stability", "at_middle"):
             object.__setattr__(self, name, getattr(self.integrator, name))
+
+    def inputs(self, stage: Inputs, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
+        return self.integrator.inputs(stage, t, q, q_dot, u, dt)
 
 
 @dataclass(frozen=True)
@@ -186,15 +203,17 @@ class Accelerated(Integrator):
         return self._robot.following.placed(z[:n])
 
 
-METHODS = ("rk4", "midpoint", "euler", "zoh", "adaptive")
+METHODS = ("rk4", "midpoint", "euler", "zoh", "zoh_midpoint", "adaptive")
+#: Those with steps of one length, which limits need.
+STEPPING = METHODS[:-1]
 
 
 def integrator(method: str, robot: Robot, tolerance: float) -> Integrator:
     """The integrator of that name; `InputError` lists the names."""
     expect_known("method", method, METHODS)
     found: Integrator
-    if method == "zoh":
-        found = ZeroOrderHold(robot)
+    if method in ("zoh", "zoh_midpoint"):
+        found = ZeroOrderHold(robot, at_middle=method == "zoh_midpoint")
     elif method == "adaptive":
         found = Adaptive(tolerance)
     else:

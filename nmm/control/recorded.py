@@ -9,10 +9,11 @@ import numpy as np
 from numba import types
 
 from nmm.arrays import Array, Integers
-from nmm.control.equations import ControlStep
+from nmm.control.equations import ControlStep, drive
 from nmm.control.quantities import QUANTITIES
 from nmm.functions.program import BESIDE, LaidOut
-from nmm.kernels.compiled import checked_by_caller, compiled
+from nmm.kernels.compiled import call_platform, checked_by_caller, clear, compiled, scratch, view
+from nmm.kernels.linear_algebra import dot
 from nmm.kernels.record_layout import Blocks, Kind, record_type, views
 from nmm.resolvers.answer import FALLBACK, added_residual
 from nmm.resolvers.partitions import COLUMNS
@@ -83,6 +84,28 @@ def note_sample(
             found.limited[k, i] += e.problem.limit_rows[i, j] * found.u[k, j]
     for i in range(w, found.limited.shape[1]):
         found.limited[k, i] = b.value[e.limits.rows[i - w]]
+
+
+NOTE_HELD = types.void(
+    *(types.int64[::1], types.float64[::1], types.float64[::1], types.float64[::1]),
+    *(types.int64, record_type(Recorded)),
+)
+
+
+@compiled
+def note_held(integers: Integers, floats: Array, q: Array, u: Array, k: int, found: Recorded) -> None:
+    """Of the k-th sample, at q: the inputs u (m,) that are held after it, in place of its own."""
+    e = views(ControlStep, integers, floats, BESIDE)
+    b = views(LaidOut, integers, floats, 0)
+    G, G_q = scratch(b.buffers.G.shape), scratch((*b.buffers.G.shape, b.buffers.G.shape[0]))
+    clear(G)
+    clear(G_q)
+    call_platform(b.platform_kernel, q, b.platform_numbers, G, G_q)
+    drive(u, G, e.arm, view(found.q_dot, k * q.shape[0], (q.shape[0],)))
+    for j in range(u.shape[0]):
+        found.u[k, j] = u[j]
+    for i in range(e.limits.spin.shape[0] if found.limited.shape[1] > 0 else 0):
+        found.limited[k, i] = dot(e.problem.limit_rows[i], u)
 
 
 #: What no sample holds, as a float and as an integer.

@@ -249,6 +249,24 @@ class StepSolver:
             mode[()] = usual
             self.program.stands[()] = 0
 
+    def at_stage(self, t: float, q: Array) -> None:
+        """The inputs at (t, q), with what the last sample decided; raises as a call does."""
+        if self.samples:
+            self.solve_stage(t, q)
+        elif self.solve(t, q) >= FAILED:
+            raise self.failure(t, q)
+
+    def inputs_at(self, t: float, q: Array) -> Array:
+        """The inputs u (m,) of `at_stage`."""
+        with self.alone():
+            self.at_stage(t, q)
+            return self.found.answer.u.copy()
+
+    def count_from(self, held: Array) -> None:
+        """Accelerations count from the inputs (m,) that are held after the sample."""
+        if self.found.limits.mode == SAMPLE:
+            self.before[:] = held
+
     def _back_off(self, retreat_state: RetreatState, q: Array) -> None:
         """Replace the resolver's inputs by the retreat's."""
         G = self.program.buffers.G

@@ -10,9 +10,10 @@ from numba import types
 from nmm.arrays import Array, Integers
 from nmm.control.bounds import SAMPLE, STAGE
 from nmm.control.equations import ControlStep, call_step, write_equation
-from nmm.control.integrators import Integrator, RungeKutta, WithMimicJoints, ZeroOrderHold
+from nmm.control.integrators import MIDPOINT, Integrator, RungeKutta, WithMimicJoints, ZeroOrderHold
 from nmm.functions.program import BESIDE, LaidOut, run_program
 from nmm.kernels.compiled import compiled, compiled_without_gil, integer_scratch, scratch, view
+from nmm.kernels.linear_algebra import copied
 from nmm.kernels.record_layout import Matrix, Vector, keep, kept, put_back, record_type, views
 from nmm.kernels.velocity_map import place_mimic_joints
 from nmm.resolvers.answer import SINGULAR_J, SOLVED
@@ -20,11 +21,15 @@ from nmm.robots.zero_order_hold import Inputs, hold_rates
 
 
 class Tableau(NamedTuple):
-    """An explicit method of s stages: nodes (s,), matrix (s, s), weights (s,); empty for constant inputs."""
+    """An explicit method of s stages: nodes (s,), matrix (s, s), weights (s,); empty for constant inputs.
+
+    holds : 1 where the last stage's inputs are held over the step, else 0
+    """
 
     nodes: Vector
     matrix: Matrix
     weights: Vector
+    holds: int
 
 
 _FLAT = types.float64[::1]
@@ -35,11 +40,13 @@ ADVANCE = types.float64(
 
 def tableau(integrator: Integrator) -> Tableau | None:
     """The integrator's tableau, or None; `go_on` sets mimic joints in any case."""
+    if isinstance(integrator, ZeroOrderHold) and not integrator.at_middle:
+        return Tableau(np.zeros(0), np.zeros((0, 0)), np.zeros(0), 0)
     if isinstance(integrator, ZeroOrderHold):
-        return Tableau(np.zeros(0), np.zeros((0, 0)), np.zeros(0))
+        return Tableau(*MIDPOINT.tableau, 1)
     if isinstance(integrator, WithMimicJoints):
         return tableau(integrator.integrator)
-    return Tableau(*integrator.tableau) if isinstance(integrator, RungeKutta) else None
+    return Tableau(*integrator.tableau, 0) if isinstance(integrator, RungeKutta) else None
 
 
 @compiled
@@ -96,26 +103,38 @@ def go_on(
             if status >= SINGULAR_J:
                 break
     e.limits.mode[()], stands[()] = mode, 0
+    if status >= SINGULAR_J:
+        return status
+    if method.holds == 1:
+        hold_inputs(q, e.answer.u, dt, integers, floats, q_next)
+        return SOLVED
     place_mimic_joints(stage, e.arm.mimic_joints)
     for i in range(n):
         q_next[i] = stage[i]
-    return status if status >= SINGULAR_J else SOLVED
+    return SOLVED
 
 
 @compiled
-def end_stages(integers: Integers, floats: Array, left_integers: Integers, left: Array) -> None:
-    """Restore what the sample left, but the active bounds and, at second order, the inputs."""
+def end_stages(
+    integers: Integers, floats: Array, left_integers: Integers, left: Array, method: Tableau, held: Array
+) -> None:
+    """Restore what stages changed, but for the active bounds and, at second order, the inputs. Where the
+    stages' inputs are held over the step, held (m,) becomes these, from which accelerations then count."""
     e = views(ControlStep, integers, floats, BESIDE)
     active, inputs = integer_scratch(e.problem.active.shape[0]), scratch(e.second.u_dot.shape[0])
     for j in range(inputs.shape[0]):
         inputs[j] = e.problem.before[j]
     for i in range(active.shape[0]):
         active[i] = e.problem.active[i]
+    if method.holds == 1:
+        copied(e.answer.u, held)
     put_back(integers, floats, left_integers, left)
     for i in range(active.shape[0]):
         e.problem.active[i] = active[i]
     for j in range(inputs.shape[0]):
         e.problem.before[j] = inputs[j]
+    if method.holds == 1 and e.limits.mode[()] == SAMPLE:
+        copied(held, e.problem.before)
 
 
 @compiled_without_gil
@@ -136,8 +155,8 @@ def write_errors(
 def advance(
     t: float, dt: float, q: Array, integers: Integers, floats: Array, method: Tableau, q_next: Array, u: Array
 ) -> float:
-    """q_next (n,), q at t + dt, and the inputs u (m,) of the sample at (t, q); returns the status of the
-    first step that failed, else that of the step at t."""
+    """q_next (n,), q at t + dt, and the inputs u (m,) of the sample at (t, q), or those held after it;
+    returns the status of the first step that failed, else that of the step at t."""
     e = views(ControlStep, integers, floats, BESIDE)
     status = float(call_step(e.step, t, q, integers, floats))
     for j in range(u.shape[0]):
@@ -151,7 +170,7 @@ def advance(
     left_integers, left = integer_scratch(count), scratch(size)
     keep(integers, floats, left_integers, left)
     failed = go_on(t, dt, q, integers, floats, method, q_next)
-    end_stages(integers, floats, left_integers, left)
+    end_stages(integers, floats, left_integers, left, method, u)
     if failed >= SINGULAR_J:
         e.answer.status[()] = failed
     return failed if failed >= SINGULAR_J else status

@@ -88,8 +88,12 @@ class Samples(NamedTuple):
         feedback = Feedback(*gain_rows(controller.task, controller.robot))
         error, rate, residual, J, u = found.error, found.rate, found.residual, found.J, found.u
         if feedback.has_bounds:
+            full = rate
             rate = rate - error @ feedback.K.T + feedback.rates(error)
-            residual = np.linalg.norm(np.einsum("kij,kj->ki", J, u) - rate, axis=1)
+            if recorder.at_middle:  # u is not of the samples at which J and the rate are
+                residual = np.maximum(residual - _sizes(full - rate), 0.0)
+            else:
+                residual = np.linalg.norm(np.einsum("kij,kj->ki", J, u) - rate, axis=1)
         servo = float(controller.given.servo) if controller.given.order == 2 else 0.0
         return cls(recorder.t, error, rate, J, u, residual, found.partition, feedback, servo)
 

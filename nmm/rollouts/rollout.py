@@ -159,9 +159,8 @@ def rollout(
             got=method if until is None else f"{method} and a goal",
         )
     sampled = any(one.solver.samples for one in controllers)
-    expect(
-        not (sampled and method == "adaptive"), "method", "rk4, midpoint, euler or zoh with limits", method
-    )
+    expected = "rk4, midpoint, euler, zoh or zoh_midpoint with limits"
+    expect(not (sampled and method == "adaptive"), "method", expected, method)
     times = sample_times(0.0, dt, steps, duration)
     where = None if folder is None else Path(folder)
     every = counted(every, "every")

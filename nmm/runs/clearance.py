@@ -12,7 +12,7 @@ from nmm.arrays import Array, Integers
 from nmm.collisions.obstacle import Obstacle, as_passed, shifts
 from nmm.collisions.scene import Scene
 from nmm.control.controller import Controller
-from nmm.control.integrators import Around, Integrator, Velocity
+from nmm.control.integrators import Around, Inputs, Integrator, Velocity
 from nmm.control.safety_filter import SafetyFilter
 from nmm.robots.zero_order_hold import HeldInputs
 
@@ -53,6 +53,14 @@ class Guarded(Around):
 
     safety_filter: SafetyFilter
     held: HeldInputs
+
+    def inputs(self, stage: Inputs, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
+        """Other inputs than the sample's are not checked: they are taken where nothing is near."""
+        if self.safety_filter.held:
+            return u
+        found = self.integrator.inputs(stage, t, q, q_dot, u, dt)
+        near = found is not u and not self.safety_filter.clear(np.abs(self.held(q, found, dt) - q).sum())
+        return u if near else found
 
     def advance(self, velocity: Velocity, t: float, q: Array, q_dot: Array, u: Array, dt: float) -> Array:
         if not self.safety_filter.held:

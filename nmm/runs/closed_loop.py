@@ -91,6 +91,7 @@ def record_run(
 ) -> tuple[Recorder, Ended]:
     """Integrate over the times (N,) from q; `watch` gets the recorder first."""
     recorder = Recorder(controller, times)
+    recorder.at_middle = advance.at_middle
     if watch is not None:
         watch(recorder)
     if len(times) > 1 and not advance.tolerance:  # adaptive steps are shorter than the samples
@@ -268,7 +269,7 @@ class _Loop:
     def _next(self, sample: Step, t: float, earlier: Snapshot) -> tuple[Step | None, Snapshot]:
         """The sample at t (None: another leg's), the state before it; `earlier`: that before `sample`."""
         here = self.kept.snapshot()
-        stands, following = self._advanced(sample, t)
+        stands, following, here = self._advanced(sample, t, here)
         if not stands:
             self.kept.restore(earlier)
             self.state.reset()
@@ -277,38 +278,59 @@ class _Loop:
             sample = self._sample(sample.t, sample.q)
             self.recorder.replace_last(sample)
             before, here = self.state.memory.copy(), self.kept.snapshot()
-            stands, following = self._advanced(sample, t)
+            stands, following, here = self._advanced(sample, t, here)
             if not stands:
                 self.kept.restore(here)
-                following = self._next_sample(t, self._integrated(sample, t), sample.t)
+                q, held = self._integrated(sample, t)
+                here = self._hold(sample, held, here)
+                following = self._next_sample(t, q, sample.t)
                 reserved = self.state.reservation(before, self.controller.robot.u_names, sample.t)
                 self.recorder.find_once(reserved)
         return following, here
 
-    def _advanced(self, sample: Step, t: float) -> tuple[bool, Step | None]:
-        """Whether the step to t stands, and the sample there (None: another leg's)."""
+    def _advanced(self, sample: Step, t: float, here: Snapshot) -> tuple[bool, Step | None, Snapshot]:
+        """Whether the step to t stands, the sample there (None: another leg's), and the state before
+        it: `here` where the sample's own inputs are held."""
         left, before = self.kept.snapshot(), self.state.memory.copy()
         try:
             with self.state.held():
-                q = self._integrated(sample, t)
+                q, held = self._integrated(sample, t)
         except SingularError:
             if self.state.may_stand(before):
                 raise
-            return False, None
+            return False, None, here
         if not self.state.may_stand(before):
-            return False, None
+            return False, None, here
         self.kept.end_stages(left)
+        before_next = self._hold(sample, held, here)
         following = self._next_sample(t, q, sample.t)
-        return following is None or self.state.may_stand(before), following
+        stands = following is None or self.state.may_stand(before)
+        return stands, following, before_next if stands else here
+
+    def _hold(self, sample: Step, held: Array, here: Snapshot) -> Snapshot:
+        """The state `here` where the sample's own inputs are held, else that with those that are: they are
+        recorded, and accelerations count from them."""
+        if held is sample.u:
+            return here
+        self.recorder.hold(held)
+        now = self.kept.snapshot()
+        self.kept.restore(here)
+        self.controller.solver.count_from(held)
+        here = self.kept.snapshot()
+        self.kept.restore(now)
+        self.controller.solver.count_from(held)
+        return here
 
     def _next_sample(self, t: float, q: Array, earlier: float) -> Step | None:
         """The sample at t; None if an event ends the leg there."""
         changes = self.leg is not None and self.leg.changes(t, q)
         return None if changes else self._sample(t, q, earlier)
 
-    def _integrated(self, sample: Step, t: float) -> Array:
-        velocity = self.controller.velocity
-        return self.advance.advance(velocity, sample.t, sample.q, sample.q_dot, sample.u, t - sample.t)
+    def _integrated(self, sample: Step, t: float) -> tuple[Array, Array]:
+        """q at t, and the inputs of the step."""
+        at, dt = (sample.t, sample.q, sample.q_dot), t - sample.t
+        held = self.advance.inputs(self.controller.solver.inputs_at, *at, sample.u, dt)
+        return self.advance.advance(self.controller.velocity, *at, held, dt), held
 
     def _sample(self, t: float, q: Array, earlier: float = -math.inf) -> Step:
         """The sample at t; accelerations count from the one at `earlier`, finally less than dt before."""

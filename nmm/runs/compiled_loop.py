@@ -17,7 +17,7 @@ from nmm.control.controller import Controller
 from nmm.control.equations import ControlStep, call_step, watch_error
 from nmm.control.goal import Goal, norms, unit_codes
 from nmm.control.integrators import Accelerated, Integrator
-from nmm.control.recorded import Recorded, note_sample
+from nmm.control.recorded import Recorded, note_held, note_sample
 from nmm.control.step_size import Descent, call_shorten, shorten
 from nmm.control.stepping import Tableau, end_stages, go_on, tableau
 from nmm.functions.program import BESIDE
@@ -139,6 +139,7 @@ def advance_samples(
     was, was_integers = view(both, 0, (size,)), view(both_integers, 0, (count,))
     now, now_integers = view(both, size, (size,)), view(both_integers, count, (count,))
     ahead, decided = scratch(n), integer_scratch(e.state.shape[0] + 1)
+    held = scratch(e.answer.u.shape[0])
     keep(integers, floats, was_integers, was)
     reached = first
     for k in range(first + 1, last + 1):
@@ -156,7 +157,9 @@ def advance_samples(
         if not fine:
             break
         if method.weights.shape[0] > 1 or e.second.u_dot.shape[0] > 0:
-            end_stages(integers, floats, now_integers, now)
+            end_stages(integers, floats, now_integers, now, method, held)
+            if method.holds == 1:
+                note_held(integers, floats, q, held, k - 1, found)
             keep(integers, floats, now_integers, now)
         whole = whole_alpha(e, choice)
         status = compiled_sample(times[k], times[k - 1], ahead, integers, floats)

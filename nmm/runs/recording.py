@@ -10,12 +10,13 @@ from nmm.arrays import Array, Integers
 from nmm.control.controller import Controller
 from nmm.control.limits import Limits
 from nmm.control.quantities import Record, saved
-from nmm.control.recorded import Recorded, room
+from nmm.control.recorded import NOTE_HELD, Recorded, note_held, room
 from nmm.control.safety_filter import Counts
 from nmm.control.sequence import Event
 from nmm.control.step import Step
 from nmm.findings import Finding
 from nmm.functions.program import COMPILED
+from nmm.kernels.compiled import checked_by_caller
 from nmm.kernels.spectra import spectra
 from nmm.machine import expect_memory
 from nmm.runs.clearance import Swept, swept
@@ -35,6 +36,7 @@ class Recorder:
     against : which limits contradict each, by name
     retreats (N,) : how often the robot had backed off; backed_off : before the first sample, with other tasks
     counts : how often distances changed the inputs; blocking : what held the robot back at the end
+    at_middle : whether inputs are those of the middle between samples
     goes_on : whether the run goes on after the last sample, with other tasks
     singular_values (N, s) of J, swept : known once the trajectory is made
     """
@@ -55,7 +57,7 @@ class Recorder:
         self.findings: list[Finding] = []
         self.blocking: tuple[str, ...] = ()
         self.counts, self.backed_off = Counts(), 0
-        self.goes_on = self._compiled = False
+        self.goes_on = self.at_middle = self._compiled = False
         self.singular_values: Array = np.zeros((0, len(rows)))
         self.swept: Swept | None = None
         self._places: list[tuple[Any, ...]] = []
@@ -106,6 +108,12 @@ class Recorder:
 
     def replace_last(self, sample: Step) -> None:
         self._write(self._count - 1, sample)
+
+    def hold(self, u: Array) -> None:
+        """Record the inputs u (m,) that are held after the last sample, where they are not its own."""
+        k = self._count - 1
+        note = checked_by_caller(note_held, NOTE_HELD)
+        note(*self.controller.solver.blocks, self.found.q[k].copy(), u, k, self.found)
 
     def _write(self, k: int, sample: Step) -> None:
         noted = sample.by_name

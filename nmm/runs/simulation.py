@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from nmm.arrays import Array, positive
 from nmm.control.controller import Controller
 from nmm.control.goal import Goal
-from nmm.control.integrators import Integrator, integrator
+from nmm.control.integrators import STEPPING, Integrator, integrator
 from nmm.control.sequence import Schedule
 from nmm.errors import InputError, RunError, expect_kind
 from nmm.lazy_call import lazy_call
@@ -21,6 +21,7 @@ from nmm.runs.joining import join
 from nmm.runs.recording import Recorder
 from nmm.runs.trajectory import Trajectory
 from nmm.runs.verdict import Outcome
+from nmm.text_format import listed
 
 #: The most samples that a run may have; beyond it the numbers do not fit in memory.
 MOST_SAMPLES = 20_000_000
@@ -51,7 +52,9 @@ def simulate(
     q0 : (n,) or by name, m and rad
     duration : s, above 0
     dt : s, above 0; the last step is shorter when it does not divide the duration
-    method : "rk4", "midpoint", "euler", "zoh" (inputs held over dt) or "adaptive" (SciPy's DOP853)
+    method : "rk4", "midpoint", "euler", "zoh" (inputs held over dt), "zoh_midpoint" (held, but those at
+        t + dt/2, q + dt/2 S u, within the limits of the sample; u of a sample is what is held after it) or
+        "adaptive" (SciPy's DOP853)
     tolerance : of the adaptive method, local error in m and rad
     progress : called with the fraction done, about a hundred times
     until : a target to reach: the run ends where the error is within its tolerances
@@ -96,12 +99,14 @@ def simulate(
         raise InputError(
             "limits, distances, a retreat and a step by Armijo's rule are kept from sample to sample",
             where="method",
-            expected="rk4, midpoint, euler or zoh",
+            expected=listed(STEPPING, "or"),
             got=method,
         )
-    if controller.given.order == 2 and controller.limits is not None and method != "zoh":
+    if controller.given.order == 2 and (
+        method == "zoh_midpoint" or (controller.limits is not None and method != "zoh")
+    ):
         raise InputError(
-            "at order 2 limits hold for a u_dot that is held over a sample",
+            "at order 2 what is held over a sample, and limits hold for, is its u_dot",
             where="method",
             expected="zoh",
             got=method,

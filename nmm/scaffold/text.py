@@ -67,7 +67,7 @@ _ABOUT = {
     "q0": "Where it starts, m and rad, by name, 0 for the rest; posture: NAME takes one of its SRDF "
     "(nmm info tells them).",
     "duration": "How long, s.",
-    "dt": "Time between samples, s. Beside it: method, rk4, midpoint, euler, zoh or adaptive.",
+    "dt": "Time between samples, s. Beside it: method, rk4, midpoint, euler, zoh, zoh_midpoint or adaptive.",
     "task": f"What it does: a task, or a list of them. kind: {', '.join(TASKS)}. reference: "
     f"{', '.join(REFERENCES)}. gain, 1/s, is how fast an error decays.",
     "objective": "What the motion that is left over is used for. kind: "

@@ -128,8 +128,10 @@ class ScenarioPart(Part):
     )
     duration: Positive = Field(description="s, above 0")
     dt: Positive = Field(0.005, description="time between samples and step of the fixed-step methods, s")
-    method: Literal["rk4", "midpoint", "euler", "zoh", "adaptive"] = Field(
-        "rk4", description="rk4, midpoint, euler, zoh (inputs constant over dt, as on a robot), adaptive"
+    method: Literal["rk4", "midpoint", "euler", "zoh", "zoh_midpoint", "adaptive"] = Field(
+        "rk4",
+        description="rk4, midpoint, euler, zoh (inputs constant over dt, as on a robot), zoh_midpoint "
+        "(constant, those of the middle of dt), adaptive",
     )
     tolerance: Positive = Field(1e-9, description="local error of the adaptive method, m and rad")
     task: Annotated[TaskList, BeforeValidator(listed), Field(min_length=1)] = Field(
