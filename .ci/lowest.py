@@ -5,7 +5,13 @@ from pathlib import Path
 
 project = tomllib.loads(Path("pyproject.toml").read_text(encoding="utf-8"))["project"]
 extras = project["optional-dependencies"]
-for requirement in [*project["dependencies"], *extras["sweep"], *extras["video"], *extras["test"]]:
+for requirement in [
+    *project["dependencies"],
+    *extras["sweep"],
+    *extras["video"],
+    *extras["mujoco"],
+    *extras["test"],
+]:
     name, above, rest = requirement.partition(">=")
     if above:
         print(f"{name.partition('[')[0]}=={rest.partition(',')[0]}")
