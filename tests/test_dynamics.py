@@ -15,6 +15,7 @@ from nmm.arrays import Array
 from nmm.cli.torques import torques
 from nmm.dynamics.support import Support, hull
 from nmm.dynamics.torques import accelerations, torques_along
+from nmm.playback.channels import channels, events
 
 UR5 = "package://example-robot-data/robots/ur_description/urdf/ur5_robot.urdf"
 G = 9.81
@@ -259,6 +260,23 @@ def test_the_papers_cases_need_more_than_their_wheels_have() -> None:
     (one,) = found.findings
     assert (one.code, one.values["actuator"], one.where["t"]) == ("effort_exceeded", "left_wheel_joint", 0.0)
     assert one.values["peak"] / one.values["effort"] == pytest.approx(1.33, abs=0.005)
+
+
+def test_a_runs_summary_and_page_tell_what_its_motors_lack(tmp_path: Path) -> None:
+    """Apart from warnings, in a saved run once, and in its page beside the curve that crosses its limit."""
+    run = nmm.Scenario.load("unicycle_2r_position", {"duration": 0.2}).run()
+    told = run.summary()
+    (found,) = [one for one in told["findings"] if one["line"] == "motors"]
+    assert (found["code"], found["values"]["actuator"]) == ("effort_exceeded", "left_wheel_joint")
+    assert found["text"] not in told["warnings"]
+    again = nmm.Trajectory.load(run.save(tmp_path / "run", figures=False))
+    assert again.summary()["findings"] == told["findings"]
+    assert again.verdict.as_json() == run.verdict.as_json()
+    shown = channels(run)
+    (wheel,) = [one for one in shown.channels if one.name == "torque left_wheel_joint"]
+    assert wheel.limits == (-20.0, 20.0)
+    assert np.nanmax(np.abs(wheel.values)) == pytest.approx(found["values"]["peak"])
+    assert (0.0, found["text"]) in events(run, shown)
 
 
 def test_a_robot_that_reaches_far_with_a_load_tips() -> None:

@@ -61,7 +61,7 @@ CUT = """() => [...document.querySelectorAll("button, select, input, output, h1,
 
 @dataclass
 class Plotted:
-    """One page of three runs for many checks, and what the runs' folders hold."""
+    """One page of three runs for many checks, and what the runs' folders hold, and torques."""
 
     page: Page
     url: str
@@ -77,6 +77,7 @@ class Plotted:
                 ("q_names", "", "q"),
                 ("u_names", "u_", "u"),
                 ("r_names", "error_", "error"),
+                ("torque_names", "torque ", "torque"),
             ):
                 columns |= {f"{prefix}{name}": file[values][:, i] for i, name in enumerate(file[names])}
             found.append({name: float(np.interp(t, file["t"], column)) for name, column in columns.items()})
@@ -114,6 +115,8 @@ def opened(
         one.save(folder / one.resolver, figures=False)
         with np.load(folder / one.resolver / "trajectory.npz", allow_pickle=False) as file:
             arrays.append({name: file[name] for name in file.files})
+        found = one.torques()
+        arrays[-1] |= {"torque_names": found.names, "torque": found.torques}
     url = write_html(runs, folder / "page.html", title="Three").as_uri()
     with watched(empty_page) as window:
         window.page.set_viewport_size({"width": 1000, "height": 640})

@@ -10,7 +10,9 @@ import numpy as np
 from nmm.collisions.obstacle import obstacle_as_json
 from nmm.control.quantities import Number, placed
 from nmm.diagnosis.limits import fast_wheels
+from nmm.diagnosis.motors import motor_findings
 from nmm.findings import Finding
+from nmm.findings.run import MOTORS
 from nmm.robots.wheel_rates import inputs_held_by
 from nmm.runs.margins import at_limits, nearest_limits
 
@@ -24,7 +26,8 @@ BAND = 0.02
 NO_ERROR = 1e-6
 
 
-def summarise(trajectory: Trajectory) -> dict[str, Any]:
+def summarise(trajectory: Trajectory, motors: bool = True) -> dict[str, Any]:
+    """`motors`: also what motors and wheels find, which takes longer than a short run does."""
     robot, count = trajectory.robot, len(trajectory)
     rows = len(trajectory.r_names)
     if np.isnan(trajectory.error).any():  # of tasks that come and go: the most at one time
@@ -75,6 +78,8 @@ def summarise(trajectory: Trajectory) -> dict[str, Any]:
         found = Finding("no_redundancy")
         summary["findings"].append({**found.as_json(), "line": f"warnings.{len(summary['warnings'])}"})
         summary["warnings"].append(str(found))
+    if motors:
+        summary["findings"] += [{**one.as_json(), "line": MOTORS} for one in motor_findings(trajectory)]
     return summary
 
 

@@ -7,6 +7,9 @@ from typing import Any
 from nmm.findings.finding import Finding, Words
 from nmm.text_format import counted, listed
 
+#: The line in a run's summary of what its motors and wheels find: nothing that control is to blame for.
+MOTORS = "motors"
+
 
 def line(findings: Sequence[Finding]) -> str:
     """Related findings on one line; their leg, if any, is named once."""

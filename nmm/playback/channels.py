@@ -11,6 +11,7 @@ from nmm.arrays import Array, Integers
 from nmm.control.quantities import Curve, RecordedQuantity, placed
 from nmm.diagnosis.jumps import chattering
 from nmm.diagnosis.limits import AT_LIMIT
+from nmm.diagnosis.motors import motor_findings, motor_torques
 from nmm.diagnosis.summary import settling_time, summarise
 from nmm.findings.run import line
 from nmm.playback.drawing import Drawing, packed
@@ -34,11 +35,15 @@ LENGTHS: Mapping[str, list[int]] = dict(zip(DASHES, ([], [7, 4], [9, 3, 2, 3], [
 STILL = 1e-6
 
 
+#: The panel of what is not recorded, but follows from the motion.
+TORQUES = Curve("torques", "Torques", 13)
+
+
 @dataclass(frozen=True, eq=False)
 class Channel:
     """One quantity over time in a panel of the page: values (K,), NaN where there is none; unit "" for none.
-    `name` is its column in trajectory.csv and in the page's `nmm.state()`, `text` its label. Limits (lower,
-    upper) are infinite where there is none; `log` asks for a logarithmic axis."""
+    `name` is its column in trajectory.csv, but for torques, and in the page's `nmm.state()`, `text` its
+    label. Limits (lower, upper) are infinite where there is none; `log` asks for a logarithmic axis."""
 
     name: str
     text: str
@@ -65,7 +70,7 @@ def channels(run: Trajectory | Motion) -> Channels:
     events: list[Integers] = []
     partitions: tuple[str, ...] = ()
     if isinstance(run, Trajectory):
-        found = [*_of_task(run), *found]
+        found = [*_of_task(run), *found, *_of_motors(run)]
         if np.any(run.partition >= 0):
             number, partitions, switches = _partition(run)
             found.append(Channel("partition", "partition", "", "partition", number))
@@ -108,6 +113,17 @@ def _of_motion(run: Trajectory | Motion) -> Iterator[Channel]:
         own = np.where(robot.limited[i], robot.q_limits[i], [-np.inf, np.inf])
         ends = named.get(name, (float(own[0]), float(own[1])))
         yield Channel(name, pretty(name), unit, "coordinates", run.q[:, i], ends)
+
+
+def _of_motors(run: Trajectory) -> Iterator[Channel]:
+    """Torques of the motors whose limits are known."""
+    if (found := motor_torques(run)) is None:
+        return
+    units = found.dynamics.actuators.units
+    for name, unit, effort, values in zip(found.names, units, found.efforts, found.torques.T, strict=True):
+        if np.isfinite(effort):
+            ends = (-float(effort), float(effort))
+            yield Channel(f"torque {name}", pretty(name), unit, TORQUES.panel, values, ends)
 
 
 def _of_task(run: Trajectory) -> Iterator[Channel]:
@@ -227,7 +243,7 @@ def draw_curves(drawing: Drawing, runs: Sequence[Channels], looks: Sequence[Look
     used = {lane["panel"] for lane in lanes.values()}
     panels = [
         {"id": one.panel, "title": one.title, "open": _opens(one, runs)}
-        for one in sorted(filter(None, (one.curve for one in placed())), key=lambda curve: curve.place)
+        for one in sorted(filter(None, [*(one.curve for one in placed()), TORQUES]), key=lambda x: x.place)
         if one.panel in used
     ]
     drawing.add("curves", panels=panels, lanes=list(lanes.values()), runs=found)
@@ -258,10 +274,11 @@ def draw_facts(
         facts: list[tuple[str, str]] = []
         happened: list[tuple[float, str]] = []
         if isinstance(run, Trajectory):
-            numbers = summarise(run)
+            numbers = summarise(run, motors=False)
             facts += summary_rows(run, numbers, events=False)  # they have their own list
             facts += [("message", run.message)] * bool(run.message)
             facts += [("warning", warning) for warning in numbers["warnings"]]
+            facts += [("motors", str(one)) for one in motor_findings(run)]
             happened = sorted(events(run, channels))
         told = [[t - start, text] for t, text in happened[:MOST]]
         more = max(len(happened) - MOST, 0)
@@ -290,6 +307,8 @@ def events(run: Trajectory, channels: Channels) -> Iterator[tuple[float, str]]:
         yield t, "J_e was singular on the way from the sample before"
     if (jumps := chattering(run.t, run.u, run.robot.u_names)) is not None:
         yield jumps.where["t"], str(jumps)
+    for one in motor_findings(run):
+        yield one.where["t"], str(one)
     if (settles := settling_time(run)) is not None:
         yield float(run.t[0]) + settles, "‖e‖ down to 2 % of its start"
     if len(run) and (run.verdict.reasons or not run.complete):

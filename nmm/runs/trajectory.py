@@ -238,9 +238,10 @@ class Trajectory:
         """The same trajectory with the scenario that it came from, and with what that warns of."""
         return replace(self, scenario=scenario, verdict=self.verdict.after(warnings))
 
-    def summary(self) -> dict[str, Any]:
-        """The run in numbers, ready for JSON."""
-        return lazy_call("nmm.diagnosis.summary:summarise")(self)
+    def summary(self, motors: bool = True) -> dict[str, Any]:
+        """The run in numbers, ready for JSON; `motors`: also motors over their limits, and a robot that tips,
+        as findings of the line "motors"."""
+        return lazy_call("nmm.diagnosis.summary:summarise")(self, motors)
 
     def save(
         self, folder: str | Path, *, figures: Drawn = True, html: bool = False, ellipsoids: Wanted = False

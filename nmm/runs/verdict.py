@@ -10,7 +10,7 @@ from enum import StrEnum
 from typing import Any
 
 from nmm.findings import Finding, words
-from nmm.findings.run import line
+from nmm.findings.run import MOTORS, line
 
 
 class Outcome(StrEnum):
@@ -69,6 +69,8 @@ def verdict_of(
             {"code": "said", "values": {"text": told[name]}, "line": name} for name in told if told[name]
         ]
     for one in findings:
+        if one["line"] == MOTORS:  # found anew, from the motion
+            continue
         lines[one["line"]] = (*lines.get(one["line"], ()), _finding_of(one))
     return Verdict(outcome, lines.pop("message", ()), tuple(lines.values()))
 

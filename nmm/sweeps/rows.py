@@ -113,7 +113,7 @@ def columns_of(definition: Definition) -> list[Column]:
 
 
 def measured(trajectory: Trajectory) -> dict[str, Any]:
-    summary = trajectory.summary()
+    summary = trajectory.summary(motors=False)
     found = {column.name: summary.get(column.name) for column in MEASURED}
     found["warnings"] = len(summary["warnings"])
     if len(trajectory):
