@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import re
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -143,3 +147,35 @@ def test_a_robot_tips_where_the_zero_moment_point_leaves_its_wheels(side: float)
         middle = np.sqrt(light * heavy)
         light, heavy = (middle, heavy) if margin(middle) > side * 0.008 else (light, middle)
     assert falls(robot, nmm.Dynamics(robot, payload={"ur5_ee_link": light}), q) == (side < 0.0)
+
+
+@pytest.fixture(scope="module")
+def tutorial(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The files of docs/tutorials/robot_loop.md."""
+    folder = tmp_path_factory.mktemp("robot_loop")
+    page = Path(__file__).parents[1] / "docs" / "tutorials" / "robot_loop.md"
+    for code in re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL):
+        (folder / code.split("\n")[0].removeprefix("# ")).write_text(code, encoding="utf-8")
+    return folder
+
+
+def numbers_of(folder: Path, name: str) -> list[list[float]]:
+    """Those that a file prints, by line."""
+    done = subprocess.run([sys.executable, name], cwd=folder, capture_output=True, text=True, check=True)
+    lines = [re.findall(r"(?<![\w.])\d+(?:\.\d+)?", line) for line in done.stdout.splitlines()]
+    return [[float(one) for one in line] for line in lines]
+
+
+def test_the_loop_of_the_tutorial_leads_mujocos_robot_as_far_as_odometry_goes(tutorial: Path) -> None:
+    for contact, _friction, off, drift, share in numbers_of(tutorial, "mujoco_loop.py"):
+        assert contact in (4.0, 20.0)
+        assert abs(off - drift) <= 5.0  # mm: what the servos' lag adds
+        assert 1.0 < drift < 100.0
+        assert 5.0 < share < 100.0
+
+
+def test_computed_torques_are_those_foretold(tutorial: Path) -> None:
+    (platform, joints), (share, *_) = numbers_of(tutorial, "computed_torque.py")
+    assert platform <= 0.5  # mm
+    assert joints <= 0.02
+    assert share <= 1.0  # per cent
