@@ -110,6 +110,51 @@ def test_noise_delay_and_slip_are_what_they_say() -> None:
         np.testing.assert_allclose(found["u"][k], u, atol=1e-9)
 
 
+def test_odometry_is_what_wheels_say() -> None:
+    """Sample by sample: the controller sees what its inputs would have done, the robot has other wheels and
+    slides; every 0.3 s both are the same."""
+    slip, creep, every = np.array([0.98, 0.97, 1.0, 0.9]), -0.05, 15
+    more = {"slip": slip, "creep": creep, "odometry": True, "correct": 0.3, "delay": 2}
+    keep = ("q", "u", "believed", "error")
+    found = nmm.rollout(controller(), starts(2), 1.0, 0.02, "zoh", **more, keep=keep)
+    ours = controller()
+    held = HeldInputs(ours.robot)
+    for q, believed, u in zip(found["q"], found["believed"], found["u"], strict=True):
+        assert np.array_equal(q[0], believed[0])
+        for i in range(50):
+            np.testing.assert_allclose(u[i], ours(0.02 * i, believed[i]), rtol=0.0, atol=1e-12)
+            turned = u[i - 2] if i >= 2 else np.zeros(4)
+            ahead = held(q[i], slip * turned, 0.02)
+            v, omega = slip[:2] * turned[:2]
+            middle = q[i, 2] + 0.01 * omega
+            forwards = np.array([np.cos(middle), np.sin(middle)])
+            along = forwards @ (ahead - q[i])[:2]  # the arc's chord
+            assert along == pytest.approx(0.02 * v * np.sinc(0.01 * omega / np.pi), rel=1e-6, abs=1e-12)
+            ahead[:2] += creep * along * omega * np.array([-forwards[1], forwards[0]])
+            np.testing.assert_allclose(q[i + 1], ahead, rtol=0.0, atol=1e-13)
+            right = (i + 1) % every == 0
+            seen = q[i + 1] if right else np.append(held(believed[i], turned, 0.02)[:3], ahead[3:])
+            np.testing.assert_allclose(believed[i + 1], seen, rtol=0.0, atol=1e-13)
+    away = found["believed"][:, -1] - found["q"][:, -1]
+    assert np.array_equal(found["drift"], np.hypot(*away[:, :2].T))
+    assert found["drift"].min() > 1e-4
+    robot = nmm.load("unicycle_2r")
+    tip = nmm.Configuration(robot, found["q"][1, -1]).placement("ee").translation[:2]
+    target = nmm.rollout(controller(), starts(2), 1.0, 0.02, "zoh", keep=("r_d",))["r_d"][1, -1]
+    np.testing.assert_allclose(found["error"][1, -1], target - tip, atol=1e-12)
+
+
+def test_odometry_of_wheels_that_do_not_slip_is_the_robots_own_place() -> None:
+    """To the last bit, and the run is the one without it."""
+    still = nmm.rollout(controller(), starts(2), 1.0, 0.02, "zoh", keep=("q", "u", "believed"))
+    same = nmm.rollout(controller(), starts(2), 1.0, 0.02, "zoh", odometry=True, keep=("q", "u", "believed"))
+    for name in ("q", "u", "believed"):
+        assert np.array_equal(still[name], same[name])
+    assert np.array_equal(same["believed"], same["q"])
+    assert np.array_equal(same["drift"], [0.0, 0.0])
+    assert np.array_equal(still["drift"], [0.0, 0.0])
+
+
 def test_errors_under_noise_are_the_robots_not_what_was_measured() -> None:
     found = nmm.rollout(controller(), START, 1.0, 0.02, "zoh", noise=0.05, keep=("q", "error", "r_d"))
     robot = nmm.load("unicycle_2r")
@@ -195,6 +240,10 @@ def test_the_same_controller_may_stand_there_twice() -> None:
         ({"noise": -0.1, "method": "zoh"}, "noise"),
         ({"slip": [1.0, 2.0], "method": "zoh"}, "slip"),
         ({"delay": 0.5, "method": "zoh"}, "delay"),
+        ({"creep": np.nan, "method": "zoh"}, "creep"),
+        ({"correct": 1.0, "method": "zoh"}, "correct"),
+        ({"correct": 0.0, "odometry": True, "method": "zoh"}, "correct"),
+        ({"odometry": True}, "rollout"),
         ({"slip": np.nan, "method": "zoh"}, "slip"),
         ({"seed": -1, "noise": 0.1, "method": "zoh"}, "seed"),
         ({"seed": "a"}, "seed"),

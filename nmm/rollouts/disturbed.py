@@ -1,4 +1,5 @@
-"""A sampled controller that sees a robot with noise and acts on it late, while its wheels slip."""
+"""A sampled controller that sees a robot with noise, or by its odometry, and acts on it late, while its
+wheels slip and creep."""
 
 import math
 from collections.abc import Callable
@@ -9,7 +10,7 @@ import numpy as np
 from numba import types
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, Integers, counted
+from nmm.arrays import Array, Integers, counted, scalar
 from nmm.control.controller import Controller
 from nmm.control.equations import ControlStep, write_equation
 from nmm.control.integrators import Around
@@ -18,10 +19,11 @@ from nmm.control.stepping import hold_inputs
 from nmm.errors import InputError, expect
 from nmm.findings import Finding
 from nmm.functions.program import BESIDE, LaidOut, run_program
-from nmm.kernels.compiled import checked_by_caller, compiled_without_gil, scratch, view
+from nmm.kernels.compiled import checked_by_caller, compiled, compiled_without_gil, scratch, view
 from nmm.kernels.record_layout import Matrix, Vector, record_type, views
 from nmm.resolvers.answer import SINGULAR_J
 from nmm.resolvers.partitions import PartitionState
+from nmm.robots.robot import Robot
 from nmm.runs.closed_loop import finding_in
 from nmm.runs.compiled_loop import DIVERGED_BEYOND, compiled_sample, within_bound
 from nmm.runs.recording import Recorder
@@ -30,11 +32,16 @@ from nmm.runs.verdict import FindingLine, Outcome
 
 class Disturbed(NamedTuple):
     """A run's disturbances: noise (N or 0, n) added to q at each sample before the controller sees it, m and
-    rad; the delay, in samples, until inputs act; and slip (m,), the share of each input that acts."""
+    rad; the delay, in samples, until inputs act; slip (m,), the share of each input that acts; creep, s, by
+    which a platform slides sideways, at creep v ω; and what the controller believes its q to be by odometry,
+    believed (N or 0, n), put right every `correct` samples (0: never)."""
 
     noise: Matrix
     delay: int
     slip: Vector
+    creep: float
+    believed: Matrix
+    correct: int
 
 
 @dataclass(frozen=True)
@@ -52,34 +59,60 @@ class Acting(Around):
             del self.asked[next(iter(self.asked))]
         known = len(self.asked) > self.disturbed.delay
         acting = self.disturbed.slip * next(iter(self.asked.values())) if known else np.zeros(len(u))
-        return self.integrator.advance(velocity, t, q, q_dot, acting, dt)
+        ahead = self.integrator.advance(velocity, t, q, q_dot, acting, dt)
+        if self.disturbed.creep:
+            slide(q, self.disturbed.creep / dt, ahead)
+        return ahead
 
 
 class Plant:
     """What disturbs `count` runs with n coordinates and m inputs, as a user gives it."""
 
     def __init__(
-        self, n: int, m: int, count: int, noise: ArrayLike, delay: int, slip: ArrayLike, seed: int
+        self,
+        robot: Robot,
+        count: int,
+        *,
+        noise: ArrayLike = 0.0,
+        delay: int = 0,
+        slip: ArrayLike = 1.0,
+        creep: float = 0.0,
+        odometry: bool = False,
+        correct: int = 0,
+        seed: int = 0,
     ) -> None:
+        n, m = robot.n, robot.n_u
         self.noise = _broadcast(noise, (n,), "noise")
         expect(not np.any(self.noise < 0.0), "noise", "standard deviations, at least 0")
         self.delay, self.seed = counted(delay, "delay", 0), counted(seed, "seed", 0)
         self.slip = _broadcast(slip, (count, m), "slip")
+        self.creep, self.odometry, self.correct = scalar(creep, "creep"), odometry, correct
+        if robot.platform.n_p < 3 and (odometry or self.creep):
+            raise InputError(
+                "odometry and creep are a mobile platform's",
+                where=f"{robot.name}: {'odometry' if odometry else 'creep'}",
+            )
 
     @property
     def noisy(self) -> bool:
         return bool(np.any(self.noise > 0.0))
 
     @property
+    def misleads(self) -> bool:
+        """Whether a controller sees another q than the robot's."""
+        return self.noisy or self.odometry
+
+    @property
     def disturbs(self) -> bool:
-        return bool(self.noisy or self.delay or np.any(self.slip != 1.0))
+        return bool(self.misleads or self.delay or self.creep or np.any(self.slip != 1.0))
 
     def at(self, i: int, samples: int) -> Disturbed:
         noise = np.zeros((0, len(self.noise)))
         if self.noisy:
             drawn = np.random.default_rng([self.seed, i]).standard_normal((samples, len(self.noise)))
             noise = drawn * self.noise
-        return Disturbed(noise, self.delay, self.slip[i].copy())
+        believed = np.zeros((samples if self.odometry else 0, len(self.noise)))
+        return Disturbed(noise, self.delay, self.slip[i].copy(), self.creep, believed, self.correct)
 
 
 def _broadcast(value: ArrayLike, shape: tuple[int, ...], what: str) -> Array:
@@ -99,6 +132,18 @@ _DRIFT = types.int64(
 AT_ONCE = 200
 
 
+@compiled
+def slide(q: Array, share: float, ahead: Array) -> None:
+    """Move `ahead` (n,), where the platform comes to from q, sideways by share times the way along it times
+    the turn: creep v ω dt, with share = creep / dt."""
+    turn = ahead[2] - q[2]
+    middle = q[2] + 0.5 * turn
+    c, s = math.cos(middle), math.sin(middle)
+    aside = share * turn * (c * (ahead[0] - q[0]) + s * (ahead[1] - q[1]))
+    ahead[0] -= s * aside
+    ahead[1] += c * aside
+
+
 @compiled_without_gil
 def drift(
     integers: Integers,
@@ -112,30 +157,42 @@ def drift(
 ) -> int:
     """Sample from the time `first` to before `last`, inputs held in between, from q there, which is recorded;
     returns how many samples were recorded in all. q, r and errors are the robot's, not those that the
-    controller sees; u is what the controller asks for."""
+    controller sees; u is what it asks for. Odometry counts what the wheels turn, of which slip and creep are
+    no part; encoders of the arm's joints see these where they are."""
     e = views(ControlStep, integers, floats, BESIDE)
     b = views(LaidOut, integers, floats, 0).buffers
     n, m = found.q.shape[1], disturbed.slip.shape[0]
-    seen, acting = scratch(n), scratch(m)
+    seen, acting, turned = scratch(n), scratch(m), scratch(m)
+    believes, n_p = disturbed.believed.shape[0] > 0, b.G.shape[0]
     for k in range(first, last):
         q = view(found.q, k * n, (n,))
         noisy = disturbed.noise.shape[0] > 0
         for i in range(n):
-            seen[i] = q[i] + (disturbed.noise[k, i] if noisy else 0.0)
+            seen[i] = disturbed.believed[k, i] if believes else q[i]
+            seen[i] += disturbed.noise[k, i] if noisy else 0.0
         status = compiled_sample(times[k], times[k - 1] if k > 0 else -math.inf, seen, integers, floats)
         if status >= SINGULAR_J or not within_bound(e.answer.u) or not within_bound(q):
             return k
-        if noisy:  # the task as it is
+        if noisy or believes:  # the task as it is
             run_program(times[k], q, integers, floats)
             write_equation(e.task, b, e.arm, e.problem.J, e.problem.rate)
         note_sample(integers, floats, q, partitioned, 1.0, k, found)
         if k + 1 < times.shape[0]:
             for j in range(m):
-                acting[j] = (
-                    disturbed.slip[j] * found.u[k - disturbed.delay, j] if k >= disturbed.delay else 0.0
-                )
+                turned[j] = found.u[k - disturbed.delay, j] if k >= disturbed.delay else 0.0
+                acting[j] = disturbed.slip[j] * turned[j]
+            dt = times[k + 1] - times[k]
             ahead = view(found.q, (k + 1) * n, (n,))
-            hold_inputs(q, acting, times[k + 1] - times[k], integers, floats, ahead)
+            hold_inputs(q, acting, dt, integers, floats, ahead)
+            if disturbed.creep != 0.0:
+                slide(q, disturbed.creep / dt, ahead)
+            if believes:
+                now = view(disturbed.believed, k * n, (n,))
+                after = view(disturbed.believed, (k + 1) * n, (n,))
+                hold_inputs(now, turned, dt, integers, floats, after)
+                right = disturbed.correct > 0 and (k + 1) % disturbed.correct == 0
+                for i in range(0 if right else n_p, n):
+                    after[i] = ahead[i]
     return last
 
 
@@ -148,9 +205,11 @@ def driven_disturbed(
     fly = checked_by_caller(drift, _DRIFT)
 
     def as_seen(some: slice) -> Array:
-        return found.q[some] + (disturbed.noise[some] if len(disturbed.noise) else 0.0)
+        q = disturbed.believed if len(disturbed.believed) else found.q
+        return q[some] + (disturbed.noise[some] if len(disturbed.noise) else 0.0)
 
     found.q[0] = q
+    disturbed.believed[:1] = q
     count, last = 0, 0
     with solver.compiled() as blocks:
         while last < len(times) and count == last:

@@ -17,7 +17,7 @@ from nmm.kernels.spectra import write_spectrum
 from nmm.machine import expect_memory
 
 #: Quantities of a sample that can be kept, named as in a trajectory.
-QUANTITIES = tuple(one.name for one in saved() if one.noted)
+QUANTITIES = (*(one.name for one in saved() if one.noted), "believed")
 #: Largest size of a part's file, bytes.
 PART = 64e6
 #: What `measure` writes, in order. Norms are over the task's rows in their mixed units, as in a summary.
@@ -36,6 +36,7 @@ MEASURES = (
     "input_rms",
     "input_peak",
     "input_integral",
+    "drift",
 )
 
 #: The least singular value is sought at every 64th sample, then at every 8th, then at all.
@@ -63,7 +64,8 @@ class Kept:
             raise InputError(where="folder", expected="names of what to keep", available=QUANTITIES)
         self._every, self._folder = every, folder
         self.t = times[::every].copy()
-        self._each = {name: getattr(shapes, name)[::every] for name in names}
+        like = {**shapes._asdict(), "believed": shapes.q}
+        self._each = {name: like[name][::every] for name in names}
         of_one = sum(one.nbytes for one in self._each.values())
         self.part = count if folder is None else max(1, min(count, int(PART / max(of_one, 1))))
         expect_memory(
@@ -80,9 +82,13 @@ class Kept:
             for name, one in self._each.items()
         }
 
-    def put(self, room: dict[str, Array], row: int, found: Recorded, count: int) -> None:
+    def put(
+        self, room: dict[str, Array], row: int, found: Recorded, believed: Array | None, count: int
+    ) -> None:
+        """Of a run; believed (N, n): what its controller takes q for, q itself if None."""
+        of_run = {**found._asdict(), "believed": found.q if believed is None else believed}
         for name, whole in room.items():
-            some = getattr(found, name)[: count : self._every]
+            some = of_run[name][: count : self._every]
             whole[row, : len(some)] = some
 
     def write(self, first: int, room: dict[str, Array]) -> None:

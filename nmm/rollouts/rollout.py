@@ -85,6 +85,9 @@ def rollout(
     noise: ArrayLike = 0.0,
     delay: int = 0,
     slip: ArrayLike = 1.0,
+    creep: float = 0.0,
+    odometry: bool = False,
+    correct: float | None = None,
     seed: int = 0,
     until: Goal | None = None,
     keep: Sequence[str] = (),
@@ -101,10 +104,15 @@ def rollout(
         or a controller for each run, of one robot and one task's shape
     q0 : (B, n), (n,) for all, or by name; m and rad
     duration, dt : s
-    method : as `simulate`'s; "zoh" with noise, delay or slip, which are a sampled controller's
+    method : as `simulate`'s; "zoh" with disturbances, which are a sampled controller's
     noise : standard deviation of what the controller sees of each coordinate, m and rad: a number or (n,)
     delay : samples until inputs act
     slip : the share of each input that acts, 1 for all of it: a number, (m,) or (B, m)
+    creep : a platform that drives with v and turns with ω slides sideways with creep v ω, to its left where
+        that is above 0; s
+    odometry : whether the controller sees the platform where its wheels' turning says that it is, of which
+        slip and creep are no part, as on a robot with encoders; keep "believed" for what it sees
+    correct : every so many seconds odometry is put right, as by a localisation; never if None
     seed : of the noise; that of a run depends on the seed and on the run's number
     until : a goal, at which a run ends
     keep, every : names of what to keep (`nmm.rollouts.kept.QUANTITIES`), of each `every`-th sample
@@ -148,14 +156,26 @@ def rollout(
     expect(steps <= MOST_SAMPLES, "dt", f"at most {MOST_SAMPLES} samples", dt)
     starts = checked_starts(controllers, q0)
     count = len(starts)
-    plant = Plant(robot.n, robot.n_u, count, noise, delay, slip, seed)
+    often = 0 if correct is None else max(1, round(positive(correct, "correct") / dt))
+    expect(odometry or not often, "correct", "nothing without odometry", correct)
+    plant = Plant(
+        robot,
+        count,
+        noise=noise,
+        delay=delay,
+        slip=slip,
+        creep=creep,
+        odometry=odometry,
+        correct=often,
+        seed=seed,
+    )
     compiled = until is None and all(one.solver.compiles_steps for one in controllers)
-    if plant.disturbs and (method != "zoh" or (plant.noisy and not compiled)):
+    if plant.disturbs and (method != "zoh" or (plant.misleads and not compiled)):
         raise InputError(
             "of a scenario with a goal, hand over scenario.controller()",
             where="rollout",
-            expected="with noise, delay or slip method zoh, and with noise no goal, and controllers without "
-            "distances, retreats, Armijo's rule and Python functions",
+            expected="with disturbances method zoh, and with noise or odometry no goal, and controllers "
+            "without distances, retreats, Armijo's rule and Python functions",
             got=method if until is None else f"{method} and a goal",
         )
     sampled = any(one.solver.samples for one in controllers)
@@ -226,8 +246,12 @@ class _Runs:
                 advance = Acting(integrator(self.method, controller.robot, 1e-9), disturbed)
             outcome, reasons = drive_loop(controller, advance, recorder, self.times, start, None, self.until)
         count = len(recorder)
-        self.kept.put(room, row, recorder.found, count)
+        believed = disturbed.believed if disturbed is not None and self.plant.odometry else None
+        self.kept.put(room, row, recorder.found, believed, count)
         measure(self.times, count, recorder.found, self.measures[i])
+        if count:
+            away = np.zeros(2) if believed is None else (believed - recorder.found.q)[count - 1, :2]
+            self.measures[i, MEASURES.index("drift")] = np.hypot(*away)
         self.samples[i] = count
         why = (
             *reasons,
