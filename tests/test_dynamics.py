@@ -16,6 +16,7 @@ from nmm.cli.torques import torques
 from nmm.dynamics.support import Support, hull
 from nmm.dynamics.torques import accelerations, torques_along
 from nmm.playback.channels import channels, events
+from nmm.runs.table import summary_rows
 
 UR5 = "package://example-robot-data/robots/ur_description/urdf/ur5_robot.urdf"
 G = 9.81
@@ -269,6 +270,8 @@ def test_a_runs_summary_and_page_tell_what_its_motors_lack(tmp_path: Path) -> No
     (found,) = [one for one in told["findings"] if one["line"] == "motors"]
     assert (found["code"], found["values"]["actuator"]) == ("effort_exceeded", "left_wheel_joint")
     assert found["text"] not in told["warnings"]
+    row = dict(summary_rows(run, told))["motors beyond their limits"]
+    assert row == f"left_wheel_joint {found['values']['peak']:.3g} N m (at most 20)"
     again = nmm.Trajectory.load(run.save(tmp_path / "run", figures=False))
     assert again.summary()["findings"] == told["findings"]
     assert again.verdict.as_json() == run.verdict.as_json()

@@ -10,6 +10,7 @@ import numpy as np
 
 from nmm.control.quantities import placed
 from nmm.errors import RunError
+from nmm.findings.run import MOTORS
 
 if TYPE_CHECKING:
     from nmm.control.controller import Controller
@@ -71,6 +72,13 @@ def summary_rows(
         own = {wheel.joint: wheel.velocity for wheel in trajectory.robot.wheels}
         rates = [f"{name} {rate:.3g} rad/s (at most {own[name]:.3g})" for name, rate in fast.items()]
         yield "wheels beyond their limits", ", ".join(rates)
+    motors = [one for one in numbers["findings"] if one["line"] == MOTORS]
+    if over := [one["values"] for one in motors if one["code"] == "effort_exceeded"]:
+        efforts = [
+            f"{one['actuator']} {one['peak']:.3g} {one['unit']} (at most {one['effort']:.3g})" for one in over
+        ]
+        yield "motors beyond their limits", ", ".join(efforts)
+    yield from (("balance", one["text"]) for one in motors if one["code"] == "tips")
     if still := numbers.get("standing_at_limits"):
         yield "at a limit throughout", f"{', '.join(still)}; not counted above"
     if numbers.get("clearance_min") is not None:
