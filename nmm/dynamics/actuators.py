@@ -66,6 +66,6 @@ class Actuators:
     def _turned(self, q: Array) -> Array:
         """R (N, platform's, p): rates of the wheels and of steering, R u_p."""
         platform = self.robot.platform
-        G = np.array([platform.G(one[: platform.n_p]) for one in q])
+        G, _ = platform.velocity_maps(q[:, : platform.n_p])
         R = wheel_shares(self._rows, q)[:, :, : platform.n_p] @ G
         return np.hstack([R, np.tile(np.eye(platform.p)[self._own], (len(q), 1, 1))])

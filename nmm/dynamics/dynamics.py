@@ -116,8 +116,8 @@ class Dynamics:
         of_q = np.einsum("kji,kj->ki", self._through(q), torques)
         np.add.at(of_q.T, following.leaders, (following.multipliers * of_q[:, following.columns]).T)
         f = np.zeros((len(q), robot.n_u))
-        for k, one in enumerate(q):
-            f[k, :p] = of_q[k, :n_p] @ robot.platform.G(one[:n_p])
+        G, _ = robot.platform.velocity_maps(q[:, :n_p])
+        f[:, :p] = np.einsum("ki,kij->kj", of_q[:, :n_p], G)
         f[:, p:] = of_q[:, robot.arm_coordinates]
         return f, ground
 
@@ -134,10 +134,10 @@ class Dynamics:
         robot, platform = self.robot, self.robot.platform
         p, n_p, following = platform.p, platform.n_p, robot.following
         q_dot, q_ddot = np.zeros_like(q), np.zeros_like(q)
-        for k, (one, up, up_dot) in enumerate(zip(q, u, u_dot, strict=True)):
-            G = platform.G(one[:n_p])
-            q_dot[k, :n_p] = G @ up[:p]
-            q_ddot[k, :n_p] = G @ up_dot[:p] + platform.G_dot(one[:n_p], q_dot[k, :n_p]) @ up[:p]
+        G, G_q = platform.velocity_maps(q[:, :n_p])
+        q_dot[:, :n_p] = np.einsum("kij,kj->ki", G, u[:, :p])
+        q_ddot[:, :n_p] = np.einsum("kij,kj->ki", G, u_dot[:, :p])
+        q_ddot[:, :n_p] += np.einsum("kijl,kl,kj->ki", G_q, q_dot[:, :n_p], u[:, :p])
         for rates, inputs in ((q_dot, u), (q_ddot, u_dot)):
             rates[:, robot.arm_coordinates] = inputs[:, p:]
             rates[:, following.columns] = following.multipliers * rates[:, following.leaders]

@@ -53,20 +53,26 @@ class Support:
         wheels between which the nearest edge runs. Infinite without a polygon."""
         if not self.names:
             return np.full(len(q), np.inf), [("", "")] * len(q)
-        found, edges = np.empty(len(q)), []
-        corners: list[int] = []
-        for k, (one, point) in enumerate(zip(q, points, strict=True)):
-            wheels = self.points(one)
-            if not corners or not self._rigid:
-                corners = hull(wheels)
-            begins = wheels[corners]
-            along = np.roll(begins, -1, axis=0) - begins
-            off = point - begins
-            inside = (along[:, 0] * off[:, 1] - along[:, 1] * off[:, 0]) / np.hypot(*along.T)
-            least = int(inside.argmin())
-            found[k] = inside[least]
-            edges.append((self.names[corners[least]], self.names[corners[(least + 1) % len(corners)]]))
-        return found, edges
+        if self._rigid:  # as seen from the main body
+            home = np.concatenate([np.zeros(3), q[0, 3:]])
+            cosine, sine = np.cos(q[:, 2]), np.sin(q[:, 2])
+            x, y = (points - q[:, :2]).T
+            seen = np.stack([cosine * x + sine * y, cosine * y - sine * x], axis=1)
+            return self._inside(home, seen)
+        found = [self._inside(one, point[np.newaxis]) for one, point in zip(q, points, strict=True)]
+        return np.concatenate([one for one, _ in found]), [edges[0] for _, edges in found]
+
+    def _inside(self, q: Array, points: Array) -> tuple[Array, list[tuple[str, str]]]:
+        """Of points (N, 2) at one q (n,)."""
+        wheels = self.points(q)
+        corners = hull(wheels)
+        begins = wheels[corners]
+        along = np.roll(begins, -1, axis=0) - begins
+        off = points[:, np.newaxis] - begins
+        inside = (along[:, 0] * off[..., 1] - along[:, 1] * off[..., 0]) / np.hypot(*along.T)
+        least = inside.argmin(axis=1)
+        ends = [(self.names[a], self.names[b]) for a, b in zip(corners, np.roll(corners, -1), strict=True)]
+        return inside[range(len(points)), least], [ends[k] for k in least]
 
 
 def hull(points: Array) -> list[int]:

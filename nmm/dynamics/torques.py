@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 JUMP = 10.0
 #: if by more than this share of the run's largest input.
 SMALL = 1e-3
+#: So many samples are computed at once: some megabytes.
+AT_ONCE = 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,10 +178,15 @@ def torques_along(
         u_dot, jumps = accelerations(t, u)
     else:
         jumps = np.zeros(len(t), dtype=bool)
-    f, ground = dynamics.forces(q, u, u_dot)
+    parts = []
+    for first in range(0, len(t), AT_ONCE):
+        some = slice(first, first + AT_ONCE)
+        f, from_ground = dynamics.forces(q[some], u[some], u_dot[some])
+        motors = dynamics.actuators
+        parts.append((motors.torques(q[some], f), motors.rates(q[some], u[some]), from_ground))
+    torques, rates, ground = (np.concatenate(one) for one in zip(*parts, strict=True))
     acts = support.zero_moment(ground) if robot.platform.n_p else np.zeros((len(t), 2))
     margins, edges = support.margins(q, acts)
-    torques, rates = dynamics.actuators.torques(q, f), dynamics.actuators.rates(q, u)
     return Torques(dynamics, t, torques, rates, jumps, acts, margins, tuple(edges))
 
 

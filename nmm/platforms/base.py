@@ -223,8 +223,15 @@ class Platform(ABC):
         A = self.pfaffian(qp) if at_once else np.array([self.pfaffian(one) for one in qp])
         return np.einsum("kij,kj->ki", A.reshape(len(qp), -1, self.n_p), qp_dot)
 
-    def _evaluate(self, qp: ArrayLike) -> tuple[Array, Array]:
-        G = np.zeros((self.n_p, self.p))
-        G_q = np.zeros((self.n_p, self.p, self.n_p))
-        self.velocity_map(vector(qp, self.n_p, "qp"), self.parameters, G, G_q)
+    def velocity_maps(self, qp: Array) -> tuple[Array, Array]:
+        """G (N, n_p, p) and its derivatives by the coordinates (N, n_p, p, n_p) at N samples (N, n_p)."""
+        N, n_p, p = len(qp), self.n_p, self.p
+        G, G_q = np.zeros((N, n_p, p)), np.zeros((N, n_p, p, n_p))
+        kernel, parameters = self.velocity_map, self.parameters
+        for one, G_there, G_q_there in zip(np.ascontiguousarray(qp), G, G_q, strict=True):
+            kernel(one, parameters, G_there, G_q_there)
         return G, G_q
+
+    def _evaluate(self, qp: ArrayLike) -> tuple[Array, Array]:
+        G, G_q = self.velocity_maps(vector(qp, self.n_p, "qp")[np.newaxis])
+        return G[0], G_q[0]
