@@ -282,6 +282,26 @@ def test_a_runs_summary_and_page_tell_what_its_motors_lack(tmp_path: Path) -> No
     assert (0.0, found["text"]) in events(run, shown)
 
 
+def test_a_robot_that_its_arm_pulls_off_the_ground_tips() -> None:
+    robot = robot_of("differential_base+ur5")
+    q, u = np.tile(robot.rest, (2, 1)), np.zeros((2, robot.n_u))
+    u_dot = np.outer([1e4, -1e4], np.eye(robot.n_u)[3])  # one way the shoulder lifts all the rest
+    found = torques_along(robot, np.arange(2.0), q, u, u_dot=u_dot)
+    off = np.isnan(found.zero_moment).all(axis=1)
+    assert off.sum() == 1
+    (tips,) = (one for one in found.findings if one.code == "tips")
+    assert (tips.values["margin"], tips.where["t"]) == (None, found.t[off][0])
+    assert "pull" in str(tips)
+
+
+def test_where_a_main_body_has_no_mass_nothing_is_said_of_tipping() -> None:
+    robot = nmm.load("car_base")
+    assert len(Support(robot).names) == 4
+    model = robot.display_model
+    model.inertias[model.getJointId("theta")] = pin.Inertia.Zero()
+    assert Support(robot).names == ()
+
+
 def test_a_robot_that_reaches_far_with_a_load_tips() -> None:
     robot = robot_of("differential_base+ur5")
     controller = nmm.Controller(

@@ -14,7 +14,8 @@ class Support:
     """The polygon of a robot's wheels on the ground.
 
     A caster touches the ground on its swivel's axis here: its trail is left out. A robot on fewer than three
-    wheels has no polygon: it keeps its balance by what its file does not say.
+    wheels has no polygon: it keeps its balance by what its file does not say. Nor has one whose main body has
+    no mass: where that is decides.
 
     Attributes
     ----------
@@ -25,7 +26,8 @@ class Support:
     def __init__(self, robot: Robot) -> None:
         ground = Ground.of(robot)
         self.robot, self.height = robot, 0.0 if ground is None else ground.z
-        self._wheels = robot.wheels if len(robot.wheels) >= 3 and robot.platform.n_p >= 3 else ()
+        known = len(robot.wheels) >= 3 and robot.platform.n_p >= 3 and _main_mass(robot) > 0.0
+        self._wheels = robot.wheels if known else ()
         self.names = tuple(wheel.joint for wheel in self._wheels)
         self._data = robot.model.createData()
         #: Whether all of them are on the main body, where the polygon is the same at every q.
@@ -42,15 +44,17 @@ class Support:
         return np.array(places).reshape(-1, 3)[:, :2]
 
     def zero_moment(self, forces: Array) -> Array:
-        """Where the ground's force (N, 6), about the world's origin, acts on the ground, (N, 2) m."""
+        """Where the ground's force (N, 6), about the world's origin, acts on the ground, (N, 2) m; not a
+        number where it would have to pull."""
         F, M = forces[:, :3], forces[:, 3:]
         x = self.height * F[:, 0] - M[:, 1]
         y = M[:, 0] + self.height * F[:, 1]
-        return np.stack([x, y], axis=1) / F[:, [2]]
+        return np.stack([x, y], axis=1) / np.where(F[:, [2]] > 0.0, F[:, [2]], np.nan)
 
     def margins(self, q: Array, points: Array) -> tuple[Array, list[tuple[str, str]]]:
         """How far points (N, 2) are inside the polygon at q (N, n), (N,) m, below 0 outside it; and the
-        wheels between which the nearest edge runs. Infinite without a polygon."""
+        wheels between which the nearest edge runs. Infinite without a polygon, minus that for a point that is
+        not a number."""
         if not self.names:
             return np.full(len(q), np.inf), [("", "")] * len(q)
         if self._rigid:  # as seen from the main body
@@ -70,9 +74,16 @@ class Support:
         along = np.roll(begins, -1, axis=0) - begins
         off = points[:, np.newaxis] - begins
         inside = (along[:, 0] * off[..., 1] - along[:, 1] * off[..., 0]) / np.hypot(*along.T)
+        inside = np.where(np.isnan(inside), -np.inf, inside)
         least = inside.argmin(axis=1)
         ends = [(self.names[a], self.names[b]) for a, b in zip(corners, np.roll(corners, -1), strict=True)]
         return inside[range(len(points)), least], [ends[k] for k in least]
+
+
+def _main_mass(robot: Robot) -> float:
+    """The mass of the body that the platform moves, without its wheels, kg."""
+    model = robot.display_model
+    return float(model.inertias[model.getJointId(robot.q_names[2])].mass)
 
 
 def hull(points: Array) -> list[int]:

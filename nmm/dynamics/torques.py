@@ -111,7 +111,8 @@ class Torques:
             found.append(Finding("effort_exceeded", values, {"t": float(self.t[k])}))
         k = int(self.margins.argmin())
         if self.margins[k] < 0.0:
-            values = {"margin": float(self.margins[k]), "edge": list(self.edges[k])}
+            margin = float(self.margins[k])
+            values = {"margin": margin if np.isfinite(margin) else None, "edge": list(self.edges[k])}
             found.append(Finding("tips", values, {"t": float(self.t[k])}))
         return tuple(found)
 
@@ -136,7 +137,7 @@ class Torques:
             },
             "power_peak": float(self.power.max()),
             "energy": self.energy,
-            "tipping": tips if np.isfinite(self.margins[least]) else None,
+            "tipping": None if np.isposinf(self.margins[least]) else tips,
             "jumps": self.t[:-1][self.jumps[:-1]].tolist(),
             "left_out": list(self.dynamics.left_out),
             "findings": [one.as_json() for one in self.findings],

@@ -113,6 +113,14 @@ def _beyond(one: Mapping[str, Any]) -> str:
     return f"{one['name']} at {one['t']:.3g} s ({one['value']:.4g} {one['unit']}; {range_})"
 
 
+def _tips(margin: float | None, edge: Sequence[str], t: float, **_: Any) -> str:
+    said = f"the robot tips at t = {t:.4g} s"
+    if margin is None:
+        return f"{said}: the ground would have to pull it down"
+    outside = f"{-1e3 * margin:.3g} mm outside the edge from {edge[0]} to {edge[1]}"
+    return f"{said}: the zero-moment point is {outside}"
+
+
 WORDS: Mapping[str, Words] = {
     # Ready-made sentences: from a user's function, or a folder older than codes
     "said": "{text}",
@@ -191,10 +199,7 @@ WORDS: Mapping[str, Words] = {
         f"{actuator} needs {peak:.3g} {unit} at t = {t:.4g} s, "
         f"{100 * peak / effort:.0f} % of its {effort:.3g}"
     ),
-    "tips": lambda margin, edge, t, **_: (
-        f"the robot tips at t = {t:.4g} s: the zero-moment point is {-1e3 * margin:.3g} mm outside the edge "
-        f"from {edge[0]} to {edge[1]}"
-    ),
+    "tips": _tips,
     "left_plan": lambda m, rad, tube_m, tube_rad, t, back, **_: (
         f"the robot left its plan from t = {t:.3g} s on, by up to {m:.3g} m and {rad:.3g} rad (more than "
         f"{tube_m:g} m or {tube_rad:g} rad); "
