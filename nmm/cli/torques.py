@@ -24,7 +24,9 @@ def torques(
         str, typer.Argument(metavar="RUN|SCENARIO", help="A run's folder; or a scenario, which is run.")
     ],
     *,
-    payload: list[str] | None = option("FRAME=KG", "A mass carried by a frame. May be repeated."),
+    payload: list[str] | None = option(
+        "FRAME=KG", "A mass carried by a frame, or KG@X,Y,Z: at that point of it, m. May be repeated."
+    ),
     settings: SetOption = None,
     out: Annotated[Path | None, out_option("runs/<name>-torques")] = None,
     as_json: bool = flag("--json", "The numbers as JSON on standard output, for scripts."),
@@ -37,7 +39,7 @@ def torques(
 
     \b
     nmm torques runs/ur5_differential_line-rg
-    nmm torques tiago_pose --payload arm_tool_link=1.5
+    nmm torques tiago_pose --payload arm_tool_link=1.5@0,0,0.1
     nmm torques unicycle_2r_position --json
 
     Not in it: friction, tyres that scrub, the motors' own inertia, the motion of casters. The folder holds
@@ -59,7 +61,8 @@ def torques(
             raise InputError(what, where=source, expected="a run's folder or a scenario")
         with progress(name) as report:
             run = scenario.run(progress=report)
-    found = run.torques(values_of(payload, "--payload", "FRAME=KG, as in ee=1.5"))
+    expected = "FRAME=KG or FRAME=KG@X,Y,Z, as in ee=1.5"
+    found = run.torques(values_of(payload, "--payload", expected, _load))
     with shielded():
         save(found, folder, figures=drawn)
     for one in found.findings:
@@ -69,6 +72,14 @@ def torques(
     else:
         _show(found, folder)
     return OK
+
+
+def _load(text: str) -> float | tuple[float, list[float]]:
+    """KG or KG@X,Y,Z: a mass, or a mass and its place in the frame, m."""
+    from nmm.scenario.numbers import evaluate
+
+    mass, at, place = text.partition("@")
+    return (evaluate(mass), [evaluate(one) for one in place.split(",")]) if at else evaluate(mass)
 
 
 def _show(found: Torques, folder: Path) -> None:
