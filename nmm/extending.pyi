@@ -64,6 +64,8 @@ from .functions.program import run_program as run_program
 from .functions.references import PiecewisePolynomial as PiecewisePolynomial
 from .functions.references.circle import bearing as bearing
 from .functions.tasks.conditions import Condition as Condition
+from .functions.tasks.image import image_points as image_points
+from .functions.tasks.image import log_depth as log_depth
 from .functions.tasks.pointing import pointing as pointing
 from .functions.tasks.pose import frame_pose as frame_pose
 from .functions.tasks.pose import orientation_error as orientation_error

@@ -57,7 +57,10 @@ from nmm.functions.tasks import (
     CenterOfMass,
     Distance,
     Heading,
+    ImageLine,
+    ImagePoints,
     LinearCoordinates,
+    LogDepth,
     Orientation,
     Pointing,
     Pose,
@@ -168,6 +171,26 @@ def _spatial_tasks() -> Iterator[Entry]:
     for axes in ("xyz", "zx"):
         yield Entry(f"centre of mass {axes}", CenterOfMass(axes))
         yield Entry(f"centre of mass {axes} in a frame", CenterOfMass(axes, "link1"))
+
+
+def _seen() -> Iterator[Entry]:
+    """The z axes of these frames are upright, or the point is ahead of the frame wherever that is."""
+    above = Circle([2, -1, 60], 3.0, -1.3, 0.4)
+    ahead = CallableReference(
+        lambda t, c: c.placement("ee").act(np.array([0.3 * np.sin(t), -0.2, 2.0 + 0.1 * t])),
+        3,
+        of_configuration=True,
+    )
+    pixels = [500, 520, 320, 240]
+    yield Entry("image point", ImagePoints([[6, 2, 50]], "link1"))
+    yield Entry(
+        "image points, px", ImagePoints([[6, 2, 50], above, "ee"], "base_footprint", pixels), BOTH[:1]
+    )
+    yield Entry("image of what goes along", ImagePoints([ahead, ahead], "ee"), SPATIAL)
+    yield Entry("image line", ImageLine([above, [6, 2, 40]], "link1"))
+    yield Entry("image line, px", ImageLine([[-6, 2, 50], [6, 2, 40]], "base_footprint", pixels))
+    yield Entry("depth", LogDepth(above, "link1"))
+    yield Entry("depth of what goes along", LogDepth(ahead, "ee"), SPATIAL)
 
 
 def _references() -> Iterator[Entry]:
@@ -335,7 +358,15 @@ def _of_coordinates() -> Iterator[Entry]:
     yield Entry("weights that change", line * w + spline * (bent - 2.0 * w), everywhere)
 
 
-ENTRIES = (*_tasks(), *_spatial_tasks(), *_references(), *_signals(), *_pose_references(), *_objectives())
+ENTRIES = (
+    *_tasks(),
+    *_spatial_tasks(),
+    *_seen(),
+    *_references(),
+    *_signals(),
+    *_pose_references(),
+    *_objectives(),
+)
 
 
 def evaluated(function: Function, t: float, configuration: Configuration) -> Evaluation:

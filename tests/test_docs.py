@@ -68,7 +68,7 @@ def test_a_new_kind_gets_its_lines_in_the_lists(monkeypatch: pytest.MonkeyPatch)
     page = (lists.API / "task.md").read_text(encoding="utf-8")
     entry = ".. autoclass:: nmm.NewTask\n"
     assert lists.reference(page, TASKS).replace(entry, "") == page
-    assert ".. autoclass:: nmm.Parking\n" + entry in lists.reference(page, TASKS)
+    assert ".. autoclass:: nmm.LogDepth\n" + entry in lists.reference(page, TASKS)
 
 
 def test_the_gallery_is_that_of_the_scenarios() -> None:

@@ -93,7 +93,7 @@ def test_a_task_that_is_no_number_ends_the_run_as_without_limits() -> None:
     assert not run.complete
     assert (
         the(run, "singular").values["undefined"]
-        == "the task, its reference or the objective is undefined here"
+        == "the task, its reference, the objective or a limit is undefined here"
     )
 
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from nmm.arrays import Array
 from nmm.findings import Finding
-from nmm.functions.function import Row, row_scales
+from nmm.functions.function import Function, Row, row_scales
 from nmm.functions.tasks.pose import Orientation, Pose
 from nmm.functions.tasks.task import Stack
 from nmm.resolvers.answer import Status
@@ -134,18 +134,29 @@ def in_world_axes(J: Array, task: Stack, robot: Robot, q: ArrayLike) -> Array:
     return turned
 
 
-def failure(status: Status, problem: ProblemArrays, robot: Robot, task: Stack, t: float, q: Array) -> Finding:
+def failure(
+    status: Status,
+    problem: ProblemArrays,
+    robot: Robot,
+    task: Stack,
+    t: float,
+    q: Array,
+    limited: Sequence[Function] = (),
+) -> Finding:
     """Why a call at t (s) and q (n,) gave no inputs: directions that J lost and at which level of the stack,
-    what is not finite, or what is wrong with the platform there."""
+    what is not finite (among it the `limited` functions), or what is wrong with the platform there."""
     J = problem.J
     values: dict[str, Any] = {"status": status.name.lower(), "meaning": status.meaning, "lost": []}
     values |= {"level": None, "tasks": [], "undefined": "", "platform": ""}
     if status is Status.NOT_FINITE:
-        finite = all(np.isfinite(part).all() for part in (J, problem.rate, problem.h))
+        parts = (J, problem.rate, problem.h, problem.limit_rows)
+        finite = all(np.isfinite(part).all() for part in parts)
+        functions = [*(one.function for one in task), *limited]
         values["undefined"] = (
             "the resolver's answer, though J, rate and h are finite"
             if finite
-            else "the task, its reference or the objective is undefined here"
+            else next(filter(None, (one.undefined(robot, t, q) for one in functions)), "")
+            or "the task, its reference, the objective or a limit is undefined here"
         )
     elif status is Status.SINGULAR_J and np.all(np.isfinite(J)):
         rows = task.rows(robot)

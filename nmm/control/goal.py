@@ -17,7 +17,8 @@ class Goal:
 
     Parameters
     ----------
-    m, rad : tolerances of rows in metres and of rows in radians; rows of other units are ignored
+    m, rad : tolerances of rows in metres and of rows in radians. Rows without a unit count as radians, as
+        image coordinates do, and pixels over the focal length; rows of other units are ignored
 
     Examples
     --------
@@ -35,32 +36,39 @@ class Goal:
 
     def reached(self, error: Array, rows: Sequence[Row]) -> bool:
         """Whether an error (s,) is within the tolerances."""
-        metres, radians = error_sizes(error, [row.unit for row in rows])
+        metres, radians = error_sizes(error, rows)
         return metres <= self.m and radians <= self.rad
 
 
-#: Codes of units.
+#: Codes of units; that of pixels is the focal length.
 METRES, RADIANS, ANOTHER = 0, 1, -1
 
 
-def unit_codes(units: Sequence[str]) -> Integers:
-    """The units of rows (s,) as codes for `norms`."""
-    codes = {"m": METRES, "rad": RADIANS}
-    return np.array([codes.get(unit, ANOTHER) for unit in units], dtype=np.int64)
+def unit_codes(rows: Sequence[Row | str]) -> Integers:
+    """The units of rows, or units by name, (s,) as codes for `norms`."""
+    codes = {"m": METRES, "rad": RADIANS, "1": RADIANS}
+
+    def code(row: Row | str) -> int:
+        if isinstance(row, Row) and row.unit == "px":
+            return max(RADIANS, round(row.scale or 0.0))
+        return codes.get(row.unit if isinstance(row, Row) else row, ANOTHER)
+
+    return np.array([code(row) for row in rows], dtype=np.int64)
 
 
 @inlined
 def norms(error: Array, units: Integers) -> tuple[float, float]:
-    """The error's norms over rows in metres and over rows in radians; units (s,) of `unit_codes`."""
+    """The error's norms over rows in metres and over those in radians; units (s,) of `unit_codes`."""
     metres, radians = 0.0, 0.0
     for i in range(error.shape[0]):
         if units[i] == METRES:
             metres += error[i] * error[i]
-        elif units[i] == RADIANS:
-            radians += error[i] * error[i]
+        elif units[i] >= RADIANS:
+            angle = error[i] / units[i]
+            radians += angle * angle
     return math.sqrt(metres), math.sqrt(radians)
 
 
-def error_sizes(error: Array, units: Sequence[str]) -> tuple[float, float]:
-    """`norms` for units by name."""
-    return norms(error, unit_codes(units))
+def error_sizes(error: Array, rows: Sequence[Row | str]) -> tuple[float, float]:
+    """`norms` for rows, or units by name."""
+    return norms(error, unit_codes(rows))

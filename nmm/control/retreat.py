@@ -117,7 +117,7 @@ class RetreatNumbers(NamedTuple):
 def retreat_numbers(retreat: Retreat | None, robot: Robot, rows: Sequence[Row]) -> RetreatNumbers:
     given = retreat or Retreat()
     return RetreatNumbers(
-        units=unit_codes([row.unit for row in rows]),
+        units=unit_codes(rows),
         stalled=np.array(given.stalled),
         progress=np.array(given.progress),
         durations=np.array(given.durations if retreat else ()),

@@ -35,6 +35,8 @@ def standing_pose(solver: StepSolver, q: Array, times: Array) -> Finding | None:
         return None
     if any(np.abs(one.value_t).max() > STANDS or one.value_q.any() for one in targets):
         return None
+    if not np.isfinite(J).all():
+        return None
     left, sizes, _ = np.linalg.svd(J[:, 3:])
     free = left[:, np.count_nonzero(sizes > ZERO * max(1.0, sizes.max(initial=0.0))) :]
     if _rank(free.T @ J[:, :3]) < 3 or not np.linalg.norm(free.T @ error) > AT_TARGET:

@@ -358,7 +358,8 @@ class StepSolver:
         self.robot.q(q)
         scalar(t, "t")
         status = Status(int(self.found.answer.status[()]))
-        return SingularError(failure(status, self.found.problem, self.robot, self.task, float(t), q))
+        given = status, self.found.problem, self.robot, self.task, float(t), q, self.limits_on.functions
+        return SingularError(failure(*given))
 
     def errors(self, times: Array, configurations: Array) -> tuple[Array, Array]:
         """The task's errors e and ∂g/∂t + K e (without bounds of feedback) at times (N,) and q (N, n).

@@ -147,7 +147,7 @@ def _reached(verdict: Verdict, leg: Leg, goal: Goal | None) -> Verdict:
         return Verdict(Outcome.COMPLETED, (found,), (*said, *verdict.warnings))
     if verdict.outcome is Outcome.UNSTABLE:
         return verdict
-    m, rad = error_sizes(error, [row.unit for row in rows])
+    m, rad = error_sizes(error, rows)
     found = Finding("not_reached", {"within": recorder.duration, "m": float(m), "rad": float(rad)})
     return replace(verdict, outcome=Outcome.MISSED, reasons=(found, *verdict.reasons))
 

@@ -211,7 +211,8 @@ class Function(ABC):
     """φ(t, q). A new function is a kernel and a subclass with two methods: `rows(robot)` returns the
     components' names and units, and raises `InputError` for what the robot lacks; `stages(robot)` returns the
     kernels that compute value, time derivative and Jacobian. One that moves a frame or looks at a point
-    overrides `shown()`, one whose values deserve a warning `noticed()`.
+    overrides `shown()`, one whose values deserve a warning `noticed()`, one without a value somewhere
+    `undefined()`.
 
     `comparison` is for values that cannot be subtracted (orientations, poses): a kernel of signature
     `records.FUNCTION` that reads the rows [value, target, error], s of each, and writes the error and its
@@ -238,6 +239,10 @@ class Function(ABC):
     def shown(self) -> Shown:
         """What figures and playback draw of it; nothing by default."""
         return Shown()
+
+    def undefined(self, robot: Robot, t: float, q: Array) -> str:
+        """Why it has no value at t (s) and q (n,), for people; empty where that is not known."""
+        return ""
 
     def planned(self, t: Array) -> Array | None:
         """The configurations (N, n) of the plan that it follows, at times (N,), s; None for most."""

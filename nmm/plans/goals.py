@@ -181,18 +181,18 @@ _STEPPED = types.int64(types.float64, types.float64[::1], types.int64, *BLOCKS.t
 
 
 class TaskError:
-    """A task's value, target and error along a motion, without a controller. units : of the rows"""
+    """A task's value, target and error along a motion, without a controller. rows : its components"""
 
     def __init__(self, robot: Robot, task: Task, tolerance: Goal | None = None) -> None:
         rows, following, tolerance = task.rows(robot), robot.following, tolerance or Goal()
-        self.robot, self.units = robot, [row.unit for row in rows]
+        self.robot, self.rows = robot, rows
         self._program = Program(robot, (task.function, task.reference, Comparison(task)), COMPILED)
         leads = np.eye(robot.n)
         leads[following.columns] = following.multipliers[:, np.newaxis] * leads[following.leaders]
         # Angles of a platform and of joints without limits go where they like.
         self._limits = np.where(robot.limited, robot.q_limits, [-np.inf, np.inf]).T.copy()
         newton = Newton(
-            units=unit_codes(self.units),
+            units=unit_codes(rows),
             met=np.array([MET * tolerance.m, MET * tolerance.rad, 1e-4]),
             compared=np.array(int(task.function.comparison is not None), dtype=np.int64),
             limits=self._limits,

@@ -134,7 +134,7 @@ class Horizon:
                 np.zeros((N + 1, robot.n_u)),
                 float(self._times[1]),
                 False,
-                robot.n if self.plan is not None else len(self._error.units),
+                robot.n if self.plan is not None else len(self._error.rows),
                 [shape for shape, _ in self._movers],
             )
         )
@@ -192,7 +192,7 @@ class Horizon:
             times = t[-1] + self.dt * np.arange(1, parts + 1) / parts
             there, inputs = self._ahead(times, q[-1])
             t, q, u = [*t, *times.tolist()], [*q, *there], [*u, *inputs]
-            sizes = error_sizes(self._error.evaluate(q[-1], t[-1])[2], self._error.units)
+            sizes = error_sizes(self._error.evaluate(q[-1], t[-1])[2], self._error.rows)
             reached = until is not None and sizes[0] <= until.m and sizes[1] <= until.rad
         count = {"samples": len(unsolved), "of": (len(t) - 1) // parts}
         warnings = tuple((Finding("horizon_unsolved", count, {"t": one}),) for one in unsolved[:1])

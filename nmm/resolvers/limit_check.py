@@ -78,7 +78,14 @@ def undefined(problem: ProblemArrays) -> bool:
 @compiled
 def keep_limits(problem: ProblemArrays, answer: AnswerArrays) -> None:
     """Call `limit` where the resolver found no inputs, or inputs beyond the limits; where nothing did so, no
-    limit is active."""
+    limit is active. A limit that has no value ends a run: nothing says that it is kept."""
+    for i in range(problem.lower.shape[0]):
+        if math.isnan(problem.lower[i]) or math.isnan(problem.upper[i]):
+            answer.status[()] = NOT_FINITE
+            answer.excess[()] = 0.0
+            for j in range(answer.u.shape[0]):
+                answer.u[j] = math.nan
+            return
     limited = problem.lower.shape[0] > 0
     for j in range(answer.u.shape[0]):
         limited = limited or not (math.isinf(problem.u_lower[j]) and math.isinf(problem.u_upper[j]))

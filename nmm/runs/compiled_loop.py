@@ -187,7 +187,7 @@ class CompiledLoop:
         self._controller, self._method = controller, method
         self._partitioned = int(isinstance(controller.solver.state, PartitionState))
         self._ends = Ends(
-            unit_codes([row.unit for row in controller.rows]),
+            unit_codes(controller.rows),
             np.array([-1.0, -1.0] if until is None else [until.m, until.rad]),
         )
         self._choice = Choice(0, np.zeros(0, dtype=np.int64), np.zeros(0))

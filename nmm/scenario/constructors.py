@@ -143,6 +143,7 @@ SPELLINGS: dict[str, Any] = {
     "Function": REFERENCE,
     "Function | ArrayLike": REFERENCE,
     "Function | str | ArrayLike": POINT,
+    "Sequence[Function | str | ArrayLike]": list[POINT],  # type: ignore[valid-type]  # a value, not a type
     "Function | RotationVector": REFERENCE,
     "Weights": Weights,
     "Mapping[str, Function | float]": dict[str, REFERENCE],  # type: ignore[valid-type]  # a value, not a type
@@ -178,6 +179,8 @@ class MadePart(Part):
             value = _argument(getattr(self, parameter.key), parameter.key)
             if isinstance(value, dict):
                 value = {name: _argument(one, parameter.key, name) for name, one in value.items()}
+            elif isinstance(value, list):
+                value = [_argument(one, parameter.key, str(k)) for k, one in enumerate(value)]
             if parameter.starred:
                 listed += value or ()
             else:
@@ -301,9 +304,9 @@ def check_part(part: MadePart, robot: Robot) -> None:
                 check_coordinates(value, robot)
             elif isinstance(value, FunctionPart):
                 value.build(robot)
-            elif isinstance(value, dict):
-                for name, function in value.items():
-                    with at(name):
+            elif isinstance(value, dict | list):
+                for name, function in value.items() if isinstance(value, dict) else enumerate(value):
+                    with at(str(name)):
                         if isinstance(function, FunctionPart):
                             function.build(robot)
 

@@ -32,7 +32,7 @@ _OPERATORS: dict[type[ast.AST], Callable[..., float]] = {
     ast.UAdd: operator.pos,
 }
 _SYNTAX = (ast.BinOp, ast.UnaryOp, ast.Name, ast.Call)
-_EXPECTED = "a number or arithmetic with pi (+ - * / ** sqrt)"
+_EXPECTED = "a number or arithmetic with pi (+ - * / ** sqrt log)"
 
 
 def _literal(node: ast.Constant) -> float:
@@ -43,8 +43,10 @@ def _literal(node: ast.Constant) -> float:
 
 
 def _arithmetic() -> SimpleEval:
-    """simpleeval with floating-point numbers, + - * / **, pi and sqrt, and nothing else."""
-    made = SimpleEval(operators=_OPERATORS, functions={"sqrt": math.sqrt}, names={"pi": math.pi})
+    """simpleeval with floating-point numbers, + - * / **, pi, sqrt and log, and nothing else."""
+    made = SimpleEval(
+        operators=_OPERATORS, functions={"sqrt": math.sqrt, "log": math.log}, names={"pi": math.pi}
+    )
     made.nodes = {kind: made.nodes[kind] for kind in _SYNTAX} | {ast.Constant: _literal}
     return made
 

@@ -156,7 +156,8 @@ def _domain(analysis: SymbolicAnalysis, forms: Sequence[Product]) -> Domain:
     below = [one for one in denominators if not isinstance(one.factors[0][0], Symbol) and one not in nonzero]
     divisible = [*analysis.numerators.values(), *analysis.denominators]
     used = {ring.names[i] for value in divisible for i in value.variables() if not ring.is_angle[i]}
-    lengths = used & {*analysis.geometry, *analysis.definitions}
+    may_vanish = {one.name for one in analysis.derivation.auxiliaries if one.kind == "share"}
+    lengths = used & {*analysis.geometry, *analysis.definitions} - may_vanish
     names = [alone(Symbol(name)) for name in ring.names if name in lengths]
     return Domain([*names, *nonzero], list(dict.fromkeys(below)), [one for one in zero if one not in below])
 

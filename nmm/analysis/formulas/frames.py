@@ -167,7 +167,7 @@ class Frames:
         """Indices of auxiliary lengths, which are never negative."""
         ring = self.geometry.ring
         kinds = {one.name: one.kind for one in self.auxiliaries}
-        return {i for i, name in enumerate(ring.names) if kinds.get(name) in ("length", "root")}
+        return {i for i, name in enumerate(ring.names) if kinds.get(name) in ("length", "root", "ahead")}
 
     def angle(self, sine: Expansion, cosine: Expansion) -> Linear | None:
         """atan2 of both, where that is a combination of angles plus quarter turns."""

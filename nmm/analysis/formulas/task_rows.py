@@ -17,6 +17,7 @@ from nmm.errors import InputError
 from nmm.functions.function import Function, Stage
 from nmm.functions.references.circle import bearing
 from nmm.functions.tasks import Stack
+from nmm.functions.tasks.image import image_points, log_depth
 from nmm.functions.tasks.pointing import pointing
 from nmm.functions.tasks.pose import frame_pose, orientation_error, pose_error
 from nmm.functions.tasks.position import distance
@@ -236,6 +237,36 @@ def _pointing(stage: Stage, read: Read, rows: Rows, frames: Frames) -> Read:
     )
 
 
+def _seen(stage: Stage, read: Read, rows: Rows, frames: Frames) -> Read:
+    """P = Z (xi, eta, 1) of each point, in the camera's own axes: J is the interaction matrix times the
+    frame's motion."""
+    ring = frames.geometry.ring
+    steps, at = steps_to(frames.robot, *stage.frames), frames.position(*stage.frames)
+    home, velocity, identity = back(turns(steps, frames.geometry)), frames.twists(steps), np.eye(3)
+    for first in range(0, stage.rows, 3):
+        own = slice(first, first + 3)
+        d = [to - p for to, p in zip(_polynomials(rows.value[own], frames), at, strict=True)]
+        P = turned(home, d, ring)
+        fixed = not any(quotient(entry, ring) for entry in rows.value_q[own].flat)  # in the world
+        Z, x, y = (
+            ring.scalar(name)
+            for name in frames.auxiliary(
+                ("Z", "ahead", P[2:]), ("xi", "share", P[::2]), ("eta", "share", P[1:])
+            )
+        )
+        point = [Z * x, Z * y, Z]
+        if not fixed:
+            gradients = [frames.gradient(entry) for entry in P]
+            for k, motion in enumerate(velocity):
+                carried = [a + b for a, b in zip(motion[:3], cross(motion[3:], point), strict=True)]
+                rows.value_q[own, k] = [Quotient(gradients[i][k] + carried[i]) for i in range(3)]
+        rows.value[own] = list(map(Quotient, point))
+    return read._replace(
+        placements=lazy(lambda k, i, j: float(identity[i, j]) if j < 3 else 0.0, 1, 3, 4),
+        jacobians=lazy(lambda k, i, j: Quotient(velocity[j][i]), 1, 6, frames.robot.n),
+    )
+
+
 def _polynomials(values: Any, frames: Frames) -> list[Expansion]:
     found = [quotient(value, frames.geometry.ring) for value in values]
     if any(value.under.variables() for value in found):
@@ -245,4 +276,10 @@ def _polynomials(values: Any, frames: Frames) -> list[Expansion]:
 
 #: Rewrite the point in a kernel's rows by its distance rho and angles from another, which keeps formulas
 #: short; return the placements and Jacobians that the kernel then reads.
-_CHANGES: dict[Any, Callable[..., Read]] = {bearing: _bearing, distance: _distance, pointing: _pointing}
+_CHANGES: dict[Any, Callable[..., Read]] = {
+    bearing: _bearing,
+    distance: _distance,
+    pointing: _pointing,
+    image_points: _seen,
+    log_depth: _seen,
+}

@@ -108,6 +108,17 @@ class _Module:
             root = x.ring.scalar(name)
         return Quotient(root)
 
+    def log(self, x: Any) -> Any:
+        """That of how far ahead a point is gets a name."""
+        if not isinstance(x, Traced):
+            return math.log(x)
+        value = self._polynomial(x)
+        for one in self._frames.auxiliaries:
+            if one.kind == "ahead" and not value - x.ring.scalar(one.name):
+                (name,) = self._frames.auxiliary(("lambda", "log", one.arguments))
+                return Quotient(x.ring.scalar(name))
+        raise Untraceable("it takes math.log of a formula")
+
     def _root(self, square: Expansion) -> Expansion | None:
         """The root of a number times squares of auxiliary lengths and of sines of angles between 0 and π."""
         if not square:

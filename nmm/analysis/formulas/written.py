@@ -44,7 +44,8 @@ Value: TypeAlias = Expansion | Arc | Linear | Turn | Share
 class Auxiliary(NamedTuple):
     """A symbol for a quantity that would make formulas long. Of its arguments a, b, c, the kinds are:
     "length" of a vector (2 or 3), "bearing" atan2(b, a), "elevation" atan2(c, hypot(a, b)), "off axis"
-    atan2(hypot(b, c), a), "over sine" (the angle off axis over its sine), and "root" of a."""
+    atan2(hypot(b, c), a), "over sine" (the angle off axis over its sine), "root" of a, "ahead" a itself,
+    above 0, "share" a / b, and "log" of a."""
 
     name: str
     kind: str
@@ -116,6 +117,14 @@ def auxiliary_written(auxiliary: Auxiliary, symbols: Mapping[str, Any]) -> Writt
     if auxiliary.kind == "root":
         root = Formula(f"sqrt({a.formula})", rf"\sqrt{{{a.formula.latex}}}")
         return Written(sympy.sqrt(a.expression), root)
+    if auxiliary.kind == "ahead":
+        return a
+    if auxiliary.kind == "log":
+        return Written(sympy.log(a.expression), Formula(f"log({a.formula})", rf"\log({a.formula.latex})"))
+    if auxiliary.kind == "share":
+        b = rest[0]
+        text, latex = f"({a.formula}) / ({b.formula})", rf"\frac{{{a.formula.latex}}}{{{b.formula.latex}}}"
+        return Written(a.expression / b.expression, Formula(text, latex))
     if auxiliary.kind == "length":
         return _hypot(*everything)
     if auxiliary.kind == "bearing":
