@@ -171,7 +171,13 @@ def main() -> int:
             f"  (aims: {of_all} for all, {of_binding} for binding)"
         )
     print(f"\n{'order 2':24s}{'order 1':>8s}{'compiled':>10s}{'order 2':>9s}{'ratio':>8s}{'ratio':>8s}")
-    for name in ("unicycle_2r_position", "unicycle_3r_position", "ur5_unicycle_pose", "tiago_pose"):
+    for name in (
+        "unicycle_2r_position",
+        "unicycle_3r_position",
+        "ur5_unicycle_pose",
+        "tiago_pose",
+        "pan_tilt_follow",
+    ):
         bundled, compiled, second = both_orders(*of_scenario(name))
         ratios = f"{second / bundled:8.2f}{second / compiled:8.2f}"
         print(f"{name:24s}{bundled:8.2f}{compiled:10.2f}{second:9.2f}{ratios}  (aim: 2)")

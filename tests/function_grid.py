@@ -58,9 +58,11 @@ from nmm.functions.tasks import (
     Distance,
     Heading,
     ImageLine,
+    ImageMoments,
     ImagePoints,
     LinearCoordinates,
     LogDepth,
+    MeasuredPoints,
     Orientation,
     Pointing,
     Pose,
@@ -189,6 +191,8 @@ def _seen() -> Iterator[Entry]:
     yield Entry("image of what goes along", ImagePoints([ahead, ahead], "ee"), SPATIAL)
     yield Entry("image line", ImageLine([above, [6, 2, 40]], "link1"))
     yield Entry("image line, px", ImageLine([[-6, 2, 50], [6, 2, 40]], "base_footprint", pixels))
+    yield Entry("image moments", ImageMoments([above, [6, 2, 40], [3, 3, 50]], "link1"))
+    yield Entry("age of a picture", MeasuredPoints([above], "link1").age())
     yield Entry("depth", LogDepth(above, "link1"))
     yield Entry("depth of what goes along", LogDepth(ahead, "ee"), SPATIAL)
 

@@ -27,7 +27,8 @@ from nmm.functions.objectives import Clearance, Manipulability, Objective, Quadr
 from nmm.functions.program import Program, evaluate
 from nmm.functions.pursuit import Pursuit
 from nmm.functions.references import CallableReference, Circle
-from nmm.functions.tasks import LinearCoordinates, Position, Task
+from nmm.functions.tasks import LinearCoordinates, MeasuredPoints, Position, Task
+from nmm.functions.tasks.measured import MeasuredPoint
 from nmm.functions.tasks.pose import PartsOfPose
 from nmm.functions.tasks.task import Comparison
 from nmm.kinds import OBJECTIVES, REFERENCES, TASKS
@@ -51,8 +52,10 @@ def test_the_grid_holds_every_function() -> None:
     # wherever the robot is stands still by definition: test_analysis_subjects.py. What parts of a pose share
     # is a base, and the pursuit's angles are values alone: its spring's gradient is in test_steering.py.
     # Distances have kinks and Coal's last digits: test_clearance.py. One from a plan needs the plan:
-    # test_plans_followed.py. A parking law's rows are velocities: test_parking.py.
+    # test_plans_followed.py. A parking law's rows are velocities: test_parking.py. Measured points change
+    # with pictures alone: test_measured_points.py.
     apart = {Clearance, Comparison, FromPlan, Parking, Reached, PartsOfPose, Pursuit}
+    apart |= {MeasuredPoints, MeasuredPoint}
     examples = {type(entry.function) for entry in ENTRIES}
     for listed in (TASKS, REFERENCES, OBJECTIVES):
         without = [name for name, kind in listed.items() if kind not in examples | apart]

@@ -377,6 +377,12 @@ EXAMPLES: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
         "the robot tips at t = 1.5 s: the zero-moment point is 12.5 mm outside the edge from front to left",
     ),
     (
+        "pictures_lost",
+        {"lost": 3, "taken": 30, "gap": 0.25},
+        {},
+        "3 of 30 pictures did not come or did not show all points, for up to 0.25 s at a time",
+    ),
+    (
         "replanned",
         {"plans": [{"t": 3.5, "m": 0.25, "rad": 0.1, "duration": 9.0}]},
         {"t": 3.5},

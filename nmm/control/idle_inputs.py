@@ -68,9 +68,12 @@ def _zero_columns(
         with solver.sample.aside():
             for q in _configurations(solver, solver.robot.q(q0)):
                 solver.linearise(0.0, q)
-                for matrix in matrices(solver, q):
+                here = matrices(solver, q)
+                if not all(np.isfinite(matrix).all() for matrix in here):
+                    continue
+                for matrix in here:
                     size = float(np.linalg.norm(matrix))
-                    if np.isfinite(size) and size > 0.0:
+                    if size > 0.0:
                         largest = np.maximum(largest, np.linalg.norm(matrix, axis=0) / size)
                         looked = True
                 if np.all(largest > ZERO):  # `largest` never falls

@@ -13,6 +13,7 @@ from nmm.diagnosis.judgement import Judged, judge
 from nmm.diagnosis.limits import binding, broken_limits, broken_rows, distances_short, not_kept, ran_into
 from nmm.diagnosis.reasons import near_singularity
 from nmm.findings import Finding
+from nmm.functions.function import row_scales
 from nmm.runs.clearance import Swept
 from nmm.runs.closed_loop import Leg
 from nmm.runs.recording import Recorder
@@ -122,9 +123,12 @@ def lines(found: Iterable[tuple[Finding, Collection[Outcome]]], outcome: Outcome
 
 
 def _nearly_singular(recorder: Recorder) -> Iterator[Finding]:
-    values = recorder.singular_values
+    values, rows = recorder.singular_values, recorder.controller.rows
     if not len(values):
         return
+    if any(row.unit == "px" for row in rows):  # in numbers hundreds of times those of other rows
+        scales = row_scales(rows, recorder.controller.robot)[:, np.newaxis]
+        values = np.linalg.svd(recorder.so_far.J / scales, compute_uv=False)
     largest = values[:, 0]
     ratio = np.divide(values[:, -1], largest, out=np.ones(len(largest)), where=largest > 0.0)
     k = int(np.argmin(ratio))

@@ -215,7 +215,8 @@ def _judged(leg: Leg, dt: float, method: str, goal: Goal | None) -> Judged:
     there = goal is not None and goal.reached(samples.error[-1], controller.rows)
     found = assess(controller, recorder, leg.integrator, dt, held=not there)
     left = found.departure
-    moved = (Finding("target_jumps", {"steps": found.target}),) if found.target else ()
+    measured = any(one.jumps for one in controller.solver.program.renewals)
+    moved = (Finding("target_jumps", {"steps": found.target}),) if found.target and not measured else ()
     why = *_seen(controller, recorder, samples, left), *(moved if left else ()), passed(recorder)
     seen = tuple(one for one in why if one is not None)
     troubled = bool(found.unstable) or found.missed or outcome is Outcome.DIVERGED

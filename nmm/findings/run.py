@@ -205,6 +205,9 @@ WORDS: Mapping[str, Words] = {
         f"{tube_m:g} m or {tube_rad:g} rad); "
         f"{'not back at the end' if back is None else f'back at t = {back:.4g} s'}"
     ),
+    "pictures_lost": (
+        "{lost} of {taken} pictures did not come or did not show all points, for up to {gap:.3g} s at a time"
+    ),
     "replanned": _replanned,
     "not_replanned": lambda t, times, why, **_: (
         f"the robot left its plan, and no other was made, {counted(times, 'time')} from t = {t:.4g} s on: "

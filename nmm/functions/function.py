@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import weakref
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from threading import Lock
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -126,6 +127,13 @@ class Renewal(LiveNumbers, ABC):
     of the run: t, s; the task's name; what happened; why."""
 
     events: list[tuple[float, str, str, str]]
+    #: Whether values jump where the numbers change, as measured ones do.
+    jumps: ClassVar[bool] = False
+
+    @property
+    def due(self) -> float:
+        """A time, s, before which no others are needed; infinite where only `stays` says."""
+        return math.inf
 
     @abstractmethod
     def begin(self) -> None:

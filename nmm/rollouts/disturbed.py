@@ -216,6 +216,8 @@ def driven_disturbed(
             first, last = count, min(count + AT_ONCE, len(times)) if renewals else len(times)
             for one in renewals:
                 one.renew(float(times[first]), as_seen(slice(first, first + 1))[0])
+            for one in renewals:
+                last = max(first + 1, min(last, int(np.searchsorted(times, one.due))))
             left = solver.sample.snapshot()
             count = fly(*blocks, times, first, last, *given)
             for one in renewals:

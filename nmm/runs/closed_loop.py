@@ -254,6 +254,10 @@ class _Loop:
         retreat_state, found = self.controller.solver.retreat_state, self.recorder.found
         if self.pass_over is None or (retreat_state is not None and retreat_state.now):
             return k, False
+        for one in self.renewals:
+            last = min(last, int(np.searchsorted(self.times, one.due)) - 1)
+        if last <= k:
+            return k, False
         left = self.kept.snapshot()
         reached, whole = self.pass_over(self.times, k, last, found)
         for one in (*self.renewals, *(() if self.leg is None else (self.leg,))):

@@ -143,7 +143,7 @@ SPELLINGS: dict[str, Any] = {
     "Function": REFERENCE,
     "Function | ArrayLike": REFERENCE,
     "Function | str | ArrayLike": POINT,
-    "Sequence[Function | str | ArrayLike]": list[POINT],  # type: ignore[valid-type]  # a value, not a type
+    "Points": Annotated[list[POINT], BeforeValidator(lambda v: v if isinstance(v, list | tuple) else [v])],  # type: ignore[valid-type]  # a value, not a type
     "Function | RotationVector": REFERENCE,
     "Weights": Weights,
     "Mapping[str, Function | float]": dict[str, REFERENCE],  # type: ignore[valid-type]  # a value, not a type

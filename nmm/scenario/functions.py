@@ -17,8 +17,9 @@ from nmm.errors import InputError, expect_known
 from nmm.functions.function import Function
 from nmm.functions.references.orientation import rotation_vector
 from nmm.functions.references.polynomial import Constant, Polynomial
+from nmm.functions.tasks.measured import CameraFaults
 from nmm.kinds import REFERENCES, TASKS
-from nmm.scenario.constructors import FunctionPart, Unit, part_of
+from nmm.scenario.constructors import FunctionPart, MadePart, Unit, keys_of, part_of
 from nmm.scenario.keys import KeyedError, OneOf, Part, at, is_path, references_of
 from nmm.scenario.numbers import NumberList, Numbers, Positive, numbers
 
@@ -119,6 +120,15 @@ SPELLED: dict[str, dict[str, Any]] = {
     "constant": {"value": Numbers},
     "line": {"start": Numbers, "end": Numbers},
 }
+
+
+class CameraFaultsPart(keys_of(CameraFaults, MadePart)):  # type: ignore[misc]  # made
+    """What a simulation's camera does that a perfect one does not."""
+
+    makes = CameraFaults
+
+
+SPELLED["measured_points"] = {"faults": CameraFaultsPart, "depth": Numbers}
 SPECIAL: dict[str, type[FunctionPart]] = {"polynomial": PolynomialPart, "rotation": RotationPart}
 
 

@@ -5,10 +5,13 @@ from nmm.functions.tasks.conditions import After as After
 from nmm.functions.tasks.conditions import Between as Between
 from nmm.functions.tasks.conditions import While as While
 from nmm.functions.tasks.image import ImageLine as ImageLine
+from nmm.functions.tasks.image import ImageMoments as ImageMoments
 from nmm.functions.tasks.image import ImagePoints as ImagePoints
 from nmm.functions.tasks.image import LogDepth as LogDepth
 from nmm.functions.tasks.linear_coordinates import LinearCoordinates as LinearCoordinates
 from nmm.functions.tasks.linear_coordinates import Posture as Posture
+from nmm.functions.tasks.measured import CameraFaults as CameraFaults
+from nmm.functions.tasks.measured import MeasuredPoints as MeasuredPoints
 from nmm.functions.tasks.pointing import Heading as Heading
 from nmm.functions.tasks.pointing import Pointing as Pointing
 from nmm.functions.tasks.pose import Orientation as Orientation

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Sequence, Sized
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,6 +20,8 @@ from nmm.kernels.rotations import transposed_times3
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 
+#: Points that a camera sees: each as three numbers, a frame's name or a function; or `MeasuredPoints`.
+Points: TypeAlias = Function | Sequence[Function | str | ArrayLike]
 #: What the names of frames have that look along their z axis, with x to the right and y down (REP-103).
 OPTICAL = "optical"
 #: Intrinsics [fx, fy, cx, cy] of normalised coordinates.
@@ -75,6 +78,34 @@ def image_points(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
             rows.value_q[two + 1, k] = fy * (ahead * (dY - y * dZ))
         rows.value[two] = fx * x + numbers[2]
         rows.value[two + 1] = fy * y + numbers[3]
+
+
+@kernel(FUNCTION)
+def image_moments(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
+    """The mean (x, y) of k points, of which two rows each are there, and log a, a² the mean square of their
+    distance from it, by the chain rule, in place."""
+    k = rows.value.shape[0] // 2
+    mean, d = scratch(2), scratch(2)
+    for i in range(2):
+        mean[i] = 0.0
+        for point in range(k):
+            mean[i] += rows.value[2 * point + i] / k
+    square = 0.0
+    for row in range(2 * k):
+        rows.value[row] -= mean[row % 2]
+        square += rows.value[row] * rows.value[row] / k
+    spread = square if square > 0.0 else math.nan  # points that coincide have no size
+    for column in range(-1, at.q.shape[0]):  # -1: the time
+        d[0], d[1], growth = 0.0, 0.0, 0.0
+        for row in range(2 * k):
+            rate = rows.value_t[row] if column < 0 else rows.value_q[row, column]
+            d[row % 2] += rate / k
+            growth += rows.value[row] * rate / (k * spread)
+        if column < 0:
+            rows.value_t[0], rows.value_t[1], rows.value_t[2] = d[0], d[1], growth
+        else:
+            rows.value_q[0, column], rows.value_q[1, column], rows.value_q[2, column] = d[0], d[1], growth
+    rows.value[0], rows.value[1], rows.value[2] = mean[0], mean[1], 0.5 * math.log(spread)
 
 
 @kernel(FUNCTION)
@@ -149,9 +180,17 @@ class Seen(Function):
     points: tuple[Function, ...]
     intrinsics: Array
 
-    def _see(self, camera: str | None, points: Sequence[Function | str | ArrayLike]) -> None:
+    def _see(self, camera: str | None, points: Points) -> None:
+        """`points` are some, each a function of three rows, or one function of three rows a point."""
         self.camera = camera or ""
-        self.points = tuple(as_point(one, "points") for one in points)
+        if isinstance(points, Function):
+            expect(isinstance(points, Sized), "points", "a list of points", points)
+            self.points = (points,)
+        else:
+            expect(not isinstance(points, str), "points", "a list of points", points)
+            self.points = tuple(as_point(one, "points") for one in points)
+        self.count = sum(len(one) if isinstance(one, Sized) else 1 for one in self.points)
+        expect(self.count > 0, "points", "a list of points", points)
 
     def _measured_by(self, intrinsics: ArrayLike | None) -> None:
         self.intrinsics = vector(NORMALISED if intrinsics is None else intrinsics, 4, "intrinsics")
@@ -162,7 +201,8 @@ class Seen(Function):
         """The camera's frame; `InputError` for points that it cannot see."""
         camera = optical_frame(self.camera, robot)
         for point in self.points:
-            check_point(point, camera, robot, "points")
+            if not isinstance(point, Sized):
+                check_point(point, camera, robot, "points")
         return camera
 
     def _row(self, camera: str, name: str) -> Row:
@@ -173,10 +213,13 @@ class Seen(Function):
         here = Configuration(robot, q)
         camera = optical_frame(self.camera, robot)
         seen_by = here.placement(camera)
-        for k, point in enumerate(self.points):
-            Z = float(seen_by.actInv(evaluate(point, t, here).value)[2])
+        points = np.concatenate([evaluate(one, t, here).value for one in self.points]).reshape(-1, 3)
+        for k, point in enumerate(points):
+            which = f"point {k + 1} of {self.count}" if self.count > 1 else "the point"
+            if not np.isfinite(point).all():
+                return f"no picture has shown {which} yet"
+            Z = float(seen_by.actInv(point)[2])
             if Z <= 0.0:
-                which = f"point {k + 1} of {len(self.points)}" if len(self.points) > 1 else "the point"
                 return f"{which} is behind {camera} (Z = {Z:.3g} m)"
         return ""
 
@@ -192,7 +235,7 @@ class ImagePoints(Seen):
     Parameters
     ----------
     points : one or more, each as three numbers (world axes, m), the name of a frame (its origin), or a
-        function with three rows, of time (circle, spline, ...) or of the configuration
+        function with three rows, of time (circle, spline, ...) or of the configuration; or `MeasuredPoints`
     camera : its frame, z ahead, x right, y down; when not given, the only one whose name has "optical" in it
     intrinsics : fx, fy, cx, cy, px; normalised coordinates when not given
 
@@ -206,26 +249,62 @@ class ImagePoints(Seen):
 
     def __init__(
         self,
-        points: Sequence[Function | str | ArrayLike],
+        points: Points,
         camera: str | None = None,
         intrinsics: ArrayLike | None = None,
     ) -> None:
-        expect(not isinstance(points, str) and len(points) > 0, "points", "a list of points", points)
         self._see(camera, points)
         self._measured_by(intrinsics)
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        camera, many = self._placed(robot), len(self.points) > 1
+        camera, many = self._placed(robot), self.count > 1
         return tuple(
-            self._row(camera, f"{axis}{k + 1 if many else ''}")
-            for k in range(len(self.points))
-            for axis in "xy"
+            self._row(camera, f"{axis}{k + 1 if many else ''}") for k in range(self.count) for axis in "xy"
         )
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
         camera = self._placed(robot)
-        own = Stage(image_points, 3 * len(self.points), (camera,), self.intrinsics)
+        own = Stage(image_points, 3 * self.count, (camera,), self.intrinsics)
         return (*stacked(self.points, robot), own)
+
+
+class ImageMoments(Seen):
+    """Where a camera sees a thing that several points mark, and how large: their mean x and y, and log a.
+
+    a² is the mean square of the points' distance from the mean in the picture. Half as far a thing is twice
+    as large: log a grows by log 2 = 0.69 (F. Chaumette, Image moments, IEEE Trans. Robotics 20 (2004)). Where
+    the points coincide in the picture, and where one is behind the camera (Z <= 0), it is undefined.
+
+    Parameters
+    ----------
+    points : two or more, as those of `ImagePoints`
+    camera, intrinsics : as of `ImagePoints`
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_pan_tilt")
+    >>> board = nmm.ImageMoments([[2.0, y, z] for y in (-0.2, 0.2) for z in (0.5, 0.9)])
+    >>> nmm.evaluate(board, 0.0, nmm.Configuration(robot, robot.rest)).value.round(3)
+    array([ 0.   ,  0.   , -1.822])
+    """
+
+    def __init__(
+        self,
+        points: Points,
+        camera: str | None = None,
+        intrinsics: ArrayLike | None = None,
+    ) -> None:
+        self._see(camera, points)
+        expect(self.count > 1, "points", "two or more points", points)
+        self._measured_by(intrinsics)
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        camera = self._placed(robot)
+        return (*(self._row(camera, axis) for axis in "xy"), Row(f"{camera}.log_size", "1"))
+
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        seen = Stage(image_points, 3 * self.count, (self._placed(robot),), self.intrinsics)
+        return (*stacked(self.points, robot), seen, Stage(image_moments, 2 * self.count))
 
 
 class ImageLine(Seen):
@@ -250,12 +329,12 @@ class ImageLine(Seen):
 
     def __init__(
         self,
-        points: Sequence[Function | str | ArrayLike],
+        points: Points,
         camera: str | None = None,
         intrinsics: ArrayLike | None = None,
     ) -> None:
-        expect(not isinstance(points, str) and len(points) == 2, "points", "two points", points)
         self._see(camera, points)
+        expect(self.count == 2, "points", "two points", points)
         self._measured_by(intrinsics)
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:

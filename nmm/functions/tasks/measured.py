@@ -1,0 +1,396 @@
+"""Points as a camera measures them: late, with noise, and without their depth."""
+
+from __future__ import annotations
+
+import math
+import weakref
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.arrays import Array, counted, positive, scalar, vector
+from nmm.errors import InputError, expect
+from nmm.findings import Finding
+from nmm.functions.function import Function, LiveNumbers, Renewal, Row, Stage, move_rows
+from nmm.functions.program import Program
+from nmm.functions.references.live_target import signal
+from nmm.functions.tasks.image import Points, Seen
+from nmm.kernels.compiled import kernel
+from nmm.kernels.records import FUNCTION, At, Frames, Rows
+from nmm.kernels.rotations import exp3
+from nmm.robots.configuration import Configuration
+from nmm.robots.robot import Robot
+
+#: Of a depth that is guessed: its standard deviation over it.
+UNSURE = 0.5
+#: Of a picture's coordinates at least, normalised; and how fast a point may wander, m/√s.
+ALMOST_SURE, WANDERS = 1e-4, 5e-4
+#: The least depth that is believed over the first guess, and the least of its inverse.
+LEAST = 0.02
+
+
+class DepthEstimate:
+    """Where a point is in the world, from pictures of it: an extended Kalman filter whose state is what the
+    first picture should have shown, x and y, and the inverse of the depth there.
+
+    A picture from the same place says nothing of the depth: without a translation across the ray there is no
+    observation, and the guess stays (J. Montiel, J. Civera, A. Davison, Unified inverse depth
+    parametrization for monocular SLAM, RSS 2006).
+
+    Parameters
+    ----------
+    depth : the first guess, m
+    noise : standard deviation of x and y, normalised
+    """
+
+    def __init__(self, depth: float, noise: float) -> None:
+        self._first, self._noise = depth, max(noise, ALMOST_SURE)
+        self._R, self._c, self._t = np.eye(3), np.zeros(3), -math.inf
+        self._state, self._spread = np.zeros(3), np.zeros((3, 3))
+
+    def look(self, t: float, x: float, y: float, R: Array, c: Array) -> Array:
+        """The point (3,) after a picture taken at t, s, from c, m, in axes R, at normalised x and y."""
+        if not math.isfinite(self._t):
+            self._R, self._c, self._state = R, c, np.array([x, y, 1.0 / self._first])
+            self._spread = np.diag([self._noise**2, self._noise**2, (UNSURE / self._first) ** 2])
+        else:
+            away = WANDERS * self._state[2] * math.sqrt(max(t - self._t, 0.0))  # over the depth
+            self._spread += np.diag([away, away, away * self._state[2]]) ** 2
+            turned, moved = R.T @ self._R, R.T @ (self._c - c)
+            P_q = np.column_stack([turned[:, 0], turned[:, 1], moved])  # P, times the inverse depth
+            P = P_q @ self._state + turned[:, 2]
+            if P[2] > 0.0:
+                seen = P[:2] / P[2]
+                H = (P_q[:2] - np.outer(seen, P_q[2])) / P[2]
+                spread = H @ self._spread @ H.T + self._noise**2 * np.eye(2)
+                gain = np.linalg.solve(spread, H @ self._spread).T
+                self._state = self._state + gain @ (np.array([x, y]) - seen)
+                self._state[2] = min(max(self._state[2], LEAST / self._first), 1.0 / (LEAST * self._first))
+                kept = np.eye(3) - gain @ H
+                self._spread = kept @ self._spread @ kept.T + self._noise**2 * gain @ gain.T
+        self._t = max(self._t, t)
+        x0, y0, inverse = self._state
+        return np.asarray(self._c + self._R @ np.array([x0, y0, 1.0]) / inverse)
+
+    @property
+    def depth(self) -> tuple[float, float]:
+        """The depth in the first picture, and its standard deviation, m."""
+        inverse = float(self._state[2])
+        return 1.0 / inverse, math.sqrt(self._spread[2, 2]) / inverse**2
+
+
+@dataclass(frozen=True)
+class CameraFaults:
+    """What a camera in a simulation does that a perfect one does not.
+
+    Parameters
+    ----------
+    rate : pictures per s
+    latency : until a picture arrives, s
+    noise : standard deviation of each coordinate, in the unit of the image
+    whole : whether coordinates are rounded to whole pixels (to 1 in the image's unit)
+    dropped : the share of pictures that do not come
+    size : width and height of the picture, px, from 0 on; points outside are not seen; all are when not given
+    focal : the focal length over the one that is believed
+    hand_eye : where the camera is in its frame's axes, x, y, z (m) and a rotation vector (rad); as believed
+        when not given
+    seed : of the noise and of what is dropped
+
+    Raises
+    ------
+    InputError : numbers out of their range
+
+    Examples
+    --------
+    >>> nmm.CameraFaults(rate=30.0, latency=0.05, noise=0.5, size=[640, 480]).latency
+    0.05
+    """
+
+    rate: float = 30.0
+    latency: float = 0.0
+    noise: float = 0.0
+    whole: bool = False
+    dropped: float = 0.0
+    size: ArrayLike | None = None
+    focal: float = 1.0
+    hand_eye: ArrayLike | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        positive(self.rate, "rate")
+        positive(self.focal, "focal")
+        scalar(self.latency, "latency", least=0.0)
+        scalar(self.noise, "noise", least=0.0)
+        expect(0.0 <= scalar(self.dropped, "dropped") < 1.0, "dropped", "a share, 0 to below 1", self.dropped)
+        if self.hand_eye is not None:
+            vector(self.hand_eye, 6, "hand_eye")
+        if self.size is not None:
+            expect(bool(np.all(vector(self.size, 2, "size") > 0.0)), "size", "numbers above 0", self.size)
+        counted(self.seed, "seed", 0)
+
+
+class MeasuredPoints(Seen):
+    """Points of the world where a camera's pictures say that they are: three rows each.
+
+    `ImagePoints(measured)` and `LogDepth(measured.point(0))` are tasks of what was measured. Between two
+    pictures, and for the time that one takes to arrive, a point stands in the world while the camera moves:
+    what is foretold is what the robot's own motion does to the picture. A point is put at its depth along the
+    ray of its picture; the depth is given, or observed, from how the ray turns as the camera moves (it takes
+    a translation across the ray to observe it).
+
+    On a robot, `set` takes what was measured. `simulate` and `rollout` take pictures of `points` themselves;
+    the first one is there when a run begins.
+
+    Parameters
+    ----------
+    points : where they are, as those of `ImagePoints`: what a simulation takes pictures of. Only their number
+        matters to a robot with a camera of its own
+    camera, intrinsics : as of `ImagePoints`, of the camera that the controller believes in
+    depth : of each point, m, as it is believed: a number, or one a point
+    observed : whether the depth is estimated from there on
+    faults : of the simulation's camera; `CameraFaults()` when not given
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_pan_tilt")
+    >>> ball = nmm.MeasuredPoints([[2.0, 0.5, 0.6]], depth=1.0, observed=True)
+    >>> middle = nmm.Task(nmm.ImagePoints(ball), [0.0, 0.0])
+    >>> controller = nmm.Controller(robot, middle, nmm.ProjectedGradient())
+    >>> ball.set([-0.2, 0.1], t=0.0, q=robot.rest)
+    >>> controller.evaluate(0.1, robot.rest).r.round(3)
+    array([-0.2,  0.1])
+    """
+
+    def __init__(
+        self,
+        points: Points,
+        camera: str | None = None,
+        intrinsics: ArrayLike | None = None,
+        depth: ArrayLike = 1.0,
+        observed: bool = False,
+        faults: CameraFaults | None = None,
+    ) -> None:
+        self._see(camera, points)
+        self._measured_by(intrinsics)
+        k = self.count
+        given = np.asarray(depth, dtype=np.float64)
+        self.depth = vector(np.full(k, given) if given.ndim == 0 else given, k, "depth")
+        expect(bool(np.all(self.depth > 0.0)), "depth", "numbers above 0, m", depth)
+        self.observed, self.faults = bool(observed), faults or CameraFaults()
+        self._pictures: weakref.WeakSet[Pictures] = weakref.WeakSet()
+        self._robot: Robot | None = None
+        self._taken: Belief | None = None
+        #: The time of the last picture, s, which `Age` reads.
+        self._at = LiveNumbers(np.array([0.0]))
+
+    def __len__(self) -> int:
+        return self.count
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        camera = self._placed(robot)
+        return tuple(Row(f"{camera}.point{k + 1}.{axis}", "m") for k in range(len(self)) for axis in "xyz")
+
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        camera = self._placed(robot)
+        self._robot, live = robot, Pictures(self, robot, camera)
+        self._pictures.add(live)
+        return (Stage(signal, 3 * len(self), (), live.numbers, live=live),)
+
+    def point(self, k: int) -> Function:
+        """One of them, from 0 on, as a point."""
+        return MeasuredPoint(self, counted(k, "point", 0))
+
+    def age(self) -> Function:
+        """How old the last picture is that has all points, s: for a task's `While`."""
+        return Age(self)
+
+    def set(self, values: ArrayLike, t: float, q: ArrayLike, depth: ArrayLike | None = None) -> None:
+        """What a picture shows, from the next step on.
+
+        Parameters
+        ----------
+        values : (2 k,) or (k, 2), x and y of each point, in the unit of the image; not numbers for a point
+            that is not in it
+        t : when it was taken, s, in the controller's time
+        q : (n,) the configuration then, by encoders and odometry
+        depth : of each point, m, where a sensor or a model gives it: (k,) or a number
+
+        Raises
+        ------
+        InputError : another number of numbers; no controller has these points yet
+        """
+        if self._robot is None:
+            raise InputError("no controller has these points yet", where="set", expected="a controller first")
+        if self._taken is None:
+            self._taken = Belief(self)
+        seen = np.asarray(values, dtype=np.float64).reshape(-1)
+        expect(seen.size == 2 * len(self), "values", f"{2 * len(self)} numbers", seen.size)
+        if depth is not None:
+            depth = np.broadcast_to(np.asarray(depth, dtype=np.float64), len(self))
+        camera = self._placed(self._robot)
+        here = Configuration(self._robot, self._robot.q(q)).placement(camera)
+        at = scalar(t, "t")
+        numbers = self._taken.look(at, seen.reshape(-1, 2), here.rotation, here.translation, depth)
+        for live in self._pictures:
+            live.set(numbers)
+        self._at.set(np.array([self._taken.oldest]))
+
+    def __getstate__(self) -> dict[str, object]:
+        """Copies are measured by themselves."""
+        return {**self.__dict__, "_pictures": None, "_robot": None, "_taken": None}
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        self.__dict__.update(state)
+        self._pictures = weakref.WeakSet()
+
+
+class Belief:
+    """Where points are believed to be, picture by picture."""
+
+    def __init__(self, of: MeasuredPoints) -> None:
+        self._of, k = of, len(of)
+        fx = float(min(of.intrinsics[:2]))
+        noise = math.hypot(of.faults.noise, 0.3 if of.faults.whole else 0.0) / fx
+        self._estimates = [DepthEstimate(float(depth), noise) for depth in of.depth]
+        self._points, self._times = np.full((k, 3), np.nan), np.full(k, -np.inf)
+
+    @property
+    def oldest(self) -> float:
+        """When the point was seen that has not been seen for longest, s."""
+        return float(self._times.min())
+
+    def look(self, t: float, seen: Array, R: Array, c: Array, depth: Array | None = None) -> Array:
+        """The numbers of `signal` after a picture (k, 2) taken at t, s, from c (3,), m, in axes R."""
+        fx, fy, cx, cy = self._of.intrinsics
+        for k, (x, y) in enumerate((seen - [cx, cy]) / [fx, fy]):
+            if not (math.isfinite(x) and math.isfinite(y)):
+                continue
+            self._times[k] = t
+            if depth is None and self._of.observed:
+                self._points[k] = self._estimates[k].look(t, x, y, R, c)
+            else:
+                far = self._of.depth[k] if depth is None else depth[k]
+                self._points[k] = c + far * (R @ np.array([x, y, 1.0]))
+        return np.concatenate([[0.0, t], self._points.ravel(), np.zeros(self._points.size)])
+
+
+class Pictures(Renewal):
+    """The points' numbers along a run, whose camera takes pictures of the true points."""
+
+    jumps = True
+
+    def __init__(self, of: MeasuredPoints, robot: Robot, camera: str) -> None:
+        self._of, self._robot, self._camera = of, robot, camera
+        self._true = Program(robot, of.points)
+        self._true.lay_out()
+        given = of.faults
+        shift = np.zeros(6) if given.hand_eye is None else vector(given.hand_eye, 6, "hand_eye")
+        self._moved, turned = shift[:3], np.empty((3, 3))
+        exp3(shift[3:], turned)
+        self._turned = turned
+        super().__init__(np.concatenate([[0.0, 0.0], np.full(3 * len(of), np.nan), np.zeros(3 * len(of))]))
+        self.begin()
+
+    def begin(self) -> None:
+        self.events = []
+        self._rng = np.random.default_rng(self._of.faults.seed)
+        self._belief, self._next = Belief(self._of), 0
+        self._waiting: deque[tuple[float, float, Array, Array, Array]] = deque()
+        self._taken = self._lost = 0
+        self._since, self._gap = 0.0, 0.0
+
+    @property
+    def due(self) -> float:
+        arrives = self._waiting[0][0] if self._waiting else math.inf
+        return min(arrives, self._next / self._of.faults.rate) - SOON
+
+    def stays(self, times: Array, q: Array) -> int:
+        return int(np.searchsorted(times, self.due))
+
+    def renew(self, t: float, q: Array) -> None:
+        faults = self._of.faults
+        if t >= self._next / faults.rate - SOON:
+            self._next = math.floor((t + SOON) * faults.rate) + 1
+            self._take(t, q)
+        while self._waiting and self._waiting[0][0] <= t + SOON:
+            _, taken, seen, R, c = self._waiting.popleft()
+            self.set(self._belief.look(taken, seen, R, c))
+            if np.isfinite(self._belief.oldest):
+                self._of._at.set(np.array([self._belief.oldest]))
+
+    def _take(self, t: float, q: Array) -> None:
+        """Take a picture."""
+        of, faults = self._of, self._of.faults
+        here = Configuration(self._robot, q).placement(self._camera)
+        R, c = here.rotation, here.translation
+        P = np.array([one.value for one in self._true.evaluate(t, q)]).reshape(-1, 3)
+        P = (P - (c + R @ self._moved)) @ (R @ self._turned)
+        ahead = P[:, 2] > 0.0
+        with np.errstate(divide="ignore", invalid="ignore"):
+            seen = P[:, :2] / P[:, 2:]
+        seen = seen * faults.focal * of.intrinsics[:2] + of.intrinsics[2:]
+        seen += faults.noise * self._rng.standard_normal(seen.shape)
+        first = not self._taken
+        lost = self._rng.random() < faults.dropped and not first
+        if faults.whole:
+            seen = np.round(seen)
+        inside = np.all((seen >= 0.0) & (seen <= faults.size), axis=1) if faults.size is not None else ahead
+        seen[~(ahead & inside)] = np.nan
+        self._taken += 1
+        whole = not lost and bool(np.isfinite(seen).all())
+        self._lost += not whole
+        self._gap = max(self._gap, t - self._since)
+        if whole:
+            self._since = t
+        if not lost:
+            self._waiting.append((t + (0.0 if first else faults.latency), t, seen, R, c))
+
+    def planned(self, t: Array) -> None:
+        return None
+
+    def noticed(self, end: float) -> Iterator[Finding]:
+        if self._lost:
+            values = {"lost": self._lost, "taken": self._taken, "gap": max(self._gap, end - self._since)}
+            yield Finding("pictures_lost", values)
+
+
+#: Times of samples and pictures that differ by less are equal, s.
+SOON = 1e-9
+
+
+class MeasuredPoint(Function):
+    """One of `MeasuredPoints`: made by their `point`."""
+
+    def __init__(self, of: MeasuredPoints, k: int) -> None:
+        expect(k < len(of), "point", f"a number below {len(of)}", k)
+        self.of, self.k = of, k
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        return self.of.rows(robot)[3 * self.k : 3 * self.k + 3]
+
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        first = Stage(move_rows, 3 * len(self.of), (), np.array([3.0 * self.k, 0.0, 3.0, 0.0]))
+        return (*self.of.stages(robot), *((first,) if self.k else ()))
+
+
+@kernel(FUNCTION)
+def since(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
+    """t - numbers[0]."""
+    rows.value[0] = at.t - numbers[0]
+    rows.value_t[0] = 1.0
+
+
+class Age(Function):
+    """How old the last whole picture of `MeasuredPoints` is, s: made by their `age`."""
+
+    def __init__(self, of: MeasuredPoints) -> None:
+        self.of = of
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        return (Row(f"{self.of._placed(robot)}.age", "s"),)
+
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        return (Stage(since, 1, (), self.of._at.numbers, live=self.of._at),)
