@@ -53,6 +53,7 @@ from .functions.function import Function as Function
 from .functions.function import LiveNumbers as LiveNumbers
 from .functions.function import Row as Row
 from .functions.function import Shown as Shown
+from .functions.function import Sight as Sight
 from .functions.function import Stage as Stage
 from .functions.function import row_scales as row_scales
 from .functions.objectives import Objective as Objective
@@ -150,6 +151,7 @@ from .robots.meshes import Shapes as Shapes
 from .robots.meshes import read_meshes as read_meshes
 from .robots.mimic_joints import MimicJoint as MimicJoint
 from .robots.motion import Body as Body
+from .robots.motion import Camera as Camera
 from .robots.motion import Motion as Motion
 from .robots.motion import Nearest as Nearest
 from .robots.reach import Reach as Reach
@@ -192,6 +194,9 @@ from .runs.residuals import Residuals as Residuals
 from .runs.residuals import differs as differs
 from .runs.residuals import residuals as residuals
 from .runs.residuals import run_up as run_up
+from .runs.seen import GoalRows as GoalRows
+from .runs.seen import RunCamera as RunCamera
+from .runs.seen import SeenPoints as SeenPoints
 from .runs.shown_frame import shown_frame as shown_frame
 from .runs.simulation import MOST_SAMPLES as MOST_SAMPLES
 from .runs.table import step_time as step_time

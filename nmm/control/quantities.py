@@ -98,8 +98,8 @@ class RecordedQuantity:
     name : in `Step`, the record, `Trajectory` and trajectory.npz, where it is present
     symbol, meaning : for people
     shape : a letter for each extent: N samples, n coordinates, m inputs, s rows of the task, l levels of
-        priority, w values with limits, L limits with names, K samples or 0 where no distances are kept; a
-        digit stands for itself
+        priority, w values with limits, L limits with names, K samples or 0 where no distances are kept, P
+        points that cameras see; a digit stands for itself
     unit : "" for none; "rows", "inputs" or "coordinates" for theirs
     whole : whether it holds integers
     fill : its value where it was not recorded, and while its task is not active
@@ -140,7 +140,7 @@ class RecordedQuantity:
 
     def absent(self, **sizes: int) -> Any:
         """Its value where it was not recorded; extents that are not given are 0."""
-        return self.room(dict.fromkeys("NnmsLK", 0) | {"l": 1} | sizes)
+        return self.room(dict.fromkeys("NnmsLKP", 0) | {"l": 1} | sizes)
 
     def room(self, sizes: dict[str, int]) -> Any:
         """An array with these extents, `fill` everywhere."""
@@ -329,6 +329,7 @@ _TABLE = (
     RecordedQuantity("desired", "", "its desired path", "N3", "m", optional=True),
     RecordedQuantity("planned", "", "where its plan was", "Nn", "coordinates", optional=True, finite=True),
     RecordedQuantity("target", "", "the point that a bearing looks at", "3", "m", optional=True, finite=True),
+    RecordedQuantity("seen", "", "the points that cameras see", "NP3", "m", since=9, optional=True),
     RecordedQuantity("rate", "ṙ_d + K e", "rate that the task asks for", "Ns", noted=True, saved=False),
     RecordedQuantity("J", "J̄", "matrix of the task", "Nsm", noted=True, saved=False),
     RecordedQuantity(

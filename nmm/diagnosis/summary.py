@@ -69,6 +69,8 @@ def summarise(trajectory: Trajectory, motors: bool = True) -> dict[str, Any]:
             for one in trajectory.obstacles
         ],
     }
+    if trajectory.cameras:
+        summary["cameras"] = [one.as_json() for one in trajectory.cameras]
     if count:
         if trajectory.clearance_names:
             summary["clearance_names"] = list(trajectory.clearance_names)

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from nmm.ellipsoid_options import Wanted
     from nmm.folders.schema import ToldObstacle, ToldRun
     from nmm.robots.robot import Robot
+    from nmm.runs.seen import RunCamera
     from nmm.runs.trajectory import Trajectory
 #: More samples take seconds to write, which is logged.
 MANY = 50_000
@@ -122,11 +123,13 @@ def _loaded(folder: Path, robot: Robot | None) -> Trajectory:
     same = told.robot.fingerprint in (None, robot.fingerprint)
     if not same or (found["q"].shape[1], found["u"].shape[1]) != (robot.n, robot.n_u):
         raise InputError(f"{robot.name} is another robot than the run's ({_ASK})", where=folder)
-    if told.frame is not None:
+    named = [] if told.frame is None else [("frame", told.frame)]
+    named += [(f"cameras.{i}.frame", one.frame) for i, one in enumerate(told.cameras)]
+    for key, frame in named:
         try:
-            robot.frame_id(told.frame)
+            robot.frame_id(frame)
         except InputError as error:
-            raise error.at(f"{summary}: frame") from None
+            raise error.at(f"{summary}: {key}") from None
     findings = None if told.findings is None else [one.model_dump() for one in told.findings]
     own = ToldRun.model_fields.keys() & Trajectory.__dataclass_fields__.keys()
     rest: dict[str, Any] = {name: getattr(told, name) for name in own} | {
@@ -137,8 +140,28 @@ def _loaded(folder: Path, robot: Robot | None) -> Trajectory:
         "obstacles": obstacles,
         "scenario": scenario,
         "events": tuple(Event(**event.model_dump()) for event in told.events),
+        "cameras": _cameras(told, arrays, summary),
     }
     return Trajectory.of(arrays, **rest)
+
+
+def _cameras(told: ToldRun, arrays: Mapping[str, Any], summary: Path) -> tuple[RunCamera, ...]:
+    """The cameras of a summary; InputError for points that were not seen, or rows that the task lacks."""
+    from nmm.runs.seen import GoalRows, RunCamera
+
+    seen, rows = arrays["seen"], range(len(told.r_names))
+    points = range(0 if seen is None else seen.shape[1])
+    for i, one in enumerate(told.cameras):
+        own = range(len(one.points))
+        numbers = [*(goal.point for goal in one.goals), *(end for line in one.lines for end in line)]
+        fits = all(point in points for point in one.points) and all(number in own for number in numbers)
+        expect(fits, f"{summary}: cameras.{i}", f"numbers of the {len(points)} points in trajectory.npz")
+        fits = all(goal.x in rows and goal.y in rows for goal in one.goals)
+        expect(fits, f"{summary}: cameras.{i}.goals", f"rows from 0 to {len(rows) - 1}")
+    return tuple(
+        RunCamera(**{**dict(one), "goals": tuple(GoalRows(**dict(goal)) for goal in one.goals)})
+        for one in told.cameras
+    )
 
 
 def _check_counts(told: ToldRun, found: Mapping[str, Any], summary: Path) -> None:

@@ -58,6 +58,23 @@ class ToldObstacle(Told):
     shape: dict[str, Any]
 
 
+class ToldGoal(Told):
+    point: int
+    x: int
+    y: int
+    intrinsics: tuple[PositiveFloat, PositiveFloat, FiniteFloat, FiniteFloat]
+
+
+class ToldCamera(Told):
+    frame: str
+    points: tuple[int, ...]
+    goals: tuple[ToldGoal, ...]
+    border: tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat]
+    bounded: bool
+    intrinsics: tuple[PositiveFloat, PositiveFloat, FiniteFloat, FiniteFloat]
+    lines: tuple[tuple[int, int], ...]
+
+
 class ToldRun(Told):
     """summary.json of a run; values with a default may be absent in older ones."""
 
@@ -82,6 +99,7 @@ class ToldRun(Told):
     clearance_asked: FiniteFloat = 0.0
     obstacles: tuple[ToldObstacle, ...] | None = None
     events: tuple[ToldEvent, ...] = ()
+    cameras: tuple[ToldCamera, ...] = ()
     made_with: dict[str, str | int] = {}
     unmet_samples: int = NO_RESIDUALS.samples
     unmet_share: float = NO_RESIDUALS.share

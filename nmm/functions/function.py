@@ -20,6 +20,7 @@ from nmm.kernels.compiled import Kernel, clear, kernel
 from nmm.kernels.linear_algebra import copied
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.configuration import Configuration
+from nmm.robots.motion import NORMALISED
 from nmm.robots.robot import Robot
 
 
@@ -192,6 +193,31 @@ class Stage:
     remembers: bool = False
 
 
+class Sight(NamedTuple):
+    """What a function sees of points.
+
+    Attributes
+    ----------
+    camera : the camera's frame (z ahead, x right, y down); "" for the only one that is called optical
+    points : what it sees, each with three rows, m, world axes
+    rows : the rows of x and y of each point in the picture; () where the function has none
+    intrinsics : fx, fy, cx, cy of these rows, px; 1, 1, 0, 0 for normalised coordinates
+    line : whether it is the line through its points that is seen
+
+    Examples
+    --------
+    >>> sight = nmm.ImagePoints([[2.0, 0.5, 0.6]]).shown().sees
+    >>> isinstance(sight, nmm.extending.Sight), len(sight.points), sight.rows
+    (True, 1, ((0, 1),))
+    """
+
+    camera: str
+    points: tuple[Function, ...]
+    rows: tuple[tuple[int, int], ...] = ()
+    intrinsics: tuple[float, float, float, float] = NORMALISED
+    line: bool = False
+
+
 class Shown(NamedTuple):
     """What figures and playback draw of a function.
 
@@ -201,6 +227,7 @@ class Shown(NamedTuple):
     axes : the world axes ("x", "y", "z") of that position, each with its row, m
     turns : the frame that it turns
     looks_at : the fixed point that it looks at, (2,) or (3,), m, world axes
+    sees : what a camera sees of points
 
     Examples
     --------
@@ -213,13 +240,14 @@ class Shown(NamedTuple):
     axes: Mapping[str, int] = MappingProxyType({})
     turns: str | None = None
     looks_at: Array | None = None
+    sees: Sight | None = None
 
 
 class Function(ABC):
     """φ(t, q). A new function is a kernel and a subclass with two methods: `rows(robot)` returns the
     components' names and units, and raises `InputError` for what the robot lacks; `stages(robot)` returns the
-    kernels that compute value, time derivative and Jacobian. One that moves a frame or looks at a point
-    overrides `shown()`, one whose values deserve a warning `noticed()`, one without a value somewhere
+    kernels that compute value, time derivative and Jacobian. One that moves a frame, or looks at or sees
+    points, overrides `shown()`, one whose values deserve a warning `noticed()`, one without a value somewhere
     `undefined()`.
 
     `comparison` is for values that cannot be subtracted (orientations, poses): a kernel of signature

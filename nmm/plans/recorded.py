@@ -16,6 +16,7 @@ from nmm.robots.reach import first_tip
 from nmm.robots.robot import Robot
 from nmm.runs.clearance import swept
 from nmm.runs.margins import margin, shares, standing
+from nmm.runs.seen import SeenPoints
 from nmm.runs.shown_frame import shown_frame
 from nmm.runs.trajectory import Trajectory
 from nmm.runs.verdict import AS_ASKED, Verdict
@@ -35,7 +36,7 @@ def recorded(
 ) -> Trajectory:
     """The run that was at q (N, n) with u (N, n_u) at t (N,), s, every dt."""
     S = np.array([robot.S(one) for one in q])
-    rows, drawn = task.rows(robot), shown_frame([task], robot)
+    rows, drawn, seen = task.rows(robot), shown_frame([task], robot), SeenPoints([task], None, robot)
     found = map(np.array, zip(*map(TaskError(robot, task).evaluate, q, t.tolist()), strict=True))
     r, r_d, error, error_q = found
     names, within = shares(limits, robot, q, u, np.zeros((len(t), 0)))
@@ -76,5 +77,7 @@ def recorded(
         path=path,
         desired=None if path is None or not drawn.rows else drawn.desired(path, r_d),
         target=drawn.mark(path),
+        seen=seen.at(t, q),
+        cameras=seen.cameras,
         **distances,
     )

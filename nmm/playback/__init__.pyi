@@ -1,3 +1,4 @@
+from .cameras import Camera as Camera
 from .ellipsoids import EllipsoidOptions as EllipsoidOptions
 from .html import Page as Page
 from .html import write_html as write_html

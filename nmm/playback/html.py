@@ -20,8 +20,8 @@ from nmm.playback.scene import Shown, playback_scene
 HEIGHT = 600
 #: In the order in which they depend on one another.
 _NAMES = (
-    "commands elements theme runs legend scenery texts ghosts ellipsoids obstacles apart camera curves plots "
-    "values facts player film webm record keys address start"
+    "commands elements theme runs legend scenery texts ghosts ellipsoids obstacles sights apart camera "
+    "curves plots values facts player film webm record keys address start"
 )
 SCRIPTS = tuple(f"{name}.js" for name in _NAMES.split())
 
@@ -191,7 +191,7 @@ def _page(title: str, styles: Sequence[str], sources: str, beside: str = "", **o
         "policy": POLICY.format(sources=sources, beside=beside),
         "version": metadata.version("nmm"),
         "title": escape(title),
-        "style": "\n".join(_resource(name) for name in ("style.css", "plots.css", *styles)),
+        "style": "\n".join(_resource(name) for name in ("style.css", "plots.css", "sights.css", *styles)),
     }
     # Split once, so that inserted text is not searched for places.
     pieces = _resource("page.html").split("@")

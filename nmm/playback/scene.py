@@ -12,6 +12,7 @@ from nmm.collisions.obstacle import Obstacle, obstacle_places
 from nmm.ellipsoid_options import Wanted, options_of
 from nmm.errors import expect
 from nmm.playback import extent
+from nmm.playback.cameras import draw_cameras, seen_points, tell_cameras
 from nmm.playback.channels import channels, draw_curves, draw_facts
 from nmm.playback.drawing import Command, Drawing, Rgb, packed
 from nmm.playback.keyframes import MOST_FRAMES, Keyframes, ghost_samples, keyframes, samples_kept
@@ -64,7 +65,7 @@ def playback_scene(
     if shown is not None:
         boxes = shown.around(boxes, times)
     obstacles = SceneObstacles(motions, boxes, fps)
-    view = np.vstack([extent.view_points(boxes, motions), obstacles.points()])
+    view = np.vstack([extent.view_points(boxes, motions), obstacles.points(), seen_points(motions)])
     size = max(0.5 * float(np.linalg.norm(np.ptp(view, axis=0))), 1e-3)
     several = len(motions) > 1
     drawing = Drawing()
@@ -110,10 +111,12 @@ def playback_scene(
         planned = None if motion.planned is None else _on_the_floor(motion.robot, motion.planned, size)
         if planned is not None:
             _line(drawing, f"{path}/plan", DESIRED, planned[drawn], thick=0.6)
+        animations += draw_cameras(drawing, motion, robot, path, start, fps, size)
         draw_nearest(drawing, motion, path, color if several else None, start, fps)
         if shown is not None:
             animations += shown.draw(drawing, i, path, color, start)
     obstacles.tell(drawing)
+    tell_cameras(drawing, motions)
     _desired(drawing, motions)
     _targets(drawing, motions, size)
     if shown is not None:

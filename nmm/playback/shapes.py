@@ -33,7 +33,7 @@ class DrawnRobot:
         below = [path]
         for joint in range(1, model.njoints):
             below.append(f"{below[model.parents[joint]]}/{segment(model.names[joint])}")
-        self.paths = below[1:]
+        self.paths, self._below = below[1:], below
         # A fixed base stands at the robot's own node.
         self.root = below[model.getJointId("theta") if robot.platform.n_p else 0]
         self._drawing = drawing
@@ -45,6 +45,14 @@ class DrawnRobot:
                 drawing.object(f"{at}/{k}", shape.geometry, color, opacity=shape.color[3], rank=rank)
                 if not np.array_equal(shape.matrix, np.eye(4)):
                     drawing.transform(f"{at}/{k}", shape.matrix)
+
+    def frame_node(self, frame: str, name: str) -> str:
+        """Draw a node of that name, once, at a frame; returns its path."""
+        model = self.placements.model
+        found = model.frames[model.getFrameId(frame)]
+        path = f"{self._below[found.parentJoint]}/{segment(name)}"
+        self._drawing.transform(path, np.array(found.placement.homogeneous))
+        return path
 
     def place(self, q: Array, wheels: Array) -> None:
         for path, matrix in self._nodes(q, wheels):

@@ -65,6 +65,56 @@ class Nearest:
     asked: float
 
 
+#: Intrinsics [fx, fy, cx, cy] of normalised coordinates.
+NORMALISED = (1.0, 1.0, 0.0, 0.0)
+#: x and y of a picture's upper left corner and of the lower right one, where nothing is known, normalised.
+PICTURE = (-0.6, -0.45, 0.6, 0.45)
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """What a camera of a robot sees of k points at each of a motion's N samples.
+
+    Attributes
+    ----------
+    frame : the camera's, z ahead, x right, y down
+    points (N, k, 3) : where they are, m, world axes
+    goals (N, k, 2) : where they are to be in the picture, normalised; not a number where nowhere
+    border : x and y of the picture's upper left corner, then of the lower right one, normalised
+    bounded : whether limits keep points within the border
+    intrinsics : fx, fy, cx, cy, px, in which the picture is read; 1, 1, 0, 0 for normalised coordinates
+    lines : pairs of points whose line is seen
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_pan_tilt")
+    >>> ball = np.array([[[2.0, 0.5, 0.6]]])
+    >>> camera = nmm.playback.Camera("camera_optical_frame", ball, np.zeros((1, 1, 2)))
+    >>> camera.picture(robot, robot.rest[None]).round(3)
+    array([[[-0.278,  0.111]]])
+    """
+
+    frame: str
+    points: Array
+    goals: Array
+    border: tuple[float, float, float, float] = PICTURE
+    bounded: bool = False
+    intrinsics: tuple[float, float, float, float] = NORMALISED
+    lines: tuple[tuple[int, int], ...] = ()
+
+    def picture(self, robot: Robot, q: Array) -> Array:
+        """Where it sees the points (N, k, 2), normalised, from q (N, n); not a number behind it."""
+        data, frame = robot.model.createData(), robot.frame_id(self.frame)
+        found = np.full((len(q), self.points.shape[1], 2), np.nan)
+        for k, (here, points) in enumerate(zip(q, self.points, strict=True)):
+            pin.framesForwardKinematics(robot.model, data, here)
+            placement = data.oMf[frame]
+            seen = (points - placement.translation) @ placement.rotation
+            ahead = seen[:, 2] > 0.0
+            found[k, ahead] = seen[ahead, :2] / seen[ahead, 2:]
+        return found
+
+
 @dataclass(frozen=True, eq=False)
 class Motion:
     """N samples of a robot that moves, and what belongs into the picture with it.
@@ -82,6 +132,7 @@ class Motion:
     frame : the end-effector's frame
     bodies : what stands or moves beside the robot
     nearest : which points are nearest to each other, and how near
+    cameras : what its cameras see
 
     Raises
     ------
@@ -111,6 +162,7 @@ class Motion:
     frame: str | None = None
     bodies: tuple[Body, ...] = ()
     nearest: Nearest | None = None
+    cameras: tuple[Camera, ...] = ()
 
     def __post_init__(self) -> None:
         t = vector(self.t, None, "t")
@@ -135,6 +187,12 @@ class Motion:
             expect(shape in ((t.size, 4, 4), (1, 4, 4)), f"bodies: {body.name}", expected, shape)
         if self.nearest is not None:
             matrix(np.nan_to_num(self.nearest.points), (t.size, 6), "nearest: points")
+        for camera in self.cameras:
+            self.robot.frame_id(camera.frame)
+            shapes, count = (camera.points.shape, camera.goals.shape), camera.points.shape[1:2]
+            expected = f"points and goals of shapes ({t.size}, k, 3) and ({t.size}, k, 2)"
+            fits = shapes == ((t.size, *count, 3), (t.size, *count, 2))
+            expect(fits, f"cameras: {camera.frame}", expected, shapes)
 
     @property
     def duration(self) -> float:

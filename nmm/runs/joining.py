@@ -15,6 +15,7 @@ from nmm.robots.robot import Robot
 from nmm.runs.clearance import Swept, swept
 from nmm.runs.closed_loop import Leg
 from nmm.runs.residuals import NO_RESIDUALS, Residuals
+from nmm.runs.seen import SeenPoints
 from nmm.runs.shown_frame import shown_frame
 from nmm.runs.trajectory import Trajectory
 
@@ -61,6 +62,7 @@ def join(
             alone = shown_frame([task], robot)
             if alone.frame == drawn.frame:
                 desired = alone.desired(desired, arrays["r_d"][:, first[i] :])
+    seen = SeenPoints(stack, controller.limits, robot)
     happened = [*schedule.events, *(event for part in parts for event in part.events)]
     more = {name: arrays.pop(name) for name in [*arrays] if name in parts[0].more}
     joined = replace(
@@ -78,6 +80,8 @@ def join(
         planned=None,
         u_dot=None if parts[0].u_dot is None else np.concatenate([part.u_dot for part in parts]),
         target=drawn.mark(path),
+        seen=seen.at(t, q),
+        cameras=seen.cameras,
         events=tuple(sorted(dict.fromkeys(happened), key=lambda event: event.t)),
         **({} if found is None else found.kept),
     )

@@ -22,6 +22,7 @@ from nmm.machine import expect_memory
 from nmm.runs.clearance import Swept, swept
 from nmm.runs.margins import margin, shares, standing
 from nmm.runs.residuals import residuals
+from nmm.runs.seen import SeenPoints
 from nmm.runs.shown_frame import shown_frame
 from nmm.runs.trajectory import Trajectory
 
@@ -45,6 +46,7 @@ class Recorder:
         rows, count, sizes = controller.rows, len(times), controller.solver.sizes
         self.controller, self._times, self._count = controller, times, 0
         self._shown = shown_frame(controller.task, controller.robot)
+        self._seen = SeenPoints(controller.task, controller.limits, controller.robot)
         expect_memory(
             COPIES * count * sum(one.nbytes for one in room(1, *sizes)),
             f"{count} samples need",
@@ -183,6 +185,7 @@ class Recorder:
             "desired": desired,
             "planned": planned,
             "target": self._shown.mark(path),
+            "seen": self._seen.at(self.t, found.q),
             **distances,
         }
         those = [one for one in saved() if one.name not in worked_out]
@@ -202,6 +205,7 @@ class Recorder:
             dt=dt,
             events=tuple(Event(*event) for one in controller.solver.program.renewals for event in one.events),
             frame=self._shown.frame,
+            cameras=self._seen.cameras,
             kinematics_off=np.nan if three is None else controller.solver.program.kinematics_off(three),
         )
 

@@ -23,6 +23,7 @@ from nmm.machine import made_with
 from nmm.robots.motion import Body, Motion, Nearest
 from nmm.robots.robot import Robot
 from nmm.runs.residuals import NO_RESIDUALS, Residuals
+from nmm.runs.seen import RunCamera
 from nmm.runs.verdict import AS_ASKED, Awaited, Verdict
 from nmm.runs.verdict import Outcome as Outcome
 
@@ -65,6 +66,8 @@ class Trajectory:
     frame : the end-effector frame that the task positions, if any
     path, desired (N, 3): its path and, where the task says, the desired one, m in the world
     target (3,): the fixed point that a bearing looks at, if any
+    seen (N, P, 3): the points that cameras see, m in the world, if any
+    cameras : which of them each camera sees, and where the task wants them in its picture
     clearance (N,): least distance between shapes that are kept apart, m, infinite where none are
     clearance_between (N,): the least on the way to the next sample, m
     clearance_pairs (N,): which of `clearance_names` is nearest, -1 for none
@@ -115,6 +118,7 @@ class Trajectory:
     planned: Array | None = None
     u_dot: Array | None = None
     target: Array | None = None
+    seen: Array | None = None
     unmet: Residuals = NO_RESIDUALS
     limited: bool = False
     shares: Array = field(default_factory=QUANTITIES["shares"].absent)
@@ -131,6 +135,7 @@ class Trajectory:
     kinematics_off: float = float("nan")
     scenario: dict[str, Any] | None = field(default=None)
     events: tuple[Event, ...] = ()
+    cameras: tuple[RunCamera, ...] = ()
     label: str = ""
     made_with: dict[str, str | int] = field(default_factory=made_with)
     more: dict[str, Array] = field(default_factory=dict)
@@ -296,6 +301,7 @@ class Trajectory:
             nearest=Nearest(*near, self.clearance_names, self.clearance_asked)
             if len(self) and len(self.clearance_points) == len(self)
             else None,
+            cameras=() if self.seen is None else tuple(one.on(self.seen, self.r_d) for one in self.cameras),
         )
 
     def play(self, *, port: int | None = None, open_browser: bool = True, ellipsoids: Wanted = False) -> None:

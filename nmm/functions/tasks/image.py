@@ -11,21 +11,20 @@ from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, vector
 from nmm.errors import InputError, expect, few
-from nmm.functions.function import Function, Row, Stage, stacked
+from nmm.functions.function import Function, Row, Shown, Sight, Stage, stacked
 from nmm.functions.program import evaluate
 from nmm.functions.tasks.position import as_point, check_point
 from nmm.kernels.compiled import compiled, kernel, scratch
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.kernels.rotations import transposed_times3
 from nmm.robots.configuration import Configuration
+from nmm.robots.motion import NORMALISED
 from nmm.robots.robot import Robot
 
 #: Points that a camera sees: each as three numbers, a frame's name or a function; or `MeasuredPoints`.
 Points: TypeAlias = Function | Sequence[Function | str | ArrayLike]
 #: What the names of frames have that look along their z axis, with x to the right and y down (REP-103).
 OPTICAL = "optical"
-#: Intrinsics [fx, fy, cx, cy] of normalised coordinates.
-NORMALISED = (1.0, 1.0, 0.0, 0.0)
 
 
 @compiled
@@ -179,6 +178,8 @@ class Seen(Function):
     camera: str
     points: tuple[Function, ...]
     intrinsics: Array
+    _rows: tuple[tuple[int, int], ...] = ()
+    _line = False
 
     def _see(self, camera: str | None, points: Points) -> None:
         """`points` are some, each a function of three rows, or one function of three rows a point."""
@@ -191,6 +192,7 @@ class Seen(Function):
             self.points = tuple(as_point(one, "points") for one in points)
         self.count = sum(len(one) if isinstance(one, Sized) else 1 for one in self.points)
         expect(self.count > 0, "points", "a list of points", points)
+        self.intrinsics = np.array(NORMALISED)
 
     def _measured_by(self, intrinsics: ArrayLike | None) -> None:
         self.intrinsics = vector(NORMALISED if intrinsics is None else intrinsics, 4, "intrinsics")
@@ -208,6 +210,10 @@ class Seen(Function):
     def _row(self, camera: str, name: str) -> Row:
         size = float(max(self.intrinsics[:2]))
         return Row(f"{camera}.{name}", self._unit, scale=None if self._unit == "1" else size)
+
+    def shown(self) -> Shown:
+        fx, fy, cx, cy = self.intrinsics.tolist()
+        return Shown(sees=Sight(self.camera, self.points, self._rows, (fx, fy, cx, cy), self._line))
 
     def undefined(self, robot: Robot, t: float, q: Array) -> str:
         here = Configuration(robot, q)
@@ -255,6 +261,7 @@ class ImagePoints(Seen):
     ) -> None:
         self._see(camera, points)
         self._measured_by(intrinsics)
+        self._rows = tuple((2 * k, 2 * k + 1) for k in range(self.count))
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         camera, many = self._placed(robot), self.count > 1
@@ -326,6 +333,8 @@ class ImageLine(Seen):
     >>> nmm.evaluate(kerb, 0.0, here).value.round(3)
     array([0.   , 2.603])
     """
+
+    _line = True
 
     def __init__(
         self,

@@ -3,7 +3,7 @@
 "use strict";
 {
   const address = (nmm.address = {});
-  const SHOWN = ["grid", "ghosts", "paths"];
+  const SHOWN = ["grid", "ghosts", "paths", "image"];
   const pressed = (part) => document.getElementById(part).getAttribute("aria-pressed") === "true";
   const words = (text) => text.split(",").map((word) => word.trim().toLowerCase()).filter(Boolean);
   const short = (time) => String(Number((nmm.stage.start + time).toFixed(4)));

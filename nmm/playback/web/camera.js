@@ -38,30 +38,36 @@
   // Pixels at the upper, lower, left and right edge that are kept free: several ways to have nothing behind
   // the heading and the tools.
   function covered(named) {
-    const bar = document.getElementById("bar").getBoundingClientRect();
+    const bar = boxOf("bar");
     const [head, tools] = cards();
+    const seen = boxOf("sights"); // what cameras see: at the left edge above the bar, or at the upper right
     const narrow = tools.top > 0.5 * view.clientHeight; // the tools are below
     const lowest = Math.min(bar.height ? bar.top : Infinity, narrow && tools.height ? tools.top : Infinity, view.clientHeight);
     const bottom = view.clientHeight - lowest + (bar.height ? 10 : view.clientHeight < window.innerHeight ? 56 : 24);
+    if (narrow && seen.width) return [[seen.bottom + 4, bottom, 0, 0], [head.bottom + 4, bottom, 0, view.clientWidth - seen.left + 4]];
     if (narrow) return [[head.bottom + 4, bottom, 0, 0]];
     if (camera.held) return [[Math.max(head.bottom, tools.bottom) + 4, bottom, 0, 0]];
     const [aside, above] = room(named.length > 0).map((pixels) => pixels + 4);
     const tops = [24, tools.bottom + above, Math.max(head.bottom, tools.bottom) + above];
     const lefts = [0, head.right + aside];
     const rights = [0, view.clientWidth - tools.left + aside];
-    return tops.flatMap((top) => lefts.flatMap((left) => rights.map((right) => [top, bottom, left, right])));
+    const ways = (left, below) => tops.flatMap((top) => rights.map((right) => [top, below, left, right]));
+    if (!seen.width) return lefts.flatMap((left) => ways(left, bottom));
+    const [free, lifted] = [Math.max(seen.right + aside, lefts[1]), view.clientHeight - seen.top + 14];
+    return [...ways(0, bottom), ...ways(free, bottom), ...lefts.flatMap((left) => ways(left, lifted))];
   }
 
   // Pixels beside and above a point that what stands there takes: a ball, or the tags one over another.
   const room = (tagged) => (tagged ? [44, 14 + 26 * nmm.motions.length] : [14, 14]);
-  const cards = () => ["heading", "tools"].map((id) => document.getElementById(id).getBoundingClientRect());
+  const boxOf = (id) => document.getElementById(id).getBoundingClientRect();
+  const cards = () => ["heading", "tools"].map(boxOf);
 
   // Whether something that is held is behind a card.
   function hidden(held, named) {
     eye.updateMatrixWorld();
     eye.updateProjectionMatrix();
     const [width, height] = [view.clientWidth, view.clientHeight];
-    const shown = cards();
+    const shown = [...cards(), boxOf("sights")].filter((card) => card.width);
     const behind = (p, aside, above) => {
       const { x, y } = p.clone().project(eye);
       const [px, py] = [0.5 * (1 + x) * width, 0.5 * (1 - y) * height];

@@ -18,6 +18,7 @@
     e: actions.ellipsoids,
     f: actions.follow,
     g: actions.ghosts,
+    i: actions.image,
     l: actions.loop,
     m: () => document.body.classList.toggle("panel"),
     p: actions.paths,

@@ -66,6 +66,7 @@
     nmm.viewer.animator.seek(player.time);
     nmm.scenery.update(player.time);
     nmm.obstacles.update(player.time);
+    nmm.sights.update(player.time);
     nmm.camera.update();
     nmm.plots.update();
     nmm.values.update();
@@ -150,6 +151,10 @@
     ghosts: () => setShown("ghosts", nmm.ghosts, !isPressed("ghosts")),
     ellipsoids: () => setShown("ellipsoids", nmm.ellipsoids, !isPressed("ellipsoids")),
     distances: () => setShown("distances", nmm.obstacles.lines, !isPressed("distances")),
+    image: () => {
+      nmm.sights.show(!nmm.sights.shown);
+      nmm.address.changed();
+    },
     paths: () => setShown("paths", nmm.scenery.paths, !isPressed("paths")),
     grid: () => {
       setShown("grid", nmm.scenery.measures, !isPressed("grid"));

@@ -24,7 +24,7 @@
 
   // What lies over the view stands still, but for another size of the window.
   texts.fit = () => {
-    cards = ["heading", "tools", "bar"].map((id) => document.getElementById(id).getBoundingClientRect());
+    cards = ["heading", "tools", "bar", "sights"].map((id) => document.getElementById(id).getBoundingClientRect());
   };
 
   function shown(sprite) {
