@@ -153,3 +153,25 @@ def test_what_leaves_the_picture_is_told_by_its_number(
     page = window.open(write_html([replace(motion, cameras=(told,))], tmp_path / "page.html").as_uri())
     page.evaluate("nmm.player.seek(0)")
     assert page.inner_text("#sights p") == "outside the picture: 2; behind the camera: 3"
+
+
+def test_figures_have_the_path_of_what_is_seen(run: nmm.Trajectory) -> None:
+    """One that moves has a path, with its places at the instants drawn; one that stands has a mark."""
+    figure = nmm.figures.stroboscopic(run, [0.0, 1.0])
+    lines = {str(line.get_label()): line for line in figure.axes[0].get_lines()}
+    np.testing.assert_allclose(lines["path of what is seen"].get_xydata(), ball(run.t)[:, :2])
+    dots = [np.asarray(line.get_xydata()) for line in figure.axes[0].get_lines()]
+    expected = ball(np.array([0.0, 1.0]))[:, :2]
+    assert any(one.shape == expected.shape and np.allclose(one, expected) for one in dots)
+    standing = np.tile(np.array([2.0, 0.3, 0.6]), (len(run), 1, 1))
+    figure = nmm.figures.stroboscopic(replace(run, seen=standing), [0.0, 1.0])
+    lines = {str(line.get_label()): line for line in figure.axes[0].get_lines()}
+    assert "path of what is seen" not in lines
+    np.testing.assert_allclose(lines["seen point"].get_xydata(), [[2.0, 0.3]])
+
+
+def test_a_comparison_has_what_all_runs_see(run: nmm.Trajectory) -> None:
+    elsewhere = replace(run, seen=None if run.seen is None else run.seen + 1.0)
+    for other, shown in ((run, True), (elsewhere, False)):
+        axes = nmm.figures.comparison([run, other]).axes[0]
+        assert ("path of what is seen" in [line.get_label() for line in axes.get_lines()]) is shown

@@ -14,6 +14,7 @@ from nmm import resolver_style
 from nmm.arrays import Array
 from nmm.errors import expect
 from nmm.figures import style
+from nmm.figures.seen_points import SeenPoints, few
 from nmm.figures.silhouette import Ink, Pose, Silhouette, hull, outline_points
 from nmm.figures.time_labels import SIZE, Ground, Place, Subject, places
 from nmm.figures.views import ABOVE, View, Viewed, page, upright
@@ -48,9 +49,9 @@ def stroboscopic(
 ) -> Figure:
     """The robot seen from above at instants of the run (the paper's Figs. 3, 5 and 7).
 
-    Platform with wheels and heading, arm, end-effector's path, desired path, start, end and the
-    target, looked at or held; drawings fade towards the start. A second view from the side, of the upright
-    plane in which the motion mostly lies, where the arm leaves the ground's.
+    Platform with wheels and heading, arm, end-effector's path, desired path, start, end, the target, looked
+    at or held, and what cameras see; drawings fade towards the start. A second view from the side, of the
+    upright plane in which the motion mostly lies, where the arm leaves the ground's.
 
     Parameters
     ----------
@@ -86,6 +87,7 @@ class Scene(Viewed):
         self.poses: list[Pose] = [silhouette.at(trajectory.q[k]) for k in samples]
         self.lines = _lines(trajectory)
         self.outlines = outlines(trajectory, self.times)
+        self.seen = SeenPoints([trajectory], self.times)
         self._labels: dict[float, list[Place]] = {}
         heights = np.array([[*pose.joints[:, 2], *pose.tip[:, 2]] for pose in self.poses])
         rises = heights.size > 0 and float(np.ptp(heights, axis=0).max()) > _RISES
@@ -95,7 +97,7 @@ class Scene(Viewed):
     @property
     def names(self) -> list[str]:
         names = ["desired path"] if "desired" in self.lines else []
-        names += [self._path_name, "start", "end", *["obstacle"] * bool(self.outlines)]
+        names += [self._path_name, "start", "end", *["obstacle"] * bool(self.outlines), *self.seen.names]
         return names if not len(self.trajectory.marks) else [*names, "target"]
 
     @property
@@ -107,7 +109,8 @@ class Scene(Viewed):
 
     def _drawn(self, view: View) -> list[Array]:
         robots, bodies = (pose.points() for pose in self.poses), (one.points for one in self.outlines)
-        return [view.of(part) for part in (*robots, *self.lines.values(), *bodies, self.trajectory.marks)]
+        paths = *self.lines.values(), *self.seen.parts
+        return [view.of(part) for part in (*robots, *paths, *bodies, self.trajectory.marks)]
 
     def times_at(self, view: View, width: float) -> list[Place]:
         """Where the times stand in a drawing `width` in wide: the robots', then the obstacles'."""
@@ -135,13 +138,14 @@ class Scene(Viewed):
         robots = [edge for pose in self.poses for edges in pose.outlines(view) for edge in edges]
         links = [view.of(ends) for pose in self.poses for ends in pose.links]
         solid = [hull(view.of(outline.points)) for outline in self.outlines]
-        paths = [view.of(line) for line in self.lines.values()]
+        paths = [view.of(line) for line in (*self.lines.values(), *self.seen.lines)]
         mains = [hull(view.of(pose.main)) for pose in self.poses]
         texts = [_seconds(float(t)) for t in self.times]
         texts += [_span(*outline.times) if outline.times else "" for outline in self.outlines]
         named = zip(texts, [*mains, *solid], strict=True)
         subjects = [Subject(text, edge) for text, edge in named if text]
-        ends, targets = view.of(self.lines["path"][[0, -1]]), view.of(self.trajectory.marks)
+        ends, targets = view.of(self.lines["path"][[0, -1]]), self.trajectory.marks
+        targets = view.of(np.vstack([targets, self.seen.marks]))
         marks = [*_around(ends, _END, scale), *_around(targets, _TARGET, scale)]
         return subjects, Ground([*paths, *links, *marks], [*robots, *solid], scale)
 
@@ -158,6 +162,7 @@ class Scene(Viewed):
                 *edge.T, facecolor=(*shade, 0.25), edgecolor=shade, linewidth=1.0, zorder=2.5,
                 label=None if k else "obstacle",
             )  # fmt: skip
+        self.seen.draw(axes, view.of)
         self._draw_times(axes, view)
         if "desired" in self.lines:
             axes.plot(
@@ -261,16 +266,10 @@ def _instants(t: Array, instants: ArrayLike | int) -> Array:
 def _lines(trajectory: Trajectory) -> dict[str, Array]:
     """The paths to draw, (k, 3) each, with few enough points."""
     if trajectory.path is None:
-        x_y = _few(base_position(trajectory.robot, trajectory.q))
+        x_y = few(base_position(trajectory.robot, trajectory.q))
         return {"path": np.column_stack([x_y, np.zeros(len(x_y))])}
-    desired = {} if trajectory.moving is None else {"desired": _few(trajectory.moving)}
-    return {"path": _few(trajectory.path), **desired}
-
-
-def _few(points: Array) -> Array:
-    """About 1500 of the points, including both ends."""
-    last = len(points) - 1
-    return points[np.unique([*range(0, len(points), max(1, len(points) // 1500)), last])]
+    desired = {} if trajectory.moving is None else {"desired": few(trajectory.moving)}
+    return {"path": few(trajectory.path), **desired}
 
 
 def _faded(color: str, strength: float) -> tuple[float, float, float]:

@@ -12,6 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from nmm import resolver_style
 from nmm.arrays import Array
 from nmm.figures import style
+from nmm.figures.seen_points import SeenPoints
 from nmm.playback.placements import base_position
 from nmm.runs.trajectory import Trajectory
 
@@ -158,7 +159,8 @@ def draw_views(
 
 
 class Paths(Viewed):
-    """The frames' and the platforms' paths of runs, each with a look, what is desired, and targets."""
+    """The frames' and the platforms' paths of runs, each with a look, what is desired, targets, and
+    what cameras see."""
 
     on_the_ground = False
 
@@ -166,6 +168,7 @@ class Paths(Viewed):
         self._worn = worn
         self._desired, self._held = runs[0].moving, runs[0].held
         self._frames = [run.frame for run in runs]
+        self._seen = SeenPoints(runs)
         self._paths = [run.path for run in runs]
         self._floors = [_on_the_floor(run) for run in runs]
         risen = [path for path in (*self._paths, self._desired) if path is not None]
@@ -175,6 +178,7 @@ class Paths(Viewed):
     @property
     def names(self) -> list[str]:
         names = ["target"] * bool(len(self._held)) + ["desired path"] * (self._desired is not None)
+        names += self._seen.names
         for i, (name, *_) in enumerate(self._worn):
             names += [f"{name}: {self._frames[i]}"] * (self._paths[i] is not None)
             names += [f"{name}: platform"] * (self._floors[i] is not None)
@@ -182,7 +186,7 @@ class Paths(Viewed):
 
     def points(self, view: View, width: float) -> list[Array]:
         floors = self._floors if view == ABOVE else []
-        parts = [self._held, self._desired, *self._paths, *floors]
+        parts = [self._held, self._desired, *self._seen.parts, *self._paths, *floors]
         found = np.vstack([view.of(part) for part in parts if part is not None and len(part)])
         low, high = np.nanmin(found, axis=0), np.nanmax(found, axis=0)
         middle, half = 0.5 * (low + high), max(0.05, _FLAT * float(np.max(high - low)))
@@ -195,6 +199,7 @@ class Paths(Viewed):
                 *view.of(self._held).T, "*", color=resolver_style.ORANGE, markersize=_TARGET,
                 markeredgecolor=resolver_style.BLACK, label="target", linestyle="none", zorder=6,
             )  # fmt: skip
+        self._seen.draw(axes, view.of)
         if self._desired is not None:
             axes.plot(*view.of(self._desired).T, color=_DESIRED, linewidth=5.0, label="desired path")
         for i, (name, color, dashes) in enumerate(self._worn):
