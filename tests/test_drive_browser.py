@@ -167,7 +167,16 @@ def test_n_plans_round_a_wall_and_the_page_shows_how(window: Window) -> None:
         page.keyboard.press("n")
         page.wait_for_function("nmm.drive.followed === 1", timeout=1000.0 * MOST)
         drawn = "nmm.node('/nmm/plan').children.length"
-        assert page.evaluate(drawn) == 3  # two ways, and the copies
+        assert page.evaluate(drawn) == 4  # two ways, the tree, and the copies
+        tree = "nmm.node('/nmm/plan/tree')"
+        points = np.array(page.evaluate(f"[...{tree}.children[0].geometry.attributes.position.array]"))
+        points = points.reshape(-1, 2, 3)
+        assert len(points) > 2
+        assert np.linalg.norm(np.diff(points, axis=1), axis=-1).max() <= 2.0 + 1e-6  # a step: 2 s, 1 m/s
+        key = page.get_by_role("button", name="search tree")
+        for shown in (False, True):
+            key.click()
+            assert page.evaluate(f"{tree}.visible") is shown
         button = page.get_by_role("button", name="Plan", exact=True)
         page.wait_for_function("document.getElementById('plan').ariaPressed === 'true'")
         began = np.array(page.evaluate("nmm.drive.targets[0].at"))

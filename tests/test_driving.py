@@ -8,6 +8,7 @@ import signal
 import time
 import urllib.error
 import urllib.request
+from base64 import b64decode
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -378,12 +379,18 @@ def test_a_plan_is_sent_to_pages_once_and_taken_away() -> None:
         (plan,) = [one for one in found if one["type"] == "plan"]
         assert len(plan["lines"]) == 2  # of the end-effector and of the platform
         assert len(plan["ghosts"]["joints"]) > 5
+        tree = np.frombuffer(b64decode(plan["tree"]["f32"]), dtype="<f4").reshape(-1, 2, 3)
+        assert len(tree) > 2
+        assert np.ptp(tree[..., 2]) == 0.0  # on the ground
+        np.testing.assert_allclose(tree[0, 0, :2], loop.session._driven.setup.q0[:2], atol=1e-6)
         wait_for(lambda: loop.picture()["plans"] is True)
         late = [json.loads(line) for line in loop.session.follow()().splitlines()]
         assert plan in late
         loop.session.receive('{"type":"order","what":"react"}')
         wait_for(lambda: seen(2))
-        assert [one["lines"] for one in found if one["type"] == "plan"][-1] == []
+        gone = [one for one in found if one["type"] == "plan"][-1]
+        assert gone["lines"] == []
+        assert gone["tree"] is None
 
 
 # the loop

@@ -283,6 +283,23 @@ def test_more_shortening_gives_no_longer_plan():
         assert durations[2] < durations[1] < durations[0]
 
 
+def test_the_trees_of_a_plan_grow_from_start_and_goal_until_they_meet():
+    robot = nmm.load("unicycle_3r")
+    goal = robot.q(BEHIND)
+    plan = nmm.plan(robot, robot.rest, goal, [WALL], limits=LIMITS)
+    trees = [{tuple(robot.rest)}, {tuple(goal)}]
+    for before, new in plan.tree:
+        (tree,) = (one for one in trees if tuple(before) in one)
+        tree.add(tuple(new))
+    met = trees[0] & trees[1]
+    assert len(met) == 1
+    assert len(plan.tree) == sum(map(len, trees)) - 2
+    queries, pairs = plan.found.scene.queries, range(len(plan.found.scene.names))
+    for new in plan.tree[:, 1]:
+        assert np.all(queries.distances(0.0, new, pairs) >= 0.03)
+    assert nmm.plan(robot, robot.rest, {"x": 1.0}, limits=LIMITS).tree.shape == (0, 2, robot.n)
+
+
 def test_an_impossible_plan_says_what_it_tried():
     robot = nmm.load("unicycle_3r")
     ring = [

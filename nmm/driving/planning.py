@@ -26,6 +26,7 @@ from nmm.playback.drawing import Command, packed
 from nmm.playback.keyframes import ghost_samples
 from nmm.playback.shapes import DrawnRobot
 from nmm.resolvers import CallableResolver, ProjectedGradient
+from nmm.robots.frame_path import FramePath
 from nmm.robots.motion import Motion
 
 #: How long a plan is looked for, s, and how much more than the controller it keeps, m.
@@ -155,16 +156,22 @@ class Planning:
         return f"It follows its plan, {left:.1f} s to go" if left > 0.0 else "It is at its plan's end", False
 
     def shown(self, drawn: DrawnRobot, wheels: Array) -> Command:
-        """The command that draws the plan: the ways of the task's frame and of the platform, and copies."""
+        """The command that draws the plan: the ways of the task's frame and of the platform, the trees that
+        were grown, of the platform or else of the frame, and copies."""
         lines: list[Any] = []
-        found: Command = {"type": "plan", "lines": lines, "ghosts": None}
+        found: Command = {"type": "plan", "lines": lines, "tree": None, "ghosts": None}
         if self._followed is None:
             return found
         plan, frame = self._followed.plan, self._driven.targets[self._task].frame
         robot, t = plan.robot, np.linspace(0.0, plan.duration, POINTS)
         q, u = plan(t)
         motion = Motion(robot, t, q, u, frame=frame)
-        floor = np.column_stack([q[:, :2], np.full(len(q), 0.005)]) if robot.platform.n_p else None
+        floor = on_floor(q) if robot.platform.n_p else None
+        grown = plan.tree.reshape(-1, robot.n)
+        if floor is not None:
+            found["tree"] = packed(on_floor(grown), np.float32)
+        elif frame is not None:
+            found["tree"] = packed(FramePath(robot, frame).positions(grown), np.float32)
         for points in (motion.driven, floor):
             if points is not None:
                 lines.append(
@@ -174,6 +181,11 @@ class Planning:
         if some:
             found["ghosts"] = drawn.ghosts("/nmm/plan/ghosts", q[some], np.tile(wheels, (len(some), 1)), [])
         return found
+
+
+def on_floor(q: Array) -> Array:
+    """Where the platform is at q (N, n), (N, 3), m, a little above the ground."""
+    return np.column_stack([q[:, :2], np.full(len(q), 0.005)])
 
 
 def made_for(controller: Controller, q: Array, number: int, target: LiveTarget, dt: float) -> Made:

@@ -57,13 +57,15 @@ class Asked:
 
 
 class Found(NamedTuple):
-    """What a search leaves to a plan: its motion, what that keeps, and what another search is made with."""
+    """What a search leaves to a plan: its motion, what that keeps, what another search is made with, and the
+    trees that were grown, (E, 2, n)."""
 
     motion: Motion
     limits: LimitsOn
     scene: Scene | None
     goal: Wanted
     asked: Asked
+    tree: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +110,12 @@ class Plan:
     def duration(self) -> float:
         """How long it takes, s."""
         return self.found.motion.duration
+
+    @property
+    def tree(self) -> Array:
+        """The trees that the search grew, (E, 2, n), m and rad: motions from one configuration to the next,
+        those of the start's tree first. There are none where a way is free at once."""
+        return self.found.tree
 
     @property
     def smooth(self) -> bool:

@@ -136,6 +136,7 @@ class Search:
 
     _ends: float
     asked_kept: Array
+    tree: Array
 
     def __init__(
         self,
@@ -147,6 +148,7 @@ class Search:
     ) -> None:
         self.robot, self.start, self.goals, self.asked = robot, start, goals, asked
         self.seed = seed = counted(seed, "seed", 0)
+        self.tree = np.zeros((0, 2, robot.n))
         self.rng = np.random.default_rng(seed)
         self.efforts, given = efforts_of(robot, asked.effort), asked.collisions
         self.obstacles = tuple(given.obstacles)
@@ -232,7 +234,7 @@ class Search:
         elif self.asked.smooth:
             motion = self._smoothed(parts) or path
         motions, postures = (int(count) for count in self.trees.looked)
-        found = Found(motion, self.limits, self.scene, self.goals[-1], self.asked)
+        found = Found(motion, self.limits, self.scene, self.goals[-1], self.asked, self.tree)
         return Plan(self.robot, motions, postures, found)
 
     def _waited(self, path: TimedLegs, movers: Scene) -> TimedLegs:
@@ -246,7 +248,8 @@ class Search:
             at = None if k % 2 == 0 else LONG if k == 1 else float(self.rng.uniform(0.0, path.duration))
             with suppress(NmmError):  # what stands there may touch the start, the goal, or leave no way
                 other = self._another_way(at, k, left / (WAYS - k))
-                timed, more = waited(other, self.robot, movers)
+                timed, more = waited(cast(TimedLegs, other.motion), self.robot, movers)
+                self.tree = other.tree if timed is not None else self.tree
                 ways, looked = ways + 1, looked + more
         if timed is None:
             names = few(sorted({one.name for one in movers.obstacles}))
@@ -254,7 +257,7 @@ class Search:
             raise RunError(f"{tried}: none keeps its distance of {names}", where="plan")
         return timed
 
-    def _another_way(self, at: float | None, k: int, seconds: float) -> TimedLegs:
+    def _another_way(self, at: float | None, k: int, seconds: float) -> Found:
         """The way of another seed, with what moves standing where it is at a time, s; without it at None."""
         given = self.asked.collisions
         kept = [one for one in self.obstacles if not one.moves]
@@ -263,7 +266,7 @@ class Search:
             kept += [Obstacle(one.shape, one.placement(at), name=one.name) for one in moves]
         asked = replace(self.asked, collisions=replace(given, obstacles=tuple(kept)), smooth=False)
         other = Search(self.robot, self.start, self.goals, asked, self.seed + k)
-        return cast(TimedLegs, other.plan(seconds, SHORTEN, None).found.motion)
+        return other.plan(seconds, SHORTEN, None).found
 
     def _timed(self, start: Array, legs: Array) -> TimedLegs:
         motion = timed(self.guide, self.robot, start, self.guide.merged(legs), self.limits, self.usual)
@@ -333,8 +336,17 @@ class Search:
                     "looked at",
                     where="plan",
                 )
+        self._remember_tree()
         nodes = [trees.nodes[k, i] for k in (0, 1) for i in self._chain(k)]
         return np.vstack([self.guide.way(a, b) for a, b in pairwise(nodes)])
+
+    def _remember_tree(self) -> None:
+        grown = [self.tree]
+        for k in (0, 1):
+            nodes, before = self.trees.nodes[k], self.trees.parents[k, : self.trees.counts[k]]
+            new = np.flatnonzero(before >= 0)
+            grown.append(nodes[np.column_stack([before[new], new])])
+        self.tree = np.concatenate(grown)
 
     def _chain(self, k: int) -> list[int]:
         """The nodes of a tree from its root to where both met, in the motion's order."""

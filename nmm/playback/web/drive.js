@@ -3,7 +3,7 @@
 {
   const THREE = MeshCat.THREE;
   const [WINDOW, KEPT, REDRAW, PATIENCE] = [20, 30, 100, 5000]; // s, s, ms, ms
-  const drive = (nmm.drive = { targets: [], active: 0, time: 0, paused: false, plan: false, followed: 0 });
+  const drive = (nmm.drive = { targets: [], active: 0, time: 0, paused: false, plan: false, tree: false, grown: true, followed: 0 });
   const panel = document.createElement("div");
   const parts = {};
   let [drawn, axes, polled] = [0, [], null];
@@ -153,8 +153,26 @@
     run.samples = run.t.length;
   }
 
-  // The plan that it follows: its ways, dashed, and copies of the robot along it.
-  nmm.hooks.plan = ({ lines, ghosts }) => {
+  // What the search has grown: from pair to pair of points. The legend's button shows and hides it.
+  const GROWN = [0.47, 0.62, 0.72];
+  function grow(points) {
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", new THREE.BufferAttribute(points, 3));
+    const material = new THREE.LineBasicMaterial({ color: nmm.color(GROWN), transparent: true, opacity: 0.7 });
+    const tree = new THREE.LineSegments(geometry, material);
+    tree.visible = drive.grown;
+    nmm.viewer.set_object(nmm.split("/nmm/plan/tree"), tree);
+    nmm.scenery.paths = (nmm.scenery.paths || []).concat(tree);
+    if (parts.grown) return;
+    const act = (on) => {
+      drive.grown = on;
+      if (drive.tree) nmm.node("/nmm/plan/tree").visible = on;
+    };
+    parts.grown = nmm.legend({ kind: "line", color: GROWN, text: "search tree", act });
+  }
+
+  // The plan that it follows: its ways, dashed, the tree it comes of, and copies of the robot along it.
+  nmm.hooks.plan = ({ lines, tree, ghosts }) => {
     const before = nmm.node("/nmm/plan");
     const stays = (one) => {
       for (let part = one; part; part = part.parent) if (part === before) return false;
@@ -164,6 +182,8 @@
     nmm.ghosts = (nmm.ghosts || []).filter(stays);
     nmm.viewer.delete_path(nmm.split("/nmm/plan"));
     lines.forEach((line, i) => nmm.hooks.path({ ...line, path: `/nmm/plan/${i}`, text: "plan" }));
+    drive.tree = tree !== null && tree.length > 0;
+    if (drive.tree) grow(tree);
     if (ghosts !== null) nmm.hooks.ghosts(ghosts);
     drive.plan = lines.length > 0;
     if (drive.plan) drive.followed += 1;
