@@ -15,9 +15,11 @@ from nmm.control.collisions import Collisions
 from nmm.control.goal import Goal
 from nmm.control.limits import Limits, LimitsOn
 from nmm.errors import InputError
+from nmm.functions.objectives.base import Objective
 from nmm.functions.tasks.task import Task
 from nmm.plans.following import FromPlan
 from nmm.plans.goals import Wanted, goal_task
+from nmm.plans.objective import SampleCosts
 from nmm.plans.recorded import recorded
 from nmm.plans.samples import SampledMotion
 from nmm.robots.robot import Robot
@@ -52,6 +54,7 @@ class Asked:
     limits: Limits
     tolerance: Goal
     smooth: bool = False
+    objective: Objective | None = None
     effort: bool | Mapping[str, Any] = False
     margin: float = 0.0
 
@@ -197,4 +200,7 @@ class Plan:
         times = np.arange(0.0, self.duration - 1e-9, positive(dt, "dt"))
         t = np.append(times, self.duration)
         task = goal_task(self.robot, self.found.goal, self.end)
-        return recorded(self.robot, t, *self(t), dt, task, self.found.limits, self.found.scene, "plan")
+        (q, u), objective = self(t), self.found.asked.objective
+        H = None if objective is None else SampleCosts(self.robot, objective).at(q)[0]
+        kept = self.found.limits, self.found.scene
+        return recorded(self.robot, t, q, u, dt, task, *kept, "plan", H=H)

@@ -33,8 +33,9 @@ def recorded(
     scene: Scene | None,
     method: str,
     verdict: Verdict = AS_ASKED,
+    H: Array | None = None,
 ) -> Trajectory:
-    """The run that was at q (N, n) with u (N, n_u) at t (N,), s, every dt."""
+    """The run that was at q (N, n) with u (N, n_u) at t (N,), s, every dt; H (N,) : of an objective."""
     S = np.array([robot.S(one) for one in q])
     rows, drawn, seen = task.rows(robot), shown_frame([task], robot), SeenPoints([task], None, robot)
     found = map(np.array, zip(*map(TaskError(robot, task).evaluate, q, t.tolist()), strict=True))
@@ -56,7 +57,7 @@ def recorded(
         r=r,
         r_d=r_d,
         error=error,
-        objective=np.zeros(len(t)),
+        objective=np.zeros(len(t)) if H is None else H,
         sigma_min=np.linalg.svd(error_q @ S, compute_uv=False)[:, -1],
         partition=np.full(error.shape, -1),
         residual=np.zeros(len(t)),

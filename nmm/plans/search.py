@@ -21,11 +21,13 @@ from nmm.control.collisions import Collisions
 from nmm.control.goal import Goal
 from nmm.control.limits import Limits
 from nmm.errors import InputError, NmmError, RunError, expect_kind, few
+from nmm.functions.objectives.base import Objective
 from nmm.kernels.compiled import checked_by_caller
 from nmm.kernels.record_layout import views
 from nmm.plans import tree
 from nmm.plans.effort import efforts_of
 from nmm.plans.goals import GoalPostures, Wanted, alternatives, nothing_found
+from nmm.plans.objective import SampleCosts
 from nmm.plans.path import Guide, shortened
 from nmm.plans.plan import Asked, Found, Motion, Plan
 from nmm.plans.samples import SampledMotion, joined
@@ -59,6 +61,7 @@ def plan(
     through: Sequence[Wanted] = (),
     shorten: int = 200,
     smooth: bool = False,
+    objective: Objective | None = None,
     effort: bool | Mapping[str, Any] = False,
     margin: float = 0.0,
     progress: Callable[[float], None] | None = None,
@@ -82,6 +85,8 @@ def plan(
     shorten : how often a shorter way between two points of the motion is tried
     smooth : whether to look for one motion without rests, which takes about half the time and 0.1 to 0.5 s
         more to plan; where none is found that keeps everything, the one with rests stands (`Plan.smooth`)
+    objective : H(q) to minimise along a smooth motion, in the time that it takes without: each of its samples
+        costs 0.3 for an input at its limit, 1 for a rate of it at its limit, by their squares, and H
     effort : whether motors keep the torque limits of the robot's file, or masses that the robot carries then,
         kg by frame (as `payload` of `nmm.Dynamics`); what needs more is driven slower
     margin : so much farther than the distance, m, it keeps off what start and goals leave so much room to,
@@ -95,7 +100,7 @@ def plan(
     Raises
     ------
     InputError : a start that touches something or is outside limits, a goal of another kind, limits of
-        functions, a platform whose ways are not known
+        functions, a platform whose ways are not known, an objective that changes with time or without smooth
     RunError : no goal configuration was found, or no way there; the text says what was tried
 
     Examples
@@ -118,12 +123,15 @@ def plan(
         raise InputError(
             f"{few(endless)}: slides without limits", where="plan: robot", expected="limits of it"
         )
+    if objective is not None and not smooth:
+        raise InputError("smooth motions alone have one", where="plan: objective", expected="smooth=True")
     kept = collisions or Collisions()
     asked = Asked(
         collisions=replace(kept, obstacles=(*kept.obstacles, *obstacles)),
         limits=limits,
         tolerance=tolerance or Goal(),
         smooth=smooth,
+        objective=objective,
         effort=effort,
         margin=scalar(margin, "plan: margin", least=0.0),
     )
@@ -150,6 +158,9 @@ class Search:
         self.seed = seed = counted(seed, "seed", 0)
         self.tree = np.zeros((0, 2, robot.n))
         self.rng = np.random.default_rng(seed)
+        self.costs = None
+        if asked.smooth and asked.objective is not None:
+            self.costs = SampleCosts(robot, asked.objective)
         self.efforts, given = efforts_of(robot, asked.effort), asked.collisions
         self.obstacles = tuple(given.obstacles)
         known = bool(self.obstacles) or len(robot.collision_model.collisionPairs) > 0
@@ -274,7 +285,7 @@ class Search:
 
     def _smoothed(self, parts: Sequence[Array]) -> SampledMotion | None:
         """The parts as smooth motions with rests between them; None where one of them is not found."""
-        smoothing = Smoothing(self.robot, self.limits, USUAL, self.check)
+        smoothing = Smoothing(self.robot, self.limits, USUAL, self.check, self.costs)
         found, here = [], self.start
         for legs in parts:
             path = self._timed(here, legs)

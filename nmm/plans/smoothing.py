@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from nmm.control.limits import LimitsOn
 from nmm.kernels.compiled import checked_by_caller
 from nmm.kernels.record_layout import Memory, views
 from nmm.plans.interior import SHOOT, shoot
+from nmm.plans.objective import SampleCosts
 from nmm.plans.problem import MU, TURN, largest_inputs, shooting_problem
 from nmm.plans.samples import SampledMotion, Samples
 from nmm.plans.shooting import LOOK, Shooting, first_blocked_sample
@@ -25,6 +27,9 @@ EACH, FEWEST, MOST = 0.27, 24, 80
 FIRST, ROUNDS, ALL = 100, 25, 200
 #: The next motion takes this share of the time of the one before; after a failure, of the best.
 FASTER, LESS = 0.8, 0.92
+#: An objective is minimised in so many rounds, or as many more as it takes; products of slacks and
+#: multipliers to begin with, of smaller ones rounds are short; and the shares of it that are tried in turn.
+LOWERED, LONGEST, BEGIN, SHARES = 20, 60, 10.0, (1.0, 0.2, 0.04)
 #: Samples' ends that are blocked between keep so much more than the distance, m.
 MORE = 0.015
 #: What is left of gaps between samples and of the end's error when a motion is found.
@@ -36,11 +41,19 @@ class Smoothing:
 
     The first takes as long as the path. The time is then cut down as far as the limits allow on the same way,
     and by a fifth more, and a motion is looked for that takes no longer, from the one before; until none is
-    found. usual : speeds of inputs without limits, m/s and rad/s
+    found. In the time of the last, an objective is minimised then. usual : speeds of inputs without limits,
+    m/s and rad/s
     """
 
-    def __init__(self, robot: Robot, limits: LimitsOn, usual: float, check: MotionCheck) -> None:
-        self.robot, self.limits, self.check = robot, limits, check
+    def __init__(
+        self,
+        robot: Robot,
+        limits: LimitsOn,
+        usual: float,
+        check: MotionCheck,
+        costs: SampleCosts | None = None,
+    ) -> None:
+        self.robot, self.limits, self.check, self.costs = robot, limits, check, costs
         self.top = largest_inputs(robot, limits, usual)
         self._shoot = checked_by_caller(shoot, SHOOT)
         self._first_blocked = checked_by_caller(first_blocked_sample, LOOK)
@@ -61,11 +74,33 @@ class Smoothing:
             elif best is None or share == LESS:
                 break
             else:
-                for one, before in zip((x.q, x.u, x.a, x.step), kept, strict=True):
-                    one[...] = before
+                self._restore(kept)
                 share = LESS
             self._quicken(share)
-        return best if best is not None and best.duration < path.duration else None
+        if best is None or best.duration >= path.duration:
+            return None
+        return best if self.costs is None else self._lowered(self.costs, kept) or best
+
+    def _restore(self, kept: Sequence[Array]) -> None:
+        x = self.x
+        for one, before in zip((x.q, x.u, x.a, x.step), kept, strict=True):
+            one[...] = before
+
+    def _lowered(self, costs: SampleCosts, kept: Sequence[Array]) -> SampledMotion | None:
+        """A motion as long as the one kept, with less of an objective; None where none keeps everything."""
+        x, least, margin = self.x, costs.at(kept[0])[0].mean(), self.x.margin.copy()
+        for share in SHARES:
+            self._restore(kept)
+            x.margin[:], x.s[:], x.z[:], x.duals[:], x.mu[()] = margin, 0.0, 0.0, 0.0, BEGIN
+            for k in range(LONGEST):
+                costs.write(x, share)
+                allowed = self._shoot(*self.check.blocks, *self._own, int(k < LOWERED), 1, EXACT) > 0
+                if allowed and not self._refined():
+                    motion = self._motion()
+                    if self._within(motion) and costs.at(x.q)[0].mean() < least:
+                        return motion
+                    break
+        return None
 
     def begin(self, path: TimedLegs) -> None:
         """Set the problem up, with a path in its own time to begin with."""
@@ -73,9 +108,8 @@ class Smoothing:
         q, u = path.at(np.linspace(0.0, path.duration, N + 1))
         u[0] = u[-1] = 0.0
         memory = Memory()
-        memory.add(
-            shooting_problem(self.robot, self.limits, self.top, self.check, q, u, path.duration / N, True)
-        )
+        given, aims = (self.robot, self.limits, self.top, self.check), 0 if self.costs is None else len(q[0])
+        memory.add(shooting_problem(*given, q, u, path.duration / N, True, aims))
         self._own = memory.blocks()
         self.x = views(Shooting, *self._own, 0)
         self._left = ALL
@@ -108,15 +142,21 @@ class Smoothing:
             self._left -= abs(rounds)
             if rounds < 0:
                 return False
-            turn = float(np.abs(np.diff(x.q[:, 2 : self.robot.platform.n_p], axis=0)).max(initial=0.0))
-            if turn > 1.2 * TURN * x.substeps[()]:
-                x.substeps[()] = math.ceil(turn / TURN)
-                continue
-            blocked = self._first_blocked(*self.check.blocks, *self._own)
-            if blocked < 0:
+            if not self._refined():
                 return self._within(self._motion())
-            x.margin[blocked : blocked + 2] += MORE
         return False
+
+    def _refined(self) -> bool:
+        """Make samples finer that turn far, or keep more where one is blocked; whether there was any."""
+        x = self.x
+        turn = float(np.abs(np.diff(x.q[:, 2 : self.robot.platform.n_p], axis=0)).max(initial=0.0))
+        if turn > 1.2 * TURN * x.substeps[()]:
+            x.substeps[()] = math.ceil(turn / TURN)
+            return True
+        blocked = self._first_blocked(*self.check.blocks, *self._own)
+        if blocked >= 0:
+            x.margin[blocked : blocked + 2] += MORE
+        return bool(blocked >= 0)
 
     def _motion(self) -> SampledMotion:
         x, N = self.x, len(self.x.a)

@@ -100,6 +100,11 @@ class PlanPart(Part):
         False,
         description="whether it goes on without rests, in about half the time, where such a motion is found",
     )
+    objective: ObjectiveList = Field(
+        default_factory=list,
+        description="what a smooth plan minimises in its time: one as the scenario's objective, or a list "
+        "that is added up; a sample costs 0.3 for an input at its limit, 1 for a rate at its limit, and H",
+    )
     effort: bool | dict[str, Positive] = Field(
         False,
         description="whether motors keep the torque limits of the robot's file; or masses that the robot "
@@ -262,10 +267,12 @@ class ScenarioPart(Part):
         with at("collisions"):
             place = ("collisions",)
             collisions = None if self.collisions is None else self.collisions.build(robot, absolute, place)
+        with at("plan"), at("objective"):
+            objective = build_objective(part.objective, robot, collisions)
         limits = None if self.limits is None else self.limits.build(robot)
         tolerance = None if self.until is None else self.until.make()
         given = part.given("through", "seconds", "seed", "shorten", "smooth", "effort")
-        given |= {"limits": limits, "tolerance": tolerance, "progress": progress}
+        given |= {"limits": limits, "tolerance": tolerance, "objective": objective, "progress": progress}
         if part.track is not None:
             given["margin"] = part.track.margin
         with at("plan"):
