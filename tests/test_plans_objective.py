@@ -46,8 +46,11 @@ def test_a_plan_has_less_of_its_objective_in_the_same_time_and_keeps_all(
     assert run.objective[3] == pytest.approx(objective.value(here), abs=1e-9)
 
 
-def test_an_objective_that_nothing_lowers_leaves_the_plan_as_it_is_to_the_bit() -> None:
-    plain, plan = made(None), made(0.0 * W)
+@pytest.mark.parametrize("factor", [0.0, 1e300])
+def test_an_objective_that_nothing_lowers_leaves_the_plan_as_it_is_to_the_bit(factor: float) -> None:
+    """Of no weight, or infinite."""
+    infinite = nmm.Quadratic(nmm.QuadraticTerm("q1", 9.0, 1e300))
+    plain, plan = made(None), made(factor * infinite)
     t = np.linspace(0.0, plain.duration, 300)
     for one, other in zip(plain(t), plan(t), strict=True):
         np.testing.assert_array_equal(one, other)

@@ -43,25 +43,31 @@ class SampleCosts:
         """H (K,) and ∂H/∂q (K, n) at q (K, n)."""
         program, rows, weights = self._program, self._program.first_rows, self._weights
         H, H_q = np.empty(len(q)), np.empty(q.shape)
-        for k, one in enumerate(q):
-            program.prepare(t, one)
-            run_program(t, one, *program.blocks)
-            H[k] = weights @ program.buffers.value[rows]
-            H_q[k] = weights @ program.buffers.value_q[rows]
+        with np.errstate(over="ignore", invalid="ignore"):
+            for k, one in enumerate(q):
+                program.prepare(t, one)
+                run_program(t, one, *program.blocks)
+                H[k] = weights @ program.buffers.value[rows]
+                H_q[k] = weights @ program.buffers.value_q[rows]
         return H, H_q
 
     def curvature(self, q: Array, H_q: Array) -> Array:
         """∂²H/∂q² (K, n, n) at q (K, n), by differences of gradients."""
         n = q.shape[1]
         beside = (q[:, np.newaxis] + APART * np.eye(n)).reshape(-1, n)
-        found = (self.at(beside)[1].reshape(-1, n, n) - H_q[:, np.newaxis]) / APART
+        with np.errstate(invalid="ignore"):
+            found = (self.at(beside)[1].reshape(-1, n, n) - H_q[:, np.newaxis]) / APART
         return 0.5 * (found + found.transpose(0, 2, 1))
 
     def write(self, x: Shooting, share: float) -> None:
         """A share of H about the motion, as the problem's squares: its gradient, and its curvature with all
         signs positive, so that a round goes down from everywhere."""
         H_q = self.at(x.q)[1]
-        bends, ways = np.linalg.eigh(self.curvature(x.q, H_q))
+        curvature = self.curvature(x.q, H_q)
+        if not np.all(np.isfinite(curvature)):  # nothing is known there: limits and effort alone lead on
+            x.pull[:] = 0.0
+            return
+        bends, ways = np.linalg.eigh(curvature)
         bends = np.abs(bends)
         bends = np.maximum(bends, FLAT * max(bends.max(), np.abs(H_q).max(), np.finfo(float).tiny))
         x.aims[:] = ways.transpose(0, 2, 1)
