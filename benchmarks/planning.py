@@ -1,8 +1,9 @@
 """Plans for random scenes of six kinds, with rests and smooth:
 
-    python benchmarks/planning.py [INSTANCES] [SEED] [KIND …] [--only rests|smooth]
+    python benchmarks/planning.py [INSTANCES] [SEED] [KIND …] [--only rests|smooth] [--ways N]
 
-and to random poses of the platform without obstacles (1000 5 poses_differential poses_car --only rests).
+to random poses of the platform without obstacles (1000 5 poses_differential poses_car --only rests), and past
+a gap that closes for good before the robot is through (20 7 closing_gap --only rests), with so many ways.
 
 Each plan is checked by what shares no code with the planner: Coal on the exact shapes of the robot at 2,000
 times along it, differences of its coordinates against S(q) u, and the limits. `free` is the least distance
@@ -20,8 +21,11 @@ from typing import NamedTuple
 import numpy as np
 
 import nmm
+from nmm.plans import search
 
 DISTANCE = 0.03
+#: Among what moves, how long it is looked at after the end of its motion, s.
+STAYS = 5.0
 #: No point of a robot here is farther from a joint that moves it, m.
 SIZE = 2.0
 UR5 = "package://example-robot-data/robots/ur_description/urdf/ur5_robot.urdf"
@@ -166,9 +170,28 @@ def poses_car(rng: np.random.Generator) -> Scene:
     return pose_of("car_base", rng)
 
 
+def closing_gap(rng: np.random.Generator) -> Scene:
+    """A wall with a gap, on the way to a pose; a box moves into it before the robot is there, and stays."""
+    x, y, speed = rng.uniform(2.4, 3.6), rng.uniform(-0.5, 0.5), rng.uniform(2.0, 4.0)
+    walls = [
+        nmm.Obstacle(nmm.Box([0.2, 2.0, 2.0]), [x, y + side, 0.5], name=name)
+        for name, side in (("right", -1.6), ("left", 1.6))
+    ]
+
+    def moves_in(t: float) -> list[float]:
+        return [x, max(y, y + 4.0 - speed * t), 0.9]
+
+    walls.append(nmm.Obstacle(nmm.Box([0.3, 1.4, 1.8]), motion=moves_in, name="stays"))
+    goal = {"x": 6.0, "y": 0.0, "theta": 0.0}
+    return Scene(nmm.load("unicycle_3r"), {"q1": 0.5, "q2": -0.4}, goal, walls)
+
+
 KINDS: dict[str, Callable[[np.random.Generator], Scene]] = {
     one.__name__: one
-    for one in (u_shaped_wall, door, shelf, park, table, low_gate, poses_differential, poses_car)
+    for one in (
+        *(u_shaped_wall, door, shelf, park, table, low_gate),
+        *(poses_differential, poses_car, closing_gap),
+    )
 }
 #: What is measured where no kind is named.
 SIX = list(KINDS)[:6]
@@ -184,7 +207,8 @@ class Checked(NamedTuple):
 
 def checked(scene: Scene, plan: nmm.Plan, samples: int = 2000) -> Checked:
     robot, T = scene.robot, plan.duration
-    t = np.linspace(0.0, T, samples)
+    moving = any(one.moves for one in scene.obstacles)
+    t = np.linspace(0.0, T + STAYS * moving, samples)
     q, _ = plan(t)
     queries = nmm.Collisions(DISTANCE, obstacles=scene.obstacles).on(robot).queries
     pairs = range(len(queries.scene.kept))
@@ -192,11 +216,13 @@ def checked(scene: Scene, plan: nmm.Plan, samples: int = 2000) -> Checked:
     moved = np.abs(np.diff(q, axis=0, prepend=q[:1])) @ np.where(
         np.array(robot.q_units) == "m", 2.0, 2.0 * SIZE
     )
+    if moving:
+        moved[:] = np.inf
     least, near = np.full(len(pairs), -np.inf), np.inf
-    for one, step in zip(q, moved, strict=True):
+    for when, one, step in zip(t, q, moved, strict=True):
         least -= step  # two shapes come nearer by so much at most: far ones need no look
         due = np.flatnonzero(least < near)
-        least[due] = queries.distances(0.0, one, due) - asked[due]
+        least[due] = queries.distances(float(when), one, due) - asked[due]
         near = min(near, float(least.min()))
     h = 1e-6
     inner = t[(t > h) & (t < T - h)]
@@ -235,7 +261,9 @@ def main() -> None:
     parser.add_argument("seed", type=int, nargs="?", default=0)
     parser.add_argument("kinds", nargs="*", choices=[[], *KINDS], default=[])
     parser.add_argument("--only", choices=["rests", "smooth"])
+    parser.add_argument("--ways", type=int, default=search.WAYS)
     given = parser.parse_args()
+    search.WAYS = given.ways
     print(f"{given.instances} instances of each, seed {given.seed}")
     for kind in (u_shaped_wall, table):  # what is compiled once is no part of a plan
         nmm.plan(*kind(np.random.default_rng(0)), smooth=True)
