@@ -165,7 +165,7 @@ def test_a_scenario_replans_and_its_folder_says_when(tmp_path):
     assert the(run, "replanned").values["plans"]
     assert np.abs(run.q[-1] - scenario.plan().end).max() < 5e-3
     assert run.clearance_between.min() > 0.0299
-    run.save(tmp_path / "run", html=True)
+    run.save(tmp_path / "run", figures=False, html=True)
     again = nmm.Trajectory.load(tmp_path / "run")
     assert again.events == run.events
     np.testing.assert_array_equal(again.planned, run.planned)
