@@ -186,11 +186,58 @@ def closing_gap(rng: np.random.Generator) -> Scene:
     return Scene(nmm.load("unicycle_3r"), {"q1": 0.5, "q2": -0.4}, goal, walls)
 
 
+def trailers(rng: np.random.Generator) -> Scene:
+    """A tractor with two trailers to a pose up to 7 m away, the trailers as they come."""
+    start = {"theta": rng.uniform(-np.pi, np.pi), "hitch1": rng.uniform(-0.6, 0.6)}
+    goal = {"x": rng.uniform(-5, 5), "y": rng.uniform(-5, 5), "theta": rng.uniform(-np.pi, np.pi)}
+    return Scene(nmm.load("trailer_base"), start | {"hitch2": rng.uniform(-0.6, 0.6)}, goal, [])
+
+
+def trailers_straight(rng: np.random.Generator) -> Scene:
+    """The same, with straight trailers there."""
+    robot, start, goal, _ = trailers(rng)
+    return Scene(robot, start, goal | {"hitch1": 0.0, "hitch2": 0.0}, [])
+
+
+def trailers_wall(rng: np.random.Generator) -> Scene:
+    """Round a wall of 4 m to a pose behind it, with straight trailers."""
+    goal = {"x": rng.uniform(5, 7), "y": rng.uniform(-2, 2), "theta": rng.uniform(-np.pi, np.pi)}
+    start = {"theta": rng.uniform(-np.pi, np.pi)}
+    walls = [box("wall", (2.4, -2.0, 0.0), (2.6, 2.0, 1.5))]
+    return Scene(nmm.load("trailer_base"), start, goal | {"hitch1": 0.0, "hitch2": 0.0}, walls)
+
+
+def trailers_door(rng: np.random.Generator) -> Scene:
+    """Through a gap of 1.0 to 1.4 m in a wall, to any heading with straight trailers."""
+    y, half = rng.uniform(-1.5, 1.5), 0.5 * rng.uniform(1.0, 1.4)
+    walls = [
+        box("left", (3.0, y + half, 0.0), (3.2, y + 8.0, 1.5)),
+        box("right", (3.0, y - 8.0, 0.0), (3.2, y - half, 1.5)),
+    ]
+    goal = {"x": rng.uniform(5.5, 7.5), "y": rng.uniform(-2, 2), "theta": rng.uniform(-np.pi, np.pi)}
+    start = {"theta": rng.uniform(-np.pi, np.pi)}
+    return Scene(nmm.load("trailer_base"), start, goal | {"hitch1": 0.0, "hitch2": 0.0}, walls)
+
+
+def trailers_slot(rng: np.random.Generator) -> Scene:
+    """Backwards into a slot 0.9 to 1.2 m wide and 2.4 m deep."""
+    half = 0.5 * rng.uniform(0.9, 1.2)
+    walls = [
+        box("left", (-2.5, half, 0.0), (0.0, half + 0.2, 1.0)),
+        box("right", (-2.5, -half - 0.2, 0.0), (0.0, -half, 1.0)),
+        box("end", (-2.6, -half, 0.0), (-2.4, half, 1.0)),
+    ]
+    start = {"x": rng.uniform(3, 5), "y": rng.uniform(-2, 2), "theta": rng.uniform(-np.pi, np.pi)}
+    goal = {"x": rng.uniform(-0.1, 0.3), "y": 0.0, "theta": 0.0, "hitch1": 0.0, "hitch2": 0.0}
+    return Scene(nmm.load("trailer_base"), start, goal, walls)
+
+
 KINDS: dict[str, Callable[[np.random.Generator], Scene]] = {
     one.__name__: one
     for one in (
         *(u_shaped_wall, door, shelf, park, table, low_gate),
         *(poses_differential, poses_car, closing_gap),
+        *(trailers, trailers_straight, trailers_wall, trailers_door, trailers_slot),
     )
 }
 #: What is measured where no kind is named.
@@ -265,7 +312,7 @@ def main() -> None:
     given = parser.parse_args()
     search.WAYS = given.ways
     print(f"{given.instances} instances of each, seed {given.seed}")
-    for kind in (u_shaped_wall, table):  # what is compiled once is no part of a plan
+    for kind in (u_shaped_wall, table, trailers):  # what is compiled once is no part of a plan
         nmm.plan(*kind(np.random.default_rng(0)), smooth=True)
     print(f"{'':18} smooth found   end  free   s median   worst  duration  spare mm  |q_dot - S u|  limits")
     for kind in given.kinds or SIX:

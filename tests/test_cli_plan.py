@@ -86,7 +86,7 @@ def test_a_scenario_is_planned_with_or_without_a_plan_of_its_own(tmp_path):
         (("unicycle_3r", "--to", "x=1", "--seconds", "0"), 2, "plan.seconds"),
         (("unicycle_3r", "--to", "x=1", "--obstacles", "none.yaml"), 2, "none.yaml"),
         (("behind_the_wall", "--obstacles", "behind_the_wall"), 2, "--obstacles"),
-        (("trailer_base", "--to", "x=1"), 2, "tractor"),
+        (("trailer_base", "--to", "x=1", "--set", "robot.platform=wheeled"), 2, "wheeled"),
         (("no_such_robot", "--to", "x=1"), 2, "no_such_robot"),
         (("unicycle_3r", "--to", "x=2.5,y=0", "--obstacles", "behind_the_wall"), 1, "wall"),
     ],

@@ -198,7 +198,7 @@ def test_links_that_touch_at_the_start_are_named():
 
 
 def test_what_has_no_words_is_refused_by_name():
-    robot = nmm.load("trailer_base")
+    robot = nmm.load("trailer_base", platform="wheeled")
     with pytest.raises(nmm.InputError) as found:
         nmm.plan(robot, robot.rest, {"x": 1.0, "y": 0.0, "theta": 0.0})
     assert robot.platform.name in found.value.what

@@ -133,12 +133,15 @@ def solve_backward(x: Shooting, closing: int) -> int:
                 for b in range(i):
                     value -= L[i, b] * K[b, c]
                 K[i, c] = value / L[i, i]
+        # Made symmetric: what rounding leaves of a difference grows on a way on which hitches fold.
         for i in range(size):
-            for c in range(size + 1):
+            for c in range(i, size + 1):
                 value = Q[i, c if c < size else last]
                 for b in range(m):
                     value -= K[b, i] * K[b, c]
                 V[i, c] = value
+                if c < size:
+                    V[c, i] = value
         for c in range(size + 1):
             for i in range(m - 1, -1, -1):
                 value = K[i, c]

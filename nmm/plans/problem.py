@@ -11,15 +11,18 @@ from nmm.arrays import Array
 from nmm.collisions.motion_check import MotionCheck
 from nmm.control.limits import LimitsOn
 from nmm.plans.shooting import Shooting
+from nmm.platforms.tractor import Tractor
 from nmm.robots.robot import Robot
 from nmm.robots.zero_order_hold import inputs_of
 
 #: Samples' ends keep this much more than the distance, m.
 MARGIN = 0.005
-#: The most that the platform turns in one step of its integration, rad.
-TURN = 0.1
+#: The most that the platform turns in one step of its integration, rad, and goes, in lengths of a trailer.
+TURN, TOWED = 0.1, 0.04
 #: Wheels keep this share of their limits at the ends of samples.
 WITHIN = 0.99
+#: Hitches keep off their limits by so much at the ends of samples, rad.
+FOLDING = 0.02
 #: Weight of inputs beside that of their rates, both as shares of their limits; of the end's error.
 EFFORT, END = 0.3, 1e5
 #: Products of slacks and multipliers to begin with.
@@ -33,6 +36,15 @@ def largest_inputs(robot: Robot, limits: LimitsOn, usual: float) -> Array:
         G = robot.platform.G(np.zeros(robot.platform.n_p))
         largest[: robot.platform.p] *= np.abs(np.linalg.pinv(G)).max(axis=1)
     return np.where(np.isfinite(limits.inputs), limits.inputs, np.column_stack([-largest, largest]))
+
+
+def steps_within(robot: Robot, q: Array, u: Array, step: float) -> float:
+    """How many steps the platform's integration needs in a sample of a motion q (N + 1, n), u (N + 1, m)."""
+    needed = float(np.abs(np.diff(q[:, 2 : robot.platform.n_p], axis=0)).max(initial=0.0)) / TURN
+    if isinstance(robot.platform, Tractor):
+        shortest = min(one.length for one in robot.platform.trailers)
+        needed = max(needed, step * float(np.abs(u[:, 0]).max()) / (TOWED * shortest))
+    return needed
 
 
 def shooting_problem(
@@ -58,6 +70,8 @@ def shooting_problem(
     over = np.zeros(n)
     moved = robot.rate_coordinates
     over[moved[moved >= 0]] = (np.where(np.isfinite(hardest), hardest, 0.0) * step * step / 8.0)[moved >= 0]
+    towed = np.setdiff1d(np.arange(robot.platform.n_p), moved)
+    over[towed[np.isfinite(limits.coordinates[towed]).any(axis=1)]] = FOLDING
     over = np.minimum(over, 0.5 * np.maximum(room.min(axis=0), 0.0))
     ends = np.vstack(
         [
@@ -77,11 +91,10 @@ def shooting_problem(
         apart = np.minimum(*(scene.queries.distances(0.0, one, pairs) for one in q[[0, -1]]))
         spare = np.maximum(0.5 * (apart - kept), 0.0)
     R = len(column) + 2 * len(limits.spin) + len(kept)
-    turn = float(np.abs(np.diff(q[:, 2 : robot.platform.n_p], axis=0)).max(initial=0.0))
     return Shooting(
         inputs=inputs_of(robot),
         step=np.array(step),
-        substeps=np.array(max(2, math.ceil(turn / TURN)), dtype=np.int64),
+        substeps=np.array(max(2, math.ceil(steps_within(robot, q, u, step))), dtype=np.int64),
         column=column.astype(np.int64),
         sign=sign,
         offset=-sign * ends[column, side],

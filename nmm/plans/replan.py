@@ -16,6 +16,7 @@ from nmm.errors import InputError, expect_kind
 from nmm.plans.following import differences
 from nmm.plans.plan import Plan
 from nmm.plans.search import STEP, Search
+from nmm.platforms.tractor import Tractor
 
 #: Times at which the plan's nearest point is looked for, s apart.
 NEAR = 0.05
@@ -66,6 +67,10 @@ def replan(
     """
     expect_kind(plan, Plan, "replan", "a Plan, as nmm.plan returns it")
     robot, old = plan.robot, plan.found
+    if isinstance(robot.platform, Tractor):
+        raise InputError(
+            "a tractor with trailers is not replanned for", where="replan: plan", expected="another nmm.plan"
+        )
     here = robot.following.placed(robot.q(q))
     robot.check_limits(here)
     asked = old.asked

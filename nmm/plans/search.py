@@ -6,8 +6,9 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,9 +35,11 @@ from nmm.plans.samples import SampledMotion, joined
 from nmm.plans.search_space import USUAL, drawn_within, leg_speeds, pause_between, usual_speeds
 from nmm.plans.smoothing import Smoothing
 from nmm.plans.timing import TimedLegs, timed
+from nmm.plans.towing import Towing
 from nmm.plans.tree import PLACE, Trees
 from nmm.plans.waiting import LONG, waited
 from nmm.plans.ways import LEGS, ways_of
+from nmm.platforms.tractor import Tractor
 from nmm.robots.robot import Robot
 
 #: Room for configurations in each tree, and rounds of a search between two looks at the clock.
@@ -45,6 +48,8 @@ ROOM, ROUNDS = 20_000, 200
 STEP = 2.0
 #: Ways that are tried among obstacles that move, and how often each but the first is shortened.
 WAYS, SHORTEN = 8, 50
+
+T = TypeVar("T")
 
 
 def plan(
@@ -84,7 +89,8 @@ def plan(
     through : goals that are reached on the way, in order
     shorten : how often a shorter way between two points of the motion is tried
     smooth : whether to look for one motion without rests, which takes about half the time and 0.1 to 0.5 s
-        more to plan; where none is found that keeps everything, the one with rests stands (`Plan.smooth`)
+        more to plan; where none is found that keeps everything, the one with rests stands (`Plan.smooth`). A
+        tractor's with trailers always is
     objective : H(q) to minimise along a smooth motion, in the time that it takes without: each of its samples
         costs 0.3 for an input at its limit, 1 for a rate of it at its limit, by their squares, and H
     effort : whether motors keep the torque limits of the robot's file, or masses that the robot carries then,
@@ -101,7 +107,8 @@ def plan(
     ------
     InputError : a start that touches something or is outside limits, a goal of another kind, limits of
         functions, a platform whose ways are not known, an objective that changes with time or without smooth
-    RunError : no goal configuration was found, or no way there; the text says what was tried
+    RunError : no goal configuration was found, or no way there, or of a tractor with trailers no exact motion
+        along it; the text says what was tried
 
     Examples
     --------
@@ -197,6 +204,8 @@ class Search:
 
     def plan(self, seconds: float, shorten: int, progress: Callable[[float], None] | None) -> Plan:
         """From the start through all goals; each part ends where the next begins."""
+        if isinstance(self.robot.platform, Tractor):
+            return self._towed(self.robot.platform, seconds, progress)
         self.begin(seconds, progress)
         here, parts, least = self.start, [], self.asked_kept + self.asked.margin
         for wanted in self.goals:
@@ -207,17 +216,56 @@ class Search:
         self.check.kept[:] = least
         return self.finished(*parts)
 
+    def _towed(self, tractor: Tractor, seconds: float, progress: Callable[[float], None] | None) -> Plan:
+        """The plan of a tractor with trailers, which is smooth."""
+        if self.movers is not None:
+            raise InputError("a tractor with trailers waits for none that move", where="plan: obstacles")
+        towing = Towing(self.robot, self.limits, USUAL, self.check, self.low, self.high, self.seed, self.left)
+        self.begin(seconds, progress)
+        hitches, here, found = {one.joint for one in tractor.trailers}, self.start, []
+        for wanted in self.goals:
+            self.check.kept[:] = self.asked_kept
+            ends, named = self.ends(wanted, here), self._named(wanted)
+            if any(np.array_equal(here, end) for end in ends):
+                continue
+            find = partial(towing, here, ends, loose=named is not None and not hitches & named)
+            motion = self._farther(find, here, ends)
+            found.append(motion if self.efforts is None else self.efforts.samples(motion))
+            here = motion.corners[-1]
+        still = self._timed(here, np.zeros((0, 3 + self.robot.n)))
+        return self._plan(joined(found) if found else still, towing.motions, towing.configurations)
+
+    def _named(self, wanted: object) -> set[str] | None:
+        """The coordinates that goals name, and their postures; None where one of them is no goal by name."""
+        named: set[str] = set()
+        for one in alternatives(wanted):
+            if not isinstance(one, Mapping):
+                return None
+            named |= {*one, *self.robot.postures.get(str(one.get("posture")), {})}
+        return named
+
     def farther(
         self, here: Array, ends: Sequence[Array], ahead: Sequence[Array] = (), behind: Sequence[Array] = ()
     ) -> Array:
         """A `way` that keeps the margin, too, where one is found in half of the time."""
+        return self._farther(partial(self.way, here, ends, ahead, behind), here, ends)
+
+    def _farther(self, find: Callable[[], T], here: Array, ends: Sequence[Array]) -> T:
+        """What is found with the margin kept between these (n,) in half of the time, or else without."""
         if self.asked.margin > 0.0:
             last, self._ends = self._ends, 0.5 * (time.monotonic() + self._ends)
             self.widen(here, *ends)
             with suppress(RunError):
-                return self.way(here, ends, ahead, behind)
+                return find()
             self._ends, self.check.kept[:] = last, self.asked_kept
-        return self.way(here, ends, ahead, behind)
+        return find()
+
+    def left(self) -> float:
+        """How much time is left, s; told to `progress`, too."""
+        left = self._ends - time.monotonic()
+        if self._progress is not None:
+            self._progress(min(1.0, 1.0 - left / self._seconds))
+        return left
 
     def widen(self, *configurations: Array) -> None:
         """Keep the margin as far as these (n,) do."""
@@ -245,6 +293,9 @@ class Search:
         elif self.asked.smooth:
             motion = self._smoothed(parts) or path
         motions, postures = (int(count) for count in self.trees.looked)
+        return self._plan(motion, motions, postures)
+
+    def _plan(self, motion: Motion, motions: int, postures: int) -> Plan:
         found = Found(motion, self.limits, self.scene, self.goals[-1], self.asked, self.tree)
         return Plan(self.robot, motions, postures, found)
 
@@ -335,9 +386,7 @@ class Search:
         scratch = np.zeros((LEGS, 3 + self.robot.n))
         while True:
             found = self._search(*self.check.blocks, ROUNDS, scratch)
-            left = self._ends - time.monotonic()
-            if self._progress is not None:
-                self._progress(min(1.0, 1.0 - left / self._seconds))
+            left = self.left()
             if found > 0:
                 break
             if found < 0 or left < 0.0:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 
@@ -14,10 +15,9 @@ from nmm.kernels.compiled import checked_by_caller
 from nmm.kernels.record_layout import Memory, views
 from nmm.plans.interior import SHOOT, shoot
 from nmm.plans.objective import SampleCosts
-from nmm.plans.problem import MU, TURN, largest_inputs, shooting_problem
+from nmm.plans.problem import MU, largest_inputs, shooting_problem, steps_within
 from nmm.plans.samples import SampledMotion, Samples
 from nmm.plans.shooting import LOOK, Shooting, first_blocked_sample
-from nmm.plans.timing import TimedLegs
 from nmm.robots.robot import Robot
 from nmm.robots.wheel_rates import turning_wheels
 
@@ -34,6 +34,15 @@ LOWERED, LONGEST, BEGIN, SHARES = 20, 60, 10.0, (1.0, 0.2, 0.04)
 MORE = 0.015
 #: What is left of gaps between samples and of the end's error when a motion is found.
 EXACT = 1e-11
+
+
+class Path(Protocol):
+    """What a motion is looked for along: q (N, n) and u (N, m) at times from 0 to `duration`, s."""
+
+    @property
+    def duration(self) -> float: ...
+
+    def at(self, t: Array) -> tuple[Array, Array]: ...
 
 
 class Smoothing:
@@ -58,8 +67,9 @@ class Smoothing:
         self._shoot = checked_by_caller(shoot, SHOOT)
         self._first_blocked = checked_by_caller(first_blocked_sample, LOOK)
 
-    def __call__(self, path: TimedLegs) -> SampledMotion | None:
-        """A motion that takes less time than a path, or None where none is found that keeps everything."""
+    def __call__(self, path: Path, rough: bool = False) -> SampledMotion | None:
+        """A motion that takes less time than a path, or any where that is rough and no motion of the robot;
+        None where none is found that keeps everything."""
         self.begin(path)
         x = self.x
         kept: list[Array] = []
@@ -77,7 +87,7 @@ class Smoothing:
                 self._restore(kept)
                 share = LESS
             self._quicken(share)
-        if best is None or best.duration >= path.duration:
+        if best is None or not (rough or best.duration < path.duration):
             return None
         return best if self.costs is None else self._lowered(self.costs, kept) or best
 
@@ -102,7 +112,7 @@ class Smoothing:
                     break
         return None
 
-    def begin(self, path: TimedLegs) -> None:
+    def begin(self, path: Path) -> None:
         """Set the problem up, with a path in its own time to begin with."""
         N = int(np.clip(path.duration / EACH, FEWEST, MOST))
         q, u = path.at(np.linspace(0.0, path.duration, N + 1))
@@ -124,7 +134,8 @@ class Smoothing:
     def _spare(self) -> float:
         """The share of its time that the motion needs within the limits of inputs and wheels, just."""
         x, limits = self.x, self.limits
-        needed = float(np.max(np.where(x.u >= 0.0, x.u / self.top[:, 1], x.u / self.top[:, 0])))
+        most = np.where(x.u >= 0.0, self.top[:, 1], self.top[:, 0])  # 0 for what may not reverse
+        needed = float(np.max(np.divide(x.u, most, out=np.zeros_like(x.u), where=most != 0.0)))
         B, w = len(x.column), len(x.spin)
         if w:  # c is the limit less the rate, and plus it
             left = x.c[1:-1, B : B + 2 * w].reshape(-1, w, 2).min(axis=2)
@@ -149,9 +160,9 @@ class Smoothing:
     def _refined(self) -> bool:
         """Make samples finer that turn far, or keep more where one is blocked; whether there was any."""
         x = self.x
-        turn = float(np.abs(np.diff(x.q[:, 2 : self.robot.platform.n_p], axis=0)).max(initial=0.0))
-        if turn > 1.2 * TURN * x.substeps[()]:
-            x.substeps[()] = math.ceil(turn / TURN)
+        steps = steps_within(self.robot, x.q, x.u, float(x.step))
+        if steps > 1.2 * x.substeps[()]:
+            x.substeps[()] = math.ceil(steps)
             return True
         blocked = self._first_blocked(*self.check.blocks, *self._own)
         if blocked >= 0:

@@ -11,10 +11,12 @@ from nmm.kernels.compiled import clear, compiled, scratch
 from nmm.kernels.record_layout import Cell, IntegerCell, Vector
 from nmm.plans.words import PARTS, dubins, reeds_shepp, wrapped
 from nmm.platforms.steering import SteeredAxle, SteeringPivot
+from nmm.platforms.tractor import Tractor
 from nmm.robots.robot import Robot
 
-#: What a platform does: it stands, moves every way, or rolls one way, to and fro or only forwards.
-STANDS, SLIDES, ROLLS, FORWARDS = 0, 1, 2, 3
+#: What a platform does: it stands, moves every way, rolls one way, to and fro or only forwards, or tows
+#: trailers, whose ways are not legs (`nmm.plans.towing`).
+STANDS, SLIDES, ROLLS, FORWARDS, TOWS = 0, 1, 2, 3, 4
 #: Legs of one way at most: the parts of a word, and the steering before and after each.
 LEGS = 2 * PARTS + 1
 #: A platform that turns on the spot is driven along arcs of this radius, as a share of its size.
@@ -26,7 +28,7 @@ SHORT = 1e-9
 class Ways(NamedTuple):
     """What decides a platform's ways; lengths in m, angles in rad.
 
-    kind () : STANDS, SLIDES, ROLLS or FORWARDS; radius () : of its arcs
+    kind () : STANDS, SLIDES, ROLLS, FORWARDS or TOWS; radius () : of its arcs
     rolling (3,) : where, in the platform's axes, a frame stands whose origin moves only along its x axis
     steering () : the coordinate that is the steering angle, or -1; wheelbase () : tan(angle) = wheelbase /
         radius
@@ -175,7 +177,7 @@ def ways_of(robot: Robot, speeds: Array, pause: float, reverses: bool) -> Ways:
 
     Raises
     ------
-    InputError : a platform whose ways are not known (a tractor with trailers, wheels that steer on their own)
+    InputError : a platform whose ways are not known (wheels that steer on their own)
     """
     platform = robot.platform
     kind, radius, rolling, steering, wheelbase = STANDS, 1.0, np.zeros(3), -1, 0.0
@@ -186,7 +188,9 @@ def ways_of(robot: Robot, speeds: Array, pause: float, reverses: bool) -> Ways:
         # What no twist has, a vx + b vy + c ω = 0: (a, b) is across the direction in which it rolls.
         across = np.linalg.svd(G)[0][:, 2]
         size = float(np.hypot(*across[:2]))
-        if platform.n_p == 3 and twists == 3:
+        if isinstance(platform, Tractor):
+            kind = TOWS
+        elif platform.n_p == 3 and twists == 3:
             kind = SLIDES
         elif platform.n_p == 3 and twists == 2 and size > 1e-9:
             ahead = np.array([across[1], -across[0]]) / size
@@ -203,7 +207,8 @@ def ways_of(robot: Robot, speeds: Array, pause: float, reverses: bool) -> Ways:
             raise InputError(
                 f"no ways from pose to pose are known for the platform {platform.name}",
                 where=robot.name,
-                expected="one that stands, moves every way, turns on the spot or steers one axle as a car",
+                expected="one that stands, moves every way, turns on the spot, steers one axle as a car "
+                "or is a tractor",
             )
     return Ways(
         kind=np.array(kind, dtype=np.int64),
