@@ -213,7 +213,8 @@ class Seen(Function):
 
     def shown(self) -> Shown:
         fx, fy, cx, cy = self.intrinsics.tolist()
-        return Shown(sees=Sight(self.camera, self.points, self._rows, (fx, fy, cx, cy), self._line))
+        points = tuple(one for point in self.points for one in getattr(point, "true_points", (point,)))
+        return Shown(sees=Sight(self.camera, points, self._rows, (fx, fy, cx, cy), self._line))
 
     def undefined(self, robot: Robot, t: float, q: Array) -> str:
         here = Configuration(robot, q)

@@ -189,6 +189,11 @@ class MeasuredPoints(Seen):
     def __len__(self) -> int:
         return self.count
 
+    @property
+    def true_points(self) -> tuple[Function, ...]:
+        """What a simulation takes pictures of, and is drawn."""
+        return self.points
+
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         camera = self._placed(robot)
         return tuple(Row(f"{camera}.point{k + 1}.{axis}", "m") for k in range(len(self)) for axis in "xyz")
@@ -366,7 +371,7 @@ class MeasuredPoint(Function):
 
     def __init__(self, of: MeasuredPoints, k: int) -> None:
         expect(k < len(of), "point", f"a number below {len(of)}", k)
-        self.of, self.k = of, k
+        self.of, self.k, self.true_points = of, k, of.points[k : k + 1]
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         return self.of.rows(robot)[3 * self.k : 3 * self.k + 3]
