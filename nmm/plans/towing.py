@@ -172,8 +172,8 @@ class Towing:
                     return motion
                 self.trains.tried[self.motions % TRIED] = self.trains.shortest
         raise RunError(
-            f"no motion with trailers found: {self.configurations} configurations looked at, "
-            f"{self.motions} rough ways there, of which the solver made none exact",
+            f"no motion with trailers found: {self.configurations} configurations and "
+            f"{self.motions} rough ways looked at",
             where="plan",
         )
 
