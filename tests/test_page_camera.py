@@ -13,10 +13,13 @@ from playback_browser import UPRIGHT, WALK, Window
 from playback_browser import browser as browser
 from playback_browser import empty_page as empty_page
 from playback_browser import window as window
+from ports import MOST, served
 
 import nmm
 from nmm.control.quantities import QUANTITIES
+from nmm.driving import ScenarioSetup, drive
 from nmm.playback import write_html
+from nmm.playback.running import Growing
 
 PIXELS = [525.0, 500.0, 320.0, 240.0]
 
@@ -175,3 +178,52 @@ def test_a_comparison_has_what_all_runs_see(run: nmm.Trajectory) -> None:
     for other, shown in ((run, True), (elsewhere, False)):
         axes = nmm.figures.comparison([run, other]).axes[0]
         assert ("path of what is seen" in [line.get_label() for line in axes.get_lines()]) is shown
+
+
+def test_a_live_page_gets_what_is_seen_as_it_is_recorded() -> None:
+    scenario = nmm.Scenario.load("pan_tilt_follow")
+    controller, q0 = scenario.controller(), scenario.parts.q0
+    growing, recorders = Growing(controller), []
+    run = nmm.simulate(controller, q0, 0.2, 0.02, watch=recorders.append)
+    values = growing.values(recorders[0], growing.active_rows(), np.array([0, 4, 10]))[:, -7:]
+    assert run.seen is not None
+    whole = np.hstack([run.seen[:, 0], run.r[:, :2], run.r_d[:, :2]])
+    np.testing.assert_allclose(values, whole[[0, 4, 10]], atol=1e-12)
+    (camera,) = growing.cameras(run.q[0])
+    assert camera.frame == "camera_optical_frame"
+
+
+#: Where normalised coordinates of the picture are in the window, px.
+SPOT = """([x, y]) => {
+  const { canvas, range: [x0, y0, x1] } = nmm.sights.figures[0];
+  const box = canvas.getBoundingClientRect();
+  const scale = (box.width - 37) / (x1 - x0);
+  return [box.left + 30 + scale * (x - x0), box.top + 6 + scale * (y - y0)];
+}"""
+
+
+@pytest.mark.browser
+def test_a_goal_is_dragged_in_the_picture_and_the_ball_comes_there(window: Window) -> None:
+    setup = ScenarioSetup(nmm.Scenario.load("pan_tilt_follow"))
+    with served(drive, setup) as url:
+        page = window.open(url)
+        page.wait_for_function(
+            "nmm.sights.figures.length && nmm.sights.figures[0].range && nmm.drive.time > 0"
+        )
+        page.evaluate("nmm.viewer.scene.visible = false")  # the processor that draws it is slow
+        page.mouse.move(*page.evaluate(SPOT, [0.0, 0.0]))
+        page.mouse.down()
+        page.mouse.move(*page.evaluate(SPOT, [0.2, -0.15]), steps=3)
+        page.mouse.up()
+        wanted = np.array([0.2, -0.15])
+        aimed = page.evaluate("nmm.drive.targets[0].value")
+        np.testing.assert_allclose(aimed, wanted, atol=0.02)  # a pixel is 0.01
+        page.wait_for_function(
+            """([x, y]) => {
+              const { pictures } = nmm.sights.all[0];
+              const [dx, dy] = [pictures.at(-2) - x, pictures.at(-1) - y];
+              return Math.hypot(dx, dy) < 2e-3;
+            }""",
+            arg=aimed,
+            timeout=1000.0 * MOST,
+        )

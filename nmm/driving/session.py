@@ -20,12 +20,15 @@ from nmm.driving.driven import Driven, Look, Made
 from nmm.driving.planning import Planning, later, why
 from nmm.driving.setups import Choice, DriveSetup, named
 from nmm.errors import InputError, NmmError
+from nmm.playback.cameras import live_numbers
 from nmm.playback.channels import live_channels
 from nmm.playback.drawing import Drawing, encode
 from nmm.playback.server import Visitor
 from nmm.playback.session import FPS, RobotSession
 from nmm.resolver_style import looks
+from nmm.robots.motion import Camera
 from nmm.runs.components import Axes
+from nmm.runs.seen import SeenPoints
 
 #: Samples that a new page gets, at FPS.
 KEPT = int(30 * FPS)
@@ -134,12 +137,15 @@ class DriveSession(RobotSession):
         self._planning, self._plan = Planning(driven), (0, "")
         self._choices: tuple[int, list[Choice]] = (0, driven.choices)
         self._picture: tuple[list[str], dict[str, Any]] | None = None
+        first = driven.reacting
+        self._seen = SeenPoints(first.task, first.limits, driven.robot)
         targets = Drawing()
         targets.add(
             "targets",
             targets=[target.for_page() for target in driven.targets],
             values=[target.signal.value.tolist() for target in driven.targets],
             at=finite(look.at),
+            goals=self._goals(),
             reach=float(driven.robot.reach),
             far=FAR,
         )
@@ -155,6 +161,7 @@ class DriveSession(RobotSession):
             obstacles=driven.obstacles,
             channels=channels,
             look=looks([_kind(driven.choices)])[0],
+            cameras=self._cameras(look),
             further=targets.commands,
             scripts=("drive_gizmo.js", "drive.js"),
             styles=("drive.css",),
@@ -162,6 +169,28 @@ class DriveSession(RobotSession):
         )
         self._publish(look)
         self.begin(self._run, "nmm drive")
+
+    def _cameras(self, look: Look) -> tuple[Camera, ...]:
+        t, q, r_d = np.array([look.t]), look.step.q[np.newaxis], look.step.r_d[np.newaxis]
+        return self._seen.by_camera(t, q, r_d)
+
+    def _goals(self) -> list[list[dict[str, Any]]]:
+        """The goals in each camera's picture: the point, its target, that one's rows of x and y,
+        with their intrinsics."""
+        counts = [len(target.rows) for target in self._driven.targets]
+        whose = [(task, row) for task, count in enumerate(counts) for row in range(count)]
+        return [
+            [
+                {
+                    "point": goal.point,
+                    "target": whose[goal.x][0],
+                    "rows": [whose[goal.x][1], whose[goal.y][1]],
+                    "intrinsics": list(goal.intrinsics),
+                }
+                for goal in camera.goals
+            ]
+            for camera in self._seen.cameras
+        ]
 
     def receive(self, text: str | bytes) -> bool:
         """Queue a page's message for the loop, ignoring invalid ones. False: there is no answer."""
@@ -274,7 +303,8 @@ class DriveSession(RobotSession):
             "sigma_min": [look.sigma_min],
             "scale": [step.scale.min(initial=1.0)],
         }
-        return finite([*(x for one in self._curves for x in known[one.name]), *step.u, *step.q])
+        seen = live_numbers(self._cameras(look), self.robot, step.q[np.newaxis])[0]
+        return finite([*(x for one in self._curves for x in known[one.name]), *step.u, *step.q, *seen])
 
     def _state(self, look: Look) -> tuple[str, bool]:
         if self._driven.trouble:

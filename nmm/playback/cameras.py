@@ -9,6 +9,7 @@ from nmm.playback.drawing import Command, Drawing, Rgb, animation, packed, page_
 from nmm.playback.keyframes import samples_kept
 from nmm.playback.shapes import DrawnRobot, sphere
 from nmm.robots.motion import Camera, Motion
+from nmm.robots.robot import Robot
 
 SEEN: Rgb = (0.91, 0.55, 0.04)
 FRUSTUM: Rgb = (0.20, 0.26, 0.34)
@@ -51,7 +52,7 @@ def draw_camera(
 ) -> list[str]:
     """Draw the i-th camera of a robot, and its points at the first sample; returns the points' nodes. The
     last command is the camera's, without samples of its picture."""
-    lens = robot.frame_node(camera.frame, f"camera {i}")
+    lens = robot.frame_node(drawing, camera.frame, f"camera {i}")
     nodes = [f"{path}/seen {i} {k}" for k in range(camera.points.shape[1])]
     radius = min(max(0.014 * size, 0.02), 0.2)
     for node, place in zip(nodes, placed(camera.points[0]), strict=True):
@@ -74,10 +75,19 @@ def draw_camera(
     return nodes
 
 
-def tell_cameras(drawing: Drawing, motions: Sequence[Motion]) -> None:
+def tell_cameras(drawing: Drawing, cameras: Sequence[Camera]) -> None:
     """Append what tells pages that cameras are drawn, once all of them are."""
-    if any(motion.cameras for motion in motions):
+    if cameras:
         drawing.add("sights", color=list(SEEN))
+
+
+def live_numbers(cameras: Sequence[Camera], robot: Robot, q: Array) -> Array:
+    """What live pages get of cameras from q (N, n), for each of them where its k points are, where it sees
+    them and where they are to be, (N, 3 k + 2 k + 2 k)."""
+    found = [np.zeros((len(q), 0))]
+    for one in cameras:
+        found += [x.reshape(len(q), -1) for x in (one.points, one.picture(robot, q), one.goals)]
+    return np.hstack(found)
 
 
 def placed(points: Array) -> Iterator[Array]:

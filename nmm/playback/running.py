@@ -17,6 +17,7 @@ from nmm.control.quantities import Record
 from nmm.control.recorded import Recorded
 from nmm.ellipsoid_options import Wanted
 from nmm.errors import NmmError
+from nmm.playback.cameras import live_numbers
 from nmm.playback.channels import live_channels, partition_text
 from nmm.playback.drawing import Drawing, encode, packed
 from nmm.playback.rolling import RolledRobot
@@ -25,9 +26,11 @@ from nmm.playback.server import Visitor
 from nmm.playback.session import RobotSession, Watching, counted
 from nmm.resolver_style import looks_of_labels
 from nmm.robots.frame_path import FramePath
+from nmm.robots.motion import Camera
 from nmm.runs.components import Axes
 from nmm.runs.joining import row_names
 from nmm.runs.recording import Recorder
+from nmm.runs.seen import SeenPoints
 from nmm.runs.shown_frame import shown_frame
 from nmm.runs.trajectory import Trajectory
 
@@ -119,14 +122,15 @@ class LiveRun(RobotSession):
         running = Drawing()
         path, desired = self._growing.drawn
         running.add("running", duration=self._end, path=path, desired=desired, color=list(look.rgb))
-        collisions = controller.given.collisions
+        collisions, start = controller.given.collisions, robot.following.placed(robot.q(q0))
         super().__init__(
-            RolledRobot(robot, robot.following.placed(robot.q(q0))),
+            RolledRobot(robot, start),
             self._title,
             self._visit,
             obstacles=() if collisions is None else collisions.obstacles,
             channels=self._growing.channels,
             look=look,
+            cameras=self._growing.cameras(start),
             further=running.commands,
             scripts=("running.js",),
             styles=("running.css",),
@@ -289,6 +293,7 @@ class Growing:
         rows = [row for task in tasks for row in task.rows(robot)]
         self._rows = len(rows)
         self._shown = shown_frame(tasks, robot)
+        self._seen = SeenPoints(tasks, controller.limits, robot)
         self._path = None if self._shown.frame is None else FramePath(robot, self._shown.frame)
         self.drawn = self._path is not None, self._path is not None and bool(self._shown.rows)
         self.partitions: list[str] = []
@@ -303,6 +308,12 @@ class Growing:
         self._partitioned = controller.resolver.name.lower() == "rg"
         self._curves, self.channels = live_channels(axes, hidden, partitioned=self._partitioned)
 
+    def cameras(self, q: Array) -> tuple[Camera, ...]:
+        """Those of the robot at q (n,), without goals; none where a thread of the page's own would call
+        users' functions."""
+        none = np.full((1, self._rows), np.nan)
+        return () if self._seen.calls_python else self._seen.by_camera(np.zeros(1), q[np.newaxis], none)
+
     def active_rows(self) -> Integers:
         """Rows of the tasks active now, among all rows; called when a leg of the run begins."""
         on = [True] * len(self._counts) if self._schedule is None else self._schedule.moment.active
@@ -310,7 +321,7 @@ class Growing:
 
     def values(self, recorder: Recorder, rows: Integers, at: Integers) -> Array:
         """Values (K, channels) at samples `at` (K,) of a recorder with those rows, then the drawn frame's
-        position (K, 3), m, and its desired one, as `drawn` has them."""
+        position (K, 3), m, and its desired one, as `drawn` has them, then what its cameras see."""
         found = Recorded._make(whole[at] for whole in recorder.found)
         record = Record(self._robot, {"t": recorder.t[at], **found._asdict()})
         known = slice(len(rows))  # without a task, a recorder has a row of its own
@@ -334,6 +345,9 @@ class Growing:
             parts.append(place)
             if self._shown.rows:
                 parts.append(self._shown.desired(place, of_all(found.r_d)))
+        if not self._seen.calls_python:
+            cameras = self._seen.by_camera(recorder.t[at], found.q, of_all(found.r_d))
+            parts.append(live_numbers(cameras, self._robot, found.q))
         return np.column_stack(parts)
 
     def _partition(self, columns: Integers) -> Array:

@@ -116,7 +116,7 @@ def playback_scene(
         if shown is not None:
             animations += shown.draw(drawing, i, path, color, start)
     obstacles.tell(drawing)
-    tell_cameras(drawing, motions)
+    tell_cameras(drawing, [camera for motion in motions for camera in motion.cameras])
     _desired(drawing, motions)
     _targets(drawing, motions, size)
     if shown is not None:

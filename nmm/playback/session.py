@@ -17,6 +17,7 @@ import numpy as np
 
 from nmm.collisions.obstacle import Obstacle
 from nmm.errors import InputError, expect
+from nmm.playback.cameras import draw_camera, tell_cameras
 from nmm.playback.channels import Channel, Channels, draw_curves
 from nmm.playback.drawing import Command, Drawing, encode
 from nmm.playback.extent import robot_boxes
@@ -26,6 +27,7 @@ from nmm.playback.scene import draw_beside, live_scene, still
 from nmm.playback.server import PageServer, Visitor
 from nmm.playback.sticks import appearance
 from nmm.resolver_style import Look
+from nmm.robots.motion import Camera
 from nmm.robots.robot import Robot
 
 FPS = 30.0
@@ -134,8 +136,9 @@ class Session:
 
 
 class RobotSession(Session):
-    """A session whose page shows one robot where it is now, and, with a look, obstacles and curves of
-    channels, empty at first; `further` commands follow the scene's, `page` are options of `Session`."""
+    """A session whose page shows one robot where it is now, what its cameras see, and, with a look, obstacles
+    and curves of channels, empty at first; `further` commands follow the scene's, `page` are options of
+    `Session`."""
 
     def __init__(
         self,
@@ -146,6 +149,7 @@ class RobotSession(Session):
         obstacles: Sequence[Obstacle] = (),
         channels: Sequence[Channel] = (),
         look: Look | None = None,
+        cameras: Sequence[Camera] = (),
         further: Sequence[Command] = (),
         **page: Any,
     ) -> None:
@@ -156,6 +160,9 @@ class RobotSession(Session):
         room = 2.0 if look is None else reach
         commands, self._drawn = live_scene(self.robot, q, wheels, title=title, room=room)
         drawing = Drawing()
+        for i, camera in enumerate(cameras):
+            draw_camera(drawing, camera, self._drawn, "/nmm/motion 0", i, 2.0 * reach)
+        tell_cameras(drawing, cameras)
         if look is not None:
             boxes = robot_boxes(self.robot, q[np.newaxis], wheels[np.newaxis])
             draw_beside(drawing, still(self.robot, q, self._obstacles), boxes, size=2.0 * reach)

@@ -46,12 +46,12 @@ class DrawnRobot:
                 if not np.array_equal(shape.matrix, np.eye(4)):
                     drawing.transform(f"{at}/{k}", shape.matrix)
 
-    def frame_node(self, frame: str, name: str) -> str:
-        """Draw a node of that name, once, at a frame; returns its path."""
+    def frame_node(self, drawing: Drawing, frame: str, name: str) -> str:
+        """Draw a node of that name at a frame; returns its path."""
         model = self.placements.model
         found = model.frames[model.getFrameId(frame)]
         path = f"{self._below[found.parentJoint]}/{segment(name)}"
-        self._drawing.transform(path, np.array(found.placement.homogeneous))
+        drawing.transform(path, np.array(found.placement.homogeneous))
         return path
 
     def place(self, q: Array, wheels: Array) -> None:

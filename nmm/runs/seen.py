@@ -60,7 +60,8 @@ class RunCamera(NamedTuple):
 
 
 class SeenPoints:
-    """The points that the cameras of tasks and limits see, each once, and the cameras. Points that are set
+    """The points that the cameras of tasks and limits see, each once, and the cameras; `calls_python` tells
+    whether users' functions say where they are. Points that are set
     from outside are none: afterwards nobody knows where they were.
 
     Raises
@@ -96,6 +97,7 @@ class SeenPoints:
         self.cameras = tuple(_bordered(one, edges.get(one.frame, [])) for one in found.values())
         self._program = Program(robot, list(self._functions.values()))
         self._program.lay_out()
+        self.calls_python = self._program.calls_python
 
     def _sights(self, function: Function) -> Iterator[tuple[str, Sight, list[int]]]:
         """What a function sees: the camera's frame, and the number of each point, -1 for one that is not
@@ -119,6 +121,11 @@ class SeenPoints:
         )
         self._functions.setdefault(same, point)
         return list(self._functions).index(same)
+
+    def by_camera(self, t: Array, q: Array, r_d: Array) -> tuple[Camera, ...]:
+        """What each camera sees at times (N,), s, and q (N, n), with targets r_d (N, s) of the tasks."""
+        seen = self.at(t, q)
+        return () if seen is None else tuple(one.on(seen, r_d) for one in self.cameras)
 
     def at(self, t: Array, q: Array) -> Array | None:
         """Where they are at times (N,), s, and q (N, n): (N, K, 3), m, world axes; None without any."""

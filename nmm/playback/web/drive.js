@@ -2,7 +2,7 @@
 "use strict";
 {
   const THREE = MeshCat.THREE;
-  const [WINDOW, KEPT, REDRAW, PATIENCE] = [20, 30, 100, 5000]; // s, s, ms, ms
+  const [WINDOW, KEPT, SEEN, REDRAW, PATIENCE] = [20, 30, 5, 100, 5000]; // s, s, s, ms, ms
   const drive = (nmm.drive = { targets: [], active: 0, time: 0, paused: false, plan: false, tree: false, grown: true, followed: 0 });
   const panel = document.createElement("div");
   const parts = {};
@@ -69,7 +69,7 @@
     nmm.gizmos.put(target.gizmo, at.x, at.y, at.z);
   }
 
-  nmm.hooks.targets = ({ targets, values, at, reach, far, title }) => {
+  nmm.hooks.targets = ({ targets, values, at, goals, reach, far }) => {
     drive.far = far;
     const head = nmm.element(panel, "div", { class: "head" });
     nmm.element(head, "h2", {}, "Drive");
@@ -105,7 +105,18 @@
     axes = Object.keys(run.columns);
     empty(run);
     const upright = ([x, y, z]) => new THREE.Vector3(x, z, -y);
-    nmm.camera.also = () => drive.targets.filter((target) => target.gizmo).map((target) => upright(target.gizmo.place.toArray()));
+    // A goal in a camera's picture is dragged there.
+    nmm.sights.drag = (camera, point, spot) => {
+      const goal = goals[camera].find((one) => one.point === point);
+      const target = drive.targets[goal.target];
+      const [fx, fy, cx, cy] = goal.intrinsics;
+      const value = [...target.value];
+      [value[goal.rows[0]], value[goal.rows[1]]] = [fx * spot[0] + cx, fy * spot[1] + cy];
+      drive.active = goal.target;
+      aim(target, value);
+    };
+    const seen = nmm.camera.also;
+    nmm.camera.also = () => [...seen(), ...drive.targets.filter((target) => target.gizmo).map((target) => upright(target.gizmo.place.toArray()))];
     if (!nmm.camera.following) nmm.actions.follow();
     nmm.plots.show(true);
     nmm.camera.reset();
@@ -145,6 +156,7 @@
       run.t.push(t);
       axes.forEach((key, i) => run.columns[key].values.push(values[i] ?? NaN));
     }
+    nmm.sights.take(samples.map(([t]) => t), (i, k) => samples[i][1 + axes.length + k], SEEN);
     const old = nmm.before(run.t, run.t[run.t.length - 1] - KEPT);
     if (old > 0) {
       run.t.splice(0, old);
@@ -209,6 +221,7 @@
       }
       if (target.trail && samples.length) extend(target);
     });
+    nmm.sights.update();
     parts.pause.textContent = paused ? "Go on" : "Pause";
     if (parts.told.textContent !== told) parts.told.textContent = told;
     parts.told.classList.toggle("bad", wrong);

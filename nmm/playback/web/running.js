@@ -53,7 +53,8 @@
 
   function remember(t, values) {
     const run = nmm.runs[0];
-    const width = keys.length + 3 * lines.length;
+    const paths = keys.length + 3 * lines.length;
+    const width = paths + nmm.sights.width();
     for (let i = 0; i < t.length; i++) {
       run.t.push(t[i]);
       keys.forEach((key, k) => run.columns[key].values.push(values[i * width + k]));
@@ -64,6 +65,7 @@
     }
     run.samples = run.t.length;
     if (t.length) lines.forEach(extend);
+    nmm.sights.take(t, (i, k) => values[i * width + paths + k]);
   }
 
   // A panel that had nothing to say at first opens once it has.
@@ -95,6 +97,7 @@
     remember(t, values);
     Object.assign(running, { picture, dropped });
     if (run.t.length) nmm.player.time = run.t[run.t.length - 1];
+    nmm.sights.update();
     const parts = [`${nmm.player.time.toFixed(2)} of ${Number(nmm.stage.duration.toPrecision(6))} s`];
     if (told) parts.push(told);
     if (dropped) parts.push(`${dropped} ${dropped === 1 ? "picture" : "pictures"} dropped`);

@@ -6,10 +6,14 @@
   const get = (id) => document.getElementById(id);
   const card = get("sights");
   // all: a camera of a motion each; figures: a picture each, of all motions' cameras of that name.
-  const sights = (nmm.sights = { all: [], figures: [], shown: false });
+  // drag: what a page does with a goal that is dragged in a picture, as the camera's and the point's number and x, y.
+  const sights = (nmm.sights = { all: [], figures: [], shown: false, drag: null });
   const [LEFT, RIGHT, TOP, BOTTOM] = [30, 7, 6, 16]; // px around the picture
   // What is shown beyond the border, as a share of it, and how much more where points have been.
   const [AROUND, FARTHEST] = [0.12, 0.6];
+  const NEAR = 22; // px, of a goal that is taken hold of
+  const REDRAW = 80; // ms between two drawings of a live page's pictures
+  let drawn = 0;
 
   // The edges of a pyramid from the lens to the border, and a mark on its upper side.
   function frustum({ border: [x0, y0, x1, y1], depth, ink }) {
@@ -39,7 +43,7 @@
   }
 
   nmm.hooks.sight = (sight) => {
-    const one = { times: [], pictures: [], goals: [], ...sight, count: sight.points.length };
+    const one = { times: [], pictures: [], goals: [], ...sight, count: sight.points.length, widened: 0 };
     const edges = `${sight.path}/frustum`;
     nmm.viewer.set_object(nmm.split(edges), frustum(sight));
     // Where a point is seen: from the lens to it.
@@ -56,6 +60,9 @@
   };
 
   nmm.hooks.sights = ({ color }) => {
+    const also = nmm.camera.also;
+    const seen = () => sights.all.flatMap(({ points }) => points.map((path) => new THREE.Vector3().setFromMatrixPosition(nmm.node(path).matrixWorld)));
+    if (nmm.stage.live) nmm.camera.also = () => [...also(), ...seen()];
     document.body.classList.add("sighted");
     nmm.legend({ kind: "ball", color, text: "seen", act: (on) => {
       for (const { path, points, rays } of sights.all) {
@@ -72,7 +79,42 @@
     const unit = fx === 1 && fy === 1 && cx === 0 && cy === 0 ? "X/Z" : "px";
     nmm.element(part, "figcaption", { title: one.frame }, one.frame);
     const canvas = nmm.element(part, "canvas", { role: "img" });
-    return { frame: one.frame, unit, views: [one], canvas, told: nmm.element(part, "p"), range: null };
+    const made = { frame: one.frame, unit, views: [one], canvas, told: nmm.element(part, "p"), range: null };
+    listen(made);
+    return made;
+  }
+
+  // The nearest goal within reach of a pointer; one that is held is aimed at where the pointer is.
+  function listen(figure) {
+    const { canvas } = figure;
+    const spotOf = (event) => {
+      const box = canvas.getBoundingClientRect();
+      const [x0, y0, x1, y1] = figure.range;
+      const scale = (canvas.clientWidth - LEFT - RIGHT) / (x1 - x0);
+      const spot = [x0 + (event.clientX - box.left - LEFT) / scale, y0 + (event.clientY - box.top - TOP) / scale];
+      return { scale, spot: spot.map((x, axis) => Math.min(Math.max(x, [x0, y0][axis]), [x1, y1][axis])) };
+    };
+    const near = (event) => {
+      if (sights.drag === null || figure.range === null) return null;
+      const { scale, spot } = spotOf(event);
+      const found = figure.views.flatMap((one) =>
+        at(one, one.goals, nmm.player.time).map((goal, point) => ({
+          camera: sights.all.indexOf(one), point, away: goal === null ? Infinity : scale * Math.hypot(goal[0] - spot[0], goal[1] - spot[1]),
+        })));
+      return found.filter(({ away }) => away < NEAR).sort((a, b) => a.away - b.away)[0] ?? null;
+    };
+    let held = null;
+    canvas.addEventListener("pointerdown", (event) => {
+      held = near(event);
+      if (held === null) return;
+      event.preventDefault();
+      canvas.setPointerCapture(event.pointerId);
+    });
+    canvas.addEventListener("pointermove", (event) => {
+      if (held === null) canvas.style.cursor = near(event) === null ? "" : "grab";
+      else sights.drag(held.camera, held.point, spotOf(event).spot);
+    });
+    for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, () => (held = null));
   }
 
   // Where the points of a camera, or their goals, are in its picture at a time; null for what is not there.
@@ -89,22 +131,26 @@
   }
   const inside = ([x, y], [x0, y0, x1, y1]) => x >= x0 && x <= x1 && y >= y0 && y <= y1;
 
+  const around = ([x0, y0, x1, y1], share) => {
+    const [wide, high] = [share * (x1 - x0), share * (y1 - y0)];
+    return [x0 - wide, y0 - high, x1 + wide, y1 + high];
+  };
   // The border with what is around it, wider where points have been, but not much.
-  function reach({ views }) {
-    let [x0, y0, x1, y1] = views[0].border;
-    const [wide, high] = [x1 - x0, y1 - y0];
-    const most = [x0 - FARTHEST * wide, y0 - FARTHEST * high, x1 + FARTHEST * wide, y1 + FARTHEST * high];
-    [x0, y0, x1, y1] = [x0 - AROUND * wide, y0 - AROUND * high, x1 + AROUND * wide, y1 + AROUND * high];
-    for (const { pictures, goals } of views) {
-      for (const values of [pictures, goals]) {
-        for (let k = 0; k + 1 < values.length; k += 2) {
+  function widen(figure) {
+    const { border } = figure.views[0];
+    const [most, room] = [around(border, FARTHEST), 0.04 * (border[2] - border[0])];
+    let [x0, y0, x1, y1] = figure.range ?? around(border, AROUND);
+    for (const one of figure.views) {
+      for (const values of [one.pictures, one.goals]) {
+        for (let k = one.widened; k + 1 < values.length; k += 2) {
           const [x, y] = [values[k], values[k + 1]];
           if (!inside([x, y], most)) continue;
-          [x0, y0, x1, y1] = [Math.min(x0, x - 0.04 * wide), Math.min(y0, y - 0.04 * wide), Math.max(x1, x + 0.04 * wide), Math.max(y1, y + 0.04 * wide)];
+          [x0, y0, x1, y1] = [Math.min(x0, x - room), Math.min(y0, y - room), Math.max(x1, x + room), Math.max(y1, y + room)];
         }
       }
+      one.widened = one.pictures.length;
     }
-    return [x0, y0, x1, y1];
+    figure.range = [x0, y0, x1, y1];
   }
 
   function pen(canvas, width, height) {
@@ -127,8 +173,7 @@
   function draw(figure, time) {
     const width = figure.canvas.clientWidth;
     if (width === 0) return;
-    const live = figure.views.some(({ grows }) => grows);
-    if (figure.range === null || live) figure.range = reach(figure);
+    widen(figure);
     const [x0, y0, x1, y1] = figure.range;
     const scale = (width - LEFT - RIGHT) / (x1 - x0);
     const [right, bottom] = [width - RIGHT, TOP + Math.round(scale * (y1 - y0))];
@@ -180,7 +225,7 @@
     p.restore();
     stroke(line, 1, [[LEFT, TOP], [right, TOP], [right, bottom], [LEFT, bottom], [LEFT, TOP]]);
 
-    const text = lost.length ? lost.join("; ") : "in the picture";
+    const text = lost.length ? lost.join("; ") : seen.some((one) => one.times.length) ? "in the picture" : "";
     if (figure.told.textContent !== text) figure.told.textContent = text;
     figure.told.classList.toggle("lost", lost.length > 0);
     figure.canvas.setAttribute("aria-label", `Picture of ${figure.frame}: ${text}`);
@@ -254,8 +299,13 @@
 
   // From the lens to each point that it sees, in the axes of the motion's node.
   function rays(one, time) {
-    const root = nmm.node(one.of).matrixWorld.clone().invert();
-    const local = (path) => new THREE.Vector3().setFromMatrixPosition(nmm.node(path).matrixWorld).applyMatrix4(root);
+    const world = (path) => {
+      const node = nmm.node(path);
+      node.updateWorldMatrix(true, false);
+      return node.matrixWorld;
+    };
+    const root = world(one.of).clone().invert();
+    const local = (path) => new THREE.Vector3().setFromMatrixPosition(world(path)).applyMatrix4(root);
     const { position } = one.rays.geometry.attributes;
     const now = at(one, one.pictures, time);
     const lens = local(one.path);
@@ -267,11 +317,40 @@
     position.needsUpdate = true;
   }
 
+  // Live pages: so many numbers a sample, and samples at times; number(i, k) is the k-th of sample i. Samples older
+  // than `kept`, s, are forgotten.
+  sights.width = () => sights.all.reduce((sum, { count }) => sum + 7 * count, 0);
+  sights.take = (times, number, kept = Infinity) => {
+    times.forEach((time, i) => {
+      let first = 0;
+      const next = (count) => Array.from({ length: count }, () => number(i, first++) ?? NaN);
+      for (const one of sights.all) {
+        if (one.times.length && time < one.times[one.times.length - 1]) Object.assign(one, { times: [], pictures: [], goals: [], widened: 0 });
+        one.places = next(3 * one.count);
+        one.pictures.push(...next(2 * one.count));
+        one.goals.push(...next(2 * one.count));
+        one.times.push(time);
+      }
+    });
+    for (const one of sights.all) {
+      const old = nmm.before(one.times, one.times[one.times.length - 1] - kept);
+      if (old > 0) {
+        one.times.splice(0, old);
+        for (const values of [one.pictures, one.goals]) values.splice(0, 2 * one.count * old);
+        one.widened = Math.max(0, one.widened - 2 * one.count * old);
+      }
+      if (one.places) one.points.forEach((path, k) => nmm.node(path).position.fromArray(one.places, 3 * k));
+    }
+    if (times.length) nmm.viewer.set_dirty();
+  };
+
   sights.update = (time = nmm.player.time) => {
     if (!sights.all.length) return;
-    nmm.viewer.scene.updateMatrixWorld();
     for (const one of sights.all) rays(one, time);
-    if (sights.shown) for (const figure of sights.figures) draw(figure, time);
+    const now = performance.now();
+    if (!sights.shown || (nmm.stage.live && now - drawn < REDRAW)) return;
+    drawn = now;
+    for (const figure of sights.figures) draw(figure, time);
   };
   sights.redraw = () => sights.update();
 
