@@ -120,6 +120,7 @@ from .robots.loading import pinocchio_model as pinocchio_model
 from .robots.loading import pinocchio_models as pinocchio_models
 from .robots.robot import Robot as Robot
 from .rollouts.rollout import rollout as rollout
+from .runs.disturbances import Disturbances as Disturbances
 from .runs.simulation import simulate as simulate
 from .runs.trajectory import Outcome as Outcome
 from .runs.trajectory import Trajectory as Trajectory

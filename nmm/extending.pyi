@@ -38,7 +38,6 @@ from .control.quantities import placed as placed
 from .control.quantities import rms as rms
 from .control.quantities import saved as saved
 from .control.recorded import Recorded as Recorded
-from .control.recorded import note_sample as note_sample
 from .control.safety_filter import Counts as Counts
 from .control.sequence import Event as Event
 from .control.sequence import Schedule as Schedule
@@ -46,7 +45,6 @@ from .control.sequence import Sequence as Sequence
 from .control.steering import Steered as Steered
 from .control.step import Step as Step
 from .control.step_solver import StepSolver as StepSolver
-from .control.stepping import hold_inputs as hold_inputs
 from .control.task_rows import gain_rows as gain_rows
 from .functions.function import Evaluation as Evaluation
 from .functions.function import Function as Function
@@ -175,14 +173,13 @@ from .runs.clearance import Swept as Swept
 from .runs.clearance import guarded as guarded
 from .runs.closed_loop import Leg as Leg
 from .runs.closed_loop import drive_loop as drive_loop
-from .runs.closed_loop import finding_in as finding_in
 from .runs.closed_loop import record_run as record_run
 from .runs.closed_loop import sample_times as sample_times
-from .runs.compiled_loop import DIVERGED_BEYOND as DIVERGED_BEYOND
-from .runs.compiled_loop import compiled_sample as compiled_sample
-from .runs.compiled_loop import within_bound as within_bound
 from .runs.components import Axes as Axes
 from .runs.components import components as components
+from .runs.disturbances import Plant as Plant
+from .runs.disturbed import check_disturbed as check_disturbed
+from .runs.disturbed import drive_disturbed as drive_disturbed
 from .runs.joining import row_names as row_names
 from .runs.margins import at_limits as at_limits
 from .runs.margins import nearest_limits as nearest_limits

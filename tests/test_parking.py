@@ -68,7 +68,8 @@ def test_the_pose_is_reached_from_anywhere(name, platform):
 def test_slip_and_noise_do_not_keep_it_away(name, slip):
     law = controller(name, within=0.002)
     starts = random_starts(law.robot, 10)
-    found = nmm.rollout(law, starts, 60.0, 0.02, "zoh", noise=1e-4, slip=slip, seed=2, keep=["q"])
+    worn = nmm.Disturbances(noise=1e-4, slip=slip, seed=2)
+    found = nmm.rollout(law, starts, 60.0, 0.02, "zoh", disturbances=worn, keep=["q"])
     assert np.max(off(found["q"][:, -1])) < 0.004
 
 

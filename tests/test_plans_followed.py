@@ -187,7 +187,8 @@ def test_a_rollout_follows_a_plan_with_noise_and_slip():
     """It ends near the goal; the plan's inputs alone, with the same slip, do not."""
     scenario = nmm.Scenario.load("behind_the_wall", TRACKED)
     starts = scenario.robot().q(scenario.parts.q0) + np.zeros((4, 1))
-    found = nmm.rollout(scenario, starts, noise=0.002, slip=[0.9, 0.95, 1, 1, 1], keep=["q"], seed=1)
+    worn = nmm.Disturbances(noise=0.002, slip=[0.9, 0.95, 1, 1, 1], seed=1)
+    found = nmm.rollout(scenario, starts, disturbances=worn, keep=["q"])
     plan = scenario.plan()
     away = np.abs(found["q"][:, -1] - plan.end).max(axis=1)
     assert away.max() < 0.05

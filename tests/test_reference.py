@@ -78,6 +78,7 @@ INNER = {
     "nmm.Controller.compiled",
     "nmm.Controller.safety_filter",
     "nmm.Controller.period_monitor",
+    "nmm.Disturbances.on",
     "nmm.extending.LimitReport.__init__",  # made by a controller
     "nmm.Limits.on",
     "nmm.Plan.__init__",  # made by `nmm.plan`

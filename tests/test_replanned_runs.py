@@ -103,7 +103,7 @@ def test_slip_is_replanned_beside_distances_of_the_controller_too():
     settings = {"plan.track": {"replan": True}, "duration": 30, "dt": 0.04}
     scenario = nmm.Scenario.load("behind_the_wall", settings)
     slip = [0.6, 1.0, 1.0, 1.0, 1.0]
-    rolled = nmm.rollout(scenario, slip=slip, keep=["q"])
+    rolled = nmm.rollout(scenario, disturbances=nmm.Disturbances(slip=slip), keep=["q"])
     assert "left its plan" in rolled.message[0]
     made = scenario.controller()
     scene, end = made.solver.scene, scenario.plan().end

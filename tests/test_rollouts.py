@@ -93,10 +93,7 @@ def test_noise_delay_and_slip_are_what_they_say() -> None:
         1.0,
         0.02,
         "zoh",
-        noise=noise,
-        delay=delay,
-        slip=slip,
-        seed=7,
+        disturbances=nmm.Disturbances(noise=noise, delay=delay, slip=slip, seed=7),
         keep=("q", "u"),
     )
     for k, start in enumerate(starts(3)):
@@ -114,9 +111,9 @@ def test_odometry_is_what_wheels_say() -> None:
     """Sample by sample: the controller sees what its inputs would have done, the robot has other wheels and
     slides; every 0.3 s both are the same."""
     slip, creep, every = np.array([0.98, 0.97, 1.0, 0.9]), -0.05, 15
-    more = {"slip": slip, "creep": creep, "odometry": True, "correct": 0.3, "delay": 2}
+    disturbed = nmm.Disturbances(slip=slip, creep=creep, odometry=True, correct=0.3, delay=2)
     keep = ("q", "u", "believed", "error")
-    found = nmm.rollout(controller(), starts(2), 1.0, 0.02, "zoh", **more, keep=keep)
+    found = nmm.rollout(controller(), starts(2), 1.0, 0.02, "zoh", disturbances=disturbed, keep=keep)
     ours = controller()
     held = HeldInputs(ours.robot)
     for q, believed, u in zip(found["q"], found["believed"], found["u"], strict=True):
@@ -147,7 +144,10 @@ def test_odometry_is_what_wheels_say() -> None:
 def test_odometry_of_wheels_that_do_not_slip_is_the_robots_own_place() -> None:
     """To the last bit, and the run is the one without it."""
     still = nmm.rollout(controller(), starts(2), 1.0, 0.02, "zoh", keep=("q", "u", "believed"))
-    same = nmm.rollout(controller(), starts(2), 1.0, 0.02, "zoh", odometry=True, keep=("q", "u", "believed"))
+    known = nmm.Disturbances(odometry=True)
+    same = nmm.rollout(
+        controller(), starts(2), 1.0, 0.02, "zoh", disturbances=known, keep=("q", "u", "believed")
+    )
     for name in ("q", "u", "believed"):
         assert np.array_equal(still[name], same[name])
     assert np.array_equal(same["believed"], same["q"])
@@ -156,7 +156,9 @@ def test_odometry_of_wheels_that_do_not_slip_is_the_robots_own_place() -> None:
 
 
 def test_errors_under_noise_are_the_robots_not_what_was_measured() -> None:
-    found = nmm.rollout(controller(), START, 1.0, 0.02, "zoh", noise=0.05, keep=("q", "error", "r_d"))
+    found = nmm.rollout(
+        controller(), START, 1.0, 0.02, "zoh", disturbances=nmm.Disturbances(0.05), keep=("q", "error", "r_d")
+    )
     robot = nmm.load("unicycle_2r")
     for q, error, target in zip(found["q"][0], found["error"][0], found["r_d"][0], strict=True):
         position = nmm.Configuration(robot, q).placement("ee").translation[:2]
@@ -164,10 +166,12 @@ def test_errors_under_noise_are_the_robots_not_what_was_measured() -> None:
 
 
 def test_no_disturbance_is_no_other_run() -> None:
-    still = nmm.rollout(controller(), starts(2), 1.0, 0.02, "zoh", keep=("q",))
-    same = nmm.rollout(controller(), starts(2), 1.0, 0.02, "zoh", noise=0.0, delay=0, slip=1.0, keep=("q",))
+    none, least = nmm.Disturbances(), nmm.Disturbances(slip=1.0 - 1e-15)
+    given = controller(), starts(2), 1.0, 0.02, "zoh"
+    still = nmm.rollout(*given, keep=("q",))
+    same = nmm.rollout(*given, disturbances=none, keep=("q",))
     assert np.array_equal(still["q"], same["q"])
-    slow = nmm.rollout(controller(), starts(2), 1.0, 0.02, "zoh", slip=1.0 - 1e-15, keep=("q",))
+    slow = nmm.rollout(*given, disturbances=least, keep=("q",))
     np.testing.assert_allclose(still["q"], slow["q"], atol=1e-12)
 
 
@@ -197,7 +201,7 @@ def test_how_runs_end_is_told_run_by_run() -> None:
         assert found["t_end"][k] == found.t[count - 1]
     task = nmm.Task(nmm.Position("ee", "xyz"), [2.0, 0.5, 0.0], gain=1.0)
     stuck = nmm.Controller(nmm.load("unicycle_2r"), task, nmm.ProjectedGradient())
-    for method, more in (("rk4", {}), ("zoh", {"delay": 1})):
+    for method, more in (("rk4", {}), ("zoh", {"disturbances": nmm.Disturbances(delay=1)})):
         found = nmm.rollout(stuck, starts(2), 1.0, 0.01, method, keep=("q",), **more)
         assert found.outcome == ("singular", "singular")
         assert "lost rank" in found.message[1]
@@ -235,18 +239,11 @@ def test_the_same_controller_may_stand_there_twice() -> None:
         ({"every": 0}, "every"),
         ({"folder": "nowhere"}, "folder"),
         ({"threads": -1}, "threads"),
-        ({"noise": 0.1}, "rollout"),
-        ({"noise": 0.1, "method": "zoh", "until": nmm.Goal(m=0.1)}, "rollout"),
-        ({"noise": -0.1, "method": "zoh"}, "noise"),
-        ({"slip": [1.0, 2.0], "method": "zoh"}, "slip"),
-        ({"delay": 0.5, "method": "zoh"}, "delay"),
-        ({"creep": np.nan, "method": "zoh"}, "creep"),
-        ({"correct": 1.0, "method": "zoh"}, "correct"),
-        ({"correct": 0.0, "odometry": True, "method": "zoh"}, "correct"),
-        ({"odometry": True}, "rollout"),
-        ({"slip": np.nan, "method": "zoh"}, "slip"),
-        ({"seed": -1, "noise": 0.1, "method": "zoh"}, "seed"),
-        ({"seed": "a"}, "seed"),
+        ({"disturbances": nmm.Disturbances(0.1)}, "method"),
+        ({"disturbances": nmm.Disturbances(0.1), "method": "zoh", "until": nmm.Goal(m=0.1)}, "until"),
+        ({"disturbances": nmm.Disturbances(slip=[1.0, 2.0]), "method": "zoh"}, "slip"),
+        ({"disturbances": nmm.Disturbances(slip={"w": 0.5}), "method": "zoh"}, "slip"),
+        ({"disturbances": nmm.Disturbances(odometry=True)}, "method"),
     ],
 )
 def test_bad_input_is_named(given: dict[str, object], where: str) -> None:
@@ -257,7 +254,11 @@ def test_bad_input_is_named(given: dict[str, object], where: str) -> None:
 
 def test_slip_and_delay_are_the_same_in_a_loop_in_python() -> None:
     """A goal that is never reached keeps a run there."""
-    given = {"method": "zoh", "slip": [0.9, 1.0, 1.0, 0.8], "delay": 3, "keep": ("q", "u", "error")}
+    given = {
+        "method": "zoh",
+        "disturbances": nmm.Disturbances(slip=[0.9, 1.0, 1.0, 0.8], delay=3),
+        "keep": ("q", "u", "error"),
+    }
     compiled = nmm.rollout(controller(), starts(2), 1.0, 0.02, **given)
     python = nmm.rollout(controller(), starts(2), 1.0, 0.02, until=nmm.Goal(1e-12, 1e-12), **given)
     assert python.outcome == ("missed", "missed")

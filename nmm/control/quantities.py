@@ -160,6 +160,14 @@ def lateral_slip(record: Record) -> Array:
     return np.asarray(np.abs(slip).max(axis=1, initial=0.0))
 
 
+def drift(record: Record) -> Array:
+    """How far the platform is from where odometry has it at each sample (N,), m; (0,) without odometry."""
+    believed = record.arrays.get("believed")
+    if believed is None:
+        return np.zeros(0)
+    return np.asarray(np.hypot(*(believed - record["q"])[:, :2].T))
+
+
 def partition_changes(record: Record) -> Integers:
     """1 at the samples from which RG has another partition, else 0 (N,)."""
     found = np.zeros(len(record["partition"]), dtype=np.int64)
@@ -328,6 +336,9 @@ _TABLE = (
     RecordedQuantity("path", "", "the end-effector's path", "N3", "m", optional=True, finite=True),
     RecordedQuantity("desired", "", "its desired path", "N3", "m", optional=True),
     RecordedQuantity("planned", "", "where its plan was", "Nn", "coordinates", optional=True, finite=True),
+    RecordedQuantity(
+        "believed", "", "where its odometry has it", "Nn", "coordinates", since=9, optional=True, finite=True
+    ),
     RecordedQuantity("target", "", "the point that a bearing looks at", "3", "m", optional=True, finite=True),
     RecordedQuantity("seen", "", "the points that cameras see", "NP3", "m", since=9, optional=True),
     RecordedQuantity("rate", "ṙ_d + K e", "rate that the task asks for", "Ns", noted=True, saved=False),
@@ -353,6 +364,22 @@ _TABLE = (
                 "lateral slip, largest", about="largest slip of the wheels",
             ),
         ),
+    ),
+    RecordedQuantity(
+        "drift", "drift", "distance of the platform from where its odometry has it", unit="m", saved=False,
+        of=drift, place=2,
+        curve=Curve("drift", "Drift of the odometry", 13, lower=0.0, opens_below=np.inf),
+        numbers=(
+            Number(
+                "drift", lambda t, x: x[-1], "drift, at the end",
+                about="distance of the platform from where its odometry has it, at the end",
+            ),
+            Number(
+                "drift_max", lambda t, x: x.max(), "drift, largest",
+                about="largest distance of the platform from where its odometry has it",
+            ),
+        ),
+        line=("drift of the odometry", "{drift:.3g} m at the end, {drift_max:.3g} m at most"),
     ),
     RecordedQuantity(
         "sliding", "", "speed of the wheel that slides fastest by design", unit="m/s", saved=False, place=2,

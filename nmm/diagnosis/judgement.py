@@ -210,8 +210,8 @@ def _judged(leg: Leg, dt: float, method: str, goal: Goal | None) -> Judged:
         return Judged(outcome, ended, lost=lost)
     samples = Samples.of(recorder)
     warnings = tuple((one,) for one in _unmet(controller, recorder, samples, dt))
-    if outcome is Outcome.INTERRUPTED:
-        return Judged(outcome, ended, warnings)
+    if outcome is Outcome.INTERRUPTED or recorder.disturbed:  # its gain promises nothing of a disturbed robot
+        return Judged(outcome, ended, warnings, lost)
     there = goal is not None and goal.reached(samples.error[-1], controller.rows)
     found = assess(controller, recorder, leg.integrator, dt, held=not there)
     left = found.departure
@@ -248,6 +248,8 @@ def _unmet(controller: Controller, recorder: Recorder, samples: Samples, dt: flo
         there = {"limits": controller.limits, "distances": controller.solver.scene}
         kept = [name for name, one in there.items() if one is not None]
         yield unmet.finding(scale=float(recorder.so_far.scale.min(initial=1.0)), kept=kept)
+    if recorder.disturbed:
+        return
     robot, found = controller.robot, recorder.so_far
     otherwise = moving_otherwise(samples.t, found.q, found.q_dot, robot.q_names, robot.q_units)
     if otherwise is not None:

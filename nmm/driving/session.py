@@ -150,7 +150,7 @@ class DriveSession(RobotSession):
             far=FAR,
         )
         names, units = zip(*(row for target in driven.targets for row in target.rows), strict=True)
-        hidden = {"residual", "u_dot"} | (
+        hidden = {"residual", "u_dot", "drift"} | (
             set() if driven.has_objective else {"objective"}
         )  # it drives at order 1
         self._curves, channels = live_channels(Axes(driven.robot, names, units, 1), hidden)

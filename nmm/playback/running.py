@@ -304,6 +304,7 @@ class Growing:
         self._levels = len(tasks.levels(robot)) if some else 0
         axes = Axes(robot, tuple(names), tuple(row.unit for row in rows), self._levels)
         hidden = {"objective"} if controller.given.objective is None else set()
+        hidden |= {"drift"}  # known at the end
         hidden |= {"u_dot"} if controller.order == 1 else set()
         self._partitioned = controller.resolver.name.lower() == "rg"
         self._curves, self.channels = live_channels(axes, hidden, partitioned=self._partitioned)

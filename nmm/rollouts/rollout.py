@@ -20,10 +20,11 @@ from nmm.control.integrators import Integrator, integrator
 from nmm.cores import cores
 from nmm.errors import InputError, expect, no_such
 from nmm.findings.run import line
-from nmm.rollouts.disturbed import Acting, Plant, driven_disturbed
 from nmm.rollouts.kept import MEASURES, Kept, measure
 from nmm.runs.clearance import guarded
 from nmm.runs.closed_loop import drive_loop, sample_times
+from nmm.runs.disturbances import Disturbances, Plant
+from nmm.runs.disturbed import check_disturbed, drive_disturbed
 from nmm.runs.recording import Recorder
 from nmm.runs.simulation import MOST_SAMPLES
 from nmm.runs.verdict import Outcome
@@ -82,13 +83,7 @@ def rollout(
     dt: float | None = None,
     method: str | None = None,
     *,
-    noise: ArrayLike = 0.0,
-    delay: int = 0,
-    slip: ArrayLike = 1.0,
-    creep: float = 0.0,
-    odometry: bool = False,
-    correct: float | None = None,
-    seed: int = 0,
+    disturbances: Disturbances | None = None,
     until: Goal | None = None,
     keep: Sequence[str] = (),
     every: int = 1,
@@ -100,20 +95,14 @@ def rollout(
 
     Parameters
     ----------
-    subject : a controller; a scenario, whose start, duration, dt, method and goal hold where none are given;
+    subject : a controller; a scenario, whose start, duration, dt, method, disturbances and goal hold where
+        none are given;
         or a controller for each run, of one robot and one task's shape
     q0 : (B, n), (n,) for all, or by name; m and rad
     duration, dt : s
-    method : as `simulate`'s; "zoh" with disturbances, which are a sampled controller's
-    noise : standard deviation of what the controller sees of each coordinate, m and rad: a number or (n,)
-    delay : samples until inputs act
-    slip : the share of each input that acts, 1 for all of it: a number, (m,) or (B, m)
-    creep : a platform that drives with v and turns with ω slides sideways with creep v ω, to its left where
-        that is above 0; s
-    odometry : whether the controller sees the platform where its wheels' turning says that it is, of which
-        slip and creep are no part, as on a robot with encoders; keep "believed" for what it sees
-    correct : every so many seconds odometry is put right, as by a localisation; never if None
-    seed : of the noise; that of a run depends on the seed and on the run's number
+    method : as `simulate`'s
+    disturbances : what disturbs the runs; slip may be (B, m), and a run's noise depends on the seed and on
+        the run's number; keep "believed" for what the controllers take q for by odometry
     until : a goal, at which a run ends
     keep, every : names of what to keep (`nmm.rollouts.kept.QUANTITIES`), of each `every`-th sample
     folder : write what is kept there, as npz files of some runs each, instead of holding it
@@ -145,6 +134,8 @@ def rollout(
         duration, dt = duration or parts.duration, dt or parts.dt
         method = method or parts.method
         until = parts.goal() if until is None else until
+        if disturbances is None and parts.disturbances is not None:
+            disturbances = parts.disturbances.make()
         subject = subject.controller()
     controllers = (subject,) if isinstance(subject, Controller) else tuple(subject)
     _check(controllers)
@@ -156,28 +147,9 @@ def rollout(
     expect(steps <= MOST_SAMPLES, "dt", f"at most {MOST_SAMPLES} samples", dt)
     starts = checked_starts(controllers, q0)
     count = len(starts)
-    often = 0 if correct is None else max(1, round(positive(correct, "correct") / dt))
-    expect(odometry or not often, "correct", "nothing without odometry", correct)
-    plant = Plant(
-        robot,
-        count,
-        noise=noise,
-        delay=delay,
-        slip=slip,
-        creep=creep,
-        odometry=odometry,
-        correct=often,
-        seed=seed,
-    )
-    compiled = until is None and all(one.solver.compiles_steps for one in controllers)
-    if plant.disturbs and (method != "zoh" or (plant.misleads and not compiled)):
-        raise InputError(
-            "of a scenario with a goal, hand over scenario.controller()",
-            where="rollout",
-            expected="with disturbances method zoh, and with noise or odometry no goal, and controllers "
-            "without distances, retreats, Armijo's rule and Python functions",
-            got=method if until is None else f"{method} and a goal",
-        )
+    plant = (disturbances or Disturbances()).on(robot, dt, count)
+    if plant.disturbs:
+        check_disturbed(plant, controllers, method, until)
     sampled = any(one.solver.samples for one in controllers)
     expected = "rk4, midpoint, euler, zoh or zoh_midpoint with limits"
     expect(not (sampled and method == "adaptive"), "method", expected, method)
@@ -185,7 +157,7 @@ def rollout(
     where = None if folder is None else Path(folder)
     every = counted(every, "every")
     kept = Kept(keep, times, every, count, Recorder(controllers[0], times).found, where)
-    runs = _Runs(controllers, starts, times, method, until, plant, kept, compiled)
+    runs = _Runs(controllers, starts, times, method, until, plant, kept)
     workers = min(counted(cores() if threads is None else threads, "threads"), count)
     rooms: dict[str, Array] = {}
     with ThreadPoolExecutor(workers) as pool:
@@ -224,7 +196,6 @@ class _Runs:
     until: Goal | None
     plant: Plant
     kept: Kept
-    compiled: bool
 
     def __post_init__(self) -> None:
         self._local, self.stop = threading.local(), threading.Event()
@@ -239,14 +210,13 @@ class _Runs:
         controller, recorder, advance = self._controller(i)
         start = self.starts[i].copy()
         disturbed = self.plant.at(i, len(self.times)) if self.plant.disturbs else None
-        if disturbed is not None and self.compiled:
-            outcome, reasons = driven_disturbed(controller, recorder, self.times, start, disturbed)
+        if disturbed is not None:
+            given = controller, self.method, recorder, self.times, start, disturbed
+            outcome, reasons = drive_disturbed(*given, until=self.until)
         else:
-            if disturbed is not None:
-                advance = Acting(integrator(self.method, controller.robot, 1e-9), disturbed)
             outcome, reasons = drive_loop(controller, advance, recorder, self.times, start, None, self.until)
         count = len(recorder)
-        believed = disturbed.believed if disturbed is not None and self.plant.odometry else None
+        believed = recorder.believed
         self.kept.put(room, row, recorder.found, believed, count)
         measure(self.times, count, recorder.found, self.measures[i])
         if count:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -27,6 +27,11 @@ from nmm.runs.clearance import guarded
 from nmm.runs.compiled_loop import DIVERGED_BEYOND, CompiledLoop, compiled_loop
 from nmm.runs.recording import Recorder
 from nmm.runs.verdict import FindingLine, Outcome
+
+#: Records a run over the times (N,) from q (n,), with progress and goal; returns how it ended.
+Drive: TypeAlias = Callable[
+    [Recorder, Array, Array, Callable[[float], None] | None, Goal | None], tuple[Outcome, FindingLine]
+]
 
 
 class Ended(NamedTuple):
@@ -88,8 +93,10 @@ def record_run(
     until: Goal | None = None,
     leg: Leaving | None = None,
     watch: Callable[[Recorder], None] | None = None,
+    disturbed: Drive | None = None,
 ) -> tuple[Recorder, Ended]:
-    """Integrate over the times (N,) from q; `watch` gets the recorder first."""
+    """Integrate over the times (N,) from q; `watch` gets the recorder first. `disturbed` drives a robot that
+    does not do as it is told."""
     recorder = Recorder(controller, times)
     recorder.at_middle = advance.at_middle
     if watch is not None:
@@ -101,7 +108,10 @@ def record_run(
     if controller.solver.second:
         own = controller.solver
         guarded_advance = Accelerated(advance, controller.robot, own.before, own.found.second.u_dot)
-    outcome, reasons = drive_loop(controller, guarded_advance, recorder, times, q, progress, until, leg)
+    if disturbed is None:
+        outcome, reasons = drive_loop(controller, guarded_advance, recorder, times, q, progress, until, leg)
+    else:
+        outcome, reasons = disturbed(recorder, times, q, progress, until)
     if controller.solver.second:
         recorder.findings += rate_jumps(recorder, follows=leg is not None and math.isfinite(leg.earlier))
     recorder.blocking = controller.report.blocking()

@@ -38,6 +38,7 @@ class Recorder:
     retreats (N,) : how often the robot had backed off; backed_off : before the first sample, with other tasks
     counts : how often distances changed the inputs; blocking : what held the robot back at the end
     at_middle : whether inputs are those of the middle between samples
+    disturbed : whether the robot does not do as it is told; believed (N, n): where its odometry has it
     goes_on : whether the run goes on after the last sample, with other tasks
     singular_values (N, s) of J, swept : known once the trajectory is made
     """
@@ -59,7 +60,8 @@ class Recorder:
         self.findings: list[Finding] = []
         self.blocking: tuple[str, ...] = ()
         self.counts, self.backed_off = Counts(), 0
-        self.goes_on = self.at_middle = self._compiled = False
+        self.goes_on = self.at_middle = self.disturbed = self._compiled = False
+        self.believed: Array | None = None
         self.singular_values: Array = np.zeros((0, len(rows)))
         self.swept: Swept | None = None
         self._places: list[tuple[Any, ...]] = []
@@ -184,6 +186,7 @@ class Recorder:
             "path": path,
             "desired": desired,
             "planned": planned,
+            "believed": None if self.believed is None else self.believed[: len(self)].copy(),
             "target": self._shown.mark(path),
             "seen": self._seen.at(self.t, found.q),
             **distances,

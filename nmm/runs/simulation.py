@@ -16,11 +16,13 @@ from nmm.control.sequence import Schedule
 from nmm.errors import InputError, RunError, expect_kind
 from nmm.lazy_call import lazy_call
 from nmm.progress import between
-from nmm.runs.closed_loop import Leaving, Leg, finding_in, record_run, sample_times
+from nmm.runs.closed_loop import Drive, Leaving, Leg, finding_in, record_run, sample_times
+from nmm.runs.disturbances import Disturbances, Disturbed
+from nmm.runs.disturbed import check_disturbed, drive_disturbed
 from nmm.runs.joining import join
 from nmm.runs.recording import Recorder
 from nmm.runs.trajectory import Trajectory
-from nmm.runs.verdict import Outcome
+from nmm.runs.verdict import FindingLine, Outcome
 from nmm.text_format import listed
 
 #: The most samples that a run may have; beyond it the numbers do not fit in memory.
@@ -38,6 +40,7 @@ def simulate(
     progress: Callable[[float], None] | None = None,
     until: Goal | None = None,
     watch: Callable[[Recorder], None] | None = None,
+    disturbances: Disturbances | None = None,
 ) -> Trajectory:
     """Integrate q_dot = S(q) u(t, q) from q0 over `duration`, sampled every dt; at order 2 also
     u_dot(t, q, u), from rest.
@@ -60,6 +63,7 @@ def simulate(
     until : a target to reach: the run ends where the error is within its tolerances
     watch : called with what records the samples, before the first one; of tasks that come and go, at each
         event. Another thread may read the samples in it, all but the last, which may be taken again
+    disturbances : what the robot does otherwise than it is told; such a run is not judged by its gain
 
     Returns
     -------
@@ -69,7 +73,8 @@ def simulate(
     Raises
     ------
     InputError : wrong q0 (also one outside limits that the controller does not keep, or with a joint that is
-        not where the one that it follows has it), duration, dt, method; an `until` that is no Goal
+        not where the one that it follows has it), duration, dt, method; an `until` that is no Goal;
+        disturbances that are not known with the controller, the method or the goal
 
     Examples
     --------
@@ -115,6 +120,11 @@ def simulate(
     if controller.solver.scene is not None:
         controller.solver.scene.check_start(0.0, q)
     times = sample_times(0.0, dt, steps, duration)
+    expect_kind(disturbances, Disturbances | None, "disturbances", "Disturbances, as Disturbances(slip=0.99)")
+    plant, drive = None if disturbances is None else disturbances.on(robot, dt), None
+    if plant is not None and plant.disturbs:
+        check_disturbed(plant, [controller], method, until)
+        drive = _disturbed(controller, method, plant.at(0, len(times)))
     schedule = controller.schedule
     if schedule is not None:
         legs = _legs(controller, schedule, advance, times, q, progress, until, watch)
@@ -123,11 +133,24 @@ def simulate(
             controller, schedule, legs, run, found, until
         )
     else:
-        recorder, ended = record_run(controller, advance, times, q, progress, until, watch=watch)
+        recorder, ended = record_run(controller, advance, times, q, progress, until, None, watch, drive)
         run = recorder.trajectory(dt, method)
         leg = Leg(controller, (), advance, recorder, ended, duration)
         verdict = lazy_call("nmm.diagnosis.diagnose:diagnose")(leg, run, until)
     return replace(run, verdict=verdict)
+
+
+def _disturbed(controller: Controller, method: str, disturbed: Disturbed) -> Drive:
+    def drive(
+        recorder: Recorder,
+        times: Array,
+        q: Array,
+        progress: Callable[[float], None] | None,
+        until: Goal | None,
+    ) -> tuple[Outcome, FindingLine]:
+        return drive_disturbed(controller, method, recorder, times, q, disturbed, progress, until)
+
+    return drive
 
 
 def _legs(

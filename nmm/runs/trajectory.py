@@ -65,6 +65,7 @@ class Trajectory:
         read (of `outcome`, where it depends on that)
     frame : the end-effector frame that the task positions, if any
     path, desired (N, 3): its path and, where the task says, the desired one, m in the world
+    believed (N, n): where its odometry has the robot, which is what the controller sees, if it has odometry
     target (3,): the fixed point that a bearing looks at, if any
     seen (N, P, 3): the points that cameras see, m in the world, if any
     cameras : which of them each camera sees, and where the task wants them in its picture
@@ -116,6 +117,7 @@ class Trajectory:
     path: Array | None = None
     desired: Array | None = None
     planned: Array | None = None
+    believed: Array | None = None
     u_dot: Array | None = None
     target: Array | None = None
     seen: Array | None = None

@@ -139,3 +139,11 @@ def number_or_by_name(value: object) -> float | dict[str, float] | None:
 
 
 Speeds = Annotated[float | dict[str, float] | None, BeforeValidator(number_or_by_name)]
+
+
+def numbers_or_by_name(value: object) -> Nested | dict[str, float]:
+    return numbers_by_name(value) if isinstance(value, Mapping) else nested(value)
+
+
+#: A number for all, a list, or some by name.
+NumbersByName = Annotated[Nested | dict[str, float], BeforeValidator(numbers_or_by_name)]

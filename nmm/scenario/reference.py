@@ -8,6 +8,7 @@ from pydantic_core import PydanticUndefined
 
 from nmm.kinds import RESOLVERS
 from nmm.scenario.collisions import SHAPE_PARTS, CollisionsPart, ObstaclePart
+from nmm.scenario.disturbances import DisturbancesPart
 from nmm.scenario.functions import FUNCTION_PARTS, REFERENCE_PARTS
 from nmm.scenario.keys import Part
 from nmm.scenario.limits import BoundPart, GoalPart, LimitsPart, RetreatPart, SteeringPart
@@ -40,6 +41,7 @@ def sections() -> Iterator[Section]:
     yield _section("objective.terms", TermPart)
     yield from _kinds("resolver", RESOLVER_PARTS, {kind: RESOLVERS.words(kind) for kind in RESOLVER_PARTS})
     yield _section("until", GoalPart)
+    yield _section("disturbances", DisturbancesPart)
     yield _section("retreat", RetreatPart)
     yield _section("plan", PlanPart)
     yield _section("plan.track", TrackPart)

@@ -30,7 +30,7 @@ SUFFIXES = (".yaml", ".yml")
 #: The kind of a resolver that is no kind of ours.
 OWN = "own"
 #: The keys that a controller without a plan does not depend on.
-KEYS_OF_A_RUN = ("q0", "duration", "method", "tolerance")
+KEYS_OF_A_RUN = ("q0", "duration", "method", "tolerance", "disturbances")
 
 
 class Scenario:
@@ -222,6 +222,7 @@ class Scenario:
                     until=parts.goal(),
                     progress=progress,
                     watch=watch,
+                    disturbances=None if parts.disturbances is None else parts.disturbances.make(),
                 )
         return self._told(trajectory)
 

@@ -18,6 +18,7 @@ from nmm.resolvers.base import Resolver
 from nmm.robots.robot import Robot
 from nmm.robots.semantics import POSTURE
 from nmm.scenario.collisions import CollisionsPart
+from nmm.scenario.disturbances import DisturbancesPart
 from nmm.scenario.functions import REFERENCE_PARTS
 from nmm.scenario.keys import KeyedError, Part, at
 from nmm.scenario.limits import GoalPart, LimitsPart, RetreatPart, SteeringPart, part_or_none
@@ -170,6 +171,9 @@ class ScenarioPart(Part):
     until: Annotated[GoalPart | None, BeforeValidator(part_or_none)] = Field(
         None, description="a target to reach: the run ends where the error is within tolerances"
     )
+    disturbances: DisturbancesPart | None = Field(
+        None, description="what a real robot does to the controller: slip, creep, odometry, noise, delay"
+    )
     retreat: Annotated[RetreatPart | None, BeforeValidator(part_or_none)] = Field(
         None, description="whether to back off where the error stalls, and start again: true, or a mapping"
     )
@@ -231,6 +235,9 @@ class ScenarioPart(Part):
         with at("retreat"):
             goal = None if self.until is None else self.until.make()
             retreat = None if self.retreat is None else self.retreat.build(robot, goal)
+        with at("disturbances"):
+            if self.disturbances is not None:
+                self.disturbances.build(robot, self.dt)
         steering = None if self.steering is None else self.steering.make()
         with at("resolver"):
             resolver, added = own or self.resolver.make(), None

@@ -2,46 +2,31 @@
 wheels slip and creep."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 from numba import types
-from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, Integers, counted, scalar
+from nmm.arrays import Array, Integers
 from nmm.control.controller import Controller
 from nmm.control.equations import ControlStep, write_equation
-from nmm.control.integrators import Around
+from nmm.control.goal import Goal
+from nmm.control.integrators import Around, integrator
 from nmm.control.recorded import Recorded, note_sample
 from nmm.control.stepping import hold_inputs
-from nmm.errors import InputError, expect
+from nmm.errors import InputError
 from nmm.findings import Finding
 from nmm.functions.program import BESIDE, LaidOut, run_program
 from nmm.kernels.compiled import checked_by_caller, compiled, compiled_without_gil, scratch, view
-from nmm.kernels.record_layout import Matrix, Vector, record_type, views
+from nmm.kernels.record_layout import record_type, views
 from nmm.resolvers.answer import SINGULAR_J
 from nmm.resolvers.partitions import PartitionState
-from nmm.robots.robot import Robot
-from nmm.runs.closed_loop import finding_in
+from nmm.runs.closed_loop import drive_loop, finding_in
 from nmm.runs.compiled_loop import DIVERGED_BEYOND, compiled_sample, within_bound
+from nmm.runs.disturbances import Disturbed, Plant
 from nmm.runs.recording import Recorder
 from nmm.runs.verdict import FindingLine, Outcome
-
-
-class Disturbed(NamedTuple):
-    """A run's disturbances: noise (N or 0, n) added to q at each sample before the controller sees it, m and
-    rad; the delay, in samples, until inputs act; slip (m,), the share of each input that acts; creep, s, by
-    which a platform slides sideways, at creep v ω; and what the controller believes its q to be by odometry,
-    believed (N or 0, n), put right every `correct` samples (0: never)."""
-
-    noise: Matrix
-    delay: int
-    slip: Vector
-    creep: float
-    believed: Matrix
-    correct: int
 
 
 @dataclass(frozen=True)
@@ -65,70 +50,11 @@ class Acting(Around):
         return ahead
 
 
-class Plant:
-    """What disturbs `count` runs with n coordinates and m inputs, as a user gives it."""
-
-    def __init__(
-        self,
-        robot: Robot,
-        count: int,
-        *,
-        noise: ArrayLike = 0.0,
-        delay: int = 0,
-        slip: ArrayLike = 1.0,
-        creep: float = 0.0,
-        odometry: bool = False,
-        correct: int = 0,
-        seed: int = 0,
-    ) -> None:
-        n, m = robot.n, robot.n_u
-        self.noise = _broadcast(noise, (n,), "noise")
-        expect(not np.any(self.noise < 0.0), "noise", "standard deviations, at least 0")
-        self.delay, self.seed = counted(delay, "delay", 0), counted(seed, "seed", 0)
-        self.slip = _broadcast(slip, (count, m), "slip")
-        self.creep, self.odometry, self.correct = scalar(creep, "creep"), odometry, correct
-        if robot.platform.n_p < 3 and (odometry or self.creep):
-            raise InputError(
-                "odometry and creep are a mobile platform's",
-                where=f"{robot.name}: {'odometry' if odometry else 'creep'}",
-            )
-
-    @property
-    def noisy(self) -> bool:
-        return bool(np.any(self.noise > 0.0))
-
-    @property
-    def misleads(self) -> bool:
-        """Whether a controller sees another q than the robot's."""
-        return self.noisy or self.odometry
-
-    @property
-    def disturbs(self) -> bool:
-        return bool(self.misleads or self.delay or self.creep or np.any(self.slip != 1.0))
-
-    def at(self, i: int, samples: int) -> Disturbed:
-        noise = np.zeros((0, len(self.noise)))
-        if self.noisy:
-            drawn = np.random.default_rng([self.seed, i]).standard_normal((samples, len(self.noise)))
-            noise = drawn * self.noise
-        believed = np.zeros((samples if self.odometry else 0, len(self.noise)))
-        return Disturbed(noise, self.delay, self.slip[i].copy(), self.creep, believed, self.correct)
-
-
-def _broadcast(value: ArrayLike, shape: tuple[int, ...], what: str) -> Array:
-    try:
-        found = np.broadcast_to(np.asarray(value, dtype=np.float64), shape).copy()
-    except (TypeError, ValueError):
-        raise InputError(where=what, expected=f"a number or shape {shape}", got=value) from None
-    expect(np.all(np.isfinite(found)), what, "finite numbers")
-    return found
-
-
 _DRIFT = types.int64(
     *(types.int64[::1], types.float64[::1], types.float64[::1], types.int64, types.int64),
     *(record_type(Disturbed), types.int64, record_type(Recorded)),
 )
-#: Samples in one compiled call, where the run may replace numbers of the controller's functions.
+#: Samples in one compiled call, which cannot be interrupted.
 AT_ONCE = 200
 
 
@@ -196,8 +122,69 @@ def drift(
     return last
 
 
-def driven_disturbed(
-    controller: Controller, recorder: Recorder, times: Array, q: Array, disturbed: Disturbed
+def drive_disturbed(
+    controller: Controller,
+    method: str,
+    recorder: Recorder,
+    times: Array,
+    q: Array,
+    disturbed: Disturbed,
+    progress: Callable[[float], None] | None = None,
+    until: Goal | None = None,
+) -> tuple[Outcome, FindingLine]:
+    """Record a run over the times (N,) from q, as `closed_loop.drive_loop` does."""
+    recorder.disturbed = True
+    recorder.believed = disturbed.believed if len(disturbed.believed) else None
+    if not wholly_compiled(controller, until):
+        acting = Acting(integrator(method, controller.robot, 1e-9), disturbed)
+        return drive_loop(controller, acting, recorder, times, q, progress, until)
+    try:
+        return _driven(controller, recorder, times, q, disturbed, progress)
+    except KeyboardInterrupt:
+        found = Finding("interrupted", {"end": float(times[-1])}, {"t": recorder.reached})
+        return Outcome.INTERRUPTED, (found,)
+
+
+def wholly_compiled(controller: Controller, until: Goal | None) -> bool:
+    return until is None and controller.solver.compiles_steps
+
+
+def check_disturbed(plant: Plant, controllers: Sequence[Controller], method: str, until: Goal | None) -> None:
+    """`InputError` for disturbances that runs of these controllers cannot have."""
+    if method != "zoh":
+        raise InputError(
+            "disturbances are a sampled controller's, whose inputs are held",
+            where="method",
+            expected="zoh",
+            got=method,
+        )
+    if any(one.schedule is not None or one.order == 2 for one in controllers):
+        raise InputError(
+            "disturbances are not known with tasks that come and go, nor at order 2",
+            where="disturbances",
+            expected="none",
+        )
+    if plant.misleads and until is not None:
+        raise InputError(
+            "noise and odometry are not known with a goal at which a run ends",
+            where="until",
+            expected="none; of a scenario, set until=false",
+        )
+    if plant.misleads and not all(wholly_compiled(one, until) for one in controllers):
+        raise InputError(
+            "noise and odometry are known of controllers that run compiled as a whole",
+            where="disturbances",
+            expected="no distances, retreats, Armijo's rule or Python functions beside them",
+        )
+
+
+def _driven(
+    controller: Controller,
+    recorder: Recorder,
+    times: Array,
+    q: Array,
+    disturbed: Disturbed,
+    progress: Callable[[float], None] | None,
 ) -> tuple[Outcome, FindingLine]:
     solver, found, renewals = controller.solver, recorder.found, controller.solver.program.renewals
     solver.begin_run()
@@ -213,7 +200,9 @@ def driven_disturbed(
     count, last = 0, 0
     with solver.compiled() as blocks:
         while last < len(times) and count == last:
-            first, last = count, min(count + AT_ONCE, len(times)) if renewals else len(times)
+            if progress is not None:
+                progress(count / len(times))
+            first, last = count, min(count + AT_ONCE, len(times))
             for one in renewals:
                 one.renew(float(times[first]), as_seen(slice(first, first + 1))[0])
             for one in renewals:
@@ -226,7 +215,10 @@ def driven_disturbed(
                 if stays < count:  # begin again, up to the sample before the one that needs others
                     solver.sample.restore(left)
                     count = last = fly(*blocks, times, first, stays, *given)
-    recorder.passed_over(count - 1)
+            if count:
+                recorder.passed_over(count - 1)
+    if progress is not None:
+        progress(1.0)
     if count == len(times):
         return Outcome.COMPLETED, ()
     (seen,) = as_seen(slice(count, count + 1))

@@ -1,0 +1,156 @@
+"""What a real robot does to a sampled controller: noise, delay, slip, creep, odometry."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.arrays import Array, counted, positive, scalar
+from nmm.errors import InputError, expect, expect_known
+from nmm.kernels.record_layout import Matrix, Vector
+from nmm.robots.robot import Robot
+
+
+class Disturbed(NamedTuple):
+    """A run's disturbances: noise (N or 0, n) added to q at each sample before the controller sees it, m and
+    rad; the delay, in samples, until inputs act; slip (m,), the share of each input that acts; creep, s, by
+    which a platform slides sideways, at creep v ω; and what the controller believes its q to be by odometry,
+    believed (N or 0, n), put right every `correct` samples (0: never)."""
+
+    noise: Matrix
+    delay: int
+    slip: Vector
+    creep: float
+    believed: Matrix
+    correct: int
+
+
+class Disturbances:
+    """What a real robot does to a sampled controller; by default nothing. `simulate` and `rollout` take them
+    with method "zoh".
+
+    q, r and errors of such a run are the robot's, not those that the controller sees; u is what it asks for.
+
+    Parameters
+    ----------
+    noise : standard deviation of what the controller sees of each coordinate, m and rad: a number, (n,), or
+        numbers for some by name
+    delay : samples until inputs act; the robot stands before
+    slip : the share of each input that acts, 1 for all of it: a number, (m,), or numbers for some by name
+    creep : a platform that drives with v and turns with ω slides sideways with creep v ω, to its left where
+        that is above 0; s
+    odometry : whether the controller sees the platform where its wheels' turning says that it is, of which
+        slip and creep are no part, as on a robot with encoders; the run records it as `believed`
+    correct : every so many seconds odometry is put right, as by a localisation; never when not given
+    seed : of the noise
+
+    Raises
+    ------
+    InputError : a negative noise, numbers that are not finite, `correct` without odometry
+
+    Examples
+    --------
+    >>> scenario = nmm.Scenario.load("unicycle_2r_position")
+    >>> worn = nmm.Disturbances(slip={"v": 0.99}, creep=-0.01, odometry=True)
+    >>> run = nmm.simulate(scenario.controller(), scenario.parts.q0, 5.0, 0.01, "zoh", disturbances=worn)
+    >>> bool(run["drift"][-1] > 0.01)
+    True
+    """
+
+    def __init__(
+        self,
+        noise: ArrayLike | Mapping[str, float] = 0.0,
+        delay: int = 0,
+        slip: ArrayLike | Mapping[str, float] = 1.0,
+        creep: float = 0.0,
+        odometry: bool = False,
+        correct: float | None = None,
+        seed: int = 0,
+    ) -> None:
+        self.noise, self.slip = _numbers(noise, "noise"), _numbers(slip, "slip")
+        for one in self.noise.values() if isinstance(self.noise, dict) else [self.noise]:
+            expect(not np.any(np.asarray(one) < 0.0), "noise", "standard deviations, at least 0")
+        self.delay, self.seed = counted(delay, "delay", 0), counted(seed, "seed", 0)
+        self.creep, self.odometry = scalar(creep, "creep"), bool(odometry)
+        self.correct = None if correct is None else positive(correct, "correct")
+        expect(self.odometry or correct is None, "correct", "nothing without odometry", correct)
+
+    def on(self, robot: Robot, dt: float, count: int | None = None) -> Plant:
+        """What disturbs one run of the robot, sampled every dt, s, or `count` runs, which may have slip of
+        their own, (count, m); `InputError` for what the robot does not have."""
+        if robot.platform.n_p < 3 and (self.odometry or self.creep):
+            what = "odometry" if self.odometry else "creep"
+            raise InputError("odometry and creep are a mobile platform's", where=f"{what}: {robot.name}")
+        shape = (robot.n_u,) if count is None else (count, robot.n_u)
+        slip = _each(self.slip, 1.0, robot.u_names, shape, "slip")
+        return Plant(
+            noise=_each(self.noise, 0.0, robot.q_names, (robot.n,), "noise"),
+            delay=self.delay,
+            slip=slip.reshape(-1, robot.n_u),
+            creep=self.creep,
+            odometry=self.odometry,
+            correct=0 if self.correct is None else max(1, round(self.correct / dt)),
+            seed=self.seed,
+        )
+
+
+class Plant(NamedTuple):
+    """Disturbances of B runs: noise (n,), slip (B, m), and what is the same in all; `correct` in samples."""
+
+    noise: Array
+    delay: int
+    slip: Array
+    creep: float
+    odometry: bool
+    correct: int
+    seed: int
+
+    @property
+    def noisy(self) -> bool:
+        return bool(np.any(self.noise > 0.0))
+
+    @property
+    def misleads(self) -> bool:
+        """Whether a controller sees another q than the robot's."""
+        return self.noisy or self.odometry
+
+    @property
+    def disturbs(self) -> bool:
+        return bool(self.misleads or self.delay or self.creep or np.any(self.slip != 1.0))
+
+    def at(self, i: int, samples: int) -> Disturbed:
+        """Of run i."""
+        noise = np.zeros((0, len(self.noise)))
+        if self.noisy:
+            drawn = np.random.default_rng([self.seed, i]).standard_normal((samples, len(self.noise)))
+            noise = drawn * self.noise
+        believed = np.zeros((samples if self.odometry else 0, len(self.noise)))
+        return Disturbed(noise, self.delay, self.slip[i].copy(), self.creep, believed, self.correct)
+
+
+def _numbers(value: ArrayLike | Mapping[str, float], what: str) -> Array | dict[str, float]:
+    if isinstance(value, Mapping):
+        return {str(name): scalar(one, f"{what}: {name}") for name, one in value.items()}
+    try:
+        found = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(where=what, expected="numbers, or some by name", got=value) from None
+    expect(np.all(np.isfinite(found)), what, "finite numbers")
+    return found
+
+
+def _each(
+    given: Array | dict[str, float], rest: float, names: Sequence[str], shape: tuple[int, ...], what: str
+) -> Array:
+    """The numbers for all names, (len(names),) or (B, len(names)); `rest` for those that are not given."""
+    if isinstance(given, dict):
+        for name in given:
+            expect_known("name", name, names, what)
+        given = np.array([given.get(name, rest) for name in names])
+    try:
+        return np.broadcast_to(given, shape).copy()
+    except ValueError:
+        raise InputError(where=what, expected=f"a number or shape {shape}", got=given.tolist()) from None

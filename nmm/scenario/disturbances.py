@@ -1,0 +1,18 @@
+"""The disturbances of a scenario."""
+
+from nmm.robots.robot import Robot
+from nmm.runs.disturbances import Disturbances
+from nmm.scenario.constructors import MadePart, keys_of
+from nmm.scenario.numbers import NumbersByName
+
+
+class DisturbancesPart(keys_of(Disturbances, MadePart, noise=NumbersByName, slip=NumbersByName)):  # type: ignore[misc]  # made
+    """What a real robot does to the controller, with method zoh."""
+
+    makes = Disturbances
+
+    def build(self, robot: Robot, dt: float) -> Disturbances:
+        found: Disturbances = self.make()
+        with self.own_keys():
+            found.on(robot, dt)
+        return found
