@@ -10,6 +10,8 @@ import pytest
 import yaml
 
 import nmm
+from nmm.playback.channels import channels
+from nmm.sweeps.rows import rows_of
 
 #: The paper's first case on worn wheels (its shares were measured in a physics engine, docs/rollouts.md).
 CASE = "unicycle_2r_position"
@@ -70,6 +72,27 @@ def test_what_is_believed_is_in_the_folder_of_a_run(tmp_path: Path) -> None:
     read = nmm.Trajectory.load(folder)
     assert np.array_equal(read.believed, run(1.0).believed)
     assert np.array_equal(read["drift"], run(1.0)["drift"])
+
+
+def test_page_and_figure_show_where_odometry_has_it() -> None:
+    found = run(1.0)
+    assert np.array_equal(found.motion().believed, found.believed)
+    drift = {one.panel: one.values for one in channels(found).channels}["drift"]
+    assert drift.max() == found["drift"].max()
+    line = {one.get_label(): one for one in nmm.figures.stroboscopic(found).axes[0].get_lines()}
+    believed = line["where odometry has it"].get_xydata()
+    tip = nmm.Configuration(found.robot, found.believed[-1]).placement("ee").translation[:2]
+    np.testing.assert_allclose(believed[-1], tip, atol=1e-12)
+
+
+def test_rows_of_a_sweep_have_the_drift_of_their_runs() -> None:
+    varied = {"disturbances.slip.v": (0.9, 1.0, 2), "disturbances.creep": [0.0, -0.05]}
+    few = scenario({"odometry": True}, duration=1.0)
+    rows = rows_of(nmm.Sweep(few, varied).definition, range(4))
+    for row in rows:
+        keys = {key: row[key] for key in varied}
+        assert row["drift"] == few.with_settings(keys).run().summary()["drift"], keys
+    assert [row["drift"] > 0.0 for row in rows].count(False) == 1  # with its wheels whole, and no creep
 
 
 @pytest.mark.parametrize(

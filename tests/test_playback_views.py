@@ -233,3 +233,31 @@ def test_texts_of_ghosts_stand_at_their_own_and_not_on_one_another(
             assert right <= page.evaluate("document.getElementById('view').clientWidth")
             for other in boxes[: len(cards) + i]:
                 assert right <= other[0] or other[2] <= left or bottom <= other[1] or other[3] <= top
+
+
+def test_a_copy_moves_where_odometry_has_the_robot(
+    small_robot: Robot, window: Window, tmp_path: Path
+) -> None:
+    """Beside the robot by what it is off, at each time; the legend hides it."""
+    motion = drive(small_robot)
+    off = np.zeros_like(motion.q)
+    off[:, 0] = 0.1 * motion.t
+    motion = Motion(small_robot, motion.t, motion.q, motion.u, frame="ee", believed=motion.q + off)
+    page = window.open(file_url([motion], tmp_path))
+    for t in (0.0, 2.0, 4.0):
+        page.evaluate(f"nmm.player.seek({t})")
+        nodes = page.evaluate(WALK)
+        there = [path for path in nodes if path.startswith("/nmm/motion 0/believed/") and "visual" in path]
+        assert there
+        for path in there:
+            believed, real = (
+                UPRIGHT.T @ np.reshape(nodes[one], (4, 4)).T
+                for one in (path, path.replace("/believed/", "/robot/"))
+            )
+            np.testing.assert_allclose(believed[:3, :3], real[:3, :3], atol=1e-5)
+            np.testing.assert_allclose(believed[:3, 3] - real[:3, 3], [0.1 * t, 0.0, 0.0], atol=1e-4)
+    shown = "nmm.node('/nmm/motion 0/believed').visible"
+    assert page.evaluate(shown)
+    page.locator("#legend button", has_text="odometry").click()
+    assert not page.evaluate(shown)
+    assert page.evaluate("nmm.node('/nmm/motion 0/robot').visible")

@@ -368,7 +368,7 @@ _TABLE = (
     RecordedQuantity(
         "drift", "drift", "distance of the platform from where its odometry has it", unit="m", saved=False,
         of=drift, place=2,
-        curve=Curve("drift", "Drift of the odometry", 13, lower=0.0, opens_below=np.inf),
+        curve=Curve("drift", "Odometry", 4, opens_below=np.inf),
         numbers=(
             Number(
                 "drift", lambda t, x: x[-1], "drift, at the end",

@@ -19,6 +19,7 @@ from nmm.figures.silhouette import Ink, Pose, Silhouette, hull, outline_points
 from nmm.figures.time_labels import SIZE, Ground, Place, Subject, places
 from nmm.figures.views import ABOVE, View, Viewed, page, upright
 from nmm.playback.placements import base_position
+from nmm.robots.frame_path import FramePath
 from nmm.runs.trajectory import Trajectory
 
 #: Sizes of the marks at the path's ends and of a target, pt.
@@ -49,8 +50,9 @@ def stroboscopic(
 ) -> Figure:
     """The robot seen from above at instants of the run (the paper's Figs. 3, 5 and 7).
 
-    Platform with wheels and heading, arm, end-effector's path, desired path, start, end, the target, looked
-    at or held, and what cameras see; drawings fade towards the start. A second view from the side, of the
+    Platform with wheels and heading, arm, end-effector's path, the one by odometry, desired path, start, end,
+    the target, looked at or held, and what cameras see; drawings fade towards the start. A second view from
+    the side, of the
     upright plane in which the motion mostly lies, where the arm leaves the ground's.
 
     Parameters
@@ -97,6 +99,7 @@ class Scene(Viewed):
     @property
     def names(self) -> list[str]:
         names = ["desired path"] if "desired" in self.lines else []
+        names += ["where odometry has it"] * ("believed" in self.lines)
         names += [self._path_name, "start", "end", *["obstacle"] * bool(self.outlines), *self.seen.names]
         return names if not len(self.trajectory.marks) else [*names, "target"]
 
@@ -168,6 +171,11 @@ class Scene(Viewed):
             axes.plot(
                 *view.of(self.lines["desired"]).T, "--", color=resolver_style.BLACK, linewidth=1.1,
                 dashes=(4, 2.5), label="desired path", zorder=5.2,
+            )  # fmt: skip
+        if "believed" in self.lines:
+            axes.plot(
+                *view.of(self.lines["believed"]).T, ":", color=style.GREY, linewidth=1.5,
+                label="where odometry has it", zorder=5.15,
             )  # fmt: skip
         path = view.of(self.lines["path"])
         axes.plot(*path.T, color=_PATH_COLOR, linewidth=1.5, label=self._path_name, zorder=5.1)
@@ -268,8 +276,12 @@ def _lines(trajectory: Trajectory) -> dict[str, Array]:
     if trajectory.path is None:
         x_y = few(base_position(trajectory.robot, trajectory.q))
         return {"path": np.column_stack([x_y, np.zeros(len(x_y))])}
-    desired = {} if trajectory.moving is None else {"desired": few(trajectory.moving)}
-    return {"path": few(trajectory.path), **desired}
+    found = {"path": few(trajectory.path)}
+    if trajectory.moving is not None:
+        found["desired"] = few(trajectory.moving)
+    if trajectory.believed is not None and trajectory.frame is not None:
+        found["believed"] = FramePath(trajectory.robot, trajectory.frame).positions(few(trajectory.believed))
+    return found
 
 
 def _faded(color: str, strength: float) -> tuple[float, float, float]:

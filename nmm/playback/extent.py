@@ -101,6 +101,8 @@ def view_points(boxes: Array, motions: Sequence[Motion]) -> Array:
         points += [
             line[:: max(1, len(line) // 200)] for line in (motion.driven, motion.desired) if line is not None
         ]
+        if motion.believed is not None:
+            points.append(np.pad(base_position(motion.robot, motion.believed), ((0, 0), (0, 1)))[::20])
         if motion.target is not None:
             points.append(np.atleast_2d(motion.target))
     return np.vstack(points)

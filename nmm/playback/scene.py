@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
 DESIRED: Rgb = (0.16, 0.18, 0.22)
 TARGET: Rgb = (0.83, 0.10, 0.22)
 
+#: Opacity of a robot where its odometry has it.
+BELIEVED = 0.35
 INSTANTS = 80
 
 
@@ -112,11 +115,16 @@ def playback_scene(
         if planned is not None:
             _line(drawing, f"{path}/plan", DESIRED, planned[drawn], thick=0.6)
         animations += draw_cameras(drawing, motion, robot, path, start, fps, size)
+        if motion.believed is not None:
+            there = replace(motion, q=motion.believed, path=None)
+            animations += _believed(drawing, there, wheels[i], path, color, len(motions) + i, start, fps)
         draw_nearest(drawing, motion, path, color if several else None, start, fps)
         if shown is not None:
             animations += shown.draw(drawing, i, path, color, start)
     obstacles.tell(drawing)
     tell_cameras(drawing, [camera for motion in motions for camera in motion.cameras])
+    if paths := [f"/nmm/motion {i}/believed" for i, one in enumerate(motions) if one.believed is not None]:
+        drawing.add("believed", paths=paths, color=list(worn[0].rgb))
     _desired(drawing, motions)
     _targets(drawing, motions, size)
     if shown is not None:
@@ -202,6 +210,23 @@ def _ellipsoids(
 
     options = options_of(wanted)
     return None if options is None else SceneEllipsoids(motions, frames, options)
+
+
+def _believed(
+    drawing: Drawing,
+    motion: Motion,
+    wheels: Array,
+    path: str,
+    color: Rgb,
+    rank: int,
+    start: float,
+    fps: float,
+) -> list[Command]:
+    """A transparent copy of the robot that moves where odometry has it; what animates it."""
+    frames = keyframes(motion, fps, wheels)
+    copy = DrawnRobot(drawing, motion.robot, f"{path}/believed", tint=color, opacity=BELIEVED, rank=rank)
+    copy.place(frames.q[0], frames.wheels[0])
+    return copy.animations(frames, start)
 
 
 def _desired(drawing: Drawing, motions: Sequence[Motion]) -> None:

@@ -26,7 +26,14 @@ class DrawnRobot:
     display model's joints, from joint 1; `root` is the root link's."""
 
     def __init__(
-        self, drawing: Drawing, robot: Robot, path: str, *, tint: Rgb | None = None, rank: int = 0
+        self,
+        drawing: Drawing,
+        robot: Robot,
+        path: str,
+        *,
+        tint: Rgb | None = None,
+        opacity: float = 1.0,
+        rank: int = 0,
     ) -> None:
         model = robot.display_model
         self.placements = Placements(robot)
@@ -42,7 +49,9 @@ class DrawnRobot:
             drawing.transform(at, np.array(geometry.placement.homogeneous))
             for k, shape in enumerate(shapes(geometry)):
                 color = _mixed(shape.color[:3], tint)
-                drawing.object(f"{at}/{k}", shape.geometry, color, opacity=shape.color[3], rank=rank)
+                drawing.object(
+                    f"{at}/{k}", shape.geometry, color, opacity=opacity * shape.color[3], rank=rank
+                )
                 if not np.array_equal(shape.matrix, np.eye(4)):
                     drawing.transform(f"{at}/{k}", shape.matrix)
 

@@ -127,6 +127,7 @@ class Motion:
     path (N, 3) : the end-effector's path, m in the world; computed from `frame` when not given
     desired (M, 3) : the desired path, m in the world
     planned (N, n) : where its plan was, if it followed one
+    believed (N, n) : where its odometry has it
     target (3,), or (T, 3) : a fixed point to look at or to reach, or several, m in the world
     label : name in the legend, such as "RG"
     frame : the end-effector's frame
@@ -157,6 +158,7 @@ class Motion:
     path: Array | None = None
     desired: Array | None = None
     planned: Array | None = None
+    believed: Array | None = None
     target: Array | None = None
     label: str = ""
     frame: str | None = None
@@ -175,6 +177,7 @@ class Motion:
             "path": None if self.path is None else matrix(self.path, (t.size, 3), "path"),
             "desired": None if self.desired is None else _points(self.desired, "desired"),
             "planned": None if self.planned is None else matrix(self.planned, self.q.shape, "planned"),
+            "believed": None if self.believed is None else matrix(self.believed, self.q.shape, "believed"),
             "target": None if self.target is None else _target(self.target),
         }
         for name, value in checked.items():

@@ -294,6 +294,7 @@ class Trajectory:
             path=self.path,
             desired=self.moving,
             planned=self.planned,
+            believed=self.believed,
             target=self.marks if len(self.marks) else None,
             label=self.called if label is None else label,
             frame=self.frame,

@@ -67,6 +67,9 @@
     return position.count ? new THREE.Vector3().fromBufferAttribute(position, highest) : null;
   }
 
+  nmm.hooks.believed = ({ paths, color }) =>
+    nmm.legend({ kind: "box", color, text: "where odometry has it", path: paths });
+
   nmm.hooks.ghosts = ({ path, joints, texts }) => {
     nmm.viewer.scene.updateMatrixWorld(true);
     const shape = merged(joints);
