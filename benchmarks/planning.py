@@ -2,8 +2,9 @@
 
     python benchmarks/planning.py [INSTANCES] [SEED] [KIND …] [--only rests|smooth] [--ways N]
 
-to random poses of the platform without obstacles (1000 5 poses_differential poses_car --only rests), and past
-a gap that closes for good before the robot is through (20 7 closing_gap --only rests), with so many ways.
+to random poses of the platform without obstacles (1000 5 poses_differential poses_car --only rests), past a gap
+that closes for good before the robot is through (20 7 closing_gap --only rests), with so many ways, and with a
+hand's pose held among posts (100 7 hold hold_car --only rests).
 
 Each plan is checked by what shares no code with the planner: Coal on the exact shapes of the robot at 2,000
 times along it, differences of its coordinates against S(q) u, and the limits. `free` is the least distance
@@ -19,6 +20,7 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 import nmm
 from nmm.plans import search
@@ -35,12 +37,13 @@ LIMITS = nmm.Limits(velocity={"platform": 1.0, "arm": 1.5}, acceleration={"platf
 
 
 class Scene(NamedTuple):
-    """What is planned: robot, start, goal, obstacles."""
+    """What is planned: robot, start, goal, obstacles, and a frame that is held."""
 
     robot: nmm.Robot
     start: dict[str, float]
     goal: object
     obstacles: list[nmm.Obstacle]
+    hold: str | None = None
 
 
 def box(name: str, low: tuple[float, ...], high: tuple[float, ...]) -> nmm.Obstacle:
@@ -232,11 +235,47 @@ def trailers_slot(rng: np.random.Generator) -> Scene:
     return Scene(nmm.load("trailer_base"), start, goal, walls)
 
 
+def held_on(base: str, rng: np.random.Generator) -> Scene:
+    """A hand's pose is held while the platform goes to a pose from which the arm reaches it."""
+    robot, hand = ur5_on(base), nmm.Position("ur5_ee_link")
+    while True:
+        bent = {"shoulder_lift": -1.2, "elbow": 1.5, "wrist_1": -1.5, "wrist_2": -1.2}
+        start = {f"ur5_{joint}_joint": at + rng.uniform(-0.3, 0.3) for joint, at in bent.items()}
+        start |= {"ur5_shoulder_pan_joint": rng.uniform(-2, 2), "theta": rng.uniform(-np.pi, np.pi)}
+        goal = dict(zip(("x", "y", "theta"), rng.uniform([-1, -1, -np.pi], [1, 1, np.pi]), strict=True))
+        here = robot.q(start)
+        there = robot.q(start | goal)
+        shoulder = nmm.Position("ur5_shoulder_link")
+        tip, held_from, old = (
+            nmm.evaluate(function, 0.0, nmm.Configuration(robot, q)).value
+            for function, q in ((hand, here), (shoulder, there), (shoulder, here))
+        )
+        posts = []
+        for k in range(3):
+            away, towards = rng.uniform(0.8, 1.5), rng.uniform(-np.pi, np.pi)
+            at = [away * np.cos(towards), away * np.sin(towards), 0.2]
+            posts.append(nmm.Obstacle(nmm.Cylinder(0.05, 0.4), at, name=f"post {k}"))
+        scene = nmm.Collisions(DISTANCE, obstacles=posts).on(robot)
+        reach = [float(np.linalg.norm(tip - one)) for one in (held_from, old)]
+        base_pairs = [k for k, name in enumerate(scene.names) if "base_link" in name[0] and "post" in name[1]]
+        spare = min(float(scene.queries.distances(0.0, q, base_pairs).min()) for q in (here, there))
+        if max(reach) < 0.75 and spare > 0.05:
+            return Scene(robot, start, goal, posts, "ur5_ee_link")
+
+
+def hold(rng: np.random.Generator) -> Scene:
+    return held_on("differential_base", rng)
+
+
+def hold_car(rng: np.random.Generator) -> Scene:
+    return held_on("car_base", rng)
+
+
 KINDS: dict[str, Callable[[np.random.Generator], Scene]] = {
     one.__name__: one
     for one in (
         *(u_shaped_wall, door, shelf, park, table, low_gate),
-        *(poses_differential, poses_car, closing_gap),
+        *(poses_differential, poses_car, closing_gap, hold, hold_car),
         *(trailers, trailers_straight, trailers_wall, trailers_door, trailers_slot),
     )
 }
@@ -302,6 +341,18 @@ def at_goal(scene: Scene, plan: nmm.Plan) -> bool:
     return bool(np.abs(off).max() <= 1e-6)
 
 
+def drift(scene: Scene, plan: nmm.Plan, samples: int = 1000) -> tuple[float, float]:
+    """How far what is held is from where it was, at most: m and rad, by Pinocchio."""
+    model = scene.robot.model
+    data, number = model.createData(), model.getFrameId(scene.hold)
+    placed = []
+    for q in plan(np.linspace(0.0, plan.duration, samples))[0]:
+        pin.framesForwardKinematics(model, data, q)
+        placed.append(pin.SE3(data.oMf[number]))
+    turned = max(float(np.linalg.norm(pin.log3(placed[0].rotation.T @ one.rotation))) for one in placed)
+    return max(float(np.linalg.norm(one.translation - placed[0].translation)) for one in placed), turned
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("instances", type=int, nargs="?", default=20)
@@ -323,13 +374,13 @@ def main() -> None:
 
 def measure(kind: str, instances: int, seed: int, smooth: bool) -> None:
     """Print a line: processor time and motion of the plans of a kind, with rests or smooth."""
-    times, durations, found, smoothed, arrived = [], [], [], 0, 0
+    times, durations, found, drifts, smoothed, arrived = [], [], [], [], 0, 0
     for k in range(instances):
         scene = KINDS[kind](np.random.default_rng([seed, k]))
         given = scene.robot, scene.start, scene.goal, scene.obstacles, nmm.Collisions(DISTANCE), LIMITS
         begin = time.process_time()
         try:
-            plan = nmm.plan(*given, seed=k, smooth=smooth)
+            plan = nmm.plan(*given, seed=k, smooth=smooth, hold=scene.hold)
         except nmm.NmmError as error:
             print(f"  {kind} {k}: {error} ({time.process_time() - begin:.2f} s)")
             continue
@@ -338,6 +389,8 @@ def measure(kind: str, instances: int, seed: int, smooth: bool) -> None:
         found.append(checked(scene, plan, 2000 if scene.obstacles else 100))
         arrived += at_goal(scene, plan)
         smoothed += plan.smooth
+        if scene.hold is not None:
+            drifts.append(drift(scene, plan))
     if found:
         least = Checked(*(f(x) for f, x in zip((min, max, max), zip(*found, strict=True), strict=True)))
         print(
@@ -346,6 +399,9 @@ def measure(kind: str, instances: int, seed: int, smooth: bool) -> None:
             f"{least.motion:14.1e} {least.limits:7.1e}",
             flush=True,
         )
+    if drifts:
+        metres, radians = np.max(drifts, axis=0)
+        print(f"  held within {1e3 * metres:.3f} mm and {radians:.1e} rad")
 
 
 if __name__ == "__main__":

@@ -39,6 +39,9 @@ def plan(
         show="a scenario's own",
     ),
     through: list[str] | None = option(_FORM, "A goal on the way, in the same form. May be repeated."),
+    hold: str | None = option(
+        "FRAME", "Its pose stays as at the start; the goal is then the platform's x, y and theta."
+    ),
     start: str | None = option(_FORM, "Where it begins.", show="a scenario's start; 0 and the rest"),
     obstacles: Path | None = option(
         "FILE", "A YAML file whose key obstacles has a list as in a scenario, or a scenario.", show="none"
@@ -83,7 +86,9 @@ def plan(
     if through:
         changed["plan.through"] = [_coordinates(one, "--through") for one in through]
     changed |= {
-        f"plan.{key}": value for key, value in (("seconds", seconds), ("seed", seed)) if value is not None
+        f"plan.{key}": value
+        for key, value in (("seconds", seconds), ("seed", seed), ("hold", hold))
+        if value is not None
     }
     made = made.with_settings({**changed, **settings_of(settings)})
     made = scenario_with(made, of_robot.keywords())

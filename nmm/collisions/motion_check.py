@@ -72,6 +72,11 @@ class MotionCheck:
         """The distance that each pair keeps, (P,), m."""
         return self._shapes.kept
 
+    @property
+    def levers(self) -> Array:
+        """How far a unit of each number of a leg can move the two of a pair to each other, (P, 3 + n), m."""
+        return self._shapes.levers
+
     def forget(self) -> None:
         """Forget what separated pairs last, which bounds begin with."""
         self._shapes.shapes.between[:] = UP

@@ -90,7 +90,7 @@ class Guide:
 
 def shortened(
     guide: Guide,
-    blocked: Callable[[Array, Array], int],
+    blocked: Callable[[Array, Array, Array], int],
     start: Array,
     legs: Array,
     rounds: int,
@@ -99,7 +99,7 @@ def shortened(
 ) -> Array:
     """A shorter path from start (n,): of two random points on it, the way between them in place of the path
     there, or the platform's path with the arm straight between them (its numbers of a leg begin at
-    `first`)."""
+    `first`). `blocked` looks at the new legs from a configuration, or at the whole path that has them."""
     known = False
     for _ in range(rounds):
         if not len(legs):
@@ -117,7 +117,7 @@ def shortened(
         for new in (guide.way(a, b), _with_straight_arm(guide, between, first)):
             parts = [legs[:i], one * legs[i : i + 1], new, (1.0 - two) * legs[j : j + 1], legs[j + 1 :]]
             shorter = guide.merged(np.vstack(parts))  # with the stops where legs were cut
-            if until[-1] - float(guide.times(shorter).sum()) > WORTH and blocked(a, new) < 0:
+            if until[-1] - float(guide.times(shorter).sum()) > WORTH and blocked(a, new, shorter) < 0:
                 legs, known = shorter, False
                 break
     return legs

@@ -57,6 +57,7 @@ class Asked:
     objective: Objective | None = None
     effort: bool | Mapping[str, Any] = False
     margin: float = 0.0
+    hold: Task | str | None = None
 
 
 class Found(NamedTuple):
@@ -123,7 +124,7 @@ class Plan:
     @property
     def smooth(self) -> bool:
         """Whether it goes on without rests, as asked for by `smooth`, but for those at `through`."""
-        return isinstance(self.found.motion, SampledMotion)
+        return self.found.asked.smooth and isinstance(self.found.motion, SampledMotion)
 
     def __call__(self, t: ArrayLike) -> tuple[Array, Array]:
         """q (N, n) and u (N, n_u) at times t (N,), s; before it begins and after it ends it stands."""

@@ -71,6 +71,8 @@ def replan(
         raise InputError(
             "a tractor with trailers is not replanned for", where="replan: plan", expected="another nmm.plan"
         )
+    if old.asked.hold is not None:
+        raise InputError("a plan that holds something is not replanned", where="replan: plan")
     here = robot.following.placed(robot.q(q))
     robot.check_limits(here)
     asked = old.asked

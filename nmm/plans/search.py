@@ -23,11 +23,15 @@ from nmm.control.goal import Goal
 from nmm.control.limits import Limits
 from nmm.errors import InputError, NmmError, RunError, expect_kind, few
 from nmm.functions.objectives.base import Objective
+from nmm.functions.tasks.task import Task
 from nmm.kernels.compiled import checked_by_caller
 from nmm.kernels.record_layout import views
 from nmm.plans import tree
 from nmm.plans.effort import efforts_of
 from nmm.plans.goals import GoalPostures, Wanted, alternatives, nothing_found
+from nmm.plans.held_motion import HeldTiming
+from nmm.plans.held_search import HeldWays, refuse_beside_hold
+from nmm.plans.holding import Held
 from nmm.plans.objective import SampleCosts
 from nmm.plans.path import Guide, shortened
 from nmm.plans.plan import Asked, Found, Motion, Plan
@@ -69,6 +73,7 @@ def plan(
     objective: Objective | None = None,
     effort: bool | Mapping[str, Any] = False,
     margin: float = 0.0,
+    hold: Task | str | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Plan:
     """A motion from start to goal that keeps every distance and limit.
@@ -97,6 +102,9 @@ def plan(
         kg by frame (as `payload` of `nmm.Dynamics`); what needs more is driven slower
     margin : so much farther than the distance, m, it keeps off what start and goals leave so much room to,
         where such a motion is found in half of the time; for a controller that follows it (`Plan.reference`)
+    hold : a frame whose pose stays what it is at the start while the platform moves, or a `Task` whose target
+        the start has (`Task(Position("tool"), p)`); goals are then poses of the platform, x, y and theta, and
+        the arm's posture there comes of the way. It rests between the platform's arcs and lines
     progress : called with the share of `seconds` that is gone
 
     Returns
@@ -106,7 +114,8 @@ def plan(
     Raises
     ------
     InputError : a start that touches something or is outside limits, a goal of another kind, limits of
-        functions, a platform whose ways are not known, an objective that changes with time or without smooth
+        functions, a platform whose ways are not known, an objective that changes with time or without smooth,
+        what the arm alone cannot hold
     RunError : no goal configuration was found, or no way there, or of a tractor with trailers no exact motion
         along it; the text says what was tried
 
@@ -141,6 +150,7 @@ def plan(
         objective=objective,
         effort=effort,
         margin=scalar(margin, "plan: margin", least=0.0),
+        hold=hold,
     )
     search = Search(robot, q, [*through, goal], asked, seed)
     return search.plan(positive(seconds, "seconds"), counted(shorten, "shorten", 0), progress)
@@ -204,9 +214,13 @@ class Search:
 
     def plan(self, seconds: float, shorten: int, progress: Callable[[float], None] | None) -> Plan:
         """From the start through all goals; each part ends where the next begins."""
+        if self.asked.hold is not None:
+            refuse_beside_hold(self.robot, self.asked)
         if isinstance(self.robot.platform, Tractor):
             return self._towed(self.robot.platform, seconds, progress)
         self.begin(seconds, progress)
+        if self.asked.hold is not None:
+            return self._holding(self.asked.hold, shorten)
         here, parts, least = self.start, [], self.asked_kept + self.asked.margin
         for wanted in self.goals:
             self.check.kept[:] = self.asked_kept
@@ -243,6 +257,20 @@ class Search:
                 return None
             named |= {*one, *self.robot.postures.get(str(one.get("posture")), {})}
         return named
+
+    def _holding(self, hold: Task | str, shorten: int) -> Plan:
+        """The plan along which the arm holds something."""
+        held = Held(self.robot, hold, self.start, self.asked.tolerance, self.check)
+        timing = HeldTiming(held, self.guide, self.limits, self.usual)
+        ways = HeldWays(self.start, self.asked, held, timing, self.trees, self.rng, self.left)
+        here, motions = self.start, list[SampledMotion]()
+        for wanted in self.goals:
+            motions += ways.motions(here, wanted, shorten)
+            here = motions[-1].corners[-1] if motions else here
+        if self.efforts is not None:
+            motions = [self.efforts.samples(one) for one in motions]
+        motion = joined(motions) if motions else self._timed(here, np.zeros((0, 3 + self.robot.n)))
+        return self._found(motion)
 
     def farther(
         self, here: Array, ends: Sequence[Array], ahead: Sequence[Array] = (), behind: Sequence[Array] = ()
@@ -292,6 +320,9 @@ class Search:
             motion = self._waited(path, self.movers)
         elif self.asked.smooth:
             motion = self._smoothed(parts) or path
+        return self._found(motion)
+
+    def _found(self, motion: Motion) -> Plan:
         motions, postures = (int(count) for count in self.trees.looked)
         return self._plan(motion, motions, postures)
 
@@ -351,7 +382,11 @@ class Search:
     def shortened(self, start: Array, legs: Array, rounds: int) -> Array:
         """Shorter legs from a configuration."""
         first = 3 + (0 if self.robot.platform.n_p < 3 else self.robot.platform.n_p)
-        return shortened(self.guide, self.blocked, start, legs, rounds, self.rng, first)
+
+        def blocked(here: Array, new: Array, whole: Array) -> int:
+            return self.blocked(here, new)
+
+        return shortened(self.guide, blocked, start, legs, rounds, self.rng, first)
 
     def blocked(self, start: Array, legs: Array) -> int:
         """The number of a pair that comes too near on legs from a free configuration, or -1; counted."""

@@ -63,13 +63,13 @@ def timed(guide: Guide, robot: Robot, start: Array, legs: Array, limits: LimitsO
     """The legs from start (n,), each as fast as the limits allow; usual (3 + n,) : speeds of
     a leg's numbers where inputs have none."""
     corners = guide.corners(start, legs)
-    inputs = np.array([_inputs(robot, q, leg) for q, leg in zip(corners[:-1], legs, strict=True)])
+    inputs = np.array([inputs_of_leg(robot, q, leg) for q, leg in zip(corners[:-1], legs, strict=True)])
     inputs = inputs.reshape(-1, robot.n_u)
     reached = np.where(inputs >= 0.0, limits.inputs[:, 1], -limits.inputs[:, 0])
     with np.errstate(divide="ignore"):
         speed = np.min(reached / np.abs(inputs), axis=1, initial=np.inf)
         speed = np.minimum(speed, np.min(usual / np.abs(legs), axis=1, initial=np.inf))
-        spins = np.maximum(*(_spins(robot, q, inputs, limits) for q in (corners[:-1], corners[1:])))
+        spins = np.maximum(*(spins_of(robot, q, inputs, limits) for q in (corners[:-1], corners[1:])))
         speed = np.minimum(speed, np.min(limits.spin / spins, axis=1, initial=np.inf))
         acceleration = np.min(limits.accelerations / np.abs(inputs), axis=1, initial=np.inf)
     # Too short to reach its speed: half of it faster, half slower.
@@ -82,14 +82,14 @@ def timed(guide: Guide, robot: Robot, start: Array, legs: Array, limits: LimitsO
     )
 
 
-def _spins(robot: Robot, q: Array, inputs: Array, limits: LimitsOn) -> Array:
+def spins_of(robot: Robot, q: Array, inputs: Array, limits: LimitsOn) -> Array:
     """How far limited wheels turn on each leg, (L, w), rad: at q (L, n), where it begins or ends."""
     ways = np.array([robot.S(one) @ u for one, u in zip(q, inputs, strict=True)]).reshape(-1, robot.n)
     names, rates = turning_wheels(robot, q, ways)
     return np.abs(rates[:, [names.index(name) for name in limits.rows[: len(limits.spin)]]])
 
 
-def _inputs(robot: Robot, q: Array, leg: Array) -> Array:
+def inputs_of_leg(robot: Robot, q: Array, leg: Array) -> Array:
     """What the inputs add up to on a leg from q: its twist in the world and its joints' ways by S⁺ (S u =
     them)."""
     way = leg[3:].copy()

@@ -111,6 +111,11 @@ class PlanPart(Part):
         description="whether motors keep the torque limits of the robot's file; or masses that the robot "
         "carries then, kg by frame",
     )
+    hold: str | None = Field(
+        None,
+        description="a frame whose pose stays what it is at the start while the platform goes to the goal, "
+        "which is then its x, y and theta",
+    )
     track: Annotated[TrackPart | None, BeforeValidator(part_or_none)] = Field(
         None,
         description="whether the controller follows the plan, for the scenario's duration: true, or a "
@@ -278,7 +283,7 @@ class ScenarioPart(Part):
             objective = build_objective(part.objective, robot, collisions)
         limits = None if self.limits is None else self.limits.build(robot)
         tolerance = None if self.until is None else self.until.make()
-        given = part.given("through", "seconds", "seed", "shorten", "smooth", "effort")
+        given = part.given("through", "seconds", "seed", "shorten", "smooth", "effort", "hold")
         given |= {"limits": limits, "tolerance": tolerance, "objective": objective, "progress": progress}
         if part.track is not None:
             given["margin"] = part.track.margin
