@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from nmm.arrays import Array
+from nmm.collisions.legs_check import MARGIN
 from nmm.errors import InputError, RunError
 from nmm.plans.goals import ATTEMPTS, GoalPostures, Wanted, alternatives, nothing_found
 from nmm.plans.held_motion import ROUND, HeldTiming
@@ -27,7 +28,9 @@ from nmm.platforms.tractor import Tractor
 from nmm.robots.robot import Robot
 
 #: The steps by which the arm follows while a way is looked for, s, and of its joints, rad or m.
-TICK, FAR = 0.1, 0.1
+TICK, FAR = 0.1, 0.04
+#: Ways that are looked for keep so much more, m, than is asked of them when they are timed, by smaller steps.
+SPARE = 0.6 * MARGIN
 #: The share of draws that are the goal; how many of the nearest nodes are compared by their ways.
 TO_GOAL, NEAREST = 0.2, 5
 #: The longest motion by which the tree grows, s.
@@ -67,29 +70,31 @@ class HeldWays:
 
     def __init__(
         self,
-        start: Array,
         asked: Asked,
-        held: Held,
         timing: HeldTiming,
         trees: Trees,
         rng: np.random.Generator,
         clock: Callable[[], float],
     ) -> None:
-        self.robot, self.asked, self.held, self.timing = held.robot, asked, held, timing
-        self.check, self.guide, self.trees, self.rng, self.clock = held.check, timing.guide, trees, rng, clock
-        self._first, self._kept = held.platform, held.check.kept.copy()
-        self._ended: Counter[int] = Counter()
-        reach = 2.0 * self.robot.reach
+        self.asked, self.timing, self.trees, self.rng, self.clock = asked, timing, trees, rng, clock
+        self.robot, self.held, self.check, self.guide = (
+            timing.robot,
+            timing.held,
+            timing.held.check,
+            timing.guide,
+        )
+        self._first = self.held.platform
         self.low, self.high = trees.low.copy(), trees.high.copy()
-        self.low[:2] = np.maximum(self.low[:2], start[:2] - reach)
-        self.high[:2] = np.minimum(self.high[:2], start[:2] + reach)
+        self._ended: Counter[int] = Counter()
 
     def motions(self, here: Array, wanted: Wanted, shorten: int) -> list[SampledMotion]:
         """From a configuration (n,) that holds it to a pose of the platform; `RunError` for none."""
         legs = self.way(here, wanted)
         if not len(legs):
             return []
-        found = self.timing(here, self.shortened(here, legs, shorten // FEWER)) or self.timing(here, legs)
+        shorter = self.shortened(here, legs, shorten // FEWER)
+        self.check.kept[:] -= SPARE
+        found = self.timing(here, shorter) or self.timing(here, legs)
         if found is None:
             what = "a way was found, on which the arm is too near to where it cannot hold: try another seed"
             raise RunError(what, where="plan")
@@ -97,14 +102,14 @@ class HeldWays:
 
     def way(self, here: Array, wanted: Wanted) -> Array:
         """Legs to a goal, with the margin where such are found in half of the time."""
-        self.check.kept[:] = self._kept
+        kept = self.check.kept.copy()
         if self.asked.margin > 0.0:
             self.check.widen(here[np.newaxis], self.asked.margin)
-            self.check.kept[:] += ROUND
+            self.check.kept[:] += ROUND + SPARE
             with suppress(RunError):
                 return self.way_to(here, self.poses(wanted, here), 0.5 * self.clock())
-            self.check.kept[:] = self._kept
-        self.check.kept[:] += ROUND
+            self.check.kept[:] = kept
+        self.check.kept[:] += ROUND + SPARE
         return self.way_to(here, self.poses(wanted, here), 0.0)
 
     def poses(self, wanted: Wanted, here: Array) -> list[Array]:
@@ -156,6 +161,9 @@ class HeldWays:
         """Legs (L, 3 + n) from a configuration to one of the poses, as the arm can follow; `RunError` when
         less time than `least` is left, s."""
         nodes, parents, ways = [start], [-1], [np.zeros((0, 3 + self.robot.n))]
+        around = 0.5 * self.robot.reach  # farther aside the arm seldom reaches what it holds
+        self.low[:2] = np.min([start[:2], *(one[:2] for one in poses)], axis=0) - around
+        self.high[:2] = np.max([start[:2], *(one[:2] for one in poses)], axis=0) + around
 
         def add(parent: int, pose: Array, most: float) -> tuple[int, bool]:
             legs, end, arrived = self.follow(nodes[parent], pose, most)
@@ -192,13 +200,13 @@ class HeldWays:
             )
             off = np.array(nodes)[:, : self._first] - pose
             off[:, 2] = 2.0 * np.sin(0.5 * off[:, 2])
-            best, least = 0, np.inf
+            best, soonest = 0, np.inf
             for i in np.argsort(np.abs(off).sum(axis=1))[:NEAREST]:
                 target = nodes[i].copy()
                 target[: self._first] = pose
                 takes = float(self.guide.times(self.guide.way(nodes[i], target)).sum())
-                if takes < least:
-                    best, least = int(i), takes
+                if takes < soonest:
+                    best, soonest = int(i), takes
             count = len(nodes)
             new, _ = add(best, pose, STEP)
             if len(nodes) > count:

@@ -211,16 +211,15 @@ class Search:
         self.trees = views(Trees, *self.check.blocks, PLACE)
         self.guide = Guide(self.check.blocks, robot.platform.n_p >= 3, robot.following.table.ravel())
         self._search = checked_by_caller(tree.search, tree.SEARCH)
+        self.ways = None if asked.hold is None else self._held_ways(asked.hold)
 
     def plan(self, seconds: float, shorten: int, progress: Callable[[float], None] | None) -> Plan:
         """From the start through all goals; each part ends where the next begins."""
-        if self.asked.hold is not None:
-            refuse_beside_hold(self.robot, self.asked)
         if isinstance(self.robot.platform, Tractor):
             return self._towed(self.robot.platform, seconds, progress)
         self.begin(seconds, progress)
-        if self.asked.hold is not None:
-            return self._holding(self.asked.hold, shorten)
+        if self.ways is not None:
+            return self._holding(self.ways, shorten)
         here, parts, least = self.start, [], self.asked_kept + self.asked.margin
         for wanted in self.goals:
             self.check.kept[:] = self.asked_kept
@@ -258,13 +257,17 @@ class Search:
             named |= {*one, *self.robot.postures.get(str(one.get("posture")), {})}
         return named
 
-    def _holding(self, hold: Task | str, shorten: int) -> Plan:
-        """The plan along which the arm holds something."""
+    def _held_ways(self, hold: Task | str) -> HeldWays:
+        refuse_beside_hold(self.robot, self.asked)
         held = Held(self.robot, hold, self.start, self.asked.tolerance, self.check)
         timing = HeldTiming(held, self.guide, self.limits, self.usual)
-        ways = HeldWays(self.start, self.asked, held, timing, self.trees, self.rng, self.left)
+        return HeldWays(self.asked, timing, self.trees, self.rng, self.left)
+
+    def _holding(self, ways: HeldWays, shorten: int) -> Plan:
+        """The plan along which the arm holds something."""
         here, motions = self.start, list[SampledMotion]()
         for wanted in self.goals:
+            self.check.kept[:] = self.asked_kept
             motions += ways.motions(here, wanted, shorten)
             here = motions[-1].corners[-1] if motions else here
         if self.efforts is not None:
