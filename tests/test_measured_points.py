@@ -172,6 +172,26 @@ def test_where_no_pictures_come_the_task_ends_and_the_robot_stops_within_acceler
     assert np.abs(np.diff(inputs, axis=0)).max() <= 2.0 * 0.02 + 1e-12
 
 
+def test_a_camera_sees_from_where_the_robot_is_not_from_where_odometry_has_it() -> None:
+    """Wheels of which one is 3 % smaller lead odometry astray, but not what the camera shows."""
+    measured = nmm.MeasuredPoints(BOARD, intrinsics=PIXELS, depth=1.3, faults=nmm.CameraFaults(rate=50.0))
+    run = nmm.rollout(
+        docking(measured),
+        ROBOT.rest,
+        12.0,
+        0.02,
+        "zoh",
+        slip=[1.0, 0.9, 1.0, 1.0],
+        odometry=True,
+        keep=["q", "believed"],
+    )
+    q, believed = run["q"][0, -1], run["believed"][0, -1]
+    assert np.abs(q[:3] - believed[:3]).max() > 0.01
+    off = np.abs(true(nmm.ImageMoments(BOARD, intrinsics=PIXELS), q) - GOAL)
+    assert off[:2].max() < 1.0
+    assert off[2] < 1e-2
+
+
 def test_copies_are_measured_by_themselves() -> None:
     ball = nmm.MeasuredPoints([BALL])
     controller = nmm.Controller(ROBOT, nmm.Task(nmm.ImagePoints(ball), [0.0, 0.0]), nmm.ProjectedGradient())

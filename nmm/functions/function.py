@@ -145,8 +145,9 @@ class Renewal(LiveNumbers, ABC):
         """How many samples at times (N,), s, and q (N, n), in order, need no others."""
 
     @abstractmethod
-    def renew(self, t: float, q: Array) -> None:
-        """Make others for a sample at t, s, and q (n,), where it needs them."""
+    def renew(self, t: float, q: Array, real: Array | None = None) -> None:
+        """Make others for a sample at t, s, and q (n,), where it needs them; real (n,) : where the robot is,
+        if that is not what the controller sees."""
 
     @abstractmethod
     def planned(self, t: Array) -> Array | None:

@@ -218,7 +218,7 @@ class Renewed(Renewal):
         at = np.ascontiguousarray(times), np.ascontiguousarray(q)
         return int(self._outside(*at, self.numbers, *self._given, self._since))
 
-    def renew(self, t: float, q: Array) -> None:
+    def renew(self, t: float, q: Array, real: Array | None = None) -> None:
         begun, now = self._plans[-1]
         if now.anew is None or self.stays(np.array([t]), q[np.newaxis]):
             return

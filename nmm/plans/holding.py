@@ -178,7 +178,7 @@ class Held(TaskError):
         targets = [given.evaluate(q, t)[1] for t in (0.0, 1.0, math.e)]
         if not all(np.array_equal(target, targets[0]) for target in targets):
             raise InputError("its target moves", where="plan: hold", expected="a task whose target stands")
-        metres, radians = norms(given.evaluate(q)[2], unit_codes(given.units))
+        metres, radians = norms(given.evaluate(q)[2], unit_codes(given.rows))
         if metres > tolerance.m or radians > tolerance.rad:
             got = f"{metres:.3g} m and {radians:.3g} rad from it"
             raise InputError(where="plan: hold", expected="a target where the start has it", got=got)
@@ -215,7 +215,7 @@ class Held(TaskError):
 
     def off(self, q: Array) -> tuple[float, float]:
         """By how much it is not kept at q (n,), m and rad."""
-        return norms(self.evaluate(q)[2], unit_codes(self.units))
+        return norms(self.evaluate(q)[2], unit_codes(self.rows))
 
     def tangent(self, q: Array, rates: Array) -> Array:
         """Rates (n,) at q (n,) of which the platform's (n_p,) are given, with the arm's least."""

@@ -204,7 +204,7 @@ def _driven(
                 progress(count / len(times))
             first, last = count, min(count + AT_ONCE, len(times))
             for one in renewals:
-                one.renew(float(times[first]), as_seen(slice(first, first + 1))[0])
+                one.renew(float(times[first]), as_seen(slice(first, first + 1))[0], found.q[first])
             for one in renewals:
                 last = max(first + 1, min(last, int(np.searchsorted(times, one.due))))
             left = solver.sample.snapshot()

@@ -315,23 +315,24 @@ class Pictures(Renewal):
     def stays(self, times: Array, q: Array) -> int:
         return int(np.searchsorted(times, self.due))
 
-    def renew(self, t: float, q: Array) -> None:
+    def renew(self, t: float, q: Array, real: Array | None = None) -> None:
         faults = self._of.faults
         if t >= self._next / faults.rate - SOON:
             self._next = math.floor((t + SOON) * faults.rate) + 1
-            self._take(t, q)
+            self._take(t, q, q if real is None else real)
         while self._waiting and self._waiting[0][0] <= t + SOON:
             _, taken, seen, R, c = self._waiting.popleft()
             self.set(self._belief.look(taken, seen, R, c))
             if np.isfinite(self._belief.oldest):
                 self._of._at.set(np.array([self._belief.oldest]))
 
-    def _take(self, t: float, q: Array) -> None:
-        """Take a picture."""
+    def _take(self, t: float, q: Array, real: Array) -> None:
+        """Take a picture where the robot is, which is believed to be at q."""
         of, faults = self._of, self._of.faults
         here = Configuration(self._robot, q).placement(self._camera)
-        R, c = here.rotation, here.translation
-        P = np.array([one.value for one in self._true.evaluate(t, q)]).reshape(-1, 3)
+        there = here if real is q else Configuration(self._robot, real).placement(self._camera)
+        R, c = there.rotation, there.translation
+        P = np.array([one.value for one in self._true.evaluate(t, real)]).reshape(-1, 3)
         P = (P - (c + R @ self._moved)) @ (R @ self._turned)
         ahead = P[:, 2] > 0.0
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -351,7 +352,9 @@ class Pictures(Renewal):
         if whole:
             self._since = t
         if not lost:
-            self._waiting.append((t + (0.0 if first else faults.latency), t, seen, R, c))
+            self._waiting.append(
+                (t + (0.0 if first else faults.latency), t, seen, here.rotation, here.translation)
+            )
 
     def planned(self, t: Array) -> None:
         return None
