@@ -174,7 +174,7 @@ def grow(scene: MovedShapes, trains: Trains, tree: int) -> int:
                 if length < shortest:
                     shortest, near = length, i
                     copy_motion(word, motion)
-        cut(motion, trains.far[()])
+        cut(motion, draw(trains.random) * trains.far[()])
     motion[3, 0], motion[3, 1] = STRAIGHT, way * trains.line[()] * lines
     if drive(scene, trains, trains.nodes[tree, near], motion, trains.nodes[tree, count]) == 0:
         return 0
