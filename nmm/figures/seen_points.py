@@ -41,10 +41,9 @@ class SeenPoints:
         self.lines = [few(point) for point in moving]
         standing = [point[0] for point, does in zip(shared, moves, strict=True) if not does]
         self.marks = np.array(standing).reshape(-1, 3)
-        at = np.zeros(0, dtype=int)
-        if times is not None:
-            at = np.searchsorted(first.t, times - 1e-9).clip(0, len(first) - 1)
-        self.dots = np.array([point[at] for point in moving] if len(at) else []).reshape(-1, 3)
+        wanted = np.zeros(0) if times is None else times
+        at = np.searchsorted(first.t, wanted - 1e-9).clip(0, len(first) - 1)
+        self.dots = np.array([point[at] for point in moving]).reshape(-1, 3)
 
     @property
     def names(self) -> list[str]:

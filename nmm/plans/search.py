@@ -233,7 +233,8 @@ class Search:
         """The plan of a tractor with trailers, which is smooth."""
         if self.movers is not None:
             raise InputError("a tractor with trailers waits for none that move", where="plan: obstacles")
-        towing = Towing(self.robot, self.limits, USUAL, self.check, self.low, self.high, self.seed, self.left)
+        given = self.robot, self.limits, USUAL, self.check, self.low, self.high, self.seed, self.left
+        towing = Towing(*given, self.costs)
         self.begin(seconds, progress)
         hitches, here, found = {one.joint for one in tractor.trailers}, self.start, []
         for wanted in self.goals:

@@ -15,6 +15,7 @@ from nmm.control.limits import LimitsOn
 from nmm.errors import RunError
 from nmm.kernels.compiled import checked_by_caller
 from nmm.kernels.record_layout import Memory, views
+from nmm.plans.objective import SampleCosts
 from nmm.plans.samples import SampledMotion
 from nmm.plans.smoothing import Smoothing
 from nmm.plans.trailers import DRIVEN, SEARCH, SPACING, TRACE, Trains, search_trains, trace
@@ -99,6 +100,7 @@ class Towing:
     usual : speeds of inputs without limits, m/s and rad/s
     low, high (n,) : where configurations are drawn, m and rad
     left : how much time is left, s
+    costs : of an objective
 
     Attributes
     ----------
@@ -115,10 +117,11 @@ class Towing:
         high: Array,
         seed: int,
         left: Callable[[], float],
+        costs: SampleCosts | None = None,
     ) -> None:
         self.robot, self.limits, self.check, self.left = robot, limits, check, left
         self.tractor = cast(Tractor, robot.platform)
-        self.smoothing = Smoothing(robot, limits, usual, check)
+        self.smoothing = Smoothing(robot, limits, usual, check, costs)
         self.motions = self.configurations = 0
         n, count = robot.n, len(self.tractor.trailers)
         folds = limits.coordinates[3 : 3 + count]

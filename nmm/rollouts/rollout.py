@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -90,14 +91,14 @@ def rollout(
     folder: str | Path | None = None,
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
+    **beside: Any,
 ) -> Rollouts:
     """Run a robot from B starts, or B controllers of one robot, each as `simulate` would, to the last bit.
 
     Parameters
     ----------
     subject : a controller; a scenario, whose start, duration, dt, method, disturbances and goal hold where
-        none are given;
-        or a controller for each run, of one robot and one task's shape
+        none are given; or a controller for each run, of one robot and one task's shape
     q0 : (B, n), (n,) for all, or by name; m and rad
     duration, dt : s
     method : as `simulate`'s
@@ -108,6 +109,7 @@ def rollout(
     folder : write what is kept there, as npz files of some runs each, instead of holding it
     threads : how many; as many as there are cores for this process when None
     progress : called with the fraction done
+    beside : odometry=True, creep=, slip=, noise=, delay=, correct=, seed= in place of `disturbances`
 
     Raises
     ------
@@ -122,6 +124,10 @@ def rollout(
     >>> found["error_final"].shape, set(found.outcome)
     ((5,), {'ended'})
     """
+    if beside:
+        if disturbances is not None:
+            raise InputError("are given twice", where="disturbances", got=sorted(beside))
+        disturbances = Disturbances(**beside)
     if isinstance(subject, Scenario):
         parts = subject.parts
         if parts.is_plan:

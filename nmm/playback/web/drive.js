@@ -100,7 +100,12 @@
     });
     drive.active = Math.max(0, drive.targets.findIndex((target) => target.gizmo));
     parts.choices = nmm.element(panel, "div", { id: "choices" });
-    nmm.element(panel, "p", { class: "quiet" }, "Drag the red ball (Shift: up and down) or an arrow; or arrow keys, Page Up and Page Down, a gamepad's sticks. N plans the way round what is between.");
+    const ways = [
+      [drive.targets.some((target) => target.gizmo), "Drag the red ball (Shift: up and down) or an arrow; or arrow keys, Page Up and Page Down, a gamepad's sticks."],
+      [goals.some((some) => some.length), "Drag a cross in the camera's picture."],
+      [true, "N plans the way round what is between."],
+    ];
+    nmm.element(panel, "p", { class: "quiet" }, ways.filter(([has]) => has).map(([, words]) => words).join(" "));
     const run = nmm.runs[0];
     axes = Object.keys(run.columns);
     empty(run);
