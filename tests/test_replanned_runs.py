@@ -7,7 +7,7 @@ import pytest
 from findings import codes, the
 
 import nmm
-from nmm.rollouts import disturbed
+from nmm.runs import disturbed
 
 LIMITS = nmm.Limits(velocity={"platform": 1.0, "arm": 1.5}, acceleration={"platform": 1.0, "arm": 3.0})
 WALL = nmm.Obstacle(nmm.Box([0.2, 4.0, 2.0]), [3.0, 0.0, 0.5], name="wall")
@@ -84,8 +84,8 @@ def test_slip_is_replanned_in_each_run_of_a_rollout(monkeypatch):
     starts = plan().robot.rest + np.zeros((2, 1))
 
     def rolled(replan, seconds=55.0):
-        given = {"noise": 1e-4, "slip": slip, "seed": 2, "keep": ["q"]}
-        return nmm.rollout(controller(replan), starts, seconds, 0.02, "zoh", **given)
+        worn = nmm.Disturbances(noise=1e-4, slip=slip, seed=2)
+        return nmm.rollout(controller(replan), starts, seconds, 0.02, "zoh", disturbances=worn, keep=["q"])
 
     alone, again = rolled(None), rolled(nmm.replan)
     assert least_distance(alone["q"][1, ::5]) < 0.1
