@@ -58,6 +58,8 @@ GIVE_WAY = (
 )
 #: Its target is 0.4 m above what the arm reaches.
 MISSED = "unicycle_3r_out_of_reach"
+#: Its camera's pictures are noisy, and some of them are lost.
+MEASURED = "dock_by_markers"
 
 
 @pytest.fixture(scope="module")
@@ -82,6 +84,10 @@ def test_every_bundled_scenario_runs_to_its_end(runs: dict[str, nmm.Trajectory])
         elif name in GIVE_WAY:
             assert {"inputs_unmet", "inputs_fell_short"} & codes(run), name
             assert run.error_norm[-1] < 1e-3, name
+            continue
+        elif name == MEASURED:
+            assert codes(run) == {"pictures_lost"}
+            assert np.all(np.abs(run.error[-100:]) < [2.0, 2.0, 0.02])  # px, and the share of its size
             continue
         else:
             # Links that are built close to each other are no fault of the run.
