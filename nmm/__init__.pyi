@@ -73,11 +73,11 @@ from .functions.tasks import Posture as Posture
 from .functions.tasks import Stack as Stack
 from .functions.tasks import Task as Task
 from .functions.tasks import While as While
+from .functions.tasks.camera_faults import CameraFaults as CameraFaults
 from .functions.tasks.image import ImageLine as ImageLine
 from .functions.tasks.image import ImageMoments as ImageMoments
 from .functions.tasks.image import ImagePoints as ImagePoints
 from .functions.tasks.image import LogDepth as LogDepth
-from .functions.tasks.measured import CameraFaults as CameraFaults
 from .functions.tasks.measured import MeasuredPoints as MeasuredPoints
 from .plans.horizon import Horizon as Horizon
 from .plans.parking import Parking as Parking

@@ -52,7 +52,7 @@ def test_a_picture_is_believed_and_foretold_as_the_camera_moves(rng: np.random.G
 
 def estimated(moves: np.ndarray, guess: float, noise: float, rng: np.random.Generator) -> np.ndarray:
     """The believed depth over the true one, in pictures taken from places (N, 3)."""
-    from nmm.functions.tasks.measured import DepthEstimate
+    from nmm.functions.tasks.depth_estimate import DepthEstimate
 
     estimate, point, found = DepthEstimate(guess, noise), np.array([0.2, 0.1, 2.0]), []
     for k, c in enumerate(moves):

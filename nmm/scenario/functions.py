@@ -17,7 +17,7 @@ from nmm.errors import InputError, expect_known
 from nmm.functions.function import Function
 from nmm.functions.references.orientation import rotation_vector
 from nmm.functions.references.polynomial import Constant, Polynomial
-from nmm.functions.tasks.measured import CameraFaults
+from nmm.functions.tasks.camera_faults import CameraFaults
 from nmm.kinds import REFERENCES, TASKS
 from nmm.scenario.constructors import FunctionPart, MadePart, Unit, keys_of, part_of
 from nmm.scenario.keys import KeyedError, OneOf, Part, at, is_path, references_of

@@ -6,130 +6,24 @@ import math
 import weakref
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, counted, positive, scalar, vector
+from nmm.arrays import Array, counted, scalar, vector
 from nmm.errors import InputError, expect
 from nmm.findings import Finding
 from nmm.functions.function import Function, LiveNumbers, Renewal, Row, Stage, move_rows
 from nmm.functions.program import Program
 from nmm.functions.references.live_target import signal
+from nmm.functions.tasks.camera_faults import CameraFaults
+from nmm.functions.tasks.depth_estimate import DepthEstimate
 from nmm.functions.tasks.image import Points, Seen
 from nmm.kernels.compiled import kernel
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.kernels.rotations import exp3
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
-
-#: Of a depth that is guessed: its standard deviation over it.
-UNSURE = 0.5
-#: Of a picture's coordinates at least, normalised; and how fast a point may wander, m/√s.
-ALMOST_SURE, WANDERS = 1e-4, 5e-4
-#: The least depth that is believed over the first guess, and the least of its inverse.
-LEAST = 0.02
-
-
-class DepthEstimate:
-    """Where a point is in the world, from pictures of it: an extended Kalman filter whose state is what the
-    first picture should have shown, x and y, and the inverse of the depth there.
-
-    A picture from the same place says nothing of the depth: without a translation across the ray there is no
-    observation, and the guess stays (J. Montiel, J. Civera, A. Davison, Unified inverse depth
-    parametrization for monocular SLAM, RSS 2006).
-
-    Parameters
-    ----------
-    depth : the first guess, m
-    noise : standard deviation of x and y, normalised
-    """
-
-    def __init__(self, depth: float, noise: float) -> None:
-        self._first, self._noise = depth, max(noise, ALMOST_SURE)
-        self._R, self._c, self._t = np.eye(3), np.zeros(3), -math.inf
-        self._state, self._spread = np.zeros(3), np.zeros((3, 3))
-
-    def look(self, t: float, x: float, y: float, R: Array, c: Array) -> Array:
-        """The point (3,) after a picture taken at t, s, from c, m, in axes R, at normalised x and y."""
-        if not math.isfinite(self._t):
-            self._R, self._c, self._state = R, c, np.array([x, y, 1.0 / self._first])
-            self._spread = np.diag([self._noise**2, self._noise**2, (UNSURE / self._first) ** 2])
-        else:
-            away = WANDERS * self._state[2] * math.sqrt(max(t - self._t, 0.0))  # over the depth
-            self._spread += np.diag([away, away, away * self._state[2]]) ** 2
-            turned, moved = R.T @ self._R, R.T @ (self._c - c)
-            P_q = np.column_stack([turned[:, 0], turned[:, 1], moved])  # P, times the inverse depth
-            P = P_q @ self._state + turned[:, 2]
-            if P[2] > 0.0:
-                seen = P[:2] / P[2]
-                H = (P_q[:2] - np.outer(seen, P_q[2])) / P[2]
-                spread = H @ self._spread @ H.T + self._noise**2 * np.eye(2)
-                gain = np.linalg.solve(spread, H @ self._spread).T
-                self._state = self._state + gain @ (np.array([x, y]) - seen)
-                self._state[2] = min(max(self._state[2], LEAST / self._first), 1.0 / (LEAST * self._first))
-                kept = np.eye(3) - gain @ H
-                self._spread = kept @ self._spread @ kept.T + self._noise**2 * gain @ gain.T
-        self._t = max(self._t, t)
-        x0, y0, inverse = self._state
-        return np.asarray(self._c + self._R @ np.array([x0, y0, 1.0]) / inverse)
-
-    @property
-    def depth(self) -> tuple[float, float]:
-        """The depth in the first picture, and its standard deviation, m."""
-        inverse = float(self._state[2])
-        return 1.0 / inverse, math.sqrt(self._spread[2, 2]) / inverse**2
-
-
-@dataclass(frozen=True)
-class CameraFaults:
-    """What a camera in a simulation does that a perfect one does not.
-
-    Parameters
-    ----------
-    rate : pictures per s
-    latency : until a picture arrives, s
-    noise : standard deviation of each coordinate, in the unit of the image
-    whole : whether coordinates are rounded to whole pixels (to 1 in the image's unit)
-    dropped : the share of pictures that do not come
-    size : width and height of the picture, px, from 0 on; points outside are not seen; all are when not given
-    focal : the focal length over the one that is believed
-    hand_eye : where the camera is in its frame's axes, x, y, z (m) and a rotation vector (rad); as believed
-        when not given
-    seed : of the noise and of what is dropped
-
-    Raises
-    ------
-    InputError : numbers out of their range
-
-    Examples
-    --------
-    >>> nmm.CameraFaults(rate=30.0, latency=0.05, noise=0.5, size=[640, 480]).latency
-    0.05
-    """
-
-    rate: float = 30.0
-    latency: float = 0.0
-    noise: float = 0.0
-    whole: bool = False
-    dropped: float = 0.0
-    size: ArrayLike | None = None
-    focal: float = 1.0
-    hand_eye: ArrayLike | None = None
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        positive(self.rate, "rate")
-        positive(self.focal, "focal")
-        scalar(self.latency, "latency", least=0.0)
-        scalar(self.noise, "noise", least=0.0)
-        expect(0.0 <= scalar(self.dropped, "dropped") < 1.0, "dropped", "a share, 0 to below 1", self.dropped)
-        if self.hand_eye is not None:
-            vector(self.hand_eye, 6, "hand_eye")
-        if self.size is not None:
-            expect(bool(np.all(vector(self.size, 2, "size") > 0.0)), "size", "numbers above 0", self.size)
-        counted(self.seed, "seed", 0)
 
 
 class MeasuredPoints(Seen):
