@@ -433,7 +433,7 @@ def test_sound_robots_stand_on_their_wheels() -> None:
         on_ground += made.facts.get("ground") == "the wheels touch it at z = 0"
         odd = {"ground_uneven", "footprint_off_ground"}
         assert not odd & {one.code for one in made.warnings}
-    assert on_ground == 10
+    assert on_ground == 11
 
 
 def test_the_root_link_belongs_on_the_wheels_axle(tmp_path: Path) -> None:

@@ -118,7 +118,7 @@ def test_with_a_reference_it_is_a_task(robot_2r: Robot) -> None:
         ("", "expected KIND:FRAME:AXES, as in position:ee:xy, or a mapping as in a scenario, got ''"),
         ("  ", "got ' '"),
         (":", "unknown kind ''"),
-        ("pos", "unknown kind 'pos' (did you mean 'pose'?); available: position"),
+        ("pos", "unknown kind 'pos' (did you mean 'pose'?); available: pose, posture, position"),
         ("Position:ee", "did you mean 'position'?"),
         ("[position]", "unknown kind '[position]'"),
         ("posé:ee", "did you mean 'pose'?"),

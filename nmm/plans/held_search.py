@@ -238,6 +238,7 @@ def refuse_beside_hold(robot: Robot, asked: Asked) -> None:
     if robot.platform.n_p < 3:
         raise InputError(f"{robot.name} stands", where="plan: hold", expected="a platform that moves")
     moves = any(one.moves for one in asked.collisions.obstacles)
-    if asked.smooth or moves or isinstance(robot.platform, Tractor):
-        what = "smooth" if asked.smooth else "obstacles that move" if moves else "trailers"
+    towed = isinstance(robot.platform, Tractor)
+    if asked.smooth or moves or towed:
+        what = "trailers" if towed else "smooth" if asked.smooth else "obstacles that move"
         raise InputError(f"it does not go with {what}", where="plan: hold")

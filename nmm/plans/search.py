@@ -139,6 +139,7 @@ def plan(
         raise InputError(
             f"{few(endless)}: slides without limits", where="plan: robot", expected="limits of it"
         )
+    smooth = smooth or isinstance(robot.platform, Tractor)
     if objective is not None and not smooth:
         raise InputError("smooth motions alone have one", where="plan: objective", expected="smooth=True")
     kept = collisions or Collisions()

@@ -91,7 +91,7 @@ class Camera:
     >>> ball = np.array([[[2.0, 0.5, 0.6]]])
     >>> camera = nmm.playback.Camera("camera_optical_frame", ball, np.zeros((1, 1, 2)))
     >>> camera.picture(robot, robot.rest[None]).round(3)
-    array([[[-0.278,  0.111]]])
+    array([[[-0.286,  0.057]]])
     """
 
     frame: str
