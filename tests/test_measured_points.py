@@ -11,6 +11,7 @@ from findings import refused, the
 from scipy.linalg import expm
 
 import nmm
+from nmm.analysis.formulas import symbolic
 
 ROBOT = nmm.load("unicycle_pan_tilt")
 CAMERA = "camera_optical_frame"
@@ -37,6 +38,8 @@ def test_a_picture_is_believed_and_foretold_as_the_camera_moves(rng: np.random.G
     controller = nmm.Controller(ROBOT, nmm.Task(nmm.ImagePoints(ball), [0.0, 0.0]), nmm.ProjectedGradient())
     with pytest.raises(nmm.SingularError, match="no picture has shown the point yet"):
         controller(0.0, ROBOT.rest)
+    with refused("symbolic"):
+        symbolic(ROBOT, nmm.ImagePoints(ball))
     taken = rng.uniform(-0.2, 0.2, 5)
     depth = np.exp(true(nmm.LogDepth(BALL), taken))
     ball.set(true(seen, taken), 0.0, taken, depth)

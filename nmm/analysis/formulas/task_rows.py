@@ -115,6 +115,8 @@ def _evaluated(stages: Sequence[Stage], t: float, frames: Frames) -> Rows:
     for stage in stages:
         if stage.callback is not None:
             raise Untraceable("it is a Python function of the user's")
+        if not np.isfinite(stage.numbers).all():
+            raise Untraceable("its numbers are not known yet")
         if stage.kernel is frame_pose:
             _frame_pose(stage, rows, frames)
         else:
