@@ -49,6 +49,10 @@ def test_a_picture_is_believed_and_foretold_as_the_camera_moves(rng: np.random.G
         np.testing.assert_allclose(here.J, nmm.evaluate(seen, 0.0, expected).value_q @ expected.S, atol=1e-12)
     ball.set([0.11, -0.07], 0.3, taken, 0.5)  # whatever the depth, what was seen there was seen there
     np.testing.assert_allclose(controller.evaluate(0.3, taken).r, [0.11, -0.07], atol=1e-12)
+    anew = nmm.Configuration(ROBOT, taken)  # what is laid out after a picture knows it, too
+    np.testing.assert_allclose(
+        nmm.evaluate(nmm.ImagePoints(ball), 0.3, anew).value, [0.11, -0.07], atol=1e-12
+    )
     ball.set([np.nan, np.nan], 0.4, taken)
     np.testing.assert_allclose(controller.evaluate(0.4, taken).r, [0.11, -0.07], atol=1e-12)
 

@@ -77,6 +77,8 @@ class MeasuredPoints(Seen):
         self._pictures: weakref.WeakSet[Pictures] = weakref.WeakSet()
         self._robot: Robot | None = None
         self._taken: Belief | None = None
+        #: What `signal` reads, as of the last picture, where a function is laid out after it.
+        self._numbers = no_points(k)
         #: The time of the last picture, s, which `Age` reads.
         self._at = LiveNumbers(np.array([0.0]))
 
@@ -133,17 +135,24 @@ class MeasuredPoints(Seen):
         here = Configuration(self._robot, self._robot.q(q)).placement(camera)
         at = scalar(t, "t")
         numbers = self._taken.look(at, seen.reshape(-1, 2), here.rotation, here.translation, depth)
+        self._numbers = numbers
         for live in self._pictures:
             live.set(numbers)
         self._at.set(np.array([self._taken.oldest]))
 
     def __getstate__(self) -> dict[str, object]:
         """Copies are measured by themselves."""
-        return {**self.__dict__, "_pictures": None, "_robot": None, "_taken": None}
+        kept = {**self.__dict__, "_pictures": None, "_robot": None, "_taken": None}
+        return {**kept, "_numbers": no_points(self.count)}
 
     def __setstate__(self, state: dict[str, object]) -> None:
         self.__dict__.update(state)
         self._pictures = weakref.WeakSet()
+
+
+def no_points(k: int) -> Array:
+    """The numbers of `signal` before a picture has shown k points."""
+    return np.concatenate([np.zeros(2), np.full(3 * k, np.nan), np.zeros(3 * k)])
 
 
 class Belief:
@@ -190,7 +199,7 @@ class Pictures(Renewal):
         self._moved, turned = shift[:3], np.empty((3, 3))
         exp3(shift[3:], turned)
         self._turned = turned
-        super().__init__(np.concatenate([[0.0, 0.0], np.full(3 * len(of), np.nan), np.zeros(3 * len(of))]))
+        super().__init__(of._numbers.copy())
         self.begin()
 
     def begin(self) -> None:
@@ -216,7 +225,8 @@ class Pictures(Renewal):
             self._take(t, q, q if real is None else real)
         while self._waiting and self._waiting[0][0] <= t + SOON:
             _, taken, seen, R, c = self._waiting.popleft()
-            self.set(self._belief.look(taken, seen, R, c))
+            self._of._numbers = self._belief.look(taken, seen, R, c)
+            self.set(self._of._numbers)
             if np.isfinite(self._belief.oldest):
                 self._of._at.set(np.array([self._belief.oldest]))
 
