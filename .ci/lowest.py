@@ -10,6 +10,7 @@ for requirement in [
     *extras["sweep"],
     *extras["video"],
     *extras["mujoco"],
+    *extras["vision"],
     *extras["test"],
 ]:
     name, above, rest = requirement.partition(">=")
