@@ -2,7 +2,7 @@
 
 starts   of 200 random starts with a board in view, how many bring it to the middle, 1 m ahead, in 15 s; how
          many keep it in the picture, and the joints within limits
-faults   of 50 of these, with measured points: by the depth that is believed over the true one at first, given
+faults   of 12 of these, with measured points: by the depth that is believed over the true one at first, given
          and observed, and by what the camera does
 depth    the error of an observed depth after 10 s, in the mean of 100 runs, by three estimators
 delay    K tau from which a head that turns to a ball is unstable without foresight, and with it
@@ -84,13 +84,13 @@ def starts() -> None:
 
 
 def faults() -> None:
-    given = random_starts(50)
+    given = random_starts(12)
     cameras: dict[str, dict[str, Any]] = {
         "30 Hz": {},
         "0.2 s late": {"latency": 0.2},
         "0.5 s late, 10 Hz": {"latency": 0.5, "rate": 10.0},
         "2 px, 30 % dropped": {"noise": 2.0, "dropped": 0.3},
-        "all, focal 1.1": {"latency": 0.2, "noise": 1.0, "dropped": 0.3, "whole": True},
+        "all of that, 1 px": {"latency": 0.2, "noise": 1.0, "dropped": 0.3, "whole": True},
     }
     shares = (0.3, 0.5, 0.7, 1.0, 1.5, 3.0)
     for observed in (False, True):
