@@ -214,17 +214,34 @@ def unplaced() -> None:
     nmm.MeasuredPoints([BALL]).set([0.0, 0.0], 0.0, ROBOT.rest)
 
 
-def wrong_count() -> None:
+def placed() -> nmm.MeasuredPoints:
     ball = nmm.MeasuredPoints([BALL])
     nmm.Controller(ROBOT, nmm.Task(nmm.ImagePoints(ball), [0.0, 0.0]), nmm.ProjectedGradient())
-    ball.set([0.0, 0.0, 0.0], 0.0, ROBOT.rest)
+    return ball
+
+
+def test_lost_pictures_of_two_tasks_of_one_camera_are_told_once() -> None:
+    ball = nmm.MeasuredPoints([BALL], depth=1.7, faults=nmm.CameraFaults(dropped=0.3))
+    tasks = [
+        nmm.Task(nmm.ImagePoints(ball), [0.0, 0.0]),
+        nmm.Task(nmm.LogDepth(ball.point(0)), [0.5], gain=0.1),
+    ]
+    controller = nmm.Controller(ROBOT, tasks, nmm.DampedLeastSquares())
+    run = nmm.simulate(controller, ROBOT.rest, 1.0, 0.02, "zoh")
+    assert [one.code for one in run.findings].count("pictures_lost") == 1
+    (message,) = nmm.rollout(controller, ROBOT.rest, 1.0, 0.02, "zoh").message
+    assert message.count("pictures") == 1
 
 
 @pytest.mark.parametrize(
     ("made", "where"),
     [
         (unplaced, "set"),
-        (wrong_count, "values"),
+        (lambda: placed().set("ab", 0.0, ROBOT.rest), "values"),
+        (lambda: placed().set([0.0, 0.0], 0.0, ROBOT.rest, depth=-1.0), "depth"),
+        (lambda: placed().set([0.0, 0.0], 0.0, ROBOT.rest, depth=[1.0, 2.0]), "depth"),
+        (lambda: nmm.MeasuredPoints([BALL], depth="far"), "depth"),
+        (lambda: placed().set([0.0, 0.0, 0.0], 0.0, ROBOT.rest), "values"),
         (lambda: nmm.MeasuredPoints([]), "points"),
         (lambda: nmm.MeasuredPoints([BALL], depth=-1.0), "depth"),
         (lambda: nmm.MeasuredPoints([BALL], depth=[1.0, 2.0]), "depth"),

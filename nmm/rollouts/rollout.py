@@ -229,10 +229,7 @@ class _Runs:
             away = np.zeros(2) if believed is None else (believed - recorder.found.q)[count - 1, :2]
             self.measures[i, MEASURES.index("drift")] = np.hypot(*away)
         self.samples[i] = count
-        why = (
-            *reasons,
-            *(one for made in controller.solver.program.renewals for one in made.noticed(recorder.reached)),
-        )
+        why = (*reasons, *recorder.noticed())
         self.outcome[i], self.message[i] = _ended(outcome, recorder, self.until, controller), line(why)
 
     def _controller(self, i: int) -> tuple[Controller, Recorder, Integrator]:

@@ -115,8 +115,7 @@ def record_run(
     if controller.solver.second:
         recorder.findings += rate_jumps(recorder, follows=leg is not None and math.isfinite(leg.earlier))
     recorder.blocking = controller.report.blocking()
-    for one in controller.solver.program.renewals:
-        recorder.findings += one.noticed(recorder.reached)
+    recorder.findings += recorder.noticed()
     if controller.safety_filter is not None:
         recorder.counts = controller.safety_filter.counts
     last = recorder.q[len(recorder) - 1] if len(recorder) else q

@@ -149,6 +149,13 @@ class Recorder:
         if found is not None and (found.code, found.values) not in known:
             self.findings.append(found)
 
+    def noticed(self) -> list[Finding]:
+        """What the numbers that the run replaced have noticed; once where two tasks have one camera."""
+        found: list[Finding] = []
+        for one in self.controller.solver.program.renewals:
+            found += (each for each in one.noticed(self.reached) if each not in found)
+        return found
+
     @property
     def _planned(self) -> Array | None:
         """Where the plan that it follows was at the samples, (N, n)."""

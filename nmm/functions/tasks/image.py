@@ -178,8 +178,23 @@ class Seen(Function):
     camera: str
     points: tuple[Function, ...]
     intrinsics: Array
-    _rows: tuple[tuple[int, int], ...] = ()
     _line = False
+    #: How many points it takes.
+    _least, _most = 1, math.inf
+
+    def __init__(
+        self,
+        points: Points,
+        camera: str | None = None,
+        intrinsics: ArrayLike | None = None,
+    ) -> None:
+        self._see(camera, points)
+        self._measured_by(intrinsics)
+
+    @property
+    def _rows(self) -> tuple[tuple[int, int], ...]:
+        """Its rows that are x and y of each point."""
+        return ()
 
     def _see(self, camera: str | None, points: Points) -> None:
         """`points` are some, each a function of three rows, or one function of three rows a point."""
@@ -191,7 +206,9 @@ class Seen(Function):
             expect(not isinstance(points, str), "points", "a list of points", points)
             self.points = tuple(as_point(one, "points") for one in points)
         self.count = sum(len(one) if isinstance(one, Sized) else 1 for one in self.points)
-        expect(self.count > 0, "points", "a list of points", points)
+        most = "" if math.isinf(self._most) else f", at most {self._most}"
+        wanted = f"a list of points, at least {self._least}{most}"
+        expect(self._least <= self.count <= self._most, "points", wanted, points)
         self.intrinsics = np.array(NORMALISED)
 
     def _measured_by(self, intrinsics: ArrayLike | None) -> None:
@@ -254,15 +271,9 @@ class ImagePoints(Seen):
     array([-0.286,  0.057])
     """
 
-    def __init__(
-        self,
-        points: Points,
-        camera: str | None = None,
-        intrinsics: ArrayLike | None = None,
-    ) -> None:
-        self._see(camera, points)
-        self._measured_by(intrinsics)
-        self._rows = tuple((2 * k, 2 * k + 1) for k in range(self.count))
+    @property
+    def _rows(self) -> tuple[tuple[int, int], ...]:
+        return tuple((2 * k, 2 * k + 1) for k in range(self.count))
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         camera, many = self._placed(robot), self.count > 1
@@ -296,15 +307,7 @@ class ImageMoments(Seen):
     array([ 0.   ,  0.   , -1.822])
     """
 
-    def __init__(
-        self,
-        points: Points,
-        camera: str | None = None,
-        intrinsics: ArrayLike | None = None,
-    ) -> None:
-        self._see(camera, points)
-        expect(self.count > 1, "points", "two or more points", points)
-        self._measured_by(intrinsics)
+    _least = 2
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         camera = self._placed(robot)
@@ -335,17 +338,7 @@ class ImageLine(Seen):
     array([ 0.  , -0.62])
     """
 
-    _line = True
-
-    def __init__(
-        self,
-        points: Points,
-        camera: str | None = None,
-        intrinsics: ArrayLike | None = None,
-    ) -> None:
-        self._see(camera, points)
-        expect(self.count == 2, "points", "two points", points)
-        self._measured_by(intrinsics)
+    _line, _least, _most = True, 2, 2
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         camera = self._placed(robot)

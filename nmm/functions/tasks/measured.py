@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, counted, scalar, vector
+from nmm.arrays import Array, array, counted, scalar, vector
 from nmm.errors import InputError, expect
 from nmm.findings import Finding
 from nmm.functions.function import Function, LiveNumbers, Renewal, Row, Stage, move_rows
@@ -45,7 +45,8 @@ class MeasuredPoints(Seen):
     camera, intrinsics : as of `ImagePoints`, of the camera that the controller believes in
     depth : of each point, m, as it is believed: a number, or one a point
     observed : whether the depth is estimated from there on
-    faults : of the simulation's camera; `CameraFaults()` when not given
+    faults : of the simulation's camera, whose noise the estimate of depths reckons with on a robot, too;
+        `CameraFaults()` when not given
 
     Examples
     --------
@@ -70,9 +71,7 @@ class MeasuredPoints(Seen):
         self._see(camera, points)
         self._measured_by(intrinsics)
         k = self.count
-        given = np.asarray(depth, dtype=np.float64)
-        self.depth = vector(np.full(k, given) if given.ndim == 0 else given, k, "depth")
-        expect(bool(np.all(self.depth > 0.0)), "depth", "numbers above 0, m", depth)
+        self.depth = each(depth, k, "depth")
         self.observed, self.faults = bool(observed), faults or CameraFaults()
         self._pictures: weakref.WeakSet[Pictures] = weakref.WeakSet()
         self._robot: Robot | None = None
@@ -121,20 +120,23 @@ class MeasuredPoints(Seen):
 
         Raises
         ------
-        InputError : another number of numbers; no controller has these points yet
+        InputError : another number of numbers, a depth that is not above 0; no controller has these points
+            yet
         """
         if self._robot is None:
             raise InputError("no controller has these points yet", where="set", expected="a controller first")
         if self._taken is None:
             self._taken = Belief(self)
-        seen = np.asarray(values, dtype=np.float64).reshape(-1)
+        try:
+            seen = np.asarray(values, dtype=np.float64).reshape(-1)
+        except (TypeError, ValueError):
+            raise InputError(where="values", expected=f"{2 * len(self)} numbers", got=values) from None
         expect(seen.size == 2 * len(self), "values", f"{2 * len(self)} numbers", seen.size)
-        if depth is not None:
-            depth = np.broadcast_to(np.asarray(depth, dtype=np.float64), len(self))
+        far = None if depth is None else each(depth, len(self), "depth")
         camera = self._placed(self._robot)
         here = Configuration(self._robot, self._robot.q(q)).placement(camera)
         at = scalar(t, "t")
-        numbers = self._taken.look(at, seen.reshape(-1, 2), here.rotation, here.translation, depth)
+        numbers = self._taken.look(at, seen.reshape(-1, 2), here.rotation, here.translation, far)
         self._numbers = numbers
         for live in self._pictures:
             live.set(numbers)
@@ -148,6 +150,14 @@ class MeasuredPoints(Seen):
     def __setstate__(self, state: dict[str, object]) -> None:
         self.__dict__.update(state)
         self._pictures = weakref.WeakSet()
+
+
+def each(depth: ArrayLike, k: int, name: str) -> Array:
+    """Depths (k,), m, given for all or one a point."""
+    given = array(depth, name)
+    found = vector(np.full(k, given) if given.ndim == 0 else given, k, name)
+    expect(bool(np.all(found > 0.0)), name, "numbers above 0, m", depth)
+    return found
 
 
 def no_points(k: int) -> Array:
