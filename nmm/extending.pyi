@@ -62,9 +62,10 @@ from .functions.program import Program as Program
 from .functions.program import run_program as run_program
 from .functions.references import PiecewisePolynomial as PiecewisePolynomial
 from .functions.references.circle import bearing as bearing
+from .functions.references.live_target import Displaced as Displaced
 from .functions.tasks.conditions import Condition as Condition
-from .functions.tasks.image import image_points as image_points
-from .functions.tasks.image import log_depth as log_depth
+from .functions.tasks.image_kernels import image_points as image_points
+from .functions.tasks.image_kernels import log_depth as log_depth
 from .functions.tasks.pointing import pointing as pointing
 from .functions.tasks.pose import frame_pose as frame_pose
 from .functions.tasks.pose import orientation_error as orientation_error
@@ -194,6 +195,7 @@ from .runs.residuals import run_up as run_up
 from .runs.seen import GoalRows as GoalRows
 from .runs.seen import RunCamera as RunCamera
 from .runs.seen import SeenPoints as SeenPoints
+from .runs.seen import same_point as same_point
 from .runs.shown_frame import shown_frame as shown_frame
 from .runs.simulation import MOST_SAMPLES as MOST_SAMPLES
 from .runs.table import step_time as step_time

@@ -35,6 +35,12 @@ from nmm.robots.configuration import Configuration
 KINDS = ("rg", "pg", "ej", "dls")
 
 
+@pytest.fixture(autouse=True)
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Plans are looked for as long as a busy machine needs."""
+    monkeypatch.setattr("nmm.driving.planning.SECONDS", MOST)
+
+
 def scenario(name: str = "unicycle_3r_position") -> ScenarioSetup:
     return ScenarioSetup(nmm.Scenario.load(name))
 

@@ -8,10 +8,11 @@ import pickle
 import numpy as np
 import pytest
 from findings import refused, the
-from scipy.linalg import expm
+from scipy.linalg import expm, solve_discrete_are
 
 import nmm
 from nmm.analysis.formulas import symbolic
+from nmm.functions.tasks.depth_estimate import MotionEstimate
 
 ROBOT = nmm.load("unicycle_pan_tilt")
 CAMERA = "camera_optical_frame"
@@ -254,3 +255,61 @@ def test_lost_pictures_of_two_tasks_of_one_camera_are_told_once() -> None:
 def test_what_is_no_measurement_is_refused(made: object, where: str) -> None:
     with refused(where):
         made()  # type: ignore[operator]
+
+
+def test_the_velocity_of_a_point_that_moves_is_estimated_as_the_steady_kalman_filter_does(
+    rng: np.random.Generator,
+) -> None:
+    h, noise, acceleration = 0.05, 0.01, 0.7
+    v, found = np.array([0.3, -0.2, 0.1]), MotionEstimate(acceleration)
+    for k in range(200):
+        p, rate = found.look(k * h, v * k * h, noise)
+    np.testing.assert_allclose(np.concatenate([p, rate]), np.concatenate([v * k * h, v]), atol=1e-9)
+    F, w = np.array([[1.0, h], [0.0, 1.0]]), np.array([[0.5 * h * h], [h]])
+    spread = solve_discrete_are(F.T, np.array([[1.0], [0.0]]), acceleration**2 * w @ w.T, [[noise**2]])
+    gain = spread[:, 0] / (spread[0, 0] + noise**2)
+    off = rng.normal(size=3)
+    before = np.array([p + rate * h, rate])
+    p, rate = found.look(200 * h, before[0] + off, noise)
+    np.testing.assert_allclose([p, rate], before + np.outer(gain, off), rtol=1e-6)
+    again = found.look(200 * h, before[0] + 9.0, noise)  # the same picture twice, or an older one
+    np.testing.assert_array_equal(again, [p, rate])
+
+
+@pytest.mark.parametrize(("late", "noise", "most"), [(0.0, 0.0, 0.003), (0.2, 0.002, 0.04)])
+def test_a_ball_that_moves_is_followed_with_its_motion_estimated(
+    late: float, noise: float, most: float
+) -> None:
+    ball = nmm.Circle([2.0, 0.0, 0.4], 0.5, 0.6)
+    faults = nmm.CameraFaults(latency=late, noise=noise, dropped=0.3 if noise else 0.0)
+    worst = []
+    for moving in (0.0, 1.0):
+        seen = nmm.MeasuredPoints([ball], depth=1.8, moving=moving, faults=faults)
+        task = nmm.Task(nmm.ImagePoints(seen), [0.0, 0.0], gain=2.0)
+        controller = nmm.Controller(
+            ROBOT, task, nmm.ReducedGradient(), STRAIGHT, limits=nmm.Limits(), dt=0.02
+        )
+        run = nmm.simulate(controller, {"x": 0.2, "y": -0.6, "pan": 0.5}, 6.0, 0.02, method="zoh")
+        there = nmm.ImagePoints([ball])
+        worst.append(
+            max(
+                np.abs(nmm.evaluate(there, t, nmm.Configuration(ROBOT, q)).value).max()
+                for t, q in zip(run.t[150:], run.q[150:], strict=True)
+            )
+        )
+    assert worst[1] < most < 0.08 < worst[0]
+
+
+def test_what_is_lost_of_points_that_move_goes_on_as_it_did() -> None:
+    points = nmm.MeasuredPoints([[2.0, 0.5, 0.6], [2.0, 0.7, 0.6]], moving=1.0)
+    task = nmm.Task(nmm.ImagePoints(points), [0.0] * 4)
+    controller = nmm.Controller(ROBOT, task, nmm.ProjectedGradient())
+    seen = np.array([0.1, 0.0, -0.1, 0.0])
+    for k in range(30):
+        points.set(seen + 0.01 * k, 0.1 * k, ROBOT.rest, depth=2.0)
+    for t in (3.0, 3.1):
+        points.set([*(seen[:2] + 0.1 * t), np.nan, np.nan], t, ROBOT.rest, depth=2.0)
+    found = controller.evaluate(3.1, ROBOT.rest)
+    np.testing.assert_allclose(found.r, seen + 0.31, atol=2e-3)
+    with refused("moving"):
+        nmm.MeasuredPoints([BALL], observed=True, moving=0.1)

@@ -18,6 +18,8 @@ from ports import MOST, served
 import nmm
 from nmm.control.quantities import QUANTITIES
 from nmm.driving import ScenarioSetup, drive
+from nmm.driving.driven import Driven
+from nmm.driving.things import Things
 from nmm.playback import write_html
 from nmm.playback.running import Growing
 
@@ -193,6 +195,55 @@ def test_a_live_page_gets_what_is_seen_as_it_is_recorded() -> None:
     assert camera.frame == "camera_optical_frame"
 
 
+def test_a_ball_is_dragged_on_its_way_and_the_camera_follows_it() -> None:
+    setup = ScenarioSetup(nmm.Scenario.load("pan_tilt_follow"))
+    driven = Driven(setup)
+    (thing,) = driven.things
+    goals = driven.targets[0].signal.value
+    where, far = thing.middle(0.0), np.array([0.3, 0.2, 0.1])
+    driven.aim(len(driven.targets), where + far)
+    np.testing.assert_allclose(driven.places[-1], where + far, atol=1e-12)
+    made = driven.with_choice("resolver.kind", "pg")
+    driven.use(made)  # a controller made afterwards sees the same ball
+    for _ in range(round(8.0 / setup.dt)):
+        assert driven.step()
+    step = driven.look().step
+    np.testing.assert_allclose(step.r, [*goals, np.log(1.5)], atol=2e-3)
+    there = nmm.evaluate(
+        nmm.Circle([1.5, 0.0, 0.4], 1.0, 0.3), driven.t, nmm.Configuration(setup.robot, driven.q)
+    ).value
+    np.testing.assert_allclose(driven.things[0].middle(driven.t), there + far, atol=1e-12)
+    driven.restart()
+    np.testing.assert_allclose(driven.places[-1], where, atol=1e-12)
+    with refused("task"):
+        driven.aim(len(driven.targets) + 1, where)
+
+
+def test_corners_of_a_board_are_dragged_as_one_thing() -> None:
+    robot = nmm.load("unicycle_pan_tilt")
+    board = np.array([[2.0, y, z] for y in (-0.2, 0.2) for z in (0.5, 0.8)])
+    far = np.array([0.5, 0.1, 0.0])
+    edge = nmm.Limits(bounds=nmm.Bound(nmm.ImagePoints(list(board[:2])), -0.6, 0.6))
+    task = nmm.Task(nmm.ImageMoments(list(board)), [0.0, 0.0, -1.5])
+    controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), limits=edge, dt=0.01)
+    things = Things(controller)
+    (thing,) = things.all
+    thing.drag(np.array([2.5, 0.1, 0.65]), 0.0)
+    moved = things.seen_by(controller)
+    apart = nmm.Controller(
+        robot,
+        nmm.Task(nmm.ImageMoments(list(board + far)), [0.0, 0.0, -1.5]),
+        nmm.ProjectedGradient(),
+    )
+    found = moved.evaluate(0.0, robot.rest)
+    np.testing.assert_allclose(found.r, apart.evaluate(0.0, robot.rest).r, atol=1e-12)
+    bound = moved.given.limits.bounds[0].function
+    here = nmm.Configuration(robot, robot.rest)
+    seen = nmm.ImagePoints(list(board[:2] + far))
+    values = [nmm.evaluate(one, 0.0, here).value for one in (bound, seen)]
+    np.testing.assert_allclose(*values, atol=1e-12)
+
+
 #: Where normalised coordinates of the picture are in the window, px.
 SPOT = """([x, y]) => {
   const { canvas, range: [x0, y0, x1] } = nmm.sights.figures[0];
@@ -227,3 +278,7 @@ def test_a_goal_is_dragged_in_the_picture_and_the_ball_comes_there(window: Windo
             arg=aimed,
             timeout=1000.0 * MOST,
         )
+        before = page.evaluate("nmm.drive.targets[1].value")
+        page.keyboard.press("PageUp")  # there is no other target in the scene
+        page.wait_for_function("z => nmm.drive.targets[1].value[2] > z", arg=before[2])
+        page.wait_for_function("z => nmm.sights.all[0].places[2] > z", arg=before[2])

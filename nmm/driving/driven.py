@@ -13,6 +13,7 @@ from nmm.control.controller import Controller
 from nmm.control.step import Step
 from nmm.diagnosis.reasons import out_of_reach, stretched
 from nmm.driving.setups import Choice, DriveSetup, Settings, aimed, named, targets_of
+from nmm.driving.things import Thing, Things
 from nmm.errors import NmmError, expect
 from nmm.playback.rolling import RolledRobot
 from nmm.robots.configuration import Configuration
@@ -28,8 +29,9 @@ NEAR = 5e-3
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """The robot at t, s since the beginning: the controller's step, σ_min of J, the tasks' frames (targets,
-    3), m in the world, NaN for tasks without one, and what keeps it from its targets ("" if nothing does)."""
+    """The robot at t, s since the beginning: the controller's step, σ_min of J, the frames of the tasks and
+    things (targets, 3), m in the world, NaN for those without one, and what keeps it from its targets ("" if
+    nothing does)."""
 
     t: float
     step: Step
@@ -79,6 +81,7 @@ class Driven:
     Attributes
     ----------
     shown : the robot at the last look, with its wheels
+    targets, things : what can be dragged: the tasks' targets, and what cameras see
     reacting : the controller that follows the targets
     elapsed : the time of the controller that leads it, s, where that is another (`lead`)
     u (m,) : the last inputs
@@ -93,12 +96,26 @@ class Driven:
         first = setup.controller({})
         self.targets = targets_of(first, setup.q0, at_robot=setup.at_robot)
         self._began = [target.signal.value for target in self.targets]
-        self.reacting = self._led = aimed(first, self.targets)
+        self._things = Things(first)
+        self.reacting = self._led = self._aimed(first)
         self._reaching = Reaching()
         self.choices = setup.choices({})
         self.trouble = ""
         self.shown = RolledRobot(self.robot, setup.q0)
         self._stand()
+
+    def _aimed(self, controller: Controller) -> Controller:
+        return self._things.seen_by(aimed(controller, self.targets))
+
+    @property
+    def things(self) -> list[Thing]:
+        return self._things.all
+
+    @property
+    def places(self) -> list[list[float]]:
+        """Where the targets are, and then the things."""
+        values = [target.signal.value for target in self.targets]
+        return [one.tolist() for one in (*values, *(thing.middle(self.t) for thing in self.things))]
 
     @property
     def has_objective(self) -> bool:
@@ -132,19 +149,26 @@ class Driven:
         """Return to the beginning, targets too; what was chosen stays."""
         for target, value in zip(self.targets, self._began, strict=True):
             target.signal.set(value)
+        for thing in self.things:
+            thing.away.set(np.zeros(3))
         self._stand()
 
     def aim(self, task: int, value: Array) -> None:
-        """Aim a task at `value` (s,), which ends a standstill; `InputError` for no such task or length."""
-        expect(task < len(self.targets), "task", f"a number below {len(self.targets)}", task)
-        self.targets[task].signal.set(value)
+        """Aim a task at `value` (s,), or drag a thing there, which are counted after the tasks; ends a
+        standstill. `InputError` for no such task or length."""
+        most = len(self.targets) + len(self.things)
+        expect(task < most, "task", f"a number below {most}", task)
+        if task < len(self.targets):
+            self.targets[task].signal.set(value)
+        else:
+            self.things[task - len(self.targets)].drag(value, self.t)
         self.trouble = ""
 
     def with_choice(self, key: str, value: object) -> Made:
         """A controller with that choice, for `use`; made apart, as it may take longer than a step. `NmmError`
         for an unknown choice or value, or ones that do not go together."""
         settings = {**self._settings, key: named(self.choices, key).checked(value)}
-        controller = aimed(self.setup.controller(settings), self.targets)
+        controller = self._aimed(self.setup.controller(settings))
         return Made(settings, controller, self.setup.choices(settings))
 
     def use(self, made: Made) -> None:
@@ -172,7 +196,7 @@ class Driven:
         self.shown.roll(self.q[np.newaxis])
         step = self.reacting.evaluate(self.t, self.q)
         here = Configuration(self.robot, self.q)
-        at = np.full((len(self.targets), 3), np.nan)
+        at = np.full((len(self.targets) + len(self.things), 3), np.nan)
         for i, target in enumerate(self.targets):
             if target.frame is not None:
                 on_robot = target.frame != CENTER_OF_MASS

@@ -103,8 +103,9 @@ class Planning:
         self._leave()
 
     def aims(self, task: int) -> None:
-        """A target was moved: it is the one to plan to."""
-        self._task = task
+        """A target was moved: it is the one to plan to. There are no plans to things."""
+        if task < len(self._driven.targets):
+            self._task = task
 
     def attend(self) -> None:
         """Take a plan that is made, have one made, or stand: once a picture."""

@@ -138,12 +138,12 @@ class DriveSession(RobotSession):
         self._choices: tuple[int, list[Choice]] = (0, driven.choices)
         self._picture: tuple[list[str], dict[str, Any]] | None = None
         first = driven.reacting
-        self._seen = SeenPoints(first.task, first.limits, driven.robot)
+        self._seen = SeenPoints(first.task, first.limits, driven.robot, live=True)
         targets = Drawing()
         targets.add(
             "targets",
-            targets=[target.for_page() for target in driven.targets],
-            values=[target.signal.value.tolist() for target in driven.targets],
+            targets=[one.for_page() for one in (*driven.targets, *driven.things)],
+            values=driven.places,
             at=finite(look.at),
             goals=self._goals(),
             reach=float(driven.robot.reach),
@@ -285,7 +285,7 @@ class DriveSession(RobotSession):
         picture: dict[str, Any] = {
             "type": "drive",
             "t": look.t,
-            "targets": [target.signal.value.tolist() for target in driven.targets],
+            "targets": driven.places,
             "at": finite(look.at),
             "paused": self._paused,
             "plans": self._planning.on,

@@ -276,7 +276,9 @@ class Target:
 
     def for_page(self) -> dict[str, Any]:
         rows = [{"name": name.removeprefix(f"{self.title}."), "unit": unit} for name, unit in self.rows]
-        return {"name": self.title, "rows": rows, "frame": self.frame, "axes": self.axes}
+        heading = f"Target of {self.title}"
+        axes = {} if self.frame is None else self.axes
+        return {"name": self.title, "heading": heading, "rows": rows, "frame": self.frame, "axes": axes}
 
 
 def targets_of(controller: Controller, q: Array, *, at_robot: bool) -> tuple[Target, ...]:

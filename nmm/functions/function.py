@@ -204,6 +204,7 @@ class Sight(NamedTuple):
     rows : the rows of x and y of each point in the picture; () where the function has none
     intrinsics : fx, fy, cx, cy of these rows, px; 1, 1, 0, 0 for normalised coordinates
     line : whether it is the line through its points that is seen
+    of_others : makes the same function of as many other points, for a page on which points are dragged
 
     Examples
     --------
@@ -217,6 +218,7 @@ class Sight(NamedTuple):
     rows: tuple[tuple[int, int], ...] = ()
     intrinsics: tuple[float, float, float, float] = NORMALISED
     line: bool = False
+    of_others: Callable[[tuple[Function, ...]], Function] | None = None
 
 
 class Shown(NamedTuple):

@@ -61,8 +61,8 @@ class RunCamera(NamedTuple):
 
 class SeenPoints:
     """The points that the cameras of tasks and limits see, each once, and the cameras; `calls_python` tells
-    whether users' functions say where they are. Points that are set
-    from outside are none: afterwards nobody knows where they were.
+    whether users' functions say where they are. Points that are set from outside are none, unless they are
+    looked at `live`: afterwards nobody knows where they were.
 
     Raises
     ------
@@ -71,8 +71,10 @@ class SeenPoints:
 
     cameras: tuple[RunCamera, ...]
 
-    def __init__(self, tasks: Iterable[Task], limits: Limits | None, robot: Robot) -> None:
-        self._robot = robot
+    def __init__(
+        self, tasks: Iterable[Task], limits: Limits | None, robot: Robot, live: bool = False
+    ) -> None:
+        self._robot, self._live = robot, live
         self._functions: dict[object, Function] = {}
         found: dict[str, RunCamera] = {}
         first = 0
@@ -111,14 +113,9 @@ class SeenPoints:
         yield optical_frame(sight.camera, self._robot), sight, [self._number(one) for one in sight.points]
 
     def _number(self, point: Function) -> int:
-        stages = point.stages(self._robot)
-        if any(stage.live is not None or stage.remembers for stage in stages):
+        same = same_point(point, self._robot, self._live)
+        if same is None:
             return -1
-        # Two functions of the same kernels with the same numbers are one.
-        same = tuple(
-            (stage.kernel, stage.rows, stage.before, stage.frames, stage.numbers.tobytes(), stage.callback)
-            for stage in stages
-        )
         self._functions.setdefault(same, point)
         return list(self._functions).index(same)
 
@@ -135,6 +132,18 @@ class SeenPoints:
         for k, (time, here) in enumerate(zip(t.tolist(), q, strict=True)):
             found[k] = [one.value for one in self._program.evaluate(time, here)]
         return found
+
+
+def same_point(point: Function, robot: Robot, live: bool = False) -> object:
+    """What two functions share that are the same point, the same kernels with the same numbers; None for one
+    that is set from outside, unless `live` ones have it."""
+    stages = point.stages(robot)
+    if any((stage.live is not None and not live) or stage.remembers for stage in stages):
+        return None
+    return tuple(
+        (stage.kernel, stage.rows, stage.before, stage.frames, stage.numbers.tobytes(), stage.callback)
+        for stage in stages
+    )
 
 
 def _add(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -20,6 +22,16 @@ def signal(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
     for i in range(s):
         rows.value[i] = numbers[2 + i] + numbers[2 + s + i] * elapsed
         rows.value_t[i] = numbers[2 + s + i]
+
+
+@kernel(FUNCTION)
+def displaced(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
+    """Adds what `signal` is to the rows, in place."""
+    s = rows.value.shape[0]
+    elapsed = numbers[0] * (at.t - numbers[1])
+    for i in range(s):
+        rows.value[i] += numbers[2 + i] + numbers[2 + s + i] * elapsed
+        rows.value_t[i] += numbers[2 + s + i]
 
 
 class LiveTarget(Function):
@@ -95,3 +107,27 @@ class LiveTarget(Function):
 
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
         return (Stage(signal, self._size, (), self._live.numbers, live=self._live),)
+
+
+class Displaced(Function):
+    """Another function, plus a live target of as many rows.
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> away = nmm.LiveTarget([0.0, 0.0])
+    >>> there = nmm.extending.Displaced(nmm.Circle([1.0, 0.0], 0.5, 1.0), away)
+    >>> away.set([0.0, 2.0])
+    >>> nmm.evaluate(there, 0.0, nmm.Configuration(robot, robot.rest)).value
+    array([1.5, 2. ])
+    """
+
+    def __init__(self, function: Function, by: LiveTarget) -> None:
+        self.function, self.by = function, by
+
+    def rows(self, robot: Robot) -> tuple[Row, ...]:
+        return self.function.rows(robot)
+
+    def stages(self, robot: Robot) -> tuple[Stage, ...]:
+        (live,) = self.by.stages(robot)
+        return (*self.function.stages(robot), replace(live, kernel=displaced))

@@ -1,4 +1,4 @@
-"""The depth of a point, from pictures of it."""
+"""Where a point is, from pictures of it: its depth, or how fast it moves."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ UNSURE = 0.5
 ALMOST_SURE, WANDERS = 1e-4, 5e-4
 #: The least depth that is believed over the first guess, and the least of its inverse.
 LEAST = 0.02
+#: A point's speed is at first as unsure as what its acceleration makes of it in so long, s.
+UNKNOWN = 1.0
 
 
 class DepthEstimate:
@@ -64,3 +66,35 @@ class DepthEstimate:
         """The depth in the first picture, and its standard deviation, m."""
         inverse = float(self._state[2])
         return 1.0 / inverse, math.sqrt(self._spread[2, 2]) / inverse**2
+
+
+class MotionEstimate:
+    """Where a point of known depth is in the world and how fast it moves, from pictures of it: a Kalman
+    filter with white noise as acceleration (Y. Bar-Shalom, X. R. Li, T. Kirubarajan, Estimation with
+    applications to tracking and navigation, 2001, sec. 6.2.2).
+
+    Parameters
+    ----------
+    acceleration : its standard deviation, m/s², from one picture to the next
+    """
+
+    def __init__(self, acceleration: float) -> None:
+        self._acceleration, self._t = acceleration, -math.inf
+        self._state = np.zeros((2, 3))  # p, v; the axes have one covariance
+        self._spread = np.zeros((2, 2))
+
+    def look(self, t: float, point: Array, noise: float) -> tuple[Array, Array]:
+        """The point (3,), m, and its velocity (3,), m/s, after a picture at t, s, that shows it at `point`,
+        m, with a standard deviation of `noise`, m. The first one says nothing of the velocity."""
+        if not math.isfinite(self._t):
+            self._state[0], self._t = point, t
+            self._spread[:] = np.diag([noise**2, (self._acceleration * UNKNOWN) ** 2])
+        elif (h := t - self._t) > 0.0:
+            self._t = t
+            F, w = np.array([[1.0, h], [0.0, 1.0]]), np.array([0.5 * h * h, h])
+            spread = F @ self._spread @ F.T + self._acceleration**2 * np.outer(w, w)
+            gain = spread[:, 0] / (spread[0, 0] + noise**2)
+            state = F @ self._state
+            self._state = state + np.outer(gain, point - state[0])
+            self._spread = spread - np.outer(gain, spread[0])
+        return self._state[0].copy(), self._state[1].copy()

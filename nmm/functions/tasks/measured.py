@@ -17,7 +17,7 @@ from nmm.functions.function import Function, LiveNumbers, Renewal, Row, Stage, m
 from nmm.functions.program import Program
 from nmm.functions.references.live_target import signal
 from nmm.functions.tasks.camera_faults import CameraFaults
-from nmm.functions.tasks.depth_estimate import DepthEstimate
+from nmm.functions.tasks.depth_estimate import ALMOST_SURE, DepthEstimate, MotionEstimate
 from nmm.functions.tasks.image import Points, Seen
 from nmm.kernels.compiled import kernel
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
@@ -27,7 +27,7 @@ from nmm.robots.robot import Robot
 
 
 class MeasuredPoints(Seen):
-    """Points of the world where a camera's pictures say that they are: three rows each.
+    """Points where a camera's pictures say that they are in the world: three rows each.
 
     `ImagePoints(measured)` and `LogDepth(measured.point(0))` are tasks of what was measured. Between two
     pictures, and for the time that one takes to arrive, a point stands in the world while the camera moves:
@@ -44,7 +44,9 @@ class MeasuredPoints(Seen):
         matters to a robot with a camera of its own
     camera, intrinsics : as of `ImagePoints`, of the camera that the controller believes in
     depth : of each point, m, as it is believed: a number, or one a point
-    observed : whether the depth is estimated from there on
+    observed : whether the depth is estimated from there on, of points that stand
+    moving : how fast the points' velocity changes, m/s²: their motion is then estimated, fed forward and
+        foretold; 0 for points that stand
     faults : of the simulation's camera, whose noise the estimate of depths reckons with on a robot, too;
         `CameraFaults()` when not given
 
@@ -67,12 +69,15 @@ class MeasuredPoints(Seen):
         depth: ArrayLike = 1.0,
         observed: bool = False,
         faults: CameraFaults | None = None,
+        moving: float = 0.0,
     ) -> None:
         self._see(camera, points)
         self._measured_by(intrinsics)
         k = self.count
         self.depth = each(depth, k, "depth")
         self.observed, self.faults = bool(observed), faults or CameraFaults()
+        self.moving = scalar(moving, "moving", least=0.0)
+        expect(not (self.observed and self.moving), "moving", "0 where the depth is observed", moving)
         self._pictures: weakref.WeakSet[Pictures] = weakref.WeakSet()
         self._robot: Robot | None = None
         self._taken: Belief | None = None
@@ -171,9 +176,11 @@ class Belief:
     def __init__(self, of: MeasuredPoints) -> None:
         self._of, k = of, len(of)
         fx = float(min(of.intrinsics[:2]))
-        noise = math.hypot(of.faults.noise, 0.3 if of.faults.whole else 0.0) / fx
-        self._estimates = [DepthEstimate(float(depth), noise) for depth in of.depth]
+        self._noise = math.hypot(of.faults.noise, 0.3 if of.faults.whole else 0.0) / fx
+        self._estimates = [DepthEstimate(float(depth), self._noise) for depth in of.depth]
+        self._motions = [MotionEstimate(of.moving) for _ in of.depth]
         self._points, self._times = np.full((k, 3), np.nan), np.full(k, -np.inf)
+        self._rates = np.zeros((k, 3))
 
     @property
     def oldest(self) -> float:
@@ -192,7 +199,12 @@ class Belief:
             else:
                 far = self._of.depth[k] if depth is None else depth[k]
                 self._points[k] = c + far * (R @ np.array([x, y, 1.0]))
-        return np.concatenate([[0.0, t], self._points.ravel(), np.zeros(self._points.size)])
+                if self._of.moving:
+                    noise = far * max(self._noise, ALMOST_SURE)
+                    self._points[k], self._rates[k] = self._motions[k].look(t, self._points[k], noise)
+        late = np.where(np.isfinite(self._times), t - self._times, 0.0)  # of points that this one lacks
+        points = self._points + self._rates * late[:, np.newaxis]
+        return np.concatenate([[float(self._of.moving > 0.0), t], points.ravel(), self._rates.ravel()])
 
 
 class Pictures(Renewal):

@@ -83,9 +83,9 @@
     targets.forEach((one, number) => {
       const target = { ...one, number, value: values[number], at: at[number], reach, inputs: [] };
       target.part = nmm.element(panel, "fieldset");
-      nmm.element(target.part, "legend", {}, `Target of ${one.name}`);
+      nmm.element(target.part, "legend", {}, one.heading);
       target.inputs = one.rows.map((_, k) => row(target, k, one.rows[k]));
-      if (one.frame !== null && Object.keys(one.axes).length) {
+      if (Object.keys(one.axes).length) {
         const ways = Object.keys(one.axes);
         target.gizmo = nmm.gizmos.add(number, ways, 0.2 * reach, (point) => {
           drive.active = number;
@@ -93,7 +93,7 @@
           for (const axis of ways) value[one.axes[axis]] = point[axis];
           aim(target, value);
         });
-        target.trail = trail(number);
+        if (one.frame !== null) target.trail = trail(number);
       }
       drive.targets.push(target);
       show(target);
