@@ -90,6 +90,20 @@ def test_the_error_follows_its_law_from_rest(kind: str) -> None:
     np.testing.assert_allclose(np.gradient(run.u, run.t, axis=0)[1:-1], run["u_dot"][1:-1], atol=0.05)
 
 
+def test_a_point_in_a_picture_follows_the_law_from_rest() -> None:
+    """A camera that turns while its platform drives; the ball stands, so that ė(0) = 0."""
+    robot = nmm.load("unicycle_pan_tilt")
+    middle = nmm.Task(nmm.ImagePoints([[2.0, 0.5, 0.6]]), [0.0, 0.0], gain=GAIN)
+    near = nmm.Task(nmm.LogDepth([2.0, 0.5, 0.6]), [0.2], gain=GAIN)
+    controller = nmm.Controller(robot, [middle, near], nmm.ReducedGradient(), order=2, servo=SERVO)
+    run = nmm.simulate(controller, {"pan": 0.1, "tilt": 0.1}, 2.0, 0.005)
+    k, K, t = SERVO, GAIN, run.t[:, np.newaxis]
+    decay = (k * np.exp(-K * t) - K * np.exp(-k * t)) / (k - K)
+    assert np.abs(run.error - run.error[0] * decay).max() < 1e-5
+    assert np.abs(run.error[0]).min() > 0.05
+    assert not run.findings
+
+
 def test_a_hundred_seconds_on_a_circle_do_not_build_up_velocity() -> None:
     run = nmm.simulate(circling(objective=None), Q0, 100.0, 0.02)
     half = len(run) // 2
