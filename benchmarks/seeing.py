@@ -1,7 +1,7 @@
 """What visual servoing with a pan-tilt camera on wheels bears: `python benchmarks/seeing.py [--only NAME]`.
 
-starts   of 200 random starts with a board in view, how many bring it to the middle, 1 m ahead, in 15 s or 60 s; how
-         many keep it in the picture, and the joints within limits
+starts   of 200 random starts with a board in view, how many bring it to the middle, 1 m ahead, in 15 s or
+         60 s; how many keep it in the picture, and the joints within limits
 faults   of 12 of these, with measured points: by the depth that is believed over the true one at first, given
          and observed, and by what the camera does
 depth    the error of an observed depth after 10 s, in the mean of 100 runs, by three estimators

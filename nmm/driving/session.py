@@ -142,7 +142,10 @@ class DriveSession(RobotSession):
         targets = Drawing()
         targets.add(
             "targets",
-            targets=[one.for_page() for one in (*driven.targets, *driven.things)],
+            targets=[
+                *(target.for_page() for target in driven.targets),
+                *(thing.for_page() for thing in driven.things),
+            ],
             values=driven.places,
             at=finite(look.at),
             goals=self._goals(),

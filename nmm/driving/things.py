@@ -10,7 +10,7 @@ import numpy as np
 
 from nmm.arrays import Array
 from nmm.control.controller import Controller
-from nmm.functions.function import Function
+from nmm.functions.function import Function, Sight
 from nmm.functions.program import evaluate
 from nmm.functions.references.live_target import Displaced, LiveTarget
 from nmm.functions.tasks.task import Stack
@@ -54,8 +54,7 @@ class Things:
     def __init__(self, controller: Controller) -> None:
         self._robot = robot = controller.robot
         groups: list[dict[object, Function]] = []
-        for function in _seeing(controller):
-            sight = function.shown().sees
+        for sight in _sights(controller):
             keyed = {key: point for point in sight.points if (key := self._key(point)) is not None}
             joined = [one for one in groups if one.keys() & keyed.keys()]
             groups = [one for one in groups if one not in joined]
@@ -101,8 +100,8 @@ class Things:
         return moved
 
 
-def _seeing(controller: Controller) -> list[Function]:
+def _sights(controller: Controller) -> list[Sight]:
     limits = controller.given.limits
     bounds = () if limits is None else limits.bounds
-    functions = [one.function for one in (*controller.given.task, *bounds)]
-    return [one for one in functions if (sees := one.shown().sees) is not None and sees.of_others is not None]
+    found = [one.function.shown().sees for one in (*controller.given.task, *bounds)]
+    return [sight for sight in found if sight is not None and sight.of_others is not None]
