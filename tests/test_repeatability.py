@@ -290,3 +290,20 @@ def test_no_lap_no_figure(arm: Robot) -> None:
         laps_figure(Repeatability((none,), PERIOD))
     assert not none.closes
     assert none.winding is None
+
+
+@pytest.mark.parametrize(("radius", "closes"), [(3.0, True), (0.3, False)])
+def test_an_extended_jacobian_on_wheels_leaves_the_heading_free(radius: float, closes: bool) -> None:
+    """Task and added task fix all but the heading, which only a long path brings to its own."""
+    ej = Scenario.load(
+        "unicycle_2r_position", {"resolver.kind": "ej", "task.0.reference.radius": radius, "dt": 0.01}
+    )
+    robot, controller, lap = ej.robot(), ej.controller(), round(25.0 / 0.01)
+    q0 = robot.q({"theta": 1.5, "q1": pi / 4, "q2": pi / 4 - 1.5})  # theta + q1 + q2 = pi/2: y = 0
+    on_circle = 2.0 + radius * np.cos(1.25 * pi)
+    q0[:2] = on_circle - nmm.Configuration(robot, q0).placement("ee").translation[:2]
+    run = nmm.simulate(controller, q0, 75.0, 0.01)
+    assert np.linalg.norm(run.error, axis=1).max() < 1e-8
+    drift = np.abs(np.angle(np.exp(1j * (run.q[2 * lap + lap, 2] - run.q[2 * lap, 2]))))
+    assert (drift < 1e-6) == closes
+    assert closes or drift > 0.4

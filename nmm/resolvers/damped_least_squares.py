@@ -52,8 +52,8 @@ class DampedLeastSquares(Resolver):
     alpha : step size α > 0, 1/s times the unit of H's curvature
     law : how λ depends on the singular values σ of J, rows in their natural scales: "directions", each
         direction by its own σ, λ_i² = λ² (1 - (σ_i / ε)²) below ε and none from there on (Maciejewski
-        and Klein 1988, Chiaverini 1997); "variable", all directions by the least σ (Nakamura and
-        Hanafusa 1986, with σ_min for the manipulability); "constant", all by λ everywhere (Wampler 1986)
+        and Klein 1988, Chiaverini 1997); "variable", all directions by the least σ (Chiaverini,
+        Egeland and Kanestrøm 1991); "constant", all by λ everywhere (Wampler 1986)
     damping : the largest λ > 0
     threshold : ε > 0; where no σ is smaller, nothing is damped and the answer is the projected gradient's
         ("constant" damps the rate everywhere, and keeps the objective out of the task from ε on)

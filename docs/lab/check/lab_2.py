@@ -143,13 +143,13 @@ def effort(of: object) -> str:
     t = np.linspace(0, 8, 401)
     constant = np.tile([3.0, 0.0, -4.0, 0.0], (len(t), 1))
     given = one_number(of, t, constant)
-    if not np.isclose(given, 5.0):
-        raise Wrong(f"effort: constant inputs (3, 0, -4, 0) have ‖u‖ = 5 all the time; got {given:.4g}")
+    if not np.isclose(given, 200.0):
+        raise Wrong(f"effort: constant inputs (3, 0, -4, 0) have ‖u‖² = 25, for 8 s: 200; got {given:.4g}")
     wave = constant * np.sin(2 * pi * t / 8)[:, None]
     given = one_number(of, t, wave)
-    if not np.isclose(given, 5 / np.sqrt(2), rtol=0.01):
-        raise Wrong(f"effort: a sine of amplitude 5 has an RMS of 5/√2, got {given:.4g}: square, mean, root")
-    return "the RMS of ‖u‖"
+    if not np.isclose(given, 100.0, rtol=0.01):
+        raise Wrong(f"effort: a sine of amplitude 5 has half of a constant's, 100; got {given:.4g}")
+    return "∫‖u‖² dt"
 
 
 @exercise

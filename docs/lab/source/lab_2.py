@@ -208,15 +208,15 @@ if check.ready("closed_loop", "runge_kutta", "fitted_gain"):
 # %% [markdown]
 # ## 6. RG and PG: H, effort, peaks (6 min)
 #
-# The paper finds that RG holds H lower than PG at the same α. What does that cost? Two numbers for the inputs: their effort, the RMS
-# of ‖u‖ over the time, and the peak of each.
+# The paper finds that RG holds H lower than PG at the same α. What does that cost? Two numbers for the inputs: their effort ∫‖u‖² dt,
+# and the peak of each.
 
 
 # %%
 def effort(t, u):
-    """RMS of ‖u‖, for times (N,), evenly spaced, and inputs (N, 4)"""
+    """∫‖u‖² dt, for times (N,), evenly spaced, and inputs (N, 4)"""
     # answer
-    return np.sqrt(np.mean(np.sum(u**2, axis=1)))
+    return np.trapezoid(np.sum(u**2, axis=1), t)
     # end
 
 
@@ -236,7 +236,7 @@ def peaks(u):
 check.peaks(peaks)
 
 # %% [markdown]
-# The paper's case 2: the hand on the circle, the second link pointing along it.
+# The paper's case 2: the end-effector on the circle, the second link pointing at (6, 2).
 
 # %%
 if check.ready("effort", "peaks"):
