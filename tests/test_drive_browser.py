@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import AbstractContextManager
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from playback_browser import UPRIGHT, WALK, Window, draw_frames, watched
 from playback_browser import browser as browser
@@ -14,7 +15,7 @@ from playwright.sync_api import Browser, Page
 from ports import MOST, served
 
 import nmm
-from nmm.driving import ScenarioSetup, drive
+from nmm.driving import DriveSetup, RobotSetup, ScenarioSetup, drive
 from nmm.resolver_style import resolver_styles
 from nmm.robots.configuration import Configuration
 
@@ -35,7 +36,7 @@ def setup() -> ScenarioSetup:
     return ScenarioSetup(nmm.Scenario.load("unicycle_3r_position"))
 
 
-def driven(setup: ScenarioSetup) -> AbstractContextManager[str]:
+def driven(setup: DriveSetup) -> AbstractContextManager[str]:
     """The address of a robot that is driven."""
     return served(drive, setup)
 
@@ -131,6 +132,105 @@ def test_an_arrow_goes_along_its_axis_and_keys_too(window: Window, setup: Scenar
         assert target(page)[0] == 0.5
         box.press("ArrowUp")  # the box's own key, and nobody else's
         assert target(page)[1] == before[1]
+
+
+def ball_from(page: Page, at: tuple[float, float]) -> float:
+    """How far the first ball is from a point of the window, px."""
+    page.evaluate("viewer.scene.updateMatrixWorld(true)")
+    return float(np.hypot(*np.subtract(page.evaluate(WHERE, [0, "", 0.0]), at)))
+
+
+def test_the_ball_stays_under_the_pointer_while_the_robot_drives(
+    window: Window, setup: ScenarioSetup
+) -> None:
+    """For 10 s, of which the robot drives the first ones, with a camera that goes along with it."""
+    with driven(setup) as url:
+        page = opened(window, url)
+        page.set_viewport_size({"width": 1280, "height": 800})
+        page.get_by_label("K of ee").fill("2.9")
+        page.get_by_label("K of ee").dispatch_event("change")
+        arrived(page)
+        assert page.evaluate("nmm.camera.following")
+        x, y = page.evaluate(WHERE, [0, "", 0.0])
+        root = "nmm.node(nmm.motions[0].root).matrixWorld.elements.slice(12, 15)"
+        began, before = np.array(page.evaluate(root)), target(page)
+        page.mouse.move(x, y)
+        page.mouse.down()
+        page.mouse.move(x + 150.0, y + 60.0, steps=6)
+        apart = []
+        for k in range(20):
+            page.wait_for_timeout(500.0)
+            at = (x + 150.0 + k, y + 60.0)
+            apart.append(ball_from(page, (at[0] - (k > 0), at[1])))
+            page.mouse.move(*at)
+            apart.append(ball_from(page, at))
+        gone = np.linalg.norm(np.array(page.evaluate(root)) - began)
+        assert gone > 0.3
+        assert max(apart) < 2.0, apart
+        assert np.linalg.norm(target(page) - before) < 3.0
+        # Let go of, the camera catches up: the robot is where it was in the picture.
+        place = """() => new MeshCat.THREE.Vector3()
+          .setFromMatrixPosition(nmm.node(nmm.motions[0].root).matrixWorld).project(viewer.camera).toArray()"""
+        away = page.evaluate(place)
+        page.mouse.up()
+        page.wait_for_timeout(1000.0)
+        back = page.evaluate(place)
+        assert np.hypot(*back[:2]) < np.hypot(*away[:2])
+
+
+#: Where a point of a target's ring is in the window, px: `at` rad about its axis from the next axis on, and on the
+#: tangent there, `further` times the radius on.
+ON_RING = """([axis, at, further]) => {
+  const { turned } = nmm.gizmos.all[0];
+  const ring = turned.children.find((one) => one.children[0].userData.name === `turn ${"xyz"[axis]}`);
+  const { radius } = ring.children[0].geometry.parameters;
+  const p = new MeshCat.THREE.Vector3();
+  p.setComponent((axis + 1) % 3, radius * (Math.cos(at) - further * Math.sin(at)));
+  p.setComponent((axis + 2) % 3, radius * (Math.sin(at) + further * Math.cos(at)));
+  viewer.scene.updateMatrixWorld(true);
+  turned.localToWorld(p).project(viewer.camera);
+  const box = document.getElementById("view").getBoundingClientRect();
+  return [box.left + (0.5 + 0.5 * p.x) * box.width, box.top + (0.5 - 0.5 * p.y) * box.height, p.z];
+}"""
+
+
+#: How far a ring is dragged, rad.
+TURN = 0.5
+
+
+def test_a_ring_turns_the_target_by_the_angle_dragged(window: Window) -> None:
+    """About each of its own axes, seen from two sides; Pinocchio composes the rotations."""
+    robot = nmm.load("unicycle_3r")
+    turning = RobotSetup(robot, [nmm.Orientation("ee")], robot.q({"q2": 0.8, "q3": 0.5}))
+    with driven(turning) as url:
+        page = opened(window, url)
+        page.set_viewport_size({"width": 1280, "height": 800})
+        page.locator("#follow").click()
+        page.locator("#pause").click()
+        page.wait_for_function("nmm.drive.paused")
+        sides: list[bool] = []
+        for side in ("iso", "top"):
+            page.evaluate(f"nmm.camera.look('{side}')")
+            draw_frames(page)
+            for axis in range(3):
+                for at in np.arange(0.3, 6.0, 0.25):  # where nothing else is before it
+                    x, y, _ = page.evaluate(ON_RING, [axis, at, 0.0])
+                    page.mouse.move(x, y)
+                    if page.evaluate("nmm.gizmos.bright") == f"0 turn {'xyz'[axis]}":
+                        break
+                before, steps = pin.exp3(target(page)), np.linspace(0.1, TURN, 5)
+                arc = np.array([page.evaluate(ON_RING, [axis, at + step, 0.0]) for step in steps])
+                points = [page.evaluate(ON_RING, [axis, one, 0.0]) for one in np.arange(0.0, 6.3, 0.1)]
+                front = 0.1 * np.argmin(np.array(points)[:, 2])  # where it is nearest to the eye
+                line = np.array([page.evaluate(ON_RING, [axis, front, step]) for step in [0.0, *steps]])
+                page.mouse.down()
+                sides.append(page.evaluate("nmm.gizmos.held.side"))
+                for one in [x, y] + (line[1:] - line[0])[:, :2] if sides[-1] else arc[:, :2]:
+                    page.mouse.move(*one)
+                page.mouse.up()
+                turned = pin.log3(before.T @ pin.exp3(target(page)))
+                np.testing.assert_allclose(turned, TURN * np.eye(3)[axis], atol=0.03)
+        assert set(sides) == {False, True}
 
 
 def test_what_is_chosen_changes_the_controller(window: Window, setup: ScenarioSetup) -> None:

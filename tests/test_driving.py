@@ -481,6 +481,36 @@ def test_pause_restart_and_choices_are_told() -> None:
         wait_for(lambda: loop.picture()["t"] > 0.1)
 
 
+def test_an_aim_shows_before_the_next_picture_is_due(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("nmm.playback.session.FPS", 0.01)
+    with Loop(RobotSetup(nmm.load("unicycle_2r"), [nmm.Position("ee", "xy")], np.zeros(5))) as loop:
+        first = loop.latest().splitlines()[-2]
+        began = loop.session._driven.targets[0].signal.value
+        aim = {"type": "aim", "task": 0, "value": [began[0] - 0.5, began[1] + 0.5]}
+        loop.session.receive(json.dumps(aim))
+        wait_for(lambda: loop.latest().splitlines()[-2] != first)
+
+
+def test_targets_are_brought_to_where_the_robot_is() -> None:
+    with Loop(scenario()) as loop:
+        wait_for(lambda: loop.picture()["t"] > 0.2)
+        loop.session.receive('{"type":"order","what":"here"}')
+        wait_for(lambda: np.allclose(loop.picture()["targets"], loop.picture()["at"], atol=1e-12))
+
+
+def test_the_rows_of_a_rotation_are_told() -> None:
+    robot = nmm.load("unicycle_3r")
+    for function, axes, rotation in (
+        (nmm.Pose("ee"), {"x": 0, "y": 1, "z": 2}, (3, 4, 5)),
+        (nmm.Orientation("ee"), {}, (0, 1, 2)),
+        (nmm.Orientation("ee", relative_to="link1"), {}, ()),
+        (nmm.Position("ee"), {"x": 0, "y": 1, "z": 2}, ()),
+    ):
+        task = nmm.Task(function, np.zeros(len(function.rows(robot))))
+        shown = task.function.shown()
+        assert (dict(shown.axes), shown.rotation) == (axes, rotation)
+
+
 def test_time_passes_as_it_does_on_the_wall() -> None:
     """As far as the machine can: what it could not do in time is told."""
     with Loop(scenario()) as loop:

@@ -15,6 +15,7 @@ from nmm.diagnosis.reasons import out_of_reach, stretched
 from nmm.driving.setups import Choice, DriveSetup, Settings, aimed, named, targets_of
 from nmm.driving.things import Thing, Things
 from nmm.errors import NmmError, expect
+from nmm.functions.program import evaluate
 from nmm.playback.rolling import RolledRobot
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import CENTER_OF_MASS
@@ -163,6 +164,12 @@ class Driven:
         else:
             self.things[task - len(self.targets)].drag(value, self.t)
         self.trouble = ""
+
+    def aim_here(self) -> None:
+        """Aim each task at the value that it has now."""
+        here = Configuration(self.robot, self.q)
+        for number, task in enumerate(self.reacting.task):
+            self.aim(number, evaluate(task.function, 0.0, here).value)
 
     def with_choice(self, key: str, value: object) -> Made:
         """A controller with that choice, for `use`; made apart, as it may take longer than a step. `NmmError`

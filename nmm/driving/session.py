@@ -63,7 +63,7 @@ class Pick:
 
 @dataclass(frozen=True, config=_STRICT)
 class Order:
-    what: Literal["pause", "go", "restart", "plan", "react"]
+    what: Literal["pause", "go", "restart", "here", "plan", "react"]
     type: Literal["order"] = "order"
 
 
@@ -128,6 +128,7 @@ class DriveSession(RobotSession):
         self._driven = driven
         self._look = look = driven.look()
         self._waiting: deque[Message] = deque(maxlen=WAITING)
+        self._aimed = threading.Event()
         self._samples: deque[tuple[int, list[float | None]]] = deque(maxlen=KEPT)
         self._picks: dict[str, object] = {}
         self._making: Future[Made] | None = None
@@ -166,7 +167,7 @@ class DriveSession(RobotSession):
             look=looks([_kind(driven.choices)])[0],
             cameras=self._cameras(look),
             further=targets.commands,
-            scripts=("drive_gizmo.js", "drive.js"),
+            scripts=("drive_gizmo.js", "drive_border.js", "drive.js"),
             styles=("drive.css",),
             port=port,
         )
@@ -195,10 +196,18 @@ class DriveSession(RobotSession):
             for camera in self._seen.cameras
         ]
 
+    def close(self) -> None:
+        self.ended.set()
+        self._aimed.set()  # the loop waits for that, too
+        super().close()
+
     def receive(self, text: str | bytes) -> bool:
         """Queue a page's message for the loop, ignoring invalid ones. False: there is no answer."""
         with suppress(InputError):
-            self._waiting.append(parsed(text))
+            heard = parsed(text)
+            self._waiting.append(heard)
+            if isinstance(heard, Aim):
+                self._aimed.set()
         return False
 
     def follow(self) -> Callable[[], str]:
@@ -227,6 +236,7 @@ class DriveSession(RobotSession):
     def _run(self) -> None:
         driven, dt, owed = self._driven, self._driven.setup.dt, 0.0
         while not self.ended.is_set():
+            self._aimed.clear()
             self._attend()
             passed = self.clock.passed()
             owed = 0.0 if self._paused or driven.trouble else owed + passed
@@ -241,7 +251,9 @@ class DriveSession(RobotSession):
                 self.changed()
             except NmmError:  # the server has been closed
                 return
-            self.clock.rest(self.ended)
+            if self.clock.rest(self._aimed):
+                # What is aimed at shows one step later, not when the next picture is due.
+                self.ended.wait(self.clock.until(dt - owed))
 
     def _attend(self) -> None:
         while self._waiting:
@@ -255,12 +267,14 @@ class DriveSession(RobotSession):
                 elif message.what == "restart":
                     self._driven.restart()
                     self._planning.begin_again()
+                elif message.what == "here":
+                    self._driven.aim_here()
                 elif message.what in ("plan", "react"):
                     self._planning.turn(message.what == "plan")
                 else:
                     self._paused = message.what == "pause"
-            except InputError:
-                continue  # no page of ours has that task
+            except NmmError:
+                continue  # no page of ours has that task; what has no value is not aimed at
         if self._making is not None and self._making.done():
             try:
                 self._driven.use(self._making.result())

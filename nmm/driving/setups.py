@@ -266,19 +266,22 @@ class RobotSetup(DriveSetup):
 @dataclass(frozen=True, eq=False)
 class Target:
     """One task's target, s numbers, with the rows' names and units. `frame` is what the task positions in the
-    world, or None; `axes` are the rows that hold each axis."""
+    world, or turns there, or None; `axes` are the rows that hold each axis, `rotation` those of its rotation
+    vector."""
 
     title: str
     signal: LiveTarget
     rows: tuple[tuple[str, str], ...]
     frame: str | None
     axes: dict[str, int]
+    rotation: tuple[int, ...]
 
     def for_page(self) -> dict[str, Any]:
         rows = [{"name": name.removeprefix(f"{self.title}."), "unit": unit} for name, unit in self.rows]
         heading = f"Target of {self.title}"
-        axes = {} if self.frame is None else self.axes
-        return {"name": self.title, "heading": heading, "rows": rows, "frame": self.frame, "axes": axes}
+        known = {} if self.frame is None else {"axes": self.axes, "rotation": self.rotation}
+        found = {"name": self.title, "heading": heading, "rows": rows, "frame": self.frame}
+        return {**found, "axes": {}, "rotation": (), **known}
 
 
 def targets_of(controller: Controller, q: Array, *, at_robot: bool) -> tuple[Target, ...]:
@@ -290,8 +293,9 @@ def targets_of(controller: Controller, q: Array, *, at_robot: bool) -> tuple[Tar
         rows = tuple((row.name, row.unit) for row in task.function.rows(controller.robot))
         shown = task.function.shown()
         axes = dict(shown.axes) if shown.positions is not None else {}
+        frame = shown.positions or (shown.turns if shown.rotation else None)
         signal = LiveTarget(np.array(value), rows[0][1])
-        found.append(Target(title_of(task, controller.robot), signal, rows, shown.positions, axes))
+        found.append(Target(title_of(task, controller.robot), signal, rows, frame, axes, shown.rotation))
     return tuple(found)
 
 

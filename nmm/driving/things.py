@@ -42,7 +42,8 @@ class Thing:
     def for_page(self) -> dict[str, Any]:
         axes = {axis: row for row, axis in enumerate("xyz")}
         rows = [{"name": axis, "unit": "m"} for axis in axes]
-        return {"name": self.title, "heading": self.title, "rows": rows, "frame": None, "axes": axes}
+        found = {"name": self.title, "heading": self.title, "rows": rows, "frame": None}
+        return {**found, "axes": axes, "rotation": ()}
 
 
 class Things:

@@ -229,6 +229,7 @@ class Shown(NamedTuple):
     positions : the frame whose origin it positions in the world
     axes : the world axes ("x", "y", "z") of that position, each with its row, m
     turns : the frame that it turns
+    rotation : the rows of that frame's rotation vector in the world, rad; () where it has not all three
     looks_at : the fixed point that it looks at, (2,) or (3,), m, world axes
     sees : what a camera sees of points
 
@@ -242,6 +243,7 @@ class Shown(NamedTuple):
     positions: str | None = None
     axes: Mapping[str, int] = MappingProxyType({})
     turns: str | None = None
+    rotation: tuple[int, ...] = ()
     looks_at: Array | None = None
     sees: Sight | None = None
 

@@ -204,14 +204,19 @@ class Clock:
         self.lost += math.ceil(gone * FPS) - 1
         return 1.0 / FPS
 
-    def rest(self, ended: threading.Event, *, stands: bool = False) -> None:
-        """Wait until the next picture is due, or `ended` is set; while time stands nothing is late."""
+    def rest(self, woken: threading.Event, *, stands: bool = False) -> bool:
+        """Wait until the next picture is due, or `woken` is set, and tell which; while time stands nothing is
+        late."""
         behind = self._now - self._due
-        if stands or behind > 1.0 / FPS:
-            self.late += 0 if stands else int(behind * FPS)
+        if stands or behind < 0.0 or behind > 1.0 / FPS:
+            self.late += 0 if stands else max(0, int(behind * FPS))
             self._due = self._now
         self._due += 1.0 / FPS
-        ended.wait(max(0.0, self._due - time.monotonic()))
+        return woken.wait(max(0.0, self._due - time.monotonic()))
+
+    def until(self, seconds: float) -> float:
+        """How long it is until so many seconds after the last `passed`, s; 0 when they are over."""
+        return max(0.0, self._now + seconds - time.monotonic())
 
 
 def message(text: str | bytes, kinds: Mapping[str, Collection[str]]) -> dict[str, Any]:

@@ -70,6 +70,8 @@ def _said(function: Function, robot: Robot, rows: int) -> Shown:
             robot.frame_id(frame)
     fits = all(axis in AXES and row in range(rows) for axis, row in said.axes.items())
     expect(fits, name, f"axes from x, y, z with rows from 0 to {rows - 1}", dict(said.axes))
+    fits = len(said.rotation) in (0, 3) and all(row in range(rows) for row in said.rotation)
+    expect(fits, name, f"three rows from 0 to {rows - 1} as rotation, or none", said.rotation)
     fits = said.looks_at is None or np.shape(said.looks_at) in ((2,), (3,))
     expect(fits, name, "2 or 3 numbers as looks_at", said.looks_at)
     return said

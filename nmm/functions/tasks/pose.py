@@ -116,7 +116,11 @@ class PartsOfPose(Function):
     def shown(self) -> Shown:
         if self.relative_to is not None:
             return Shown()
-        return Shown(self.frame, {part: row for row, part in enumerate(self.parts) if part in PARTS[:3]})
+        rows = {part: row for row, part in enumerate(self.parts)}
+        axes = {part: rows[part] for part in PARTS[:3] if part in rows}
+        rotation = tuple(rows[part] for part in PARTS[3:] if part in rows)
+        turns = self.frame if rotation else None
+        return Shown(self.frame if axes else None, axes, turns, rotation if len(rotation) == 3 else ())
 
 
 @kernel(FUNCTION)
@@ -175,7 +179,7 @@ class Orientation(PartsOfPose):
     parts = PARTS[3:]
 
     def shown(self) -> Shown:
-        return Shown(turns=self.frame)
+        return super().shown()._replace(turns=self.frame)
 
 
 @kernel(FUNCTION)

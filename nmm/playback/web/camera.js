@@ -3,18 +3,19 @@
 {
   const THREE = MeshCat.THREE;
   const FIELD = 36;
+  const CATCH = 600; // ms
   // From the target towards the camera, in the world's axes. From right above, up would be nowhere.
   const TOWARDS = {
     iso: new THREE.Vector3(0.42, -0.9, 0.82),
     top: new THREE.Vector3(0, -0.001, 1),
     front: new THREE.Vector3(0, -1, 0.06),
   };
-  const camera = (nmm.camera = { following: false, moved: false, held: null, also: () => [], from: "iso" });
+  const camera = (nmm.camera = { following: false, frozen: false, moved: false, held: null, also: () => [], from: "iso" });
   const chooser = document.getElementById("from");
   // Not the window: a page may have something beside the view.
   const view = document.getElementById("view");
   const upright = (v) => new THREE.Vector3(v.x, v.z, -v.y);
-  let eye, points, tags, last;
+  let eye, points, tags, last, thawed;
   const vectors = (numbers = []) =>
     Array.from({ length: numbers.length / 3 }, (_, i) => upright(new THREE.Vector3().fromArray(numbers, 3 * i)));
 
@@ -153,7 +154,9 @@
   const apart = (held) => (nmm.apart.ways.length ? nmm.apart.ways.flatMap((way) => held.map((p) => p.clone().add(way))) : held);
 
   camera.reset = () => {
+    if (camera.frozen) return undefined;
     camera.moved = false;
+    thawed = undefined;
     const towards = upright(TOWARDS[camera.from]);
     const also = camera.also(); // what a page holds besides
     if (!camera.following && !camera.held) return look([...apart(points), ...also], towards, apart(tags));
@@ -211,11 +214,22 @@
     camera.reset();
   };
 
+  // Under a hand that holds something the picture stands; then the camera catches up.
+  camera.freeze = (on) => {
+    camera.frozen = on;
+    thawed = { at: performance.now(), left: CATCH };
+  };
   camera.update = () => {
-    if (!camera.following) return;
-    const now = middle();
-    eye.position.add(now).sub(last);
-    nmm.viewer.controls.target.add(now).sub(last);
-    last = now;
+    if (!camera.following || camera.frozen) return;
+    const way = middle().sub(last);
+    if (thawed) {
+      const now = performance.now();
+      const passed = now - thawed.at;
+      way.multiplyScalar(Math.min(1, passed / thawed.left));
+      thawed = passed < thawed.left ? { at: now, left: thawed.left - passed } : undefined;
+    }
+    eye.position.add(way);
+    nmm.viewer.controls.target.add(way);
+    last.add(way);
   };
 }

@@ -1,7 +1,7 @@
 // What the page is told to draw. Commands come as lines of JSON, from the page itself or from a socket, and
 // are carried out in order and at once; those not known here are MeshCat's.
 "use strict";
-const nmm = (window.nmm = { hooks: {}, geometries: {} });
+const nmm = (window.nmm = { hooks: {}, geometries: {}, endings: [], ended: false });
 
 {
   const view = document.getElementById("view");
@@ -45,7 +45,6 @@ const nmm = (window.nmm = { hooks: {}, geometries: {} });
     if (nmm.stage && !nmm.camera.moved) nmm.camera.reset();
     nmm.viewer.set_dirty();
   };
-  window.addEventListener("resize", () => nmm.resize());
 }
 
 {

@@ -31,6 +31,7 @@
     for (const [task, value] of aims) send({ type: "aim", task, value });
     aims.clear();
     stick();
+    nmm.border.update(drive.targets);
   }
   requestAnimationFrame(flush);
 
@@ -66,7 +67,8 @@
   function place(target) {
     if (!target.gizmo) return;
     const at = Object.fromEntries(["x", "y", "z"].map((axis, i) => [axis, target.axes[axis] === undefined ? target.at[i] : target.value[target.axes[axis]]]));
-    nmm.gizmos.put(target.gizmo, at.x, at.y, at.z);
+    const rotation = target.rotation.length ? nmm.gizmos.quaternion(target.rotation.map((k) => target.value[k])) : undefined;
+    nmm.gizmos.put(target.gizmo, at, rotation);
   }
 
   nmm.hooks.targets = ({ targets, values, at, goals, reach, far }) => {
@@ -85,12 +87,13 @@
       target.part = nmm.element(panel, "fieldset");
       nmm.element(target.part, "legend", {}, one.heading);
       target.inputs = one.rows.map((_, k) => row(target, k, one.rows[k]));
-      if (Object.keys(one.axes).length) {
-        const ways = Object.keys(one.axes);
-        target.gizmo = nmm.gizmos.add(number, ways, 0.2 * reach, (point) => {
+      const ways = Object.keys(one.axes);
+      if (ways.length || one.rotation.length) {
+        target.gizmo = nmm.gizmos.add(number, { axes: ways, turns: one.rotation.length > 0 }, 0.2 * reach, (point, rotation) => {
           drive.active = number;
           const value = [...target.value];
           for (const axis of ways) value[one.axes[axis]] = point[axis];
+          nmm.gizmos.vector(rotation).forEach((x, i) => one.rotation.length && (value[one.rotation[i]] = x));
           aim(target, value);
         });
         if (one.frame !== null) target.trail = trail(number);
@@ -98,10 +101,12 @@
       drive.targets.push(target);
       show(target);
     });
-    drive.active = Math.max(0, drive.targets.findIndex((target) => target.gizmo));
+    drive.active = Math.max(0, drive.targets.findIndex((target) => Object.keys(target.axes).length));
     parts.choices = nmm.element(panel, "div", { id: "choices" });
     const ways = [
-      [drive.targets.some((target) => target.gizmo), "Drag the red ball (Shift: up and down) or an arrow; or arrow keys, Page Up and Page Down, a gamepad's sticks."],
+      [drive.targets.some((target) => Object.keys(target.axes).length), "Drag the red ball (Shift: up and down) or an arrow; or arrow keys, Page Up and Page Down, a gamepad's sticks."],
+      [drive.targets.some((target) => target.rotation.length), "Drag a ring to turn."],
+      [true, "T brings the targets to where the robot is."],
       [goals.some((some) => some.length), "Drag a cross in the camera's picture."],
       [true, "N plans the way round what is between."],
     ];
@@ -133,7 +138,7 @@
     const most = 30 * KEPT;
     geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(3 * most), 3));
     geometry.setDrawRange(0, 0);
-    const line = new THREE.Line(geometry, new THREE.LineBasicMaterial({ color: 0x0072b2 }));
+    const line = new THREE.Line(geometry, new THREE.LineBasicMaterial({ color: nmm.color([0, 0.447, 0.698]) }));
     line.frustumCulled = false;
     nmm.viewer.set_object(nmm.split(`/nmm/trail ${number}`), line);
     return { geometry, points: [], most };
@@ -311,6 +316,7 @@
     PageDown: (event) => step(event, "z", -1),
     " ": () => order(drive.paused ? "go" : "pause"),
     Home: () => order("restart"),
+    t: () => order("here"),
     n: () => order(drive.plans ? "react" : "plan"),
   });
   for (const key of ["End", "+", "-", "0", "l"]) delete nmm.keys[key];

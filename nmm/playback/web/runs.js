@@ -39,7 +39,7 @@ nmm.lanes = [];
   // Before there is a scene there is nothing to seek, and no run.
   nmm.seek = (t) => nmm.stage && nmm.player.seek(t - nmm.stage.start);
   nmm.state = () => ({
-    t: (nmm.stage ? nmm.stage.start : 0) + nmm.player.time,
+    t: (nmm.stage ? nmm.stage.start : 0) + (nmm.player ? nmm.player.time : 0),
     runs: nmm.runs.map((run) => {
       const at = nmm.at(run, nmm.player.time);
       const values = Object.keys(run.columns).map((key) => [key, nmm.value(run, key, at)]);

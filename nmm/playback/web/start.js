@@ -3,6 +3,17 @@
 {
   const status = document.getElementById("status");
   const embedded = document.getElementById("commands");
+  // Not before all parts of the page are there.
+  window.addEventListener("resize", () => nmm.resize());
+
+  // A program that has ended hears nothing: what one would tell it by looks dead, and is.
+  function end() {
+    nmm.ended = true;
+    document.body.classList.add("ended");
+    for (const id of ["drive", "panel", "all"]) document.getElementById(id)?.setAttribute("inert", "");
+    for (const ending of nmm.endings) ending();
+    nmm.viewer.set_dirty();
+  }
 
   function listen() {
     const socket = new WebSocket(`ws://${location.host}/socket?token=${document.body.dataset.token}`);
@@ -17,8 +28,10 @@
       nmm.viewer.num_messages_received++;
     };
     socket.onclose = () => {
-      status.textContent = nmm.stage && !nmm.stage.live ? "" : "The program that showed this has ended.";
-      status.classList.toggle("bad", status.textContent !== "");
+      if (nmm.stage && !nmm.stage.live) return;
+      status.textContent = "The program that showed this has ended.";
+      status.classList.add("bad");
+      end();
     };
   }
 
