@@ -136,6 +136,33 @@ def test_a_link_opens_the_page_at_an_instant(small_robot: Robot, window: Window,
     assert page.locator("#time").inner_text() == "12.50 / 14.00 s"
 
 
+def test_inside_another_page_the_wheel_is_the_readers_until_he_clicks(
+    small_robot: Robot, window: Window, tmp_path: Path
+) -> None:
+    file_url([drive(small_robot)], tmp_path)
+    (tmp_path / "outer.html").write_text(
+        '<body style="height: 3000px"><iframe src="playback.html#plots=none" width="400" height="250"></iframe>',
+        encoding="utf-8",
+    )
+    page = window.page
+    page.goto((tmp_path / "outer.html").as_uri())
+    inner = page.frames[1]
+    inner.wait_for_function("window.nmm && !document.body.classList.contains('loading')")
+    eye = "nmm.viewer.camera.position.toArray()"
+    first = inner.evaluate(eye)
+    page.mouse.move(200, 100)
+    page.mouse.wheel(0, 60)
+    page.wait_for_function("scrollY === 60")
+    assert inner.evaluate(eye) == first
+    page.mouse.click(200, 50)
+    page.mouse.wheel(0, 60)
+    inner.wait_for_function(f"{eye}.join() !== '{','.join(map(str, first))}'")
+    assert page.evaluate("scrollY") == 60
+    page.evaluate("document.body.tabIndex = 0; document.body.focus()")
+    page.mouse.wheel(0, -60)
+    page.wait_for_function("scrollY === 0")
+
+
 def test_hostile_names_are_only_text(small_robot: Robot, window: Window, tmp_path: Path) -> None:
     name = "</script><img src=x onerror=\"document.title='!'\">@title@"
     page = window.open(file_url([drive(small_robot, duration=0.5, label=name)], tmp_path, title=name))

@@ -196,21 +196,48 @@ def test_press_and_drag_in_a_plot_move_the_robots(plotted: Plotted) -> None:
     page.mouse.up()
 
 
-def test_hover_tells_every_runs_value(plotted: Plotted) -> None:
+def in_headers(plotted: Plotted, key: str) -> list[float]:
+    """What the header of a channel says of each run."""
+    texts = plotted.page.evaluate(
+        f"nmm.lanes.find((lane) => lane.key === '{key}').values.map((part) => part.textContent)"
+    )
+    return [float(text.replace("−", "-")) for text in texts]
+
+
+def test_headers_tell_every_runs_value_at_the_pointer_or_at_the_cursor(plotted: Plotted) -> None:
     page = plotted.page
     page.mouse.move(*plotted.place("inputs", 2.0, lane=1))
-    tip = page.locator("#tip")
-    assert tip.is_visible()
-    assert tip.locator("strong").inner_text().startswith("ω [rad/s] at 2.0")
-    rows = tip.locator("div").all_inner_texts()
-    wanted = [expected["u_omega"] for expected in plotted.wanted(2.0)]
-    for row, name, value in zip(rows, NAMES, wanted, strict=True):
-        told, number = row.split()
-        assert told == name
-        assert float(number.replace("−", "-")) == pytest.approx(value, abs=0.02)
+    hair = page.locator("#hair")
+    assert hair.is_visible()
+    at = float(hair.inner_text().split()[0])
+    assert at == pytest.approx(2.0, abs=0.02)
+    for key in ("u_omega", "error_norm"):  # of all panels, not of the one pointed at alone
+        wanted = [expected[key] for expected in plotted.wanted(at)]
+        assert in_headers(plotted, key) == pytest.approx(wanted, rel=6e-3, abs=1e-9)
     assert plotted.state()["t"] == 0.0
+    assert not page.locator("#tip").is_visible()
     page.mouse.move(5, 5)
-    assert not tip.is_visible()
+    assert not hair.is_visible()
+    for t in (0.0, 3.3):
+        page.evaluate(f"nmm.seek({t})")
+        wanted = [expected["u_omega"] for expected in plotted.wanted(t)]
+        assert in_headers(plotted, "u_omega") == pytest.approx(wanted, rel=5e-4, abs=1e-9)
+
+
+def test_a_clock_outside_the_zoom_is_said(plotted: Plotted) -> None:
+    page = plotted.page
+    cursor = page.locator("#cursor span")
+    for t, sign in ((5.5, "▶"), (1.25, "◀")):
+        page.evaluate(f"nmm.seek({t}); nmm.plots.zoom(2, 4)")
+        assert set(cursor.inner_text().split()) == {f"{t}", "s", sign}
+        wanted = [expected["u_omega"] for expected in plotted.wanted(t)]
+        assert in_headers(plotted, "u_omega") == pytest.approx(wanted, rel=5e-4, abs=1e-9)
+        assert page.evaluate("document.body.classList.contains('beyond')")
+    page.evaluate("nmm.player.play(); nmm.player.pause()")
+    assert plotted.state()["t"] == 2.0
+    assert cursor.inner_text() == ""
+    assert not page.evaluate("document.body.classList.contains('beyond')")
+    page.evaluate("nmm.plots.whole()")
 
 
 def test_the_legend_hides_a_run_everywhere(plotted: Plotted) -> None:

@@ -260,9 +260,11 @@
   function named(pen, lane, top, aside, { right, alone, colors }) {
     const rest = aside ? pen.measureText(aside).width + 10 : 0;
     pen.fillStyle = colors.ink;
-    if (!alone) pen.fillText(fit(pen, curves.named(lane), right - curves.LEFT - rest), curves.LEFT, top + 7);
-    Object.assign(pen, { textAlign: "right", lineWidth: 4, lineJoin: "round", strokeStyle: colors.plot, fillStyle: colors.quiet });
-    const at = alone ? [right - 6, top + 10] : [right, top + 7];
+    const name = alone ? "" : fit(pen, curves.named(lane), right - curves.LEFT - rest);
+    pen.fillText(name, curves.LEFT, top + 7);
+    const wide = pen.measureText(name).width;
+    Object.assign(pen, { textAlign: alone ? "right" : "left", lineWidth: 4, lineJoin: "round", strokeStyle: colors.plot, fillStyle: colors.quiet });
+    const at = alone ? [right - 6, top + 10] : [curves.LEFT + wide + 10, top + 7];
     if (alone) pen.strokeText(aside, ...at);
     pen.fillText(aside, ...at);
     pen.textAlign = "left";

@@ -56,7 +56,10 @@
     player.range = { from: first, to: length === duration ? duration : first + length };
     Object.assign(get("slider"), { min: player.range.from, max: player.range.to });
     get("slider").value = player.time;
+    document.body.classList.toggle("beyond", player.beyond() !== 0);
   };
+  // Whether the clock is before (-1) or after (1) what is zoomed into: where the slider cannot be.
+  player.beyond = () => (player.time < player.range.from - 1e-9 ? -1 : Number(player.time > player.range.to + 1e-9));
 
   // time: s since the first sample.
   player.seek = (time) => {
@@ -71,6 +74,7 @@
     nmm.plots.update();
     nmm.values.update();
     get("slider").value = player.time;
+    document.body.classList.remove("beyond");
     get("slider").setAttribute("aria-valuetext", `${(nmm.stage.start + player.time).toFixed(2)} s`);
     const end = nmm.stage.start + duration;
     get("time").textContent = `${(nmm.stage.start + player.time).toFixed(2)} / ${end.toFixed(2)} s`;
@@ -93,7 +97,7 @@
   }
 
   player.play = () => {
-    if (player.time >= player.range.to) player.seek(player.range.from);
+    if (player.time >= player.range.to || player.beyond()) player.seek(player.range.from);
     setPlaying(nmm.stage.duration > 0);
   };
   player.pause = () => setPlaying(false);

@@ -1,13 +1,14 @@
-// The plots beside the scene: panels that fold, one cursor over all of them, hover, press to seek, zoom in time.
+// The plots beside the scene: panels that fold, one cursor over all of them, press to seek, zoom in time. A pointer
+// over a plot has a line of its own through all of them; headers tell each run's value there, else at the cursor.
 // Curves are drawn once for a size, a zoom, a theme and what is shown; a seek moves the cursor and nothing else.
 "use strict";
 {
   const get = (id) => document.getElementById(id);
   const plots = (nmm.plots = { panels: [], shown: false, listeners: [] });
-  const [dock, stack, cursor, ruler, tip] = ["plots", "stack", "cursor", "ruler", "tip"].map(get);
+  const [stack, cursor, hair, ruler, tip] = ["stack", "cursor", "hair", "ruler", "tip"].map(get);
   const changed = () => plots.listeners.forEach((listener) => listener());
   const TABLES = ["facts", "values"];
-  let width = 0;
+  let [width, pointed] = [0, null]; // px; s, where the pointer is
 
   const range = () => [nmm.player.range.from, nmm.player.range.to];
   const span = () => nmm.player.range.to - nmm.player.range.from || 1;
@@ -51,6 +52,7 @@
     let top = 0;
     panel.lanes.forEach((lane, i) => {
       Object.assign(lane, { top, bottom: top + heights[i] + nmm.curves.GAP });
+      if (panel.lanes.length > 1) lane.now.style.top = `${panel.canvas.offsetTop + top}px`;
       nmm.curves.draw(pen, lane, top, heights[i], { ...about, alone: panel.lanes.length === 1 });
       top = lane.bottom;
     });
@@ -93,7 +95,38 @@
     if (!plots.shown) return;
     const at = Math.min(Math.max(x(Math.min(nmm.player.time, nmm.stage.duration)), nmm.curves.LEFT), Math.max(right(), 0));
     cursor.style.transform = `translateX(${at.toFixed(2)}px)`;
+    const beyond = nmm.player.beyond();
+    const told = nmm.curves.time(nmm.stage.start + nmm.player.time, 0.01);
+    cursor.className = ["before", "", "after"][beyond + 1];
+    cursor.firstChild.textContent = ["", `◀ ${told} s`, `${told} s ▶`][beyond ? 1 + (beyond > 0) : 0];
+    tell();
   };
+
+  // In each header, the value of each run where the pointer is, or else at the cursor.
+  function tell() {
+    const time = pointed ?? nmm.player.time;
+    const places = nmm.runs.map((run) => nmm.at(run, time));
+    for (const { part, lanes } of plots.panels) {
+      if (!part.open) continue;
+      for (const { key, values } of lanes) {
+        nmm.runs.forEach((run, i) => {
+          const shown = !run.hidden && run.columns[key] !== undefined;
+          if (values[i].hidden === shown) values[i].hidden = !shown;
+          const text = shown ? nmm.values.text(nmm.value(run, key, places[i]), run, key, 4) : "";
+          if (values[i].lastChild.data !== text) values[i].lastChild.data = text;
+        });
+      }
+    }
+  }
+  function point(time) {
+    pointed = time;
+    hair.hidden = time === null;
+    if (time !== null) {
+      hair.style.transform = `translateX(${x(time).toFixed(2)}px)`;
+      hair.firstChild.textContent = `${(nmm.stage.start + time).toFixed(3)} s`;
+    }
+    tell();
+  }
 
   plots.show = (on) => {
     plots.shown = on && plots.panels.length > 0;
@@ -126,7 +159,8 @@
       const lanes = nmm.lanes.filter((lane) => lane.panel === id);
       const [only, another] = lanes;
       const symbol = another || id === "partition" ? "" : `, ${nmm.curves.named(only)}`;
-      part.appendChild(document.createElement("summary")).textContent = `${title}${symbol}`;
+      const summary = part.appendChild(document.createElement("summary"));
+      summary.textContent = `${title}${symbol}`;
       const canvas = part.appendChild(document.createElement("canvas"));
       canvas.setAttribute("role", "img");
       canvas.setAttribute("aria-label", `${title} over time: ${lanes.map((lane) => lane.text).join(", ")}. The values are in the table.`);
@@ -137,6 +171,14 @@
         plots.draw();
         changed();
       });
+      for (const lane of lanes) {
+        lane.now = nmm.element(another ? part : summary, "span", { class: "now", "aria-hidden": "true" });
+        lane.values = nmm.runs.map((run) => {
+          const value = nmm.element(lane.now, "span", { hidden: "" }, " ");
+          if (nmm.runs.length > 1) value.prepend(nmm.sign("line", run.color, run.dash));
+          return value;
+        });
+      }
       listen(panel);
     }
     plots.first = plots.opened();
@@ -145,44 +187,27 @@
   };
 
   // Press and drag seek; a pointer that only passes over asks for the values there.
-  function listen({ canvas, lanes }) {
+  function listen({ canvas }) {
     const seek = (event) => nmm.player.seek(timeAt(event));
     canvas.addEventListener("pointerdown", (event) => {
       if (event.button !== 0) return;
       canvas.setPointerCapture(event.pointerId);
-      tip.hidden = true;
+      point(null);
       seek(event);
     });
     canvas.addEventListener("pointermove", (event) => {
       if (canvas.hasPointerCapture(event.pointerId)) return seek(event);
-      const y = event.clientY - canvas.getBoundingClientRect().top;
-      return hover(event, lanes.find((lane) => y >= lane.top && y < lane.bottom));
+      return point(timeAt(event));
     });
-    canvas.addEventListener("pointerleave", () => (tip.hidden = true));
+    canvas.addEventListener("pointerleave", () => point(null));
   }
 
-  function hover(event, lane) {
-    tip.hidden = lane === undefined;
-    if (lane === undefined) return;
-    const time = timeAt(event);
-    const title = document.createElement("strong");
-    title.textContent = `${nmm.curves.named(lane)} at ${(nmm.stage.start + time).toFixed(3)} s`;
-    const rows = nmm.runs.filter((run) => !run.hidden && run.columns[lane.key]).map((run) => {
-      const row = document.createElement("div");
-      const value = document.createElement("b");
-      value.textContent = nmm.values.text(nmm.value(run, lane.key, nmm.at(run, time)), run, lane.key);
-      row.append(nmm.sign("line", run.color, run.dash), run.name, value);
-      return row;
-    });
-    tip.replaceChildren(title, ...rows);
-    place(event);
-  }
-
-  // The tip, beside the pointer.
+  // Beside the plots, or above them where they are below the scene: it covers none.
   function place(event) {
-    const box = tip.getBoundingClientRect();
-    const left = event.clientX + 14 + box.width > window.innerWidth - 8 ? event.clientX - 14 - box.width : event.clientX + 14;
-    const top = Math.min(event.clientY + 14, window.innerHeight - 8 - box.height);
+    const [box, dock] = [tip, get("plots")].map((part) => part.getBoundingClientRect());
+    const beside = dock.left > box.width + 12;
+    const left = beside ? dock.left - 8 - box.width : Math.min(event.clientX, window.innerWidth - 8 - box.width);
+    const top = beside ? Math.min(event.clientY - 8, window.innerHeight - 8 - box.height) : dock.top - 8 - box.height;
     Object.assign(tip.style, { left: `${Math.max(left, 4)}px`, top: `${Math.max(top, 4)}px` });
   }
 

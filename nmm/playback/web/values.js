@@ -5,13 +5,13 @@
   const part = document.getElementById("values");
   let [rows, seen] = [[], false];
 
-  // Six digits, without an exponent where one can read it so.
-  values.text = (value, run, key) => {
+  // So many digits, without an exponent where one can read it so.
+  values.text = (value, run, key, digits = 6) => {
     if (value === null) return "–";
     if (key === "partition") return run.partitions[value] ?? "–";
     const size = Math.abs(value);
     if (size === 0) return "0";
-    const text = size !== 0 && (size < 1e-4 || size >= 1e6) ? value.toExponential(3) : value.toPrecision(6);
+    const text = size !== 0 && (size < 1e-4 || size >= 1e6) ? value.toExponential(Math.min(3, digits - 2)) : value.toPrecision(digits);
     return text.replace("e-", "e−").replace(/^-/, "−");
   };
 
