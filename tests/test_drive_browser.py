@@ -178,8 +178,8 @@ def test_the_ball_stays_under_the_pointer_while_the_robot_drives(
         assert np.hypot(*back[:2]) < np.hypot(*away[:2])
 
 
-#: Where a point of a target's ring is in the window, px: `at` rad about its axis from the next axis on, and on the
-#: tangent there, `further` times the radius on.
+#: Where a point of a target's ring is in the window, px: `at` rad about its axis from the next axis on, and
+#: `further` times the radius along the tangent there.
 ON_RING = """([axis, at, further]) => {
   const { turned } = nmm.gizmos.all[0];
   const ring = turned.children.find((one) => one.children[0].userData.name === `turn ${"xyz"[axis]}`);

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from math import pi
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from function_grid import ENTRIES, random_configuration
 from numpy.typing import NDArray
@@ -162,7 +163,7 @@ def test_what_is_shown_of_a_function_is_where_it_is(
     robots: dict[str, Robot], rng: np.random.Generator
 ) -> None:
     """The rows that are said to hold a frame's position along world axes do."""
-    positioned, turned = set(), set()
+    positioned, turned, rotated = set(), set(), set()
     for entry in ENTRIES:
         said = entry.function.shown()
         configuration = Configuration(robots["unicycle_3r"], random_configuration(robots["unicycle_3r"], rng))
@@ -175,9 +176,15 @@ def test_what_is_shown_of_a_function_is_where_it_is(
                 assert found[row] == place["xyz".index(axis)]
         if said.turns is not None:
             turned.add(type(entry.function))
-            configuration.robot.frame_id(said.turns)
+            if said.rotation:
+                rotated.add(type(entry.function))
+                found = evaluate(entry.function, 0.0, configuration).value[list(said.rotation)]
+                rotation = configuration.placement(said.turns).rotation
+                np.testing.assert_allclose(pin.exp3(found), rotation, atol=1e-12)
     assert positioned == {Position, Pose}
-    assert turned == {Orientation, Pointing}
+    assert turned == {Orientation, Pointing, Pose}
+    assert rotated == {Orientation, Pose}
+    assert Orientation("ee", "link1").shown().rotation == ()
     for seen in (Position("ee", relative_to="link1"), Pose("ee", "link1"), Pointing("ee", "link1")):
         assert (seen.shown().positions, seen.shown().looks_at) == (None, None)
     np.testing.assert_array_equal(Pointing("ee", [6, 2, 1]).shown().looks_at, [6, 2, 1])

@@ -141,7 +141,8 @@ def test_inside_another_page_the_wheel_is_the_readers_until_he_clicks(
 ) -> None:
     file_url([drive(small_robot)], tmp_path)
     (tmp_path / "outer.html").write_text(
-        '<body style="height: 3000px"><iframe src="playback.html#plots=none" width="400" height="250"></iframe>',
+        '<body style="height: 3000px"><iframe src="playback.html#plots=none" width="400" height="250">'
+        "</iframe>",
         encoding="utf-8",
     )
     page = window.page

@@ -10,6 +10,7 @@ from playwright.sync_api import Browser, Page
 from short_scenario import MINIMAL
 
 import nmm
+from nmm.resolver_style import resolver_styles
 
 
 @pytest.fixture(scope="module")
@@ -88,6 +89,28 @@ def test_a_click_opens_the_rollout_with_the_command_that_runs_it(
     assert float(settings["q0.x"]) == row["q0.x"]
     run = nmm.Scenario.load(command[2], settings).run()
     assert run.summary()["error_rms"] == row["error_rms"]
+
+
+def test_a_resolver_has_the_colour_of_its_runs_and_pairs_of_dots_a_key(
+    page: Page, swept: nmm.extending.SweepResult
+) -> None:
+    page.select_option("#colour", "resolver.kind")
+    kinds = [row["resolver.kind"] for row in swept.table.to_pylist()]
+    found = page.evaluate("[...Array(N).keys()].map(colouring(byName.get('resolver.kind')).of)")
+    assert found == [resolver_styles()[kind][0] for kind in kinds]
+    page.select_option("#x", "q0.x")
+    page.select_option("#y", "q0.x")
+    assert "pg and 0.01, pg and 0.02, rg and 0.01, rg and 0.02" in page.inner_text("#legend")
+
+
+def test_details_stand_beside_the_plot_and_within_the_window(page: Page) -> None:
+    page.locator("tbody tr").first.click()
+    plot, one = (page.locator(name).bounding_box() for name in ("#points", "#one"))
+    assert plot is not None
+    assert one is not None
+    assert one["x"] >= plot["x"] + plot["width"]
+    assert one["y"] >= 0.0
+    assert one["y"] + one["height"] <= 900.0
 
 
 @pytest.mark.parametrize("width", [420, 1400])

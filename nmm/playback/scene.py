@@ -32,8 +32,9 @@ if TYPE_CHECKING:
 DESIRED: Rgb = (0.16, 0.18, 0.22)
 TARGET: Rgb = (0.83, 0.10, 0.22)
 
-#: Opacity of a robot where its odometry has it.
-BELIEVED = 0.35
+#: Colour and opacity of a robot where its odometry has it.
+BELIEVED: Rgb = (0.42, 0.45, 0.50)
+THROUGH = 0.4
 INSTANTS = 80
 
 
@@ -117,14 +118,14 @@ def playback_scene(
         animations += draw_cameras(drawing, motion, robot, path, start, fps, size)
         if motion.believed is not None:
             there = replace(motion, q=motion.believed, path=None)
-            animations += _believed(drawing, there, wheels[i], path, color, len(motions) + i, start, fps)
+            animations += _believed(drawing, there, wheels[i], path, len(motions) + i, start, fps)
         draw_nearest(drawing, motion, path, color if several else None, start, fps)
         if shown is not None:
             animations += shown.draw(drawing, i, path, color, start)
     obstacles.tell(drawing)
     tell_cameras(drawing, [camera for motion in motions for camera in motion.cameras])
     if paths := [f"/nmm/motion {i}/believed" for i, one in enumerate(motions) if one.believed is not None]:
-        drawing.add("believed", paths=paths, color=list(worn[0].rgb))
+        drawing.add("believed", paths=paths, color=list(BELIEVED))
     _desired(drawing, motions)
     _targets(drawing, motions, size)
     if shown is not None:
@@ -217,14 +218,13 @@ def _believed(
     motion: Motion,
     wheels: Array,
     path: str,
-    color: Rgb,
     rank: int,
     start: float,
     fps: float,
 ) -> list[Command]:
     """A transparent copy of the robot that moves where odometry has it; what animates it."""
     frames = keyframes(motion, fps, wheels)
-    copy = DrawnRobot(drawing, motion.robot, f"{path}/believed", tint=color, opacity=BELIEVED, rank=rank)
+    copy = DrawnRobot(drawing, motion.robot, f"{path}/believed", tint=BELIEVED, opacity=THROUGH, rank=rank)
     copy.place(frames.q[0], frames.wheels[0])
     return copy.animations(frames, start)
 

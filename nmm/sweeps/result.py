@@ -14,6 +14,7 @@ import numpy as np
 
 from nmm.arrays import Array, finite
 from nmm.files import whole_file
+from nmm.resolver_style import resolver_styles
 from nmm.sweeps.definition import Definition
 from nmm.sweeps.rows import Column, columns_of, parquet
 from nmm.templates import template
@@ -176,6 +177,7 @@ def _data(swept: SweepResult) -> dict[str, Any]:
         "command": definition.command(0)[: 3 + 2 * len(definition.settings)],
         "combinations": count if points else 1,
         "keep": definition.keep,
+        "resolvers": {name: color for name, (color, _) in resolver_styles().items()},
         "outcomes": swept.outcomes,
         "columns": [
             {

@@ -4,6 +4,7 @@
   const THREE = MeshCat.THREE;
   const FIELD = 36;
   const CATCH = 600; // ms
+  const NARROW = 190; // px: a heading that is too narrow to be read
   // From the target towards the camera, in the world's axes. From right above, up would be nowhere.
   const TOWARDS = {
     iso: new THREE.Vector3(0.42, -0.9, 0.82),
@@ -62,6 +63,14 @@
   const room = (tagged) => (tagged ? [44, 14 + 26 * nmm.motions.length] : [14, 14]);
   const boxOf = (id) => document.getElementById(id).getBoundingClientRect();
   const cards = () => ["heading", "tools"].map(boxOf);
+
+  // The heading is beside the tools where there is room for it, else below them.
+  function arrange() {
+    const { width, top } = boxOf("tools");
+    const above = top < 60;
+    document.body.style.setProperty("--tools", `${above ? width : 0}px`);
+    document.body.classList.toggle("stacked", above && view.clientWidth - width - 42 < NARROW);
+  }
 
   // Whether something that is held is behind a card.
   function hidden(held, named) {
@@ -155,6 +164,7 @@
 
   camera.reset = () => {
     if (camera.frozen) return undefined;
+    arrange();
     camera.moved = false;
     thawed = undefined;
     const towards = upright(TOWARDS[camera.from]);

@@ -4,6 +4,7 @@
   const FPS = 30;
   const CODECS = [["vp09.00.51.08", "V_VP9"], ["vp8", "V_VP8"]];
   const button = document.getElementById("film");
+  const progress = button.querySelector("span");
   const status = document.getElementById("status");
   const even = (length) => Math.max(2, 2 * Math.round(length / 2));
   let stop = null;
@@ -96,14 +97,15 @@
     const title = button.title;
     button.title = "Stop (W)";
     try {
-      const film = await nmm.record((share) => (button.textContent = `Film ${Math.floor(100 * share)} %`), () => ended);
+      const film = await nmm.record((share) => (progress.textContent = `${Math.floor(100 * share)} %`), () => ended);
       if (film !== null) nmm.save(URL.createObjectURL(film), "webm");
     } catch (error) {
       status.textContent = `No film could be written: ${error.message}`;
     } finally {
       stop = null;
       button.removeAttribute("aria-pressed");
-      Object.assign(button, { title, textContent: "Film" });
+      button.title = title;
+      progress.textContent = "";
     }
   });
 }

@@ -1,4 +1,5 @@
-// Colours: outcomes and listed values by name, numbers on viridis; each tells apart in light and dark.
+// Colours: outcomes, resolvers and listed values by name, numbers on viridis; each tells apart in light and dark.
+// A resolver's is the one of its runs on all pages and figures.
 const OUTCOMES = {
   completed: "#1f8fd0", missed: "#e69f00", singular: "#b05fc9", unstable: "#f0703c", diverged: "#d62f4b",
   failed: "#a5673f", refused: "#8c95a3", error: "#6b6bd6", interrupted: "#8c95a3",
@@ -23,7 +24,8 @@ function colouring(column) {
     const names = isText(column)
       ? ("same" in column ? [column.same] : column.levels)
       : [...new Set(numbersOf(column))].sort((a, b) => a - b);
-    const colours = new Map(names.map((name, i) => [name, OUTCOMES[name] || NAMED[i % NAMED.length]]));
+    const fixed = column.name === "resolver.kind" ? DATA.resolvers : OUTCOMES;
+    const colours = new Map(names.map((name, i) => [name, fixed[name] || NAMED[i % NAMED.length]]));
     const count = new Map();
     for (let row = 0; row < N; row++) count.set(valueOf(column, row), (count.get(valueOf(column, row)) || 0) + 1);
     const order = [...ROWS].sort((a, b) => count.get(valueOf(column, b)) - count.get(valueOf(column, a)));
@@ -42,7 +44,7 @@ function colouring(column) {
   };
 }
 
-function showLegend(column, colours) {
+function showLegend(column, colours, together) {
   const legend = $("legend");
   legend.replaceChildren();
   const add = (text, background) => {
@@ -65,6 +67,11 @@ function showLegend(column, colours) {
     ramp.style.background = `linear-gradient(90deg, ${[...Array(9).keys()].map((k) => viridis(k / 8)).join(",")})`;
     legend.append(ramp);
     add((colours.clipped ? "≥ " : "") + written(colours.high));
+  }
+  if (together) {
+    const varied = DATA.columns.filter((one) => one.varied && one.listed && !("same" in one));
+    const each = [...Array(DATA.combinations).keys()].map((row) => varied.map((one) => written(valueOf(one, row), one)).join(" and "));
+    add(`Dots beside one another, from the left: ${varied.map((one) => one.name).join(" and ")} ${each.join(", ")}`);
   }
 }
 

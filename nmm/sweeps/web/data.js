@@ -19,8 +19,10 @@ function written(value, column) {
   if (typeof value === "string") return value;
   if (column && column.kind === "count") return String(value);
   const size = Math.abs(value);
-  return size !== 0 && (size < 1e-3 || size >= 1e6) ? value.toExponential(2) : String(Number(value.toPrecision(4)));
+  const short = Number(value.toPrecision(4));
+  return size !== 0 && (size < 1e-3 || size >= 1e6) ? short.toExponential().replace("e+", "e") : String(short);
 }
+const measured = (value, column) => [written(value, column), value === null ? "" : column.unit].filter(Boolean).join(" ");
 const titled = (column) => (column.unit ? `${column.name} [${column.unit}]` : column.name);
 
 function extent(values) {

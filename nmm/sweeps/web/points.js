@@ -48,7 +48,6 @@ function drawPoints() {
   const across = axisOf(xs, $("log-x").checked, margin.left, width - margin.right);
   const up = axisOf(ys, $("log-y").checked, height - margin.bottom, margin.top);
   const colours = colouring(hue);
-  showLegend(hue, colours);
   context.clearRect(0, 0, width, height);
   context.strokeStyle = style("--line");
   context.fillStyle = style("--soft");
@@ -75,6 +74,7 @@ function drawPoints() {
   const radius = N > 4000 ? 1.6 : N > 800 ? 2.4 : 3.6;
   // Rollouts of one point, with different listed values, stand side by side.
   const together = !cells && DATA.combinations > 1 && DATA.combinations <= 5 && sampled(xs) && sampled(ys);
+  showLegend(hue, colours, together);
   const aside = (row) => (together ? ((row % DATA.combinations) - (DATA.combinations - 1) / 2) * 1.7 * radius : 0);
   points.places = Array.from({ length: N }, (_, row) => [across.of(row) + aside(row), up.of(row)]);
   points.reach = cells ? Math.max(...cells) : 14;
@@ -143,6 +143,6 @@ points.canvas.addEventListener("mousemove", (event) => {
   const row = nearest(event);
   const columns = row < 0 ? [] : [...new Set(["x", "y", "colour"].map((id) => byName.get($(id).value)))];
   const index = row < 0 ? "" : `rollout ${valueOf(byName.get("index"), row)}: `;
-  $("told").textContent = index + columns.map((one) => `${one.name} = ${written(valueOf(one, row), one)}`).join(", ");
+  $("told").textContent = index + columns.map((one) => `${one.name} = ${measured(valueOf(one, row), one)}`).join(", ");
 });
 points.canvas.addEventListener("click", (event) => choose(nearest(event)));

@@ -17,9 +17,9 @@ function choose(row) {
     const value = valueOf(column, row);
     if (["index", "outcome", "message"].includes(column.name) || value === null) continue;
     const item = document.createElement("div"), name = document.createElement("dt"), cell = document.createElement("dd");
-    name.textContent = titled(column);
+    name.textContent = column.name;
     name.title = column.about;
-    cell.textContent = written(value, column);
+    cell.textContent = measured(value, column);
     item.append(name, cell);
     list.append(item);
   }
@@ -45,7 +45,9 @@ function choose(row) {
   });
   box.append(command, copy);
   box.hidden = false;
+  box.scrollTop = 0;
   drawAll();
+  box.scrollIntoView({ block: "nearest" });
 }
 
 function link(address, text) {
@@ -143,7 +145,7 @@ for (const id of ["x", "y", "colour"]) {
   for (const column of DATA.columns) {
     if (column.name === "message") continue;
     const option = document.createElement("option");
-    option.value = option.textContent = column.name;
+    Object.assign(option, { value: column.name, textContent: titled(column) });
     $(id).append(option);
   }
   $(id).addEventListener("change", drawAll);
