@@ -141,6 +141,12 @@ class Robot(Coordinates):
         seen = dict.fromkeys(frame.name for frame in self.model.frames)
         return tuple(name for name in seen if name != "universe")
 
+    @cached_property
+    def reversed_joints(self) -> tuple[str, ...]:
+        """The platform's joints whose axes point down in the file: their coordinates' sign is the other."""
+        found = (note.values["names"] for note in self.notes if note.code == "joints_reversed")
+        return tuple(name for names in found for name in names)
+
     def frame_id(self, name: str) -> int:
         """Pinocchio's index of a frame; of the link's where a link and a joint share the name."""
         found = self._frame_ids.get(name)
@@ -179,6 +185,87 @@ class Robot(Coordinates):
             if frame.parentJoint > 0 and self.model.joints[frame.parentJoint].idx_q >= self.platform.n_p
         ]
         return max((end for end in ends if np.isfinite(end)), default=0.0) or 1.0
+
+    def q_from(
+        self, joints: Mapping[str, float], base: ArrayLike | None = None, near: ArrayLike | None = None
+    ) -> Array:
+        """The configuration (n,) that sensors tell, m and rad.
+
+        Parameters
+        ----------
+        joints : absolute encoders by the names of the file's joints, in any order, with the file's signs. A
+            car's steered wheels say its steering angle; a mimic joint is where its leader puts it, and says
+            where this is if its own encoder is missing; wheels that only roll are not looked at
+        base : x, y, theta of the platform, by a localisation; none on a fixed base
+        near : a configuration (n,): theta and angles without limits are taken nearest to it, by full turns
+
+        Raises
+        ------
+        InputError : a joint without measurement, an unknown one, a number that is not finite, a joint that is
+            measured more than 0.01 rad or m from where it is locked; a missing base
+
+        Examples
+        --------
+        >>> robot = nmm.load("unicycle_2r")
+        >>> robot.q_from({"q2": 0.5, "q1": 0.1}, base=(1, 2, 0.3), near=[0, 0, 6, 0, 0]).round(3)
+        array([1.   , 2.   , 6.583, 0.1  , 0.5  ])
+        """
+        found: Array = self._encoders.q(joints, base, near)
+        return found
+
+    @cached_property
+    def _encoders(self) -> Any:
+        """What reads the joints' encoders (`nmm.robots.encoders.Encoders`)."""
+        return lazy_call("nmm.robots.encoders:Encoders")(self)
+
+    def odometry(self, q: ArrayLike, encoders: Mapping[str, float], **options: Any) -> Any:
+        """A platform's pose by its wheels' encoders, from q (n,) on (`nmm.extending.Odometry`).
+
+        Parameters
+        ----------
+        q : where the robot stands, m and rad
+        encoders : readings there, rad and m, by name: wheels that count (`robot.wheels`; a trailer's do not),
+            or the platform's inputs for what counts these (v: the way), and joints as in `q_from`
+        slip : the share of a wheel's turning that moves the platform, 1 by default: a number, or by name
+        spread : variance of a wheel's turning for each radian that it turns, rad²/rad; 0 by default
+        covariance : of x, y, theta (3, 3) at first; zero by default
+
+        Raises
+        ------
+        InputError : counters that do not determine all inputs, by name; a joint without measurement; a fixed
+            base
+        """
+        return lazy_call("nmm.robots.odometry:Odometry")(self, q, encoders, **options)
+
+    def wheel_speeds(self, u: ArrayLike, q: ArrayLike | None = None) -> dict[str, float]:
+        """Speeds of the wheels that inputs u determine, (p,) or (n_u,), by joint, rad/s, with the joints' own
+        signs; at q (n,), zero by default, which matters where the platform has joints (steering). Casters and
+        further trailers' wheels have histories, and are not among them.
+
+        Examples
+        --------
+        >>> nmm.load("differential_base", platform="unicycle").wheel_speeds([0.5, 0.0])
+        {'left_wheel_joint': 5.0, 'right_wheel_joint': 5.0}
+        """
+        found: dict[str, float] = lazy_call("nmm.robots.odometry:wheel_speeds")(self, u, q)
+        return found
+
+    def platform_inputs(self, speeds: Mapping[str, float], q: ArrayLike | None = None) -> Array:
+        """The platform's inputs (p,) for speeds of wheels, rad/s by joint, the nearest where they contradict
+        each other. An input may be given by its name: a car's steering_rate, which fixed wheels do not show.
+
+        Raises
+        ------
+        InputError : wheels that do not determine all inputs; an unknown name
+
+        Examples
+        --------
+        >>> robot = nmm.load("differential_base", platform="unicycle")
+        >>> robot.platform_inputs({"left_wheel_joint": 4.0, "right_wheel_joint": 6.0}).round(3)
+        array([0.5, 0.5])
+        """
+        found: Array = lazy_call("nmm.robots.odometry:platform_inputs")(self, speeds, q)
+        return found
 
     def _repr_html_(self) -> str:
         """In a notebook: the page that shows it, with a slider for each coordinate."""

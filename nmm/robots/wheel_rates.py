@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Callable, Collection
+from functools import partial
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from nmm.arrays import Array
 from nmm.kernels.compiled import inlined
 from nmm.platforms import Car, FrontDriveCar
+from nmm.robots.joint_table import twist
 from nmm.robots.robot import Robot
 from nmm.robots.wheel import Wheel
 
@@ -106,6 +109,28 @@ def turning_wheels(robot: Robot, q: Array, q_dot: Array) -> tuple[tuple[str, ...
     """The wheels of `wheel_rates`, and how fast they turn, (N, w) rad/s, at q and q_dot, (N, n)."""
     names, rows = wheel_rates(robot)
     return names, np.einsum("kwi,ki->kw", wheel_shares(rows, q), q_dot)
+
+
+def steered_wheels(robot: Robot) -> dict[str, tuple[str, Callable[[float], float]]]:
+    """Swivels that follow a car's steering angle δ: by joint, this, and δ at the swivel's angle."""
+    rows = dict(zip(*wheel_rates(robot), strict=True))
+    found: dict[str, tuple[str, Callable[[float], float]]] = {}
+    for wheel in robot.wheels:
+        if wheel.swivel and wheel.joint in rows:
+            row = rows[wheel.joint]
+            found[wheel.swivel] = robot.q_names[int(row[4])], partial(_steering, robot, wheel, row)
+    return found
+
+
+def _steering(robot: Robot, wheel: Wheel, row: Array, angle: float) -> float:
+    """δ of tan φ = a sin δ / (cos δ - b sin δ) at the swivel's angle, whose axis may point down."""
+    model = robot.display_model
+    joint = model.getJointId(wheel.swivel)
+    upright = (model.jointPlacements[joint].rotation @ twist(model.joints[joint], pin.neutral(model))[1])[2]
+    phi = math.copysign(1.0, upright) * angle + math.remainder(
+        math.atan2(-wheel.axis[0], wheel.axis[1]), math.pi
+    )
+    return math.atan2(math.sin(phi), row[7] * math.cos(phi) + row[8] * math.sin(phi))
 
 
 def inputs_held_by(robot: Robot, wheels: Collection[str]) -> list[str]:

@@ -176,8 +176,6 @@ def _coordinates(
 ) -> dict[str, float]:
     """The coordinates that a state sets, m and rad: no wheels, locked or mimic joints."""
     still = robot.locked
-    reversing = (note.values["names"] for note in robot.notes if note.code == "joints_reversed")
-    turned = {name for names in reversing for name in names}
     values: dict[str, float] = {}
     for joint, numbers in state.items():
         if joint in roots:
@@ -186,7 +184,7 @@ def _coordinates(
             if len(numbers) != 1:
                 notes.append(_note("posture_not_one_number", posture=name, name=joint, count=len(numbers)))
             elif joint in robot.q_names:
-                values[joint] = -numbers[0] if joint in turned else numbers[0]
+                values[joint] = -numbers[0] if joint in robot.reversed_joints else numbers[0]
             elif abs(numbers[0] - still[joint]) > _SLACK:
                 about = {"posture": name, "name": joint, "locked": still[joint], "wanted": numbers[0]}
                 notes.append(_note("posture_locked", **about))

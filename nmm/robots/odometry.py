@@ -1,0 +1,243 @@
+"""Odometry: where a platform is, by what its wheels turned and its own joints stand at."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.arrays import Array, matrix, scalar, vector
+from nmm.errors import InputError, expect_known, few, no_such
+from nmm.robots.robot import Robot
+from nmm.robots.wheel_rates import wheel_rates, wheel_shares
+from nmm.robots.zero_order_hold import HeldInputs
+
+#: Where Gauss and Legendre look between two readings, for two looks.
+NODES = 0.5 - math.sqrt(3.0) / 6.0, 0.5 + math.sqrt(3.0) / 6.0
+#: A turn with a smaller square root of rounding is straight, rad.
+_STRAIGHT = 1e-5
+
+
+def counted_wheels(robot: Robot) -> list[str]:
+    """The wheels on the main body or on steering joints, whose turning says how it moves; not a trailer's."""
+    steered = {-1, *robot.rate_coordinates[: robot.platform.p].tolist()}
+    return [name for name, row in zip(*wheel_rates(robot), strict=True) if int(row[4]) in steered]
+
+
+class Counters:
+    """What counts a platform's inputs: its wheels' encoders and, by the inputs' names, what counts these.
+
+    names : the counters, in order; `InputError` for one that is no wheel whose turning the inputs determine
+    """
+
+    def __init__(self, robot: Robot, names: Mapping[str, float], where: str) -> None:
+        self.robot, self.where = robot, where
+        wheels, rows = wheel_rates(robot)
+        platform = robot.platform
+        #: Its own joints whose rates are inputs: by the index of the input.
+        self.steered = {int(c): int(i) for i, c in enumerate(robot.rate_coordinates[: platform.p]) if c >= 3}
+        self.names = tuple(names)
+        self._wheels = [k for k, wheel in enumerate(wheels) if wheel in names]
+        self._rows = rows[self._wheels]
+        self._inputs = [platform.inputs.index(name) for name in names if name in platform.inputs]
+        order = [wheels[k] for k in self._wheels] + [platform.inputs[i] for i in self._inputs]
+        for name in names:
+            if name not in order:
+                raise no_such("wheel", name, (*wheels, *platform.inputs), where)
+        self._order = [order.index(name) for name in names]
+        self._matrices: dict[bytes, tuple[Array, Array]] = {}
+        self._inverses: dict[bytes, Array] = {}
+
+    def matrix(self, own: Array) -> tuple[Array, Array]:
+        """What inputs (p,) add to the counters (k,) and to the platform's pose in its own axes (3,), with its
+        own joints at `own` (n_p - 3,): (k, p), (3, p)."""
+        if (found := self._matrices.get(key := own.tobytes())) is not None:
+            return found
+        robot, p = self.robot, self.robot.platform.p
+        q = np.zeros((1, robot.n))
+        q[0, 3 : robot.platform.n_p] = own
+        G = robot.platform.G(q[0, : robot.platform.n_p])
+        counted = wheel_shares(self._rows, q)[0][:, : robot.platform.n_p] @ G
+        found = np.vstack([counted, np.eye(p)[self._inputs]])[self._order], G[:3]
+        self._matrices = {key: found}  # of joints that stand still it is the same again
+        return found
+
+    def solved(self, M: Array, counts: Array, steered: Mapping[int, float]) -> tuple[Array, Array]:
+        """The inputs (p,) nearest to the counts (k,), with those known that turn its own joints, and their
+        derivative (p, k); `InputError` names inputs that are not determined."""
+        known, free = np.zeros(M.shape[1]), np.ones(M.shape[1], dtype=bool)
+        for coordinate, rate in steered.items():
+            known[self.steered[coordinate]] = rate
+            free[self.steered[coordinate]] = False
+        slopes = self._inverses.get(key := M.tobytes() + free.tobytes())
+        if slopes is None:
+            slopes = np.zeros(M.T.shape)
+            slopes[free] = np.linalg.pinv(M[:, free])
+            seen = np.diag(slopes @ M)
+            lost = [
+                name
+                for name, share, asked in zip(self.robot.platform.inputs, seen, free, strict=True)
+                if asked and share < 1.0 - 1e-9
+            ]
+            if lost:
+                what = f"the counters do not determine {few(lost)}"
+                expected = "more wheels, or these inputs' own"
+                raise InputError(what, where=self.where, expected=expected, got=few(self.names))
+            self._inverses = {key: slopes}
+        return known + slopes @ (counts - M @ known), slopes
+
+
+class Odometry:
+    """A platform's pose by its wheels' encoders, exact along arcs, with a covariance. Made by
+    `Robot.odometry`.
+
+    Between two readings inputs are taken as constant. The way is integrated by a Magnus expansion of fourth
+    order: without error where the platform's own joints stand still, else with one of the fifth power of the
+    step. Steering angles are measured; hitches may be: without encoder they follow as they roll.
+
+    Attributes
+    ----------
+    q (n,) : where the robot is by its encoders, m and rad; theta is not wrapped
+    covariance (3, 3) : of x, y, theta, m and rad
+
+    Examples
+    --------
+    >>> robot = nmm.load("differential_base")
+    >>> odometry = robot.odometry(robot.rest, {"left_wheel_joint": 0.0, "right_wheel_joint": 0.0})
+    >>> odometry.update({"left_wheel_joint": 2.0, "right_wheel_joint": 2.0}).round(3)
+    array([0.2, 0. , 0. ])
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        q: ArrayLike,
+        encoders: Mapping[str, float],
+        slip: float | Mapping[str, float] = 1.0,
+        spread: float = 0.0,
+        covariance: ArrayLike | None = None,
+    ) -> None:
+        self._where = f"odometry: {robot.name}"
+        if robot.platform.n_p < 3:
+            raise InputError(where=self._where, expected="a platform that moves", got=robot.platform.name)
+        self.robot = robot
+        self.q = robot.q(q)
+        counted = [name for name in encoders if name in (*counted_wheels(robot), *robot.platform.inputs)]
+        self._counters = Counters(robot, dict.fromkeys(counted, 0.0), self._where)
+        self._shares = np.ones(len(counted))
+        if isinstance(slip, Mapping):
+            for name, share in slip.items():
+                expect_known("wheel", name, counted, f"{self._where}: slip")
+                self._shares[counted.index(name)] = scalar(share, f"{self._where}: slip of {name}")
+        else:
+            self._shares[:] = scalar(slip, f"{self._where}: slip")
+        self._spread = scalar(spread, f"{self._where}: spread", least=0.0)
+        self.covariance = np.zeros((3, 3))
+        if covariance is not None:
+            self.covariance = matrix(covariance, (3, 3), f"{self._where}: covariance")
+        own = robot.q_names[3 : robot.platform.n_p]
+        self._hitches = [name for name in own if robot.coordinate(name) not in self._counters.steered]
+        self._held = HeldInputs(robot)
+        self._counts = self._read(encoders)[0]
+        M, _ = self._counters.matrix(self.q[3 : robot.platform.n_p])
+        self._counters.solved(M, self._counts, dict.fromkeys(self._counters.steered, 0.0))  # or says why not
+
+    def update(self, encoders: Mapping[str, float]) -> Array:
+        """q (n,) at these readings, rad or m: of the wheels that were counted at first, and of the joints.
+
+        Raises
+        ------
+        InputError : a wheel or joint is missing, a number is not finite; nothing is changed then
+        """
+        counts, ahead = self._read(encoders)
+        robot, n_p = self.robot, self.robot.platform.n_p
+        turned = self._shares * (counts - self._counts)
+        before, after = self.q[3:n_p], ahead[3:n_p]
+        looks = [self._counters.matrix(before + node * (after - before)) for node in NODES]
+        M = 0.5 * (looks[0][0] + looks[1][0])
+        steered = {c: float(ahead[c] - self.q[c]) for c in self._counters.steered}
+        up, slopes = self._counters.solved(M, turned, steered)
+        one, other = (B @ up for _, B in looks)
+        twist = 0.5 * (one + other)
+        twist[:2] += (
+            math.sqrt(3.0)
+            / 12.0
+            * np.array([other[2] * one[1] - one[2] * other[1], one[2] * other[0] - other[2] * one[0]])
+        )
+        way, slope = _moved(twist)
+        c, s = math.cos(self.q[2]), math.sin(self.q[2])
+        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        step = turn @ way
+        unmeasured = [name for name in self._hitches if name not in encoders]
+        if unmeasured:
+            u = np.concatenate([up, np.zeros(robot.n_u - robot.platform.p)])
+            rolled = self._held(self.q, u, 1.0)
+            for name in unmeasured:
+                ahead[robot.coordinate(name)] = rolled[robot.coordinate(name)]
+        ahead[:3] = self.q[:3] + step
+        if self._spread or self.covariance.any():
+            carried = np.eye(3)
+            carried[:2, 2] = -step[1], step[0]
+            mean = 0.5 * (looks[0][1] + looks[1][1])
+            noise = turn @ slope @ mean @ slopes * self._shares
+            added = noise * (self._spread * np.abs(counts - self._counts)) @ noise.T
+            self.covariance = carried @ self.covariance @ carried.T + added
+        self.q, self._counts = ahead, counts
+        return ahead.copy()
+
+    def correct(self, pose: ArrayLike, covariance: ArrayLike | None = None) -> None:
+        """Put the platform at a pose (3,) that was measured, m and rad, with its covariance (3, 3), zero by
+        default. Theta is taken nearest to what it was."""
+        x, y, theta = vector(pose, 3, f"{self._where}: pose")
+        new = np.zeros((3, 3))
+        if covariance is not None:
+            new = matrix(covariance, (3, 3), f"{self._where}: covariance")
+        q = self.q.copy()
+        q[:3] = x, y, q[2] + math.remainder(theta - q[2], 2.0 * math.pi)
+        self.q, self.covariance = q, new
+
+    def _read(self, encoders: Mapping[str, float]) -> tuple[Array, Array]:
+        """The counters' readings, and q with the joints where they are measured."""
+        names, inputs = self._counters.names, self.robot.platform.inputs
+        absent = [name for name in names if name not in encoders]
+        if absent:
+            raise InputError(f"no reading of {few(absent)}", where=self._where, got=[*encoders])
+        counts = np.array([scalar(encoders[name], f"{self._where}: {name}") for name in names])
+        joints = {name: value for name, value in encoders.items() if name not in inputs}
+        rest = {name: self.q[self.robot.coordinate(name)] for name in self._hitches if name not in joints}
+        signs = dict.fromkeys(self.robot.reversed_joints, -1.0)
+        rest = {name: signs.get(name, 1.0) * value for name, value in rest.items()}
+        return counts, self.robot.q_from({**joints, **rest}, self.q[:3], self.q)
+
+
+def _moved(twist: Array) -> tuple[Array, Array]:
+    """The pose (3,) after a constant twist (3,) for a unit of time from the origin, exp of SE(2), and its
+    derivative in the twist (3, 3)."""
+    w = float(twist[2])
+    a, b = float(np.sinc(w / math.pi)), math.sin(0.5 * w) * float(np.sinc(0.5 * w / math.pi))
+    a_w, b_w = (-w / 3.0, 0.5) if abs(w) < _STRAIGHT else ((math.cos(w) - a) / w, (math.sin(w) - b) / w)
+    V, V_w = np.array([[a, -b], [b, a]]), np.array([[a_w, -b_w], [b_w, a_w]])
+    slope = np.eye(3)
+    slope[:2, :2], slope[:2, 2] = V, V_w @ twist[:2]
+    return np.array([*(V @ twist[:2]), w]), slope
+
+
+def wheel_speeds(robot: Robot, u: ArrayLike, q: ArrayLike | None = None) -> dict[str, float]:
+    """See `Robot.wheel_speeds`."""
+    names, rows = wheel_rates(robot)
+    p, n_p = robot.platform.p, robot.platform.n_p
+    up = vector(u, (p, robot.n_u), f"wheel_speeds: {robot.name}")[:p]
+    at = robot.q(q)
+    rates = wheel_shares(rows, at[np.newaxis])[0][:, :n_p] @ robot.platform.G(at[:n_p]) @ up
+    return dict(zip(names, rates.tolist(), strict=True))
+
+
+def platform_inputs(robot: Robot, speeds: Mapping[str, float], q: ArrayLike | None = None) -> Array:
+    """See `Robot.platform_inputs`."""
+    where = f"platform_inputs: {robot.name}"
+    counters = Counters(robot, speeds, where)
+    given = np.array([scalar(value, f"{where}: {name}") for name, value in speeds.items()])
+    M, _ = counters.matrix(robot.q(q)[3 : robot.platform.n_p])
+    return counters.solved(M, given, {})[0]
