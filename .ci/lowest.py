@@ -11,6 +11,7 @@ for requirement in [
     *extras["video"],
     *extras["mujoco"],
     *extras["vision"],
+    *extras["ros"],
     *extras["test"],
 ]:
     name, above, rest = requirement.partition(">=")

@@ -5,6 +5,7 @@ from . import figures as figures
 from . import folders as folders
 from . import playback as playback
 from . import rendering as rendering
+from . import ros as ros
 from .collisions import Box as Box
 from .collisions import Capsule as Capsule
 from .collisions import ConvexMesh as ConvexMesh
@@ -118,6 +119,7 @@ from .robots.loading import load as load
 from .robots.loading import mount as mount
 from .robots.loading import pinocchio_model as pinocchio_model
 from .robots.loading import pinocchio_models as pinocchio_models
+from .robots.odometry import Odometry as Odometry
 from .robots.robot import Robot as Robot
 from .rollouts.rollout import rollout as rollout
 from .runs.disturbances import Disturbances as Disturbances

@@ -153,7 +153,6 @@ from .robots.motion import Body as Body
 from .robots.motion import Camera as Camera
 from .robots.motion import Motion as Motion
 from .robots.motion import Nearest as Nearest
-from .robots.odometry import Odometry as Odometry
 from .robots.reach import Reach as Reach
 from .robots.reach import arm_branches as arm_branches
 from .robots.reach import arm_end as arm_end

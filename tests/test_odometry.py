@@ -155,7 +155,7 @@ def test_the_covariance_is_carried_as_differences_of_the_way_say(case: str) -> N
         [robot.wheel_speeds(inputs_of(robot)(t)[: robot.platform.p])[n] for t in range(5) for n in names]
     )
 
-    def end(turned: Array) -> nmm.extending.Odometry:
+    def end(turned: Array) -> nmm.Odometry:
         odometry = robot.odometry(robot.rest, dict.fromkeys(names, 0.0), slip=slip, spread=spread)
         for read in np.cumsum(turned.reshape(5, -1), axis=0):
             odometry.update(dict(zip(names, read, strict=True)))

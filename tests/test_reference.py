@@ -20,7 +20,7 @@ from nmm.runs.recording import Recorder
 
 ROOT = Path(__file__).resolve().parent.parent
 #: Packages whose names are public; those that `nmm` or `nmm.extending` has too are listed there.
-PUBLIC = ("analysis", "scaffold", "driving", "figures", "playback", "rendering", "sweeps")
+PUBLIC = ("analysis", "scaffold", "driving", "figures", "playback", "rendering", "ros", "sweeps")
 
 
 def public_names() -> dict[str, object]:

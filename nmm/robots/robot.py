@@ -219,7 +219,7 @@ class Robot(Coordinates):
         return lazy_call("nmm.robots.encoders:Encoders")(self)
 
     def odometry(self, q: ArrayLike, encoders: Mapping[str, float], **options: Any) -> Any:
-        """A platform's pose by its wheels' encoders, from q (n,) on (`nmm.extending.Odometry`).
+        """A platform's pose by its wheels' encoders, from q (n,) on (`nmm.Odometry`).
 
         Parameters
         ----------

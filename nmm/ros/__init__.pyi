@@ -1,0 +1,10 @@
+from .making import Messages as Messages
+from .reading import Transforms as Transforms
+from .reading import base as base
+from .reading import inputs as inputs
+from .reading import joint_trajectory as joint_trajectory
+from .reading import joints as joints
+from .reading import placement as placement
+from .reading import rates as rates
+from .reading import stamp as stamp
+from .reading import twist as twist

@@ -1,0 +1,310 @@
+"""ROS 2's messages of what nmm computes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.arrays import Array, array, matrix, scalar, vector
+from nmm.errors import InputError, expect
+from nmm.robots.robot import Robot
+
+
+class Rclpy(Mapping[str, type]):
+    """The classes of rclpy's messages by their names ("geometry_msgs/msg/Twist"), imported when asked for."""
+
+    def __getitem__(self, name: str) -> type:
+        package, _, kind = name.split("/")
+        try:
+            found: type = getattr(import_module(f"{package}.msg"), kind)
+        except ImportError:
+            what = f"{package} of ROS 2 is not on Python's path: source its setup file, or give types"
+            raise InputError(what, where="nmm.ros.Messages") from None
+        return found
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(())
+
+    def __len__(self) -> int:
+        return 0
+
+
+class Messages:
+    """Makes messages of one robot's motion.
+
+    Parameters
+    ----------
+    robot : whose
+    types : the classes by name; rclpy's when not given, or `rosbags.typesys.get_typestore(...).types`
+    odom, base : names of the frames (REP-105); the base is the robot's root link by default
+
+    Examples
+    --------
+    >>> from rosbags.typesys import Stores, get_typestore
+    >>> types = get_typestore(Stores.ROS2_HUMBLE).types
+    >>> robot = nmm.load("unicycle_2r")
+    >>> messages = nmm.ros.Messages(robot, types)
+    >>> messages.twist(robot.rest, [0.5, 0.2, 0, 0]).linear.x
+    0.5
+    >>> messages.joint_state(1.5, robot.q({"q1": 0.3})).name
+    ['q1', 'q2']
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        types: Mapping[str, Any] | None = None,
+        *,
+        odom: str = "odom",
+        base: str | None = None,
+    ) -> None:
+        self.robot, self.odom = robot, odom
+        self.base = root_link(robot) if base is None else base
+        self.types = Rclpy() if types is None else types
+        self._first = min(3, robot.platform.n_p)
+
+    def joint_state(
+        self,
+        t: float,
+        q: ArrayLike,
+        q_dot: ArrayLike | None = None,
+        wheels: Mapping[str, tuple[float, float]] | None = None,
+    ) -> Any:
+        """A JointState at t, s: the joints of q (n,), without x, y, theta, and their rates q_dot (n,) where
+        given; angle and rate of further joints, rad and rad/s. Signs are the file's."""
+        more = {} if wheels is None else wheels
+        names = [*self.robot.q_names[self._first :], *more]
+        position = [*self._signed(self.robot.q(q)), *(float(angle) for angle, _ in more.values())]
+        rates: list[float] = []
+        if q_dot is not None:
+            rates = self._signed(vector(q_dot, self.robot.n, "q_dot"))
+            rates += (float(rate) for _, rate in more.values())
+        return self._joint_state(t, names, position, rates)
+
+    def inputs(self, t: float, u: ArrayLike) -> Any:
+        """A JointState whose velocities are the inputs u (n_u,), by their names."""
+        u = vector(u, self.robot.n_u, "u")
+        return self._joint_state(t, [*self.robot.u_names], [], u.tolist())
+
+    def odometry(
+        self, t: float, q: ArrayLike, q_dot: ArrayLike | None = None, covariance: ArrayLike | None = None
+    ) -> Any:
+        """An Odometry at t, s, of the platform at q (n,): pose in odom, twist along the base's axes, zero
+        without q_dot (n,); the covariance (3, 3) of x, y, theta."""
+        q = self.robot.q(q)
+        spread = np.zeros((6, 6))
+        if covariance is not None:
+            spread[np.ix_([0, 1, 5], [0, 1, 5])] = matrix(covariance, (3, 3), "covariance")
+        velocity = np.zeros(3) if q_dot is None else body_twist(q, vector(q_dot, self.robot.n, "q_dot"))
+        none, pose = (
+            self._floats(np.zeros(36)),
+            self._pose(*planar_pose(q[:3] if self._first else np.zeros(3))),
+        )
+        return self._made(
+            "nav_msgs/msg/Odometry",
+            header=self._header(t, self.odom),
+            child_frame_id=self.base,
+            pose=self._made(
+                "geometry_msgs/msg/PoseWithCovariance", pose=pose, covariance=self._floats(spread.ravel())
+            ),
+            twist=self._made(
+                "geometry_msgs/msg/TwistWithCovariance", twist=self._twist(velocity), covariance=none
+            ),
+        )
+
+    def transforms(self, t: float, q: ArrayLike) -> Any:
+        """A TFMessage at t, s: the base in odom at q (n,)."""
+        q = self.robot.q(q)
+        at = planar_pose(q[:3] if self._first else np.zeros(3))
+        return self.tf([(t, self.odom, self.base, *at)])
+
+    def tf(self, found: Sequence[tuple[float, str, str, Array, Array]]) -> Any:
+        """A TFMessage of (t, frame, child, position (3,), quaternion (4,) x y z w)."""
+        made = [
+            self._made(
+                "geometry_msgs/msg/TransformStamped",
+                header=self._header(t, frame),
+                child_frame_id=child,
+                transform=self._made(
+                    "geometry_msgs/msg/Transform",
+                    translation=self._made("geometry_msgs/msg/Vector3", **_xyz(position)),
+                    rotation=self._made("geometry_msgs/msg/Quaternion", **_xyzw(turn)),
+                ),
+            )
+            for t, frame, child, position, turn in found
+        ]
+        return self._made("tf2_msgs/msg/TFMessage", transforms=made)
+
+    def twist(self, q: ArrayLike, u: ArrayLike) -> Any:
+        """A Twist (cmd_vel) of the inputs u (n_u,) at q (n,), along the base's axes."""
+        q = self.robot.q(q)
+        return self._twist(body_twist(q, self.robot.S(q) @ vector(u, self.robot.n_u, "u")))
+
+    def twist_stamped(self, t: float, q: ArrayLike, u: ArrayLike) -> Any:
+        """The same with the time t, s, in the base's frame."""
+        return self._made(
+            "geometry_msgs/msg/TwistStamped", header=self._header(t, self.base), twist=self.twist(q, u)
+        )
+
+    def pose(self, t: float, placement: ArrayLike, frame: str | None = None) -> Any:
+        """A PoseStamped of a pose (4, 4), m, in a frame, odom by default."""
+        pose = matrix(placement, (4, 4), "placement")
+        return self._pose_stamped(t, pose[:3, 3], quaternion(pose[:3, :3]), frame or self.odom)
+
+    def path(self, t: float, points: ArrayLike, frame: str | None = None) -> Any:
+        """A Path of points (N, 3), m, in a frame, odom by default."""
+        rows = array(points, "points")
+        expect(rows.ndim == 2 and rows.shape[1] == 3, "points", "points of shape (N, 3)", rows)
+        upright = np.array([0.0, 0.0, 0.0, 1.0])
+        poses = [self._pose_stamped(t, point, upright, frame or self.odom) for point in rows]
+        return self._made("nav_msgs/msg/Path", header=self._header(t, frame or self.odom), poses=poses)
+
+    def joint_trajectory(self, t: ArrayLike, q: ArrayLike, q_dot: ArrayLike | None = None) -> Any:
+        """A JointTrajectory of the arm along q (N, n) at times t (N,), s, from the first of them on, with its
+        rates where given: the platform's own joints and mimic joints are left out."""
+        robot, times = self.robot, vector(t, None, "t")
+        columns, count = robot.arm_coordinates, len(times)
+        rows = matrix(q, (count, robot.n), "q")[:, columns]
+        rates = None if q_dot is None else matrix(q_dot, (count, robot.n), "q_dot")[:, columns]
+        points = [
+            self._made(
+                "trajectory_msgs/msg/JointTrajectoryPoint",
+                positions=self._floats(rows[k]),
+                velocities=self._floats([] if rates is None else rates[k]),
+                accelerations=self._floats([]),
+                effort=self._floats([]),
+                time_from_start=self._time(times[k] - times[0], "builtin_interfaces/msg/Duration"),
+            )
+            for k in range(count)
+        ]
+        return self._made(
+            "trajectory_msgs/msg/JointTrajectory",
+            header=self._header(0.0, ""),
+            joint_names=[robot.q_names[i] for i in columns],
+            points=points,
+        )
+
+    def text(self, text: str) -> Any:
+        """A std_msgs String."""
+        return self._made("std_msgs/msg/String", data=text)
+
+    def numbers(self, values: ArrayLike, labels: Sequence[str]) -> Any:
+        """A Float64MultiArray of k values with a label of all their names."""
+        row = np.asarray(values, dtype=np.float64)
+        dimension = self._made(
+            "std_msgs/msg/MultiArrayDimension", label=",".join(labels), size=len(row), stride=len(row)
+        )
+        layout = self._made("std_msgs/msg/MultiArrayLayout", dim=[dimension], data_offset=0)
+        return self._made("std_msgs/msg/Float64MultiArray", layout=layout, data=self._floats(row))
+
+    def log(self, t: float, name: str, text: str) -> Any:
+        """A Log line (/rosout) of the level INFO."""
+        return self._made(
+            "rcl_interfaces/msg/Log",
+            stamp=self._time(t), level=20, name=name, msg=text, file="", function="", line=0,
+        )  # fmt: skip
+
+    def _signed(self, values: Array) -> list[float]:
+        turned = self.robot.reversed_joints
+        pairs = zip(self.robot.q_names[self._first :], values[self._first :].tolist(), strict=True)
+        return [-value if name in turned else value for name, value in pairs]
+
+    def _joint_state(self, t: float, names: list[str], position: list[float], velocity: list[float]) -> Any:
+        return self._made(
+            "sensor_msgs/msg/JointState",
+            header=self._header(t, ""),
+            name=names,
+            position=self._floats(position),
+            velocity=self._floats(velocity),
+            effort=self._floats([]),
+        )
+
+    def _twist(self, velocity: Array) -> Any:
+        vx, vy, omega = velocity.tolist()
+        linear, angular = (
+            self._made("geometry_msgs/msg/Vector3", **_xyz(np.array(one)))
+            for one in ([vx, vy, 0.0], [0.0, 0.0, omega])
+        )
+        return self._made("geometry_msgs/msg/Twist", linear=linear, angular=angular)
+
+    def _pose(self, position: Array, turn: Array) -> Any:
+        return self._made(
+            "geometry_msgs/msg/Pose",
+            position=self._made("geometry_msgs/msg/Point", **_xyz(position)),
+            orientation=self._made("geometry_msgs/msg/Quaternion", **_xyzw(turn)),
+        )
+
+    def _pose_stamped(self, t: float, position: Array, turn: Array, frame: str) -> Any:
+        pose = self._pose(position, turn)
+        return self._made("geometry_msgs/msg/PoseStamped", header=self._header(t, frame), pose=pose)
+
+    def _header(self, t: float, frame: str) -> Any:
+        return self._made("std_msgs/msg/Header", stamp=self._time(t), frame_id=frame)
+
+    def _time(self, t: float, name: str = "builtin_interfaces/msg/Time") -> Any:
+        sec, nanosec = divmod(in_nanoseconds(t), 1_000_000_000)
+        return self._made(name, sec=sec, nanosec=nanosec)
+
+    def _floats(self, values: ArrayLike) -> Any:
+        """Arrays where the classes are those of rosbags, lists where rclpy's, which refuse arrays."""
+        row = np.array(values, dtype=np.float64)
+        of_rosbags = hasattr(self.types["sensor_msgs/msg/JointState"], "__dataclass_fields__")
+        return row if of_rosbags else row.tolist()
+
+    def _made(self, kind: str, **fields: Any) -> Any:
+        return self.types[kind](**fields)
+
+
+def in_nanoseconds(t: float) -> int:
+    """A time, s, in whole nanoseconds, as ROS counts."""
+    return round(scalar(t, "t") * 1e9)
+
+
+def root_link(robot: Robot) -> str:
+    """The link that the platform moves; of a fixed base its first link."""
+    body = "theta" if robot.platform.n_p else "universe"
+    frames = (frame for frame in robot.model.frames if robot.model.names[frame.parentJoint] == body)
+    names = [frame.name for frame in frames if frame.type.name == "BODY" and frame.name != "universe"]
+    return names[0] if names else robot.name
+
+
+def body_twist(q: Array, q_dot: Array) -> Array:
+    """(3,) the platform's velocity q_dot along its own x and y, and about z."""
+    if len(q) < 3:
+        return np.zeros(3)
+    c, s = math.cos(q[2]), math.sin(q[2])
+    return np.array([c * q_dot[0] + s * q_dot[1], c * q_dot[1] - s * q_dot[0], q_dot[2]])
+
+
+def planar_pose(pose: Array) -> tuple[Array, Array]:
+    """Position (3,) and quaternion (4,) x y z w of x, y, theta (3,)."""
+    x, y, theta = pose
+    return np.array([x, y, 0.0]), np.array([0.0, 0.0, math.sin(theta / 2), math.cos(theta / 2)])
+
+
+def quaternion(rotation: Array) -> Array:
+    """(4,) x y z w, of length 1, of a rotation (3, 3): the eigenvector of Bar-Itzhack's matrix."""
+    (a, b, c), (d, e, f), (g, h, i) = rotation
+    K = np.array(
+        [
+            [a - e - i, b + d, c + g, h - f],
+            [b + d, e - a - i, f + h, c - g],
+            [c + g, f + h, i - a - e, d - b],
+            [h - f, c - g, d - b, a + e + i],
+        ]
+    )
+    turn = np.linalg.eigh(K)[1][:, -1]
+    return np.asarray(turn if turn[3] >= 0.0 else -turn)
+
+
+def _xyz(values: Array) -> dict[str, float]:
+    return dict(zip("xyz", values.tolist(), strict=True))
+
+
+def _xyzw(values: Array) -> dict[str, float]:
+    return dict(zip("xyzw", values.tolist(), strict=True))

@@ -1,0 +1,300 @@
+"""What ROS 2's messages say, in nmm's terms."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.arrays import Array, increasing, vector
+from nmm.errors import InputError, expect
+from nmm.robots.robot import Robot
+
+#: A platform whose z axis leans more, rad, is not read as one on level ground.
+TILT = 0.2
+#: How far from 1 the length of a quaternion may be that was rounded on its way.
+UNIT = 1e-3
+
+
+def stamp(message: Any) -> float:
+    """The time of a message's header, s; of a TFMessage that of its first transform.
+
+    Raises
+    ------
+    InputError : it has none
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace as Message
+    >>> nmm.ros.stamp(Message(header=Message(stamp=Message(sec=3, nanosec=500_000_000))))
+    3.5
+    """
+    return nanoseconds(message) / 1e9
+
+
+def nanoseconds(message: Any) -> int:
+    first = next(iter(getattr(message, "transforms", ())), message)
+    time = first if hasattr(first, "sec") else getattr(getattr(first, "header", first), "stamp", None)
+    if time is None:
+        raise InputError(where=_name(message), expected="a message with a header: it says no time")
+    return int(time.sec) * 1_000_000_000 + int(time.nanosec)
+
+
+def joints(message: Any) -> dict[str, float]:
+    """Positions of a JointState by joint, rad or m, for `Robot.q_from`.
+
+    Raises
+    ------
+    InputError : not a position for each name, a name twice, a number that is not finite
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace as Message
+    >>> nmm.ros.joints(Message(name=["q2", "q1"], position=[0.5, 0.1], velocity=[]))
+    {'q2': 0.5, 'q1': 0.1}
+    """
+    return _by_name(message, "position")
+
+
+def rates(message: Any) -> dict[str, float]:
+    """Velocities of a JointState by joint, rad/s or m/s; empty where it has none. Errors as of `joints`.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace as Message
+    >>> nmm.ros.rates(Message(name=["q1"], position=[0.1], velocity=[]))
+    {}
+    """
+    return _by_name(message, "velocity") if len(_field(message, "velocity")) else {}
+
+
+def placement(message: Any) -> Array:
+    """The pose (4, 4), m, of a Pose, PoseStamped, PoseWithCovarianceStamped, Odometry, Transform or
+    TransformStamped, in the frame of its header.
+
+    Raises
+    ------
+    InputError : no pose; a number that is not finite; a quaternion whose length is not 1 (a message that
+        nobody filled has zeros)
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace as M
+    >>> pose = M(position=M(x=1.0, y=2.0, z=0.0), orientation=M(x=0.0, y=0.0, z=1.0, w=0.0))
+    >>> nmm.ros.placement(pose)[:3, 3], nmm.ros.base(pose).round(3)
+    (array([1., 2., 0.]), array([1.   , 2.   , 3.142]))
+    """
+    where, part = _name(message), message
+    while (inner := getattr(part, "pose", None) or getattr(part, "transform", None)) is not None:
+        part = inner
+    at = getattr(part, "position", None) or getattr(part, "translation", None)
+    turn = getattr(part, "orientation", None) or getattr(part, "rotation", None)
+    if at is None or turn is None:
+        raise InputError(where=where, expected="a message with a pose or a transform")
+    x, y, z, w = vector([turn.x, turn.y, turn.z, turn.w], 4, f"{where}: orientation")
+    length = math.sqrt(x * x + y * y + z * z + w * w)
+    expect(abs(length - 1.0) <= UNIT, f"{where}: orientation", "a quaternion of length 1", length)
+    x, y, z, w = x / length, y / length, z / length, w / length
+    found = np.eye(4)
+    found[:3, 0] = 1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)
+    found[:3, 1] = 2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)
+    found[:3, 2] = 2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)
+    found[:3, 3] = vector([at.x, at.y, at.z], 3, f"{where}: position")
+    return found
+
+
+def base(message: Any, frame: str | None = None, child: str | None = None) -> Array:
+    """x, y, theta (3,) of a platform's pose, m and rad, θ within ±π, for `Robot.q_from`.
+
+    Parameters
+    ----------
+    message : as for `placement`
+    frame : in which the pose has to be, by its header: "map" or "odom"; None for any
+    child : whose pose it has to be, where the message says so: the robot's root link; None for any
+
+    Raises
+    ------
+    InputError : another frame; a platform that leans by more than 0.2 rad; the causes of `placement`
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace as M
+    >>> pose = M(position=M(x=1.0, y=2.0, z=0.0), orientation=M(x=0.0, y=0.0, z=0.0, w=1.0))
+    >>> nmm.ros.base(M(header=M(frame_id="odom"), pose=pose), frame="map")
+    Traceback (most recent call last):
+        ...
+    nmm.errors.InputError: SimpleNamespace: header.frame_id: expected 'map', got 'odom'
+    """
+    where, header = _name(message), getattr(message, "header", None)
+    given, about = getattr(header, "frame_id", None), getattr(message, "child_frame_id", None)
+    if frame is not None and given is not None:
+        expect(_plain(given) == _plain(frame), f"{where}: header.frame_id", f"{frame!r}", given)
+    if child is not None and about is not None:
+        expect(_plain(about) == _plain(child), f"{where}: child_frame_id", f"{child!r}", about)
+    return planar(placement(message), where)
+
+
+def planar(pose: Array, where: str) -> Array:
+    """x, y, theta of a pose (4, 4)."""
+    leans = math.acos(min(1.0, max(-1.0, float(pose[2, 2]))))
+    expect(leans <= TILT, f"{where}: orientation", f"a platform on level ground (within {TILT} rad)", leans)
+    return np.array([pose[0, 3], pose[1, 3], math.atan2(pose[1, 0], pose[0, 0])])
+
+
+def twist(message: Any) -> Array:
+    """(3,) the platform's velocity along its own x and y, m/s, and about z, rad/s, of a Twist, a TwistStamped
+    or an Odometry (whose twist is in its child's axes).
+
+    Raises
+    ------
+    InputError : no twist, a number that is not finite
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace as M
+    >>> nmm.ros.twist(M(linear=M(x=0.5, y=0.0, z=0.0), angular=M(x=0.0, y=0.0, z=0.2)))
+    array([0.5, 0. , 0.2])
+    """
+    part = message
+    while (inner := getattr(part, "twist", None)) is not None:
+        part = inner
+    linear, angular = getattr(part, "linear", None), getattr(part, "angular", None)
+    if linear is None or angular is None:
+        raise InputError(where=_name(message), expected="a message with a twist")
+    return vector([linear.x, linear.y, angular.z], 3, f"{_name(message)}: twist")
+
+
+def inputs(robot: Robot, q: ArrayLike, velocity: ArrayLike, joint_rates: Mapping[str, float]) -> Array:
+    """u (n_u,) at q of a platform's twist (3,), as of `twist`, and rates of joints by name, rad/s or m/s: the
+    nearest to both by least squares, since wheels admit fewer motions than a message may ask for.
+
+    Raises
+    ------
+    InputError : the rate of a joint is missing or not finite
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> nmm.ros.inputs(robot, robot.rest, [0.5, 0.0, 0.2], {"q1": 0.1, "q2": 0.0}).round(3)
+    array([0.5, 0.2, 0.1, 0. ])
+    """
+    at = robot.q(q)
+    q_dot = np.zeros(robot.n)
+    first = min(3, robot.platform.n_p)
+    for i, name in enumerate(robot.q_names[first:], first):
+        if name in joint_rates:
+            sign = -1.0 if name in robot.reversed_joints else 1.0
+            q_dot[i] = sign * float(joint_rates[name])
+        elif i >= robot.platform.n_p and i in robot.following.independent:
+            raise InputError(f"no rate of {name}", where=f"inputs: {robot.name}")
+    known = np.array([i < first or name in joint_rates for i, name in enumerate(robot.q_names)])
+    if first:
+        vx, vy, omega = vector(velocity, 3, "velocity")
+        c, s = math.cos(at[2]), math.sin(at[2])
+        q_dot[:3] = c * vx - s * vy, s * vx + c * vy, omega
+    found = np.linalg.lstsq(robot.S(at)[known], vector(q_dot, robot.n, "joint_rates")[known], rcond=None)[0]
+    return np.asarray(found)
+
+
+def joint_trajectory(message: Any) -> tuple[Array, dict[str, Array]]:
+    """Times (N,), s from its start, and positions (N,) by joint, rad or m, of a JointTrajectory.
+
+    Raises
+    ------
+    InputError : no points; not a position for each joint; times that do not ascend
+
+    Examples
+    --------
+    >>> from rosbags.typesys import Stores, get_typestore
+    >>> types = get_typestore(Stores.ROS2_HUMBLE).types
+    >>> robot = nmm.load("unicycle_2r")
+    >>> message = nmm.ros.Messages(robot, types).joint_trajectory([0, 1], [robot.rest, robot.q({"q1": 0.5})])
+    >>> nmm.ros.joint_trajectory(message)
+    (array([0., 1.]), {'q1': array([0. , 0.5]), 'q2': array([0., 0.])})
+    """
+    where, names, points = _name(message), [*message.joint_names], [*message.points]
+    expect(points, where, "at least one point")
+    expect(len({*names}) == len(names), f"{where}: joint_names", "each joint once", names)
+    times = np.array([nanoseconds(one.time_from_start) / 1e9 for one in points])
+    increasing(times, f"{where}: time_from_start")
+    rows = [
+        vector(np.asarray(one.positions), len(names), f"{where}: points.{i}.positions")
+        for i, one in enumerate(points)
+    ]
+    return times, dict(zip(names, np.array(rows).T, strict=True))
+
+
+class Transforms:
+    """The newest transforms of /tf and /tf_static, which lead from frame to frame.
+
+    Examples
+    --------
+    >>> from rosbags.typesys import Stores, get_typestore
+    >>> types = get_typestore(Stores.ROS2_HUMBLE).types
+    >>> frames = nmm.ros.Transforms()
+    >>> message = nmm.ros.Messages(nmm.load("unicycle_2r"), types).transforms(0.0, [1, 2, 0.5, 0, 0])
+    >>> frames.add(message)
+    >>> frames.base("odom", "base_footprint").round(3)
+    array([1. , 2. , 0.5])
+    """
+
+    def __init__(self) -> None:
+        self._parents: dict[str, tuple[str, Array]] = {}
+
+    def add(self, message: Any) -> None:
+        """Take over a TFMessage; `InputError` as of `placement`, with nothing taken over."""
+        found = [(_plain(one.child_frame_id), (_plain(one.header.frame_id), placement(one)))
+                 for one in _field(message, "transforms")]  # fmt: skip
+        self._parents.update(found)
+
+    def placement(self, frame: str, child: str) -> Array:
+        """The pose (4, 4) of `child` in `frame`, m; `InputError` where no transforms connect them."""
+        first, second = self._chain(_plain(frame)), self._chain(_plain(child))
+        if [*first][-1] != [*second][-1]:
+            known = sorted({*self._parents, *(parent for parent, _ in self._parents.values())})
+            raise InputError("no transforms connect them", where=f"{frame} and {child}", available=known)
+        return np.asarray(np.linalg.inv([*first.values()][-1]) @ [*second.values()][-1])
+
+    def base(self, frame: str, child: str) -> Array:
+        """x, y, theta (3,) of `child` in `frame`, as of `nmm.ros.base`."""
+        return planar(self.placement(frame, child), f"{child} in {frame}")
+
+    def _chain(self, frame: str) -> dict[str, Array]:
+        """The frames above a frame, and its pose in each."""
+        found = {frame: np.eye(4)}
+        while frame in self._parents:
+            parent, pose = self._parents[frame]
+            expect(parent not in found, f"frame {frame}", "a tree of frames, this is a circle", parent)
+            found[parent] = pose @ found[frame]
+            frame = parent
+        return found
+
+
+def _by_name(message: Any, part: str) -> dict[str, float]:
+    where, names = _name(message), [*_field(message, "name")]
+    values = _field(message, part)
+    expect(len({*names}) == len(names), f"{where}: name", "each joint once", names)
+    expect(
+        len(values) == len(names), f"{where}: {part}", f"{len(names)} numbers, as many as names", len(values)
+    )
+    for name, value in zip(names, values, strict=True):
+        expect(math.isfinite(value), f"{where}: {part} of {name}", "a finite number", float(value))
+    return {str(name): float(value) for name, value in zip(names, values, strict=True)}
+
+
+def _field(message: Any, name: str) -> Sequence[Any]:
+    if not hasattr(message, name):
+        raise InputError(where=_name(message), expected=f"a message with the field {name}")
+    found: Sequence[Any] = getattr(message, name)
+    return found
+
+
+def _name(message: Any) -> str:
+    return str(getattr(message, "__msgtype__", type(message).__name__))
+
+
+def _plain(frame: str) -> str:
+    return frame.lstrip("/")
