@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nmm.arrays import Array, positive, vector
+from nmm.arrays import Array, positive, scalar, vector
 from nmm.control.collisions import Collisions
 from nmm.control.idle_inputs import idle_inputs, inputs_without_effect
 from nmm.control.integrators import STEPPING, integrator
@@ -238,6 +238,40 @@ class Controller:
             return self._u.copy()
         finally:
             busy[0] = False
+
+    def stop(self, t: float, q: ArrayLike, u: ArrayLike | None = None) -> Array:
+        """The inputs of a call that brings the robot to rest instead of doing its task: those nearest to 0
+        that limits and distances allow; call it every dt until they are 0. At order 2 it is u_dot.
+
+        Each input falls as fast as its limit of acceleration lets it, all by the same share where distances
+        would else be lost. Beyond a limit the robot stays, and returns only when called again. It moves on
+        where something with a path comes towards it.
+
+        Parameters
+        ----------
+        t, q, u : as of a call; the task may have no value there
+
+        Raises
+        ------
+        InputError : q has the wrong length; t or q is not finite; limits need dt
+
+        Examples
+        --------
+        >>> robot = nmm.load("unicycle_2r")
+        >>> task = nmm.Task(nmm.Position("ee", "xy"), [3.0, 1.0])
+        >>> limits = nmm.Limits({"v": 0.5, "omega": 1.0}, acceleration=5.0)
+        >>> controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), limits=limits, dt=0.02)
+        >>> q = nmm.simulate(controller, {"q2": 0.5}, 0.5, 0.02).q[-1]
+        >>> [round(float(controller.stop(0.5, q)[0]), 3) for _ in range(6)]
+        [0.4, 0.3, 0.2, 0.1, 0.0, 0.0]
+        """
+        solver, q = self.solver, self.robot.q(q)
+        with solver.alone():
+            if u is not None:
+                self._move(u)
+            solver.take_stop(scalar(t, "t"), q)
+            solver.period_monitor.called[()] = t
+            return (solver.found.second.u_dot if solver.second else solver.found.answer.u).copy()
 
     def _move(self, u: ArrayLike) -> None:
         """The robot moves with the inputs u (m,)."""

@@ -29,7 +29,7 @@ from nmm.kernels.record_layout import (
     views,
 )
 from nmm.kernels.velocity_map import to_coordinates, to_inputs
-from nmm.resolvers.answer import NOT_FINITE, RELAXED, SOLVED, AnswerArrays
+from nmm.resolvers.answer import NOT_FINITE, RELAXED, SINGULAR_J, SOLVED, AnswerArrays
 from nmm.resolvers.base import call_resolver
 from nmm.resolvers.limit_check import keep_limits
 from nmm.resolvers.problem_arrays import ProblemArrays
@@ -213,7 +213,8 @@ def finish(q: Array, integers: Integers, floats: Array) -> None:
     write_shares(e.task, e.problem, e.answer, e.scale)
     if e.steering.on[()] == 1:
         steer(e.steering, q, b.value, b.G, e.problem, e.answer.u)
-    if e.limits.mode[()] == SAMPLE and e.second.u_dot.shape[0] == 0:
+    answered = e.answer.status[()] < SINGULAR_J  # else the robot still has those before
+    if answered and e.limits.mode[()] == SAMPLE and e.second.u_dot.shape[0] == 0:
         for j in range(e.answer.u.shape[0]):
             e.problem.before[j] = e.answer.u[j]
     drive(e.answer.u, b.G, e.arm, e.q_dot)

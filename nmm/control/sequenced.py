@@ -170,6 +170,10 @@ class SequencedController(Controller):
         """q_dot = S(q) u (n,) at (t, q), with the tasks that the last call decided."""
         return self.current.velocity(t, q)
 
+    def stop(self, t: float, q: ArrayLike, u: ArrayLike | None = None) -> Array:
+        """As for `Controller`; no task begins or ends meanwhile."""
+        return self.current.stop(t, q, u)
+
     def reset(self) -> None:
         """Forget all decisions and the previous inputs."""
         self.schedule.reset()

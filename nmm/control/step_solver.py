@@ -111,7 +111,7 @@ class StepSolver:
         if retreat is not None:
             self.retreat_state = RetreatState(retreat, robot, self.found.retreat)
             self._watch_error = checked_by_caller(watch_error, WATCH)
-            self._replace_inputs = checked_by_caller(replace_inputs, BOUNDS)
+        self._wanted: Array | None = None
         self.step_size: StepSize | None = None
         self.needs_dt = (
             self.retreat_state is not None
@@ -203,6 +203,9 @@ class StepSolver:
 
         def again(q: Array) -> float:
             once(q, *blocks)
+            if self._wanted is not None:
+                self._replace_by(self._wanted, q)
+                return float(Status.RELAXED)
             self._finished(q)
             if self.retreat_state is not None and self.retreat_state.now:
                 self._back_off(self.retreat_state, q)
@@ -223,6 +226,46 @@ class StepSolver:
             raise self.failure(t, q)
         if self.safety_filter is not None and earlier is not None:
             self.safety_filter.certify(t, q, earlier)
+
+    def take_nearest(self, t: float, q: Array, wanted: Array) -> None:
+        """A sample whose inputs are those within the limits that are nearest to `wanted` (m,), at order 2
+        those at its end; neither the resolver nor the task, which may have no value, is listened to."""
+        self.expect_dt()
+        earlier, self._wanted = self.before.copy(), wanted
+        try:
+            self.linearise(t, q)
+            self.before[:] = earlier
+            self._replace_by(wanted, q)
+            if self.safety_filter is not None:
+                self.safety_filter.certify(t, q, earlier)
+        finally:
+            self._wanted = None
+
+    def take_stop(self, t: float, q: Array) -> None:
+        """`take_nearest` to rest; beyond a limit the robot stays where it is and does not return."""
+        returns = self.found.limits.recovery, self.found.clearance.recovery, self.found.clearance.margin
+        usual = [one.copy() for one in returns]
+        for one in returns:
+            one[()] = 0.0
+        try:
+            self.take_nearest(t, q, np.zeros(self.robot.n_u))
+        finally:
+            for one, value in zip(returns, usual, strict=True):
+                one[()] = value
+
+    def _replace_by(self, wanted: Array, q: Array) -> None:
+        if self.second:  # it follows its answer by this share within a sample
+            wanted = self.before + (wanted - self.before) / self.found.second.share
+            self._replace_inputs(wanted, *self.blocks)
+            follow_answer(*self.blocks)
+        else:
+            self._replace_inputs(wanted, *self.blocks)
+            self.before[:] = self.found.answer.u
+
+    @cached_property
+    def _replace_inputs(self) -> Callable[..., None]:
+        replaces: Callable[..., None] = checked_by_caller(replace_inputs, BOUNDS)
+        return replaces
 
     def solve_whole(self, t: float, q: Array) -> float:
         """A sample's inputs without a retreat, with α chosen; returns the status."""
