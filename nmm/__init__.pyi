@@ -123,6 +123,8 @@ from .robots.odometry import Odometry as Odometry
 from .robots.robot import Robot as Robot
 from .rollouts.rollout import rollout as rollout
 from .runs.disturbances import Disturbances as Disturbances
+from .runs.robot_loop import Loop as Loop
+from .runs.robot_loop import LoopState as LoopState
 from .runs.simulation import simulate as simulate
 from .runs.trajectory import Outcome as Outcome
 from .runs.trajectory import Trajectory as Trajectory

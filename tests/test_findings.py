@@ -16,7 +16,7 @@ from findings import the, why
 import nmm
 from nmm.cli import runs as commands
 from nmm.diagnosis.judgement import Trials
-from nmm.findings import Finding, run, words
+from nmm.findings import Finding, loop, run, words
 from nmm.findings.run import line
 from nmm.runs.verdict import Awaited
 
@@ -665,4 +665,4 @@ def test_folders_of_other_versions_keep_their_sentences(robot_2r: nmm.Robot, tmp
 def test_every_code_is_documented(pytestconfig: pytest.Config) -> None:
     page = (pytestconfig.rootpath / "docs" / "outcomes.md").read_text("utf-8").partition("## Findings")[2]
     first = [row.split("|")[1] for row in page.splitlines() if row.startswith("| `")]
-    assert {code for cell in first for code in re.findall(r"`(\w+)`", cell)} == run.WORDS.keys()
+    assert {code for cell in first for code in re.findall(r"`(\w+)`", cell)} == {*run.WORDS, *loop.WORDS}

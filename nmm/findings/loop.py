@@ -1,0 +1,43 @@
+"""What a robot's loop found (`nmm.Loop`)."""
+
+from typing import Any
+
+from nmm.findings.finding import Words
+from nmm.text_format import counted
+
+_REASONS = {
+    "lost": "did not come",
+    "not_finite": "had values or a time that are not finite, or another number of them",
+    "from_the_future": "were made later than now",
+    "repeated": "came twice",
+    "out_of_order": "were older than one before",
+    "old": "were older than the watchdog allows",
+    "frozen": "stayed the same to the bit while the inputs moved the robot",
+    "jump": "were where the inputs cannot have brought the robot",
+}
+
+
+def _refused(reason: str, samples: int, t: float, end: float) -> str:
+    return f"{counted(samples, 'measurement')} {_REASONS[reason]}, from t = {t:.4g} to {end:.4g} s"
+
+
+def _stopped(why: str, lasted: float, t: float, **_: Any) -> str:
+    return f"at rest at t = {t:.4g} s, {lasted:.3g} s after it began to stop ({why})"
+
+
+WORDS: dict[str, Words] = {
+    "measurement_refused": _refused,
+    "measurements_ended": "no measurement that can be used for {silent:.3g} s at t = {t:.4g} s: stops",
+    "relocated": "the localisation has the platform {m:.3g} m and {rad:.3g} rad from where it was, from t = "
+    "{t:.4g} s on",
+    "call_late": lambda samples, gap, t, **_: (
+        f"{counted(samples, 'call')} late, from t = {t:.4g} s on; at most {gap:.3g} s after the one before"
+    ),
+    "clock_jumped": "the clock jumped by {by:.4g} s at t = {t:.4g} s",
+    "not_called": "not called for {gap:.3g} s before t = {t:.4g} s, or the clock jumped: stops",
+    "resolver_silent": lambda why, samples, t, end: (
+        f"no inputs in {counted(samples, 'call')} from t = {t:.4g} to {end:.4g} s ({why})"
+    ),
+    "stop_asked": "asked to stop at t = {t:.4g} s ({why})",
+    "stopped": _stopped,
+}

@@ -1,0 +1,150 @@
+"""What a loop believes of where its robot is: measurements that can be, moved on by the inputs since."""
+
+from __future__ import annotations
+
+import math
+from enum import StrEnum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.arrays import Array
+from nmm.control.goal import METRES, unit_codes
+from nmm.robots.robot import Robot
+from nmm.runs.held_history import HeldHistory
+
+
+class Refused(StrEnum):
+    """Why a measurement was not used."""
+
+    LOST = "lost"
+    NOT_FINITE = "not_finite"
+    FUTURE = "from_the_future"
+    REPEATED = "repeated"
+    OUT_OF_ORDER = "out_of_order"
+    OLD = "old"
+    FROZEN = "frozen"
+    JUMP = "jump"
+
+
+class Tolerances(NamedTuple):
+    """watchdog, lag : s; metres, radians : by how much a measurement may be off; confirm : see `Loop`."""
+
+    watchdog: float
+    lag: float
+    metres: float
+    radians: float
+    confirm: int | None
+
+
+class Jump(NamedTuple):
+    """By how much the platform is elsewhere than it was believed, m and rad."""
+
+    m: float
+    rad: float
+
+
+class MeasuredState:
+    """Where the robot is, `q` (n,) at the time of the last call; `at` is the time of the last measurement
+    that was used, s, -inf before the first one."""
+
+    def __init__(self, robot: Robot, history: HeldHistory, tolerances: Tolerances, period: float) -> None:
+        self._robot, self._history, self._tolerances = robot, history, tolerances
+        self._period = period
+        lengths = unit_codes(robot.q_units) == METRES
+        self._off = np.where(lengths, tolerances.metres, tolerances.radians)
+        self._platform = robot.platform.n_p
+        self.q = robot.rest
+        self.forget()
+
+    def forget(self) -> None:
+        """The next measurement may be anywhere."""
+        self.at, self._stamp = -math.inf, -math.inf
+        self._used: Array | None = None
+        self._candidate: Array | None = None
+        self._seen: Array | None = None
+        self._candidate_at, self._agreed = 0.0, 0
+        self._still = np.zeros(self._robot.n)
+
+    def expect_jump(self) -> None:
+        """The next measurement that is in time is used wherever it is."""
+        self._used = None
+
+    def move_on(self, since: float, until: float) -> None:
+        """No measurement, but inputs, between two calls."""
+        if self.at > -math.inf:
+            self.q = self._history.moved(self.q, since, until)
+
+    def take(self, now: float, q: ArrayLike | None, at: float) -> tuple[Refused | None, Jump | None]:
+        """Use the measurement q (n,) made at the time `at`, or say why not; and whether it has the platform
+        elsewhere."""
+        refused, read = self._in_time(now, q, at)
+        if read is None:
+            return refused, None
+        earlier, self._stamp = self._stamp, at
+        if self._stands_still(read, earlier, at):
+            return Refused.FROZEN, None
+        jump = None
+        if self._used is not None and self._beyond(self._used, self.at, read, at).any():
+            if not self._agrees(read, at):
+                return Refused.JUMP, None
+            gone = read - self._history.moved(self._used, self.at, at)
+            jump = Jump(float(np.hypot(*gone[:2])), float(abs(gone[2])))
+        self._used, self.at, self._candidate = read, at, None
+        self.q = self._history.moved(read, at, now)
+        return None, jump
+
+    def _in_time(self, now: float, q: ArrayLike | None, at: float) -> tuple[Refused | None, Array | None]:
+        if q is None:
+            return Refused.LOST, None
+        try:
+            read = np.array(q, dtype=np.float64)
+        except (TypeError, ValueError):
+            return Refused.NOT_FINITE, None
+        if read.shape != (self._robot.n,) or not (math.isfinite(at) and np.isfinite(read).all()):
+            return Refused.NOT_FINITE, None
+        if at > now + self._period:
+            return Refused.FUTURE, None
+        if at <= self._stamp:
+            return (Refused.REPEATED if at == self._stamp else Refused.OUT_OF_ORDER), None
+        if at < now - self._tolerances.watchdog:
+            return Refused.OLD, None
+        if self._platform >= 3 and self.at > -math.inf:  # sensors wrap θ, q does not
+            read[2] += 2.0 * math.pi * round((self.q[2] - read[2]) / (2.0 * math.pi))
+        return None, read
+
+    def _stands_still(self, read: Array, earlier: float, at: float) -> bool:
+        """Whether a coordinate is, to the bit, where it was though the inputs moved it by more than what a
+        measurement may be off."""
+        if self._seen is None:
+            self._seen = read
+            return False
+        changed = read != self._seen
+        if self._platform >= 3:
+            changed[:2] = changed[:2].any()
+        self._seen = read
+        self._still = np.where(changed, 0.0, self._still + self._history.way(earlier, at))
+        behind = self._history.way(at - self._tolerances.lag, at)
+        return bool(np.any(self._still > self._off + behind))
+
+    def _beyond(self, start: Array, since: float, read: Array, at: float) -> Array:
+        """Which coordinates (n,) the inputs cannot have brought from where they were to where they are read:
+        a robot that lags or slips is somewhere between rest and twice its way."""
+        ahead = self._history.moved(start, since, at)
+        way = self._history.way(since - self._tolerances.lag, at)
+        return np.asarray(np.abs(read - ahead) > self._off + way)
+
+    def _agrees(self, read: Array, at: float) -> bool:
+        """Whether so many measurements in a row have the platform, and it alone, at another place."""
+        confirm = self._tolerances.confirm
+        if self._used is None or confirm is None or self._platform < 3:
+            return False
+        if self._beyond(self._used, self.at, read, at)[self._platform :].any():
+            return False
+        near = self._candidate is not None and not np.any(
+            self._beyond(self._candidate, self._candidate_at, read, at)
+        )
+        self._agreed = self._agreed + 1 if near else 1
+        self._candidate, self._candidate_at = read, at
+        return self._agreed >= confirm

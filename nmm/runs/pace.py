@@ -1,0 +1,64 @@
+"""A loop's pace: read, step and write at the multiples of its period."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.arrays import Array
+
+
+class Paced(Protocol):
+    """What of a `Loop` its pace needs."""
+
+    period: float
+    state: Any
+    u: Array
+
+    def step(self, now: float, q: ArrayLike | None = None, measured_at: float | None = None) -> Array: ...
+
+    def stop(self, why: str) -> None: ...
+
+
+def keep_pace(
+    loop: Paced,
+    read: Callable[[], tuple[ArrayLike, float] | None],
+    write: Callable[[Array], object],
+    each: Callable[[Any], object] | None,
+    duration: float,
+    clock: Callable[[], float],
+    sleep: Callable[[float], object],
+) -> None:
+    """See `Loop.run`."""
+    raised: BaseException | None = None
+
+    def attempt(what: Callable[..., Any], *given: Any) -> Any:
+        """What it gives; None where it raises, and the robot stops. Ctrl-C a second time does not wait."""
+        nonlocal raised
+        try:
+            return what(*given)
+        except BaseException as error:
+            if raised is not None and not isinstance(error, Exception):
+                write(np.zeros_like(loop.u))
+                raise
+            raised = raised or error
+            loop.stop(type(error).__name__)
+            return None
+
+    began = due = clock()
+    while loop.state != "stopped":
+        measured = attempt(read)
+        write(loop.step(clock(), *(measured or ())))
+        if each is not None and raised is None:
+            attempt(each, loop)
+        if clock() - began >= duration:
+            loop.stop("duration")
+        due += loop.period * max(1, math.ceil((clock() - due) / loop.period))
+        if (wait := due - clock()) > 0.0:
+            attempt(sleep, wait)
+    if raised is not None:
+        raise raised

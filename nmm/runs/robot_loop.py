@@ -1,0 +1,346 @@
+"""A robot's loop that may fail: what it is given is looked at, and what goes wrong ends in a stop along the
+limits. Time comes from outside, so that a test can be any clock."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import Counter
+from collections.abc import Callable
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.arrays import Array, positive, scalar
+from nmm.control.controller import Controller
+from nmm.errors import InputError
+from nmm.findings import Finding
+from nmm.runs.held_history import HeldHistory
+from nmm.runs.loop_log import LoopFindings, LoopLog
+from nmm.runs.measured_state import MeasuredState, Refused, Tolerances
+from nmm.runs.pace import keep_pace
+from nmm.runs.trajectory import Trajectory
+
+#: A call so many periods after the one before is late.
+LATE = 1.5
+#: Measurements that did not come, or came again, are no fault: a sensor may be slower than the loop.
+QUIET = (Refused.LOST, Refused.REPEATED)
+
+
+class LoopState(StrEnum):
+    """What a `Loop` does: waits for a first measurement, starts softly, runs, holds the inputs where the
+    resolver has none, stops along the limits, has stopped."""
+
+    WAITING = "waiting"
+    STARTING = "starting"
+    RUNNING = "running"
+    HOLDING = "holding"
+    STOPPING = "stopping"
+    STOPPED = "stopped"
+
+
+class Loop:
+    """A controller in a robot's loop: u = loop.step(now, q, measured_at), once a period.
+
+    It does no input or output, and asks no clock: `step` gets both. What cannot be a measurement is refused;
+    meanwhile the robot is believed to move as its inputs say. `watchdog` after the last one that was used the
+    loop stops, along the limits, and stays so until `resume`. Nothing that `step` is given raises.
+
+    Parameters
+    ----------
+    controller : of order 1, of tasks that do not come and go; what limits it has, a stop keeps
+    period : s, between two calls; the controller's dt unless given, and then that, too
+    watchdog : s, from the time of the last measurement used until the loop stops, and from one call to the
+        next
+    hold : s, for which inputs are held, within limits, where the resolver has no answer; then it stops
+    soft_start : s, in which inputs rise from 0 to what the controller wants; 0 for none
+    lag : s, by which the robot may follow its inputs late
+    jump : m and rad; a measurement may be off by that, and by the way that the inputs asked for since the one
+        before; what is farther off is a jump
+    confirm : so many measurements in a row that agree with each other after a jump of the platform, and the
+        localisation is believed; None for never
+    keep : samples that `trajectory` has, the last ones
+
+    Attributes
+    ----------
+    state : what it does
+    t : the controller's clock, s since the first call; jumps of the clock are left out
+    q : (n,) where the robot is believed to be
+    u : (m,) the last inputs
+    calls, late_calls : how many there were
+    refused : how many measurements were not used, by reason
+
+    Raises
+    ------
+    InputError : a controller of order 2 or of tasks that come and go; no period; numbers that are not above 0
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> task = nmm.Task(nmm.Position("ee", "xy"), [2.0, 1.0])
+    >>> limits = nmm.Limits({"v": 0.5, "omega": 1.0}, acceleration=5.0)
+    >>> loop = nmm.Loop(nmm.Controller(robot, task, nmm.ProjectedGradient(), limits=limits), period=0.01)
+    >>> q = robot.q({"q2": 0.5})
+    >>> for k in range(200):
+    ...     u = loop.step(0.01 * k, q)
+    ...     q = q + 0.01 * robot.S(q) @ u
+    >>> loop.state, loop.findings
+    (<LoopState.RUNNING: 'running'>, ())
+    >>> for k in range(200, 240):  # no measurements any more
+    ...     u = loop.step(0.01 * k)
+    >>> str(loop.state), [one.code for one in loop.findings], float(abs(u).max())
+    ('stopped', ['measurements_ended', 'stopped'], 0.0)
+    """
+
+    def __init__(
+        self,
+        controller: Controller,
+        period: float | None = None,
+        *,
+        watchdog: float = 0.1,
+        hold: float = 0.05,
+        soft_start: float = 0.5,
+        lag: float = 0.05,
+        jump: tuple[float, float] = (0.05, 0.1),
+        confirm: int | None = 5,
+        keep: int = 10_000,
+    ) -> None:
+        if controller.order != 1 or controller.schedule is not None:
+            raise InputError(where="controller", expected="of order 1, with tasks that are always active")
+        period = controller.dt if period is None else period
+        if period is None:
+            raise InputError(where="period", expected="a number, s, or a controller with dt", got=None)
+        self.controller = controller
+        self.period = positive(period, "period")
+        self.watchdog = positive(watchdog, "watchdog")
+        self.hold = scalar(hold, "hold", least=0.0)
+        self.soft_start = scalar(soft_start, "soft_start", least=0.0)
+        off = positive(jump[0], "jump"), positive(jump[1], "jump")
+        tolerances = Tolerances(self.watchdog, scalar(lag, "lag", least=0.0), *off, confirm)
+        controller.dt = self.period
+        robot = controller.robot
+        remembered = math.ceil((2.0 * self.watchdog + tolerances.lag) / self.period) + 3
+        self._history = HeldHistory(robot, remembered)
+        self._measured = MeasuredState(robot, self._history, tolerances, self.period)
+        self._found = LoopFindings(2.5 * self.period)
+        self._log = LoopLog(controller, int(positive(keep, "keep")))
+        self._rest = np.zeros(robot.n_u)
+        self.state = LoopState.WAITING
+        self.t, self.u = 0.0, self._rest.copy()
+        self.calls = self.late_calls = 0
+        self.refused: Counter[str] = Counter()
+        self._now, self._offset = math.nan, 0.0
+        self._since = self._silent_since = 0.0
+        self._why = ""
+
+    @property
+    def q(self) -> Array:
+        """(n,) where the robot is believed to be."""
+        return self._measured.q.copy()
+
+    @property
+    def age(self) -> float:
+        """Time since the last measurement that was used, s; infinite before the first."""
+        return self.t - self._measured.at
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What was found, the last 200 (docs/outcomes.md has the codes); `where` has t, values `samples` and
+        `end`."""
+        return self._found.as_findings()
+
+    def trajectory(self) -> Trajectory:
+        """The last samples, as the loop saw them, with its findings; `RunError` before the first."""
+        return self._log.trajectory(self.period, self.findings)
+
+    def time_of(self, stamp: float) -> float:
+        """A time of the clock of `step` on the controller's clock, as for `LiveTarget.set`."""
+        return stamp - self._offset
+
+    def stop(self, why: str = "asked") -> None:
+        """Stop along the limits from the next call on."""
+        if self.state not in (LoopState.STOPPING, LoopState.STOPPED):
+            self._found.add("stop_asked", self.t, why=why)
+            self._begin_stop("stop_asked")
+        if self._measured.at == -math.inf:  # it has not moved yet
+            self._enter(LoopState.STOPPED)
+
+    def resume(self) -> None:
+        """Go on after a stop, from the next measurement on, which may be anywhere; `InputError` unless the
+        robot stands."""
+        if self.state is not LoopState.STOPPED:
+            raise InputError("is not at rest", where="loop", expected="stopped", got=str(self.state))
+        self._measured.forget()
+        self._enter(LoopState.WAITING)
+
+    def expect_jump(self) -> None:
+        """The localisation is set anew: the next measurement is used wherever it is, and it starts softly."""
+        self._measured.expect_jump()
+        self._start_again()
+
+    def _start_again(self) -> None:
+        if self.state in (LoopState.RUNNING, LoopState.HOLDING):
+            self._enter(LoopState.STARTING)
+
+    def step(self, now: float, q: ArrayLike | None = None, measured_at: float | None = None) -> Array:
+        """The inputs u (m,) until the next call.
+
+        Parameters
+        ----------
+        now : s, of any clock
+        q : (n,) measured, None where there is no measurement since the last call
+        measured_at : s, when, of the same clock; now unless given
+        """
+        before = self.t
+        self._tell_time(now)
+        self._measured.move_on(before, self.t)
+        at = self.t if measured_at is None else self.time_of(measured_at)
+        refused, jump = self._measured.take(self.t, q, at)
+        if refused is not None:
+            self.refused[refused] += 1
+            if refused not in QUIET:
+                self._found.add("measurement_refused", self.t, reason=str(refused))
+        if jump is not None:
+            self._found.add("relocated", self.t, m=jump.m, rad=jump.rad)
+            self._start_again()
+        if self._measured.at == -math.inf:
+            return self.u.copy()
+        if self.state is LoopState.WAITING:
+            self.controller.reset()
+            self._enter(LoopState.STARTING)
+        elif self.state not in (LoopState.STOPPING, LoopState.STOPPED) and self.age > self.watchdog:
+            self._found.add("measurements_ended", self.t, silent=self.age)
+            self._begin_stop("measurements_ended")
+        self._answer()
+        self._log.add(self.t, self._measured.q)
+        self._history.give(self.t, self.u, self.controller.solver.found.q_dot)
+        return self.u.copy()
+
+    def _tell_time(self, now: float) -> None:
+        """Advance t: by what the clock says, but by a period where it stands, jumps, or nobody called."""
+        self.calls += 1
+        if math.isnan(self._now):
+            if math.isfinite(now):
+                self._now, self._offset = float(now), float(now) - self.t
+            return
+        gap = float(now) - self._now
+        if 0.0 < gap <= self.watchdog:
+            if gap > LATE * self.period:
+                self.late_calls += 1
+                self._found.add("call_late", self.t + gap, gap=gap)
+            self.t, self._now = now - self._offset, float(now)
+            return
+        self.t += self.period
+        if not math.isfinite(gap):
+            self._now += self.period
+            self._found.add("clock_jumped", self.t, by=math.inf)
+            return
+        self._now, self._offset = float(now), float(now) - self.t
+        if gap <= 0.0:
+            self._found.add("clock_jumped", self.t, by=gap - self.period)
+            return
+        self.late_calls += 1
+        self._measured.expect_jump()  # nobody knows what the robot did meanwhile
+        if self.state not in (LoopState.WAITING, LoopState.STOPPED):
+            self._found.add("not_called", self.t, gap=gap)
+            self._begin_stop("not_called")
+
+    def _answer(self) -> None:
+        """Inputs for where the robot is believed to be."""
+        solver, q = self.controller.solver, self._measured.q
+        if self.state in (LoopState.STARTING, LoopState.RUNNING, LoopState.HOLDING):
+            earlier = solver.before.copy()
+            try:
+                self.u = self.controller(self.t, q)
+            except Exception as error:  # a user's function may raise anything
+                solver.before[:] = earlier
+                self._do_without(type(error).__name__)
+            else:
+                self._soften(earlier)
+        if self.state is LoopState.HOLDING:
+            self._within(lambda: solver.take_nearest(self.t, q, self.u))
+        elif self.state in (LoopState.STOPPING, LoopState.STOPPED):
+            self._within(lambda: solver.take_stop(self.t, q))
+            if self.state is LoopState.STOPPED:
+                self._write(self._rest)
+            elif not self.u.any():
+                self._found.add("stopped", self.t, why=self._why, lasted=self.t - self._since)
+                self._enter(LoopState.STOPPED)
+
+    def _do_without(self, why: str) -> None:
+        """The resolver has no answer: hold, then stop."""
+        if self.state is not LoopState.HOLDING:
+            self._silent_since = self.t
+            self._enter(LoopState.HOLDING)
+        self._found.add("resolver_silent", self.t, why=why)
+        if self.t - self._silent_since >= self.hold - 1e-9:
+            self._begin_stop("resolver_silent")
+
+    def _soften(self, earlier: Array) -> None:
+        """Where it has just started, less than what the controller wants."""
+        if self.state is LoopState.HOLDING:
+            self._enter(LoopState.RUNNING)
+        if self.state is not LoopState.STARTING:
+            return
+        if self.t - self._since >= self.soft_start:
+            self._enter(LoopState.RUNNING)
+            return
+        share = (self.t - self._since) / self.soft_start
+        solver, wanted = self.controller.solver, share * self.u
+        solver.before[:] = earlier
+        self._within(lambda: solver.take_nearest(self.t, self._measured.q, wanted))
+
+    def _within(self, take: Callable[[], None]) -> None:
+        """Inputs that the solver brings within the limits; where a function of the user raises, what limits
+        of acceleration allow towards rest."""
+        solver = self.controller.solver
+        earlier = solver.before.copy()
+        try:
+            take()
+            self.u = solver.found.answer.u.copy()
+        except Exception:
+            self.u = np.full_like(earlier, np.nan)
+        if not np.isfinite(self.u).all():
+            change = solver.limits_on.accelerations * self.period
+            self._write(earlier - np.clip(earlier, -change, change))
+
+    def _write(self, u: Array) -> None:
+        """u (m,) in place of the solver's."""
+        solver = self.controller.solver
+        self.u = u.copy()
+        solver.found.answer.u[:] = solver.before[:] = u
+        solver.found.q_dot[:] = solver.robot.S(self._measured.q) @ u
+
+    def _enter(self, state: LoopState) -> None:
+        self.state, self._since = state, self.t
+
+    def _begin_stop(self, why: str) -> None:
+        self._why = why
+        self._enter(LoopState.STOPPING)
+
+    def run(
+        self,
+        read: Callable[[], tuple[ArrayLike, float] | None],
+        write: Callable[[Array], object],
+        *,
+        each: Callable[[Loop], object] | None = None,
+        duration: float = math.inf,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], object] = time.sleep,
+    ) -> None:
+        """Keep the pace until the robot has stopped: each period read, `step`, write, at times that are
+        multiples of the period after the first; those that have passed are left out.
+
+        Ctrl-C, an error of `read` or `each`, and the end of `duration` first stop the robot along the limits;
+        an error is then raised.
+
+        Parameters
+        ----------
+        read : gives a measurement (q, time of the clock), or None
+        write : sends u (m,) to the drives, which hold it
+        each : called with the loop after each write, for what is done beside: targets, `stop`
+        duration : s
+        clock, sleep : others for tests
+        """
+        keep_pace(self, read, write, each, duration, clock, sleep)
