@@ -18,7 +18,7 @@ from nmm.errors import InputError, RobotError
 from nmm.files import UnwrittenError
 from nmm.platforms import Unicycle
 from nmm.playback import Motion, play, wheel_angles, wheel_rates, write_html
-from nmm.playback.keyframes import LARGEST_TURN, ghost_samples, keyframes
+from nmm.playback.keyframes import LARGEST_TURN, ghost_samples, ghost_times, keyframes
 from nmm.playback.meshes import OFF
 from nmm.playback.placements import Placements
 from nmm.playback.scene import playback_scene
@@ -149,6 +149,25 @@ def test_ghosts_stand_evenly_along_the_way(robot: Robot) -> None:
     samples = ghost_samples(slow, 5)
     np.testing.assert_allclose(motion.q[samples, 0] / motion.q[-1, 0], np.linspace(0, 1, 5), atol=1e-3)
     assert ghost_samples(slow, 0) == []
+
+
+@pytest.mark.parametrize("duration", [9.9, 14.0, 20.0, 25.0, 60.0])
+def test_ghosts_stand_clear_of_one_another_at_round_times(duration: float) -> None:
+    """One that drives on has three or four; one that parks, those before; one that stays, none."""
+    times = np.linspace(0.0, duration, 80)
+
+    def boxes(x: np.ndarray) -> np.ndarray:
+        return np.array([[[at, -0.3, 0.0], [at + 0.8, 0.3, 1.0]] for at in x])
+
+    found = ghost_times(0.0, duration, times, boxes(times))
+    assert 3 <= len(found) <= 4
+    digits = {f"{np.diff(found).min():e}"[0]}
+    assert digits <= {"1", "2", "4", "5"}
+    parked = ghost_times(0.0, duration, times, boxes(np.minimum(times, 0.3 * duration)))
+    assert 2 <= len(parked) <= 4
+    assert sum(t >= 0.3 * duration for t in parked) <= 1
+    assert ghost_times(0.0, duration, times, boxes(0.1 * np.sin(times))) == []
+    assert ghost_times(0.0, 0.0, times[:1], boxes(times[:1])) == []
 
 
 # What the page holds

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import signal
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +32,7 @@ import nmm
 from nmm.playback import LiveViewer, Motion
 from nmm.playback.ellipsoids import CLOSE, THINNEST, EllipsoidOptions
 from nmm.playback.extent import corners, robot_boxes
-from nmm.playback.keyframes import ghost_samples, keyframes
+from nmm.playback.keyframes import ghost_samples, ghost_times, keyframes
 from nmm.playback.placements import Placements
 from nmm.playback.rolling import wheel_angles
 from nmm.robots.configuration import Configuration
@@ -181,6 +181,32 @@ def test_ghosts_stand_where_the_robot_passes(small_robot: Robot, window: Window,
     assert calls - page.evaluate(CALLS) == 3 * 4  # with its text
     shown = page.evaluate("nmm.ghosts[0].children.map((copy) => copy.children.map((part) => part.name))")
     assert [sorted(names) for names in shown] == [["robot", "text"]] * 4
+
+
+def test_copies_of_large_meshes_are_coarse_and_where_the_robot_is(window: Window, tmp_path: Path) -> None:
+    """TIAGo's: at most 4,000 triangles, within 3 cm of the robot's own box; of two runs at one place, one's."""
+    robot = nmm.load("package://example-robot-data/robots/tiago_description/robots/tiago_no_hand.urdf")
+    q = np.tile(robot.rest, (61, 1))
+    q[:, 0] = np.linspace(0.0, 6.0, 61)
+    motion = Motion(robot, np.linspace(0.0, 6.0, 61), q, np.zeros((61, robot.n_u)), label="RG")
+    page = window.open(file_url([motion, replace(motion, label="PG")], tmp_path))
+    copies = page.evaluate(
+        """() => nmm.ghosts.map((run) => run.children.filter(({ visible }) => visible).map((copy) => {
+             const { geometry } = copy.children[0].children[0].children[0];
+             return [geometry.index.count / 3, geometry.boundingBox.min.toArray(), geometry.boundingBox.max.toArray()];
+           }))"""
+    )
+    assert [len(run) for run in copies] == [4, 0]
+    for k, (count, *box) in enumerate(copies[0]):
+        assert 500 < count <= 4000
+        sample = ghost_times(0.0, 6.0, motion.t, robot_boxes(robot, q, wheel_angles(motion)))[k]
+        expected = robot_boxes(robot, q[:1] + [sample, *[0.0] * (robot.n - 1)], wheel_angles(motion)[:1])[0]
+        np.testing.assert_allclose(box, expected, atol=0.03)
+    page.evaluate("nmm.apart.set(1)")
+    assert page.evaluate("nmm.ghosts.map((run) => run.children.filter(({ visible }) => visible).length)") == [
+        4,
+        4,
+    ]
 
 
 def _joints_above(robot: Robot) -> list[list[str]]:

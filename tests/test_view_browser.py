@@ -170,20 +170,32 @@ def test_frames_are_shown_and_hidden_by_name(robot_3r: Robot, window: Window) ->
     window.page.set_viewport_size({"width": 1000, "height": 640})
     with shown(robot_3r) as url:
         page = window.open(url)
-        first = {"base_footprint", "link1", "link2", "link3", "ee"}
+        kept, first = {"base_footprint", "ee"}, {"base_footprint", "link1", "link2", "link3", "ee"}
+        assert visible_names(page) == kept
+        joint = page.evaluate("""() => {
+          const node = nmm.node(nmm.frames.list.find(({ name }) => name === "link2").path);
+          const { x, y } = new MeshCat.THREE.Vector3().setFromMatrixPosition(node.matrixWorld).project(viewer.camera);
+          const { clientWidth, clientHeight } = document.getElementById("view");
+          return [0.5 * (1 + x) * clientWidth, 0.5 * (1 - y) * clientHeight];
+        }""")
+        page.mouse.move(*joint)
+        assert visible_names(page) == kept | {"link2"}
+        page.mouse.move(joint[0], 600)
+        page.locator("#names").click()
         assert visible_names(page) == first
         page.locator("#frames summary").click()
         page.locator('input[data-frame="gripper"]').check()
         page.locator('input[data-frame="link1"]').uncheck()
         assert visible_names(page) == (first | {"gripper"}) - {"link1"}
+        page.locator("#names").click()
+        assert visible_names(page) == kept | {"gripper"}
         page.locator("#triads").click()
         assert visible_names(page) == set()
         assert not page.evaluate("nmm.frames.list.some(({ triad }) => triad && triad.visible)")
         page.locator("#triads").click()
         page.get_by_role("button", name="at first").click()
-        assert visible_names(page) == first
         page.locator("#names").click()
-        assert visible_names(page) == set()
+        assert visible_names(page) == first
         listed = page.locator("input[data-frame]").evaluate_all("all => all.map((one) => one.dataset.frame)")
         assert listed == [name for name in robot_3r.frames if name not in ("x", "y")]
     with shown(robot_3r, frames=False) as url:
@@ -192,23 +204,28 @@ def test_frames_are_shown_and_hidden_by_name(robot_3r: Robot, window: Window) ->
         assert visible_names(page) == set()
 
 
-def test_names_do_not_lie_on_one_another(window: Window) -> None:
-    """The default frames of a robot with many."""
-    window.page.set_viewport_size({"width": 1100, "height": 800})
-    robot = nmm.load("package://example-robot-data/robots/tiago_description/robots/tiago_no_hand.urdf")
-    with shown(robot) as url:
+@pytest.mark.parametrize("width", [1100, 420])
+@pytest.mark.parametrize("file", ["tiago_description/robots/tiago.urdf", "pr2_description/urdf/pr2.urdf"])
+def test_names_lie_neither_on_one_another_nor_on_the_tools(window: Window, file: str, width: int) -> None:
+    """Robots with many frames: those named at first, and all of them."""
+    window.page.set_viewport_size({"width": width, "height": 800})
+    with shown(nmm.load(f"package://example-robot-data/robots/{file}")) as url:
         page = window.open(url)
-        assert len(visible_names(page)) > 10
-        boxes = page.locator("#labels span:visible").evaluate_all(
-            """all => all.map((one) => one.getBoundingClientRect())
-                         .map(({ left, top, right, bottom }) => [left, top, right, bottom])"""
-        )
-    view_width = 1100 - 320
-    for i, (left, top, right, bottom) in enumerate(boxes):
-        assert left >= 0
-        assert right <= view_width
-        for other in boxes[:i]:
-            assert right <= other[0] or other[2] <= left or bottom <= other[1] or other[3] <= top
+        few = len(visible_names(page))
+        assert 2 <= few <= 5
+        for asked in (False, True):
+            if asked:
+                page.locator("#names").click()
+                assert len(visible_names(page)) > 2 * few
+            boxes = page.locator("#tools, #heading, #labels span:visible").evaluate_all(
+                """all => all.map((one) => one.getBoundingClientRect())
+                             .map(({ left, top, right, bottom }) => [left, top, right, bottom])"""
+            )
+            for i, (left, top, right, bottom) in enumerate(boxes):
+                assert left >= 0
+                assert right <= page.evaluate("document.getElementById('view').clientWidth")
+                for other in boxes[:i]:
+                    assert right <= other[0] or other[2] <= left or bottom <= other[1] or other[3] <= top
 
 
 @pytest.mark.parametrize("size", [(1280, 800), (800, 900), (420, 760)])

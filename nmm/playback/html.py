@@ -52,7 +52,8 @@ def write_html(
     motions : at least one run (`Trajectory`) or `Motion`
     path : the file to write; it appears whole or not at all, and replaces an older one
     title : heading; the first robot's name when not given
-    ghosts : transparent copies of each robot along its way; 6 when not given, 3 of each of several
+    ghosts : transparent copies of each robot along its way; three or four at round times when not given, none
+        where they overlap
     fps : frames for each second of motion
     autoplay : whether it plays when it is opened
     ellipsoids : whether manipulability ellipsoids are drawn, or how (`EllipsoidOptions`)

@@ -16,7 +16,15 @@ from nmm.playback import extent
 from nmm.playback.cameras import draw_cameras, seen_points, tell_cameras
 from nmm.playback.channels import channels, draw_curves, draw_facts
 from nmm.playback.drawing import Command, Drawing, Rgb, packed
-from nmm.playback.keyframes import MOST_FRAMES, Keyframes, ghost_samples, keyframes, samples_kept
+from nmm.playback.keyframes import (
+    MOST_FRAMES,
+    Keyframes,
+    ghost_samples,
+    ghost_times,
+    keyframes,
+    nearest,
+    samples_kept,
+)
 from nmm.playback.obstacles import SceneObstacles, draw_nearest
 from nmm.playback.placements import base_position
 from nmm.playback.rolling import wheel_angles
@@ -36,6 +44,8 @@ TARGET: Rgb = (0.83, 0.10, 0.22)
 BELIEVED: Rgb = (0.42, 0.45, 0.50)
 THROUGH = 0.4
 INSTANTS = 80
+#: Radius of a path, at most, as a share of the robot's extent: thinner than an arm.
+THIN = 0.005
 
 
 #: What a page shows: a run with its curves, or a motion, whose curves are its inputs and coordinates.
@@ -86,6 +96,7 @@ def playback_scene(
         follow=extent.held(boxes, extent.middle(motions, frames, times)),
         wall=extent.wall(motions),
         size=size,
+        thin=THIN * float(np.linalg.norm(np.ptp(boxes[:, 0], axis=1), axis=1).min()),
     )
     animations = obstacles.draw(drawing, size, start)
     for i, (motion, frame, look) in enumerate(zip(motions, frames, worn, strict=True)):
@@ -96,10 +107,15 @@ def playback_scene(
         animations += robot.animations(frame, start)
         height = extent.TAG * float(boxes[i, 0, 1, 2])
         tag = look.name if several else ""
-        if samples := ghost_samples(motion, (3 if several else 6) if ghosts is None else ghosts):
+        if ghosts is None:
+            round_times = ghost_times(float(motion.t[0]), float(motion.t[-1]), times, boxes[i])
+            samples = nearest(motion.t, np.array(round_times)).tolist() if round_times else []
+        else:
+            samples = ghost_samples(motion, ghosts)
+        if samples:
             texts = [f"{tag}{' ' * several}{motion.t[k]:.3g} s" for k in samples]
             ghosts_of = robot.ghosts(f"{path}/ghosts", motion.q[samples], wheels[i][samples], texts)
-            drawing.commands.append(ghosts_of)
+            drawing.commands.append({**ghosts_of, "clear": ghosts is None})
         # Unlabelled, the page attributes the line to the end-effector.
         label = look.name or ("" if motion.driven is not None else motion.robot.name)
         drawing.add(
@@ -159,6 +175,7 @@ def live_scene(
         view=packed(extent.corners(around), np.float64),
         follow=extent.held(extent.reached(robot, q, wheels)[np.newaxis], base_position(robot, q)[np.newaxis]),
         size=0.5 * float(np.linalg.norm(np.ptp(around, axis=0))),
+        thin=THIN * float(np.linalg.norm(np.ptp(box, axis=0))),
     )
     drawn = DrawnRobot(drawing, robot, "/nmm/motion 0/robot")
     drawn.place(q, wheels)

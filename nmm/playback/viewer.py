@@ -169,7 +169,8 @@ def _frames(robot: Robot, drawn: DrawnRobot, drawing: Drawing) -> Iterator[dict[
     """Frames that a task may name: the node of each, and whether it is shown at first."""
     model = robot.display_model
     ends = set(tips(robot))
-    chosen = {*_joint_links(robot), *ends}
+    links = list(_joint_links(robot))
+    chosen, named = {*links, *ends}, {links[0], *ends}
     for i, name in enumerate(robot.frames):
         frame = _frame(model, name)
         if frame is None or name in robot.platform.coordinates[:2]:
@@ -177,7 +178,7 @@ def _frames(robot: Robot, drawn: DrawnRobot, drawing: Drawing) -> Iterator[dict[
         parent = drawn.paths[frame.parentJoint - 1] if frame.parentJoint else drawn.paths[0].rsplit("/", 1)[0]
         path = f"{parent}/frame {i} {segment(name)}"
         drawing.transform(path, np.array(frame.placement.homogeneous))
-        yield {"name": name, "path": path, "shown": name in chosen, "tip": name in ends}
+        yield {"name": name, "path": path, "shown": name in chosen, "named": name in named}
 
 
 def _frame(model: pin.Model, name: str) -> pin.Frame | None:

@@ -2,61 +2,102 @@
 "use strict";
 {
   const THREE = MeshCat.THREE;
-  const SLATE = nmm.color([0.36, 0.44, 0.54]);
+  const [SLATE, PALE] = [nmm.color([0.36, 0.44, 0.54]), nmm.color([0.78, 0.84, 0.9])];
+  const SHARED = 0.2; // of a copy's room on the floor, what may be another's
+  const all = [];
   let copies = 0;
 
-  // Everything fixed to the joints' nodes as one geometry: which triangles, in which colours, and each part
-  // with its joint's number and its place in that joint's frame.
+  // More triangles than this say no more of a transparent copy.
+  const MOST = 4000;
+
+  // Everything fixed to the joints' nodes as one geometry: corners in their joints' frames.
   function merged(joints) {
-    const parts = [];
+    const [places, numbers, colors, index] = [[], [], [], []];
+    const v = new THREE.Vector3();
     joints.forEach((joint, number) => {
       const node = nmm.node(joint.path);
       const inverse = node.matrixWorld.clone().invert();
       for (const child of node.children) {
         if (!child.name.startsWith("visual ")) continue;
         child.traverse(({ isMesh, geometry, material, matrixWorld }) => {
-          if (isMesh) parts.push({ number, geometry, material, matrix: inverse.clone().multiply(matrixWorld) });
+          if (!isMesh) return;
+          const placed = inverse.clone().multiply(matrixWorld);
+          const { position } = geometry.attributes;
+          const start = numbers.length;
+          for (let i = 0; i < position.count; i++) {
+            v.fromBufferAttribute(position, i).applyMatrix4(placed);
+            places.push(v.x, v.y, v.z);
+            numbers.push(number);
+            colors.push(material.color);
+          }
+          if (geometry.index === null) for (let i = 0; i < position.count; i++) index.push(start + i);
+          else for (const i of geometry.index.array) index.push(start + i);
         });
       }
     });
-    const count = parts.reduce((sum, { geometry }) => sum + geometry.attributes.position.count, 0);
-    const color = new Float32Array(3 * count);
-    const index = [];
-    let start = 0;
-    for (const { geometry, material } of parts) {
-      const many = geometry.attributes.position.count;
-      if (geometry.index === null) for (let i = 0; i < many; i++) index.push(start + i);
-      else for (const i of geometry.index.array) index.push(start + i);
-      // A little slate, so that white copies can be told from the floor.
-      const shade = material.color.clone().lerp(SLATE, 0.3);
-      for (let i = start; i < start + many; i++) shade.toArray(color, 3 * i);
-      start += many;
+    let shape = { places, numbers, colors, index };
+    for (let cell = 0.004 * spread(places); shape.index.length > 3 * MOST; cell *= 1.5) shape = coarser(shape, cell);
+    const color = new Float32Array(3 * shape.numbers.length);
+    const themed = () => {
+      // A little slate, so that white copies can be told from the floor, and black ones from a dark page.
+      shape.colors.forEach((own, i) =>
+        own.clone().lerp(nmm.theme.dark ? PALE : SLATE, nmm.theme.dark ? 0.5 : 0.3).toArray(color, 3 * i));
+      attribute.needsUpdate = true;
+    };
+    const attribute = new THREE.BufferAttribute(color, 3);
+    themed();
+    nmm.theme.listeners.push(themed);
+    return { ...shape, index: new THREE.BufferAttribute(new Uint32Array(shape.index), 1), color: attribute };
+  }
+
+  // The longest side of the box around points.
+  function spread(places) {
+    let most = 0;
+    for (const axis of [0, 1, 2]) {
+      let [low, high] = [Infinity, -Infinity];
+      for (let i = axis; i < places.length; i += 3) [low, high] = [Math.min(low, places[i]), Math.max(high, places[i])];
+      most = Math.max(most, high - low);
     }
-    return { parts, count, index: new THREE.BufferAttribute(new Uint32Array(index), 1), color: new THREE.BufferAttribute(color, 3) };
+    return most;
+  }
+
+  // The corners of a joint in one cube of a grid become one, and triangles without an area go.
+  function coarser({ places, numbers, colors, index }, cell) {
+    const found = new Map();
+    const made = { places: [], numbers: [], colors: [], index: [] };
+    const named = numbers.map((number, i) => {
+      const [x, y, z] = [0, 1, 2].map((axis) => Math.round(places[3 * i + axis] / cell) + 2 ** 11);
+      const key = ((number * 2 ** 12 + x) * 2 ** 12 + y) * 2 ** 12 + z;
+      if (!found.has(key)) {
+        found.set(key, made.numbers.length);
+        made.places.push(places[3 * i], places[3 * i + 1], places[3 * i + 2]);
+        made.numbers.push(number);
+        made.colors.push(colors[i]);
+      }
+      return found.get(key);
+    });
+    for (let i = 0; i < index.length; i += 3) {
+      const [a, b, c] = [named[index[i]], named[index[i + 1]], named[index[i + 2]]];
+      if (a !== b && b !== c && c !== a) made.index.push(a, b, c);
+    }
+    return made;
   }
 
   // The robot with its joints in the k-th of their poses.
-  function posed({ parts, count, index, color }, joints, k) {
-    const [position, normal] = [0, 1].map(() => new Float32Array(3 * count));
-    const places = joints.map(({ poses }) =>
+  function posed({ places, numbers, index, color }, joints, k) {
+    const position = new Float32Array(places.length);
+    const at = joints.map(({ poses }) =>
       new THREE.Matrix4().compose(
         new THREE.Vector3().fromArray(poses, 7 * k), new THREE.Quaternion().fromArray(poses, 7 * k + 3), new THREE.Vector3(1, 1, 1),
       ));
     const v = new THREE.Vector3();
-    let at = 0;
-    for (const { number, geometry, matrix } of parts) {
-      const placed = places[number].clone().multiply(matrix);
-      const turned = new THREE.Matrix3().getNormalMatrix(placed);
-      for (let i = 0; i < geometry.attributes.position.count; i++, at += 3) {
-        v.fromBufferAttribute(geometry.attributes.position, i).applyMatrix4(placed).toArray(position, at);
-        v.fromBufferAttribute(geometry.attributes.normal, i).applyMatrix3(turned).normalize().toArray(normal, at);
-      }
-    }
+    numbers.forEach((number, i) => v.fromArray(places, 3 * i).applyMatrix4(at[number]).toArray(position, 3 * i));
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(position, 3));
-    geometry.setAttribute("normal", new THREE.BufferAttribute(normal, 3));
     geometry.setAttribute("color", color);
     geometry.setIndex(index);
+    geometry.computeVertexNormals();
+    geometry.computeBoundingBox();
     return geometry;
   }
 
@@ -70,7 +111,30 @@
   nmm.hooks.believed = ({ paths, color }) =>
     nmm.legend({ kind: "box", color, text: "where odometry has it", path: paths });
 
-  nmm.hooks.ghosts = ({ path, joints, texts }) => {
+  // Of copies that overlap, seen from above, the first one is shown.
+  function clear() {
+    const shown = [];
+    for (const { group, box, node } of all) {
+      const run = nmm.runs.find((one) => one.path === node);
+      const { x, y } = nmm.node(node).position;
+      const now = { minX: box.min.x + x, maxX: box.max.x + x, minY: box.min.y + y, maxY: box.max.y + y };
+      const area = (one) => Math.max(one.maxX - one.minX, 0) * Math.max(one.maxY - one.minY, 0);
+      const covers = (one) => {
+        const common = {
+          minX: Math.max(one.minX, now.minX), maxX: Math.min(one.maxX, now.maxX),
+          minY: Math.max(one.minY, now.minY), maxY: Math.min(one.maxY, now.maxY),
+        };
+        return common.maxX > common.minX && area(common) > SHARED * Math.min(area(one), area(now));
+      };
+      if (run && run.hidden) continue;
+      group.visible = !shown.some(covers);
+      if (group.visible) shown.push(now);
+    }
+  }
+  nmm.runs.listeners.push(clear);
+  nmm.clearGhosts = clear;
+
+  nmm.hooks.ghosts = ({ path, joints, texts, clear: only = false }) => {
     nmm.viewer.scene.updateMatrixWorld(true);
     const shape = merged(joints);
     const count = joints[0].poses.length / 7;
@@ -87,13 +151,17 @@
       // First depth alone, then colour where it is nearest: a copy hides its own inside.
       const depth = new THREE.MeshBasicMaterial({ ...offset, transparent: true, colorWrite: false });
       const paint = new THREE.MeshLambertMaterial({
-        ...offset, transparent: true, vertexColors: true, opacity: 0.16 + (0.16 * (k + 1)) / count,
+        ...offset, transparent: true, vertexColors: true, opacity: 0.18 + (0.16 * (k + 1)) / count,
         // Each copy colours a pixel once, however many of its faces lie in one plane.
         stencilWrite: true, stencilRef: 1 + (copies % 255),
         stencilFunc: THREE.NotEqualStencilFunc, stencilZPass: THREE.ReplaceStencilOp,
       });
       const group = new THREE.Group();
       const geometry = posed(shape, joints, k);
+      const { opacity } = paint;
+      const themed = () => (paint.opacity = nmm.theme.dark ? 1.6 * opacity : opacity);
+      themed();
+      nmm.theme.listeners.push(themed);
       [depth, paint].forEach((material, pass) => {
         const mesh = new THREE.Mesh(geometry, material);
         mesh.renderOrder = 2 * k + pass + 1;
@@ -103,6 +171,7 @@
         group.add(mesh);
       });
       nmm.viewer.set_object(nmm.split(`${path}/${k}/robot`), group);
+      if (only) all.push({ group: nmm.node(`${path}/${k}`), box: geometry.boundingBox, node: path.replace(/\/ghosts$/, "") });
       const highest = top(geometry);
       if (highest && texts[k]) nmm.viewer.set_object(nmm.split(`${path}/${k}/text`), nmm.texts.add(texts[k], highest));
     }

@@ -5,9 +5,8 @@
   const obstacles = (nmm.obstacles = { lines: [], shown: [] });
 
   nmm.hooks.obstacle = ({ path, name, color, top }) => {
-    const tag = written(0.024);
+    const tag = nmm.texts.put(written(20), "obstacle");
     tag.write(name, css(color.map((c) => 0.5 * c)));
-    tag.center.set(0.5, 0);
     tag.position.fromArray(top);
     nmm.node(path).add(tag);
   };
@@ -20,8 +19,8 @@
     return new THREE.MeshBasicMaterial({ depthTest: false, depthWrite: false, transparent: true });
   }
 
-  // A text in front of everything, with a white rim, or on a white plate before the others; it keeps its size
-  // on the screen.
+  // A text in front of everything, with a white rim, or on a white plate before the others; it is so many
+  // pixels high on any screen.
   function written(height, plate = false) {
     const canvas = document.createElement("canvas");
     const pen = canvas.getContext("2d");
@@ -48,7 +47,7 @@
       }
       pen.strokeText(text, width / 2, 32);
       pen.fillText(text, width / 2, 32);
-      sprite.scale.set((height * width) / 60, height, 1);
+      nmm.scenery.sized(sprite, (height * width) / 60, height);
       if (sprite.material.map) sprite.material.map.dispose();
       const map = new THREE.CanvasTexture(canvas);
       map.encoding = THREE.sRGBEncoding;
@@ -65,8 +64,7 @@
     const material = painted();
     const line = new THREE.Mesh(new THREE.CylinderGeometry(radius, radius, 1, 8), material);
     const ends = [0, 1].map(() => new THREE.Mesh(new THREE.SphereGeometry(2.2 * radius, 12, 8), material));
-    const text = written(0.028, true);
-    text.center.set(0.5, -0.35 - 1.05 * obstacles.shown.length); // runs at one place, one over another
+    const text = nmm.texts.put(written(23, true), "distance");
     const group = new THREE.Group();
     group.add(line, ...ends, text);
     for (const part of [line, ...ends]) part.renderOrder = 1000;

@@ -147,6 +147,13 @@
     for (const { scale, userData } of labels) scale.set(userData.wide * unit, userData.high * unit, 1);
   };
 
+  // wide, high: px.
+  scenery.sized = (sprite, wide, high) => {
+    if (!labels.includes(sprite)) labels.push(sprite);
+    sprite.userData = { wide, high };
+    scenery.fit();
+  };
+
   // A text that faces the viewer and keeps its size on the screen.
   function label(text, rgb, filled, part = 1) {
     const canvas = document.createElement("canvas");
@@ -174,18 +181,14 @@
     const sprite = new THREE.Sprite(
       new THREE.SpriteMaterial({ map, depthTest: !filled, depthWrite: false, sizeAttenuation: false }),
     );
-    sprite.userData = { wide: (width / height) * HIGH * part, high: HIGH * part };
-    labels.push(sprite);
-    scenery.fit();
+    scenery.sized(sprite, (width / height) * HIGH * part, HIGH * part);
     sprite.renderOrder = filled ? 1000 : 0;
     return sprite;
   }
 
   scenery.label = label;
-  scenery.tag = (parent, text, rgb, height, row) => {
-    const sprite = label(text, rgb, true);
-    // Tags of robots that stand at one place are stacked.
-    sprite.center.set(0.5, -1.1 * row);
+  scenery.tag = (parent, text, rgb, height) => {
+    const sprite = nmm.texts.put(label(text, rgb, true), "robot");
     sprite.position.z = height;
     parent.add(sprite);
   };
@@ -251,7 +254,7 @@
 
   // A path without times is dashed; one with times grows as the robot drives it, over a faint whole.
   nmm.hooks.path = ({ path, color, points, times, thick, text = "desired path" }) => {
-    const radius = 0.0032 * nmm.stage.size * thick;
+    const radius = Math.min(0.0032 * nmm.stage.size, nmm.stage.thin) * thick;
     const [kept, when] = thinned(points, times, 1.5 * radius);
     if (kept.length < 2) return;
     const group = new THREE.Group();
@@ -265,7 +268,11 @@
     } else {
       const driven = tube(kept, 1.25 * radius);
       const faint = driven.clone();
-      group.add(new THREE.Mesh(faint, material(color, 0.22)), new THREE.Mesh(driven, material(color, 1)));
+      const ahead = material(color, 0.22);
+      const themed = () => (ahead.opacity = nmm.theme.dark ? 0.5 : 0.25);
+      themed();
+      nmm.theme.listeners.push(themed);
+      group.add(new THREE.Mesh(faint, ahead), new THREE.Mesh(driven, material(color, 1)));
       scenery.trails.push({ geometry: driven, when });
     }
     scenery.paths = (scenery.paths || []).concat(group);

@@ -1,10 +1,13 @@
-// The texts of the robot's copies: each right above its own, moved aside or upwards where another one has the room.
+// The texts over the scene: each right above its point, moved aside or upwards where another one has the room. Names of
+// robots come first, then distances, names of obstacles, and the times of the robot's copies.
 "use strict";
 {
   const THREE = MeshCat.THREE;
   const [ABOVE, GAP] = [3, 2]; // px
   const [ROWS, ASIDE] = [[0, 1, -1, 2, -2, 3, -3, 4, 5, 6], [0, -1, 1, -2, 2]];
+  const STACK = [0, 1, 2, 3, 4, 5, 6, 7, -1, -2, -3];
   const COLORS = { light: [0.31, 0.38, 0.46], dark: [0.72, 0.78, 0.85] };
+  const RANKS = ["robot", "distance", "obstacle", "time"];
   const view = document.getElementById("view");
   const texts = (nmm.texts = { all: [] });
   let cards = [];
@@ -18,7 +21,12 @@
     const themed = () => sprite.material.color.copy(nmm.color(COLORS[nmm.theme.dark ? "dark" : "light"]));
     themed();
     nmm.theme.listeners.push(themed);
-    texts.all.push(sprite);
+    return texts.put(sprite, "time");
+  };
+
+  // rank: what it names; of two that want one place the earlier in RANKS has it.
+  texts.put = (sprite, rank) => {
+    texts.all.push({ sprite, rank: RANKS.indexOf(rank) });
     return sprite;
   };
 
@@ -33,10 +41,11 @@
   }
 
   // The nearest free place: above the point, beside that, or rows higher or lower.
-  function free(taken, { x, y, wide, high }, width) {
-    for (const row of ROWS) {
-      for (const aside of ASIDE) {
-        const [left, top] = [x - 0.5 * wide + aside * (wide + GAP + 1), y - ABOVE - (row + 1) * high];
+  function free(taken, { x, y, wide, high, rank }, width) {
+    // Names of robots are stacked.
+    for (const row of rank === 0 ? STACK : ROWS) {
+      for (const aside of rank === 0 ? [0] : ASIDE) {
+        const [left, top] = [x - 0.5 * wide + aside * (wide + GAP + 1), y - ABOVE - high - row * (high + 1)];
         const box = { left, top, right: left + wide, bottom: top + high };
         const clear = (other) =>
           box.left > other.right + GAP || other.left > box.right + GAP || box.top > other.bottom || other.top > box.bottom;
@@ -50,17 +59,20 @@
   nmm.viewer.scene.onBeforeRender = (renderer, scene, camera) => {
     const [width, height] = [view.clientWidth, view.clientHeight];
     const found = [];
-    for (const sprite of texts.all) {
+    for (const { sprite, rank } of texts.all) {
       if (!shown(sprite)) continue;
       const { x, y, z } = new THREE.Vector3().setFromMatrixPosition(sprite.matrixWorld).project(camera);
       const { wide, high } = sprite.userData;
-      if (z < 1) found.push({ sprite, x: 0.5 * (1 + x) * width, y: 0.5 * (1 - y) * height, wide, high });
+      if (z < 1) found.push({ sprite, rank, x: 0.5 * (1 + x) * width, y: 0.5 * (1 - y) * height, wide, high });
     }
-    found.sort((a, b) => b.y - a.y || a.x - b.x);
+    found.sort((a, b) => a.rank - b.rank || b.y - a.y || a.x - b.x);
     const taken = [...cards];
     for (const one of found) {
-      const { sprite, x, y, wide, high } = one;
-      const box = free(taken, one, width) || { left: x - 0.5 * wide, bottom: y - ABOVE };
+      const { sprite, rank, x, y, wide, high } = one;
+      const room = free(taken, one, width);
+      sprite.material.visible = room !== null || rank < 2;
+      if (!sprite.material.visible) continue;
+      const box = room || { left: x - 0.5 * wide, top: y - ABOVE - high, right: x + 0.5 * wide, bottom: y - ABOVE };
       sprite.center.set((x - box.left) / wide, (box.bottom - y) / high);
       taken.push(box);
     }

@@ -37,7 +37,7 @@
     const on = frames.shown && frame.shown;
     if (on && !frame.triad) nmm.node(frame.path).add((frame.triad = triad()));
     if (frame.triad) frame.triad.visible = on;
-    nmm.labels.put(frame.path, frame.name, on ? nmm.node(frame.path) : null);
+    nmm.labels.put(frame.path, frame.name, on ? nmm.node(frame.path) : null, frame.named);
     nmm.viewer.set_dirty();
   }
 
@@ -107,7 +107,10 @@
       const row = nmm.element(part, "label", { class: "frame" });
       frame.box = nmm.element(row, "input", { type: "checkbox", "data-frame": frame.name });
       nmm.element(row, "span", {}, frame.name);
-      frame.box.addEventListener("change", () => frames.show(frame.name, frame.box.checked));
+      frame.box.addEventListener("change", () => {
+        frame.named = true;
+        frames.show(frame.name, frame.box.checked);
+      });
     }
   }
 
@@ -138,7 +141,7 @@
     });
     toggle("world", "World", "Show the world's axes", false, showWorld);
     showWorld(false);
-    toggle("names", "Names", "Show the frames' names", true, nmm.labels.show);
+    toggle("names", "Names", "Show the names of all frames, not only of tools, root and what is pointed at", false, nmm.labels.showAll);
     for (const frame of frames.list) frames.show(frame.name, frame.shown);
     nmm.viewer.scene.updateMatrixWorld();
     nmm.joints.listeners.push(tell);
