@@ -149,7 +149,6 @@ from .robots.mesh_files import meshes_of as meshes_of
 from .robots.meshes import Shapes as Shapes
 from .robots.meshes import read_meshes as read_meshes
 from .robots.mimic_joints import MimicJoint as MimicJoint
-from .robots.motion import Body as Body
 from .robots.motion import Camera as Camera
 from .robots.motion import Motion as Motion
 from .robots.motion import Nearest as Nearest
@@ -164,6 +163,9 @@ from .robots.robot import CENTER_OF_MASS as CENTER_OF_MASS
 from .robots.semantics import POSTURE as POSTURE
 from .robots.semantics import NamedPostures as NamedPostures
 from .robots.semantics import Semantics as Semantics
+from .robots.surroundings import Body as Body
+from .robots.surroundings import Carried as Carried
+from .robots.surroundings import Surroundings as Surroundings
 from .robots.wheel import Wheel as Wheel
 from .robots.wheel_rates import inputs_held_by as inputs_held_by
 from .robots.wheel_rates import turning_wheels as turning_wheels

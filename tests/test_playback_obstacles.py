@@ -17,6 +17,7 @@ from playback_browser import window as window
 import nmm
 from nmm.collisions.obstacle import Passed, obstacle_as_json, obstacle_from_json, shape_from_json
 from nmm.figures.motion import outlines
+from nmm.playback import Motion, Surroundings
 from nmm.playback.obstacles import REACH
 from nmm.playback.scene import playback_scene
 from nmm.runs.clearance import ROUNDING, swept
@@ -238,7 +239,7 @@ def test_runs_that_are_compared_share_their_obstacles(
         run.robot,
         **shorter,
         label="RG",
-        bodies=tuple(nmm.robots.motion.Body(one.name, one.geometry, one.places[:90]) for one in own.bodies),
+        bodies=tuple(nmm.extending.Body(one.name, one.geometry, one.places[:90]) for one in own.bodies),
     )
     page = window.open(file_url([other, own], tmp_path))
     assert len(placed(window)) == len(run.obstacles)
@@ -273,7 +274,7 @@ def test_the_camera_holds_near_obstacles_and_not_the_far_ones(window: Window, tm
     def body(shape: nmm.extending.Shape, xyz: list[float]) -> Any:
         place = np.eye(4)
         place[:3, 3] = xyz
-        return nmm.robots.motion.Body("thing", shape.geometry(), place[None])
+        return nmm.extending.Body("thing", shape.geometry(), place[None])
 
     alone = size([])
     assert size([body(nmm.HalfSpace(), [0, 0, 0])]) == alone
@@ -321,3 +322,29 @@ def test_what_moves_and_then_rests_is_drawn_once_there() -> None:
     spans = [(0.0, 0.0), (1.0, 3.0), (0.0, 0.0), (1.0, 1.0), (2.0, 2.0), (3.0, 3.0), None]
     assert [one.times for one in found] == spans
     assert [one.strength for one in found if one.times and one.times[1] == 3.0] == [1.0, 1.0]
+
+
+def test_what_stands_before_the_robot_is_seen_through(window: Window, tmp_path: Path) -> None:
+    """A wall between eye and robot, one behind it, and the first one again from its other side."""
+    robot = nmm.load("unicycle_2r")
+    q = np.tile(robot.rest, (2, 1))
+    places = []
+    for y in (-1.0, 1.0):
+        place = np.eye(4)
+        place[:3, 3] = 0.0, y, 1.0
+        places.append(place[None])
+    wall = nmm.Box([4.0, 0.1, 2.0]).geometry()
+    around = Surroundings(scenery=tuple(nmm.extending.Body("wall", wall, at) for at in places))
+    motion = Motion(robot, [0.0, 1.0], q, np.zeros((2, robot.n_u)), surroundings=around)
+    page = window.open(file_url([motion], tmp_path) + "#view=front")
+    opacity = """() => [0, 1].map((i) => {
+      let found = null;
+      nmm.viewer.render();
+      nmm.node(`/nmm/obstacle ${i}`).traverse((part) => part.isMesh && (found = part.material.opacity));
+      return found;
+    })"""
+    assert page.evaluate(opacity) == [0.3, 1.0]
+    page.evaluate("nmm.camera.put([0, 6, 1, 0, 0, 0.5])")
+    assert page.evaluate(opacity) == [1.0, 0.3]
+    page.evaluate("nmm.camera.put([6, 0, 1, 0, 0, 0.5])")
+    assert page.evaluate(opacity) == [1.0, 1.0]

@@ -173,8 +173,9 @@ def test_frames_are_shown_and_hidden_by_name(robot_3r: Robot, window: Window) ->
         kept, first = {"base_footprint", "ee"}, {"base_footprint", "link1", "link2", "link3", "ee"}
         assert visible_names(page) == kept
         joint = page.evaluate("""() => {
-          const node = nmm.node(nmm.frames.list.find(({ name }) => name === "link2").path);
-          const { x, y } = new MeshCat.THREE.Vector3().setFromMatrixPosition(node.matrixWorld).project(viewer.camera);
+          const { path } = nmm.frames.list.find(({ name }) => name === "link2");
+          const at = new MeshCat.THREE.Vector3().setFromMatrixPosition(nmm.node(path).matrixWorld);
+          const { x, y } = at.project(viewer.camera);
           const { clientWidth, clientHeight } = document.getElementById("view");
           return [0.5 * (1 + x) * clientWidth, 0.5 * (1 - y) * clientHeight];
         }""")

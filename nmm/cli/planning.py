@@ -96,7 +96,9 @@ def plan(
     check_folder(folder, is_run)
     with progress(f"{made.name}, plan") as report:
         found = made.plan(report)
-        trajectory = found.trajectory(made.parts.dt).with_scenario(made.resolved())
+        trajectory = found.trajectory(made.parts.dt).with_scenario(
+            made.resolved(), (), made.surroundings(made.robot())
+        )
     if as_json:
         trajectory.save(folder, html=html)
         said = {

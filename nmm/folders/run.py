@@ -107,12 +107,13 @@ def _loaded(folder: Path, robot: Robot | None) -> Trajectory:
     absent = {one.name: None if one.optional else one.absent(**sizes) for one in saved()}
     arrays = {name: found.get(name, fill) for name, fill in absent.items()}
     obstacles = _obstacles(told.obstacles or (), found, file)
-    scenario = None
+    scenario, rest = None, dict[str, Any]()
     if (folder / "scenario.yaml").exists():
         with older_names():
             loaded = Scenario.load(folder / "scenario.yaml")
             scenario = loaded.resolved()
         robot = loaded.robot() if robot is None else robot
+        rest["surroundings"] = loaded.surroundings(robot)
         if told.obstacles is None:
             obstacles = loaded.obstacles(robot)
     elif robot is None:
@@ -132,7 +133,7 @@ def _loaded(folder: Path, robot: Robot | None) -> Trajectory:
             raise error.at(f"{summary}: {key}") from None
     findings = None if told.findings is None else [one.model_dump() for one in told.findings]
     own = ToldRun.model_fields.keys() & Trajectory.__dataclass_fields__.keys()
-    rest: dict[str, Any] = {name: getattr(told, name) for name in own} | {
+    rest |= {name: getattr(told, name) for name in own} | {
         "robot": robot,
         "verdict": verdict_of(told.outcome, told.message, told.warnings, findings),
         "unmet": Residuals(*(getattr(told, f"unmet_{name}") for name in Residuals._fields)),

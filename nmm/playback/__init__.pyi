@@ -4,10 +4,12 @@ from .html import Page as Page
 from .html import write_html as write_html
 from .live import LiveViewer as LiveViewer
 from .live import play as play
-from .obstacles import Body as Body
 from .obstacles import Nearest as Nearest
 from .rolling import Motion as Motion
 from .rolling import wheel_angles as wheel_angles
 from .rolling import wheel_rates as wheel_rates
 from .running import LiveRun as LiveRun
+from .shapes import Body as Body
+from .shapes import Carried as Carried
+from .shapes import Surroundings as Surroundings
 from .viewer import view as view

@@ -13,9 +13,11 @@ from nmm.playback.extent import shape_corners
 from nmm.playback.keyframes import samples_kept
 from nmm.playback.placements import position_and_quaternion
 from nmm.playback.shapes import Shape, shapes, triangles
-from nmm.robots.motion import Body, Motion, Nearest
+from nmm.robots.motion import Motion, Nearest
+from nmm.robots.surroundings import Body
 
 OBSTACLE: Rgb = (0.62, 0.55, 0.38)
+SCENERY: Rgb = (0.66, 0.70, 0.74)
 NEAR: Rgb = (0.12, 0.14, 0.18)
 TOO_NEAR: Rgb = (0.83, 0.10, 0.22)
 #: How much of what is behind a half-space's face it covers.
@@ -33,11 +35,14 @@ class SceneObstacles:
         self._fps = fps
         self._room = np.array([boxes[..., 0, :].min(axis=(0, 1)), boxes[..., 1, :].max(axis=(0, 1))])
         self.drawn: list[tuple[Body, Motion]] = []
+        self._scenery: list[bool] = []
         # The longest run first: those that ended early share its obstacles.
         for motion in sorted(motions, key=lambda motion: -len(motion.t)):
-            for body in motion.bodies:
+            beside = motion.surroundings.scenery
+            for body, stands in [*((one, False) for one in motion.bodies), *((one, True) for one in beside)]:
                 if not any(_same(body, motion, *other) for other in self.drawn):
                     self.drawn.append((body, motion))
+                    self._scenery.append(stands)
 
     def points(self) -> Array:
         """Corners (K, 3), m, for the camera: of what is near the robots' room, without half-spaces."""
@@ -60,17 +65,17 @@ class SceneObstacles:
         """Draw them; returns their animations. `size` is half the diagonal of what is shown, m."""
         animations: list[Command] = []
         for i, (body, motion) in enumerate(self.drawn):
-            path = f"/nmm/obstacle {i}"
+            path, color = f"/nmm/obstacle {i}", SCENERY if self._scenery[i] else OBSTACLE
             drawing.transform(path, body.places[0])
             if isinstance(body.geometry, coal.Halfspace):
                 sheet, top = self._sheet(body, size)
-                drawing.object(f"{path}/sheet", sheet, OBSTACLE, opacity=SHEET, sheet=True)
+                drawing.object(f"{path}/sheet", sheet, color, opacity=SHEET, sheet=True)
             else:
                 for k, shape in enumerate(_drawn(body)):
-                    drawing.object(f"{path}/{k}", shape.geometry, OBSTACLE)
+                    drawing.object(f"{path}/{k}", shape.geometry, color)
                     drawing.transform(f"{path}/{k}", shape.matrix)
                 top = _top(body)
-            drawing.add("obstacle", path=path, name=body.name, color=list(OBSTACLE), top=top.tolist())
+            drawing.add("obstacle", path=path, name=body.name, color=list(color), top=top.tolist())
             if len(body.places) > 1:
                 kept = samples_kept(motion.t, self._fps)
                 times, distinct = page_times(motion.t[kept] - start)
@@ -79,9 +84,11 @@ class SceneObstacles:
         return animations
 
     def tell(self, drawing: Drawing) -> None:
-        if self.drawn:
-            paths = [f"/nmm/obstacle {i}" for i in range(len(self.drawn))]
-            drawing.add("obstacles", paths=paths, color=list(OBSTACLE))
+        for text, stands, color in (("obstacle", False, OBSTACLE), ("scenery", True, SCENERY)):
+            paths = [f"/nmm/obstacle {i}" for i, one in enumerate(self._scenery) if one is stands]
+            if paths:
+                text += "s" * (len(paths) > 1 and not stands)
+                drawing.add("obstacles", text=text, paths=paths, color=list(color))
 
     def _sheet(self, body: Body, size: float) -> tuple[dict[str, Any], Array]:
         """A square of a half-space's face, in its axes, about the robots' room, and its label's place."""

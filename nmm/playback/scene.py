@@ -28,10 +28,11 @@ from nmm.playback.keyframes import (
 from nmm.playback.obstacles import SceneObstacles, draw_nearest
 from nmm.playback.placements import base_position
 from nmm.playback.rolling import wheel_angles
-from nmm.playback.shapes import Y_TO_Z, DrawnRobot, cylinder, sphere
+from nmm.playback.shapes import CARRIED, Y_TO_Z, DrawnRobot, cylinder, sphere
 from nmm.resolver_style import looks, looks_of_labels
-from nmm.robots.motion import Body, Motion
+from nmm.robots.motion import Motion
 from nmm.robots.robot import Robot
+from nmm.robots.surroundings import Body
 from nmm.runs.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -96,6 +97,7 @@ def playback_scene(
         follow=extent.held(boxes, extent.middle(motions, frames, times)),
         wall=extent.wall(motions),
         size=size,
+        opening=_opening(motions, start),
         thin=THIN * float(np.linalg.norm(np.ptp(boxes[:, 0], axis=1), axis=1).min()),
     )
     animations = obstacles.draw(drawing, size, start)
@@ -103,6 +105,7 @@ def playback_scene(
         color = look.rgb
         path = f"/nmm/motion {i}"
         robot = DrawnRobot(drawing, motion.robot, f"{path}/robot", tint=color if several else None, rank=i)
+        robot.carry(drawing, motion.surroundings.carried)
         robot.place(frame.q[0], frame.wheels[0])
         animations += robot.animations(frame, start)
         height = extent.TAG * float(boxes[i, 0, 1, 2])
@@ -139,6 +142,7 @@ def playback_scene(
         if shown is not None:
             animations += shown.draw(drawing, i, path, color, start)
     obstacles.tell(drawing)
+    tell_carried(drawing, motions)
     tell_cameras(drawing, [camera for motion in motions for camera in motion.cameras])
     if paths := [f"/nmm/motion {i}/believed" for i, one in enumerate(motions) if one.believed is not None]:
         drawing.add("believed", paths=paths, color=list(BELIEVED))
@@ -152,6 +156,13 @@ def playback_scene(
     drawing.add("set_animation", animations=animations, options={"play": False, "repetitions": 1})
     drawing.add("ready")
     return drawing.commands
+
+
+def _opening(motions: Sequence[Motion], start: float) -> dict[str, Any]:
+    """Where a page looks from at first, and the time that it shows, from `start`; the first motion's."""
+    first = motions[0].surroundings
+    camera = first.camera if isinstance(first.camera, str) else list(first.camera)
+    return {"camera": camera, "time": 0.0 if first.opens is None else first.opens - start}
 
 
 def live_scene(
@@ -228,6 +239,12 @@ def _ellipsoids(
 
     options = options_of(wanted)
     return None if options is None else SceneEllipsoids(motions, frames, options)
+
+
+def tell_carried(drawing: Drawing, motions: Sequence[Motion]) -> None:
+    """Append what names the things that are carried."""
+    for name in dict.fromkeys(one.name for motion in motions for one in motion.surroundings.carried):
+        drawing.add("carried", name=name, color=list(CARRIED))
 
 
 def _believed(

@@ -14,11 +14,16 @@ from nmm.playback.meshes import Color, Indices, mesh_pieces
 from nmm.playback.placements import Placements, position_and_quaternion
 from nmm.playback.sticks import appearance
 from nmm.robots.robot import Robot
+from nmm.robots.surroundings import Body as Body
+from nmm.robots.surroundings import Carried
+from nmm.robots.surroundings import Surroundings as Surroundings
 
 fcl = pin.hppfcl
 
 #: three.js turns its cylinders, cones and capsules about y, Pinocchio about z.
 Y_TO_Z = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+
+CARRIED: Rgb = (0.84, 0.66, 0.40)
 
 
 class DrawnRobot:
@@ -62,6 +67,17 @@ class DrawnRobot:
         path = f"{self._below[found.parentJoint]}/{segment(name)}"
         drawing.transform(path, np.array(found.placement.homogeneous))
         return path
+
+    def carry(self, drawing: Drawing, carried: Sequence[Carried]) -> None:
+        """Draw what frames carry, as a part of the robot."""
+        model = self.placements.model
+        for i, one in enumerate(carried):
+            frame = model.frames[model.getFrameId(one.frame)]
+            path = f"{self._below[frame.parentJoint]}/visual carried {i} {segment(one.name)}"
+            drawing.transform(path, frame.placement.homogeneous @ one.place)
+            for k, shape in enumerate(shapes(pin.GeometryObject(one.name, 0, pin.SE3(), one.geometry))):
+                drawing.object(f"{path}/{k}", shape.geometry, CARRIED)
+                drawing.transform(f"{path}/{k}", shape.matrix)
 
     def place(self, q: Array, wheels: Array) -> None:
         for path, matrix in self._nodes(q, wheels):

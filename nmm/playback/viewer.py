@@ -20,7 +20,7 @@ from nmm.playback.extent import robot_boxes
 from nmm.playback.html import HEIGHT, file_page, framed
 from nmm.playback.placements import joint_screw, position_and_quaternion
 from nmm.playback.rolling import Rolling
-from nmm.playback.scene import draw_beside, live_scene, points_beside, still
+from nmm.playback.scene import draw_beside, live_scene, points_beside, still, tell_carried
 from nmm.playback.session import Session
 from nmm.playback.shapes import DrawnRobot
 from nmm.robots.motion import Motion
@@ -121,6 +121,8 @@ def viewer_scene(
     drawing = Drawing()
     if beside is not None:
         draw_beside(drawing, beside, boxes)
+        drawn.carry(drawing, beside.surroundings.carried)
+        tell_carried(drawing, [beside])
     if task is not None:
         task.draw(drawing)
     listed = list(_frames(robot, drawn, drawing))
@@ -222,7 +224,8 @@ def asked_for(scenario: Scenario, robot: Robot) -> Motion:
             desired = points
         elif len(points) and target is None:
             target = points[0]
-    return still(robot, q, scenario.obstacles(robot), desired=desired, target=target)
+    beside = {"desired": desired, "target": target, "surroundings": scenario.surroundings(robot)}
+    return still(robot, q, scenario.obstacles(robot), **beside)
 
 
 def _references(tasks: tuple[Task, ...], robot: Robot, q: Array, times: Array) -> Array:

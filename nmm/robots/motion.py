@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -12,30 +11,7 @@ import pinocchio as pin
 from nmm.arrays import Array, Integers, array, matrix, unwritable, vector
 from nmm.errors import expect
 from nmm.robots.robot import Robot
-
-
-@dataclass(frozen=True, eq=False)
-class Body:
-    """A shape in the world.
-
-    Attributes
-    ----------
-    name : what it is called
-    geometry : its shape, Coal's
-    places (N, 4, 4) : where it is at the motion's N samples, m, world axes; (1, 4, 4) where it stands
-
-    Examples
-    --------
-    >>> robot = nmm.load("unicycle_2r")
-    >>> ball = nmm.playback.Body("ball", nmm.Sphere(0.2).geometry(), np.eye(4)[None])
-    >>> motion = nmm.playback.Motion(robot, [0.0], robot.rest[None], np.zeros((1, robot.n_u)), bodies=(ball,))
-    >>> motion.bodies[0].name
-    'ball'
-    """
-
-    name: str
-    geometry: Any
-    places: Array
+from nmm.robots.surroundings import NOTHING, Body, Surroundings
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,6 +110,7 @@ class Motion:
     bodies : what stands or moves beside the robot
     nearest : which points are nearest to each other, and how near
     cameras : what its cameras see
+    surroundings : what it carries, what else stands there, and how a page opens
 
     Raises
     ------
@@ -165,6 +142,7 @@ class Motion:
     bodies: tuple[Body, ...] = ()
     nearest: Nearest | None = None
     cameras: tuple[Camera, ...] = ()
+    surroundings: Surroundings = NOTHING
 
     def __post_init__(self) -> None:
         t = vector(self.t, None, "t")
@@ -188,6 +166,13 @@ class Motion:
             expected = f"placements of shape ({t.size}, 4, 4) or (1, 4, 4)"
             shape = body.places.shape
             expect(shape in ((t.size, 4, 4), (1, 4, 4)), f"bodies: {body.name}", expected, shape)
+        for one in self.surroundings.carried:
+            with_place = f"surroundings: {one.name}: place"
+            self.robot.frame_id(one.frame)
+            expect(one.place.shape == (4, 4), with_place, "a matrix of shape (4, 4)", one.place.shape)
+        for thing in self.surroundings.scenery:
+            shape = thing.places.shape
+            expect(shape == (1, 4, 4), f"surroundings: {thing.name}", "a placement of shape (1, 4, 4)", shape)
         if self.nearest is not None:
             matrix(np.nan_to_num(self.nearest.points), (t.size, 6), "nearest: points")
         for camera in self.cameras:

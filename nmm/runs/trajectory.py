@@ -20,8 +20,9 @@ from nmm.findings import Finding
 from nmm.findings.run import line
 from nmm.lazy_call import lazy_call
 from nmm.machine import made_with
-from nmm.robots.motion import Body, Motion, Nearest
+from nmm.robots.motion import Motion, Nearest
 from nmm.robots.robot import Robot
+from nmm.robots.surroundings import NOTHING, Body, Surroundings
 from nmm.runs.residuals import NO_RESIDUALS, Residuals
 from nmm.runs.seen import RunCamera
 from nmm.runs.verdict import AS_ASKED, Awaited, Verdict
@@ -75,6 +76,7 @@ class Trajectory:
     clearance_points (N, 6): the two points that are nearest, in the order of the names, m in the world
     clearance_asked : the distance that was to be kept, m
     obstacles : what the robot kept off, where it was
+    surroundings : what its scenario draws beside it: loads, scenery, how the page opens
     kinematics_off : the most by which kinematics that were compiled differ from Pinocchio's at the first, the
         middle and the last sample, m and rad; not a number where Pinocchio computed all
     scenario : the scenario as resolved, if it came from one
@@ -138,6 +140,7 @@ class Trajectory:
     scenario: dict[str, Any] | None = field(default=None)
     events: tuple[Event, ...] = ()
     cameras: tuple[RunCamera, ...] = ()
+    surroundings: Surroundings = NOTHING
     label: str = ""
     made_with: dict[str, str | int] = field(default_factory=made_with)
     more: dict[str, Array] = field(default_factory=dict)
@@ -241,9 +244,15 @@ class Trajectory:
         events = np.searchsorted(self.t, sorted({event.t for event in self.events}))
         return [part for part in np.split(self.desired, events) if len(part)]
 
-    def with_scenario(self, scenario: dict[str, Any], warnings: Sequence[Finding] = ()) -> Trajectory:
-        """The same trajectory with the scenario that it came from, and with what that warns of."""
-        return replace(self, scenario=scenario, verdict=self.verdict.after(warnings))
+    def with_scenario(
+        self,
+        scenario: dict[str, Any],
+        warnings: Sequence[Finding] = (),
+        surroundings: Surroundings = NOTHING,
+    ) -> Trajectory:
+        """The same trajectory with the scenario that it came from, what that warns of and draws beside it."""
+        verdict = self.verdict.after(warnings)
+        return replace(self, scenario=scenario, verdict=verdict, surroundings=surroundings)
 
     def summary(self, motors: bool = True) -> dict[str, Any]:
         """The run in numbers, ready for JSON; `motors`: also motors over their limits, and a robot that tips,
@@ -277,7 +286,9 @@ class Trajectory:
         return lazy_call("nmm.figures.ellipses:ellipses")(self, options, path)
 
     def torques(self, payload: Mapping[str, Any] | None = None) -> Torques:
-        """What the motion asks of the motors, with masses carried, kg by frame (see `nmm.Dynamics`)."""
+        """What the motion asks of the motors, with masses carried, kg by frame (see `nmm.Dynamics`); what the
+        scenario says is carried when not given."""
+        payload = self.surroundings.payload if payload is None else payload
         found: Torques = lazy_call("nmm.dynamics.torques:torques_along")(
             self.robot, self.t, self.q, self.u, payload, u_dot=self.u_dot
         )
@@ -304,6 +315,7 @@ class Trajectory:
             nearest=Nearest(*near, self.clearance_names, self.clearance_asked)
             if len(self) and len(self.clearance_points) == len(self)
             else None,
+            surroundings=self.surroundings,
             cameras=() if self.seen is None else tuple(one.on(self.seen, self.r_d) for one in self.cameras),
         )
 

@@ -15,6 +15,7 @@ from nmm.scenario.limits import BoundPart, GoalPart, LimitsPart, RetreatPart, St
 from nmm.scenario.objectives import OBJECTIVE_PARTS, TermPart
 from nmm.scenario.resolvers import RESOLVER_PARTS
 from nmm.scenario.robot import ArmPart, MountedPart, RobotPart
+from nmm.scenario.scene import CarriedPart, ScenePart, SceneryPart
 from nmm.scenario.schema import PlanPart, ScenarioPart, TrackPart
 from nmm.scenario.tasks import CONDITION_PARTS, TASK_PARTS
 
@@ -51,6 +52,9 @@ def sections() -> Iterator[Section]:
     yield _section("collisions.obstacles", ObstaclePart)
     yield from _kinds("collisions.obstacles.shape", SHAPE_PARTS)
     yield _section("steering", SteeringPart)
+    yield _section("scene", ScenePart)
+    yield _section("scene.carried", CarriedPart)
+    yield _section("scene.scenery", SceneryPart)
 
 
 def _kinds(
@@ -87,6 +91,8 @@ def _text(value: object) -> str:
         return str(value).lower()
     if isinstance(value, SteeringPart):
         return "true"
+    if isinstance(value, ScenePart):
+        return ""
     if isinstance(value, GoalPart):
         return f"{{m: {value.m:g}, rad: {value.rad:g}}}"
     if isinstance(value, list) and value:

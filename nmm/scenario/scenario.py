@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from nmm.plans.plan import Plan
     from nmm.resolvers.base import Resolver
     from nmm.robots.robot import Robot
+    from nmm.robots.surroundings import Surroundings
     from nmm.runs.recording import Recorder
     from nmm.runs.trajectory import Trajectory
 
@@ -30,7 +31,7 @@ SUFFIXES = (".yaml", ".yml")
 #: The kind of a resolver that is no kind of ours.
 OWN = "own"
 #: The keys that a controller without a plan does not depend on.
-KEYS_OF_A_RUN = ("q0", "duration", "method", "tolerance", "disturbances")
+KEYS_OF_A_RUN = ("q0", "duration", "method", "tolerance", "disturbances", "scene")
 
 
 class Scenario:
@@ -172,6 +173,11 @@ class Scenario:
         with self._located(), at("collisions"):
             return tuple(part.build_obstacles(robot, self.absolute, ("collisions",)))
 
+    def surroundings(self, robot: Robot) -> Surroundings:
+        """What is drawn beside a robot in it; `ScenarioError` for a frame or a mesh that is not there."""
+        with self._located(), at("scene"):
+            return self.parts.scene.build(robot, self.absolute, ("scene",))
+
     def plan(self, progress: Progress | None = None) -> Plan:
         """The planned motion from its start, by the key `plan` or its defaults: see `nmm.plan`.
 
@@ -229,7 +235,7 @@ class Scenario:
     def _told(self, trajectory: Trajectory) -> Trajectory:
         """A run with the scenario that it came from."""
         warnings = [Finding("setting_parted", {"text": one}) for one in self.warnings]
-        return trajectory.with_scenario(self.resolved(), warnings)
+        return trajectory.with_scenario(self.resolved(), warnings, self.surroundings(self.robot()))
 
     def resolved(self) -> dict[str, Any]:
         """Every key as plain data, defaults included, numbers evaluated, files with absolute paths.
@@ -240,6 +246,7 @@ class Scenario:
         data["robot"] = self._explicit_robot()
         if self.parts.collisions is not None:
             data["collisions"] = self.parts.collisions.explicit(self.absolute, ("collisions",))
+        data["scene"] = self.parts.scene.explicit(self.absolute, ("scene",))
         return data
 
     def _explicit_robot(self) -> dict[str, Any]:

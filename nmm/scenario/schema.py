@@ -26,6 +26,7 @@ from nmm.scenario.numbers import Nested, Number, Positive, Whole, integer, numbe
 from nmm.scenario.objectives import ObjectiveList, QuadraticPart, build_objective
 from nmm.scenario.resolvers import AnyResolver, WithAddedTask
 from nmm.scenario.robot import Absolute, RobotChoice
+from nmm.scenario.scene import ScenePart
 from nmm.scenario.tasks import TASK_PARTS, TaskList, TaskPart, build_tasks, listed
 from nmm.text_format import listed as in_words
 
@@ -187,6 +188,11 @@ class ScenarioPart(Part):
         description="what steers a platform where neither task nor objective does: true, false, or a mapping",
     )
 
+    scene: ScenePart = Field(
+        ScenePart.model_validate({}),
+        description="what is drawn beside robot and task, and how the page opens; no controller knows of it",
+    )
+
     @property
     def is_plan(self) -> bool:
         """Whether a run is the planned motion itself."""
@@ -240,6 +246,8 @@ class ScenarioPart(Part):
         with at("retreat"):
             goal = None if self.until is None else self.until.make()
             retreat = None if self.retreat is None else self.retreat.build(robot, goal)
+        with at("scene"):
+            self.scene.build(robot, absolute, ("scene",))
         with at("disturbances"):
             if self.disturbances is not None:
                 self.disturbances.build(robot, self.dt)

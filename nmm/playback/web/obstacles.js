@@ -8,11 +8,14 @@
     const tag = nmm.texts.put(written(20), "obstacle");
     tag.write(name, css(color.map((c) => 0.5 * c)));
     tag.position.fromArray(top);
+    const meshes = [];
+    nmm.node(path).traverse((part) => part.isMesh && !part.material.transparent && meshes.push(part));
+    if (meshes.length) standing.push({ meshes });
     nmm.node(path).add(tag);
   };
 
-  nmm.hooks.obstacles = ({ paths, color }) =>
-    nmm.legend({ kind: "box", color, text: paths.length > 1 ? "obstacles" : "obstacle", path: paths });
+  nmm.hooks.obstacles = ({ paths, color, text }) => nmm.legend({ kind: "box", color, text, path: paths });
+  nmm.hooks.carried = ({ name, color }) => nmm.legend({ kind: "box", color, text: name });
 
   // Over everything, as it usually ends behind something.
   function painted() {
@@ -95,6 +98,44 @@
       d: distance[low] + share * (distance[next] - distance[low]),
       ends: [0, 1].map((end) => point(points, low, end).lerp(point(points, next, end), share)),
     };
+  }
+
+  // What stands before most of a robot is seen through.
+  const [FADED, MOST_HIDDEN] = [0.3, 0.4];
+  const standing = [];
+  const ray = new THREE.Raycaster();
+  let seen = "";
+
+  obstacles.fade = (eye) => {
+    if (!standing.length || !nmm.motions) return;
+    const points = nmm.motions.flatMap(({ path }) => (nmm.node(path).visible ? joints(path) : []));
+    const now = [eye.matrixWorld.elements, ...points.map((p) => p.toArray())].flat().map((x) => x.toFixed(3)).join(" ");
+    if (now === seen || !points.length) return;
+    seen = now;
+    const from = new THREE.Vector3().setFromMatrixPosition(eye.matrixWorld);
+    for (const { meshes } of standing) {
+      const hidden = points.filter((point) => {
+        const way = point.clone().sub(from);
+        ray.set(from, way.clone().normalize());
+        ray.far = way.length();
+        return ray.intersectObjects(meshes, false).length > 0;
+      });
+      const faded = hidden.length > MOST_HIDDEN * points.length;
+      for (const { material } of meshes) {
+        Object.assign(material, { transparent: faded, opacity: faded ? FADED : 1, depthWrite: !faded });
+      }
+    }
+  };
+
+  // Where a robot's joints are.
+  function joints(path) {
+    const found = [];
+    nmm.viewer.scene_tree.find(nmm.split(`${path}/robot`)).object.traverse((part) => {
+      if (part.isMesh && part.geometry.boundingSphere) {
+        found.push(part.geometry.boundingSphere.center.clone().applyMatrix4(part.matrixWorld));
+      }
+    });
+    return found;
   }
 
   obstacles.update = (time) => {

@@ -41,8 +41,11 @@
     nmm.apart.start();
     player.setRange(0, nmm.stage.duration);
     nmm.plots.show(nmm.stage.plots);
-    player.seek(0);
+    const { camera, time } = nmm.stage.opening;
+    player.seek(time);
     nmm.camera.reset(); // the play bar is there only now
+    if (typeof camera !== "string") nmm.camera.put(camera);
+    else if (camera !== "iso") nmm.camera.look(camera);
     nmm.texts.fit();
     nmm.address.start();
     return nmm.stage.autoplay && player.play();

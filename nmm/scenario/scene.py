@@ -1,0 +1,104 @@
+"""What a scenario draws beside robot and task."""
+
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import pinocchio as pin
+from pydantic import BeforeValidator, Field
+
+from nmm.arrays import Array
+from nmm.errors import InputError, expect_known
+from nmm.robots.robot import Robot
+from nmm.robots.surroundings import Body, Carried, Surroundings
+from nmm.scenario.collisions import SHAPE_PARTS, ShapePart
+from nmm.scenario.keys import OneOf, Part, at
+from nmm.scenario.numbers import Number, Positive, numbers
+from nmm.scenario.robot import Absolute, Three
+from nmm.scenario.yaml_text import Place
+
+SIDES = ("iso", "top", "front", "wall")
+
+
+def _camera(value: object) -> object:
+    """A side's name, or six numbers."""
+    if isinstance(value, str):
+        expect_known("side", value, SIDES)
+        return value
+    found = numbers(value)
+    if len(found) != 6:
+        raise InputError(expected=f"{', '.join(SIDES)}, or six numbers", got=value)
+    return found
+
+
+class DrawnPart(Part):
+    """A shape that is drawn."""
+
+    name: str = Field("", description="the shape's kind when not given")
+    shape: Annotated[ShapePart, OneOf(SHAPE_PARTS)] = Field(
+        description="kind box, sphere, cylinder, capsule, plane or mesh, with its keys"
+    )
+    xyz: Three = Field([0.0, 0.0, 0.0], description="its origin, m")
+    rpy: Three = Field([0.0, 0.0, 0.0], description="roll, pitch, yaw about fixed axes, rad")
+
+    def drawn(self, absolute: Absolute, place: Place) -> tuple[str, Any, Array]:
+        """Its name, its shape, Coal's, and where that is, (4, 4) m."""
+        with at("shape"):
+            geometry = self.shape.build(absolute, (*place, "shape")).geometry()
+        there = np.eye(4)
+        there[:3, :3], there[:3, 3] = pin.rpy.rpyToMatrix(*self.rpy), self.xyz
+        return self.name or str(self.shape.kind), geometry, there  # type: ignore[attr-defined]  # each kind has it
+
+    def explicit(self, absolute: Absolute, place: Place) -> dict[str, Any]:
+        return {**self.model_dump(), "shape": self.shape.explicit(absolute, (*place, "shape"))}
+
+
+class CarriedPart(DrawnPart):
+    """A shape that a frame of the robot carries; xyz and rpy are in the frame's axes."""
+
+    frame: str = Field(description="the frame that carries it")
+    mass: Positive | None = Field(
+        None, description="kg, in its origin: a load for torques; only drawn when not given"
+    )
+
+
+class SceneryPart(DrawnPart):
+    """A shape that stands in the world and is no obstacle; xyz and rpy are in the world's axes."""
+
+
+class ScenePart(Part):
+    """What is drawn beside robot and task, and how the page opens. Controllers know nothing of it."""
+
+    carried: list[CarriedPart] = Field(default_factory=list, description="shapes that frames carry")
+    scenery: list[SceneryPart] = Field(default_factory=list, description="shapes that stand there")
+    camera: Annotated[Literal["iso", "top", "front", "wall"] | list[Number], BeforeValidator(_camera)] = (
+        Field(
+            "iso",
+            description="where the page looks from at first: iso, top, front or wall; or six numbers, m, the eye "
+            "and what it looks at, as the page's address has them (camera=)",
+        )
+    )
+    opens: Annotated[Number, Field(ge=0.0)] | None = Field(
+        None, description="the time that the page shows at first, s; the first sample's when not given"
+    )
+
+    def build(self, robot: Robot, absolute: Absolute, place: Place) -> Surroundings:
+        carried, scenery = [], []
+        for i, load in enumerate(self.carried):
+            with at("carried", i):
+                with at("frame"):
+                    robot.frame_id(load.frame)
+                name, geometry, there = load.drawn(absolute, (*place, "carried", i))
+                carried.append(Carried(name, geometry, load.frame, there, load.mass or 0.0))
+        for i, thing in enumerate(self.scenery):
+            with at("scenery", i):
+                name, geometry, there = thing.drawn(absolute, (*place, "scenery", i))
+                scenery.append(Body(name, geometry, there[np.newaxis]))
+        camera = self.camera if isinstance(self.camera, str) else tuple(self.camera)
+        return Surroundings(tuple(carried), tuple(scenery), camera, self.opens)
+
+    def explicit(self, absolute: Absolute, place: Place) -> dict[str, Any]:
+        listed = {
+            key: [part.explicit(absolute, (*place, key, i)) for i, part in enumerate(getattr(self, key))]
+            for key in ("carried", "scenery")
+        }
+        return {**self.model_dump(), **listed}
