@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from playback_browser import UPRIGHT, WALK, Window, draw_frames, file_url
+from playback_browser import PROJECT, UPRIGHT, WALK, Window, draw_frames, file_url
 from playback_browser import browser as browser
 from playback_browser import empty_page as empty_page
 from playback_browser import small_robot as small_robot
@@ -193,7 +193,7 @@ TEXTS = """() => {
     });
     let sprite = null;
     node.find(["text"]).object.traverse((part) => part.isSprite && (sprite = part));
-    const unit = height / (2 * Math.tan(Math.PI / 10));
+    const unit = height / (2 * Math.tan((viewer.camera.fov * Math.PI) / 360));
     const [wide, high] = [sprite.scale.x * unit, sprite.scale.y * unit];
     const [x, y] = seen(new MeshCat.THREE.Vector3().setFromMatrixPosition(sprite.matrixWorld));
     const [left, bottom] = [x - sprite.center.x * wide, y + sprite.center.y * high];
@@ -261,3 +261,21 @@ def test_a_copy_moves_where_odometry_has_the_robot(
     page.locator("#legend button", has_text="odometry").click()
     assert not page.evaluate(shown)
     assert page.evaluate("nmm.node('/nmm/motion 0/robot').visible")
+
+
+def test_from_above_the_view_is_a_plan(robot: Robot, window: Window, tmp_path: Path) -> None:
+    """What is 1 m higher is at the same place to 1 cm, lengths are alike everywhere, and the
+    grid says its pitch; the address tells of the camera the same for any lens."""
+    page = window.open(file_url([drive(robot)], tmp_path) + "#view=top")
+    ends = [[x, y, z] for x, y in ((-1.0, 0.0), (1.0, 0.0), (1.0, 1.0)) for z in (0.0, 1.0)]
+    at = np.array(page.evaluate(PROJECT, ends))[:, :2] * [240.0, 150.0]
+    metre = 0.5 * np.linalg.norm(at[2] - at[0])
+    assert np.abs(at[1::2] - at[::2]).max() < 0.01 * metre
+    assert np.linalg.norm(at[4] - at[2]) == pytest.approx(metre, rel=0.01)
+    assert page.locator("#legend").inner_text().count("grid of ") == 1
+    page.evaluate("nmm.camera.put([0, -2, 3, 0, 0, 0])")
+    assert page.evaluate("nmm.camera.place()") == pytest.approx([0, -2, 3, 0, 0, 0], abs=1e-6)
+    heights = [abs(np.subtract(*np.array(page.evaluate(PROJECT, [[0, 0, 0], [0, 0.1, 0]]))[:, 1]))]
+    page.evaluate("nmm.camera.look('iso'); nmm.camera.put([0, -2, 3, 0, 0, 0])")
+    heights.append(abs(np.subtract(*np.array(page.evaluate(PROJECT, [[0, 0, 0], [0, 0.1, 0]]))[:, 1])))
+    assert heights[0] == pytest.approx(heights[1], rel=0.05)

@@ -91,8 +91,6 @@ def _text(value: object) -> str:
         return str(value).lower()
     if isinstance(value, SteeringPart):
         return "true"
-    if isinstance(value, ScenePart):
-        return ""
     if isinstance(value, GoalPart):
         return f"{{m: {value.m:g}, rad: {value.rad:g}}}"
     if isinstance(value, list) and value:

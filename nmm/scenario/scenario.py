@@ -14,6 +14,7 @@ from nmm.errors import ScenarioError, no_such
 from nmm.findings import Finding
 from nmm.kinds import RESOLVERS
 from nmm.progress import Progress
+from nmm.robots.surroundings import NOTHING, Surroundings
 from nmm.scenario.document import Document, read_file
 from nmm.scenario.keys import KeyedError, NamedReferences, as_written, at, first_error
 
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from nmm.plans.plan import Plan
     from nmm.resolvers.base import Resolver
     from nmm.robots.robot import Robot
-    from nmm.robots.surroundings import Surroundings
     from nmm.runs.recording import Recorder
     from nmm.runs.trajectory import Trajectory
 
@@ -175,6 +175,8 @@ class Scenario:
 
     def surroundings(self, robot: Robot) -> Surroundings:
         """What is drawn beside a robot in it; `ScenarioError` for a frame or a mesh that is not there."""
+        if self.parts.scene is None:
+            return NOTHING
         with self._located(), at("scene"):
             return self.parts.scene.build(robot, self.absolute, ("scene",))
 
@@ -246,7 +248,8 @@ class Scenario:
         data["robot"] = self._explicit_robot()
         if self.parts.collisions is not None:
             data["collisions"] = self.parts.collisions.explicit(self.absolute, ("collisions",))
-        data["scene"] = self.parts.scene.explicit(self.absolute, ("scene",))
+        if self.parts.scene is not None:
+            data["scene"] = self.parts.scene.explicit(self.absolute, ("scene",))
         return data
 
     def _explicit_robot(self) -> dict[str, Any]:

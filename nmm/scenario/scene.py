@@ -1,13 +1,14 @@
 """What a scenario draws beside robot and task."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
-import pinocchio as pin
 from pydantic import BeforeValidator, Field
 
 from nmm.arrays import Array
+from nmm.collisions.obstacle import Obstacle
 from nmm.errors import InputError, expect_known
+from nmm.functions.references.orientation import rotation_vector
 from nmm.robots.robot import Robot
 from nmm.robots.surroundings import Body, Carried, Surroundings
 from nmm.scenario.collisions import SHAPE_PARTS, ShapePart
@@ -43,10 +44,9 @@ class DrawnPart(Part):
     def drawn(self, absolute: Absolute, place: Place) -> tuple[str, Any, Array]:
         """Its name, its shape, Coal's, and where that is, (4, 4) m."""
         with at("shape"):
-            geometry = self.shape.build(absolute, (*place, "shape")).geometry()
-        there = np.eye(4)
-        there[:3, :3], there[:3, 3] = pin.rpy.rpyToMatrix(*self.rpy), self.xyz
-        return self.name or str(self.shape.kind), geometry, there  # type: ignore[attr-defined]  # each kind has it
+            shape = self.shape.build(absolute, (*place, "shape"))
+        there = Obstacle(shape, [*self.xyz, *rotation_vector(rpy=self.rpy)], name=self.name)
+        return there.name, shape.geometry(), there.placement(0.0)
 
     def explicit(self, absolute: Absolute, place: Place) -> dict[str, Any]:
         return {**self.model_dump(), "shape": self.shape.explicit(absolute, (*place, "shape"))}
@@ -70,12 +70,10 @@ class ScenePart(Part):
 
     carried: list[CarriedPart] = Field(default_factory=list, description="shapes that frames carry")
     scenery: list[SceneryPart] = Field(default_factory=list, description="shapes that stand there")
-    camera: Annotated[Literal["iso", "top", "front", "wall"] | list[Number], BeforeValidator(_camera)] = (
-        Field(
-            "iso",
-            description="where the page looks from at first: iso, top, front or wall; or six numbers, m, the eye "
-            "and what it looks at, as the page's address has them (camera=)",
-        )
+    camera: Annotated[str | list[Number], BeforeValidator(_camera)] = Field(
+        "iso",
+        description="where the page looks from at first: iso, top, front or wall; or six numbers, m, the eye "
+        "and what it looks at, as the page's address has them (camera=)",
     )
     opens: Annotated[Number, Field(ge=0.0)] | None = Field(
         None, description="the time that the page shows at first, s; the first sample's when not given"

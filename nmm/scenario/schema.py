@@ -188,8 +188,8 @@ class ScenarioPart(Part):
         description="what steers a platform where neither task nor objective does: true, false, or a mapping",
     )
 
-    scene: ScenePart = Field(
-        ScenePart.model_validate({}),
+    scene: ScenePart | None = Field(
+        None,
         description="what is drawn beside robot and task, and how the page opens; no controller knows of it",
     )
 
@@ -247,7 +247,8 @@ class ScenarioPart(Part):
             goal = None if self.until is None else self.until.make()
             retreat = None if self.retreat is None else self.retreat.build(robot, goal)
         with at("scene"):
-            self.scene.build(robot, absolute, ("scene",))
+            if self.scene is not None:
+                self.scene.build(robot, absolute, ("scene",))
         with at("disturbances"):
             if self.disturbances is not None:
                 self.disturbances.build(robot, self.dt)

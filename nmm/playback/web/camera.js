@@ -2,7 +2,8 @@
 "use strict";
 {
   const THREE = MeshCat.THREE;
-  const FIELD = 36;
+  // Degrees; from above all rays are as good as parallel, as in a plan.
+  const [FIELD, PARALLEL] = [36, 1];
   const CATCH = 600; // ms
   const NARROW = 190; // px: a heading that is too narrow to be read
   // From the target towards the camera, in the world's axes. From right above, up would be nowhere.
@@ -15,6 +16,27 @@
   const chooser = document.getElementById("from");
   // Not the window: a page may have something beside the view.
   const view = document.getElementById("view");
+  let extent = 1;
+  const tangent = (degrees) => Math.tan((degrees * Math.PI) / 360);
+  // How many times farther away the eye is for the same picture than with FIELD.
+  const farther = () => tangent(FIELD) / tangent(eye.fov);
+
+  function lens() {
+    eye.fov = camera.from === "top" && !camera.held ? PARALLEL : FIELD;
+    nmm.viewer.controls.minDistance = 0.05 * extent * farther();
+    nmm.viewer.controls.maxDistance = 30 * extent * farther();
+    nmm.scenery.fit();
+  }
+
+  // What is nearer or farther than this is not drawn: little is lost of the depth's precision.
+  function planes() {
+    const away = eye.position.distanceTo(nmm.viewer.controls.target);
+    eye.near = eye.fov === FIELD ? 0.01 * extent : Math.max(0.01 * extent, away - 20 * extent);
+    eye.far = away + 80 * extent;
+    eye.updateProjectionMatrix();
+  }
+  camera.unit = () => 2 * tangent(eye ? eye.fov : FIELD);
+
   const upright = (v) => new THREE.Vector3(v.x, v.z, -v.y);
   let eye, points, tags, last, thawed;
   const vectors = (numbers = []) =>
@@ -30,8 +52,8 @@
     nmm.viewer.set_object(["Cameras", "default", "rotated"], eye);
     const controls = nmm.viewer.controls;
     controls.maxPolarAngle = 0.49 * Math.PI;
-    controls.minDistance = 0.05 * size;
-    controls.maxDistance = 30 * size;
+    extent = size;
+    controls.addEventListener("change", planes);
     controls.addEventListener("start", () => (camera.moved = true));
     controls.addEventListener("end", nmm.address.changed);
     camera.reset();
@@ -107,6 +129,8 @@
   // The nearest place for an eye that looks along -towards and has all that is held in the free part of the
   // window, with nothing behind a card.
   function look(held, towards, named) {
+    lens();
+    eye.near = 0.01 * extent;
     const forward = towards.clone().negate().normalize();
     const right = new THREE.Vector3().crossVectors(forward, new THREE.Vector3(0, 1, 0)).normalize();
     const up = new THREE.Vector3().crossVectors(right, forward);
@@ -122,12 +146,13 @@
     const depth = zs.reduce((sum, z) => sum + z, 0) / zs.length - forward.dot(eye.position);
     nmm.viewer.controls.target.copy(eye.position).addScaledVector(forward, depth);
     nmm.viewer.controls.update();
+    planes();
   }
 
   // How far forward the eye may be, and between what, aside and upwards, where so many pixels are not free.
   function aim(xs, ys, zs, [top, bottom, left, right]) {
     const [width, height] = [view.clientWidth, view.clientHeight];
-    const half = Math.tan((FIELD * Math.PI) / 360);
+    const half = tangent(eye.fov);
     const share = (length, taken) => Math.max(0.1, 1 - (2 * taken) / length);
     const [west, east] = [left, right].map((side) => ((half * width) / height) * Math.min(0.94, share(width, side)));
     const [above, below] = [top, bottom].map((end) => half * share(height, end));
@@ -200,14 +225,20 @@
   };
   chooser.addEventListener("change", () => camera.look(chooser.value));
 
-  // Where somebody has put it: the eye and what it looks at, in the world's axes.
-  camera.place = () => [eye.position, nmm.viewer.controls.target].flatMap(({ x, y, z }) => [x, -z, y]);
+  // Where somebody has put it: the eye and what it looks at, in the world's axes; the eye as with FIELD.
+  camera.place = () => {
+    const { target } = nmm.viewer.controls;
+    const from = eye.position.clone().sub(target).divideScalar(farther()).add(target);
+    return [from, target].flatMap(({ x, y, z }) => [x, -z, y]);
+  };
   camera.put = (numbers) => {
     const [from, at] = vectors(numbers);
     camera.moved = true;
-    eye.position.copy(from);
+    lens();
+    eye.position.copy(from).sub(at).multiplyScalar(farther()).add(at);
     nmm.viewer.controls.target.copy(at);
     nmm.viewer.controls.update();
+    planes();
     nmm.viewer.set_dirty();
   };
 

@@ -31,6 +31,7 @@
     ground(center, 3.2 * room, step);
     axes(nice(Math.min(0.45 * size, 0.8 * reach)));
     scenery.period = 5 * step;
+    nmm.legend({ kind: "grid", color: [0.5, 0.55, 0.62], text: `grid of ${step} m` });
   };
 
   // Bring ground and sun below a robot that may go anywhere, by whole periods of the grid.
@@ -143,7 +144,7 @@
   const HIGH = 22;
   const labels = [];
   scenery.fit = () => {
-    const unit = (2 * Math.tan(Math.PI / 10)) / Math.max(document.getElementById("view").clientHeight, 1);
+    const unit = nmm.camera.unit() / Math.max(document.getElementById("view").clientHeight, 1);
     for (const { scale, userData } of labels) scale.set(userData.wide * unit, userData.high * unit, 1);
   };
 
