@@ -8,40 +8,43 @@
 The titles are those of the scenario files; a test compares the page with them.
 """
 
+import shutil
 import sys
 import tempfile
 from pathlib import Path
 
 import nmm
 from nmm.bundled import bundled_scenarios
+from nmm.rendering.chromium import NAMES
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE / "building"))
 PICTURES = HERE / "images" / "gallery"
 #: Of a picture, px, and how many colours.
 WIDTH, COLOURS = 640, 256
+COLUMNS = 3
 INTRODUCTION = """\
 # Gallery
 
-Every scenario that comes with `nmm`, drawn at instants of its motion, from above and, where the arm
-rises, from the side. `nmm run NAME --play` plays one in the browser. From the repository,
-`python docs/make_gallery.py --folder DIR` writes a page with all of them to play, with their numbers.
-To begin one of your own, copy the file and change it ([all keys](scenarios.md)).
+Every scenario that comes with `nmm`, with copies of the robot along its way. `nmm run NAME --play` plays
+one in the browser; a picture leads to its file. From the repository,
+`python docs/make_gallery.py --folder DIR` writes a page with all of them, which play where they stand, with
+their numbers. To begin one of your own, copy the file and change it ([all keys](scenarios.md)).
 
 """
 
 
 def page() -> str:
     """The page, from the scenario files."""
-    cards = []
+    cells = []
     for name, path in bundled_scenarios().items():
         title = nmm.Scenario.load(name).title
         file = f"../{path.relative_to(HERE.parent)}"
-        cards.append(
-            f"## {name}\n\n{title}. [The file]({file}).\n\n"
-            f"![{title}](images/gallery/{name}.png)\n\n```console\n$ nmm run {name} --play\n```\n"
-        )
-    return INTRODUCTION + "\n".join(cards)
+        cells.append(f"[![{title}](images/gallery/{name}.png)]({file})<br>**{name}**<br>{title}")
+    cells += [""] * (-len(cells) % COLUMNS)
+    rows = [cells[k : k + COLUMNS] for k in range(0, len(cells), COLUMNS)]
+    lines = ["| | | |", "|---|---|---|", *(f"| {' | '.join(row)} |" for row in rows)]
+    return INTRODUCTION + "\n".join(lines) + "\n"
 
 
 def draw() -> None:
@@ -53,8 +56,8 @@ def draw() -> None:
     for old in PICTURES.glob("*.png"):
         old.unlink()
     with tempfile.TemporaryDirectory() as folder:
-        for card in write_gallery(Path(folder) / "gallery").cards:
-            with Image.open(Path(folder) / "gallery" / card.name / "motion.png") as picture:
+        for card in write_gallery(Path(folder) / "gallery", scenes=True).cards:
+            with Image.open(Path(folder) / "gallery" / card.name / card.picture) as picture:
                 size = (WIDTH, round(picture.height * WIDTH / picture.width))
                 small = picture.convert("RGB").resize(size, Image.Resampling.LANCZOS)
             # FASTOCTREE: the other methods lose the colours of small marks.
@@ -66,7 +69,7 @@ def write_folder(folder: str, *only: str) -> bool:
     """The gallery's folder; whether every scenario ran to its end."""
     from gallery import write_gallery
 
-    made = write_gallery(Path(folder), only)
+    made = write_gallery(Path(folder), only, scenes=any(map(shutil.which, NAMES)))
     for card in made.cards:
         print(f"{card.name}: {card.outcome}" + ("" if card.ran else f": {card.message}"))
     print(f"open {made.index}")

@@ -14,6 +14,7 @@ import matplotlib
 import numpy as np
 import pytest
 from figure_examples import PAPER, check_legible, cut, drawn_points, run
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from nmm import figures
@@ -337,3 +338,23 @@ def test_figures_under_limits_show_every_limit_and_the_scale() -> None:
     check_legible(figures.overview(limited))
     assert any(axes.get_ylabel() == "λ, margin" for axes in figures.overview(limited).axes)
     assert not any(axes.get_ylabel() == "λ, margin" for axes in figures.overview(run(PAPER[0])).axes)
+
+
+def test_lines_of_small_robots_are_thin(tmp_path: Path) -> None:
+    """A column shows the robots of a large circle at a few points: arms and outlines shrink with them."""
+    widest = []
+    for width in (9.0, 3.4):
+        made = figures.stroboscopic(run("unicycle_2r_position"), [0.0, 10.0], width=width)
+        links = [one for one in made.axes[0].collections if isinstance(one, LineCollection)]
+        widest.append(max(float(one.get_linewidths()[0]) for one in links))
+    assert widest[0] == pytest.approx(4.0)
+    assert widest[1] < 0.5 * widest[0]
+
+
+def test_views_of_a_comparison_share_x_where_both_show_it() -> None:
+    runs = two(run("unicycle_3r_position", task__0__reference__radius=0.8))
+    above, side = figures.comparison(runs).axes[:2]
+    assert side.get_xlabel() == above.get_xlabel() == "x [m]"
+    for one, other in zip(above.get_position().intervalx, side.get_position().intervalx, strict=True):
+        assert one == pytest.approx(other)
+    assert above.get_xlim() == pytest.approx(side.get_xlim())

@@ -92,7 +92,13 @@ def test_ghosts_paths_and_motions_can_be_hidden(small_robot: Robot, window: Wind
     ]
     page = window.open(file_url(motions, tmp_path, title="Both"))
     assert page.locator("h1").inner_text() == "Both"
-    assert page.locator("#legend li").all_inner_texts() == ["RG", "PG", "desired path", "target"]
+    assert page.locator("#legend li").all_inner_texts() == [
+        "RG",
+        "PG",
+        "desired path",
+        "target",
+        "grid of 0.1 m",
+    ]
     visible = "(paths) => paths.map((path) => nmm.node(path).visible)"
     objects = {
         "#ghosts": ["/nmm/motion 0/ghosts", "/nmm/motion 1/ghosts"],
@@ -169,4 +175,4 @@ def test_hostile_names_are_only_text(small_robot: Robot, window: Window, tmp_pat
     page = window.open(file_url([drive(small_robot, duration=0.5, label=name)], tmp_path, title=name))
     assert page.title() == name
     assert page.locator("h1").inner_text() == name
-    assert page.locator("#legend li").all_inner_texts() == [name]
+    assert page.locator("#legend li").all_inner_texts() == [name, "grid of 0.1 m"]

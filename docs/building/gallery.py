@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from jinja2 import ChoiceLoader, Environment, FileSystemLoader, PackageLoader, StrictUndefined
@@ -21,6 +21,7 @@ from nmm.folders.whole import FolderKind, replaced_folder
 from nmm.playback.html import page_of, viewer_script
 from nmm.processes import share_out
 from nmm.progress import Progress, between
+from nmm.rendering.chromium import HeadlessPage
 from nmm.runs.table import summary_rows
 
 #: Marks a folder as one of ours.
@@ -29,6 +30,19 @@ FORMAT, MARKER = "nmm gallery 1", "gallery.json"
 VIEWER = "viewer.js"
 #: Pictures of a page for each second of motion; the page draws what is between them.
 FPS = 30.0
+#: Of a picture in 3D, px, and what leaves the scene alone in its page.
+SIZE = (640, 400)
+ALONE = """new Promise((done) => {
+  nmm.plots.show(false);
+  for (const card of document.querySelectorAll(".card")) card.style.display = "none";
+  if (nmm.player.time === 0) nmm.player.seek(0.4 * nmm.stage.duration);
+  if (!nmm.camera.moved) nmm.camera.reset();
+  nmm.texts.fit();
+  nmm.viewer.set_dirty();
+  let left = 3;
+  const next = () => (left-- ? requestAnimationFrame(next) : done());
+  next();
+})"""
 #: Which rows of a run's table a card has.
 LABELS = (
     *("resolver", "outcome", "tracking ‖e‖", "objective H", "smallest σ_min"),
@@ -47,6 +61,7 @@ class Card:
     message : why it did not end as asked; empty where it did
     numbers : labels with values, rows of the table that `nmm run` prints
     shown : whether there is something to see: motion.png and playback.html
+    picture : the file with its picture: scene.png, in 3D, or motion.png where no browser took one
     """
 
     name: str
@@ -55,6 +70,7 @@ class Card:
     message: str
     numbers: tuple[tuple[str, str], ...]
     shown: bool
+    picture: str = "motion.png"
 
     @property
     def ran(self) -> bool:
@@ -71,10 +87,11 @@ class Gallery:
     cards: tuple[Card, ...]
 
 
-def write_gallery(folder: Path, only: Sequence[str] = (), *, jobs: int = 2) -> Gallery:
+def write_gallery(folder: Path, only: Sequence[str] = (), *, jobs: int = 2, scenes: bool = False) -> Gallery:
     """Run the bundled scenarios, or those named `only`, and write the folder, whole or not at all.
 
     A scenario that cannot be run has a card that says why. Scenarios are shared out over `jobs` processes.
+    `scenes`: whether a browser takes pictures in 3D, one after the other.
     """
     available = bundled_scenarios()
     for name in only:
@@ -84,11 +101,24 @@ def write_gallery(folder: Path, only: Sequence[str] = (), *, jobs: int = 2) -> G
         (temporary / VIEWER).write_text(viewer_script(), encoding="utf-8")
         found = share_out(_Cards(names, temporary), range(len(names)), jobs, lambda number, fraction: None)
         cards = tuple(found[number] for number in sorted(found))
+        if scenes:
+            cards = tuple(_with_scene(card, temporary / card.name) for card in cards)
         (temporary / "index.html").write_text(render(cards), encoding="utf-8")
         content = {"format": FORMAT, "nmm": nmm.__version__, "scenarios": [asdict(card) for card in cards]}
         text = json.dumps(content, indent=2, ensure_ascii=False)
         (temporary / MARKER).write_text(text + "\n", encoding="utf-8")
     return Gallery(folder, folder / "index.html", cards)
+
+
+def _with_scene(card: Card, folder: Path) -> Card:
+    """A card with scene.png, the page's scene alone as it opens, or at two fifths of its time."""
+    if not card.shown:
+        return card
+    with HeadlessPage(folder / "playback.html", SIZE) as page:
+        page.wait_for("window.nmm && nmm.stage && !document.body.classList.contains('loading')")
+        page.evaluate(ALONE)
+        (folder / "scene.png").write_bytes(page.picture())
+    return replace(card, picture="scene.png")
 
 
 def render(cards: Sequence[Card]) -> str:

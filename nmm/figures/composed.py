@@ -191,13 +191,14 @@ def _draw_norms(
 
 
 def _mark_settled(axes: Axes, runs: Sequence[Trajectory], worn: Sequence[resolver_style.Look]) -> None:
-    """A mark where each run's error has settled; the legend has one of them."""
+    """A mark where each run's error has settled, in its colour; the legend has one for all."""
+    if all(settling_time(run) is None for run in runs):
+        return
     dot: Any = {"marker": "o", "markersize": 5.0, "linestyle": "none"}
-    label = _SETTLED
+    axes.plot([], [], color=style.GREY, label=_SETTLED, **dot)
     for run, look in zip(runs, worn, strict=True):
         if (after := settling_time(run)) is not None:
-            axes.plot(run.t[0] + after, BAND * run.error_norm[0], color=look.color, label=label, **dot)
-            label = "_"
+            axes.plot(run.t[0] + after, BAND * run.error_norm[0], color=look.color, label="_", **dot)
 
 
 def write_run_figures(

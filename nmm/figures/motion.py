@@ -24,6 +24,8 @@ from nmm.runs.trajectory import Trajectory
 
 #: Sizes of the marks at the path's ends and of a target, pt.
 _END, _TARGET = 6.0, 12.0
+#: A platform so long, pt, is drawn with full lines, a shorter one with thinner ones, at least this share.
+_LARGE, _FINEST = 42.0, 0.3
 #: When no instants are given: at most and at least this many, a platform's length apart.
 MOST, LEAST = 11, 4
 #: A run whose arm rises or falls by more than this is drawn from the side too, m.
@@ -158,7 +160,7 @@ class Scene(Viewed):
         for k, (pose, strength) in enumerate(zip(self.poses, _strengths(len(self.poses)), strict=True)):
             # From the side the robots of a round path stand behind each other: every second one is enough.
             if view == ABOVE or len(self.poses) <= 6 or (len(self.poses) - 1 - k) % 2 == 0:
-                pose.draw(axes, view, _ink(strength, k / len(self.poses)))
+                pose.draw(axes, view, _ink(strength, k / len(self.poses)).times(self._fineness(axes)))
         for k, outline in enumerate(self.outlines):
             shade, edge = _faded(OBSTACLE, outline.strength), hull(view.of(outline.points))
             axes.fill(
@@ -186,6 +188,13 @@ class Scene(Viewed):
                 markeredgecolor=resolver_style.BLACK, markeredgewidth=0.7,
                 label="target", linestyle="none", zorder=6,
             )  # fmt: skip
+
+    def _fineness(self, axes: Axes) -> float:
+        """How much thinner than usual lines are, so that arms and outlines of small robots stay apart."""
+        left, right = axes.get_xlim()
+        length = float(np.linalg.norm(np.ptp(self.poses[0].main[:, :2], axis=0)))
+        points = 72.0 * length * style.inches(axes)[0] / (right - left)
+        return float(np.clip(points / _LARGE, _FINEST, 1.0))
 
     def _draw_times(self, axes: Axes, view: View) -> None:
         width, _ = style.inches(axes)

@@ -144,9 +144,15 @@ def draw_views(
 ) -> float:
     """Draw the views that fit, downwards, the legend above the first; returns the top of the room left. All
     lengths in inches; no view is wider than `width` or taller than `tallest`."""
+    heights = [scene.height(view, width) for view in scene.views]
+    parts = [min(1.0, tallest / tall) for tall in heights]
+    # What one view has above another is at the same x.
+    aligned = min(
+        part for view, part in zip(scene.views, parts, strict=True) if view.across == scene.views[0].across
+    )
     for index, view in enumerate(scene.views):
-        tall = scene.height(view, width)
-        height = min(tall, tallest)
+        tall = heights[index]
+        height = tall * (aligned if view.across == scene.views[0].across else parts[index])
         if index and top - style.GAP - height < bottom - 1e-6:
             break
         top -= style.room(1 if index else style.legend_rows(scene.names, width)) + height

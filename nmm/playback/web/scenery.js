@@ -31,7 +31,7 @@
     ground(center, 3.2 * room, step);
     axes(nice(Math.min(0.45 * size, 0.8 * reach)));
     scenery.period = 5 * step;
-    nmm.legend({ kind: "grid", color: [0.5, 0.55, 0.62], text: `grid of ${step} m` });
+    scenery.pitch = step;
   };
 
   // Bring ground and sun below a robot that may go anywhere, by whole periods of the grid.
