@@ -265,7 +265,7 @@ def test_n_plans_round_a_wall_and_the_page_shows_how(window: Window) -> None:
     with driven(ScenarioSetup(nmm.Scenario.load("behind_the_wall"))) as url:
         page = opened(window, url)
         page.keyboard.press("n")
-        page.wait_for_function("nmm.drive.followed === 1", timeout=1000.0 * MOST)
+        page.wait_for_function("nmm.drive.followed >= 1", timeout=1000.0 * MOST)
         drawn = "nmm.node('/nmm/plan').children.length"
         assert page.evaluate(drawn) == 4  # two ways, the tree, and the copies
         tree = "nmm.node('/nmm/plan/tree')"
@@ -285,10 +285,10 @@ def test_n_plans_round_a_wall_and_the_page_shows_how(window: Window) -> None:
         page.wait_for_function(gone, arg=began.tolist(), timeout=1000.0 * MOST)
         page.keyboard.press("r")
         start = place(page, 0, "", 0.0)
-        before = target(page)
+        before, followed = target(page), page.evaluate("nmm.drive.followed")
         drag(page, start, (-40.0, 20.0))
         assert np.linalg.norm(target(page) - before) > 0.05
-        page.wait_for_function("nmm.drive.followed === 2", timeout=1000.0 * MOST)
+        page.wait_for_function(f"nmm.drive.followed > {followed}", timeout=1000.0 * MOST)
         height = page.get_by_label("ee: z in m, as a number")
         height.fill("3")
         height.press("Enter")
@@ -374,6 +374,53 @@ def test_a_target_out_of_reach_is_said_in_words_and_taken_back(window: Window, s
             "!document.getElementById('told').classList.contains('bad')", timeout=1000.0 * MOST
         )
         assert told.inner_text().startswith("t = ")
+
+
+def test_a_target_out_of_the_picture_has_an_arrow_and_comes_back(
+    window: Window, setup: ScenarioSetup
+) -> None:
+    with driven(setup) as url:
+        page = opened(window, url)
+        page.locator("#pause").click()  # else the robot would go there
+        page.wait_for_function("nmm.drive.paused")
+        page.set_viewport_size({"width": 1280, "height": 800})
+        draw_frames(page)
+        arrow = page.locator(".away")
+        assert not arrow.is_visible()
+        box = page.get_by_label("ee: x in m, as a number")
+        for x in ("40", "-40"):
+            box.fill(x)
+            box.press("Enter")
+            arrow.wait_for(state="visible")
+            view = page.evaluate("document.getElementById('view').getBoundingClientRect().toJSON()")
+            at = arrow.bounding_box()
+            assert at is not None
+            assert view["left"] <= at["x"] <= view["right"] - at["width"]
+            assert view["top"] <= at["y"] <= view["bottom"] - at["height"]
+            assert (at["x"] + 0.5 * at["width"] > 0.5 * view["right"]) is (x == "40")
+        arrow.click()
+        arrow.wait_for(state="hidden")
+        page.keyboard.press("t")
+        page.wait_for_function("Math.abs(nmm.drive.targets[0].value[0] - nmm.drive.targets[0].at[0]) < 1e-9")
+
+
+def test_a_program_that_has_ended_is_seen_and_its_controls_are_dead(
+    window: Window, setup: ScenarioSetup
+) -> None:
+    with driven(setup) as url:
+        page = opened(window, url)
+        ball = place(page, 0, "", 0.0)
+    page.wait_for_function("nmm.ended")
+    seen = """() => {
+      const { left, top, width, height } = document.getElementById("status").getBoundingClientRect();
+      return document.elementFromPoint(left + 0.5 * width, top + 0.5 * height).id;
+    }"""
+    assert page.evaluate(seen) == "status"
+    before = target(page)
+    drag(page, ball, (30.0, 10.0))
+    page.keyboard.press("ArrowRight")
+    np.testing.assert_array_equal(target(page), before)
+    assert page.evaluate("document.getElementById('drive').inert")
 
 
 #: A gamepad as a browser gives it: axes 0 and 1 of the left stick, 2 and 3 of the right one.

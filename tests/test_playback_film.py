@@ -82,9 +82,9 @@ def test_a_film_can_be_stopped_and_plays_on(small_robot: Robot, window: Window, 
     page = window.open(file_url([drive(small_robot)], tmp_path) + "#plots=none&t=0.5")
     page.evaluate("nmm.player.play()")
     page.locator("#film").click()
-    page.wait_for_function("/Film [1-9]/.test(document.getElementById('film').textContent)")
+    page.wait_for_function("/^[1-9]/.test(document.getElementById('film').textContent)")
     page.keyboard.press("w")
-    page.wait_for_function("document.getElementById('film').textContent === 'Film'")
+    page.wait_for_function("document.getElementById('film').textContent === ''")
     assert page.evaluate("nmm.player.playing")
     assert page.locator("#status").text_content() == ""
 

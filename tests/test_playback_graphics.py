@@ -24,7 +24,8 @@ def opened(small_robot: Robot, tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 def looks(page: Page) -> np.ndarray:
-    """The scene as it stands in the window, (height, width, 3)."""
+    """The scene as it stands in the window, (height, width, 3), without the tools that lie over it."""
+    page.evaluate("document.getElementById('tools').style.visibility = 'hidden'")
     draw_frames(page)
     picture = page.locator("#view canvas").screenshot()
     return np.array(Image.open(io.BytesIO(picture)).convert("RGB")).astype(int)

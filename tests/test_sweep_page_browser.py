@@ -52,7 +52,7 @@ def test_filters_of_the_table_hold_everywhere(page: Page, swept: nmm.extending.S
     assert page.locator("tbody tr").count() == min(50, len(left))
     page.get_by_role("button", name="error_rms").click()
     columns = page.locator("thead tr:first-child th").all_inner_texts()
-    first = page.locator("tbody tr").first.locator("td").nth(columns.index("error_rms")).inner_text()
+    first = page.locator("tbody tr").first.locator("td").nth(columns.index("error_rms [m]")).inner_text()
     assert float(first) == pytest.approx(min(row["error_rms"] for row in left), rel=1e-3)
     page.get_by_role("button", name="Clear all filters").click()
     assert shown(page) == 80
@@ -84,6 +84,8 @@ def test_a_click_opens_the_rollout_with_the_command_that_runs_it(
     command = page.inner_text("#one pre").split()
     index = int(page.inner_text("#one h2").split()[1].rstrip(":"))
     assert page.evaluate("chosen") == index
+    told = dict(zip(*(page.locator(f"#one {part}").all_inner_texts() for part in ("dt", "dd")), strict=True))
+    assert [told[name].split()[1] for name in ("q0.x", "error_rms", "u_max.omega")] == ["m", "m", "rad/s"]
     settings = dict(word.split("=", 1) for word in command if "=" in word)
     row = swept.table.to_pylist()[index]
     assert float(settings["q0.x"]) == row["q0.x"]

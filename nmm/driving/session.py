@@ -167,7 +167,7 @@ class DriveSession(RobotSession):
             look=looks([_kind(driven.choices)])[0],
             cameras=self._cameras(look),
             further=targets.commands,
-            scripts=("drive_gizmo.js", "drive_border.js", "drive.js"),
+            scripts=("drive_gizmo.js", "drive_border.js", "drive_choices.js", "drive.js"),
             styles=("drive.css",),
             port=port,
         )

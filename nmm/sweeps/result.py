@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -128,10 +128,11 @@ def compared(swept: SweepResult) -> list[Compared]:
     return found
 
 
-def write_page(swept: SweepResult) -> None:
-    """Write index.html, whole or not at all: maps, fronts, parallel coordinates and a table with filters."""
+def write_page(swept: SweepResult, units: Mapping[str, str]) -> None:
+    """Write index.html, whole or not at all: maps, fronts, parallel coordinates and a table with filters;
+    `units` are those of columns that have none by themselves."""
     definition = swept.definition
-    data = _data(swept)
+    data = _data(swept, units)
     text = template("nmm.sweeps", "web", "page.html").render(
         name=definition.name,
         title=definition.title,
@@ -163,7 +164,7 @@ def _about(definition: Definition) -> str:
     return text + "; ".join(parts) + "."
 
 
-def _data(swept: SweepResult) -> dict[str, Any]:
+def _data(swept: SweepResult, units: Mapping[str, str]) -> dict[str, Any]:
     definition, table = swept.definition, swept.table
     count = definition.combinations
     every = math.ceil(definition.rows / MOST_ROWS)
@@ -182,6 +183,7 @@ def _data(swept: SweepResult) -> dict[str, Any]:
         "columns": [
             {
                 **column._asdict(),
+                "unit": column.unit or units.get(column.name, ""),
                 "varied": column.name in varied,
                 "listed": column.name in listed_keys,
                 **_cells(column, shown[column.name].to_pylist(), exact=column.name in varied),

@@ -35,7 +35,7 @@ from nmm.sweeps.definition import (
 )
 from nmm.sweeps.folder import SweepFolder, check_size, is_sweep
 from nmm.sweeps.result import SweepResult, write_page
-from nmm.sweeps.rows import computed, wholly_compiled
+from nmm.sweeps.rows import MEASURED, computed, wholly_compiled
 from nmm.text_format import listed
 
 #: Up to this many rows a core, threads compute them; for more, processes pay.
@@ -177,8 +177,19 @@ class Sweep:
                     done.report(chunk, 1.0)
             place.finish()
             swept = SweepResult(place.path, definition, again)
-            write_page(swept)
+            write_page(swept, self._units())
         return swept
+
+    def _units(self) -> dict[str, str]:
+        """Units of columns that the robot and its tasks tell."""
+        robot = self.scenario.robot()
+        found = {f"q0.{name}": unit for name, unit in zip(robot.q_names, robot.q_units, strict=True)}
+        found |= {f"u_max.{name}": unit for name, unit in zip(robot.u_names, robot.u_units, strict=True)}
+        units = {row.unit for task in self.scenario.controller().task for row in task.rows(robot)}
+        if len(units) == 1 and not any(one.key.startswith("task") for one in self.definition.vary):
+            unit = units.pop()
+            found |= {one.name: unit for one in MEASURED if one.name.startswith("error_")}
+        return found
 
     def _threads(self, jobs: int, rows: int) -> int:
         """Rows that a process computes at the same time, of `jobs` in all, with `rows` left: several if they

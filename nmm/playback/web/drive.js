@@ -21,6 +21,7 @@
   // What has been aimed at since the last picture goes out with the next one.
   const aims = new Map();
   function aim(target, value) {
+    if (nmm.ended) return;
     target.value = value;
     target.awaited = performance.now();
     aims.set(target.number, value);
@@ -102,7 +103,7 @@
       show(target);
     });
     drive.active = Math.max(0, drive.targets.findIndex((target) => Object.keys(target.axes).length));
-    parts.choices = nmm.element(panel, "div", { id: "choices" });
+    nmm.element(panel, "div", { id: "choices" });
     const ways = [
       [drive.targets.some((target) => Object.keys(target.axes).length), "Drag the red ball (Shift: up and down) or an arrow; or arrow keys, Page Up and Page Down, a gamepad's sticks."],
       [drive.targets.some((target) => target.rotation.length), "Drag a ring to turn."],
@@ -242,62 +243,6 @@
       nmm.values.update();
     }
   };
-
-  // What may be chosen.
-  const controls = new Map();
-  nmm.hooks.choices = ({ choices, color }) => {
-    nmm.runs[0].color = color;
-    const keys = choices.map(({ key, options }) => `${key} ${options}`).join();
-    if (keys !== drive.keys) {
-      drive.keys = keys;
-      controls.clear();
-      parts.choices.replaceChildren();
-      const groups = new Map();
-      for (const choice of choices) {
-        if (!groups.has(choice.group)) {
-          const part = nmm.element(parts.choices, "details", choice.group.startsWith("Weights") ? {} : { open: "" });
-          nmm.element(part, "summary", {}, choice.group);
-          groups.set(choice.group, part);
-        }
-        controls.set(choice.key, control(groups.get(choice.group), choice));
-      }
-    }
-    for (const { key, value } of choices) controls.get(key)(value);
-  };
-
-  // Makes the control of a choice, and returns what shows its value.
-  function control(part, choice) {
-    const { key, text, unit, options, least, most } = choice;
-    const line = nmm.element(part, "label", { class: "choice" });
-    nmm.element(line, "span", {}, unit ? `${text} [${unit}]` : text);
-    const pick = (value) => send({ type: "pick", key, value });
-    if (typeof choice.value === "boolean") {
-      const box = nmm.element(line, "input", { type: "checkbox", "data-key": key });
-      box.addEventListener("change", () => pick(box.checked));
-      return (value) => (box.checked = value);
-    }
-    if (options.length) {
-      const list = nmm.element(line, "select", { "data-key": key });
-      for (const option of options) nmm.element(list, "option", { value: option }, option.toUpperCase());
-      list.addEventListener("change", () => pick(list.value));
-      return (value) => (list.value = value);
-    }
-    // A slider along the logarithm.
-    const slider = nmm.element(line, "input", { type: "range", min: Math.log(least), max: Math.log(most), step: "any", "data-key": key });
-    const output = nmm.element(line, "output");
-    const told = (value) => {
-      output.textContent = value.toPrecision(3);
-      slider.setAttribute("aria-valuetext", `${output.textContent} ${unit}`);
-    };
-    const chosen = () => Math.min(Math.max(Math.exp(Number(slider.value)), least), most);
-    slider.addEventListener("input", () => told(chosen()));
-    slider.addEventListener("change", () => pick(chosen()));
-    return (value) => {
-      if (document.activeElement === slider && slider.matches(":active")) return;
-      slider.value = Math.log(value);
-      told(value);
-    };
-  }
 
   // Keys and sticks move the target that was moved last.
   function shift(way, by) {

@@ -8,7 +8,7 @@
   const border = (nmm.border = {});
 
   function arrow(target) {
-    const title = `The target of ${target.name} is out of the picture: show it (R)`;
+    const title = `${target.heading} is out of the picture: show it (R)`;
     const button = nmm.element(document.body, "button", { class: "away", title, "aria-label": title, hidden: "" });
     button.innerHTML = '<svg viewBox="0 0 24 24" aria-hidden="true"><path d="M4 5l17 7-17 7 4-7z"/></svg>';
     button.addEventListener("click", nmm.actions.reset);
