@@ -147,6 +147,21 @@ def test_a_stop_keeps_distances_on_its_way(driven: int) -> None:
     assert alone <= len(us) <= 1.1 * alone
 
 
+def test_a_loop_among_obstacles_records_where_they_were() -> None:
+    controller = towards_pillar()
+    loop, held = nmm.Loop(controller, keep=40), HeldInputs(controller.robot)
+    q = controller.robot.q({"q1": 0.3, "q2": 0.6})
+    for k in range(60):
+        q = held(q, loop.step(k * DT, q), DT)
+    run = loop.trajectory()
+    assert len(run) == 40
+    assert run.obstacles[0].name == "pillar"
+    assert controller.solver.scene is not None
+    every = range(len(controller.solver.scene.names))
+    last = controller.solver.scene.queries.distances(0.0, run.q[-1], every).min()
+    assert run.clearance[-1] == pytest.approx(last, abs=1e-9)
+
+
 def test_a_stop_needs_no_task_and_no_answer() -> None:
     """Where the task has no value the controller refuses, and the stop goes on."""
     robot = nmm.load("unicycle_3r")

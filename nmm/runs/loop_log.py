@@ -55,6 +55,7 @@ class LoopLog:
         self._controller, self._count = controller, count
         self._found: Recorded = room(count, *controller.solver.sizes)
         self._t = np.zeros(count)
+        self._places: deque[tuple[Any, ...]] = deque(maxlen=count)
         self._written = 0
         self._note = checked_by_caller(note_sample, NOTE_SAMPLE)
 
@@ -66,6 +67,8 @@ class LoopLog:
         k = self._written % self._count
         self._t[k] = t
         self._note(*self._controller.solver.blocks, q, 0, 1.0, k, self._found)
+        if (scene := self._controller.solver.scene) is not None:
+            self._places.append(scene.places(t))
         self._written += 1
 
     def trajectory(self, dt: float, findings: tuple[Finding, ...]) -> Trajectory:
@@ -74,8 +77,6 @@ class LoopLog:
             raise RunError("has no samples yet", where="loop")
         first = self._written % self._count if self._written > self._count else 0
         order = (first + np.arange(len(self))) % self._count
-        recorder = Recorder(self._controller, self._t[order])
-        recorder.found = Recorded._make(values[order] for values in self._found)
-        recorder.passed_over(len(order) - 1)
-        run = recorder.trajectory(dt, "zoh")
+        found = Recorded._make(values[order] for values in self._found)
+        run = Recorder.of(self._controller, self._t[order], found, self._places).trajectory(dt, "zoh")
         return replace(run, verdict=Verdict(warnings=tuple((one,) for one in findings)), label="loop")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -65,6 +66,16 @@ class Recorder:
         self.singular_values: Array = np.zeros((0, len(rows)))
         self.swept: Swept | None = None
         self._places: list[tuple[Any, ...]] = []
+
+    @classmethod
+    def of(
+        cls, controller: Controller, times: Array, found: Recorded, places: Iterable[tuple[Any, ...]]
+    ) -> Recorder:
+        """With samples that were noted elsewhere, and where obstacles were at each."""
+        recorder = cls(controller, times)
+        recorder.found, recorder._places = found, list(places)
+        recorder.passed_over(len(times) - 1)
+        return recorder
 
     def __len__(self) -> int:
         return self._count
