@@ -122,6 +122,7 @@ from .robots.loading import pinocchio_models as pinocchio_models
 from .robots.odometry import Odometry as Odometry
 from .robots.robot import Robot as Robot
 from .rollouts.rollout import rollout as rollout
+from .ros.bag import read_bag as read_bag
 from .runs.disturbances import Disturbances as Disturbances
 from .runs.robot_loop import Loop as Loop
 from .runs.robot_loop import LoopState as LoopState

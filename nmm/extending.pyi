@@ -132,6 +132,7 @@ from .resolvers.problem_arrays import ProblemArrays as ProblemArrays
 from .resolvers.reduced_gradient import Partition as Partition
 from .robots.coordinates import UNLIMITED as UNLIMITED
 from .robots.frame_path import FramePath as FramePath
+from .robots.loading.description import describe as describe
 from .robots.loading.ground import slip_warnings as slip_warnings
 from .robots.loading.joint_kinds import axis as axis
 from .robots.loading.joint_kinds import is_revolute as is_revolute

@@ -7,6 +7,7 @@ import typer
 
 from nmm.bundled import bundled_robots, bundled_scenarios
 from nmm.cli.descriptions import info
+from nmm.cli.logs import export
 from nmm.cli.mapping import map_measures
 from nmm.cli.options import flag
 from nmm.cli.output import show_table, show_text
@@ -97,7 +98,21 @@ def robots() -> None:
     show_table(["robot", "what it is", "arguments (m, rad)"], rows)
 
 
-for _command in (run, compare, plan, paper, play, render, info, init, check, view, drive, singularities):
+for _command in (
+    run,
+    compare,
+    plan,
+    paper,
+    play,
+    render,
+    export,
+    info,
+    init,
+    check,
+    view,
+    drive,
+    singularities,
+):
     app.command()(_command)
 app.command("map")(map_measures)
 for _command in (redundancy, laps, torques, sweep, scenarios, robots):

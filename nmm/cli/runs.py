@@ -13,6 +13,7 @@ import typer
 
 from nmm.cli.groups import Browser, Ellipsoids, Figures, OfRobot, command
 from nmm.cli.interrupts import shielded
+from nmm.cli.logs import compare_with_bag
 from nmm.cli.options import (
     LIMITS,
     Chosen,
@@ -130,6 +131,10 @@ def _always_written(wanted: bool) -> None:
 @command
 def compare(
     scenario: ScenarioArgument,
+    bag: Annotated[
+        Path | None,
+        typer.Argument(metavar="[BAG]", help="A robot's log, beside a run's folder.", show_default=False),
+    ] = None,
     *,
     resolvers: ResolversOption = "rg,pg",
     settings: SetOption = None,
@@ -144,7 +149,8 @@ def compare(
     """Run a scenario with several resolvers, or with one at several settings.
 
     One table, one figure, one playback. A scenario with a plan is run with it, and with each resolver
-    without it.
+    without it. With a rosbag2 folder, .mcap or .db3 after a run's folder: how far the robot's motion in this
+    log is from the run.
 
     \b
     nmm compare unicycle_2r_position
@@ -152,6 +158,7 @@ def compare(
     nmm compare unicycle_2r_position --resolvers rg,rg:alpha=5,pg:alpha=50
     nmm compare unicycle_2r_position --table latex > table.tex
     nmm compare unicycle_2r_position --resolvers rg,my_laws.py:law
+    nmm compare runs/unicycle_2r_position-rg on_the_robot.mcap
 
     The folder holds comparison.png, playback.html (all robots in one scene), summary.json and, for each
     resolver, a folder with its run.
@@ -160,6 +167,8 @@ def compare(
     from nmm.folders.whole import check_folder
     from nmm.runs.table import step_time
 
+    if bag is not None:
+        return compare_with_bag(scenario, bag, out)
     several = [chosen(text, "--resolvers") for text in named(resolvers, "--resolvers")]
     changed = settings_of(settings)
     drawn: dict[str, Any] = {"ellipsoids": ellipsoids.wanted(), "figures": figures.options()}

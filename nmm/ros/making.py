@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, array, matrix, scalar, vector
 from nmm.errors import InputError, expect
+from nmm.playback.placements import position_and_quaternion
 from nmm.robots.robot import Robot
 
 
@@ -42,6 +43,8 @@ class Messages:
     robot : whose
     types : the classes by name; rclpy's when not given, or `rosbags.typesys.get_typestore(...).types`
     odom, base : names of the frames (REP-105); the base is the robot's root link by default
+    start : the clock's time at t = 0, s, added in whole nanoseconds: a float of this century's seconds holds
+        0.2 µs
 
     Examples
     --------
@@ -62,8 +65,9 @@ class Messages:
         *,
         odom: str = "odom",
         base: str | None = None,
+        start: float = 0.0,
     ) -> None:
-        self.robot, self.odom = robot, odom
+        self.robot, self.odom, self.start = robot, odom, in_nanoseconds(start)
         self.base = root_link(robot) if base is None else base
         self.types = Rclpy() if types is None else types
         self._first = min(3, robot.platform.n_p)
@@ -153,8 +157,8 @@ class Messages:
 
     def pose(self, t: float, placement: ArrayLike, frame: str | None = None) -> Any:
         """A PoseStamped of a pose (4, 4), m, in a frame, odom by default."""
-        pose = matrix(placement, (4, 4), "placement")
-        return self._pose_stamped(t, pose[:3, 3], quaternion(pose[:3, :3]), frame or self.odom)
+        at, turn = position_and_quaternion(matrix(placement, (4, 4), "placement"))
+        return self._pose_stamped(t, at, turn, frame or self.odom)
 
     def path(self, t: float, points: ArrayLike, frame: str | None = None) -> Any:
         """A Path of points (N, 3), m, in a frame, odom by default."""
@@ -178,7 +182,7 @@ class Messages:
                 velocities=self._floats([] if rates is None else rates[k]),
                 accelerations=self._floats([]),
                 effort=self._floats([]),
-                time_from_start=self._time(times[k] - times[0], "builtin_interfaces/msg/Duration"),
+                time_from_start=self._duration(times[k] - times[0]),
             )
             for k in range(count)
         ]
@@ -246,9 +250,17 @@ class Messages:
     def _header(self, t: float, frame: str) -> Any:
         return self._made("std_msgs/msg/Header", stamp=self._time(t), frame_id=frame)
 
-    def _time(self, t: float, name: str = "builtin_interfaces/msg/Time") -> Any:
+    def nanoseconds(self, t: float) -> int:
+        """The clock's time at t, s, in nanoseconds."""
+        return self.start + in_nanoseconds(t)
+
+    def _time(self, t: float) -> Any:
+        sec, nanosec = divmod(self.nanoseconds(t), 1_000_000_000)
+        return self._made("builtin_interfaces/msg/Time", sec=sec, nanosec=nanosec)
+
+    def _duration(self, t: float) -> Any:
         sec, nanosec = divmod(in_nanoseconds(t), 1_000_000_000)
-        return self._made(name, sec=sec, nanosec=nanosec)
+        return self._made("builtin_interfaces/msg/Duration", sec=sec, nanosec=nanosec)
 
     def _floats(self, values: ArrayLike) -> Any:
         """Arrays where the classes are those of rosbags, lists where rclpy's, which refuse arrays."""
@@ -266,11 +278,17 @@ def in_nanoseconds(t: float) -> int:
 
 
 def root_link(robot: Robot) -> str:
-    """The link that the platform moves; of a fixed base its first link."""
-    body = "theta" if robot.platform.n_p else "universe"
-    frames = (frame for frame in robot.model.frames if robot.model.names[frame.parentJoint] == body)
-    names = [frame.name for frame in frames if frame.type.name == "BODY" and frame.name != "universe"]
-    return names[0] if names else robot.name
+    """The link at the platform's reference point, or "reference_point" where no link is; of a fixed base the
+    link at its root."""
+    base = base_joint(robot)
+    links = (frame for frame in robot.model.frames if frame.parentJoint == base and frame.type.name == "BODY")
+    at_rest = (link.name for link in links if link.placement.isIdentity(1e-9) and link.name != "universe")
+    return next(at_rest, "reference_point")
+
+
+def base_joint(robot: Robot) -> int:
+    """Pinocchio's index of the joint that carries the root link."""
+    return int(robot.model.getJointId("theta")) if robot.platform.n_p else 0
 
 
 def body_twist(q: Array, q_dot: Array) -> Array:
@@ -285,21 +303,6 @@ def planar_pose(pose: Array) -> tuple[Array, Array]:
     """Position (3,) and quaternion (4,) x y z w of x, y, theta (3,)."""
     x, y, theta = pose
     return np.array([x, y, 0.0]), np.array([0.0, 0.0, math.sin(theta / 2), math.cos(theta / 2)])
-
-
-def quaternion(rotation: Array) -> Array:
-    """(4,) x y z w, of length 1, of a rotation (3, 3): the eigenvector of Bar-Itzhack's matrix."""
-    (a, b, c), (d, e, f), (g, h, i) = rotation
-    K = np.array(
-        [
-            [a - e - i, b + d, c + g, h - f],
-            [b + d, e - a - i, f + h, c - g],
-            [c + g, f + h, i - a - e, d - b],
-            [h - f, c - g, d - b, a + e + i],
-        ]
-    )
-    turn = np.linalg.eigh(K)[1][:, -1]
-    return np.asarray(turn if turn[3] >= 0.0 else -turn)
 
 
 def _xyz(values: Array) -> dict[str, float]:

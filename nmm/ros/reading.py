@@ -95,7 +95,7 @@ def placement(message: Any) -> Array:
     if at is None or turn is None:
         raise InputError(where=where, expected="a message with a pose or a transform")
     x, y, z, w = vector([turn.x, turn.y, turn.z, turn.w], 4, f"{where}: orientation")
-    length = math.sqrt(x * x + y * y + z * z + w * w)
+    length = math.hypot(x, y, z, w)
     expect(abs(length - 1.0) <= UNIT, f"{where}: orientation", "a quaternion of length 1", length)
     x, y, z, w = x / length, y / length, z / length, w / length
     found = np.eye(4)
@@ -253,10 +253,14 @@ class Transforms:
     def placement(self, frame: str, child: str) -> Array:
         """The pose (4, 4) of `child` in `frame`, m; `InputError` where no transforms connect them."""
         first, second = self._chain(_plain(frame)), self._chain(_plain(child))
-        if [*first][-1] != [*second][-1]:
+        if not self.connects(frame, child):
             known = sorted({*self._parents, *(parent for parent, _ in self._parents.values())})
             raise InputError("no transforms connect them", where=f"{frame} and {child}", available=known)
         return np.asarray(np.linalg.inv([*first.values()][-1]) @ [*second.values()][-1])
+
+    def connects(self, frame: str, child: str) -> bool:
+        """Whether there are transforms from the one to the other."""
+        return [*self._chain(_plain(frame))][-1] == [*self._chain(_plain(child))][-1]
 
     def base(self, frame: str, child: str) -> Array:
         """x, y, theta (3,) of `child` in `frame`, as of `nmm.ros.base`."""

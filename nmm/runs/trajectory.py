@@ -267,6 +267,19 @@ class Trajectory:
             self, folder, figures=figures, html=html, ellipsoids=ellipsoids
         )
 
+    def save_mcap(self, path: str | Path, start: float = 0.0) -> Path:
+        """Write the motion as a log of ROS 2's messages (.mcap), for Foxglove, Rerun and `ros2 bag`: joint
+        states, TF, odometry, twist, inputs, task error, paths, events, the robot's description
+        (docs/ros.md). `start`: the clock's time of t = 0, s.
+
+        Raises
+        ------
+        InputError : without the extra `ros`, another suffix, a run without samples, a place that cannot be
+            written; no part of a file is left then
+        """
+        written: Path = lazy_call("nmm.ros.log:save_mcap")(self, path, start)
+        return written
+
     @staticmethod
     def load(folder: str | Path, robot: Robot | None = None) -> Trajectory:
         """Read a run's folder; with the robot it ran on, if that was put together in Python.
