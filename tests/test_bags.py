@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from collections import defaultdict
 from collections.abc import Mapping
 from contextlib import suppress
@@ -268,3 +269,31 @@ def test_nothing_half_written_is_left(
         run.save_mcap(there)
     assert there.read_bytes() == b"before"
     assert [*tmp_path.iterdir()] == [there]
+
+
+def test_without_rosbags_it_is_said_how_to_get_it(
+    run: nmm.Trajectory, tmp_path: Path, monkeypatch: Any
+) -> None:
+    for part in ("rosbags.rosbag2", "rosbags.typesys"):
+        monkeypatch.setitem(sys.modules, part, None)
+    for use in (lambda: run.save_mcap(tmp_path / "run.mcap"), lambda: nmm.read_bag(tmp_path, run.robot)):
+        with pytest.raises(InputError, match=r"nmm\[ros\]"):
+            use()
+
+
+def test_commands_refuse_what_is_no_bag_and_no_run(
+    run: nmm.Trajectory, tmp_path: Path, monkeypatch: Any, capsys: Any
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    run.save("first", figures=False)
+    Path("bad.mcap").write_bytes(b"no MCAP")
+    for arguments in (
+        ["compare", "first", "bad.mcap"],
+        ["compare", "none", "bad.mcap"],
+        ["export", "first"],
+        ["export", "none", "--mcap"],
+        ["export", "first", "--mcap", "run.bag"],
+    ):
+        assert status_of(arguments) == 2, arguments
+        assert capsys.readouterr().err.count("\n") == 1, arguments
+    assert {one.name for one in tmp_path.iterdir()} == {"first", "bad.mcap"}

@@ -300,3 +300,17 @@ def test_odometry_of_mujocos_robot_is_off_by_what_its_wheels_slip() -> None:
     assert np.hypot(*off[:2]) < 0.01 * way
     assert abs(off[2]) < 0.01
     np.testing.assert_allclose(off[3:], 0.0, atol=1e-9)
+
+
+def test_the_page_s_encoders_and_odometry(capsys: pytest.CaptureFixture[str]) -> None:
+    page = (Path(__file__).parents[1] / "docs" / "robots.md").read_text("utf-8")
+    section = page.partition("## Encoders and odometry")[2].partition("\n## ")[0]
+    found = {"nmm": nmm}
+    for code in re.findall(r"```python\n(.*?)```", section, flags=re.DOTALL):
+        exec(code, found)
+    pose, speeds = capsys.readouterr().out.splitlines()
+    assert pose.startswith("[1.0")
+    assert "left_wheel_joint" in speeds
+    q = found["odometry"].q  # type: ignore[attr-defined]
+    np.testing.assert_allclose(q[:3], [1.1, 2.0, 0.32])
+    assert q[3] == pytest.approx(-3.0 + 2 * math.pi)  # nearest to 0.1, where q1 was
