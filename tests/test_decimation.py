@@ -12,7 +12,7 @@ import trimesh
 
 import nmm
 from nmm.arrays import Array
-from nmm.playback.meshes import OFF, Indices, decimated, mesh_pieces
+from nmm.playback.meshes import OFF, Indices, _light, decimated, mesh_pieces
 
 Mesh = tuple[Array, Indices]
 
@@ -120,3 +120,11 @@ def test_the_meshes_of_robots_stay_where_they_are() -> None:
         assert apart(mesh, drawn, 150) < 2.5 * OFF * size, part.name
     assert count < 30_000
     assert [shape_of(part) for part in solid] == collided
+
+
+def test_what_is_coarser_has_fewer_triangles_for_thin_parts_too() -> None:
+    """A plate that is thinner than the tolerance: nothing would be left of it, so it is kept by a finer one."""
+    plate = trimesh.creation.box([1.0, 1.0, 0.004]).subdivide().subdivide().subdivide()
+    vertices, faces = _light(plate, 0.02)
+    assert 0 < len(faces) < len(plate.faces) / 2
+    np.testing.assert_allclose(np.ptp(vertices, axis=0)[:2], 1.0, atol=0.02)

@@ -90,7 +90,7 @@ def test_ghosts_paths_and_motions_can_be_hidden(small_robot: Robot, window: Wind
     motions = [
         Motion(small_robot, motion.t, motion.q, motion.u, label=name, **fields) for name in ("RG", "PG")
     ]
-    page = window.open(file_url(motions, tmp_path, title="Both"))
+    page = window.open(file_url(motions, tmp_path, title="Both", ghosts=3))
     assert page.locator("h1").inner_text() == "Both"
     assert page.locator("#legend li").all_inner_texts() == [
         "RG",

@@ -36,11 +36,12 @@ class MeshPiece:
     color: Color | None
 
 
-def mesh_pieces(geometry: pin.GeometryObject) -> list[MeshPiece]:
-    """A mesh's pieces in the geometry's frame, read again from the file because Pinocchio merges parts and
-    drops materials, and used only if they fill the box of Pinocchio's mesh (units, axes, scales)."""
+def mesh_pieces(geometry: pin.GeometryObject, off: float = OFF) -> list[MeshPiece]:
+    """A mesh's pieces in the geometry's frame, off by at most that share of its box's diagonal. They are read
+    again from the file because Pinocchio merges parts and drops materials, and used only if they fill the box
+    of Pinocchio's mesh (units, axes, scales)."""
     loaded = _pinocchio_mesh(geometry.geometry)
-    pieces = _file_pieces(str(geometry.meshPath))
+    pieces = _file_pieces(str(geometry.meshPath), off)
     if not pieces:
         return loaded
     scale = np.asarray(geometry.meshScale, dtype=float)
@@ -49,15 +50,15 @@ def mesh_pieces(geometry: pin.GeometryObject) -> list[MeshPiece]:
     if not loaded:
         return scaled
     box = _box(loaded)
-    return scaled if np.allclose(_box(scaled), box, atol=3.0 * OFF * np.ptp(box, axis=0).max()) else loaded
+    return scaled if np.allclose(_box(scaled), box, atol=3.0 * off * np.ptp(box, axis=0).max()) else loaded
 
 
 @lru_cache(maxsize=256)
-def _file_pieces(path: str) -> tuple[MeshPiece, ...]:
+def _file_pieces(path: str, share: float) -> tuple[MeshPiece, ...]:
     try:
         meshes = meshes_of(path)
         ends = np.array([mesh.bounds for mesh in meshes])
-        off = OFF * float(np.linalg.norm(ends[:, 1].max(axis=0) - ends[:, 0].min(axis=0)))
+        off = share * float(np.linalg.norm(ends[:, 1].max(axis=0) - ends[:, 0].min(axis=0)))
         return tuple(MeshPiece(*_light(mesh, off), _color(mesh)) for mesh in meshes)
     except Exception:  # trimesh raises whatever it meets in colours; Pinocchio's copy of the mesh is at hand
         return ()
@@ -69,8 +70,15 @@ def _light(mesh: trimesh.Trimesh, off: float) -> tuple[Array, Indices]:
 
     mesh = mesh.copy()
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    vertices, faces = decimated(
-        np.array(mesh.vertices, dtype=float), np.array(mesh.faces, dtype=np.uint32), off
+    given = np.array(mesh.vertices, dtype=float), np.array(mesh.faces, dtype=np.uint32)
+    # Of a part that is thinner than this nothing would be left: then by less.
+    vertices, faces = next(
+        (
+            found
+            for finer in range(5)
+            if len((found := decimated(*given, off / 2.0**finer))[1]) < len(given[1])
+        ),
+        given,
     )
     mesh = trimesh.graph.smooth_shade(trimesh.Trimesh(vertices, faces, process=False), angle=SMOOTH)
     return np.array(mesh.vertices, dtype=float), np.array(mesh.faces, dtype=np.uint32)

@@ -25,6 +25,7 @@ from nmm.playback.keyframes import (
     nearest,
     samples_kept,
 )
+from nmm.playback.meshes import OFF
 from nmm.playback.obstacles import SceneObstacles, draw_nearest
 from nmm.playback.placements import base_position
 from nmm.playback.rolling import wheel_angles
@@ -45,6 +46,8 @@ TARGET: Rgb = (0.83, 0.10, 0.22)
 BELIEVED: Rgb = (0.42, 0.45, 0.50)
 THROUGH = 0.4
 INSTANTS = 80
+#: Meshes of robots that share a picture may be off by this share of their size: there are several.
+OFF_OF_SEVERAL = 6e-3
 #: Radius of a path, at most, as a share of the robot's extent: thinner than an arm.
 THIN = 0.005
 
@@ -83,6 +86,7 @@ def playback_scene(
     view = np.vstack([extent.view_points(boxes, motions), obstacles.points(), seen_points(motions)])
     size = max(0.5 * float(np.linalg.norm(np.ptp(view, axis=0))), 1e-3)
     several = len(motions) > 1
+    off = OFF_OF_SEVERAL if several else OFF
     drawing = Drawing()
     drawing.add(
         "stage",
@@ -104,7 +108,9 @@ def playback_scene(
     for i, (motion, frame, look) in enumerate(zip(motions, frames, worn, strict=True)):
         color = look.rgb
         path = f"/nmm/motion {i}"
-        robot = DrawnRobot(drawing, motion.robot, f"{path}/robot", tint=color if several else None, rank=i)
+        robot = DrawnRobot(
+            drawing, motion.robot, f"{path}/robot", tint=color if several else None, rank=i, off=off
+        )
         robot.carry(drawing, motion.surroundings.carried)
         robot.place(frame.q[0], frame.wheels[0])
         animations += robot.animations(frame, start)
@@ -258,7 +264,15 @@ def _believed(
 ) -> list[Command]:
     """A transparent copy of the robot that moves where odometry has it; what animates it."""
     frames = keyframes(motion, fps, wheels)
-    copy = DrawnRobot(drawing, motion.robot, f"{path}/believed", tint=BELIEVED, opacity=THROUGH, rank=rank)
+    copy = DrawnRobot(
+        drawing,
+        motion.robot,
+        f"{path}/believed",
+        tint=BELIEVED,
+        opacity=THROUGH,
+        rank=rank,
+        off=OFF_OF_SEVERAL,
+    )
     copy.place(frames.q[0], frames.wheels[0])
     return copy.animations(frames, start)
 

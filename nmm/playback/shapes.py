@@ -10,7 +10,7 @@ import pinocchio as pin
 from nmm.arrays import Array
 from nmm.playback.drawing import Command, Drawing, Rgb, animation, packed, page_times, segment
 from nmm.playback.keyframes import Keyframes
-from nmm.playback.meshes import Color, Indices, mesh_pieces
+from nmm.playback.meshes import OFF, Color, Indices, mesh_pieces
 from nmm.playback.placements import Placements, position_and_quaternion
 from nmm.playback.sticks import appearance
 from nmm.robots.robot import Robot
@@ -39,6 +39,7 @@ class DrawnRobot:
         tint: Rgb | None = None,
         opacity: float = 1.0,
         rank: int = 0,
+        off: float = OFF,
     ) -> None:
         model = robot.display_model
         self.placements = Placements(robot)
@@ -52,7 +53,7 @@ class DrawnRobot:
         for i, geometry in enumerate(appearance(robot).shapes.geometryObjects):
             at = f"{below[geometry.parentJoint]}/visual {i} {segment(geometry.name)}"
             drawing.transform(at, np.array(geometry.placement.homogeneous))
-            for k, shape in enumerate(shapes(geometry)):
+            for k, shape in enumerate(shapes(geometry, off)):
                 color = _mixed(shape.color[:3], tint)
                 drawing.object(
                     f"{at}/{k}", shape.geometry, color, opacity=opacity * shape.color[3], rank=rank
@@ -133,8 +134,9 @@ class Shape:
     matrix: Array
 
 
-def shapes(geometry: pin.GeometryObject) -> list[Shape]:
-    """What to draw for a visual geometry; nothing for kinds without a bounded surface."""
+def shapes(geometry: pin.GeometryObject, off: float = OFF) -> list[Shape]:
+    """What to draw for a visual geometry, meshes off by at most that share of their size; nothing for kinds
+    without a bounded surface."""
     red, green, blue, alpha = (float(c) for c in geometry.meshColor)
     color = (red, green, blue, alpha if alpha > 0.0 else 1.0)
     primitive = _primitive(geometry.geometry)
@@ -142,7 +144,7 @@ def shapes(geometry: pin.GeometryObject) -> list[Shape]:
         data, matrix = primitive
         return [Shape(data, color, matrix)]
     found = []
-    for piece in mesh_pieces(geometry):
+    for piece in mesh_pieces(geometry, off):
         own = color if piece.color is None or geometry.overrideMaterial else piece.color
         found.append(Shape(triangles(piece.vertices, piece.faces), own, np.eye(4)))
     return found

@@ -49,6 +49,7 @@
     else if (camera !== "iso") nmm.camera.look(camera);
     nmm.texts.fit();
     nmm.address.start();
+    requestAnimationFrame(() => requestAnimationFrame(() => performance.mark("nmm first pose")));
     return nmm.stage.autoplay && player.play();
   };
 
