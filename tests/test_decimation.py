@@ -123,7 +123,7 @@ def test_the_meshes_of_robots_stay_where_they_are() -> None:
 
 
 def test_what_is_coarser_has_fewer_triangles_for_thin_parts_too() -> None:
-    """A plate that is thinner than the tolerance: nothing would be left of it, so it is kept by a finer one."""
+    """A plate that is thinner than the tolerance: nothing would be left of it, a finer one keeps it."""
     plate = trimesh.creation.box([1.0, 1.0, 0.004]).subdivide().subdivide().subdivide()
     vertices, faces = _light(plate, 0.02)
     assert 0 < len(faces) < len(plate.faces) / 2
