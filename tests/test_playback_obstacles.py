@@ -348,3 +348,18 @@ def test_what_stands_before_the_robot_is_seen_through(window: Window, tmp_path: 
     assert page.evaluate(opacity) == [1.0, 0.3]
     page.evaluate("nmm.camera.put([6, 0, 1, 0, 0, 0.5])")
     assert page.evaluate(opacity) == [1.0, 1.0]
+
+
+def test_among_obstacles_the_distance_to_one_is_written_not_a_robots_own() -> None:
+    robot = nmm.load("unicycle_2r")
+    nearest = nmm.playback.Nearest(
+        np.zeros((1, 6)), np.array([0.2]), np.array([0]), ("link1 and base_link", "link2 and wall"), 0.1
+    )
+    wall = nmm.extending.Body("wall", nmm.Sphere(0.1).geometry(), np.eye(4)[None])
+    told = []
+    for bodies in ((), (wall,)):
+        motion = Motion(
+            robot, [0.0], robot.rest[None], np.zeros((1, robot.n_u)), bodies=bodies, nearest=nearest
+        )
+        told += [one["told"] for one in playback_scene([motion], title="") if one["type"] == "nearest"]
+    assert told == [[True, True], [False, True]]

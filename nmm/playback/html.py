@@ -45,7 +45,8 @@ def write_html(
 ) -> Path:
     """Write a page that plays runs or motions, each in its resolver's colour, with its curves beside it.
 
-    It opens at the first instant. `#t=3.2` after the file's address opens it at 3.2 s, `#play` plays.
+    It opens at the first instant, or at the one that the surroundings say. `#t=3.2` after the file's address
+    opens it at 3.2 s, `#play` plays.
 
     Parameters
     ----------

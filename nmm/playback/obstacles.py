@@ -125,8 +125,15 @@ def draw_nearest(
         distance=packed(np.where(shown, found.distance[kept], 1e9), np.float64),
         pairs=np.where(shown, found.pairs[kept], -1).tolist(),
         names=list(found.names),
+        told=_told(motion, found),
         asked=found.asked - ROUNDING,
     )
+
+
+def _told(motion: Motion, found: Nearest) -> list[bool]:
+    """Which pairs' distances are written into the scene: with obstacles those to them, not a robot's own."""
+    obstacles = {body.name for body in motion.bodies}
+    return [not obstacles or any(name in obstacles for name in pair.split(" and ")) for pair in found.names]
 
 
 def _same(body: Body, motion: Motion, other: Body, others: Motion) -> bool:

@@ -155,6 +155,7 @@
       if (length > 1e-9) {
         one.line.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), along.divideScalar(length));
       }
+      one.text.visible = one.told[pair] || d < one.asked;
       one.text.position.copy(ends[0]).add(ends[1]).multiplyScalar(0.5);
       one.text.write(`${d.toFixed(3)} m`, css(color));
       one.item.firstChild.style.color = nmm.theme.css(color);
