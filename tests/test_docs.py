@@ -119,14 +119,15 @@ SMALLER = {"sweep": "--samples 2 --jobs 1"}
 
 
 def test_the_commands_of_the_readme_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """All but `nmm render`, which needs a browser, and `nmm paper`, which a tutorial runs."""
+    """All but `nmm render`, which needs a browser, and `nmm paper`, which a tutorial runs. They are listed in
+    docs/contents.md."""
     tutorial = (ROOT / "docs" / "tutorials" / "own_robot.md").read_text(encoding="utf-8")
     robot = re.search(r"^```xml\n(.*?)^```$", tutorial, flags=re.DOTALL | re.MULTILINE)
     assert robot is not None
     draw_only([], monkeypatch)
     (tmp_path / "my_robot.urdf").write_text(robot[1], encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    readme = (ROOT / "docs" / "contents.md").read_text(encoding="utf-8")
     lines = re.findall(r"^nmm (.*?)(?:  .*)?$", readme, flags=re.MULTILINE)
     assert len(lines) > 15
     for line in lines:
@@ -145,7 +146,7 @@ NOT_RUN = {
     "--play": "waits for a browser: tests/test_bundled_scenarios.py runs the scenarios",
 }
 #: Pages whose commands are run elsewhere.
-ELSEWHERE = {"README.md", *(page.relative_to(ROOT).as_posix() for page in console.PAGES)}
+ELSEWHERE = {"README.md", "docs/contents.md", *(page.relative_to(ROOT).as_posix() for page in console.PAGES)}
 
 
 def test_the_commands_of_the_other_pages_run(
@@ -179,13 +180,16 @@ def test_every_command_on_a_page_exists_with_its_options(page: str) -> None:
 
 
 def test_the_readmes_python_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """All but the line that opens a browser."""
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    code, mounted = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
-    assert "trajectory.play()" in code
+    """With the arm on a car of docs/contents.md."""
+    pages = [ROOT / "README.md", ROOT / "docs" / "contents.md"]
+    code, mounted = (
+        found
+        for page in pages
+        for found in re.findall(r"```python\n(.*?)```", page.read_text("utf-8"), re.DOTALL)
+    )
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
-    exec(code.replace("trajectory.play()", ""), names)
+    exec(code, names)
     trajectory = names["trajectory"]
     assert isinstance(trajectory, nmm.Trajectory)
     assert trajectory.complete
@@ -284,10 +288,10 @@ def test_the_python_on_singularities_runs() -> None:
 @pytest.mark.parametrize(
     "listed", [PLATFORMS, TASKS, REFERENCES, OBJECTIVES, RESOLVERS], ids=lambda it: it.what
 )
-def test_the_readme_lists_what_there_is(listed: Kinds) -> None:
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+def test_the_contents_list_what_there_is(listed: Kinds) -> None:
+    text = (ROOT / "docs" / "contents.md").read_text(encoding="utf-8")
     (row,) = re.findall(rf"^\| \*\*{listed.what.capitalize()}s\*\* \| (.*) \|$", text, re.MULTILINE)
-    assert set(re.findall(r"`(\w+)`", row)) == set(listed), f"README.md: row {listed.what}s"
+    assert set(re.findall(r"`(\w+)`", row)) == set(listed), f"docs/contents.md: row {listed.what}s"
 
 
 def test_every_public_name_is_documented() -> None:
