@@ -40,3 +40,13 @@ def test_a_motion_plays_with_the_script_beside_it(gallery: Gallery, window: Wind
     with served_folder(gallery.folder) as start:
         plays(start)
         window.page.goto("about:blank")
+
+
+def test_a_picture_plays_where_it_stands(gallery: Gallery, window: Window) -> None:
+    page = window.page
+    page.goto(gallery.index.as_uri())
+    page.locator("a.play").click()
+    frame = page.frame_locator(".card iframe")
+    frame.locator("body.playing").wait_for()
+    assert frame.locator("#time").inner_text() != ""
+    assert page.locator("a.play").count() == 0
