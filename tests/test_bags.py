@@ -195,7 +195,10 @@ def test_a_run_beside_a_log(
     shutil.copy(log, "robot.mcap")
     assert status_of(["compare", str(folder), "robot.mcap", "--out", "both"]) == 0
     assert Path("both/playback.html").exists()
-    assert len(nmm.Trajectory.load("both/robot")) == len(run)
+    again = nmm.Trajectory.load("both/robot")
+    assert len(again) == len(run)
+    assert np.isnan(again.error_norm).all()  # it has no task
+    assert again.summary()["settling_time"] is None
     told = capsys.readouterr().out
     assert "platform" in told
     from nmm.ros.difference import difference

@@ -149,7 +149,9 @@ class RecordedQuantity:
 
 
 def error_norm(record: Record) -> Array:
-    """‖e‖ (N,) of the tasks active at each sample, in the mixed units of the rows."""
+    """‖e‖ (N,) of the tasks active at each sample, in the mixed units of the rows; NaN without a task."""
+    if not record["error"].shape[1]:
+        return np.full(len(record["error"]), np.nan)
     return np.asarray(np.linalg.norm(np.where(np.isnan(record["error"]), 0.0, record["error"]), axis=1))
 
 
