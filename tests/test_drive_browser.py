@@ -392,6 +392,7 @@ def test_a_target_out_of_the_picture_has_an_arrow_and_comes_back(
             box.fill(x)
             box.press("Enter")
             arrow.wait_for(state="visible")
+            draw_frames(page)
             view = page.evaluate("document.getElementById('view').getBoundingClientRect().toJSON()")
             at = arrow.bounding_box()
             assert at is not None
