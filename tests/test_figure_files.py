@@ -18,6 +18,8 @@ from nmm.errors import InputError
 from nmm.figure_options import WIDTHS, FigureOptions
 from nmm.figures.composed import write_run_figures
 from nmm.figures.motion import Scene
+from nmm.figures.silhouette import hull
+from nmm.figures.time_labels import Place
 from nmm.figures.views import ABOVE, SIDE, upright
 from nmm.scenario import Scenario
 
@@ -50,11 +52,19 @@ def test_times_touch_nothing(k: int, name: str) -> None:
     # Beside its robot, or with a line that leads there.
     places = scene.times_at(ABOVE, axes.get_window_extent().width / made.dpi)
     scale = np.ptp(axes.get_xlim()) / axes.get_window_extent().width * made.dpi
-    for place, pose in zip(places, scene.poses, strict=False):
-        body = pose.main[:, :2]
-        middle = 0.5 * (body.min(axis=0) + body.max(axis=0))
-        reach = np.linalg.norm(body - middle, axis=1).max()
-        assert place.foot is not None or np.linalg.norm(place.middle - middle) < reach + 0.6 * scale
+    bodies = [hull(pose.main[:, :2]) for pose in scene.poses]
+    for k, place in enumerate(places[: len(bodies)]):
+        gaps = [_gap(place, body) for body in bodies]
+        # Outlines are sampled every tenth of an inch.
+        assert place.foot is not None or gaps[k] <= min(min(gaps) + 0.05 * scale, 0.2 * scale)
+
+
+def _gap(place: Place, outline: np.ndarray) -> float:
+    """How far a text is from an outline (k, 2), m."""
+    shares = np.linspace(0.0, 1.0, 50)[:, None, None]
+    points = (outline + shares * (np.roll(outline, -1, axis=0) - outline)).reshape(-1, 2)
+    away = np.maximum(np.abs(points - place.middle) - place.half, 0.0)
+    return float(np.linalg.norm(away, axis=1).min())
 
 
 @pytest.mark.parametrize("width", [*WIDTHS.values(), 5.0])

@@ -140,20 +140,17 @@ def comparison(trajectories: Sequence[Trajectory], *, width: float = _WIDTH) -> 
     drawn = [min(scene.height(view, columns.view), tallest) for view in scene.views]
     rooms = [style.legend_rows(scene.names, columns.view), *[1] * (len(drawn) - 1)]
     drawing = style.column_height(drawn, rooms) + style.BOTTOM * (len(drawn) - 1)
-    names = [look.name for look in worn]
-    settle = [_SETTLED] * any(settling_time(run) is not None for run in runs)
-    rows = columns.rows(names)
-    legends = [rows, columns.rows(names + settle), rows]
+    # The panels share the first one's legend.
+    legends = [columns.rows([look.name for look in worn]), 1, 0]
     made, heights, begins, top = columns.made(legends, 1.3, drawing)
     bottom = style.BOTTOM if columns.beside else begins
-    below = draw_views(made, scene, columns.view, top, bottom=bottom, tallest=tallest) - style.room(rows)
+    below = draw_views(made, scene, columns.view, top, bottom=bottom, tallest=tallest) - style.GAP
     panels = style.column(made, heights, legends, columns.left, columns.right, begins)
     sigma = [run.sigma_min for run in runs]
     if has_objective(runs):
         if (axes := _lowest(made, columns, below)) is not None:
             _draw_norms(axes, runs, worn, sigma, "σ_min")
             style.label(axes, x="time t [s]")
-            style.legend(axes)
         draw_best_objective(panels[0], runs)
     else:
         _draw_norms(panels[0], runs, worn, sigma, "σ_min")
@@ -161,8 +158,8 @@ def comparison(trajectories: Sequence[Trajectory], *, width: float = _WIDTH) -> 
     _draw_norms(panels[1], runs, worn, [run.error_norm for run in runs], f"‖e‖ {units[0]}")
     _mark_settled(panels[1], runs, worn)
     _draw_norms(panels[2], runs, worn, [np.linalg.norm(run.u, axis=1) for run in runs], f"‖u‖ {units[1]}")
-    for axes in panels:
-        style.legend(axes)
+    style.legend(panels[0])
+    style.legend(panels[1], only=_SETTLED)
     _name_last(panels)
     return style.aligned(made)
 

@@ -128,15 +128,15 @@ def tracking(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
     ['ee.x [m]', 'ee.y [m]', 'ee.z [m]']
     """
     t, names = trajectory.t, trajectory.r_names
-    made, panels = style.stack([1.1] * len(names), [[name, "reference"] for name in names], width)
+    made, panels = style.stack([1.1] * len(names), [["reference"], *[[]] * (len(names) - 1)], width)
     for row, (axes, name, unit) in enumerate(zip(panels, names, trajectory.r_units, strict=True)):
         target: Array = trajectory.r_d[:, row]
         if unit == "rad":  # without the jumps of 2π that an angle's display would make
             known = ~np.isnan(target)  # the reference of a task that comes and goes has gaps
             target = target.copy()
             target[known] = np.unwrap(target[known])
-        style.curve(axes, t, target - trajectory.error[:, row], name, resolver_style.CYCLE[row % 7])
-        style.curve(axes, t, target, "reference", resolver_style.BLACK, "--")
+        style.curve(axes, t, target - trajectory.error[:, row], None, resolver_style.CYCLE[row % 7])
+        style.curve(axes, t, target, None if row else "reference", resolver_style.BLACK, "--")
         axes.lines[-1].set_linewidth(1.0)
         style.finish(axes, t, f"{name} [{unit}]", named=row == len(names) - 1)
     return style.aligned(made)

@@ -42,11 +42,12 @@ def limits(trajectory: Trajectory, *, width: float = style.PAGE) -> Figure:
     rest = "coordinates" if all(name in trajectory.robot.q_names for name in {*names} - inputs) else "others"
     parts = style.groups(["inputs" if name in inputs else rest for name in names])
     shown = {name: parts[name] for name in ("inputs", rest) if name in parts}
-    legends = [[*_names(trajectory, part), LIMIT, FREE] for part in shown.values()]
+    legends = [_names(trajectory, part) for part in shown.values()]
+    legends[0] += [LIMIT, FREE]
     legends.append([*_levels(trajectory), _LEAST])
     made, panels = style.stack([1.5] * len(shown) + [1.1], legends, width)
     for axes, (name, part) in zip(panels, shown.items(), strict=False):
-        draw_shares(axes, trajectory, part, f"{name}, share of range")
+        draw_shares(axes, trajectory, part, f"{name}, share of range", explained=axes is panels[0])
     draw_scale(panels[-1], trajectory)
     return style.aligned(made)
 
@@ -62,14 +63,19 @@ def _names(trajectory: Trajectory, columns: Sequence[int]) -> list[str]:
     return [resolver_style.pretty(name.removeprefix("u_")) + " rate" * (name in wheels) for name in names]
 
 
-def draw_shares(axes: Axes, trajectory: Trajectory, columns: Sequence[int], y: str) -> None:
-    """Where quantities are between their limits, a curve each; what is far from both is shaded."""
+def draw_shares(
+    axes: Axes, trajectory: Trajectory, columns: Sequence[int], y: str, *, explained: bool
+) -> None:
+    """Where quantities are between their limits, a curve each; what is far from both is shaded; the legend
+    says so if asked."""
     shares = trajectory.shares[:, columns]
     low, high = min(0.0, float(shares.min())), max(1.0, float(shares.max()))
     style.columns(axes, trajectory.t, shares, _names(trajectory, columns))
     for end in (0.0, 1.0):
-        axes.axhline(end, color=resolver_style.BLACK, linewidth=1.0, zorder=1, label=None if end else LIMIT)
-    axes.axhspan(NEAR, 1.0 - NEAR, color=resolver_style.GREEN, alpha=0.07, linewidth=0, label=FREE)
+        label = LIMIT if explained and not end else None
+        axes.axhline(end, color=resolver_style.BLACK, linewidth=1.0, zorder=1, label=label)
+    label = FREE if explained else None
+    axes.axhspan(NEAR, 1.0 - NEAR, color=resolver_style.GREEN, alpha=0.07, linewidth=0, label=label)
     axes.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))
     style.finish(axes, trajectory.t, y, named=False, ticks=False)
 

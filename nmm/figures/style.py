@@ -205,9 +205,12 @@ def power(value: float) -> str:
     return f"10{superscript(round(np.log10(value)))}" if value > 0.0 else ""
 
 
-def legend(axes: Axes, width: float | None = None, *, lift: float = 0.0) -> None:
-    """A legend `lift` in above the axes, where no curve can be, in as few rows as fit into a width, in."""
+def legend(axes: Axes, width: float | None = None, *, lift: float = 0.0, only: str = "") -> None:
+    """A legend `lift` in above the axes, where no curve can be, in as few rows as fit into a width, in; of
+    all that has a name, or of the one of that name."""
     handles, names = axes.get_legend_handles_labels()
+    if only:
+        handles, names = handles[names.index(only) :][:1] if only in names else [], [only]
     if not handles:
         return
     across, height = inches(axes)

@@ -17,6 +17,8 @@ _CHARACTER, _LINE = 0.66 * SIZE / 72.0, 0.95 * SIZE / 72.0
 _PAD = 0.05
 #: A text that is farther from its subject than this has a line that leads there, in.
 _FAR = 0.16
+#: So much nearer to its subject a text stands rather where another one is nearer, in.
+_UNCLEAR = 0.3
 #: Where a text is tried: so many directions, so many distances, the farthest, in.
 _DIRECTIONS, _DISTANCES, _FARTHEST = 40, 24, 2.0
 
@@ -57,24 +59,27 @@ def places(subjects: Sequence[Subject], ground: Ground, scale: float) -> list[Pl
     gaps = np.concatenate([[0.0], np.geomspace(0.02, _FARTHEST, _DISTANCES - 1)]) * scale
     centre = 0.5 * (ground.low + ground.high)
     found: list[Place] = []
-    for text, outline in subjects:
+    edges = [_sampled([np.vstack([outline, outline[:1]])], 4.0 * cell) for _, outline in subjects]
+    for number, (text, outline) in enumerate(subjects):
         half = 0.5 * scale * np.array([_CHARACTER * len(text), _LINE]) + pad
         middle = 0.5 * (outline.min(axis=0) + outline.max(axis=0))
         # As far out as the outline and the text's own box reach that way.
         edge = np.max(directions @ (outline - middle).T, axis=1)
         own = np.abs(directions) @ half
-        feet = middle + edge[:, None] * directions
-        candidates = (feet + own[:, None] * directions)[None] + gaps[:, None, None] * directions
+        ahead = (edge + own)[:, None] * directions
+        candidates = (middle + ahead[None] + gaps[:, None, None] * directions).reshape(-1, 2)
         # Of places as near, the one farther outside.
         outwards = directions @ (middle - centre) / (np.linalg.norm(middle - centre) + scale)
-        cost = gaps[:, None] - 0.02 * scale * outwards
-        order = np.argsort(cost, axis=None, kind="stable")
-        candidates = candidates.reshape(-1, 2)
         free = ground.free(candidates, half) & _clear(candidates, half, found, leads)
+        candidates, outwards = candidates[free], np.tile(outwards, len(gaps))[free]
+        apart, feet = _apart(candidates, half, edges[number])
+        others = [_apart(candidates, half, one)[0] for one in (*edges[:number], *edges[number + 1 :])]
+        unclear = np.min(others, axis=0, initial=np.inf) < apart
+        cost = apart + (unclear * _UNCLEAR - 0.02 * outwards) * scale
         place = None
-        for k in order[free[order]].tolist():
-            gap, foot = gaps[k // _DIRECTIONS], feet[k % _DIRECTIONS]
-            if gap <= _FAR * scale:
+        for k in np.argsort(cost, kind="stable").tolist():
+            foot = feet[k]
+            if apart[k] <= _FAR * scale and not unclear[k]:
                 place = Place(candidates[k], half, None)
                 break
             lead = _sampled([np.array([foot, candidates[k]])], cell)
@@ -102,6 +107,14 @@ def _sampled(lines: Sequence[Array], spacing: float) -> Array:
     shares = (np.arange(counts.sum()) - first) / np.repeat(counts, counts)
     points = np.repeat(starts, counts, axis=0) + shares[:, None] * np.repeat(ends - starts, counts, axis=0)
     return np.vstack([points, ends])
+
+
+def _apart(middles: Array, half: Array, points: Array) -> tuple[Array, Array]:
+    """How far boxes around `middles` (P, 2) are from the nearest of points, (P,) m, and that, (P, 2)."""
+    ways = np.abs(middles[:, None] - points) - half
+    away = np.hypot(*np.maximum(ways, 0.0).transpose(2, 0, 1))
+    nearest = np.argmin(away, axis=1)
+    return away[np.arange(len(away)), nearest], points[nearest]
 
 
 def _clear(middles: Array, half: Array, texts: Sequence[Place], leads: Array) -> Flags:
