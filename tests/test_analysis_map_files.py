@@ -17,6 +17,7 @@ from nmm.errors import InputError
 from nmm.figures.maps import thinned
 from nmm.folders.map import is_map
 from nmm.functions.tasks import Heading, Position
+from nmm.robots.configuration import Configuration
 from nmm.robots.loading import load
 from nmm.robots.robot import Robot
 
@@ -127,6 +128,30 @@ def test_a_figure_says_what_is_singular(robot_2r: Robot, tmp_path: Path) -> None
     assert bar.get_ylabel() == r"$\mathregular{σ_{min}}$ [mixed units]"
     figure.canvas.draw()
     assert "π/2" in [tick.get_text() for tick in axes.get_xticklabels()]
+
+
+def test_a_workspace_shows_the_robot_in_its_extreme_postures(robot_2r: Robot) -> None:
+    """To scale and in the map's plane: from joint to joint to the frame, which is in the extreme cell."""
+    name = "sigma_min"
+    for plane in ("xy", "yx"):
+        made = workspace_map(
+            (robot_2r, PLANAR), plane=plane, samples=20, configurations=1024, at={"x": 2.0, "theta": 0.5}
+        )
+        ends = [("largest", made.best_q), ("smallest", made.worst_q)]
+        for axes, (end, q) in zip(made.plot(name).axes, ends, strict=False):
+            at = made.extremes(name, worst=end == "smallest")[end].at
+            cell = [int(np.argmin(np.abs(axis - x))) for axis, x in zip(made.axes, at, strict=True)]
+            here = Configuration(robot_2r, q[name][cell[1], cell[0]])
+            rows = ["xyz".index(axis) for axis in plane]
+            points = [here.placement(frame).translation[rows] for frame in ("link1", "link2", "ee")]
+            drawn = [np.asarray(line.get_xydata()) for line in axes.lines]
+            for a, b in pairwise(points):
+                assert any(
+                    len(line) == 2 and min(np.abs(line - [a, b]).max(), np.abs(line - [b, a]).max()) < 1e-9
+                    for line in drawn
+                )
+            half = np.diff(made.axes[0][:2]) * 0.51
+            assert np.all(np.abs(points[-1] - at) <= half)
 
 
 def test_progress_rises_to_one(robot_2r: Robot) -> None:

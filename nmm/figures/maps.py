@@ -20,7 +20,9 @@ from nmm.analysis.maps.singular_set import SingularSet
 from nmm.arrays import Array
 from nmm.errors import expect_known
 from nmm.figures import style
+from nmm.figures.silhouette import Silhouette, hull
 from nmm.figures.style import save
+from nmm.figures.views import View
 from nmm.text_format import fraction_of_pi
 
 #: Even steps of the value are even steps to the eye, also to colour-blind ones.
@@ -71,6 +73,8 @@ def map_figure(
             _draw_set(axes, drawn, drawn.arm_singular, "arm alone", "white")
         own = "robot" if drawn.arm_singular is not None else drawn.about.part
         _draw_set(axes, drawn, drawn.singular, own, resolver_style.VERMILLION)
+        if drawn.kind == "workspace":
+            _draw_robot(axes, drawn, _posture(drawn, measure, worst=name == WORST))
         _dress(axes, drawn, named=k == 0)
     place = (total - BAR_ROOM - BAR, style.BOTTOM, BAR, height)
     size = made.get_size_inches()
@@ -188,7 +192,43 @@ def _held(drawn: Map) -> str:
     if drawn.height is not None:
         (axis,) = {"x", "y", "z"} - set(drawn.names)
         texts.append(f"{drawn.frame} {axis} from {drawn.height[0]:g} to {drawn.height[1]:g} m")
-    return f"held: {', '.join(texts)}" if texts else ""
+    held = f"held: {', '.join(texts)}" if texts else ""
+    shown = "outline: the robot in the best and in the worst posture of all" * (drawn.kind == "workspace")
+    return "; ".join(filter(None, [held, shown]))
+
+
+def _posture(drawn: Map, measure: str, *, worst: bool) -> Array:
+    """The best of a workspace's best postures, or the worst of the worst, q (n,)."""
+    values, q = (
+        one[measure] for one in ((drawn.worst, drawn.worst_q) if worst else (drawn.values, drawn.best_q))
+    )
+    if not np.isfinite(values).any():
+        return drawn.q
+    largest = (MEASURES[measure].better > 0.0) != worst
+    return np.array(q.reshape(values.size, -1)[np.nanargmax(values) if largest else np.nanargmin(values)])
+
+
+def _draw_robot(axes: Axes, drawn: Map, q: Array) -> None:
+    """The outlines of platform, trailers and wheels and the arm's links in the map's plane, on any colour."""
+    directions = {name: tuple(row) for name, row in zip("xyz", np.eye(3).tolist(), strict=True)}
+    view = View(*(directions[name] for name in drawn.names), drawn.names)
+    pose = Silhouette(drawn.robot, drawn.frame).at(q)
+    main = hull(view.of(pose.main))
+    bodies, wheels = pose.outlines(view)
+    low, high = main.min(axis=0) - 1e-9, main.max(axis=0) + 1e-9
+    others = [edge for edge in bodies if np.any((edge < low) | (edge > high))]
+    edges = [np.vstack([edge, edge[:1]]) for edge in (main, *others, *wheels)]
+    halo = [withStroke(linewidth=2.2, foreground=resolver_style.BLACK)]
+    for line, width in (*((edge, 0.8) for edge in edges), *((view.of(link), 1.4) for link in pose.links)):
+        axes.plot(*line.T, color="white", linewidth=width, path_effects=halo, zorder=3)
+    axes.plot(
+        *view.of(pose.joints).T,
+        "o",
+        color="white",
+        markeredgecolor=resolver_style.BLACK,
+        markersize=3.5,
+        zorder=3,
+    )
 
 
 def _write_title(made: Figure, lines: list[tuple[str, bool]]) -> None:

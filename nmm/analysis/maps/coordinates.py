@@ -97,6 +97,7 @@ def singularity_map(
         progress(1.0)
     return Map(
         kind="coordinates",
+        robot=robot,
         about=About.of(evaluator),
         names=names,
         units=(robot.q_units[columns[0]], robot.q_units[columns[1]]),

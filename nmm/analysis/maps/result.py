@@ -15,6 +15,7 @@ from nmm.analysis.singular.parts import WHOLE
 from nmm.arrays import Array, Integers
 from nmm.figure_options import PLAIN, FigureOptions
 from nmm.lazy_call import lazy_call
+from nmm.robots.robot import Robot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -111,6 +112,7 @@ class Map:
     Attributes
     ----------
     kind : "coordinates" or "workspace"
+    robot : what is mapped
     about : robot, task, weights, units
     names, units : of the axes: coordinates, or world axes of the frame
     axes : the columns' (columns,) and the rows' (rows,) coordinates, m or rad
@@ -135,6 +137,7 @@ class Map:
     """
 
     kind: Literal["coordinates", "workspace"]
+    robot: Robot
     about: About
     names: tuple[str, str]
     units: tuple[str, str]

@@ -119,6 +119,7 @@ def workspace_map(
     (best, best_q), (worst, worst_q) = search.found(1.0), search.found(-1.0)
     return Map(
         kind="workspace",
+        robot=robot,
         about=About.of(evaluator),
         names=(plane[0], plane[1]),
         units=("m", "m"),
