@@ -1,4 +1,4 @@
-"""Draw the wheels of docs/wheeled_platform.md: `python docs/make_wheel_drawing.py` writes one SVG."""
+"""Draw the wheels of docs/platforms.md: `python docs/make_wheel_drawing.py` writes one SVG."""
 
 from __future__ import annotations
 

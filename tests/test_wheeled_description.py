@@ -161,7 +161,7 @@ def test_copies_travel(name: str, rng: np.random.Generator) -> None:
 
 
 def test_the_pages_examples_are_what_they_say() -> None:
-    page = Path(__file__).resolve().parent.parent / "docs" / "wheeled_platform.md"
+    page = Path(__file__).resolve().parent.parent / "docs" / "platforms.md"
     text = page.read_text(encoding="utf-8")
     (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
     found: dict[str, Any] = {}
