@@ -13,7 +13,7 @@ import nmm
 from nmm.playback.channels import channels
 from nmm.sweeps.rows import rows_of
 
-#: The paper's first case on worn wheels (its shares were measured in a physics engine, docs/rollouts.md).
+#: The paper's first case on worn wheels (its shares were measured in a physics engine, docs/sweeps.md).
 CASE = "unicycle_2r_position"
 WORN = {"odometry": True, "slip": {"v": 0.9988, "omega": 0.9985}}
 

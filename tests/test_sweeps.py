@@ -528,6 +528,7 @@ def test_the_bundled_sweeps_run(name: str, tmp_path: Path) -> None:
 def test_the_examples_of_the_page_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """docs/sweeps.md: the Python, and the file."""
     text = (Path(__file__).parent.parent / "docs" / "sweeps.md").read_text(encoding="utf-8")
+    text, _, _ = text.partition("## Rollouts in Python")
     (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
     (said,) = re.findall(r"```yaml\n(.*?)```", text, flags=re.DOTALL)
     monkeypatch.chdir(tmp_path)

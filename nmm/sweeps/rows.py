@@ -93,7 +93,7 @@ def _measured_columns() -> Iterator[Column]:
 _COLUMNS = {one.name: one for one in _measured_columns()}
 MEASURED = (
     Column(
-        "outcome", "text", "", "how the rollout ended (docs/outcomes.md); refused: what varies is no input"
+        "outcome", "text", "", "how the rollout ended (docs/outcomes.md); refused: what varies is invalid"
     ),
     Column("message", "text", "", "why"),
     Column("warnings", "count", "", "how many things the run warned of"),
