@@ -45,16 +45,25 @@ def controller(robot: Robot, **derivatives: Callable[..., Any] | None) -> nmm.Co
     return nmm.Controller(robot, task, nmm.ProjectedGradient(), objective)
 
 
-def test_the_pages_example_runs_and_its_derivatives_are_right() -> None:
-    page = (Path(__file__).parent.parent / "docs" / "own_functions.md").read_text(encoding="utf-8")
-    example, law = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
+PAGE = Path(__file__).parent.parent / "docs" / "tutorials" / "your_own.md"
+
+
+def test_the_pages_functions_need_no_differences_and_their_derivatives_are_right() -> None:
+    blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL)
+    (mine,) = (block for block in blocks if block.startswith("# mine.py"))
+    (eight,) = (block for block in blocks if "CallableReference" in block)
     names: dict[str, Any] = {}
-    exec(example, names)
-    run, robot, task, objective = (names[name] for name in ("run", "robot", "task", "objective"))
-    assert (run.outcome, run.warnings) == ("completed", ())
-    for function in (task.function, task.reference, objective):
-        check_function(function, robot, 0.7, np.array(Q))
-    exec(law, names)
+    exec(mine + eight, names)
+    robot = nmm.load("unicycle_3r")
+    q = robot.q({"x": 0.3, "theta": 0.4, "q1": 0.3, "q2": 0.5, "q3": 1.2})
+    function = nmm.CallableFunction(names["reach"], ["reach"], units=["m"], jacobian=names["reach_slope"])
+    objective = nmm.CallableObjective(names["elbow"], gradient=names["elbow_slope"])
+    for one in (function, names["figure_eight"], objective):
+        check_function(one, robot, 0.7, q)
+    own = nmm.Controller(robot, nmm.Task(function, [0.9]), nmm.ProjectedGradient(), objective)
+    run = nmm.simulate(own, q, 0.1)
+    assert run.outcome == "completed"
+    assert "python_costs" not in codes(run)
     resolver = nmm.CallableResolver(names["least_norm"])
     scenario = nmm.Scenario.load("unicycle_2r_position", {"duration": "0.5"}).with_resolver(resolver)
     with_own = scenario.override("duration", 1).run()
@@ -65,8 +74,7 @@ def test_the_pages_example_runs_and_its_derivatives_are_right() -> None:
 
 
 def test_every_row_of_the_pages_tables_is_what_a_configuration_has(robot_2r: Robot) -> None:
-    page = (Path(__file__).parent.parent / "docs" / "own_functions.md").read_text(encoding="utf-8")
-    _, _, table = page.partition("A `Configuration` is not q")
+    _, _, table = PAGE.read_text(encoding="utf-8").partition("A `Configuration` is not q")
     here, n = Configuration(robot_2r, Q), robot_2r.n
     named = re.findall(r"^\| `(?:configuration)?\.(\w+)", table, flags=re.MULTILINE)
     assert named == ["q", "placement", "jacobian", "hessian", "center_of_mass", "S"]
