@@ -8,7 +8,7 @@ import lazy_loader
 
 from nmm.lazy_call import interrupts_wait
 
-__version__ = "0.1.0"
+__version__ = "1.0.0"
 
 #: Names that authors need, which were in front before.
 _EXTENDING = """

@@ -17,6 +17,21 @@ def made_with() -> dict[str, str | int]:
     return dict(_found())
 
 
+def versions() -> str:
+    """Two lines for a report of a fault: nmm; Python and libraries, which are not imported for it."""
+    from importlib import metadata
+
+    from nmm import __version__
+
+    told = [f"Python {platform.python_version()}"]
+    for package in ("pin", "numpy", "numba"):
+        try:
+            told.append(f"{package} {metadata.version(package)}")
+        except metadata.PackageNotFoundError:  # built from source, or of another package manager
+            told.append(f"{package} not known to pip")
+    return f"nmm {__version__}\n{', '.join(told)}"
+
+
 @cache
 def _found() -> tuple[tuple[str, str | int], ...]:
     import numba

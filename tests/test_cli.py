@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import platform
 import re
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -91,10 +93,17 @@ def test_help_lists_what_there_is(run: Command, command: str, names: Sequence[st
 
 
 def test_version(run: Command) -> None:
-    assert run("--version").out == f"nmm {nmm.__version__}\n"
+    first, second = run("--version").out.splitlines()
+    assert first == f"nmm {nmm.__version__}"
+    assert second.split(", ") == [
+        f"Python {platform.python_version()}",
+        *(f"{package} {metadata.version(package)}" for package in ("pin", "numpy", "numba")),
+    ]
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["scenarios"], ["robots"]])
+@pytest.mark.parametrize(
+    "arguments", [["--help"], ["--version"], ["run", "--help"], ["scenarios"], ["robots"]]
+)
 def test_light_commands_import_nothing_heavy(tmp_path: Path, arguments: Sequence[str]) -> None:
     assert not imported(tmp_path, *arguments) & {"pinocchio", "numba", "matplotlib", "scipy", "meshcat"}
 

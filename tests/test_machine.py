@@ -17,7 +17,7 @@ from findings import refused
 
 import nmm
 from nmm.cli.exit_status import status_of
-from nmm.machine import made_with
+from nmm.machine import made_with, versions
 
 KEYS = ["nmm", "python", "numpy", "pinocchio", "numba", "system", "processor", "cores"]
 SHORT = ("--set", "duration=0.1")
@@ -56,6 +56,16 @@ def test_what_it_tells() -> None:
         assert len(private) < 3 or private not in text
     told["nmm"] = "changed"
     assert made_with()["nmm"] == nmm.__version__
+
+
+def test_a_library_that_pip_did_not_install_is_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    def version(package: str) -> str:
+        if package == "pin":
+            raise importlib.metadata.PackageNotFoundError(package)
+        return "1.2"
+
+    monkeypatch.setattr("importlib.metadata.version", version)
+    assert versions().endswith(", pin not known to pip, numpy 1.2, numba 1.2")
 
 
 def test_a_run_keeps_what_made_it(tmp_path: Path) -> None:

@@ -125,22 +125,31 @@ def test_how_to_cite() -> None:
     said = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     text = {"cff-version", "message", "title", "abstract", "type", "version", "license"}
-    assert set(said) == text | {"authors", "keywords", "references"}
+    assert set(said) == text | {"date-released", "authors", "keywords", "references"}
     assert all(isinstance(said[key], str) and said[key] for key in text)
     assert (said["cff-version"], said["type"]) == ("1.2.0", "software")
     assert said["version"] == nmm.__version__
+    newest = re.search(
+        r"^## \[(\d.*)\] - (.*)$", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    assert newest is not None
+    assert newest.groups() == (nmm.__version__, str(said["date-released"]))
+    bibtex = (ROOT / "docs" / "papers.md").read_text(encoding="utf-8")
+    assert f"version = {{{nmm.__version__}}}" in bibtex
     for key, theirs in (("title", "name"), ("abstract", "description"), ("license", "license")):
         assert said[key] == project[theirs]
     assert said["authors"] == project["authors"]
     assert said["keywords"] == project["keywords"]
     (paper,) = said["references"]
-    assert set(paper) == {"type", "title", "authors", "year", "collection-title", "conference"}
+    number = {"year", "month", "start", "end"}
+    assert set(paper) == {"type", "title", "authors", "collection-title", "conference"} | number
     assert (paper["type"], paper["year"]) == ("conference-paper", 2006)
+    assert f"pages     = {{{paper['start']}--{paper['end']}}}" in bibtex
     assert paper["title"].replace(" ", "") in (ROOT / "README.md").read_text(encoding="utf-8").replace(
         "\n", ""
     ).replace(" ", "")
     assert all(set(author) == {"family-names", "given-names"} for author in paper["authors"])
-    assert set(paper["conference"]) == {"name"}
+    assert set(paper["conference"]) == {"name", "city", "region", "country"}
 
 
 def test_the_python_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

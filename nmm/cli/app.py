@@ -31,9 +31,9 @@ app = typer.Typer(
 
 def _version(wanted: bool) -> None:
     if wanted:
-        from nmm import __version__
+        from nmm.machine import versions
 
-        print(f"nmm {__version__}")
+        print(versions())
         raise typer.Exit
 
 
@@ -41,7 +41,13 @@ def _version(wanted: bool) -> None:
 def nmm(
     context: typer.Context,
     version: Annotated[
-        bool, typer.Option("--version", help="Show the version and exit.", callback=_version, is_eager=True)
+        bool,
+        typer.Option(
+            "--version",
+            help="Show the version, and those of Python and libraries, and exit.",
+            callback=_version,
+            is_eager=True,
+        ),
     ] = False,
 ) -> None:
     """Motion generation for nonholonomic mobile manipulators: a manipulator on a wheeled platform.
