@@ -540,6 +540,30 @@ def test_obstacles_are_shown_where_they_are_and_kept_off() -> None:
         assert 1.2 < picture["at"][0][0] < 1.95
 
 
+def test_what_a_scenario_draws_is_there_and_what_is_carried_goes_along() -> None:
+    """Scenery after the obstacles, none of which the controller knows; a load below its frame's joint."""
+    box = {"kind": "box", "size": [0.2, 0.3, 0.02]}
+    scene = {
+        "carried": [{"name": "tray", "frame": "ee", "shape": box}],
+        "scenery": [{"name": "table", "shape": box, "xyz": [2, 0, 0.5]}],
+    }
+    given = ScenarioSetup(nmm.Scenario.load("unicycle_2r_position", {"scene": scene}))
+    driven = Driven(given)
+    assert driven.obstacles == ()
+    session = DriveSession(driven)
+    try:
+        told = [command for command in session.commands if command["type"] in ("obstacle", "carried")]
+        assert [one["name"] for one in told] == ["table", "tray"]
+        (path,) = (
+            one["path"] for one in session.commands if one["type"] == "object" and "carried" in one["path"]
+        )
+        places = json.loads(session.pose())["transforms"]
+        joint = max((node for node, _ in places if path.startswith(f"{node}/")), key=len)
+        assert joint.endswith("q2")
+    finally:
+        session.close()
+
+
 def test_a_function_that_raises_stops_the_robot_and_not_the_loop() -> None:
     """Until the robot begins again where the function has a value."""
     robot = nmm.load("unicycle_2r")

@@ -105,7 +105,11 @@ def run(
         from nmm.playback import LiveRun
 
         title = f"{made.title or made.name}, {called}"
-        shown = LiveRun(controller, made.parts.q0, made.parts.duration, title=title, **browser.keywords())
+        around = made.surroundings(controller.robot)
+        shown = LiveRun(
+            controller, made.parts.q0, made.parts.duration,
+            title=title, surroundings=around, **browser.keywords(),
+        )  # fmt: skip
     with shown as page:
         trajectory = _run(made, controller, None if page is None else page.watch, label)
         with shielded() as asked_to_end:

@@ -163,6 +163,7 @@ class DriveSession(RobotSession):
             driven.setup.name,
             lambda: Visitor(self.follow(), self.receive),
             obstacles=driven.obstacles,
+            surroundings=driven.setup.surroundings,
             channels=channels,
             look=looks([_kind(driven.choices)])[0],
             cameras=self._cameras(look),

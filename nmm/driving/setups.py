@@ -24,6 +24,7 @@ from nmm.kinds import RESOLVERS
 from nmm.resolvers.base import Resolver
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
+from nmm.robots.surroundings import NOTHING, Surroundings
 from nmm.scenario import Scenario
 from nmm.scenario.resolvers import RESOLVER_PARTS
 
@@ -98,6 +99,7 @@ class DriveSetup(ABC):
     ----------
     name : the scenario's or the robot's
     at_robot : whether targets begin where the robot is, not where references are
+    surroundings : what the robot carries, and scenery
 
     Examples
     --------
@@ -111,6 +113,7 @@ class DriveSetup(ABC):
     q0: Array
     dt: float
     at_robot: bool
+    surroundings: Surroundings = NOTHING
 
     @abstractmethod
     def controller(self, settings: Settings) -> Controller:
@@ -146,6 +149,7 @@ class ScenarioSetup(DriveSetup):
         self._firsts: dict[str, float] = {}
         self.name = scenario.title or scenario.name
         self.robot = scenario.robot()
+        self.surroundings = scenario.surroundings(self.robot)
         self.q0, self.dt = self.robot.q(scenario.parts.q0 if q0 is None else q0), scenario.parts.dt
         if scenario.parts.order == 2:
             raise InputError("cannot be driven at order 2", where=scenario.name, expected="order: 1")

@@ -27,6 +27,7 @@ from nmm.playback.session import RobotSession, Watching, counted
 from nmm.resolver_style import looks_of_labels
 from nmm.robots.frame_path import FramePath
 from nmm.robots.motion import Camera
+from nmm.robots.surroundings import NOTHING, Surroundings
 from nmm.runs.components import Axes
 from nmm.runs.joining import row_names
 from nmm.runs.recording import Recorder
@@ -76,6 +77,7 @@ class LiveRun(RobotSession):
     ----------
     controller, q0, duration : of the run, as `simulate` takes them
     title : heading; the robot's name when not given
+    surroundings : what the robot carries, and scenery
     port : port on 127.0.0.1; a free one when not given
     open_browser : whether to open the page in the user's browser
 
@@ -101,6 +103,7 @@ class LiveRun(RobotSession):
         duration: float,
         *,
         title: str | None = None,
+        surroundings: Surroundings = NOTHING,
         port: int | None = None,
         open_browser: bool = True,
     ) -> None:
@@ -128,6 +131,7 @@ class LiveRun(RobotSession):
             self._title,
             self._visit,
             obstacles=() if collisions is None else collisions.obstacles,
+            surroundings=surroundings,
             channels=self._growing.channels,
             look=look,
             cameras=self._growing.cameras(start),

@@ -148,7 +148,7 @@ def playback_scene(
         if shown is not None:
             animations += shown.draw(drawing, i, path, color, start)
     obstacles.tell(drawing)
-    tell_carried(drawing, motions)
+    _tell_carried(drawing, motions)
     tell_cameras(drawing, [camera for motion in motions for camera in motion.cameras])
     if paths := [f"/nmm/motion {i}/believed" for i, one in enumerate(motions) if one.believed is not None]:
         drawing.add("believed", paths=paths, color=list(BELIEVED))
@@ -222,15 +222,20 @@ def points_beside(motion: Motion, boxes: Array) -> Array:
     return np.vstack([*given, SceneObstacles([motion], boxes[np.newaxis], 1.0).points()])
 
 
-def draw_beside(drawing: Drawing, motion: Motion, boxes: Array, size: float | None = None) -> None:
-    """Append the commands that draw it as at the motion's first sample; `boxes` (1, 2, 3) are around the
-    robot, `size` is half the diagonal of what is shown, m, by default of all of this."""
+def draw_beside(
+    drawing: Drawing, motion: Motion, boxes: Array, robot: DrawnRobot, size: float | None = None
+) -> None:
+    """Append the commands that draw it, as at the motion's first sample, and what the drawn robot carries;
+    `boxes` (1, 2, 3) are around it, `size` is half the diagonal of what is shown, m, by default of all of
+    this."""
     if size is None:
         points = np.vstack([points_beside(motion, boxes), boxes.reshape(-1, 3)])
         size = 0.5 * float(np.linalg.norm(np.ptp(points, axis=0)))
     obstacles = SceneObstacles([motion], boxes[np.newaxis], 1.0)
     obstacles.draw(drawing, size, 0.0)
     obstacles.tell(drawing)
+    robot.carry(drawing, motion.surroundings.carried)
+    _tell_carried(drawing, [motion])
     _desired(drawing, [motion])
     _targets(drawing, [motion], size)
 
@@ -247,7 +252,7 @@ def _ellipsoids(
     return None if options is None else SceneEllipsoids(motions, frames, options)
 
 
-def tell_carried(drawing: Drawing, motions: Sequence[Motion]) -> None:
+def _tell_carried(drawing: Drawing, motions: Sequence[Motion]) -> None:
     """Append what names the things that are carried."""
     for name in dict.fromkeys(one.name for motion in motions for one in motion.surroundings.carried):
         drawing.add("carried", name=name, color=list(CARRIED))

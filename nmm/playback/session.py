@@ -29,6 +29,7 @@ from nmm.playback.sticks import appearance
 from nmm.resolver_style import Look
 from nmm.robots.motion import Camera
 from nmm.robots.robot import Robot
+from nmm.robots.surroundings import NOTHING, Surroundings
 
 FPS = 30.0
 #: The clock skips the time of a picture later than this, s.
@@ -136,9 +137,9 @@ class Session:
 
 
 class RobotSession(Session):
-    """A session whose page shows one robot where it is now, what its cameras see, and, with a look, obstacles
-    and curves of channels, empty at first; `further` commands follow the scene's, `page` are options of
-    `Session`."""
+    """A session whose page shows one robot where it is now, what its cameras see, and, with a look, obstacles,
+    surroundings and curves of channels, empty at first; `further` commands follow the scene's, `page` are
+    options of `Session`."""
 
     def __init__(
         self,
@@ -147,6 +148,7 @@ class RobotSession(Session):
         visit: Callable[[], Visitor],
         *,
         obstacles: Sequence[Obstacle] = (),
+        surroundings: Surroundings = NOTHING,
         channels: Sequence[Channel] = (),
         look: Look | None = None,
         cameras: Sequence[Camera] = (),
@@ -165,7 +167,8 @@ class RobotSession(Session):
         tell_cameras(drawing, cameras)
         if look is not None:
             boxes = robot_boxes(self.robot, q[np.newaxis], wheels[np.newaxis])
-            draw_beside(drawing, still(self.robot, q, self._obstacles), boxes, size=2.0 * reach)
+            beside = still(self.robot, q, self._obstacles, surroundings=surroundings)
+            draw_beside(drawing, beside, boxes, self._drawn, size=2.0 * reach)
             draw_curves(drawing, [Channels(np.zeros(0), 0, tuple(channels))], [look], 0.0)
         # A scene's last command tells that it is complete.
         self.commands = [*commands[:-1], *drawing.commands, commands[-1], *further]

@@ -20,7 +20,7 @@ from nmm.playback.extent import robot_boxes
 from nmm.playback.html import HEIGHT, file_page, framed
 from nmm.playback.placements import joint_screw, position_and_quaternion
 from nmm.playback.rolling import Rolling
-from nmm.playback.scene import draw_beside, live_scene, points_beside, still, tell_carried
+from nmm.playback.scene import draw_beside, live_scene, points_beside, still
 from nmm.playback.session import Session
 from nmm.playback.shapes import DrawnRobot
 from nmm.robots.motion import Motion
@@ -120,9 +120,7 @@ def viewer_scene(
     length = float(np.clip(0.08 * np.linalg.norm(np.ptp(boxes[0], axis=0)), 0.02, 0.25))
     drawing = Drawing()
     if beside is not None:
-        draw_beside(drawing, beside, boxes)
-        drawn.carry(drawing, beside.surroundings.carried)
-        tell_carried(drawing, [beside])
+        draw_beside(drawing, beside, boxes, drawn)
     if task is not None:
         task.draw(drawing)
     listed = list(_frames(robot, drawn, drawing))
