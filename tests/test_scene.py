@@ -41,6 +41,14 @@ def test_a_run_and_its_folder_have_what_the_scenario_draws(scenario: nmm.Scenari
         assert not one.motion().bodies  # no obstacles
 
 
+def test_figures_draw_scenery_where_it_stands(scenario: nmm.Scenario) -> None:
+    axes = nmm.figures.stroboscopic(scenario.run()).axes[0]
+    (table,) = (patch for patch in axes.patches if patch.get_label() == "scenery")
+    corners = np.asarray(table.get_path().vertices)
+    np.testing.assert_allclose([corners.min(axis=0), corners.max(axis=0)], [[1.5, -0.5], [2.5, 0.5]])
+    assert "scenery" in [text.get_text() for text in axes.get_legend().get_texts()]
+
+
 def test_what_is_carried_loads_the_motors(scenario: nmm.Scenario) -> None:
     """As one mass in the common centre; unlike masses that the user gives, none among them."""
     surroundings = scenario.surroundings(scenario.robot())

@@ -40,11 +40,13 @@ RESTS = 1e-3
 
 
 class Outline(NamedTuple):
-    """An obstacle: the hull of points (k, 3), a strength, and first and last time, s (None if it rests)."""
+    """An obstacle, or scenery: the hull of points (k, 3), a strength, first and last time, s (None if it
+    rests), and what the legend calls it."""
 
     points: Array
     strength: float
     times: tuple[float, float] | None
+    name: str = "obstacle"
 
 
 def stroboscopic(
@@ -102,7 +104,8 @@ class Scene(Viewed):
     def names(self) -> list[str]:
         names = ["desired path"] if "desired" in self.lines else []
         names += ["where odometry has it"] * ("believed" in self.lines)
-        names += [self._path_name, "start", "end", *["obstacle"] * bool(self.outlines), *self.seen.names]
+        names += [self._path_name, "start", "end"]
+        names += [*dict.fromkeys(one.name for one in self.outlines), *self.seen.names]
         return names if not len(self.trajectory.marks) else [*names, "target"]
 
     @property
@@ -161,12 +164,15 @@ class Scene(Viewed):
             # From the side the robots of a round path stand behind each other: every second one is enough.
             if view == ABOVE or len(self.poses) <= 6 or (len(self.poses) - 1 - k) % 2 == 0:
                 pose.draw(axes, view, _ink(strength, k / len(self.poses)).times(self._fineness(axes)))
-        for k, outline in enumerate(self.outlines):
-            shade, edge = _faded(OBSTACLE, outline.strength), hull(view.of(outline.points))
+        named = set[str]()
+        for outline in self.outlines:
+            color = OBSTACLE if outline.name == "obstacle" else style.GREY
+            shade, edge = _faded(color, outline.strength), hull(view.of(outline.points))
             axes.fill(
                 *edge.T, facecolor=(*shade, 0.25), edgecolor=shade, linewidth=1.0, zorder=2.5,
-                label=None if k else "obstacle",
+                label=None if outline.name in named else outline.name,
             )  # fmt: skip
+            named.add(outline.name)
         self.seen.draw(axes, view.of)
         self._draw_times(axes, view)
         if "desired" in self.lines:
@@ -209,7 +215,8 @@ class Scene(Viewed):
 
 
 def outlines(trajectory: Trajectory, times: Array) -> list[Outline]:
-    """The obstacles, those that move at each of the times, once where they rest; half-spaces have none."""
+    """The obstacles, those that move at each of the times, once where they rest, and the scenery;
+    half-spaces have none."""
     found: list[Outline] = []
     for obstacle in trajectory.obstacles:
         points = outline_points(obstacle.shape.geometry())
@@ -226,6 +233,10 @@ def outlines(trajectory: Trajectory, times: Array) -> list[Outline]:
             else:
                 own.append(Outline(moved, strength, (t, t) if obstacle.moves else None))
         found += own
+    for thing in trajectory.surroundings.scenery:
+        if (points := outline_points(thing.geometry)) is not None:
+            place = thing.places[0]
+            found.append(Outline(points @ place[:3, :3].T + place[:3, 3], 1.0, None, "scenery"))
     return found
 
 

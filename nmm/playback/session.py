@@ -137,9 +137,9 @@ class Session:
 
 
 class RobotSession(Session):
-    """A session whose page shows one robot where it is now, what its cameras see, and, with a look, obstacles,
-    surroundings and curves of channels, empty at first; `further` commands follow the scene's, `page` are
-    options of `Session`."""
+    """A session whose page shows one robot where it is now, what its cameras see, and, with a look,
+    obstacles, surroundings and curves of channels, empty at first; `further` commands follow the scene's,
+    `page` are options of `Session`."""
 
     def __init__(
         self,
