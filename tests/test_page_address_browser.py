@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from playback_browser import Window
+from playback_browser import Window, draw_frames
 from playback_browser import browser as browser
 from playback_browser import empty_page as empty_page
 from playback_browser import small_robot as small_robot
@@ -45,7 +45,7 @@ def test_a_page_by_the_name_of_this_machine_is_told_all_the_same(
 
 
 def test_before_there_is_a_scene_there_is_no_run(window: Window) -> None:
-    """The server has the page and not yet anything to tell it."""
+    """The server has the page and not yet anything to tell it: it answers, and takes another size."""
     server = PageServer(
         lambda host, token: socket_page("empty", host, token), ['{"type": "places", "transforms": []}']
     )
@@ -59,6 +59,9 @@ def test_before_there_is_a_scene_there_is_no_run(window: Window) -> None:
             window.page.wait_for_timeout(20)
         assert window.page.evaluate("nmm.state()") == {"t": 0, "runs": []}
         window.page.evaluate("nmm.seek(1.5)")
+        window.page.set_viewport_size({"width": 400, "height": 320})
+        draw_frames(window.page)
+        assert window.page.evaluate("[nmm.viewer.renderer.domElement.clientWidth, innerWidth]") == [400, 400]
         assert window.page.evaluate("nmm.state()") == {"t": 0, "runs": []}
     finally:
         server.close()

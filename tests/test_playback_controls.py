@@ -15,16 +15,24 @@ from playback_browser import (
     drawn_visuals,
     expected_visuals,
     file_url,
+    watched,
 )
 from playback_browser import browser as browser
 from playback_browser import empty_page as empty_page
 from playback_browser import small_robot as small_robot
 from playback_browser import window as window
 from playback_robot import drive
+from playwright.sync_api import Browser
 
 from nmm.playback import Motion
 from nmm.playback.rolling import wheel_angles
 from nmm.robots.robot import Robot
+
+#: A page that holds one of ours.
+OUTER = (
+    '<body style="height: 3000px"><iframe src="playback.html#plots=none" width="400" height="250"></iframe>'
+)
+EYE = "nmm.viewer.camera.position.toArray()"
 
 
 def test_the_keyboard_and_the_bar_play(small_robot: Robot, window: Window, tmp_path: Path) -> None:
@@ -146,28 +154,56 @@ def test_inside_another_page_the_wheel_is_the_readers_until_he_clicks(
     small_robot: Robot, window: Window, tmp_path: Path
 ) -> None:
     file_url([drive(small_robot)], tmp_path)
-    (tmp_path / "outer.html").write_text(
-        '<body style="height: 3000px"><iframe src="playback.html#plots=none" width="400" height="250">'
-        "</iframe>",
-        encoding="utf-8",
-    )
+    (tmp_path / "outer.html").write_text(OUTER, encoding="utf-8")
     page = window.page
     page.goto((tmp_path / "outer.html").as_uri())
     inner = page.frames[1]
     inner.wait_for_function("window.nmm && !document.body.classList.contains('loading')")
-    eye = "nmm.viewer.camera.position.toArray()"
-    first = inner.evaluate(eye)
+    first = inner.evaluate(EYE)
     page.mouse.move(200, 100)
     page.mouse.wheel(0, 60)
     page.wait_for_function("scrollY === 60")
-    assert inner.evaluate(eye) == first
+    assert inner.evaluate(EYE) == first
     page.mouse.click(200, 50)
     page.mouse.wheel(0, 60)
-    inner.wait_for_function(f"{eye}.join() !== '{','.join(map(str, first))}'")
+    inner.wait_for_function(f"{EYE}.join() !== '{','.join(map(str, first))}'")
     assert page.evaluate("scrollY") == 60
     page.evaluate("document.body.tabIndex = 0; document.body.focus()")
     page.mouse.wheel(0, -60)
     page.wait_for_function("scrollY === 0")
+
+
+def test_inside_another_page_a_finger_scrolls_it_until_it_has_tapped(
+    small_robot: Robot, browser: Browser, tmp_path: Path
+) -> None:
+    file_url([drive(small_robot)], tmp_path)
+    (tmp_path / "outer.html").write_text(OUTER, encoding="utf-8")
+    context = browser.new_context(has_touch=True)
+    try:
+        page = context.new_page()
+        with watched(page):
+            page.goto((tmp_path / "outer.html").as_uri())
+            inner = page.frames[1]
+            inner.wait_for_function("window.nmm && !document.body.classList.contains('loading')")
+            fingers = context.new_cdp_session(page)
+
+            def wipe() -> None:
+                """Up by 80 px, on the view."""
+                where = {"x": 200, "y": 150, "yDistance": -80, "gestureSourceType": "touch"}
+                fingers.send("Input.synthesizeScrollGesture", where)
+                draw_frames(page)
+
+            first = inner.evaluate(EYE)
+            wipe()
+            scrolled = page.evaluate("scrollY")
+            assert scrolled > 40
+            assert inner.evaluate(EYE) == first
+            page.touchscreen.tap(200, 50)
+            wipe()
+            assert page.evaluate("scrollY") == scrolled
+            assert inner.evaluate(EYE) != first
+    finally:
+        context.close()
 
 
 def test_hostile_names_are_only_text(small_robot: Robot, window: Window, tmp_path: Path) -> None:

@@ -22,8 +22,8 @@ from nmm.playback.placements import base_position
 from nmm.robots.frame_path import FramePath
 from nmm.runs.trajectory import Trajectory
 
-#: Sizes of the marks at the path's ends and of a target, pt.
-_END, _TARGET = 6.0, 12.0
+#: Size of the marks at the path's ends, pt.
+_END = 6.0
 #: A platform so long, pt, is drawn with full lines, a shorter one with thinner ones, at least this share.
 _LARGE, _FINEST = 42.0, 0.3
 #: When no instants are given: at most and at least this many, a platform's length apart.
@@ -154,7 +154,7 @@ class Scene(Viewed):
         subjects = [Subject(text, edge) for text, edge in named if text]
         ends, targets = view.of(self.lines["path"][[0, -1]]), self.trajectory.marks
         targets = view.of(np.vstack([targets, self.seen.marks]))
-        marks = [*_around(ends, _END, scale), *_around(targets, _TARGET, scale)]
+        marks = [*_around(ends, _END, scale), *_around(targets, style.TARGET, scale)]
         return subjects, Ground([*paths, *links, *marks], [*robots, *solid], scale)
 
     def draw(self, axes: Axes, view: View) -> None:
@@ -188,12 +188,7 @@ class Scene(Viewed):
         path = view.of(self.lines["path"])
         axes.plot(*path.T, color=_PATH_COLOR, linewidth=1.5, label=self._path_name, zorder=5.1)
         style.mark_ends(axes, path, _END)
-        if len(trajectory.marks):
-            axes.plot(
-                *view.of(trajectory.marks).T, "*", color=resolver_style.ORANGE, markersize=_TARGET,
-                markeredgecolor=resolver_style.BLACK, markeredgewidth=0.7,
-                label="target", linestyle="none", zorder=6,
-            )  # fmt: skip
+        style.mark_targets(axes, view.of(trajectory.marks))
 
     def _fineness(self, axes: Axes) -> float:
         """How much thinner than usual lines are, so that arms and outlines of small robots stay apart."""

@@ -20,7 +20,7 @@ from nmm.arrays import Array
 from nmm.errors import expect
 from nmm.figure_options import FORMATS, FigureOptions
 from nmm.files import written_at
-from nmm.resolver_style import BLACK, CYCLE, DASHES, GREEN, PINK, Look
+from nmm.resolver_style import BLACK, CYCLE, DASHES, GREEN, ORANGE, PINK, Look
 from nmm.runs.trajectory import Trajectory
 from nmm.text_format import listed, printable, superscript
 
@@ -28,6 +28,8 @@ GREY, LIGHT = "#6B7280", "#E5E7EB"
 DPI = 180
 TEXT, SMALL = 9.0, 8.0
 WIDTH, WIDER = 1.4, 0.7
+#: Size of a target's mark, pt.
+TARGET = 12.0
 #: Figure width, and the strip that axes need for their labels at the left and below, in.
 PAGE, LEFT, RIGHT, BOTTOM = 5.2, 0.8, 0.2, 0.46
 #: Room beside the ticks' numbers, of a character of them at most, and of them where there are many, in.
@@ -295,6 +297,15 @@ def mark_ends(axes: Axes, path: Array, size: float) -> None:
         axes.plot(
             *point, marker, color=color, markersize=size, markeredgecolor="white", markeredgewidth=0.8,
             label=name, linestyle="none", zorder=6,
+        )  # fmt: skip
+
+
+def mark_targets(axes: Axes, points: Array) -> None:
+    """Stars at what is to be reached, points (k, 2), which the legend names where there are any."""
+    if len(points):
+        axes.plot(
+            *points.T, "*", color=ORANGE, markersize=TARGET, markeredgecolor=BLACK, markeredgewidth=0.7,
+            label="target", linestyle="none", zorder=6,
         )  # fmt: skip
 
 

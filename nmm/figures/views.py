@@ -27,7 +27,7 @@ _ALONG, _WIDE = np.radians(15.0), 0.4
 _RISES = 0.01
 #: The least height of a drawing is twice this share of its width.
 _FLAT = 0.1
-_TARGET, _DESIRED = 12.0, "#C3C8D0"
+_DESIRED = "#C3C8D0"
 
 
 @dataclass(frozen=True)
@@ -200,11 +200,7 @@ class Paths(Viewed):
 
     def draw(self, axes: Axes, view: View) -> None:
         self.dress(axes, view)
-        if len(self._held):
-            axes.plot(
-                *view.of(self._held).T, "*", color=resolver_style.ORANGE, markersize=_TARGET,
-                markeredgecolor=resolver_style.BLACK, label="target", linestyle="none", zorder=6,
-            )  # fmt: skip
+        style.mark_targets(axes, view.of(self._held))
         self._seen.draw(axes, view.of)
         if self._desired is not None:
             axes.plot(*view.of(self._desired).T, color=_DESIRED, linewidth=5.0, label="desired path")
