@@ -9,6 +9,7 @@ HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent), str(HERE / "building")]
 
 from docstrings import as_rst, signature_that_helps
+from formulas import block, inline
 from frames import copy_frames, without_missing_frames
 from keyboards import for_keyboards
 from notebooks import NotebookParser
@@ -21,11 +22,12 @@ project, author, copyright = "nmm", "The nmm developers", "The nmm developers"
 version = release = nmm.__version__
 extensions = ["sphinx.ext.autodoc", "myst_parser"]
 exclude_patterns = ["building", "lab/solutions"]
-suppress_warnings = ["misc.highlighting_failure"]  # what a command prints is no shell script
 
 # Anchors as code hosts make them, so that a link works here and there.
 myst_heading_anchors = 4
 myst_enable_extensions = ["colon_fence"]
+myst_fence_as_directive = ["math"]  # as code hosts draw it, too
+html_math_renderer = "mathml"
 
 default_role = "py:obj"
 autodoc_default_options = {"members": True, "inherited-members": False}
@@ -55,6 +57,7 @@ def setup(app: Any) -> None:
     """Docstrings and notebooks as they are written here; pages that a keyboard can read."""
     app.add_source_suffix(".ipynb", "notebook")
     app.add_source_parser(NotebookParser)
+    app.add_html_math_renderer("mathml", (inline, None), (block, None))
     app.connect("source-read", only_folders_that_are_there)
     app.connect("autodoc-process-docstring", lambda *given: as_rst(given[-1]))
     app.connect("autodoc-process-signature", signature_that_helps)

@@ -53,6 +53,15 @@ def test_pages_ask_for_nothing_outside(site: Path) -> None:
         assert not re.search(r"@import|url\(\s*['\"]?(https?:)?//", text), style
 
 
+def test_formulas_are_drawn_with_nothing_to_load(site: Path) -> None:
+    pytest.importorskip("latex2mathml")
+    for written in (ROOT / "docs").glob("*.md"):
+        page = (site / f"{written.stem}.html").read_text(encoding="utf-8")
+        formulas = re.findall(r"<math .*?</math>", page, flags=re.DOTALL)
+        assert len(formulas) == written.read_text(encoding="utf-8").count("```math\n"), written
+        assert [one for one in formulas if re.search(r"\\\w", one)] == [], "a command that is not LaTeX's"
+
+
 def test_every_page_of_the_docs_is_in_the_site(site: Path) -> None:
     """And can be reached from the first: Sphinx warns of a page that no contents list."""
     written = {path.relative_to(ROOT / "docs") for path in (ROOT / "docs").rglob("*.md")}
