@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 import twin
+from scipy.linalg import null_space
+from scipy.spatial.transform import Rotation
 
 import nmm
 
@@ -59,12 +61,60 @@ def inputs(t, q):
     return pg(robot.J(q), rate(t, q), h(q), 10.0)
 
 
-def rk4(velocity, t, q, dt, weights=(1, 2, 2, 1), times=(0.5, 0.5, 1.0), from_first=False):
-    k1 = velocity(t, q)
-    k2 = velocity(t + times[0] * dt, q + dt / 2 * k1)
-    k3 = velocity(t + times[1] * dt, q + dt / 2 * (k1 if from_first else k2))
-    k4 = velocity(t + times[2] * dt, q + dt * k3)
-    return q + dt / 6 * sum(w * k for w, k in zip(weights, (k1, k2, k3, k4), strict=True))
+def column(axis, point, hand, sign=1.0):
+    arm = hand - point
+    return np.concatenate(
+        [
+            sign * np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]]) @ arm,
+            axis,
+        ]
+    )
+
+
+def spatial(platform, joints, hand, drive=None, carried=1.0):
+    x, y, theta = platform
+    upright = column(np.array([0.0, 0.0, 1.0]), np.array([x, y, 0.0]), hand)
+    upright[:3] *= carried
+    ahead = [np.cos(theta), np.sin(theta), 0, 0, 0, 0] if drive is None else drive
+    return np.array([ahead, upright, *(column(*joint, hand) for joint in joints)]).T
+
+
+def logarithm(R):
+    return Rotation.from_matrix(R).as_rotvec()
+
+
+def without_limit(R):
+    sine_axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2
+    sine = np.linalg.norm(sine_axis)
+    with np.errstate(invalid="ignore"):
+        return np.arctan2(sine, (np.trace(R) - 1) / 2) * sine_axis / sine
+
+
+def pointing(hand, J, T, link=1.0, target=1.0):
+    """The bearing is the angle of a complex number, which turns by Im(ż / z)."""
+    bearing = (-(J[0] + 1j * J[1]) / complex(*(T - hand))).imag
+    return link * np.array([0, 1, 1, 1]) - target * bearing
+
+
+def levels(J_1, r_1, J_2, r_2, bound=1e-9, rest=True, projected=True):
+    """Along a basis of what the first leaves, where the solution has a projector."""
+    first = np.linalg.lstsq(J_1, r_1)[0]
+    left = null_space(J_1)
+    A = J_2 @ left if projected else J_2
+    more = np.linalg.pinv(A, bound) @ (r_2 - (J_2 @ first if rest else 0))
+    return first + (left @ more if projected else more)
+
+
+def rounded(J_1, r_1, J_2, r_2):
+    """With a projector whose singular values of 0 are inverted, but for rounding."""
+    inverse = np.linalg.pinv(J_1)
+    N = np.eye(4) - inverse @ J_1
+    return inverse @ r_1 + np.linalg.pinv(J_2 @ N, 1e-30) @ (r_2 - J_2 @ inverse @ r_1)
+
+
+def axes(J, power=0.5):
+    squares, directions = np.linalg.eigh(J @ J.T)
+    return (directions * squares**power)[:, ::-1]
 
 
 def stops(q):
@@ -159,16 +209,7 @@ ANSWERS: list[tuple[str, Any, str]] = [
     ("euler", lambda v, t, q, dt: q + dt * v(t, q), "✓ right"),
     ("euler", lambda v, t, q, dt: dt * v(t, q), "gives the change"),
     ("euler", lambda v, t, q, dt: q + v(t, q), "is taken 10 times"),
-    ("euler", lambda v, t, q, dt: q + dt * v(t + dt / 2, q + dt / 2 * v(t, q)), "expected 2"),
-    ("runge_kutta", rk4, "✓ right"),
-    ("runge_kutta", lambda *a: rk4(*a, weights=(1, 1, 1, 1)), "is taken 0.667 times"),
-    ("runge_kutta", lambda *a: rk4(*a, weights=(2, 1, 1, 2)), "at which times"),
-    ("runge_kutta", lambda *a: rk4(*a, times=(0.0, 0.0, 0.0)), "at which times"),
-    ("runge_kutta", lambda *a: rk4(*a, from_first=True), "expected 16"),
-    ("observed_order", lambda e, half: np.log(e / half) / np.log(2), "✓ right"),
-    ("observed_order", lambda e, half: np.log(e / half), "which base"),
-    ("observed_order", lambda e, half: np.log2(half / e), "the sign"),
-    ("observed_order", lambda e, half: e / half, "of order 1, not 2"),
+    ("euler", lambda v, t, q, dt: q + dt * v(t + dt / 2, q + dt / 2 * v(t, q)), "at which t, and at which q"),
     ("fitted_gain", lambda t, e: np.log(e[0] / e[-1]) / (t[-1] - t[0]), "✓ right"),
     ("fitted_gain", lambda t, e: np.polyfit(t, np.log(e), 1)[0], "the sign"),
     ("fitted_gain", lambda t, e: -np.polyfit(t, np.log10(e), 1)[0], "natural logarithm"),
@@ -198,4 +239,52 @@ ANSWERS: list[tuple[str, Any, str]] = [
     ("design", DESIGN | {"gain": -1}, "design: "),
     ("design", DESIGN | {"gain": ...}, "not yet: design: gain to be chosen"),
     ("design", {"gain": 1}, "expected a dictionary with gain, resolver, objective, limits"),
+    ("joint_column", column, "✓ right"),
+    ("joint_column", lambda a, p, r: np.roll(column(a, p, r), 3), "the linear velocity comes first"),
+    ("joint_column", lambda a, p, r: column(a, p, r, sign=-1.0), "the other way"),
+    ("joint_column", lambda a, p, r: column(a, 0 * p, r), "passes through the origin"),
+    ("joint_column", lambda a, p, r: np.concatenate([column(a, p, r)[:3], 2 * a]), "the angular velocity"),
+    ("joint_column", lambda a, p, r: column(a, p, r)[:3], "expected 6 numbers"),
+    ("spatial_jacobian", spatial, "✓ right"),
+    ("spatial_jacobian", lambda *a: spatial(*a, drive=[1, 0, 0, 0, 0, 0]), "where it points"),
+    ("spatial_jacobian", lambda *a: spatial(*a, carried=0.0), "carries the hand round"),
+    ("spatial_jacobian", lambda *a: np.insert(spatial(*a), 0, 0.0, axis=1), "the wheels leave v and omega"),
+    ("spatial_jacobian", lambda p, joints, r: spatial(p, joints[::-1], r), "column q1, q2, q4, q5 not right"),
+    ("rotation_vector", logarithm, "✓ right"),
+    ("rotation_vector", lambda R: logarithm(R.T), "the other way"),
+    ("rotation_vector", lambda R: np.sinc(np.linalg.norm(logarithm(R)) / np.pi) * logarithm(R), "is sin φ"),
+    ("rotation_vector", lambda R: np.degrees(logarithm(R)), "in degrees"),
+    ("rotation_vector", lambda R: 2 * logarithm(R), "a turn of 1 rad has length 2"),
+    ("rotation_vector", without_limit, "at R = I: .*not finite"),
+    ("target_jacobian", pointing, "✓ right"),
+    ("target_jacobian", lambda *a: pointing(*a)[None], "✓ right"),
+    ("target_jacobian", lambda *a: pointing(*a, target=0.0), "the target moves, too"),
+    ("target_jacobian", lambda *a: pointing(*a, target=-1.0), "the sign of ∂g/∂q"),
+    ("target_jacobian", lambda *a: pointing(*a, link=0.0), "and the link's"),
+    ("extended_jacobian", lambda J, r, K, s: np.linalg.pinv(np.block([[J], [K]])) @ [*r, *s], "✓ right"),
+    ("extended_jacobian", lambda J, r, K, s: np.linalg.pinv(J) @ r, "the added one is not"),
+    (
+        "extended_jacobian",
+        lambda J, r, K, s: np.linalg.solve(np.vstack([K, J]), [*r, *s]),
+        "J u is not the rate",
+    ),
+    ("algorithmic_singularity", [1, 2, 3, -np.arccos(-0.6), 1.0], "✓ right"),
+    ("algorithmic_singularity", [0, 0, 0, 0, 0], "expected 0, to 1e-6"),
+    ("algorithmic_singularity", [0, 0, 0], "expected 5 numbers"),
+    ("priorities", levels, "✓ right"),
+    ("priorities", lambda *a: levels(*a, rest=False), "can be had"),
+    ("priorities", lambda *a: levels(*a, projected=False), "is spoilt by the second"),
+    ("priorities", lambda J, r, K, s: np.linalg.lstsq(J, r)[0], "can be had"),
+    ("priorities", rounded, "was inverted"),
+    ("ellipsoid", axes, "✓ right"),
+    ("ellipsoid", lambda J: axes(J, power=1.0), "squares"),
+    ("ellipsoid", lambda J: axes(J, power=0.0), "all lengths are 1"),
+    ("ellipsoid", lambda J: axes(J).T, "here they are rows"),
+    ("ellipsoid", lambda J: axes(J)[:, ::-1], "the longest comes first"),
+    ("ellipsoid", lambda J: 3 * axes(J), "is not that of J u"),
+    ("ellipsoid", lambda J: J @ J.T, "not at right angles"),
+    ("speed_along", lambda J, d: (d @ np.linalg.solve(J @ J.T, d)) ** -0.5, "✓ right"),
+    ("speed_along", lambda J, d: np.linalg.norm(np.linalg.pinv(J) @ d), "upside down"),
+    ("speed_along", lambda J, d: np.linalg.norm(J.T @ d), "moves across it"),
+    ("speed_along", lambda J, d: np.linalg.norm(J), "with inputs of length 1 it is"),
 ]

@@ -1,7 +1,8 @@
 """The checks of the lab's exercises: `check.jacobian(J)` says in words whether J is right, or what is not.
 
-They judge by laws (J u = rate, what a constant velocity must give) and against nmm's own answers, at random
-configurations. None tells the solution. An answer that is not written yet is "not yet", never an error.
+They judge by laws (J u = rate, differences, what a constant velocity must give), in the first two labs also
+against nmm's own answers, at random configurations. None tells the solution. An answer that is not written
+yet is "not yet", never an error.
 """
 
 from check.lab_1 import (
@@ -53,19 +54,40 @@ from check.lab_2 import (
     fitted_gain as fitted_gain,
 )
 from check.lab_2 import (
-    observed_order as observed_order,
-)
-from check.lab_2 import (
     peaks as peaks,
-)
-from check.lab_2 import (
-    runge_kutta as runge_kutta,
 )
 from check.lab_2 import (
     share_left as share_left,
 )
 from check.lab_2 import (
     task_rate as task_rate,
+)
+from check.lab_3 import (
+    algorithmic_singularity as algorithmic_singularity,
+)
+from check.lab_3 import (
+    ellipsoid as ellipsoid,
+)
+from check.lab_3 import (
+    extended_jacobian as extended_jacobian,
+)
+from check.lab_3 import (
+    joint_column as joint_column,
+)
+from check.lab_3 import (
+    priorities as priorities,
+)
+from check.lab_3 import (
+    rotation_vector as rotation_vector,
+)
+from check.lab_3 import (
+    spatial_jacobian as spatial_jacobian,
+)
+from check.lab_3 import (
+    speed_along as speed_along,
+)
+from check.lab_3 import (
+    target_jacobian as target_jacobian,
 )
 from check.verdicts import ready as ready
 from check.verdicts import score as score
