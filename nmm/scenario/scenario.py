@@ -14,7 +14,7 @@ from nmm.errors import ScenarioError, no_such
 from nmm.findings import Finding
 from nmm.kinds import RESOLVERS
 from nmm.progress import Progress
-from nmm.robots.surroundings import NOTHING, Surroundings
+from nmm.robots.surroundings import Surroundings
 from nmm.scenario.document import Document, read_file
 from nmm.scenario.keys import KeyedError, NamedReferences, as_written, at, first_error
 
@@ -176,7 +176,7 @@ class Scenario:
     def surroundings(self, robot: Robot) -> Surroundings:
         """What is drawn beside a robot in it; `ScenarioError` for a frame or a mesh that is not there."""
         if self.parts.scene is None:
-            return NOTHING
+            return Surroundings()
         with self._located(), at("scene"):
             return self.parts.scene.build(robot, self.absolute, ("scene",))
 
