@@ -164,6 +164,7 @@ from .robots.robot import CENTER_OF_MASS as CENTER_OF_MASS
 from .robots.semantics import POSTURE as POSTURE
 from .robots.semantics import NamedPostures as NamedPostures
 from .robots.semantics import Semantics as Semantics
+from .robots.surroundings import NO_SURROUNDINGS as NO_SURROUNDINGS
 from .robots.surroundings import Body as Body
 from .robots.surroundings import Carried as Carried
 from .robots.surroundings import Surroundings as Surroundings

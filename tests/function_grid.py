@@ -52,6 +52,7 @@ from nmm.functions.references import (
     SteadyTurn,
     VelocityOf,
 )
+from nmm.functions.references.live_target import Displaced
 from nmm.functions.tasks import (
     CallableFunction,
     CenterOfMass,
@@ -241,6 +242,7 @@ def _signals() -> Iterator[Entry]:
     turned = LiveTarget([0.1, -0.4, 0.3], "rad")
     yield Entry("signal", LiveTarget([1.0, -2.0]))
     yield Entry("signal that moves on", moved)
+    yield Entry("displaced", Displaced(LinearCoordinates("x", "y", "theta"), moved))
     yield Entry("bearing of a signal", Bearing(moved, _TARGET))
     yield Entry("pointing at a signal", Pointing("ee", moved))
     yield Entry("distance from a signal", Distance("ee", moved))

@@ -111,6 +111,7 @@ class StepSolver:
         if retreat is not None:
             self.retreat_state = RetreatState(retreat, robot, self.found.retreat)
             self._watch_error = checked_by_caller(watch_error, WATCH)
+            self.load_stop()
         self._wanted: Array | None = None
         self.step_size: StepSize | None = None
         self.needs_dt = (
@@ -261,6 +262,10 @@ class StepSolver:
         else:
             self._replace_inputs(wanted, *self.blocks)
             self.before[:] = self.found.answer.u
+
+    def load_stop(self) -> None:
+        """Load what stops and retreats need, which else takes 25 ms within a control loop."""
+        _ = self._replace_inputs
 
     @cached_property
     def _replace_inputs(self) -> Callable[..., None]:

@@ -24,7 +24,7 @@ from nmm.kinds import RESOLVERS
 from nmm.resolvers.base import Resolver
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
-from nmm.robots.surroundings import NOTHING, Surroundings
+from nmm.robots.surroundings import NO_SURROUNDINGS, Surroundings
 from nmm.scenario import Scenario
 from nmm.scenario.resolvers import RESOLVER_PARTS
 
@@ -113,7 +113,7 @@ class DriveSetup(ABC):
     q0: Array
     dt: float
     at_robot: bool
-    surroundings: Surroundings = NOTHING
+    surroundings: Surroundings = NO_SURROUNDINGS
 
     @abstractmethod
     def controller(self, settings: Settings) -> Controller:

@@ -27,7 +27,7 @@ from nmm.playback.session import RobotSession, Watching, counted
 from nmm.resolver_style import looks_of_labels
 from nmm.robots.frame_path import FramePath
 from nmm.robots.motion import Camera
-from nmm.robots.surroundings import NOTHING, Surroundings
+from nmm.robots.surroundings import NO_SURROUNDINGS, Surroundings
 from nmm.runs.components import Axes
 from nmm.runs.joining import row_names
 from nmm.runs.recording import Recorder
@@ -103,7 +103,7 @@ class LiveRun(RobotSession):
         duration: float,
         *,
         title: str | None = None,
-        surroundings: Surroundings = NOTHING,
+        surroundings: Surroundings = NO_SURROUNDINGS,
         port: int | None = None,
         open_browser: bool = True,
     ) -> None:

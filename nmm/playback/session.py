@@ -29,7 +29,7 @@ from nmm.playback.sticks import appearance
 from nmm.resolver_style import Look
 from nmm.robots.motion import Camera
 from nmm.robots.robot import Robot
-from nmm.robots.surroundings import NOTHING, Surroundings
+from nmm.robots.surroundings import NO_SURROUNDINGS, Surroundings
 
 FPS = 30.0
 #: The clock skips the time of a picture later than this, s.
@@ -148,7 +148,7 @@ class RobotSession(Session):
         visit: Callable[[], Visitor],
         *,
         obstacles: Sequence[Obstacle] = (),
-        surroundings: Surroundings = NOTHING,
+        surroundings: Surroundings = NO_SURROUNDINGS,
         channels: Sequence[Channel] = (),
         look: Look | None = None,
         cameras: Sequence[Camera] = (),

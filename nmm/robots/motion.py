@@ -11,7 +11,7 @@ import pinocchio as pin
 from nmm.arrays import Array, Integers, array, matrix, unwritable, vector
 from nmm.errors import expect
 from nmm.robots.robot import Robot
-from nmm.robots.surroundings import NOTHING, Body, Surroundings
+from nmm.robots.surroundings import NO_SURROUNDINGS, Body, Surroundings
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +142,7 @@ class Motion:
     bodies: tuple[Body, ...] = ()
     nearest: Nearest | None = None
     cameras: tuple[Camera, ...] = ()
-    surroundings: Surroundings = NOTHING
+    surroundings: Surroundings = NO_SURROUNDINGS
 
     def __post_init__(self) -> None:
         t = vector(self.t, None, "t")

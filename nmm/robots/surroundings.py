@@ -99,4 +99,4 @@ class Surroundings:
 
 
 #: Nothing beside the robot.
-NOTHING = Surroundings()
+NO_SURROUNDINGS = Surroundings()

@@ -30,7 +30,16 @@ QUIET = (Refused.LOST, Refused.REPEATED)
 
 class LoopState(StrEnum):
     """What a `Loop` does: waits for a first measurement, starts softly, runs, holds the inputs where the
-    resolver has none, stops along the limits, has stopped."""
+    resolver has none, stops along the limits, has stopped.
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_2r")
+    >>> task = nmm.Task(nmm.Position("ee", "xy"), [1.5, 0.3])
+    >>> controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), limits=nmm.Limits(acceleration=2.0), dt=0.01)
+    >>> nmm.Loop(controller).state is nmm.LoopState.WAITING
+    True
+    """
 
     WAITING = "waiting"
     STARTING = "starting"
@@ -119,6 +128,7 @@ class Loop:
         off = positive(jump[0], "jump"), positive(jump[1], "jump")
         tolerances = Tolerances(self.watchdog, scalar(lag, "lag", least=0.0), *off, confirm)
         controller.dt = self.period
+        controller.solver.load_stop()
         robot = controller.robot
         remembered = math.ceil((2.0 * self.watchdog + tolerances.lag) / self.period) + 3
         self._history = HeldHistory(robot, remembered)

@@ -22,7 +22,7 @@ from nmm.lazy_call import lazy_call
 from nmm.machine import made_with
 from nmm.robots.motion import Motion, Nearest
 from nmm.robots.robot import Robot
-from nmm.robots.surroundings import NOTHING, Body, Surroundings
+from nmm.robots.surroundings import NO_SURROUNDINGS, Body, Surroundings
 from nmm.runs.residuals import NO_RESIDUALS, Residuals
 from nmm.runs.seen import RunCamera
 from nmm.runs.verdict import AS_ASKED, Awaited, Verdict
@@ -140,7 +140,7 @@ class Trajectory:
     scenario: dict[str, Any] | None = field(default=None)
     events: tuple[Event, ...] = ()
     cameras: tuple[RunCamera, ...] = ()
-    surroundings: Surroundings = NOTHING
+    surroundings: Surroundings = NO_SURROUNDINGS
     label: str = ""
     made_with: dict[str, str | int] = field(default_factory=made_with)
     more: dict[str, Array] = field(default_factory=dict)
@@ -248,7 +248,7 @@ class Trajectory:
         self,
         scenario: dict[str, Any],
         warnings: Sequence[Finding] = (),
-        surroundings: Surroundings = NOTHING,
+        surroundings: Surroundings = NO_SURROUNDINGS,
     ) -> Trajectory:
         """The same trajectory with the scenario that it came from, what that warns of and draws beside it."""
         verdict = self.verdict.after(warnings)
