@@ -328,14 +328,14 @@ def test_the_errors_have_one_root() -> None:
 
 
 def test_the_table_of_rooms_is_the_order_of_the_imports() -> None:
-    """docs/architecture.md lists every room, in the order that pyproject.toml states."""
+    """docs/architecture.md lists every package, in the order that pyproject.toml states."""
     contracts = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"][
         "contracts"
     ]
     (rooms,) = (contract for contract in contracts if contract["name"] == "Rooms")
     stated = [sorted(layer.split(" : ")) for layer in reversed(rooms["layers"])]
     text = (ROOT / "docs" / "architecture.md").read_text("utf-8")
-    table = text[text.index("| room |") :].split("\n\n")[0].splitlines()[2:]
+    table = text[text.index("| package |") :].split("\n\n")[0].splitlines()[2:]
     listed = [sorted(re.findall(r"`(\w+)/?`", row.split("|")[1])) for row in table]
     assert listed == stated
 
