@@ -36,7 +36,8 @@ class LoopState(StrEnum):
     --------
     >>> robot = nmm.load("unicycle_2r")
     >>> task = nmm.Task(nmm.Position("ee", "xy"), [1.5, 0.3])
-    >>> controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), limits=nmm.Limits(acceleration=2.0), dt=0.01)
+    >>> limits = nmm.Limits(acceleration=2.0)
+    >>> controller = nmm.Controller(robot, task, nmm.ProjectedGradient(), limits=limits, dt=0.01)
     >>> nmm.Loop(controller).state is nmm.LoopState.WAITING
     True
     """
