@@ -192,9 +192,9 @@ def _held(drawn: Map) -> str:
     if drawn.height is not None:
         (axis,) = {"x", "y", "z"} - set(drawn.names)
         texts.append(f"{drawn.frame} {axis} from {drawn.height[0]:g} to {drawn.height[1]:g} m")
-    held = f"held: {', '.join(texts)}" if texts else ""
-    shown = "outline: the robot in the best and in the worst posture of all" * (drawn.kind == "workspace")
-    return "; ".join(filter(None, [held, shown]))
+    parts = [f"held: {', '.join(texts)}"] * bool(texts)
+    parts += ["outline: the robot in the best and in the worst posture of all"] * (drawn.kind == "workspace")
+    return "; ".join(parts)
 
 
 def _posture(drawn: Map, measure: str, *, worst: bool) -> Array:
@@ -210,8 +210,9 @@ def _posture(drawn: Map, measure: str, *, worst: bool) -> Array:
 
 def _draw_robot(axes: Axes, drawn: Map, q: Array) -> None:
     """The outlines of platform, trailers and wheels and the arm's links in the map's plane, on any colour."""
-    directions = {name: tuple(row) for name, row in zip("xyz", np.eye(3).tolist(), strict=True)}
-    view = View(*(directions[name] for name in drawn.names), drawn.names)
+    directions = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+    across, up = drawn.names
+    view = View(directions[across], directions[up], drawn.names)
     pose = Silhouette(drawn.robot, drawn.frame).at(q)
     main = hull(view.of(pose.main))
     bodies, wheels = pose.outlines(view)
