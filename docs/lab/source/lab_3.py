@@ -299,14 +299,16 @@ check.speed_along(speed)
 
 # %%
 if check.ready("ellipsoid", "speed_along"):
-    figure, pictures = plt.subplots(1, 3, figsize=(11, 3.6))
+    figure, pictures = plt.subplots(1, 3, figsize=(11, 4), sharex=True, sharey=True)
     around = np.array([[cos(a), sin(a)] for a in np.linspace(0, 2 * pi, 100)]).T
     for q2, picture in zip((0, 0.8, 1.6), pictures):
         rows = planar(np.array([0, 0, 0, 0.5, q2]))[1]
         for label, part in (("arm alone", rows[:, 2:]), ("with the platform", rows)):
             picture.plot(*(semi_axes(part) @ around), label=label)
         picture.set(aspect="equal", title=f"q2 = {q2}: {speed(rows, np.array([0, 1])):.2f} m/s sideways")
-    pictures[0].legend()
+        picture.set_xlabel("ẋ [m/s]")
+    pictures[0].set_ylabel("ẏ [m/s]")
+    pictures[2].legend()
     plt.show()
 
 # %%
