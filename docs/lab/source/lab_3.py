@@ -315,5 +315,5 @@ if check.ready("ellipsoid", "speed_along"):
 check.score()
 
 # %% [markdown]
-# If there is time: in which configurations does the platform not help the arm along a direction? `nmm map unicycle_2r --task position --over q1,q2`
-# draws the smallest singular value of both.
+# If there is time: where is the arm alone singular, and how small does the smallest singular value of the whole robot become?
+# `nmm map unicycle_2r --task position --over q1,q2` in a terminal draws both.
