@@ -28,6 +28,7 @@
     const fixed = path === undefined && act === undefined;
     if (fixed && text && [...list.children].some((item) => item.textContent === text)) return undefined;
     const item = document.createElement("li");
+    item.classList.toggle("fixed", fixed);
     const holder = fixed ? item : item.appendChild(document.createElement("button"));
     holder.append(nmm.sign(kind, color), text);
     if (!fixed) {

@@ -57,7 +57,7 @@
 
   // Before each picture: where they are depends on where one looks from.
   nmm.viewer.scene.onBeforeRender = (renderer, scene, camera) => {
-    nmm.obstacles.fade(camera);
+    nmm.obstacles?.fade(camera); // it may not be loaded yet
     const [width, height] = [view.clientWidth, view.clientHeight];
     const found = [];
     for (const { sprite, rank } of texts.all) {
