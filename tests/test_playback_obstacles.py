@@ -317,7 +317,7 @@ def test_what_moves_and_then_rests_is_drawn_once_there() -> None:
     goes = nmm.Obstacle(nmm.Sphere(0.1), motion=lambda t: [min(t, 1.0), 0.0, 0.0], name="goes")
     returns = nmm.Obstacle(nmm.Sphere(0.1), motion=lambda t: [abs(t - 1.0), 0.0, 0.0], name="returns")
     stands = nmm.Obstacle(nmm.Sphere(0.1), name="stands")
-    run: Any = SimpleNamespace(obstacles=[goes, returns, stands])
+    run: Any = SimpleNamespace(obstacles=[goes, returns, stands], surroundings=nmm.playback.Surroundings())
     found = outlines(run, np.array([0.0, 1.0, 2.0, 3.0]))
     spans = [(0.0, 0.0), (1.0, 3.0), (0.0, 0.0), (1.0, 1.0), (2.0, 2.0), (3.0, 3.0), None]
     assert [one.times for one in found] == spans
