@@ -57,7 +57,9 @@ size = 512e-6 * sum(one.stat().st_blocks for one in files)
 apart = 1e6 * np.diff(woken)
 for what, us in (("between calls", apart[4:]), ("read to write", 1e6 * np.array(spent[5:]))):
     if len(us):  # on a busy machine the watchdog may stop it at once
-        print(what, *np.percentile(us, [50, 99, 99.9, 100]).round().astype(int), "µs: median, 99, 99.9 %, most")
+        print(
+            what, *np.percentile(us, [50, 99, 99.9, 100]).round().astype(int), "µs: median, 99, 99.9 %, most"
+        )
 print(f"{loop.calls} calls, {loop.late_calls} late; {size:.0f} MB installed")
 if len(sys.argv) == 1 and size > MOST:
     raise SystemExit(f"expected at most {MOST} MB")

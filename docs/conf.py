@@ -1,4 +1,4 @@
-"""The site: `sphinx-build -W -b html docs site`, offline; `pip install 'nmm[docs]'` has what it needs."""
+"""The site: `sphinx-build -W -b html docs site`, offline; `pip install '.[docs]'` has what it needs."""
 
 import re
 import sys

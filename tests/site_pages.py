@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parent.parent
 def built(folder: Path, docs: Path = ROOT / "docs") -> Path:
     """The site's folder; a warning is an error."""
     if importlib.util.find_spec("sphinx") is None:
-        pytest.skip("Sphinx is not here: pip install 'nmm[docs]'")
+        pytest.skip("Sphinx is not here: pip install '.[docs]'")
     options = ["-W", "--keep-going", "-q", "-b", "html", "-d", str(folder / "doctrees")]
     command = [sys.executable, "-P", "-m", "sphinx", *options, str(docs), str(folder / "html")]
     done = subprocess.run(command, capture_output=True, text=True, cwd=folder)

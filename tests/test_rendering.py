@@ -175,7 +175,7 @@ def test_what_is_missing_is_named(
     with pytest.raises(RunError, match=r"has ended: .*cannot open display"):
         render([motion], tmp_path / "motion.mp4")
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    with pytest.raises(RunError, match=r"ffmpeg.*nmm\[video\]"):
+    with pytest.raises(RunError, match=r"ffmpeg.*pip install imageio-ffmpeg"):
         render([motion], tmp_path / "motion.mp4")
     assert [path.name for path in tmp_path.iterdir()] == ["chromium"]
 

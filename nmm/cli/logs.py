@@ -27,7 +27,7 @@ def export(
     """Write a run as a log that Foxglove, Rerun and ROS 2's tools open.
 
     Joint states, TF, odometry, twist, inputs, task error, paths, events, the robot's description
-    (docs/ros.md). Needs pip install 'nmm[ros]'.
+    (docs/ros.md). Needs pip install rosbags.
 
     \b
     nmm export runs/unicycle_2r_position-rg --mcap

@@ -56,7 +56,7 @@ def render(
 ) -> None:
     """Make a video of a run.
 
-    Picture by picture through Chromium without a window, and ffmpeg (pip install 'nmm[video]').
+    Picture by picture through Chromium without a window, and ffmpeg (pip install imageio-ffmpeg).
 
     \b
     nmm render runs/unicycle_2r_position-rg --video motion.mp4

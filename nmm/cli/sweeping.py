@@ -76,7 +76,7 @@ def sweep(
 
     The folder holds rows.parquet, sweep.json (what was swept) and index.html: maps, fronts, parallel
     coordinates and a table that filters, offline. Ctrl-C, or worse, ends it: the same command goes on where
-    it was. Needs `pip install "nmm[sweep]"`.
+    it was. Needs `pip install pyarrow distributed`.
     """
     asked = {"samples": samples, "sampler": sampler, "seed": seed, "keep": keep}
     given = {name: value for name, value in asked.items() if value is not None}

@@ -39,7 +39,7 @@ def find_ffmpeg() -> str:
         return str(imageio_ffmpeg.get_ffmpeg_exe())
     except (ImportError, RuntimeError):
         raise RunError(
-            "videos need ffmpeg, and none is installed: pip install 'nmm[video]', or the system's own"
+            "videos need ffmpeg, and none is installed: pip install imageio-ffmpeg, or the system's own"
         ) from None
 
 

@@ -62,7 +62,7 @@ def render(
     Raises
     ------
     InputError : no motion, another suffix, a size, view or time that cannot be
-    RunError : no Chromium, no ffmpeg (`pip install 'nmm[video]'`), or one that fails
+    RunError : no Chromium, no ffmpeg (`pip install imageio-ffmpeg`), or one that fails
 
     Examples
     --------

@@ -38,7 +38,7 @@ def rosbags(part: str) -> Any:
     try:
         return import_module(f"rosbags.{part}")
     except ImportError:
-        raise InputError("bags need the package rosbags: pip install 'nmm[ros]'") from None
+        raise InputError("bags need the package rosbags: pip install rosbags") from None
 
 
 def typestore() -> Any:

@@ -45,12 +45,12 @@ Value = TypeVar("Value")
 
 
 def needed(module: str, what: str) -> Any:
-    """A module of the extra `nmm[sweep]`; `InputError` if it is not installed says what needs it."""
+    """A module of the extra `sweep`; `InputError` if it is not installed says what needs it."""
     try:
         return import_module(module)
     except ImportError:
         package = module.split(".")[0]
-        problem = f'{what} needs {package}, which is not installed: pip install "nmm[sweep]"'
+        problem = f"{what} needs {package}, which is not installed: pip install {package}"
         raise InputError(problem) from None
 
 

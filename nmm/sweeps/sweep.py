@@ -146,7 +146,7 @@ class Sweep:
         Raises
         ------
         InputError : the folder is another's, scheduler or workers will not do, the sweep is too large,
-            or pyarrow (of `nmm[sweep]`) is missing
+            or pyarrow (of `sweep`) is missing
         RunError : a process or the cluster was lost
         """
         definition, place = self.definition, SweepFolder(folder, self.definition)
