@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from playback_browser import PROJECT, UPRIGHT, WALK, Window, draw_frames, file_url
+from playback_browser import PROJECT, SIZE, UPRIGHT, WALK, Window, draw_frames, file_url
 from playback_browser import browser as browser
 from playback_browser import empty_page as empty_page
 from playback_browser import small_robot as small_robot
@@ -272,7 +272,11 @@ def test_from_above_the_view_is_a_plan(robot: Robot, window: Window, tmp_path: P
     metre = 0.5 * np.linalg.norm(at[2] - at[0])
     assert np.abs(at[1::2] - at[::2]).max() < 0.01 * metre
     assert np.linalg.norm(at[4] - at[2]) == pytest.approx(metre, rel=0.01)
-    assert page.locator("#legend").inner_text().count("grid of ") == 1
+    assert (page.locator("#legend").text_content() or "").count("grid of ") == 1
+    assert not page.get_by_text("grid of ").is_visible()  # a low window is for the robot
+    page.set_viewport_size({"width": 480, "height": 480})
+    assert page.get_by_text("grid of ").is_visible()
+    page.set_viewport_size(SIZE)
     page.evaluate("nmm.camera.put([0, -2, 3, 0, 0, 0])")
     assert page.evaluate("nmm.camera.place()") == pytest.approx([0, -2, 3, 0, 0, 0], abs=1e-6)
     heights = [abs(np.subtract(*np.array(page.evaluate(PROJECT, [[0, 0, 0], [0, 0.1, 0]]))[:, 1]))]
