@@ -129,21 +129,25 @@ def _moved(q: Matrix, j: int, by: float) -> Matrix:
     return q + by * (ahead if j == 0 else np.eye(5)[1 + j])
 
 
+def _slope(q: Matrix, j: int, T: Matrix, lengths: tuple[float, float, float], step: float = 1e-5) -> float:
+    """How fast the arm's heading leaves the direction to T, as input j moves it: a central difference."""
+
+    def off(at: Matrix) -> float:
+        to = T - planar(at, lengths)[0]
+        return float(at[2:].sum() - np.arctan2(to[1], to[0]))
+
+    return (off(_moved(q, j, step)) - off(_moved(q, j, -step))) / (2 * step)
+
+
 @exercise
 def target_jacobian(J_bar: object) -> str:
     for _ in range(10):
         q, T = _random.uniform(-1.4, 1.4, 5), _random.uniform(4, 6, 2)
-        lengths = tuple(_random.uniform(0.2, 0.6, 3))
+        d, l1, l2 = _random.uniform(0.2, 0.6, 3)
+        lengths = d, l1, l2
         hand, J = planar(q, lengths)
 
-        def off(at: Matrix) -> float:
-            to = T - planar(at, lengths)[0]  # noqa: B023
-            return float(at[2:].sum() - np.arctan2(to[1], to[0]))
-
-        step = 1e-5
-        right = np.array(
-            [(off(_moved(q, j, step)) - off(_moved(q, j, -step))) / (2 * step) for j in range(4)]
-        )
+        right = np.array([_slope(q, j, T, lengths) for j in range(4)])
         given = np.squeeze(called(J_bar, hand, J, T))
         shaped("J_bar", given, U)
         if np.allclose(given, right, atol=1e-7):
@@ -160,8 +164,8 @@ def target_jacobian(J_bar: object) -> str:
 
 
 def _two_tasks(rows: int, more: int, inputs: int) -> tuple[Matrix, Matrix, Matrix, Matrix]:
-    shapes = ((rows, inputs), rows, (more, inputs), more)
-    return tuple(_random.normal(size=shape) for shape in shapes)  # type: ignore[return-value]
+    normal = _random.normal
+    return normal(size=(rows, inputs)), normal(size=rows), normal(size=(more, inputs)), normal(size=more)
 
 
 @exercise
