@@ -106,7 +106,7 @@
   const ray = new THREE.Raycaster();
   let seen = "";
 
-  obstacles.fade = (eye) => {
+  nmm.texts.before.push((eye) => {
     if (!standing.length || !nmm.motions) return;
     const points = nmm.motions.flatMap(({ path }) => (nmm.node(path).visible ? joints(path) : []));
     const now = [eye.matrixWorld.elements, ...points.map((p) => p.toArray())].flat().map((x) => x.toFixed(3)).join(" ");
@@ -125,7 +125,7 @@
         Object.assign(material, { transparent: faded, opacity: faded ? FADED : 1, depthWrite: !faded });
       }
     }
-  };
+  });
 
   // Where a robot's joints are.
   function joints(path) {

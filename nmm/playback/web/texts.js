@@ -9,7 +9,8 @@
   const COLORS = { light: [0.31, 0.38, 0.46], dark: [0.72, 0.78, 0.85] };
   const RANKS = ["robot", "distance", "obstacle", "time"];
   const view = document.getElementById("view");
-  const texts = (nmm.texts = { all: [] });
+  // before: what else is to be done before each picture, with the eye.
+  const texts = (nmm.texts = { all: [], before: [] });
   let cards = [];
 
   texts.add = (text, place) => {
@@ -57,7 +58,7 @@
 
   // Before each picture: where they are depends on where one looks from.
   nmm.viewer.scene.onBeforeRender = (renderer, scene, camera) => {
-    nmm.obstacles?.fade(camera); // it may not be loaded yet
+    for (const act of texts.before) act(camera);
     const [width, height] = [view.clientWidth, view.clientHeight];
     const found = [];
     for (const { sprite, rank } of texts.all) {
