@@ -60,6 +60,9 @@
 
   function show(target) {
     target.inputs.forEach(({ slider, box }, k) => {
+      // What moves by itself, or is dragged far, takes its slider's ends along.
+      const beyond = target.value[k] < Number(slider.min) || target.value[k] > Number(slider.max);
+      if (beyond) Object.assign(slider, { min: target.value[k] - target.reach, max: target.value[k] + target.reach });
       if (document.activeElement !== slider) slider.value = target.value[k];
       if (document.activeElement !== box) box.value = target.value[k].toFixed(3);
     });
