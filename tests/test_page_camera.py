@@ -282,3 +282,10 @@ def test_a_goal_is_dragged_in_the_picture_and_the_ball_comes_there(window: Windo
         box.fill("0.65")
         box.press("Enter")
         page.wait_for_function("Math.abs(nmm.sights.all[0].places[2] - 0.65) < 1e-9")
+        # The ball goes round: its slider's ends go with it.
+        page.wait_for_function(
+            "Math.abs(nmm.drive.targets[2].value[0] - 2.5) > 1.2 * nmm.drive.targets[2].reach"
+        )
+        slider = page.get_by_label("What is seen: x in m", exact=True)
+        away = slider.evaluate("one => Number(one.value) - nmm.drive.targets[2].value[0]")
+        assert abs(away) < 0.02
