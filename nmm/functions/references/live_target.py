@@ -9,28 +9,32 @@ from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, array, scalar, vector
 from nmm.functions.function import Function, LiveNumbers, Row, Stage
-from nmm.kernels.compiled import kernel
+from nmm.kernels.compiled import compiled, kernel
 from nmm.kernels.records import FUNCTION, At, Frames, Rows
 from nmm.robots.robot import Robot
 
 
+@compiled
+def live_value(t: float, numbers: Array, i: int, s: int) -> float:
+    """Number i of s at t: value + rate (t - t0), or value; numbers = [1 or 0, t0, value..., rate...]."""
+    return numbers[2 + i] + numbers[2 + s + i] * (numbers[0] * (t - numbers[1]))
+
+
 @kernel(FUNCTION)
 def signal(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
-    """g = value + rate (t - t0), or g = value; numbers = [1 or 0, t0, value..., rate...]."""
+    """g = what `live_value` says."""
     s = rows.value.shape[0]
-    elapsed = numbers[0] * (at.t - numbers[1])
     for i in range(s):
-        rows.value[i] = numbers[2 + i] + numbers[2 + s + i] * elapsed
+        rows.value[i] = live_value(at.t, numbers, i, s)
         rows.value_t[i] = numbers[2 + s + i]
 
 
 @kernel(FUNCTION)
 def displaced(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
-    """Adds what `signal` is to the rows, in place."""
+    """Adds g of `signal` to the rows, in place."""
     s = rows.value.shape[0]
-    elapsed = numbers[0] * (at.t - numbers[1])
     for i in range(s):
-        rows.value[i] += numbers[2 + i] + numbers[2 + s + i] * elapsed
+        rows.value[i] += live_value(at.t, numbers, i, s)
         rows.value_t[i] += numbers[2 + s + i]
 
 
