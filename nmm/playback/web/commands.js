@@ -33,6 +33,20 @@ const nmm = (window.nmm = { hooks: {}, geometries: {}, endings: [], ended: false
   }
   nmm.viewer = window.viewer = new MeshCat.Viewer(view, true, drawing());
 
+  // Nothing is drawn before all is there. The first picture leaves out the robots' copies: with OpenGL by the
+  // processor they and their shaders take as long as all the rest.
+  const { render } = nmm.viewer;
+  let first = true;
+  nmm.viewer.render = () => {
+    if (document.body.classList.contains("loading")) return;
+    const later = first ? (nmm.ghosts || []).filter(({ visible }) => visible) : [];
+    first = false;
+    for (const copies of later) copies.visible = false;
+    render.call(nmm.viewer);
+    for (const copies of later) copies.visible = true;
+    if (later.length) nmm.viewer.set_dirty();
+  };
+
   // MeshCat takes the window's height for the view's.
   const fit = nmm.viewer.set_3d_pane_size;
   nmm.viewer.set_3d_pane_size = () => {
