@@ -12,15 +12,19 @@ import shutil
 import sys
 import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import nmm
 from nmm.bundled import bundled_scenarios
 from nmm.rendering.chromium import NAMES
 
+if TYPE_CHECKING:
+    from PIL import Image
+
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE / "building"))
 PICTURES = HERE / "images" / "gallery"
-#: Of a picture, px, and how many colours.
+#: Of a card's picture, px, and how many colours pictures have.
 WIDTH, COLOURS = 640, 256
 COLUMNS = 3
 INTRODUCTION = """\
@@ -50,6 +54,7 @@ def page() -> str:
 def draw() -> None:
     """A small picture of each scenario's run."""
     from gallery import write_gallery
+    from made_from import record
     from PIL import Image
 
     PICTURES.mkdir(exist_ok=True)
@@ -58,11 +63,20 @@ def draw() -> None:
     with tempfile.TemporaryDirectory() as folder:
         for card in write_gallery(Path(folder) / "gallery", scenes=True).cards:
             with Image.open(Path(folder) / "gallery" / card.name / card.picture) as picture:
-                size = (WIDTH, round(picture.height * WIDTH / picture.width))
-                small = picture.convert("RGB").resize(size, Image.Resampling.LANCZOS)
-            # FASTOCTREE: the other methods lose the colours of small marks.
-            few = small.quantize(COLOURS, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
-            few.save(PICTURES / f"{card.name}.png", optimize=True)
+                save_small(picture, PICTURES / f"{card.name}.png", WIDTH)
+            record({f"gallery/{card.name}.png": card.name})
+
+
+def save_small(picture: "Image.Image", file: Path, width: int) -> None:
+    """Save a picture at most `width` pixels wide, in few colours."""
+    from PIL import Image
+
+    if picture.width > width:
+        size = (width, round(picture.height * width / picture.width))
+        picture = picture.convert("RGB").resize(size, Image.Resampling.LANCZOS)
+    # FASTOCTREE: the other methods lose the colours of small marks.
+    few = picture.convert("RGB").quantize(COLOURS, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+    few.save(file, optimize=True)
 
 
 def write_folder(folder: str, *only: str) -> bool:

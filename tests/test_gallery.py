@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import gallery
+import made_from
 import pytest
 from gallery import Card, Gallery, make_card, render, write_gallery
 from test_paper import Links
@@ -114,6 +115,33 @@ def test_an_earlier_gallery_is_replaced(tmp_path: Path, monkeypatch: pytest.Monk
     content = json.loads((tmp_path / "g" / "gallery.json").read_text(encoding="utf-8"))
     assert [one["outcome"] for one in content["scenarios"]] == [card.outcome for card in made.cards]
     assert not made.cards[0].ran
+
+
+def test_the_sites_pictures_show_what_the_scenarios_say_now() -> None:
+    """Else: `python docs/make_pictures.py`, `python docs/make_gallery.py`; and look at them."""
+    recorded = made_from.recorded()
+    shown = {
+        path.relative_to(made_from.IMAGES).as_posix() for path in made_from.IMAGES.rglob("*.[pg][ni][gf]")
+    }
+    assert {*recorded} == shown
+    assert made_from.old() == []
+
+
+def test_a_picture_is_old_once_its_scenario_has_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    name = "unicycle_2r_position"
+    changed = tmp_path / f"{name}.yaml"
+    changed.write_text(
+        "# A remark.\n" + bundled_scenarios()[name].read_text(encoding="utf-8"), encoding="utf-8"
+    )
+    then = made_from.content(name)
+    monkeypatch.setattr(made_from, "bundled_scenarios", lambda: {name: changed})
+    assert made_from.content(name) == then
+    changed.write_text(
+        changed.read_text(encoding="utf-8").replace("radius: 3", "radius: 2"), encoding="utf-8"
+    )
+    assert made_from.content(name) != then
 
 
 def test_wrong_names_and_folders_are_refused(tmp_path: Path) -> None:
