@@ -478,5 +478,5 @@ def test_what_was_missed_is_read_in_two_lines(
     assert len(last) <= 200, last
     assert reason in last
     error = np.linalg.norm(nmm.Trajectory.load("missed").error, axis=1)
-    assert f"{error[0]:.3g} at first, {error[-1]:.3g} at the end (promised" in last
+    assert f"{error[0]:.3g} at first, {error[-1]:.3g} at the end (expected" in last
     assert "missed" in result.out

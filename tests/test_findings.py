@@ -95,14 +95,14 @@ EXAMPLES: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
             "end": 4.0,
         },
         {"t": 1.5},
-        "the error left its gain's promise at t = 1.5 s: 1 at first, 0.5 at t = 2 s (promised 0.1), 0.2 at "
-        "the end (promised 0.01)",
+        "the error left its expected decay at t = 1.5 s: 1 at first, 0.5 at t = 2 s (expected 0.1), 0.2 "
+        "at the end (expected 0.01)",
     ),
     (
         "shorter_dt",
         {"shorter": 0.005, "dt": 0.01},
         {},
-        "with dt = 0.005 s in place of 0.01 s it kept its promise when tried",
+        "with dt = 0.005 s in place of 0.01 s the error decayed as expected when tried",
     ),
     (
         "dt_too_long",
@@ -526,7 +526,7 @@ def test_nothing_is_tried_before_somebody_reads(robot_2r: nmm.Robot, trials: lis
     assert run.outcome is nmm.Outcome.MISSED
     assert not run.complete
     assert trials == []
-    assert run.message.startswith("the error left its gain's promise")
+    assert run.message.startswith("the error left its expected decay")
     assert 0 < len(trials) <= 6
     count = len(trials)
     assert run.summary()["message"] == run.message

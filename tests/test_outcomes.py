@@ -18,7 +18,7 @@ from urdf_parts import robot as urdf
 
 import nmm
 from nmm.control.directions import in_world_axes, lost_directions
-from nmm.diagnosis.error_bound import Feedback, accumulated, decay, promised
+from nmm.diagnosis.error_bound import Feedback, accumulated, decay, expected_decay
 from nmm.diagnosis.jumps import chattering
 from nmm.resolvers import Answer, Problem, Status
 from nmm.robots.reach import joint_position, reach
@@ -106,7 +106,7 @@ def test_the_promise_is_the_exponential(rng: np.random.Generator) -> None:
     t = np.array([0.0, 0.1, 0.2, 0.3, 0.35])
     error = np.tile(rng.normal(size=3), (5, 1))
     expected = [np.linalg.norm(expm(-K * one) @ error[0]) for one in t]
-    np.testing.assert_allclose(promised(t, error, feedback(K)), expected, rtol=1e-12)
+    np.testing.assert_allclose(expected_decay(t, error, feedback(K)), expected, rtol=1e-12)
     # An error of 1 that was made along the first step, and what is left of it.
     symmetric = K @ K.T
     left = accumulated(np.array([1.0, 0, 0, 0]), decay(t, error, feedback(symmetric)))
@@ -127,7 +127,7 @@ def test_the_promise_counts_a_bound_of_the_feedback(rng: np.random.Generator) ->
     )
     expected = np.where(t > meets, 0.2 * np.exp(-K * (t - meets)), expected)
     bounded = feedback(K * np.eye(3), speed, braking)
-    np.testing.assert_allclose(promised(t, error, bounded), expected, atol=1e-5)
+    np.testing.assert_allclose(expected_decay(t, error, bounded), expected, atol=1e-5)
     np.testing.assert_array_equal(bounded.bound(expected[:, np.newaxis] * error / 3.0), t < meets)
 
 
@@ -209,7 +209,7 @@ def test_a_rate_that_is_not_the_targets_is_told(robot_2r: Robot) -> None:
 
 
 def test_a_target_that_moves_as_its_rate_says_is_not_blamed(robot_2r: Robot) -> None:
-    """Inputs are clipped while the target goes round: that alone is why the error left its promise."""
+    """Inputs are clipped while the target goes round: that alone is why the error exceeds its decay."""
     circle = nmm.Circle(center=[2, 2], radius=3, rate=0.25, phase=4.0)
     resolver = nmm.CallableResolver(lambda p: np.clip(np.linalg.pinv(p.J) @ p.rate, -1.0, 1.0))
     controller = nmm.Controller(robot_2r, nmm.Task(nmm.Position("ee", "xy"), circle, 1.0), resolver)

@@ -350,7 +350,7 @@ def test_a_leg_is_judged_from_its_beginning_and_the_one_that_did_too_little_is_n
     called = {0: "", 4: "with reach and swing from t = 0 to 1 s", 3: "with reach from t = 1 to 4 s"}[lazy]
     if lazy == 3:
         assert run.outcome is nmm.Outcome.MISSED
-        assert run.message.startswith(f"{called}: the error left its gain's promise at t = 1")
+        assert run.message.startswith(f"{called}: the error left its expected decay at t = 1")
     else:  # an event ended the leg before it had to be where it was promised
         assert (run.outcome, run.message) == (nmm.Outcome.COMPLETED, "")
     assert {one.split(": ")[0] for one in run.warnings} == ({called} if lazy else set())

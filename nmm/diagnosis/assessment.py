@@ -1,5 +1,5 @@
 """What is wrong with a recorded run: modes that its dt is too long for (by the eigenvalues of the closed
-loop's linearisation), an error that left its promise."""
+loop's linearisation), an error that did not decay as expected."""
 
 import math
 from contextlib import suppress
@@ -138,7 +138,7 @@ def instabilities(
 
 
 class Assessment(NamedTuple):
-    """What is wrong with a run: instabilities at `examined` instants; where the error left its promise; the
+    """What is wrong with a run: instabilities at `examined` instants; an error above its expected decay; the
     number of steps in which the target moved otherwise than its rate says."""
 
     unstable: list[Instability]
@@ -154,7 +154,7 @@ class Assessment(NamedTuple):
 def assess(
     controller: Controller, recorder: Recorder, advance: Integrator, dt: float, held: bool = True
 ) -> Assessment:
-    """Assess a recorded run; `held`: also against its gain's promise."""
+    """Assess a recorded run; `held`: also against its expected decay."""
     with controller.without_limits():
         some = np.unique(np.linspace(0, len(recorder) - 1, EXAMINED if advance.stability else 0).astype(int))
         unstable = instabilities(controller, recorder.t[some], recorder.q[some], dt, advance.stability)

@@ -51,7 +51,7 @@ def diagnose_legs(
     swept: Swept | None,
     until: Goal | None,
 ) -> Verdict | Awaited:
-    """The verdict on a run of tasks that come and go: the first leg that left its promise decides."""
+    """The verdict on a run of tasks that come and go: the first leg above its expected decay decides."""
     last = legs[-1]
     judged = [judge(leg, trajectory.dt, trajectory.method, until if leg is last else None) for leg in legs]
     before = [tuple((one,) for one in leg.recorder.findings) for leg in legs]
@@ -140,7 +140,7 @@ def _nearly_singular(recorder: Recorder) -> Iterator[Finding]:
 
 
 def _reached(verdict: Verdict, leg: Leg, goal: Goal | None) -> Verdict:
-    """The verdict with a goal: by its tolerances, whatever the gain promised."""
+    """The verdict with a goal: by its tolerances, whatever decay the gain asks for."""
     recorder, rows = leg.recorder, leg.controller.rows
     if goal is None or verdict.outcome not in ENDED or not len(recorder):
         return verdict

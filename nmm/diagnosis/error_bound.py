@@ -1,4 +1,4 @@
-"""What a gain promises of the task error along a run, and what an integrator of finite step may add to it.
+"""How the gain lets the task error decay along a run, and what an integrator of finite step may add to it.
 
 The closed loop has e_dot = -K e for any robot, so e(t) = exp(-K (t - t0)) e(t0), also for angles and a pose's
 logarithm. A step h of a method of order p adds its local error. Along a step the task's rate changes by ΔJ u
@@ -8,7 +8,7 @@ error is c for order 1 and c ρ^(p-1) for order p, to leading order, with
     c = h/2 (‖ΔJ u‖ + ‖Δ ∂e/∂t‖ + h ‖K² e‖)
 
 and ρ the share by which u, J or ∂e/∂t changed along the step. Earlier errors decay as the error does. Where a
-task bounds its feedback by a speed or braking (`Feedback`), the promise follows the bounded K e, and nothing
+task bounds its feedback by a speed or braking (`Feedback`), the decay follows the bounded K e, and nothing
 is taken to decay where a bound binds. A step along which u or J changed by more than its own size is not
 resolved by the method: no allowance is made for it.
 """
@@ -31,9 +31,9 @@ from nmm.runs.residuals import differs
 SAFETY = 3.0
 #: Largest integration error of a run that follows its target, as a share of 1 + ‖e(t0)‖ (m, rad).
 MOST = 0.1
-#: The error has left its promise where it exceeds it by more than this share of 1 + ‖e(t0)‖.
+#: The error counts as above its expected decay from more than this share of 1 + ‖e(t0)‖.
 LEFT = 0.01
-#: The final error keeps the promise up to this factor, or up to a share as above.
+#: The final error is as expected up to this factor, or up to a share as above.
 RETURNED, ENDS = 2.0, 1e-3
 
 
@@ -98,7 +98,7 @@ class Samples(NamedTuple):
         return cls(recorder.t, error, rate, J, u, residual, found.partition, feedback, servo)
 
     def lag(self) -> tuple[Array, Array]:
-        """At order 2, what J u may lack of the rate at the samples, as y_dot = -k y promises, and what it
+        """At order 2, what J u may lack of the rate at the samples, as y_dot = -k y has it, and what it
         lacks more, (N,) each; zeros at order 1."""
         if not self.servo:
             return np.zeros(len(self.t)), np.zeros(len(self.t))
@@ -108,12 +108,12 @@ class Samples(NamedTuple):
 
 
 class Departure(NamedTuple):
-    """Where the error left its promise.
+    """Where the error exceeds its expected decay.
 
     first, worst : the samples at which it left and was farthest away
-    bound (N,) : the largest ‖e‖ that promise, integration and target explain
+    bound (N,) : the largest ‖e‖ that decay, integration and target explain
     unmet (N,) : what the residual adds, where inputs fell short of the task
-    missed : the promise was not kept; else the error left it by little, or by the residual, and came back
+    missed : the error stayed above; else it exceeded that by little, or by the residual, and came back
     """
 
     first: int
@@ -126,10 +126,10 @@ class Departure(NamedTuple):
 def departure(
     samples: Samples, step: Array, target: Array | None = None, *, goes_on: bool = False
 ) -> Departure | None:
-    """Where and how far ‖e‖ left its promise, if it did.
+    """Where and how far ‖e‖ exceeds its expected decay, if it does.
 
     step (N - 1,) : the error that each integration step may add (`step_errors`)
-    target (N - 1,) : the target's motion along each step beyond its rate; one that jumps restarts the promise
+    target (N - 1,) : the target's motion along each step beyond its rate; one that jumps restarts the decay
     goes_on : the task goes on after the last sample, so that the error need not have returned there
     """
     t, error = samples.t, samples.error
@@ -138,7 +138,7 @@ def departure(
     decays = decay(t, error, samples.feedback)
     norm = _sizes(error)
     size = 1.0 + norm[0]
-    bound = promised(t, error, samples.feedback) + np.minimum(accumulated(step, decays), MOST * size)
+    bound = expected_decay(t, error, samples.feedback) + np.minimum(accumulated(step, decays), MOST * size)
     if target is not None:
         bound = bound + accumulated(target, decays)
     short = np.where(differs(samples.residual, samples.rate), samples.residual, 0.0)
@@ -174,7 +174,7 @@ def decay(t: Array, error: Array, feedback: Feedback) -> Array:
     return np.where(bound[1:] | bound[:-1], 1.0, norms[which])
 
 
-def promised(t: Array, error: Array, feedback: Feedback) -> Array:
+def expected_decay(t: Array, error: Array, feedback: Feedback) -> Array:
     """‖e‖ at t (N,) of e_dot = -K e from error[0], in the rows' mixed units."""
     if feedback.has_bounds:
         from scipy.integrate import solve_ivp  # here: a quarter of a second that most runs need not pay

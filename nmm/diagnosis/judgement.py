@@ -1,4 +1,4 @@
-"""What a run, or a leg of one, amounts to: its error against its gain's promise, its inputs against the task.
+"""What a run, or a leg of one, amounts to: its error against its expected decay, its inputs against the task.
 
 Examined at its end, as controller and targets may change later; only a shorter dt, which takes as long as
 several runs, is tried when the verdict is read (`Judged.trials`).
@@ -131,9 +131,9 @@ class Judged:
 
     lost : what nothing moves, at a singular end
     found : the assessment, if it was made
-    left : the finding that the error left its promise
+    left : the finding that the error exceeds its expected decay
     seen : possible causes
-    moved : the finding that the target moved otherwise than its rate says, though the promise was kept
+    moved : the finding that the target moved otherwise than its rate says, though the error decayed
     trials : shorter dt to be tried; method, dt, s : the run's
     """
 
@@ -192,7 +192,7 @@ class Judged:
 
 
 def judge(leg: Leg, dt: float, method: str, goal: Goal | None) -> Judged:
-    """Judge a leg; one that reached its goal need not keep its promise. An interrupt only loses findings."""
+    """Judge a leg; one that reached its goal may be above its decay. An interrupt only loses findings."""
     ended = leg.ended
     try:
         with leg.controller.solver.sample.aside():  # the controller stays as the run left it
@@ -210,7 +210,7 @@ def _judged(leg: Leg, dt: float, method: str, goal: Goal | None) -> Judged:
         return Judged(outcome, ended, lost=lost)
     samples = Samples.of(recorder)
     warnings = tuple((one,) for one in _unmet(controller, recorder, samples, dt))
-    if outcome is Outcome.INTERRUPTED or recorder.disturbed:  # its gain promises nothing of a disturbed robot
+    if outcome is Outcome.INTERRUPTED or recorder.disturbed:  # no decay is expected of a disturbed robot
         return Judged(outcome, ended, warnings, lost)
     there = goal is not None and goal.reached(samples.error[-1], controller.rows)
     found = assess(controller, recorder, leg.integrator, dt, held=not there)
@@ -220,7 +220,7 @@ def _judged(leg: Leg, dt: float, method: str, goal: Goal | None) -> Judged:
     why = *_seen(controller, recorder, samples, left), *(moved if left else ()), passed(recorder)
     seen = tuple(one for one in why if one is not None)
     troubled = bool(found.unstable) or found.missed or outcome is Outcome.DIVERGED
-    # A task that distances hold back departs from its promise with any dt, and to try costs many runs.
+    # A task that distances hold back departs from its decay with any dt, and to try costs many runs.
     held_back = bool(recorder.blocking) or recorder.avoided
     hopeless = outcome is Outcome.SINGULAR or any(one.code == HOPELESS for one in seen)
     return Judged(
@@ -229,7 +229,7 @@ def _judged(leg: Leg, dt: float, method: str, goal: Goal | None) -> Judged:
         warnings,
         lost,
         found,
-        left=() if left is None else (_promise_left(samples, left),),
+        left=() if left is None else (_above_decay(samples, left),),
         seen=seen,
         moved=() if left else moved,
         trials=Trials(leg, dt, found) if troubled and not (hopeless or held_back or samples.servo) else None,
@@ -256,8 +256,8 @@ def _unmet(controller: Controller, recorder: Recorder, samples: Samples, dt: flo
         yield otherwise
 
 
-def _promise_left(samples: Samples, found: Departure) -> Finding:
-    """What was promised and found: at the worst, and at the end if the promise is not kept there."""
+def _above_decay(samples: Samples, found: Departure) -> Finding:
+    """What was expected and found: at the worst, and at the end if the error is above it there."""
     norm = np.linalg.norm(samples.error, axis=1)
     last = len(norm) - 1
     missed = norm[last] > found.bound[last]
@@ -273,7 +273,7 @@ def _promise_left(samples: Samples, found: Departure) -> Finding:
 def _seen(
     controller: Controller, recorder: Recorder, samples: Samples, left: Departure | None
 ) -> Iterator[Finding | None]:
-    """Possible causes where the error left its promise, or at the end of an unfinished run."""
+    """Possible causes where the error exceeds its expected decay, or at the end of an unfinished run."""
     chatter = chattering(samples.t, samples.u, controller.robot.u_names)
     if left is None:
         yield chatter

@@ -1,4 +1,4 @@
-"""Why a task error left its promise: what a run shows there."""
+"""Why a task error exceeds its expected decay: what a run shows there."""
 
 from collections.abc import Iterator
 
@@ -77,7 +77,7 @@ def stretched(controller: Controller, q: Array, J: Array) -> Finding | None:
 def singularity(
     controller: Controller, samples: Samples, q: Array, found: Departure
 ) -> Iterator[Finding | None]:
-    """Whether J was singular between two samples, or nearly so, where the error left its promise."""
+    """Whether J was singular between two samples, or nearly so, where the error exceeds its decay."""
     first, last = max(0, found.first - 1), min(len(q) - 1, found.worst + 1)
     norm = np.linalg.norm(samples.error, axis=1)
     grown = np.diff(norm[first : last + 1]) >= JUMP * (1.0 + norm[first:last])
@@ -135,7 +135,7 @@ def still_moving(controller: Controller, samples: Samples) -> Finding | None:
 
 
 def unresolved(samples: Samples, found: Departure) -> Finding | None:
-    """The change of the inputs along the step on which the error left its promise."""
+    """The change of the inputs along the step on which the error exceeds its expected decay."""
     k = max(1, found.first)
     before, after = samples.u[k - 1], samples.u[k]
     larger = max(float(np.linalg.norm(before)), float(np.linalg.norm(after)))

@@ -71,12 +71,12 @@ def _inputs_unmet(
     )
 
 
-def _promise_left(t: float, initial: float, errors: Sequence[Mapping[str, Any]], end: float, **_: Any) -> str:
+def _above_decay(t: float, initial: float, errors: Sequence[Mapping[str, Any]], end: float, **_: Any) -> str:
     told = [f"{initial:.3g} at first"]
     for one in errors:
         when = "at the end" if one["t"] == end else f"at t = {one['t']:.4g} s"
-        told.append(f"{one['error']:.3g} {when} (promised {one['promised']:.2g})")
-    return f"the error left its gain's promise at t = {t:.4g} s: {', '.join(told)}"
+        told.append(f"{one['error']:.3g} {when} (expected {one['promised']:.2g})")
+    return f"the error left its expected decay at t = {t:.4g} s: {', '.join(told)}"
 
 
 def _crossed(steps: Sequence[Sequence[float]], more: int, name: str = "", **of: Any) -> str:
@@ -139,9 +139,9 @@ WORDS: Mapping[str, Words] = {
     ),
     "blocked": lambda pairs, **_: f"blocked by the distance of {', '.join(pairs)}",
     "collided": "{name} ran into each other from t = {t:.3g} s on, by up to {depth:.3g} m",
-    # The error against its promise, and why
-    "promise_left": _promise_left,
-    "shorter_dt": "with dt = {shorter:.3g} s in place of {dt:g} s it kept its promise when tried",
+    # The error against its expected decay, and why
+    "promise_left": _above_decay,
+    "shorter_dt": "with dt = {shorter:.3g} s in place of {dt:g} s the error decayed as expected when tried",
     "dt_too_long": _unstable,
     "rate_jumps": (
         "the rate that tasks ask for jumps {jumps} times, by up to {size:.3g} (m/s, rad/s), first at "

@@ -195,7 +195,7 @@ class Trajectory:
 
     @property
     def complete(self) -> bool:
-        """Whether the run reached its end, and its task error went as its gain promises."""
+        """Whether the run reached its end, and its task error decayed as its gain asks."""
         return self.outcome is Outcome.COMPLETED
 
     @property
