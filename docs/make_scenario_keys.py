@@ -2,31 +2,34 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from itertools import groupby
 from pathlib import Path
 
-from nmm.scenario.reference import sections
+from nmm.scenario.reference import Section, sections
 
 PAGE = Path(__file__).with_name("scenarios.md")
+KIND, ANY = ", kind: ", ", of any kind"
+Key = tuple[str, str, str]
 
 HEAD = """# Scenarios
 
-A scenario is a YAML file: a robot, a start, a task, an objective and a resolver. `nmm scenarios` lists the
-bundled ones; copy one and change it, or let [`nmm init ROBOT`](command_line.md#nmm-init) write one for
-your robot. Any key can be set from the command line by its dotted path, lists counting from 0:
+A scenario is a YAML file: a robot, a start, a task, an objective and a resolver. Copy a bundled one
+(`nmm scenarios`) or let [`nmm init ROBOT`](command_line.md#nmm-init) write one for your robot. `--set` sets
+any key by its dotted path; lists count from 0:
 
     nmm run unicycle_2r_position --set dt=0.001 --set resolver.alpha=5 --set task.0.gain=2
     nmm run my_scenario.yaml --resolver pg
 
-Numbers may be arithmetic with pi (`5/4*pi`). Units are metres, radians and seconds. A key that does not
-exist, a frame that the robot does not have, text where a number belongs: each is one line that names the
-file, the key and what was expected.
+Numbers may be arithmetic with pi (`5/4*pi`). Units are metres, radians and seconds. A wrong key or value
+gives one line with the file, the key and what was expected.
 
 ```yaml
 %s```
 
-A reference that another one is made from stands once, and is named by its path wherever a reference may
-stand: a bearing's or velocity's `of`, a point, a direction, an objective's target, another task's
-`reference`.
+A reference may be named by its path wherever a reference may stand:
 
 ```yaml
 task:
@@ -34,10 +37,11 @@ task:
   - {kind: heading, frame: link2, reference: {kind: bearing, of: task.0.reference, towards: [6, 2]}}
 ```
 
-`--set task.0.reference.radius=2` then changes both. Below an anchor (`&`) of YAML it changes that place
-alone, with a warning that names those that the anchor ties to it.
+`--set task.0.reference.radius=2` then changes both. Where YAML anchors (`&`) share a value, `--set` changes
+one place and warns about the others.
 
-Below, every key. (`docs/make_scenario_keys.py` writes this page from the schema that checks the files.)
+All keys follow, as `nmm scenarios --keys` prints them. In each table, keys that several kinds have come
+first; a kind's row (bold) names those that it also has, and its own keys follow.
 """
 
 
@@ -47,16 +51,54 @@ def page() -> str:
 
     example = bundled_scenarios()["unicycle_2r_link_pointing"].read_text(encoding="utf-8")
     parts = [HEAD % example]
-    for section in sections():
-        parts.append(f"## {section.title}\n\n{section.summary}\n")
-        if section.keys:
-            rows = [f"| `{key}` | {_cell(default)} | {_cell(text)} |" for key, default, text in section.keys]
-            parts.append("\n".join(["| key | default | |", "|---|---|---|", *rows]) + "\n")
+    for top, found in groupby(sections(), lambda section: re.split(r"[.,:]", section.title)[0]):
+        group = list(found)
+        summary = "" if ", " in group[0].title else f"\n{group[0].summary}\n"
+        rows = "\n".join(_rows(group))
+        parts.append(f"## {top}\n{summary}\n| key | default | |\n|---|---|---|\n{rows}\n")
     return "\n".join(parts)
 
 
-def _cell(text: str) -> str:
-    return text.replace("|", "\\|").replace("\n", " ")
+def _rows(group: list[Section]) -> Iterator[str]:
+    """A part's keys, those of its kinds, and those of its parts, each after a row with its name."""
+    for where, found in groupby(group, lambda section: section.title.partition(KIND)[0]):
+        kinds = list(found)
+        if KIND in kinds[0].title:
+            yield from _of_kinds(kinds, f"{where}: " if "." in where else "")
+            continue
+        (section,) = kinds
+        if section is not group[0] and ANY not in where:
+            yield _row((where, "", section.summary), "**")
+        yield from _merged(section.keys)
+
+
+def _of_kinds(kinds: list[Section], where: str) -> Iterator[str]:
+    """Keys that several kinds have; then each kind, what it is, which of these it has, and its own keys."""
+    count = Counter(key for section in kinds for key in section.keys)
+    shared: dict[str, Key] = {}
+    for key, times in count.most_common():
+        if times > 1:
+            shared.setdefault(key[0], key)
+    yield from _merged(shared.values())
+    for section in kinds:
+        own = [key for key in section.keys if key != shared.get(key[0])]
+        also = ", ".join(f"`{key[0]}`" for key in section.keys if key not in own)
+        told = f"{section.summary} Also {also}." if also else section.summary
+        yield _row((where + section.title.partition(KIND)[2], "", told), "**")
+        yield from _merged(own)
+
+
+def _merged(keys: Iterable[Key]) -> Iterator[str]:
+    """A row for each key, and one for neighbours that say the same."""
+    for text, found in groupby(keys, lambda key: key[2]):
+        names, defaults = zip(*(key[:2] for key in found), strict=True)
+        said = defaults[:1] if len({*defaults}) == 1 else defaults
+        yield _row(("`, `".join(names), ", ".join(said), text), "`")
+
+
+def _row(key: Key, mark: str) -> str:
+    name, default, text = (cell.replace("|", "\\|").replace("\n", " ") for cell in key)
+    return f"| {mark}{name}{mark} | {default} | {text} |"
 
 
 if __name__ == "__main__":
