@@ -74,16 +74,22 @@ def _rows(group: list[Section]) -> Iterator[str]:
 
 def _of_kinds(kinds: list[Section], where: str) -> Iterator[str]:
     """Keys that several kinds have; then each kind, what it is, which of these it has, and its own keys."""
-    count = Counter(key for section in kinds for key in section.keys)
-    shared: dict[str, Key] = {}
-    for key, times in count.most_common():
+    count = Counter((name, text) for section in kinds for name, _, text in section.keys)
+    texts: dict[str, str] = {}
+    for (name, text), times in count.most_common():
         if times > 1:
-            shared.setdefault(key[0], key)
+            texts.setdefault(name, text)
+    every = [key for section in kinds for key in section.keys if texts.get(key[0]) == key[2]]
+    shared = {name: Counter(key for key in every if key[0] == name).most_common(1)[0][0] for name in texts}
     yield from _merged(shared.values())
     for section in kinds:
-        own = [key for key in section.keys if key != shared.get(key[0])]
-        also = ", ".join(f"`{key[0]}`" for key in section.keys if key not in own)
-        told = f"{section.summary} Also {also}." if also else section.summary
+        own = [key for key in section.keys if key not in every]
+        also = [
+            f"`{key[0]}`" if key == shared[key[0]] else f"`{key[0]}` ({key[1]})"
+            for key in section.keys
+            if key in every
+        ]
+        told = f"{section.summary} Also {', '.join(also)}." if also else section.summary
         yield _row((where + section.title.partition(KIND)[2], "", told), "**")
         yield from _merged(own)
 

@@ -52,11 +52,11 @@ class Collisions:
     band : pairs nearer than this have rows, m; `distance` plus 0.2 m when not given
     gain : 1/s, a distance falls at most at this times what is left of it
     recovery : speed at which a distance below the minimum is restored, m/s
-    braking : deceleration of a distance to rely on, m/s²; None for a quarter of what the inputs'
+    braking : deceleration of a distance to count on, m/s²; None for a quarter of what the inputs'
         accelerations give
     rows : the largest number of distances kept at a time, the smallest ones
-    horizon : for so long ahead, s, obstacles that move along a path are looked at: the robot waits, or gives
-        way, where they will come; 0 for no longer than it takes to stop
+    horizon : s ahead, for which obstacles with a motion are looked at: the robot waits or gives way; 0 for
+        the time to stop
 
     Raises
     ------

@@ -17,8 +17,8 @@ class Goal:
 
     Parameters
     ----------
-    m, rad : tolerances of rows in metres and of rows in radians. Rows without a unit count as radians, as
-        image coordinates do, and pixels over the focal length; rows of other units are ignored
+    m, rad : tolerances of rows in metres and in radians; rows without a unit, and pixels over the focal
+        length, count as radians
 
     Examples
     --------

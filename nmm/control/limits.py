@@ -30,12 +30,12 @@ class Limits:
 
     Parameters
     ----------
-    velocity : of inputs: True for the robot's, False for none, or numbers for inputs, groups ("platform",
-        "arm") or mimic joints, in place of the robot's: a number for both signs or [lower, upper]; m/s, rad/s
+    velocity : of inputs, m/s, rad/s: True for the robot's, False for none, or by input, group ("platform",
+        "arm") or mimic joint: a number for both signs or [lower, upper]
     position : of coordinates, in the same way: [lower, upper]; m, rad
-    acceleration : of inputs: None for none, a number for all, or numbers for inputs or groups; m/s², rad/s²
-    wheels : largest rolling rates, rad/s: numbers by joint in place of the robot's, or one for all wheels
-        except casters; None for the robot's own, unless velocity=False
+    acceleration : of inputs, m/s², rad/s²: a number for all, or by input or group; None for none
+    wheels : largest rolling rates, rad/s: by joint, or one for all but casters; None for the robot's, unless
+        velocity=False
     bounds : limits of functions
     recovery : speed at which a coordinate returns from beyond its limit, m/s or rad/s
 

@@ -82,8 +82,7 @@ class Steering:
     Parameters
     ----------
     gain : k, with which a steering angle converges, 1/s
-    spring : k1, with which the null space turns the end-effector ahead of the axle, 1/s (α of the resolver
-        times its weight; the weight where it has no α); 0 for none
+    spring : k1 with which the null space turns the end-effector ahead of the axle, 1/s; 0 for none
 
     Raises
     ------

@@ -227,7 +227,7 @@ class Parking(Function):
     Parameters
     ----------
     x, y, theta : the pose of the platform, m and rad
-    within : m and rad; so near, the platform rests. Where the pose is measured, some ten times the noise
+    within : m and rad at which the platform rests: ten times the noise of a measured pose
 
     Raises
     ------

@@ -50,18 +50,16 @@ class DampedLeastSquares(Resolver):
     Parameters
     ----------
     alpha : step size α > 0, 1/s times the unit of H's curvature
-    law : how λ depends on the singular values σ of J, rows in their natural scales: "directions", each
-        direction by its own σ, λ_i² = λ² (1 - (σ_i / ε)²) below ε and none from there on (Maciejewski
-        and Klein 1988, Chiaverini 1997); "variable", all directions by the least σ (Chiaverini,
-        Egeland and Kanestrøm 1991); "constant", all by λ everywhere (Wampler 1986)
+    law : λ by the singular values σ of J, rows in their natural scales: "directions", each by its own σ, λ_i²
+        = λ² (1 - (σ_i / ε)²) below ε, else 0 (Maciejewski and Klein 1988, Chiaverini 1997); "variable", all
+        by the least σ (Chiaverini, Egeland and Kanestrøm 1991); "constant", λ everywhere (Wampler 1986)
     damping : the largest λ > 0
-    threshold : ε > 0; where no σ is smaller, nothing is damped and the answer is the projected gradient's
-        ("constant" damps the rate everywhere, and keeps the objective out of the task from ε on)
-    weights : None; m positive numbers; a mapping from names of inputs or of their groups ("platform",
-        "arm"), 1 for the rest: an input with a large weight moves less; or a symmetric positive definite
-        (m, m) matrix
+    threshold : ε > 0; where no σ is smaller, the answer is the projected gradient's ("constant" damps
+        everywhere)
+    weights : numbers above 0, one an input, or by input or group ("platform", "arm"), 1 for the rest: a heavy
+        input moves less; or a symmetric positive definite (m, m) matrix
     step : "constant": α; "armijo": at each sample α is shortened until the objective falls along the sample's
-        motion, so that α dt is never too large
+        motion
 
     Examples
     --------

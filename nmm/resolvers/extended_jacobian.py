@@ -158,11 +158,10 @@ class ExtendedJacobian(Resolver):
 
     Parameters
     ----------
-    tolerance : J_e counts as singular where its last pivot, rows in their natural scales, is below this,
-        times the largest pivot if that is above 1
-    singular : what happens where J_e loses rank though J does not (algorithmic singularities): "stop" ends
-        the run; with "damped" the task stays exact and the added task is damped, as by damped least squares
-        with its defaults, in the directions that the task hardly leaves free; likewise levels of priority
+    tolerance : singular where the last pivot, rows in their natural scales, is below this (times the largest
+        one above 1)
+    singular : where J_e loses rank and J does not (algorithmic singularities): "stop" ends the run; "damped"
+        keeps the task exact and damps the added task, or lower levels, where the task hardly leaves it free
 
     Examples
     --------

@@ -64,13 +64,12 @@ class ProjectedGradient(Resolver):
     Parameters
     ----------
     alpha : step size α > 0, 1/s times the unit of H's curvature
-    weights : None; m positive numbers; a mapping from names of inputs or of their groups ("platform",
-        "arm"), 1 for the rest: an input with a large weight moves less; or a symmetric positive definite
-        (m, m) matrix
-    tolerance : J counts as singular where its last pivot, rows in their natural scales, is below this,
-        times the first pivot if that is above 1
+    weights : numbers above 0, one an input, or by input or group ("platform", "arm"), 1 for the rest: a heavy
+        input moves less; or a symmetric positive definite (m, m) matrix
+    tolerance : singular where the last pivot, rows in their natural scales, is below this (times the largest
+        one above 1)
     step : "constant": α; "armijo": at each sample α is shortened until the objective falls along the sample's
-        motion, so that α dt is never too large
+        motion
 
     Examples
     --------

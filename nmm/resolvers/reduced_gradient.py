@@ -216,16 +216,14 @@ class ReducedGradient(Resolver):
         most 1 / (2 sqrt(their number)); or a list of candidates, measured by |det Ja| (the paper's rule:
         [("v", "q1"), ("v", "omega")] in case 1; the arm's joints when n_m = s)
     threshold : Θ; 0.01 for given candidates (the paper's), 0.05 for automatic ones
-    tolerance : Ja or J counts as singular where its last pivot, rows in their natural scales, is below
-        this, times the largest pivot if that is above 1
-    weights : None; m positive numbers; or a mapping from names of inputs or of their groups
-        ("platform", "arm"), 1 for the rest. The counterpart of the weighted pseudoinverse: the method
-        in the inputs sqrt(w) u. A heavy input is less often in Ja (its column counts for less in
-        |det Ja|, which is then weighted), and descends H more slowly (α / w)
-    singular : what happens where no candidate is well conditioned: "stop" ends the run; with "damped" the
-        answer changes gradually to that of damped least squares with its defaults, and back
+    tolerance : singular where the last pivot, rows in their natural scales, is below this (times the largest
+        one above 1)
+    weights : numbers above 0, one an input, or by input or group ("platform", "arm"), 1 for the rest: the
+        method in the inputs sqrt(w) u. A heavy input is less often in Ja, and descends H more slowly (α / w)
+    singular : where no candidate is well conditioned: "stop" ends the run, "damped" changes gradually to
+        damped least squares, and back
     step : "constant": α; "armijo": at each sample α is shortened until the objective falls along the sample's
-        motion, so that α dt is never too large
+        motion
 
     Examples
     --------

@@ -36,15 +36,14 @@ class Disturbances:
 
     Parameters
     ----------
-    noise : standard deviation of what the controller sees of each coordinate, m and rad: a number, (n,), or
-        numbers for some by name
+    noise : standard deviation of each coordinate that the controller sees, m and rad: a number, (n,), or by
+        name
     delay : samples until inputs act; the robot stands before
-    slip : the share of each input that acts, 1 for all of it: a number, (m,), or numbers for some by name
-    creep : a platform that drives with v and turns with ω slides sideways with creep v ω, to its left where
-        that is above 0; s
-    odometry : whether the controller sees the platform where its wheels' turning says that it is, of which
-        slip and creep are no part, as on a robot with encoders; the run records it as `believed`
-    correct : every so many seconds odometry is put right, as by a localisation; never when not given
+    slip : the share of each input that acts: a number, (m,), or by name
+    creep : s; the platform slides to its left with creep v ω
+    odometry : whether the controller sees the platform where its wheels' encoders have it, without slip and
+        creep; recorded as `believed`
+    correct : s, after which odometry is put right each time; never when not given
     seed : of the noise
 
     Raises

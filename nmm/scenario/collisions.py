@@ -133,8 +133,8 @@ class ObstaclePart(Part):
     rpy: Three = Field([0.0, 0.0, 0.0], description="roll, pitch, yaw about fixed axes, rad")
     motion: Annotated[FunctionPart, OneOf(PATH_PARTS)] | None = Field(
         None,
-        description="where its origin is at t, in place of xyz: a reference of kind line, circle, polynomial "
-        "or spline, of three rows; m",
+        description="in place of xyz, its origin over time, m: a reference of three rows (line, "
+        "circle, polynomial, spline)",
     )
 
     def build(self, robot: Robot, absolute: Absolute, place: Place) -> Obstacle:
@@ -156,8 +156,8 @@ class ObstaclePart(Part):
 
 _SRDF = (
     bool | FileName | None,
-    "a file of MoveIt's whose disabled pairs are left out, too; relative to the scenario, or "
-    "package://PACKAGE/PATH; true for the robot's own",
+    "MoveIt's file of disabled pairs, relative to the scenario, or package://PACKAGE/PATH; true for the "
+    "robot's own",
 )
 _PAIRS = list[Annotated[list[str], Field(min_length=2, max_length=2)]]
 

@@ -27,13 +27,13 @@ class BoundPart(FunctionPart):
     )
     braking: Positive | None = Field(
         None,
-        description="deceleration to count on, m/s² or rad/s²; when not given, a quarter of what the inputs' "
-        "accelerations give where the robot is",
+        description="deceleration to count on, m/s² or rad/s²; by default a quarter of what the "
+        "inputs' accelerations give",
     )
     name: str = Field("", description="for messages; the function's rows when not given")
     priority: Whole | None = Field(
         None,
-        description="1, 2, ... where it is kept if possible, as far as tasks of a lower number leave it; "
+        description="1, 2, ...: a soft limit, kept as far as tasks of a lower number leave it; "
         "before any task when not given",
     )
 

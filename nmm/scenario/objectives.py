@@ -43,10 +43,10 @@ class ObjectivePart(MadePart):
 
     weight: Weight = Field(
         1.0,
-        description="factor on this objective in the sum: a number above 0, or a reference of one row, as "
-        "its weight over time ({kind: line, start: 0, end: 1, duration: 5})",
+        description="factor above 0: a number, or a reference of one row ({kind: line, start: 0, "
+        "end: 1, duration: 5})",
     )
-    maximise: bool = Field(False, description="whether to maximise it: its negative is minimised")
+    maximise: bool = Field(False, description="whether it is maximised")
 
     def among(self, collisions: Collisions | None) -> Objective:
         objective: Objective = self.make()
@@ -118,7 +118,7 @@ class ClearancePart(keys_of(Clearance, ObjectivePart, "collisions")):  # type: i
 class MaximisedPart(ObjectivePart):
     """An objective that is better when it is larger."""
 
-    maximise: bool = Field(True, description="whether to maximise it: its negative is minimised")
+    maximise: bool = Field(True, description="whether it is maximised")
 
 
 SPECIAL: dict[str, type[ObjectivePart]] = {"quadratic": QuadraticPart, "clearance": ClearancePart}

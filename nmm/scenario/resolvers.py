@@ -42,9 +42,8 @@ class WithAddedTask(ResolverPart):
         TaskList | None, BeforeValidator(lambda value: None if value is None else listed(value))
     ] = Field(
         None,
-        description="the task y = h(q) that takes up the redundancy, or a list of such, p + n_m - s rows "
-        "together; when not given and the objective is quadratic with so many terms, each term's combination "
-        "is driven to its target",
+        description="the task y = h(q), or a list, of p + n_m - s rows; by default the terms of a "
+        "quadratic objective, driven to their targets",
     )
     gain: Positive = Field(
         10.0, description="feedback gain K_y, 1/s, of the added task made from the objective"

@@ -99,37 +99,34 @@ class RobotPart(Part):
     )
     platform: Annotated[str | dict[str, Any] | None, BeforeValidator(_kind_of_platform)] = Field(
         None,
-        description="how the base moves: a kind (car), measured in the file, or with its parameters, as "
-        "{kind: car, wheelbase: 0.5}; when not given, what the file declares, or a car or a unicycle, as "
-        "its wheels steer",
+        description="a kind (car), measured in the file, or {kind: car, wheelbase: 0.5}; by default "
+        "what the file declares, else a car or a unicycle, as its wheels steer",
     )
     package_dirs: list[FileName] = Field(
         default_factory=list,
-        description="folders that hold the packages of package:// names, or NAME=FOLDER of one, relative to "
-        "the scenario",
+        description="folders of package:// names, or NAME=FOLDER of one package, relative to the scenario",
     )
     wheels: Annotated[list[str] | dict[str, float] | None, BeforeValidator(_wheels)] = Field(
         None,
-        description="joints that only roll, as a list, or with their radius, m, as {wheel_left: 0.1}; "
-        "when not given, the loader finds them",
+        description="passive wheels: a list, or with radius, m, {wheel_left: 0.1}; by default found "
+        "in the file",
     )
     lock: dict[str, Number] = Field(
         default_factory=dict,
-        description="joints to fix, and their values, rad or m, as {torso: 0.2}, or {'*finger*': 0} for all "
-        "that match",
+        description="joints to fix, rad or m: {torso: 0.2}, or {'*finger*': 0} for all that match",
     )
     axle: Annotated[str | list[float] | None, BeforeValidator(_axle)] = Field(
         None,
-        description="the platform's reference point in the root link: a frame, or [x, y] or [x, y, z], m; "
-        "when not given, the root link itself",
+        description="the platform's reference point in the root link: a frame, [x, y] or [x, y, z], "
+        "m; by default its origin",
     )
     limits: dict[str, Number] = Field(
-        default_factory=dict, description="largest absolute values of the platform's inputs, as {v: 0.5}"
+        default_factory=dict, description="largest absolute values of the platform's inputs: {v: 0.5}"
     )
     srdf: FileName | None = Field(
         None,
-        description="a file of MoveIt's with named postures and groups, relative to the scenario, or "
-        "package://PACKAGE/PATH; when not given, the one beside the robot's file, if there is one",
+        description="MoveIt's file of postures and groups, relative to the scenario, or "
+        "package://PACKAGE/PATH; by default the one beside the robot's file",
     )
     missing_meshes: Literal["error", "skip"] = Field(
         "error", description="error, or skip to leave out shapes whose mesh is not there"
@@ -171,13 +168,13 @@ class ArmPart(Part):
 
     arm: AnyRobotPart = Field(description="the arm: a name, a path, or a mapping with the keys of a robot")
     at: str | None = Field(
-        None, description="the platform's frame that carries it; when not given, mount, arm_mount or top"
+        None, description="the platform's frame that carries it; by default mount, arm_mount or top"
     )
     xyz: Three = Field([0.0, 0.0, 0.0], description="of the arm's root link in that frame, m")
     rpy: Three = Field([0.0, 0.0, 0.0], description="roll, pitch, yaw about fixed axes, rad")
     prefix: str | None = Field(
         None,
-        description="put before the arm's names; when not given, none, or the arm's name where they clash",
+        description="put before the arm's names; by default none, or the arm's name where they clash",
     )
 
     def mount_on(self, platform: Robot, absolute: Absolute, place: Place) -> Robot:
@@ -206,7 +203,7 @@ class MountedPart(Part):
     rpy: Three | None = Field(None, description="as in the list")
     prefix: str | None = Field(None, description="as in the list")
     limits: dict[str, Number] = Field(
-        default_factory=dict, description="largest absolute values of the platform's inputs, as {v: 0.5}"
+        default_factory=dict, description="largest absolute values of the platform's inputs: {v: 0.5}"
     )
 
     @model_validator(mode="before")

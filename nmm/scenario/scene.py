@@ -72,11 +72,11 @@ class ScenePart(Part):
     scenery: list[SceneryPart] = Field(default_factory=list, description="shapes that stand there")
     camera: Annotated[str | list[Number], BeforeValidator(_camera)] = Field(
         "iso",
-        description="where the page looks from at first: iso, top, front or wall; or six numbers, m, the eye "
-        "and what it looks at, as the page's address has them (camera=)",
+        description="where the page looks from: iso, top, front or wall, or six numbers, m, the eye "
+        "and what it looks at (camera= in the page's address)",
     )
     opens: Annotated[Number, Field(ge=0.0)] | None = Field(
-        None, description="the time that the page shows at first, s; the first sample's when not given"
+        None, description="the time that the page shows first, s"
     )
 
     def build(self, robot: Robot, absolute: Absolute, place: Place) -> Surroundings:

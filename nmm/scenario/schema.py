@@ -62,24 +62,23 @@ class TrackPart(Part):
 
     gain: Positive = Field(2.0, description="on what each input moved too far, 1/s")
     length: Positive = Field(
-        0.4, description="the way along which a platform that is beside its own comes back, about, m"
+        0.4, description="the way, m, along which a platform comes back to its path, about"
     )
     pace: Positive = Field(
         0.8,
-        description="share of the plan's speed; below 1 feedback has room where the plan is at its limits",
+        description="share of the plan's speed, which leaves room for feedback",
     )
     margin: Annotated[Number, Field(ge=0.0)] = Field(
         0.05,
-        description="how much farther than collisions.distance the plan stays from what is near, m, where "
-        "there is such a plan",
+        description="m, how much farther than collisions.distance the plan stays, where it can",
     )
     tube: GoalPart = Field(
         GoalPart.model_validate({"m": 0.1, "rad": 0.2}),
-        description="how far from the plan, m and rad, is worth a warning, or another plan",
+        description="m and rad, how far from the plan the run warns, or plans again",
     )
     replan: bool = Field(
         False,
-        description="whether the run goes on with another plan where the robot is farther from it than tube",
+        description="whether it plans again beyond the tube",
     )
 
 
@@ -89,8 +88,8 @@ class PlanPart(Part):
 
     to: Coordinates | None = Field(
         None,
-        description="coordinates to be reached, m and rad: by name, others are free; posture: home takes a "
-        "named posture of the robot's SRDF; the target of the scenario's one task when not given",
+        description="coordinates to be reached by name, m and rad, or posture: home of the SRDF; by "
+        "default the task's target",
     )
     through: list[Coordinates] = Field(default_factory=list, description="such goals on the way, in order")
     seconds: Positive = Field(10.0, description="after which the search gives up, s")
@@ -100,27 +99,24 @@ class PlanPart(Part):
     shorten: Whole = Field(200, description="how often a shorter way between two points of it is tried")
     smooth: bool = Field(
         False,
-        description="whether it goes on without rests, in about half the time, where such a motion is found",
+        description="whether it goes on without rests, where such a motion is found",
     )
     objective: ObjectiveList = Field(
         default_factory=list,
-        description="what a smooth plan minimises in its time: one as the scenario's objective, or a list "
-        "that is added up; a sample costs 0.3 for an input at its limit, 1 for a rate at its limit, and H",
+        description="what a smooth plan minimises in its time, as the scenario's objective",
     )
     effort: bool | dict[str, Positive] = Field(
         False,
-        description="whether motors keep the torque limits of the robot's file; or masses that the robot "
-        "carries then, kg by frame",
+        description="whether motors keep the torque limits of the robot's file; or loads, kg by frame",
     )
     hold: str | None = Field(
         None,
-        description="a frame whose pose stays what it is at the start while the platform goes to the goal, "
-        "which is then its x, y and theta",
+        description="a frame that keeps its pose while the platform goes to x, y and theta of the goal",
     )
     track: Annotated[TrackPart | None, BeforeValidator(part_or_none)] = Field(
         None,
-        description="whether the controller follows the plan, for the scenario's duration: true, or a "
-        "mapping; else the run is the plan itself",
+        description="true or a mapping for a controller that follows the plan; else the run is the "
+        "plan itself",
     )
 
 
@@ -132,11 +128,11 @@ class ScenarioPart(Part):
     )
     title: str = Field("", description="a line that says what it shows")
     robot: RobotChoice = Field(
-        description="a name, a path, a mapping with source, or one with platform and arm (or arms), mounted"
+        description="a name, a path, or a mapping with source, or with platform and arm (or arms)"
     )
     q0: Annotated[dict[str, Any] | list[Nested], BeforeValidator(_start)] = Field(
-        description="configuration at t = 0, m and rad: by name (0 for the rest), or a list in q's order; "
-        "posture: home takes a named posture of the robot's SRDF, for what has no value beside it"
+        description="configuration at t = 0, m and rad: a list in q's order, or by name (0 for the "
+        "rest; posture: home takes one of the SRDF)"
     )
     duration: Positive = Field(description="s, above 0")
     dt: Positive = Field(0.005, description="time between samples and step of the fixed-step methods, s")
@@ -171,17 +167,15 @@ class ScenarioPart(Part):
     )
     plan: Annotated[PlanPart | None, BeforeValidator(part_or_none)] = Field(
         None,
-        description="whether the run is a planned motion, which ends at its goal: true, or a mapping. Then "
-        "only the task's target and the tolerances of until matter; resolver and duration with plan.track",
+        description="true or a mapping for a planned motion to the goal; resolver and duration then "
+        "matter with plan.track alone",
     )
     until: Annotated[GoalPart | None, BeforeValidator(part_or_none)] = Field(
         None, description="a target to reach: the run ends where the error is within tolerances"
     )
-    disturbances: DisturbancesPart | None = Field(
-        None, description="what a real robot does to the controller: slip, creep, odometry, noise, delay"
-    )
+    disturbances: DisturbancesPart | None = Field(None, description="slip, creep, odometry, noise, delay")
     retreat: Annotated[RetreatPart | None, BeforeValidator(part_or_none)] = Field(
-        None, description="whether to back off where the error stalls, and start again: true, or a mapping"
+        None, description="true or a mapping to back off where the error stalls, and start again"
     )
     steering: Annotated[SteeringPart | None, BeforeValidator(part_or_none)] = Field(
         SteeringPart.model_validate({}),
@@ -190,7 +184,7 @@ class ScenarioPart(Part):
 
     scene: ScenePart | None = Field(
         None,
-        description="what is drawn beside robot and task, and how the page opens; no controller knows of it",
+        description="what is drawn beside robot and task, and how the page opens",
     )
 
     @property

@@ -50,7 +50,7 @@ class WhilePart(ConditionPart):
     )
     margin: Number = Field(
         0.01,
-        description="once it holds, it does so until a row is beyond its bound by more than this; m, rad",
+        description="hysteresis: it holds until a row is beyond its bound by this; m, rad",
     )
 
     def build(self, robot: Robot) -> Condition:
@@ -98,8 +98,8 @@ def listed(value: object) -> object:
 
 _GAIN = (
     Numbers | None,
-    "K on the task's error, 1/s: a number, a number a row, or a matrix (its symmetric part positive "
-    "definite); null for planning mode, which follows the reference without feedback",
+    "K, 1/s: a number, a number a row, or a matrix (symmetric part positive definite); null for planning "
+    "mode, without feedback",
 )
 
 
@@ -109,14 +109,13 @@ class TaskPart(
     """A function of the robot that follows a reference."""
 
     reference: Reference = Field(
-        description="the target: a number, numbers, or a mapping with a kind of reference, among them "
-        "functions of the configuration (position, orientation, heading, coordinates, ...); or another "
-        "task's, by its path (task.0.reference)"
+        description="the target: numbers, a kind of reference or of task (a function of q), or "
+        "another task's by its path (task.0.reference)"
     )
     when: Annotated[list[Annotated[ConditionPart, OneOf(CONDITION_PARTS)]], BeforeValidator(listed)] = Field(
         default_factory=list,
-        description="a condition of kind between, while or after, or a list of such, which all have to hold, "
-        "for a task that comes and goes; none for one that is always there",
+        description="conditions (between, while, after), which all have to hold; none for a task "
+        "that is always active",
     )
 
     def build_task(self, robot: Robot, names: Sequence[str] = ()) -> Task:

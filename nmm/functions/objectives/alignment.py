@@ -67,9 +67,9 @@ class Alignment(Objective):
     Parameters
     ----------
     along : the desired direction: an angle from the world's x axis, rad, two numbers (x, y), or a function of
-        one row, an angle (bearing, spline, ...), or of two or three, a direction (velocity of a circle, ...)
-    at : in place of along, a point to head for, seen from the platform's: two or three numbers, m, a frame's
-        name (its origin), or a function with two or three rows (circle, position, ...)
+        one row (an angle) or more (a direction, as velocity)
+    at : in place of along, a point to head for: two or three numbers, m, a frame's name (its origin), or a
+        function with so many rows
     of : the heading: theta, the platform's, or a combination of coordinates ({theta: 1, hitch1: 1})
     offset : added to the heading, rad: π for a platform that backs, π/2 for one whose left side counts
 

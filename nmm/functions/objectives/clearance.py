@@ -56,8 +56,8 @@ class Clearance(Objective):
         and with `among`, they are those of the run
     reach : how far beyond the distance to keep a pair is felt, m
     own : whether the robot keeps off itself, too
-    ahead : how far ahead the robot is looked at, too, m, below 0 for one that drives backwards; when not
-        given, 1 with wheels that have to roll to turn (a car's) and 0 with others
+    ahead : how far ahead the robot is looked at, too, m, below 0 backwards; by default 1 for a car's wheels,
+        else 0
 
     Raises
     ------

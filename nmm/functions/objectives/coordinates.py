@@ -129,13 +129,12 @@ class Quadratic(Objective):
 
 
 class PreferredPosture(Objective):
-    """Distance from a posture: H(q) = Σ weight ½ (q_i - q_i*)². For angles without limits the term is
-    weight (1 - cos(q_i - q_i*)): about the same nearby, and whole turns do not matter.
+    """Distance from a posture, H(q) = Σ weight ½ (q_i - q_i*)², weight (1 - cos(q_i - q_i*)) for angles
+    without limits.
 
     Parameters
     ----------
-    posture : values of coordinates by name, rad or m, each a number or a function of one row; other
-        coordinates are free
+    posture : values by name, rad or m, each a number or a function of one row
     weights : numbers above 0 by name, 1 for the rest
 
     Examples
@@ -195,12 +194,12 @@ class _OfRanges(Objective):
 
 
 class JointRange(_OfRanges):
-    """Distance from the middle of the joint ranges, H = 1/(2N) Σ ((q - middle) / (upper - lower))²
-    (Liégeois 1977); N joints, H from 0 (all in the middle) to 1/8 (all at a limit).
+    """Distance from the middle of N joint ranges, H = 1/(2N) Σ ((q - middle) / (upper - lower))² (Liégeois
+    1977), from 0 to 1/8.
 
     Parameters
     ----------
-    joints : names of coordinates; all of the arm's without its mimic joints when not given
+    joints : names of coordinates; by default all of the arm's that have an input
     lower : their lower limits, rad or m; the robot's own when not given
     upper : their upper limits
 
@@ -239,8 +238,8 @@ def limit_barrier(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
 
 
 class LimitBarrier(_OfRanges):
-    """Barrier at the limits, H = Σ (u - l)² / (4 (u - q) (q - l)) (Zghal, Dubey, Euler 1990): 1 for each
-    coordinate in the middle of its range, growing towards the limits.
+    """Barrier at the limits, H = Σ (u - l)² / (4 (u - q) (q - l)) (Zghal, Dubey, Euler 1990), 1 each in the
+    middle.
 
     Within `margin` of a limit, and beyond it, a term continues as the parabola with its value, slope and
     curvature there (a relaxed barrier: Feller, Ebenbauer 2017). So H is finite and twice differentiable, a
@@ -250,10 +249,10 @@ class LimitBarrier(_OfRanges):
 
     Parameters
     ----------
-    joints : names of coordinates; all with a lower and an upper limit, without mimic joints, when not given
+    joints : names of coordinates; by default all with two limits and an input
     lower : their lower limits, rad or m; the robot's own when not given
     upper : their upper limits
-    margin : share of the range, above 0 and below 1/2, next to each limit where the parabola replaces it
+    margin : share of the range, below 1/2, next to each limit where a parabola replaces it
 
     Examples
     --------

@@ -38,17 +38,15 @@ def manipulability(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
 
 
 class Manipulability(JacobianObjective):
-    """Manipulability w(q) = sqrt(det(J Jᵀ)) (Yoshikawa 1985) of a frame; minimise `-Manipulability(...)`.
+    """Manipulability w(q) = sqrt(det(J Jᵀ)) (Yoshikawa 1985) of a frame.
 
     Parameters
     ----------
     frame : a frame of the robot
     rows : rows of its Jacobian: "xy", "xyz", or a list of x, y, z, rx, ry, rz
-    of : "robot", with J = (∂f/∂q) S and the platform's inputs (in m/s and rad/s), "arm", with the arm's
-        joints alone, or "platform"
-    weights : None; a positive number for each of the robot's inputs; or a mapping from names of inputs or of
-        their groups ("platform", "arm"), 1 for the rest. J's columns are divided by their roots, so that
-        {"platform": 4} halves the platform's share
+    of : the inputs of the "robot" (J = (∂f/∂q) S), the "arm" or the "platform"
+    weights : numbers above 0, one an input, or by input or group ("platform", "arm"), 1 for the rest; J's
+        columns are divided by their roots: {"platform": 4} halves the platform's share
 
     Examples
     --------
@@ -91,8 +89,8 @@ def inverse_condition(at: At, frames: Frames, numbers: Array, rows: Rows) -> Non
 
 
 class InverseCondition(JacobianObjective):
-    """Inverse condition number 1/κ_F = s / (‖J‖_F ‖J⁺‖_F) of s rows of a frame's Jacobian, Frobenius norms
-    (Angeles 2003), from 0 (rank lost) to 1 (isotropic); to maximise, minimise `-InverseCondition(...)`.
+    """Inverse condition number 1/κ_F = s / (‖J‖_F ‖J⁺‖_F) of s rows of a frame's Jacobian (Angeles 2003),
+    from 0 (rank lost) to 1 (isotropic).
 
     Unlike σ_min / σ_max (which `nmm map` draws as `inverse_condition`) it is smooth wherever J has full rank,
     also where singular values meet. Where rank is lost it is 0 and has no gradient, which is set to 0.
@@ -101,11 +99,10 @@ class InverseCondition(JacobianObjective):
     ----------
     frame : a frame of the robot
     rows : two or more rows of its Jacobian: "xy", "xyz", or a list of x, y, z, rx, ry, rz
-    of : "robot", with the platform's inputs (m/s and rad/s), "arm", with the arm's joints alone, or
-        "platform"
+    of : the inputs of the "robot" (J = (∂f/∂q) S), the "arm" or the "platform"
     weights : of the inputs, as for manipulability
-    length : m, by which rows of metres are divided to be compared with those of radians; the robot's reach
-        when not given. Without rows rx, ry, rz it has no effect
+    length : m, by which rows of metres are divided where there are rows rx, ry, rz; by default the robot's
+        reach
 
     Examples
     --------
@@ -133,14 +130,14 @@ class InverseCondition(JacobianObjective):
 
 class WeightedManipulability(Sum):
     """Weighted sum of the arm's manipulability and the whole robot's, α w_arm + (1 - α) w (Bayle, Fourquet,
-    Renaud 2003): the arm keeps a good posture even where the platform could make up for a bad one.
+    Renaud 2003).
 
     Parameters
     ----------
     frame : a frame of the robot
     rows : rows of its Jacobian: "xy", "xyz", or a list of x, y, z, rx, ry, rz
     alpha : α, from 0 (only the whole robot's) to 1 (only the arm's)
-    weights : of the inputs, as for manipulability, in both
+    weights : of the inputs, as for manipulability
 
     Examples
     --------
@@ -216,11 +213,10 @@ class DirectionalManipulability(JacobianObjective):
     Parameters
     ----------
     frame : a frame of the robot
-    direction : d, of any length but 0: one number per row, world axes, or a function with as many rows
-        (velocity of a circle or a spline, ...)
+    direction : d, of any length but 0: a number a row, world axes, or a function of so many rows (velocity,
+        ...)
     rows : rows of its Jacobian: "xy", "xyz", or a list of x, y, z, rx, ry, rz
-    of : "robot", with the platform's inputs (m/s and rad/s), "arm", with the arm's joints alone, or
-        "platform"
+    of : the inputs of the "robot" (J = (∂f/∂q) S), the "arm" or the "platform"
     weights : of the inputs, as for manipulability
 
     Examples

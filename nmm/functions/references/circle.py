@@ -128,9 +128,8 @@ class Bearing(Function):
 
     Parameters
     ----------
-    of : the moving point, its first two components x and y: a reference of time (circle, spline, ...;
-        case 2), or a point of the robot (position; case 3), which makes the bearing a function of the
-        configuration
+    of : the moving point (its x and y): a reference of time (case 2), or a position of the robot (case 3),
+        with which the bearing depends on q
     towards : the fixed point, 2 numbers, m (a third, z, is only drawn)
 
     Examples

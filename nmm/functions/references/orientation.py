@@ -94,11 +94,10 @@ class Slerp(_Turning):
 
     Parameters
     ----------
-    start : where it begins, R0: a rotation vector (3,), rad (`rotation_vector` makes one of other notations)
+    start : R0: a rotation vector (3,), rad (`rotation_vector`)
     end : where it ends, R1
     duration : s, above 0
-    profile : "constant" rate, or "smooth": a fifth-degree polynomial that starts and stops at rest with
-        zero acceleration
+    profile : "constant" speed, or "smooth", a fifth-degree polynomial from rest to rest
 
     Examples
     --------
@@ -190,9 +189,8 @@ class PoseReference(Function):
 
     Parameters
     ----------
-    position : three numbers (world axes, m), or a function with three rows, of time or the configuration
-    orientation : a rotation vector, rad, or a function with three rows, read as one (slerp, turn, orientation
-        of another frame, ...)
+    position : three numbers (world axes, m), or a function of three rows
+    orientation : a rotation vector, rad, or a function of three rows (slerp, turn, orientation, ...)
 
     Examples
     --------

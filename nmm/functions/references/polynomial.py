@@ -86,7 +86,7 @@ class Constant(PiecewisePolynomial):
     Parameters
     ----------
     value : s numbers
-    unit : of the values: m, rad or 1
+    unit : m, rad or 1
 
     Examples
     --------
@@ -108,7 +108,7 @@ class Polynomial(PiecewisePolynomial):
     ----------
     coefficients : (order, s), lowest power first, in m/s^k
     duration : s, above 0
-    unit : of the values: m, rad or 1
+    unit : m, rad or 1
 
     Examples
     --------
@@ -154,9 +154,8 @@ class Line(PiecewisePolynomial):
     start : where it begins, s numbers
     end : where it ends, s numbers
     duration : s, above 0
-    profile : "constant" speed, or "smooth": a fifth-degree polynomial that starts and stops at
-        rest with zero acceleration
-    unit : of the values: m, rad or 1
+    profile : "constant" speed, or "smooth", a fifth-degree polynomial from rest to rest
+    unit : m, rad or 1
 
     Examples
     --------
@@ -190,10 +189,9 @@ class Spline(PiecewisePolynomial):
     times : (k,) s, increasing
     points : (k, s), a point a time
     degree : 3, twice continuously differentiable, or 5, four times
-    ends : "rest" (velocity zero at both ends; for degree 5 the acceleration too), "natural" (free
-        ends; the second derivative is zero, for degree 5 the third and fourth), or "periodic" (the
-        last point equals the first; degree 3)
-    unit : of the values: m, rad or 1
+    ends : "rest" (at both ends), "natural" (free ends), or "periodic" (the last point equals the first;
+        degree 3)
+    unit : m, rad or 1
 
     Examples
     --------

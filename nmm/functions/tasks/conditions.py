@@ -48,7 +48,7 @@ class While:
     ----------
     function : φ; each of its rows has to be within
     lower, upper : a number for all rows, or one a row; infinite for none; in the rows' units
-    margin : once it holds, it does so until a row is beyond its bound by more than this; in the rows' units
+    margin : hysteresis: it holds until a row is beyond its bound by this; in the rows' units
 
     Raises
     ------
@@ -100,10 +100,9 @@ class After:
     Parameters
     ----------
     task : that task's name
-    within : of its error's norm over rows of one unit: a number, or numbers by unit ({"m": 0.005}), of which
-        rows of other units are not looked at
-    hold : how long the error has to stay there, while that task is active, s
-    instead : whether that task ends when the one with this condition begins
+    within : bound of ‖e‖ over rows of one unit: a number, or numbers by unit ({"m": 0.005})
+    hold : how long the error has to stay there, s
+    instead : whether that task then ends
 
     Raises
     ------

@@ -130,10 +130,10 @@ class ImagePoints(Seen):
 
     Parameters
     ----------
-    points : one or more, each as three numbers (world axes, m), the name of a frame (its origin), or a
-        function with three rows, of time (circle, spline, ...) or of the configuration; or `MeasuredPoints`
-    camera : its frame, z ahead, x right, y down; when not given, the only one whose name has "optical" in it
-    intrinsics : fx, fy, cx, cy, px; normalised coordinates when not given
+    points : one or more points: three numbers (world axes, m), a frame's name (its origin), or a function of
+        three rows; or `MeasuredPoints`
+    camera : its frame, z ahead, x right, y down; by default the only one with "optical" in its name
+    intrinsics : fx, fy, cx, cy, px; normalised coordinates by default
 
     Examples
     --------

@@ -88,7 +88,7 @@ class Posture(Function):
 
     Parameters
     ----------
-    names : names of coordinates; all of the manipulator's without its mimic joints when none is given
+    names : names of coordinates; by default all of the arm's that have an input
 
     Examples
     --------

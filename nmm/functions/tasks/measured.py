@@ -40,15 +40,14 @@ class MeasuredPoints(Seen):
 
     Parameters
     ----------
-    points : where they are, as those of `ImagePoints`: what a simulation takes pictures of. Only their number
-        matters to a robot with a camera of its own
-    camera, intrinsics : as of `ImagePoints`, of the camera that the controller believes in
-    depth : of each point, m, as it is believed: a number, or one a point
-    observed : whether the depth is estimated from there on, of points that stand
-    moving : how fast the points' velocity changes, m/s²: their motion is then estimated, fed forward and
-        foretold; 0 for points that stand
-    faults : of the simulation's camera, whose noise the estimate of depths reckons with on a robot, too;
-        `CameraFaults()` when not given
+    points : where they are, as those of `ImagePoints`, for a simulation; on a robot only their number matters
+    camera, intrinsics : as of `ImagePoints`, as believed
+    depth : of each point, m, as believed: a number, or one a point
+    observed : whether the depth of points that stand is estimated
+    moving : how fast the points' velocity changes, m/s²: their motion is then estimated and fed forward; 0
+        for points that stand
+    faults : of the simulation's camera; its noise is also that of the estimates. `CameraFaults()` when not
+        given
 
     Examples
     --------

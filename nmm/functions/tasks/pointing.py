@@ -67,9 +67,8 @@ class Heading(Function):
     Parameters
     ----------
     frame : a frame of the robot
-    direction : whose angle is taken: x, y, z or three numbers, in the frame's axes
-    about : world axis x, y or z about which the angle is measured, from the next axis in the cyclic order
-        x, y, z (about z: from x towards y)
+    direction : x, y, z or three numbers, in the frame's axes
+    about : world axis x, y or z of the angle, which counts from the next axis (about z: from x towards y)
 
     Examples
     --------
@@ -161,8 +160,8 @@ class Pointing(Function):
     Parameters
     ----------
     frame : a frame of the robot
-    at : the point, world axes, m: three numbers, the name of a frame (its origin), or a function with
-        three rows, of time (circle, spline, ...) or of the configuration (position, center_of_mass)
+    at : a point: three numbers (world axes, m), a frame's name (its origin), or a function of three rows
+        (circle, spline, position, ...)
     axis : x, y, z or three numbers, in the frame's axes
 
     Examples

@@ -165,7 +165,7 @@ class Orientation(PartsOfPose):
     Parameters
     ----------
     frame : a frame of the robot
-    relative_to : a frame of the robot that sees it, in its axes; the world when not given
+    relative_to : a frame of the robot that it is measured from; the world when not given
 
     Examples
     --------
@@ -242,8 +242,7 @@ class Pose(PartsOfPose):
     Parameters
     ----------
     frame : a frame of the robot
-    relative_to : a frame of the robot in whose axes it is taken (two arms that hold one object); the world
-        when not given
+    relative_to : a frame of the robot that it is measured from; the world when not given
 
     Examples
     --------

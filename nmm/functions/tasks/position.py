@@ -45,8 +45,7 @@ class Position(PartsOfPose):
     ----------
     frame : a frame of the robot
     axes : some of x, y, z in the order wanted: "xy", "xyz", "z"
-    relative_to : a frame of the robot that sees it, from its origin and in its axes (two arms that hold one
-        thing); the world when not given
+    relative_to : a frame of the robot that it is measured from; the world when not given
 
     Examples
     --------
@@ -94,8 +93,7 @@ class CenterOfMass(Function):
     Parameters
     ----------
     axes : some of x, y, z in the order wanted: "xy", "xyz", "z"
-    relative_to : a frame of the robot that sees it, from its origin and in its axes (the platform's, to keep
-        it above the wheels); the world when not given
+    relative_to : a frame of the robot that it is measured from; the world when not given
 
     Examples
     --------
@@ -155,8 +153,8 @@ class Distance(Function):
     Parameters
     ----------
     frame : a frame of the robot
-    to : the point: the name of another frame (its origin), three numbers (world axes, m), or a function with
-        three rows, of time (circle, spline, ...) or of the configuration (center_of_mass)
+    to : a point: three numbers (world axes, m), a frame's name (its origin), or a function of three rows
+        (circle, spline, position, ...)
 
     Examples
     --------

@@ -27,12 +27,12 @@ class Task:
         numbers stand for a constant
     gain : K in 1/s: a number, s numbers, or an (s, s) matrix with a positive definite symmetric
         part; None for planning mode, without feedback
-    priority : 1, 2, ...: where limits bind, tasks of a lower number keep their rate and the others have what
-        is left; tasks of one number are scaled together
-    speed : how fast feedback may approach the target, ‖K e‖ at most over rows of one unit: a number, or
-        numbers by unit ({"m": 1.0, "rad": 2.0}), 1/s of these; None for no bound
-    braking : deceleration b with which it may come to rest there, ‖K e‖ <= √(2 b ‖e‖), in the same way, 1/s²
-    name : for messages, and for the conditions of other tasks; its rows' names when not given
+    priority : 1, 2, ...: where limits bind, lower numbers keep their rate; tasks of one number are scaled
+        together
+    speed : bound of ‖K e‖ over rows of one unit: a number, or numbers by unit ({"m": 1.0, "rad": 2.0}), 1/s
+        of these
+    braking : deceleration b to the target, ‖K e‖ <= √(2 b ‖e‖), in the same way, 1/s²
+    name : for messages and other tasks' conditions; by default its rows' names
     when : a `Between`, `While` or `After`, or several, which all have to hold, for a task that comes and goes
         (`SequencedController`); none for one that is always there
 
