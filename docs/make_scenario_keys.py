@@ -27,16 +27,17 @@ Numbers may be arithmetic with pi (`5/4*pi`). Units are metres, radians and seco
 gives one line with the file, the key and what was expected.
 
 ```yaml
-%s```
-
-A reference may be named by its path wherever a reference may stand:
-
-```yaml
+robot: unicycle_2r
+q0: {x: -1, y: -1, theta: pi}
+duration: 25
 task:
-  - {kind: position, frame: ee, axes: xy, reference: {kind: circle, center: [2, 2], radius: 3, rate: 0.25}}
+  - {kind: position, frame: ee, axes: xy, reference: {kind: circle, center: [2, 2], radius: 3, rate: 0.08*pi}}
   - {kind: heading, frame: link2, reference: {kind: bearing, of: task.0.reference, towards: [6, 2]}}
+objective: {kind: quadratic, terms: [{of: {theta: 1, q1: 1, q2: 1}, target: 0}]}
+resolver: {kind: rg, alpha: 10}
 ```
 
+A reference may be named by its path wherever one may stand, as `task.0.reference` here:
 `--set task.0.reference.radius=2` then changes both. Where YAML anchors (`&`) share a value, `--set` changes
 one place and warns about the others.
 
@@ -47,10 +48,7 @@ first; a kind's row (bold) names those that it also has, and its own keys follow
 
 def page() -> str:
     """The page's text."""
-    from nmm.bundled import bundled_scenarios
-
-    example = bundled_scenarios()["unicycle_2r_link_pointing"].read_text(encoding="utf-8")
-    parts = [HEAD % example]
+    parts = [HEAD]
     for top, found in groupby(sections(), lambda section: re.split(r"[.,:]", section.title)[0]):
         group = list(found)
         summary = "" if ", " in group[0].title else f"\n{group[0].summary}\n"

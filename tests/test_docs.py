@@ -202,7 +202,7 @@ def test_the_readmes_python_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert len(controller(0.0, controller.robot.q({"ur5_elbow_joint": 1.0, "ur5_wrist_2_joint": 1.0}))) == 8
 
 
-def test_the_worked_examples_can_be_typed_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_worked_examples_can_be_copied(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The page's own files: a task that has its derivatives, a resolver that says what it gives."""
     write_examples(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)

@@ -1,4 +1,4 @@
-"""The files that docs/architecture.md has to type in, and, as a plugin of pytest, all of them registered.
+"""The files that docs/architecture.md has to copy, and, as a plugin of pytest, all of them registered.
 
     PYTHONPATH=tests python -m pytest -p worked_examples tests/test_robot_grid.py
 
@@ -8,22 +8,19 @@ runs a grid with them: it must ask of a new kind no more than the kind declares.
 from __future__ import annotations
 
 import atexit
-import re
 import shutil
 import sys
 import tempfile
 from pathlib import Path
 
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "architecture.md"
-#: The page's code, in its order.
+FOLDER = Path(__file__).resolve().parents[1] / "docs" / "own_kinds"
 FILES = ("slope", "damped", "used")
 
 
 def write_examples(folder: Path) -> None:
-    """The page's files, as slope.py, damped.py and used.py."""
-    codes = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL)
-    for name, code in zip(FILES, codes, strict=True):
-        (folder / f"{name}.py").write_text(code, encoding="utf-8")
+    """Copies, where a reader has them: beside a script."""
+    for name in FILES:
+        shutil.copy(FOLDER / f"{name}.py", folder)
 
 
 def pytest_configure() -> None:
