@@ -1,6 +1,6 @@
 """Time of a control step u = controller(t, q), in µs, all in one run:
 
-    python benchmarks/step.py
+    python benchmarks/step.py            (--short: a tenth of the calls, to see that all of it runs)
 
 fused     through the public API, as a user's loop calls it
 floor     Pinocchio's calls and one function written by hand for the case (`floor.py`)
@@ -29,12 +29,13 @@ import nmm
 CASES = {1: "unicycle_2r_position", 4: "unicycle_3r_position"}
 RESOLVERS = ("rg", "pg")
 T = 0.3
+SHORT = [word for word in sys.argv if word == "--short"]
 
 
 def microseconds(function: Callable[[], object], seconds: float = 1.0) -> float:
     """The best of nine means, in processor time: the step's own, without what else the machine does."""
     once = min(timeit.repeat(function, number=3, repeat=3)) / 3
-    number = max(1, int(seconds / 9 / once))
+    number = max(1, int(seconds / (90 if SHORT else 9) / once))
     return min(timeit.repeat(function, number=number, repeat=9, timer=time.process_time)) / number * 1e6
 
 
@@ -72,7 +73,7 @@ def _named(square: nmm.QuadraticTerm) -> list[tuple[str, float]]:
 def unfused() -> dict[str, float]:
     """Times of the plain form, measured in a process of its own."""
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
-    command = [sys.executable, str(Path(__file__).resolve()), "--plain"]
+    command = [sys.executable, str(Path(__file__).resolve()), "--plain", *SHORT]
     answer = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     times: dict[str, float] = json.loads(answer.stdout)
     return times
