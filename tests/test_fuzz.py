@@ -10,10 +10,10 @@ import pytest
 from fuzz import HUNTS
 from fuzz.hunting import KEPT, some, tried
 
-#: Cases of each hunt: about ten seconds of it.
+#: Cases of each hunt: a few seconds of it.
 EXAMPLES = {
-    "scenarios": 60, "robots": 80, "xacros": 30, "meshes": 60, "folders": 60, "caches": 15, "commands": 40,
-    "films": 12, "problems": 60,
+    "scenarios": 20, "robots": 80, "xacros": 12, "meshes": 60, "folders": 20, "caches": 6, "commands": 14,
+    "films": 5, "problems": 20,
 }  # fmt: skip
 
 
