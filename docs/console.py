@@ -3,9 +3,11 @@
 A page's blocks run in order, in one empty folder:
 
 - ```console: what the commands in it ("$ nmm …", "$ python FILE", "$ cat FILE") print. The tests compare it.
+  "$ nmm … | grep -E PATTERN" prints the lines that match; standard error passes by, unless it is "2>&1 |".
 - ```text with commands: the same, not compared: its numbers are times, rounding, or chaotic.
 - ```bash: lines "nmm …" run, without what they print. What waits for Ctrl-C (view, drive, --play, …) gets it
   when its page is open.
+- a file beside the page to which it links, "](NAME.py)", is copied there first.
 - a block of any language whose first line is "# NAME" or "<!-- NAME -->" is the file NAME.
 - ```python else runs as it stands, with the names of the page's blocks before it.
 
@@ -36,6 +38,7 @@ COMPARED, WRITTEN = "console", ("console", "text")
 
 _BLOCK = re.compile(r"^```(?P<kind>\w+)\n(?P<body>.*?)^```$", re.DOTALL | re.MULTILINE)
 _NAMED = re.compile(r"(?:# |<!-- )(?P<name>[\w-]+\.\w+)(?: -->)?\n")
+_LINKED = re.compile(r"\]\(([\w-]+\.(?:py|urdf))\)")
 _PROMPT = "$ "
 _STAYS = ("view", "drive", "play")
 _PATIENCE = 120.0
@@ -63,6 +66,8 @@ def rewritten(text: str, folder: Path | None = None) -> str:
         return block.group()
 
     with tempfile.TemporaryDirectory() as empty, contextlib.chdir(folder or empty):
+        for name in _LINKED.findall(text):
+            shutil.copyfile(FOLDER / "tutorials" / name, name)
         return _BLOCK.sub(anew, text)
 
 
@@ -87,9 +92,21 @@ def _printed(command: str) -> str:
 
 
 def _done(arguments: list[str]) -> tuple[int, str]:
-    """A command's exit status, and what it prints, errors included, where no "> FILE" takes it."""
+    """A command's exit status, and what a terminal shows: errors too, and not what "> FILE" takes."""
     from nmm.cli.exit_status import status_of
 
+    if "|" in arguments:
+        *arguments, _, grep, extended, pattern = arguments
+        if (grep, extended) != ("grep", "-E"):
+            raise ValueError(f"expected grep -E after |, got {grep} {extended}")
+        errors, printed = io.StringIO(), io.StringIO()
+        if arguments[-1] == "2>&1":
+            arguments, errors = arguments[:-1], printed
+        with contextlib.redirect_stderr(errors), contextlib.redirect_stdout(printed):
+            status = status_of(arguments)
+        found = [line for line in printed.getvalue().splitlines() if re.search(pattern, line)]
+        passed_by = "" if errors is printed else errors.getvalue()
+        return status, passed_by + "\n".join(found)
     printed = io.StringIO()
     with contextlib.ExitStack() as stack:
         stack.enter_context(contextlib.redirect_stderr(printed))

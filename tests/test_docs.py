@@ -7,6 +7,7 @@ import importlib.util
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -105,13 +106,30 @@ def test_a_page_that_runs_prints_what_it_says(
         assert (tmp_path / path).stat().st_size > 10_000, path
 
 
+@pytest.mark.parametrize(
+    "page", [name for name in DOCUMENTS if re.search(r"\bTry\b", (ROOT / name).read_text("utf-8"))]
+)
+def test_what_a_page_says_to_try_is_run_and_what_comes_out_is_stated(page: str) -> None:
+    """Sections "Try" are texts with a console after each, which the test above runs and compares."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    assert ROOT / page in console.PAGES
+    (section,) = re.findall(r"^## Try\n(.*?)(?=^## |\Z)", text, re.DOTALL | re.MULTILINE)
+    assert len(re.findall(r"\bTry\b", text)) == 1, "what is to be tried belongs into the section"
+    *tried, more = re.split(r"^```console\n.*?^```\n", section, flags=re.DOTALL | re.MULTILINE)
+    assert tried
+    assert all(said.strip() for said in tried)
+    assert "`" not in more, "to try this there is no console"
+    for body in re.findall(r"^```console\n(.*?)^```\n", section, flags=re.DOTALL | re.MULTILINE):
+        assert all(printed.count("\n") > 1 for printed in body.split("$ ")[1:]), f"shows nothing: {body}"
+
+
 def commands(text: str) -> Iterator[list[str]]:
     """The arguments of each line of nmm in a block of a page, up to a pipe into another program."""
     blocks = re.findall(r"^```\w*\n(.*?)^```$", text, flags=re.DOTALL | re.MULTILINE)
     indented = re.findall(r"^ {4}(nmm .*)$", text, flags=re.MULTILINE)
     for line in "\n".join([*blocks, *indented]).splitlines():
         if found := re.match(r"(?:\$ )?nmm (?!check: |[\w-]+: )(.*?)(?:  .*| > \S+)?$", line):
-            yield list(takewhile("|".__ne__, shlex.split(found[1], comments=True)))
+            yield list(takewhile(lambda it: it not in ("|", "2>&1"), shlex.split(found[1], comments=True)))
 
 
 #: What the README's commands take in the tests, to be done in seconds.
@@ -121,11 +139,8 @@ SMALLER = {"sweep": "--samples 2 --jobs 1"}
 def test_the_commands_of_the_readme_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """All but `nmm render`, which needs a browser, and `nmm paper`, which a tutorial runs. They are listed in
     docs/contents.md."""
-    tutorial = (ROOT / "docs" / "tutorials" / "own_robot.md").read_text(encoding="utf-8")
-    robot = re.search(r"^```xml\n(.*?)^```$", tutorial, flags=re.DOTALL | re.MULTILINE)
-    assert robot is not None
     draw_only([], monkeypatch)
-    (tmp_path / "my_robot.urdf").write_text(robot[1], encoding="utf-8")
+    shutil.copy(ROOT / "docs" / "tutorials" / "my_robot.urdf", tmp_path)
     monkeypatch.chdir(tmp_path)
     readme = (ROOT / "docs" / "contents.md").read_text(encoding="utf-8")
     lines = re.findall(r"^nmm (.*?)(?:  .*)?$", readme, flags=re.MULTILINE)

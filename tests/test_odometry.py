@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 import re
+import runpy
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -281,18 +281,15 @@ def test_a_cars_wheels_say_its_steering_angle() -> None:
 def test_odometry_of_mujocos_robot_is_off_by_what_its_wheels_slip() -> None:
     """The physics engine of docs/tutorials/robot_loop.md: hard contacts, 2 s along an arc of 1.2 m."""
     pytest.importorskip("mujoco")
-    page = Path(__file__).parents[1] / "docs" / "tutorials" / "robot_loop.md"
-    (code,) = re.findall(r"```python\n(# mujoco_robot.py.*?)```", page.read_text("utf-8"), flags=re.DOTALL)
-    module = importlib.util.module_from_spec(importlib.util.spec_from_loader("mujoco_robot", None))  # type: ignore[arg-type]
-    exec(code, module.__dict__)
+    path = Path(__file__).parents[1] / "docs" / "tutorials" / "mujoco_robot.py"
+    made = runpy.run_path(str(path))["MujocoRobot"]
     robot = nmm.load("unicycle_3r", platform="differential")
-    names = [*(w.joint for w in robot.wheels), *robot.q_names[3:]]
-    hardware = module.MujocoRobot(robot, robot.q({"q2": 0.6, "q3": 0.8}), [(0.25, 0.0), (-0.25, 0.0)])
-    odometry = robot.odometry(hardware.q, dict(zip(names, hardware.encoders(), strict=True)))
+    hardware = made(robot, robot.q({"q2": 0.6, "q3": 0.8}), [(0.25, 0.0), (-0.25, 0.0)])
+    odometry = robot.odometry(hardware.q, hardware.readings())
     for k in range(200):
         speed = min(1.0, k / 50) * np.array([5.0, 7.0, 0, 0, 0])
         hardware.send(speed, 0.01)
-        odometry.update(dict(zip(names, hardware.encoders(), strict=True)))
+        odometry.update(hardware.readings())
     way = np.hypot(*hardware.q[:2])
     assert 0.9 < way < 1.2
     assert hardware.q[2] > 0.5
