@@ -83,8 +83,8 @@ from .functions.tasks.measured import MeasuredPoints as MeasuredPoints
 from .plans.horizon import Horizon as Horizon
 from .plans.parking import Parking as Parking
 from .plans.plan import Plan as Plan
+from .plans.planned import plan as plan
 from .plans.replan import replan as replan
-from .plans.search import plan as plan
 from .platforms import Car as Car
 from .platforms import CasterWheel as CasterWheel
 from .platforms import CommonSpeed as CommonSpeed

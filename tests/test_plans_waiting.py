@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import nmm
-from nmm.plans import search
+from nmm.plans import planned
 
 LIMITS = nmm.Limits(velocity={"platform": 1.0, "arm": 1.5}, acceleration={"platform": 1.0, "arm": 3.0})
 WALL = nmm.Obstacle(nmm.Box([0.2, 4.0, 2.0]), [3.0, -2.5, 0.5], name="wall")
@@ -71,7 +71,7 @@ def test_what_is_far_when_it_passes_costs_no_time(robot):
     ],
 )
 def test_where_no_timing_works_it_is_refused(robot, motion, monkeypatch):
-    monkeypatch.setattr(search, "WAYS", 3)  # each kind of other way once
+    monkeypatch.setattr(planned, "WAYS", 3)  # each kind of other way once
     post = nmm.Obstacle(nmm.Cylinder(0.3, 1.8), motion=motion, name="post")
     with pytest.raises(nmm.RunError, match="post"):
         nmm.plan(robot, START, GOAL, [post], limits=LIMITS)

@@ -21,7 +21,7 @@ from nmm.functions.references import Constant
 from nmm.functions.references.live_target import LiveTarget
 from nmm.functions.tasks.task import Task
 from nmm.plans.plan import Plan
-from nmm.plans.search import plan
+from nmm.plans.planned import plan
 from nmm.playback.drawing import Command, packed
 from nmm.playback.keyframes import ghost_samples
 from nmm.playback.shapes import DrawnRobot

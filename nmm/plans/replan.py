@@ -15,6 +15,7 @@ from nmm.collisions.obstacle import Obstacle
 from nmm.errors import InputError, expect_kind
 from nmm.plans.following import differences
 from nmm.plans.plan import Plan
+from nmm.plans.planned import finished
 from nmm.plans.search import STEP, Search
 from nmm.platforms.tractor import Tractor
 
@@ -92,13 +93,13 @@ def replan(
     # What is joined is what begins free: all of it, or up to where something is in the way.
     joined, join = _join(search, here, rest[: first + 1], ways)
     if joined is not None and first == len(free):
-        return search.finished(np.vstack([join, *ways[joined:]]))
+        return finished(search, np.vstack([join, *ways[joined:]]))
     ahead: list[Array] = [] if joined is None else rest[joined : first + 1]
     goals, behind = rest[-1:], rest[last:-1]
     if search.check.too_near(rest[-1]) >= 0:
         goals, behind = search.ends(old.goal, here), []
     legs = search.farther(here, goals, ahead, behind)
-    return search.finished(search.shortened(here, legs, counted(shorten, "shorten", 0)))
+    return finished(search, search.shortened(here, legs, counted(shorten, "shorten", 0)))
 
 
 def _rest(plan: Plan, q: Array, t: float | None) -> list[Array]:

@@ -265,7 +265,7 @@ class ScenarioPart(Part):
 
     def build_plan(self, robot: Robot, absolute: Absolute, progress: Progress | None) -> "Plan":
         """The planned motion; `RunError` where none is found."""
-        from nmm.plans.search import plan
+        from nmm.plans.planned import plan
 
         part = self.plan or PlanPart.model_validate({})
         goals = [part.to, *part.through]

@@ -1,0 +1,290 @@
+"""Plans by their kinds: legs with rests, waiting for what moves, smooth, towed, and with something held."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nmm.arrays import Array, counted, positive, scalar
+from nmm.collisions.obstacle import Obstacle
+from nmm.collisions.scene import Scene
+from nmm.control.collisions import Collisions
+from nmm.control.goal import Goal
+from nmm.control.limits import Limits
+from nmm.errors import InputError, NmmError, RunError, expect_kind, few
+from nmm.functions.objectives.base import Objective
+from nmm.functions.tasks.task import Task
+from nmm.plans.goals import Wanted, alternatives
+from nmm.plans.held_motion import HeldTiming
+from nmm.plans.held_search import HeldWays, refuse_beside_hold
+from nmm.plans.holding import Held
+from nmm.plans.plan import Asked, Found, Motion, Plan
+from nmm.plans.samples import SampledMotion, joined
+from nmm.plans.search import Search
+from nmm.plans.search_space import USUAL
+from nmm.plans.smoothing import Smoothing
+from nmm.plans.timing import TimedLegs, timed
+from nmm.plans.towing import Towing
+from nmm.plans.waiting import LONG, waited
+from nmm.platforms.tractor import Tractor
+from nmm.robots.robot import Robot
+
+#: Ways that are tried among obstacles that move, and how often each but the first is shortened.
+WAYS, SHORTEN = 8, 50
+
+
+def plan(
+    robot: Robot,
+    start: ArrayLike | Mapping[str, float],
+    goal: Wanted,
+    obstacles: Sequence[Obstacle] = (),
+    collisions: Collisions | None = None,
+    limits: Limits | None = None,
+    seconds: float = 10.0,
+    seed: int = 0,
+    *,
+    tolerance: Goal | None = None,
+    through: Sequence[Wanted] = (),
+    shorten: int = 200,
+    smooth: bool = False,
+    objective: Objective | None = None,
+    effort: bool | Mapping[str, Any] = False,
+    margin: float = 0.0,
+    hold: Task | str | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Plan:
+    """A motion from start to goal that keeps every distance and limit.
+
+    Parameters
+    ----------
+    start : (n,) or by name, m and rad
+    goal : a configuration (n,); coordinates by name, of which the others are free; a `Task` whose target
+        stands; or a list of these, of which one is to be reached
+    obstacles : those with a `motion` are waited for: the way is looked for among the others, which stand
+        where they are at t = 0; where no timing of it works, other ways are tried
+    collisions : distances to keep, with obstacles of its own; `Collisions()` with the obstacles when not
+        given
+    limits : of velocity, acceleration and position; the robot's own when not given
+    seconds : after which the search gives up
+    seed : of the random numbers; the same plan comes of the same seed
+    tolerance : of a task's goal; `Goal()` when not given
+    through : goals that are reached on the way, in order
+    shorten : how often a shorter way between two points of the motion is tried
+    smooth : whether to look for one motion without rests, which takes about half the time and 0.1 to 0.5 s
+        more to plan; where none is found that keeps everything, the one with rests stands (`Plan.smooth`). A
+        tractor's with trailers always is
+    objective : H(q) to minimise along a smooth motion, in the time that it takes without: each of its samples
+        costs 0.3 for an input at its limit, 1 for a rate of it at its limit, by their squares, and H
+    effort : whether motors keep the torque limits of the robot's file, or masses that the robot carries then,
+        kg by frame (as `payload` of `nmm.Dynamics`); what needs more is driven slower
+    margin : so much farther than the distance, m, it keeps off what start and goals leave so much room to,
+        where such a motion is found in half of the time; for a controller that follows it (`Plan.reference`)
+    hold : a frame whose pose stays what it is at the start while the platform moves, or a `Task` whose target
+        the start has (`Task(Position("tool"), p)`); goals are then poses of the platform, x, y and theta, and
+        the arm's posture there comes of the way. It rests between the platform's arcs and lines
+    progress : called with the share of `seconds` that is gone
+
+    Returns
+    -------
+    Plan; it stands between two of its legs unless it is smooth, and ends at rest.
+
+    Raises
+    ------
+    InputError : a start that touches something or is outside limits, a goal of another kind, limits of
+        functions, a platform whose ways are not known, an objective that changes with time or without smooth,
+        what the arm alone cannot hold
+    RunError : no goal configuration was found, or no way there, or of a tractor with trailers no exact motion
+        along it; the text says what was tried
+
+    Examples
+    --------
+    >>> robot = nmm.load("unicycle_3r")
+    >>> wall = nmm.Obstacle(nmm.Box([0.2, 4.0, 2.0]), [3.0, 0.0, 0.5], name="wall")
+    >>> plan = nmm.plan(robot, {"q1": 0.5}, {"x": 6.0, "y": 0.0, "theta": 0.0}, [wall])
+    >>> np.allclose(plan.end[:3], [6.0, 0.0, 0.0], atol=1e-9)
+    True
+    """
+    q = robot.following.placed(robot.q(start))
+    robot.check_limits(q)
+    limits = Limits() if limits is None else limits
+    expect_kind(limits, Limits, "plan: limits", "Limits")
+    if limits.bounds:
+        raise InputError("limits of functions are not planned for", where="plan: limits")
+    n_p, ends = robot.platform.n_p, np.asarray(robot.limited.all(axis=1))
+    endless = [robot.q_names[i] for i in range(n_p, robot.n) if robot.q_units[i] == "m" and not ends[i]]
+    if endless:  # nothing bounds how far what it carries is from the joints before it
+        raise InputError(
+            f"{few(endless)}: slides without limits", where="plan: robot", expected="limits of it"
+        )
+    smooth = smooth or isinstance(robot.platform, Tractor)
+    if objective is not None and not smooth:
+        raise InputError("smooth motions alone have one", where="plan: objective", expected="smooth=True")
+    kept = collisions or Collisions()
+    asked = Asked(
+        collisions=replace(kept, obstacles=(*kept.obstacles, *obstacles)),
+        limits=limits,
+        tolerance=tolerance or Goal(),
+        smooth=smooth,
+        objective=objective,
+        effort=effort,
+        margin=scalar(margin, "plan: margin", least=0.0),
+        hold=hold,
+    )
+    search = Search(robot, q, [*through, goal], asked, seed)
+    return planned(search, positive(seconds, "seconds"), counted(shorten, "shorten", 0), progress)
+
+
+def planned(search: Search, seconds: float, shorten: int, progress: Callable[[float], None] | None) -> Plan:
+    """From a search's start through all its goals; each part ends where the next begins."""
+    begin = partial(search.begin, seconds, progress)
+    if isinstance(search.robot.platform, Tractor):
+        return _towed(search, search.robot.platform, begin)
+    if search.asked.hold is not None:
+        return _holding(search, search.asked.hold, shorten, begin)
+    begin()
+    here, parts, least = search.start, [], search.asked_kept + search.asked.margin
+    for wanted in search.goals:
+        search.keep_asked()
+        legs = search.shortened(here, search.farther(here, search.ends(wanted, here)), shorten)
+        parts.append(legs)
+        here, least = search.guide.corners(here, legs)[-1], np.minimum(least, search.check.kept)
+    search.check.kept[:] = least
+    return finished(search, *parts)
+
+
+def finished(search: Search, *parts: Array) -> Plan:
+    """The plan of legs from the start; a smooth one rests between the parts."""
+    path = _timed(search, search.start, np.vstack(parts))
+    motion: Motion = path
+    if search.movers is not None:
+        motion = _waited(search, path, search.movers)
+    elif search.asked.smooth:
+        motion = _smoothed(search, parts) or path
+    return _found(search, motion)
+
+
+def _waited(search: Search, path: TimedLegs, movers: Scene) -> TimedLegs:
+    """The path, or another way, with a timing among what moves; `RunError` where none of them has one."""
+    timing, looked = waited(path, search.robot, movers)
+    ways = 1
+    for k in range(1, WAYS):
+        left = search.left()
+        if timing is not None or left <= 0.0:
+            break
+        at = None if k % 2 == 0 else LONG if k == 1 else float(search.rng.uniform(0.0, path.duration))
+        with suppress(NmmError):  # what stands there may touch the start, the goal, or leave no way
+            other = _another_way(search, at, k, left / (WAYS - k))
+            timing, more = waited(cast(TimedLegs, other.motion), search.robot, movers)
+            search.tree = other.tree if timing is not None else search.tree
+            ways, looked = ways + 1, looked + more
+    if timing is None:
+        names = few(sorted({one.name for one in movers.obstacles}))
+        tried = f"{ways} way{'s'[: ways > 1]} and {looked} timings of their parts looked at"
+        raise RunError(f"{tried}: none keeps its distance of {names}", where="plan")
+    return timing
+
+
+def _another_way(search: Search, at: float | None, k: int, seconds: float) -> Found:
+    """The way of another seed, with what moves standing where it is at a time, s; without it at None."""
+    given = search.asked.collisions
+    kept = [one for one in given.obstacles if not one.moves]
+    if at is not None:
+        moves = [one for one in given.obstacles if one.moves]
+        kept += [Obstacle(one.shape, one.placement(at), name=one.name) for one in moves]
+    asked = replace(search.asked, collisions=replace(given, obstacles=tuple(kept)), smooth=False)
+    other = Search(search.robot, search.start, search.goals, asked, search.seed + k)
+    return planned(other, seconds, SHORTEN, None).found
+
+
+def _smoothed(search: Search, parts: Sequence[Array]) -> SampledMotion | None:
+    """The parts as smooth motions with rests between them; None where one of them is not found."""
+    smoothing = Smoothing(search.robot, search.limits, USUAL, search.check, search.costs)
+    found, here = [], search.start
+    for legs in parts:
+        path = _timed(search, here, legs)
+        here = path.corners[-1]
+        if path.duration > 0.0:
+            motion = smoothing(path)
+            if motion is None:
+                return None
+            found.append(_within_efforts(search, motion))
+    return joined(found) if found else None
+
+
+def _towed(search: Search, tractor: Tractor, begin: Callable[[], None]) -> Plan:
+    """The plan of a tractor with trailers, which is smooth."""
+    robot = search.robot
+    if search.movers is not None:
+        raise InputError("a tractor with trailers waits for none that move", where="plan: obstacles")
+    given = robot, search.limits, USUAL, search.check, search.low, search.high, search.seed, search.left
+    towing = Towing(*given, search.costs)
+    begin()
+    hitches, here, found = {one.joint for one in tractor.trailers}, search.start, []
+    for wanted in search.goals:
+        search.keep_asked()
+        ends, named = search.ends(wanted, here), _named(robot, wanted)
+        if any(np.array_equal(here, end) for end in ends):
+            continue
+        find = partial(towing, here, ends, loose=named is not None and not hitches & named)
+        motion = search.with_margin(find, here, ends)
+        found.append(_within_efforts(search, motion))
+        here = motion.corners[-1]
+    whole = joined(found) if found else _still(search, here)
+    return _plan(search, whole, towing.motions, towing.configurations)
+
+
+def _named(robot: Robot, wanted: object) -> set[str] | None:
+    """The coordinates that goals name, and their postures; None where one of them is no goal by name."""
+    named: set[str] = set()
+    for one in alternatives(wanted):
+        if not isinstance(one, Mapping):
+            return None
+        named |= {*one, *robot.postures.get(str(one.get("posture")), {})}
+    return named
+
+
+def _holding(search: Search, hold: Task | str, shorten: int, begin: Callable[[], None]) -> Plan:
+    """The plan along which the arm holds something."""
+    robot, asked = search.robot, search.asked
+    refuse_beside_hold(robot, asked)
+    held = Held(robot, hold, search.start, asked.tolerance, search.check)
+    timing = HeldTiming(held, search.guide, search.limits, search.usual)
+    ways = HeldWays(asked, timing, search.trees, search.rng, search.left)
+    begin()
+    here, motions = search.start, list[SampledMotion]()
+    for wanted in search.goals:
+        search.keep_asked()
+        motions += ways.motions(here, wanted, shorten)
+        here = motions[-1].corners[-1] if motions else here
+    motions = [_within_efforts(search, one) for one in motions]
+    return _found(search, joined(motions) if motions else _still(search, here))
+
+
+def _timed(search: Search, start: Array, legs: Array) -> TimedLegs:
+    guide = search.guide
+    motion = timed(guide, search.robot, start, guide.merged(legs), search.limits, search.usual)
+    return motion if search.efforts is None else search.efforts.legs(motion)
+
+
+def _still(search: Search, q: Array) -> TimedLegs:
+    return _timed(search, q, np.zeros((0, 3 + search.robot.n)))
+
+
+def _within_efforts(search: Search, motion: SampledMotion) -> SampledMotion:
+    return motion if search.efforts is None else search.efforts.samples(motion)
+
+
+def _found(search: Search, motion: Motion) -> Plan:
+    motions, postures = (int(count) for count in search.trees.looked)
+    return _plan(search, motion, motions, postures)
+
+
+def _plan(search: Search, motion: Motion, motions: int, postures: int) -> Plan:
+    found = Found(motion, search.limits, search.scene, search.goals[-1], search.asked, search.tree)
+    return Plan(search.robot, motions, postures, found)
