@@ -37,7 +37,7 @@ objective: {kind: quadratic, terms: [{of: {theta: 1, q1: 1, q2: 1}, target: 0}]}
 resolver: {kind: rg, alpha: 10}
 ```
 
-A reference may be named by its path wherever one may stand, as `task.0.reference` here:
+A reference may be named by its path wherever one may stand, as `task.0.reference` here;
 `--set task.0.reference.radius=2` then changes both. Where YAML anchors (`&`) share a value, `--set` changes
 one place and warns about the others.
 
