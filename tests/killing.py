@@ -8,6 +8,8 @@ process makes, moves and removes, so that a signal meets it while it writes, and
 from __future__ import annotations
 
 import atexit
+import contextlib
+import gc
 import importlib
 import json
 import os
@@ -24,6 +26,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any
+
+from expanding import expanded_once
 
 #: What touches files, by the name of Python's audit event; `open` counts where it is for writing.
 TOUCHING = {
@@ -158,12 +162,37 @@ def _begin(request: Request) -> None:
     sys.addaudithook(touching)
     from nmm.cli import main
 
-    main()
+    try:
+        main()
+    except SystemExit as ended:
+        if request.number:  # Python's own end belongs to the moments at which a signal may come
+            raise
+        threading._shutdown()  # type: ignore[attr-defined]
+        atexit._run_exitfuncs()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(ended.code if isinstance(ended.code, int) else 0)
 
 
 def _picture(figure: Any, path: Path, **options: Any) -> None:
     image = importlib.import_module("PIL.Image")
     image.new("L", (8, 8)).save(path)
+
+
+def _practise(arguments: list[str]) -> None:
+    """The command, once, in this process: each one forked has what it loads and compiles from the start."""
+    from nmm.cli.exit_status import status_of
+
+    kept = [os.dup(handle) for handle in (1, 2)]
+    null = os.open(os.devnull, os.O_WRONLY)
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        for handle in (1, 2):
+            os.dup2(null, handle)
+        status_of(arguments)
+        for handle, ours in zip((1, 2), kept, strict=True):
+            os.dup2(ours, handle)
+    for handle in (null, *kept):
+        os.close(handle)
 
 
 def _serve() -> None:
@@ -175,9 +204,14 @@ def _serve() -> None:
         importlib.import_module(name)
     # Drawing is most of a command's time, and writes no other files than this.
     importlib.import_module("matplotlib.figure").Figure.savefig = _picture
-    nmm.Scenario.load("unicycle_2r_position").override("duration", 0.05).run()
+    importlib.import_module("nmm.robots.loading.description").expand = expanded_once
+    practised: list[list[str]] = []
     for line in sys.stdin:
         request = Request(**json.loads(line))
+        if request.arguments not in practised and not request.prepared:
+            _practise(request.arguments)
+        practised.append(request.arguments)
+        gc.freeze()  # else each forked process would look for garbage in all of it, and copy it for that
         process = os.fork()
         if not process:
             _begin(request)
