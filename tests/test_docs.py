@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
@@ -24,10 +25,12 @@ from small_pictures import draw_only
 from worked_examples import FILES, write_examples
 
 import nmm
+import nmm.paper
 from nmm.bundled import bundled_scenarios
 from nmm.cli.app import app
 from nmm.cli.exit_status import status_of
 from nmm.kinds import OBJECTIVES, PLATFORMS, REFERENCES, RESOLVERS, TASKS, Kinds
+from nmm.paper import write
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENTS = ["README.md", *(path.relative_to(ROOT).as_posix() for path in sorted(ROOT.glob("docs/**/*.md")))]
@@ -91,6 +94,24 @@ def words_and_numbers(text: str) -> tuple[list[str], list[float]]:
 console = script("console")
 
 
+@pytest.fixture(scope="module")
+def paper_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """The paper's folder, which more than one page writes and none shows, is computed for the first, here:
+    other processes would draw all of it. They have tests of their own."""
+    kept, reports = tmp_path_factory.mktemp("paper") / "paper", []
+
+    def write_paper(folder: str | Path, progress: Any, figures: Any) -> Any:
+        if not reports:
+            reports.append(write.write_paper(kept, progress, 1, figures=figures))
+        shutil.copytree(kept, folder)
+        return replace(reports[0], folder=Path(folder), index=Path(folder, "index.html"))
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(nmm.paper, "write_paper", write_paper)
+        yield
+
+
+@pytest.mark.usefixtures("paper_once")
 @pytest.mark.parametrize("page", console.PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
 def test_a_page_that_runs_prints_what_it_says(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
