@@ -79,6 +79,10 @@ def compared(text: str) -> str:
 def _printed(command: str) -> str:
     """What a command prints, errors included, as a terminal would show it."""
     program, *arguments = shlex.split(command, comments=True)
+    if program == "grep":
+        _, pattern, name = arguments
+        lines = Path(name).read_text(encoding="utf-8").splitlines()
+        return "\n".join(line for line in lines if re.search(pattern, line))
     if program == "cat":
         return "\n".join(Path(name).read_text(encoding="utf-8").strip("\n") for name in arguments)
     if program == "python":
@@ -87,7 +91,7 @@ def _printed(command: str) -> str:
         )
         return done.stdout.strip("\n")
     if program != "nmm":
-        raise ValueError(f"expected nmm, python or cat, got {command!r}")
+        raise ValueError(f"expected nmm, python, cat or grep -E, got {command!r}")
     return _done(arguments)[1].strip("\n")
 
 

@@ -155,7 +155,8 @@ def tutorial(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The files of docs/tutorials/robot_loop.md."""
     folder = tmp_path_factory.mktemp("robot_loop")
     page = Path(__file__).parents[1] / "docs" / "tutorials" / "robot_loop.md"
-    shutil.copy(page.with_name("mujoco_robot.py"), folder)
+    for path in page.parent.glob("*.py"):
+        shutil.copy(path, folder)
     for code in re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL):
         (folder / code.split("\n")[0].removeprefix("# ")).write_text(code, encoding="utf-8")
     return folder

@@ -232,7 +232,9 @@ def test_the_node_s_logic_leads_a_robot_by_messages_alone() -> None:
     bad.position[1] = math.nan
     with pytest.raises(InputError):
         follow.on_joint_state(bad)
-    twist, rates = follow.commands(9.0)
+    for k in range(1200, 1300):
+        twist, rates = follow.commands(k * dt)
+    assert follow.loop.state == nmm.LoopState.STOPPED
     assert not np.any([*nmm.ros.twist(twist), *rates.values()])
 
 

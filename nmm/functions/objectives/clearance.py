@@ -23,7 +23,7 @@ from nmm.robots.robot import Robot
 from nmm.robots.zero_order_hold import RollingPreview
 
 #: Usual way that is looked ahead with wheels that have to roll to turn, m. What turns on the spot drove
-#: around random obstacles less often with it than without: docs/collisions.md.
+#: around random obstacles less often with it than without.
 AHEAD = 1.0
 #: Looks on that way: with one, what stands before it is not seen, and one turns back towards it.
 LOOKS = 3
