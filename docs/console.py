@@ -4,7 +4,7 @@ A page's blocks run in order, in one empty folder:
 
 - ```console: what the commands in it ("$ nmm …", "$ python FILE", "$ cat FILE") print. The tests compare it.
   "$ nmm … | grep -E PATTERN" prints the lines that match; standard error passes by, unless it is "2>&1 |".
-- ```text with commands: the same, not compared: its numbers are times, rounding, or chaotic.
+- ```text with commands: the same; not run by the tests, as its numbers are times, rounding, or chaotic.
 - ```bash: lines "nmm …" run, without what they print. What waits for Ctrl-C (view, drive, --play, …) gets it
   when its page is open.
 - a file beside the page to which it links, "](NAME.py)", is copied there first.
@@ -27,6 +27,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+from collections.abc import Collection
 from pathlib import Path
 from typing import TextIO
 
@@ -44,15 +45,15 @@ _STAYS = ("view", "drive", "play")
 _PATIENCE = 120.0
 
 
-def rewritten(text: str, folder: Path | None = None) -> str:
-    """The page with what its commands print now, run in an empty folder."""
+def rewritten(text: str, folder: Path | None = None, written: Collection[str] = WRITTEN) -> str:
+    """The page with what its commands print now, run in an empty folder: those of blocks of these kinds."""
     names: dict[str, object] = {"__name__": "__main__"}
 
     def anew(block: re.Match[str]) -> str:
         kind, body = block["kind"], block["body"]
         if named := _NAMED.match(body):
             Path(named["name"]).write_text(body, encoding="utf-8")
-        elif kind in WRITTEN and body.startswith(_PROMPT):
+        elif kind in written and body.startswith(_PROMPT):
             commands = [line for line in body.splitlines() if line.startswith(_PROMPT)]
             printed = "\n".join(
                 f"{line}\n{_printed(line.removeprefix(_PROMPT))}".rstrip() for line in commands

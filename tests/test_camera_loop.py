@@ -10,14 +10,12 @@ from pathlib import Path
 import pytest
 
 pytest.importorskip("cv2")
-PAGE = Path(__file__).parents[1] / "docs" / "tutorials" / "camera_loop.md"
+SCRIPT = Path(__file__).parents[1] / "docs" / "tutorials" / "dock.py"
 
 
 def test_a_robot_drives_up_to_markers_that_its_camera_sees(tmp_path: Path) -> None:
-    (code,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL)
-    (tmp_path / "dock.py").write_text(code, encoding="utf-8")
     done = subprocess.run(
-        [sys.executable, "dock.py"], cwd=tmp_path, capture_output=True, text=True, check=True
+        [sys.executable, str(SCRIPT)], cwd=tmp_path, capture_output=True, text=True, check=True
     )
     found, of, pixels, x, y, size = map(float, re.findall(r"(?<![\w.])\d+(?:\.\d+)?", done.stdout))
     assert of == 1200.0

@@ -120,7 +120,8 @@ def test_a_page_that_runs_prints_what_it_says(
     draw_only([Path(path).name for path in console.shown(page)], monkeypatch)
     text = page.read_text(encoding="utf-8")
     said, said_numbers = words_and_numbers(console.compared(text))
-    printed, printed_numbers = words_and_numbers(console.compared(console.rewritten(text, tmp_path)))
+    anew = console.rewritten(text, tmp_path, [console.COMPARED])
+    printed, printed_numbers = words_and_numbers(console.compared(anew))
     assert printed == said, "run python docs/console.py"
     np.testing.assert_allclose(printed_numbers, said_numbers, rtol=0.05, atol=1e-6)
     for path in console.shown(page):

@@ -201,8 +201,9 @@ def test_a_missing_rate_is_asked_for_by_name() -> None:
 def test_the_node_s_logic_leads_a_robot_by_messages_alone() -> None:
     """docs/ros.md: its robot here is q_dot = S(q) u, which gets and sends serialised messages."""
     page = (Path(__file__).parents[1] / "docs" / "ros.md").read_text("utf-8")
-    code, node = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
-    compile(node, "node.py", "exec")
+    (code,) = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
+    node = Path(__file__).parents[1] / "docs" / "tutorials" / "ros_node.py"
+    compile(node.read_text("utf-8"), "ros_node.py", "exec")
     found: dict[str, Any] = {}
     exec(code, found)
     robot = nmm.load("unicycle_3r")
