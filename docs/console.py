@@ -4,7 +4,8 @@ A page's blocks run in order, in one empty folder:
 
 - ```console: what the commands in it ("$ nmm …", "$ python FILE", "$ cat FILE") print. The tests compare it.
   "$ nmm … | grep -E PATTERN" prints the lines that match; standard error passes by, unless it is "2>&1 |".
-- ```text with commands: the same; not run by the tests, as its numbers are times, rounding, or chaotic.
+- ```text with commands: the same, not compared: its numbers are times, rounding, or chaotic. The tests run
+  its "$ nmm …"; scripts have tests of their own.
 - ```bash: lines "nmm …" run, without what they print. What waits for Ctrl-C (view, drive, --play, …) gets it
   when its page is open.
 - a file beside the page to which it links, "](NAME.py)", is copied there first.
@@ -27,7 +28,6 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Collection
 from pathlib import Path
 from typing import TextIO
 
@@ -35,7 +35,7 @@ FOLDER = Path(__file__).parent
 TUTORIALS = sorted((FOLDER / "tutorials").glob("*.md"))
 #: Pages whose blocks run.
 PAGES = (*(FOLDER / f"{name}.md" for name in ("singularities", "sweeps", "papers")), *TUTORIALS)
-COMPARED, WRITTEN = "console", ("console", "text")
+COMPARED = "console"
 
 _BLOCK = re.compile(r"^```(?P<kind>\w+)\n(?P<body>.*?)^```$", re.DOTALL | re.MULTILINE)
 _NAMED = re.compile(r"(?:# |<!-- )(?P<name>[\w-]+\.\w+)(?: -->)?\n")
@@ -45,15 +45,16 @@ _STAYS = ("view", "drive", "play")
 _PATIENCE = 120.0
 
 
-def rewritten(text: str, folder: Path | None = None, written: Collection[str] = WRITTEN) -> str:
-    """The page with what its commands print now, run in an empty folder: those of blocks of these kinds."""
+def rewritten(text: str, folder: Path | None = None, *, scripts: bool = True) -> str:
+    """The page with what its commands print now, run in an empty folder; `scripts` not compared run, too."""
+    run_in = {COMPARED: _PROMPT, "text": _PROMPT if scripts else f"{_PROMPT}nmm "}
     names: dict[str, object] = {"__name__": "__main__"}
 
     def anew(block: re.Match[str]) -> str:
         kind, body = block["kind"], block["body"]
         if named := _NAMED.match(body):
             Path(named["name"]).write_text(body, encoding="utf-8")
-        elif kind in written and body.startswith(_PROMPT):
+        elif kind in run_in and body.startswith(run_in[kind]):
             commands = [line for line in body.splitlines() if line.startswith(_PROMPT)]
             printed = "\n".join(
                 f"{line}\n{_printed(line.removeprefix(_PROMPT))}".rstrip() for line in commands

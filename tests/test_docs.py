@@ -120,7 +120,7 @@ def test_a_page_that_runs_prints_what_it_says(
     draw_only([Path(path).name for path in console.shown(page)], monkeypatch)
     text = page.read_text(encoding="utf-8")
     said, said_numbers = words_and_numbers(console.compared(text))
-    anew = console.rewritten(text, tmp_path, [console.COMPARED])
+    anew = console.rewritten(text, tmp_path, scripts=False)
     printed, printed_numbers = words_and_numbers(console.compared(anew))
     assert printed == said, "run python docs/console.py"
     np.testing.assert_allclose(printed_numbers, said_numbers, rtol=0.05, atol=1e-6)
