@@ -45,10 +45,10 @@ class Collisions:
     distance : to keep, m, at least 0
     self_collisions : whether the robot also avoids itself
     obstacles : what it avoids, `Obstacle`s
-    ignore : pairs of names (links, shapes, obstacles) that are not kept apart
+    ignore : pairs of names (links, shapes, obstacles) that are ignored
     srdf : a MoveIt file whose disabled pairs are ignored, too, or True for the robot's own (see `nmm.load`);
         disabled pairs that do touch are reported
-    shapes : what stands for the robot's meshes, "hulls" or "capsules"
+    shapes : the shapes in place of the robot's meshes, "hulls" or "capsules"
     band : pairs nearer than this have rows, m; `distance` plus 0.2 m when not given
     gain : 1/s, a distance falls at most at this times what is left of it
     recovery : speed at which a distance below the minimum is restored, m/s

@@ -38,7 +38,7 @@ class Disturbances:
     ----------
     noise : standard deviation of each coordinate that the controller sees, m and rad: a number, (n,), or by
         name
-    delay : samples until inputs act; the robot stands before
+    delay : samples until inputs act; the robot is at rest before
     slip : the share of each input that acts: a number, (m,), or by name
     creep : s; the platform slides to its left with creep v ω
     odometry : whether the controller sees the platform where its wheels' encoders have it, without slip and

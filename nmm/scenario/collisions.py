@@ -171,7 +171,7 @@ class CollisionsPart(
     beside = ("obstacles", "ignore", "srdf")
     renamed: ClassVar[dict[str, str]] = {"self": "self_collisions"}
 
-    obstacles: list[ObstaclePart] = Field(default_factory=list, description="what it keeps off")
+    obstacles: list[ObstaclePart] = Field(default_factory=list, description="shapes to avoid")
 
     def build_obstacles(self, robot: Robot, absolute: Absolute, place: Place) -> list[Obstacle]:
         obstacles = []

@@ -97,7 +97,7 @@ class GoalPart(keys_of(Goal, MadePart)):  # type: ignore[misc]  # made
 
 _POSTURE = (
     dict[str, Number] | None,
-    "where joints go meanwhile, by name; the middle of their limits when not given",
+    "the posture that joints move to meanwhile, by name; the middle of their limits when not given",
 )
 
 

@@ -69,7 +69,7 @@ class ScenePart(Part):
     """What is drawn beside robot and task, and how the page opens. Controllers know nothing of it."""
 
     carried: list[CarriedPart] = Field(default_factory=list, description="shapes that frames carry")
-    scenery: list[SceneryPart] = Field(default_factory=list, description="shapes that stand there")
+    scenery: list[SceneryPart] = Field(default_factory=list, description="shapes in the world")
     camera: Annotated[str | list[Number], BeforeValidator(_camera)] = Field(
         "iso",
         description="where the page looks from: iso, top, front or wall, or six numbers, m, the eye "

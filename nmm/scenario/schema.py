@@ -60,7 +60,7 @@ class TrackPart(Part):
     """The plan is the controller's task, with limits and distances as they are; `track: true` is this with
     its defaults."""
 
-    gain: Positive = Field(2.0, description="on what each input moved too far, 1/s")
+    gain: Positive = Field(2.0, description="feedback gain on the deviation in each input, 1/s")
     length: Positive = Field(
         0.4, description="the way, m, along which a platform comes back to its path, about"
     )
@@ -92,11 +92,9 @@ class PlanPart(Part):
         "default the task's target",
     )
     through: list[Coordinates] = Field(default_factory=list, description="such goals on the way, in order")
-    seconds: Positive = Field(10.0, description="after which the search gives up, s")
-    seed: Annotated[Whole, Field(ge=0)] = Field(
-        1, description="of the random numbers; the same plan comes of the same seed"
-    )
-    shorten: Whole = Field(200, description="how often a shorter way between two points of it is tried")
+    seconds: Positive = Field(10.0, description="limit of the search, s")
+    seed: Annotated[Whole, Field(ge=0)] = Field(1, description="seed of the random numbers")
+    shorten: Whole = Field(200, description="how many shorter motions between two of its points are tried")
     smooth: bool = Field(
         False,
         description="whether it goes on without rests, where such a motion is found",
@@ -157,13 +155,13 @@ class ScenarioPart(Part):
         1, description="1 for inputs u, 2 for inputs that accelerate: u_dot from t, q and u, from rest"
     )
     servo: Positive = Field(
-        Controller.SERVO, description="of order 2: k with which u follows what the resolver answers, 1/s"
+        Controller.SERVO, description="at order 2: k with which u follows the resolver's answer, 1/s"
     )
     limits: Annotated[LimitsPart | None, BeforeValidator(part_or_none)] = Field(
         None, description="what the inputs are kept within: true for the robot's own limits, or a mapping"
     )
     collisions: Annotated[CollisionsPart | None, BeforeValidator(part_or_none)] = Field(
-        None, description="what the robot keeps off: true for itself, or a mapping with obstacles"
+        None, description="distances to keep: true for the robot to itself, or a mapping with obstacles"
     )
     plan: Annotated[PlanPart | None, BeforeValidator(part_or_none)] = Field(
         None,
@@ -184,7 +182,7 @@ class ScenarioPart(Part):
 
     scene: ScenePart | None = Field(
         None,
-        description="what is drawn beside robot and task, and how the page opens",
+        description="what else is drawn, and how the page opens",
     )
 
     @property

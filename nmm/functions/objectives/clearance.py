@@ -54,8 +54,8 @@ class Clearance(Objective):
     ----------
     collisions : the `Collisions` of the controller, for their obstacles, shapes and distance; in a scenario,
         and with `among`, they are those of the run
-    reach : how far beyond the distance to keep a pair is felt, m
-    own : whether the robot keeps off itself, too
+    reach : how far beyond the distance to keep a pair counts, m
+    own : whether the robot's distances to itself count, too
     ahead : how far ahead the robot is looked at, too, m, below 0 backwards; by default 1 for a car's wheels,
         else 0
 
