@@ -31,8 +31,10 @@ robot: unicycle_2r
 q0: {x: -1, y: -1, theta: pi}
 duration: 25
 task:
-  - {kind: position, frame: ee, axes: xy, reference: {kind: circle, center: [2, 2], radius: 3, rate: 0.08*pi}}
-  - {kind: heading, frame: link2, reference: {kind: bearing, of: task.0.reference, towards: [6, 2]}}
+  - {kind: position, frame: ee, axes: xy,
+     reference: {kind: circle, center: [2, 2], radius: 3, rate: 0.08*pi}}
+  - {kind: heading, frame: link2,
+     reference: {kind: bearing, of: task.0.reference, towards: [6, 2]}}
 objective: {kind: quadratic, terms: [{of: {theta: 1, q1: 1, q2: 1}, target: 0}]}
 resolver: {kind: rg, alpha: 10}
 ```
@@ -102,7 +104,8 @@ def _merged(keys: Iterable[Key]) -> Iterator[str]:
 
 def _row(key: Key, mark: str) -> str:
     name, default, text = (cell.replace("|", "\\|").replace("\n", " ") for cell in key)
-    return f"| {mark}{name}{mark} | {default} | {text} |"
+    plain = re.sub(r"(`[^`]*`)|\*", lambda found: found[1] or r"\*", text)
+    return f"| {mark}{name}{mark} | {default} | {plain} |"
 
 
 if __name__ == "__main__":
