@@ -182,3 +182,11 @@ def test_computed_torques_are_those_foretold(tutorial: Path) -> None:
     assert platform <= 0.5  # mm
     assert joints <= 0.02
     assert share <= 1.0  # per cent
+
+
+def test_where_a_cable_breaks_a_stop_along_the_limits_asks_less_of_the_motors_than_zeros(
+    tutorial: Path,
+) -> None:
+    (along,), (zeros,), *found = numbers_of(tutorial, "broken_cable.py")
+    assert 10.0 < along < 0.6 * zeros
+    assert found

@@ -12,7 +12,7 @@ second = nmm.Controller(robot, task, nmm.ProjectedGradient(), order=2, servo=2.0
 run = nmm.simulate(second, start, 4.0, 0.005)  # its inputs, and their accelerations
 hardware = MujocoRobot(robot, start, [(0.25, 0.0), (-0.25, 0.0)])
 dynamics, sent, off, k1 = hardware.dynamics, [], [], 10.0
-for q_d, u_d, u_dot in zip(run.q[:-1], run.u, run.u_dot, strict=True):
+for q_d, u_d, u_dot in zip(run.q[:-1], run.u[:-1], run.u_dot[:-1], strict=True):
     q, motors = hardware.q[np.newaxis], dynamics.actuators
     turned = np.vstack([motors.rates(q, one[np.newaxis]) for one in np.eye(robot.n_u)]).T
     u = np.linalg.pinv(turned) @ hardware.rates()
