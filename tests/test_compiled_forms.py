@@ -6,7 +6,10 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,6 +28,7 @@ from nmm.functions.program import Program, evaluate
 from nmm.functions.tasks import LinearCoordinates, Task
 from nmm.functions.tasks.task import Comparison
 from nmm.kernels.compiled import Kernel
+from nmm.kernels.record_layout import Memory, views
 from nmm.kernels.records import At, Frames, Rows
 from nmm.resolvers import (
     CallableResolver,
@@ -35,7 +39,8 @@ from nmm.resolvers import (
     ReducedGradient,
     Resolver,
 )
-from nmm.resolvers.answer import SINGULAR_J, SOLVED, unanswered
+from nmm.resolvers.answer import SINGULAR_J, SOLVED, AnswerArrays, unanswered
+from nmm.resolvers.base import ANSWER, resolve_one
 from nmm.resolvers.saturation import limit
 from nmm.robots.configuration import Configuration
 from nmm.robots.loading import load
@@ -51,6 +56,25 @@ def assert_same(plain: Array, compiled: Array, tolerance: float = TOLERANCE, nam
     """Of the largest finite number, or of 1; what is no finite number is the same in both forms."""
     scale = np.abs(plain).max(initial=1.0, where=np.isfinite(plain))
     np.testing.assert_allclose(compiled, plain, rtol=0, atol=tolerance * scale, err_msg=name)
+
+
+@contextmanager
+def in_plain_python() -> Iterator[None]:
+    """nmm's functions are Python's: else what a plain kernel calls would be compiled for Python alone."""
+    with pytest.MonkeyPatch.context() as patch:
+        for place, module in list(sys.modules.items()):
+            if place.split(".")[0] == "nmm":
+                for name, thing in list(vars(module).items()):
+                    if isinstance(thing, Dispatcher):
+                        patch.setattr(module, name, thing.py_func)
+        yield
+
+
+def both_forms(kernel: Kernel, one: Sequence[Any], other: Sequence[Any]) -> None:
+    """Run the plain form on one set of arguments, the compiled one on the other."""
+    with in_plain_python():
+        kernel.plain(*one)
+    kernel(*other)
 
 
 def kernels() -> dict[str, Kernel]:
@@ -107,9 +131,9 @@ def test_function_kernels(entry: Entry, robots: dict[str, Robot], rng: np.random
         rows = max(stage.rows for stage in stages)
         outcomes = [[np.zeros(rows), np.zeros(rows), np.zeros((rows, robot.n))] for _ in range(2)]
         for stage in stages:
-            arguments = stage_arguments(stage, t, configuration)
-            for form, outcome in zip((stage.kernel.plain, stage.kernel), outcomes, strict=True):
-                form(*arguments, Rows(*(array[: stage.rows] for array in outcome)))
+            at = stage_arguments(stage, t, configuration)
+            written = (Rows(*(array[: stage.rows] for array in outcome)) for outcome in outcomes)
+            both_forms(stage.kernel, *((*at, rows) for rows in written))
         for plain, compiled in zip(*outcomes, strict=True):
             assert_same(plain, compiled)
         count = len(entry.function.rows(robot))
@@ -130,8 +154,7 @@ def test_comparison_kernels(entry: Entry, robots: dict[str, Robot], rng: np.rand
     for _ in range(20):
         given = [rng.normal(size=shape) for shape in (3 * s, 3 * s, (3 * s, robot.n))]
         outcomes = [[part.copy() for part in given] for _ in range(2)]
-        for form, outcome in zip((kernel.plain, kernel), outcomes, strict=True):
-            form(*nothing, Rows(*outcome))
+        both_forms(kernel, *((*nothing, Rows(*outcome)) for outcome in outcomes))
         for plain, compiled, before in zip(*outcomes, given, strict=True):
             assert_same(plain, compiled)
             assert np.array_equal(plain[: 2 * s], before[: 2 * s])
@@ -143,12 +166,10 @@ def test_platform_kernels(name: str, rng: np.random.Generator) -> None:
     platform = EXAMPLES[name]
     for _ in range(20):
         qp = random_qp(platform, rng, 5.0)
-        both = []
-        for form in (platform.velocity_map.plain, platform.velocity_map):
-            G, G_q = np.zeros((platform.n_p, platform.p)), np.zeros((platform.n_p, platform.p, platform.n_p))
-            form(qp, platform.parameters, G, G_q)
-            both.append(np.append(G, G_q))
-        assert_same(*both)
+        n_p, p = platform.n_p, platform.p
+        both = [(np.zeros((n_p, p)), np.zeros((n_p, p, n_p))) for _ in range(2)]
+        both_forms(platform.velocity_map, *((qp, platform.parameters, *maps) for maps in both))
+        assert_same(*(np.append(*maps) for maps in both))
 
 
 RESOLVERS = [
@@ -172,14 +193,17 @@ def test_resolver_kernels(resolver: Resolver, rng: np.random.Generator) -> None:
         added = 2 if resolver.takes_added_task else 0
         more = {"added_J": rng.normal(size=(added, 4)), "added_rate": rng.normal(size=added)}
         problem = Problem(J, rng.normal(size=2), rng.normal(size=4), row_scales=[0.5, 2.0], **more)
-        setup = resolver.setup(problem.dimensions)
-        both = []
-        for form in (resolver.kernel.plain, resolver.kernel):
-            answer = unanswered(4, 1)
-            state = resolver.start(problem.dimensions)
-            form(problem.arrays, setup.numbers, setup.options, state.memory, answer)
-            both.append(np.concatenate([*(np.atleast_1d(field) for field in answer), state.memory]))
-        assert_same(*both)
+        setup, plain = resolver.setup(problem.dimensions), unanswered(4, 1)
+        memory = Memory()  # as a controller's: for arrays by themselves it would be compiled again
+        memory.add(problem.arrays)
+        memory.add(unanswered(4, 1))
+        blocks = memory.blocks()
+        one, other = (resolver.start(problem.dimensions).memory for _ in range(2))
+        with in_plain_python():
+            resolver.kernel.plain(problem.arrays, setup.numbers, setup.options, one, plain)
+        resolve_one(resolver.kernel.address, *blocks, setup.numbers, setup.options, other)
+        answers = (plain, one), (views(AnswerArrays, *blocks, ANSWER), other)
+        assert_same(*(np.concatenate([*map(np.atleast_1d, answer), state]) for answer, state in answers))
 
 
 def test_limit_kernel(rng: np.random.Generator) -> None:
@@ -198,12 +222,11 @@ def test_limit_kernel(rng: np.random.Generator) -> None:
             )
             u, status = rng.normal(size=4), rng.choice([SOLVED, SINGULAR_J])
             T = np.diag(1.0 + rng.random(4)) if level else np.zeros((0, 0))
-            both = []
-            for form in (limit.plain, limit):
-                answer = unanswered(4, 1)
+            answers = unanswered(4, 1), unanswered(4, 1)
+            for answer in answers:
                 answer.u[:], answer.status[()] = u, status
-                form(problem.arrays, T, answer)
-                both.append(np.concatenate([np.atleast_1d(field) for field in answer]))
+            both_forms(limit, *((problem.arrays, T, answer) for answer in answers))
+            both = [np.concatenate([*map(np.atleast_1d, answer)]) for answer in answers]
             assert_same(*both)
             moved += not np.array_equal(both[0][:4], u)
     assert moved > 40
