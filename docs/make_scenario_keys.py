@@ -61,6 +61,7 @@ def page() -> str:
 
 def _rows(group: list[Section]) -> Iterator[str]:
     """A part's keys, those of its kinds, and those of its parts, each after a row with its name."""
+    told: list[Key] = []
     for where, found in groupby(group, lambda section: section.title.partition(KIND)[0]):
         kinds = list(found)
         if KIND in kinds[0].title:
@@ -68,8 +69,11 @@ def _rows(group: list[Section]) -> Iterator[str]:
             continue
         (section,) = kinds
         if section is not group[0] and ANY not in where:
-            yield _row((where, "", section.summary), "**")
-        yield from _merged(section.keys)
+            also = [f"`{key[0]}`" for key in section.keys if key in told]
+            text = f"{section.summary} Also {', '.join(also)}." if also else section.summary
+            yield _row((where, "", text), "**")
+        yield from _merged(key for key in section.keys if key not in told)
+        told += section.keys
 
 
 def _of_kinds(kinds: list[Section], where: str) -> Iterator[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -246,10 +247,12 @@ def test_every_key_is_described() -> None:
         assert section.summary, section.title
         for key, _, description in section.keys:
             assert description, f"{section.title}: {key}"
+            assert not re.search(r"\b(None|True|False)\b", description), f"{section.title}: {key}"
     titles = [section.title for section in sections()]
     assert len(set(titles)) == len(titles)
     shared = [kind for kind, part in REFERENCE_PARTS.items() if part is FUNCTION_PARTS.get(kind)]
     others = ("the file", "robot", "robot, with arms mounted", "robot.arms", "objective.terms")
+    others = (*others, "reference.faults")
     others = (*others, "limits", "limits.bounds", "until", "disturbances", "retreat", "plan", "plan.track")
     others = (*others, "steering", "scene", "scene.carried", "scene.scenery")
     others = (*others, *(f"task.when, kind: {kind}" for kind in CONDITION_PARTS))

@@ -1,15 +1,17 @@
 """The keys of a scenario as text: what `nmm scenarios --keys` prints."""
 
+import re
 from collections.abc import Iterator, Mapping
+from functools import cache
 from types import MappingProxyType
 from typing import NamedTuple
 
 from pydantic_core import PydanticUndefined
 
-from nmm.kinds import RESOLVERS
+from nmm.kinds import REFERENCES, RESOLVERS, TASKS
 from nmm.scenario.collisions import SHAPE_PARTS, CollisionsPart, ObstaclePart
 from nmm.scenario.disturbances import DisturbancesPart
-from nmm.scenario.functions import FUNCTION_PARTS, REFERENCE_PARTS
+from nmm.scenario.functions import FUNCTION_PARTS, REFERENCE_PARTS, CameraFaultsPart
 from nmm.scenario.keys import Part
 from nmm.scenario.limits import BoundPart, GoalPart, LimitsPart, RetreatPart, SteeringPart
 from nmm.scenario.objectives import OBJECTIVE_PARTS, TermPart
@@ -18,6 +20,8 @@ from nmm.scenario.robot import ArmPart, MountedPart, RobotPart
 from nmm.scenario.scene import CarriedPart, ScenePart, SceneryPart
 from nmm.scenario.schema import PlanPart, ScenarioPart, TrackPart
 from nmm.scenario.tasks import CONDITION_PARTS, TASK_PARTS
+
+YAML = {"None": "null", "True": "true", "False": "false"}
 
 
 class Section(NamedTuple):
@@ -38,6 +42,7 @@ def sections() -> Iterator[Section]:
     yield from _kinds("task.when", CONDITION_PARTS)
     own = {kind: part for kind, part in REFERENCE_PARTS.items() if part is not FUNCTION_PARTS.get(kind)}
     yield from _kinds("reference", own)
+    yield _section("reference.faults", CameraFaultsPart)
     yield from _kinds("objective", OBJECTIVE_PARTS)
     yield _section("objective.terms", TermPart)
     yield from _kinds("resolver", RESOLVER_PARTS, {kind: RESOLVERS.words(kind) for kind in RESOLVER_PARTS})
@@ -82,8 +87,20 @@ def _section(title: str, part: type[Part], called: str = "") -> Section:
             continue
         default = field.get_default(call_default_factory=True)
         text = "required" if default is PydanticUndefined else _text(default)
-        keys.append((name, text, field.description or ""))
+        keys.append((name, text, _in_yaml(field.description or "")))
     return Section(title, called + " ".join((part.__doc__ or "").split()), keys)
+
+
+def _in_yaml(text: str) -> str:
+    """A parameter's description as a key's: YAML's words, and kinds in place of their classes."""
+    text = re.sub(r"\b(\w+)=(True|False)\b", r"\1: \2", text)
+    text = re.sub(r"\b(None|True|False)\b", lambda found: YAML[found[1]], text)
+    return re.sub(r"`(\w+)`", lambda found: f"`{_kinds_of_classes().get(found[1], found[1])}`", text)
+
+
+@cache
+def _kinds_of_classes() -> dict[str, str]:
+    return {kinds[name].__name__: name for kinds in (TASKS, REFERENCES) for name in kinds}
 
 
 def _text(value: object) -> str:

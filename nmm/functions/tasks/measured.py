@@ -46,8 +46,7 @@ class MeasuredPoints(Seen):
     observed : whether the depth of points that stand is estimated
     moving : how fast the points' velocity changes, m/s²: their motion is then estimated and fed forward; 0
         for points that stand
-    faults : of the simulation's camera; its noise is also that of the estimates. `CameraFaults()` when not
-        given
+    faults : of the simulation's camera, which else is perfect; its noise is also that of the estimates
 
     Examples
     --------
