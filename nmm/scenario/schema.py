@@ -62,7 +62,7 @@ class TrackPart(Part):
 
     gain: Positive = Field(2.0, description="feedback gain on the deviation in each input, 1/s")
     length: Positive = Field(
-        0.4, description="the way, m, along which a platform comes back to its path, about"
+        0.4, description="about how far, m, a platform drives until it is back on its path"
     )
     pace: Positive = Field(
         0.8,
