@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import runpy
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -199,13 +200,10 @@ def test_a_missing_rate_is_asked_for_by_name() -> None:
 
 
 def test_the_node_s_logic_leads_a_robot_by_messages_alone() -> None:
-    """docs/ros.md: its robot here is q_dot = S(q) u, which gets and sends serialised messages."""
-    page = (Path(__file__).parents[1] / "docs" / "ros.md").read_text("utf-8")
-    (code,) = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
-    node = Path(__file__).parents[1] / "docs" / "tutorials" / "ros_node.py"
-    compile(node.read_text("utf-8"), "ros_node.py", "exec")
-    found: dict[str, Any] = {}
-    exec(code, found)
+    """docs/tutorials/follow.py: its robot is q_dot = S(q) u, which gets and sends serialised messages."""
+    folder = Path(__file__).parents[1] / "docs" / "tutorials"
+    compile((folder / "ros_node.py").read_text("utf-8"), "ros_node.py", "exec")
+    found = runpy.run_path(str(folder / "follow.py"))
     robot = nmm.load("unicycle_3r")
     messages = nmm.ros.Messages(robot, STORE.types)
     follow, q, dt = (
