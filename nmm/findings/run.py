@@ -1,4 +1,4 @@
-"""What a run found: how it ended, why, and warnings; docs/outcomes.md lists the codes."""
+"""What a run found: how it ended, why, and warnings; docs/api/findings.md lists the codes."""
 
 import math
 from collections.abc import Mapping, Sequence

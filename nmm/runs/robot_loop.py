@@ -157,7 +157,7 @@ class Loop:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What was found, the last 200 (docs/outcomes.md has the codes); `where` has t, values `samples` and
+        """What was found, the last 200 (codes: docs/api/findings.md); `where` has t, values `samples` and
         `end`."""
         return self._found.as_findings()
 

@@ -190,7 +190,7 @@ class Trajectory:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What `message` and `warnings` say, as data (docs/outcomes.md lists the codes)."""
+        """What `message` and `warnings` say, as data (docs/api/findings.md lists the codes)."""
         return (*self.verdict.reasons, *(one for many in self.verdict.warnings for one in many))
 
     @property
