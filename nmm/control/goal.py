@@ -18,7 +18,7 @@ class Goal:
     Parameters
     ----------
     m, rad : tolerances of rows in metres and in radians; rows without a unit, and pixels over the focal
-        length, count as radians
+        length, count as radians; others are ignored
 
     Examples
     --------

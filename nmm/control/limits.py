@@ -30,8 +30,8 @@ class Limits:
 
     Parameters
     ----------
-    velocity : of inputs, m/s, rad/s: True for the robot's, False for none, or by input, group ("platform",
-        "arm") or mimic joint: a number for both signs or [lower, upper]
+    velocity : of inputs, m/s, rad/s: True for the robot's, False for none, or others by input, group
+        ("platform", "arm") or mimic joint: a number for both signs or [lower, upper]
     position : of coordinates, in the same way: [lower, upper]; m, rad
     acceleration : of inputs, m/s², rad/s²: a number for all, or by input or group; None for none
     wheels : largest rolling rates, rad/s: by joint, or one for all but casters; None for the robot's, unless

@@ -42,8 +42,8 @@ class Retreat:
     stalled : s in which the error has to fall by the share `progress`, else the robot backs off; the time in
         which the platform speeds up does not count
     progress : share, between 0 and 1
-    durations : s, of the first retreat, the second, ...; the last holds for all later ones; None for 1 to
-        3.5, no two alike
+    durations : s, of the first retreat, the second, ...; the last holds for all later ones; or one for
+        all; None for 1 to 3.5, no two alike
     posture : where joints move meanwhile, (n,) or by name; None for the middle of their limits, or rest
     speed, turn : of the platform where it drives backwards, m/s and rad/s
     gain : 1/s, of the joints' motion to the posture

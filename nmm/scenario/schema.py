@@ -88,8 +88,8 @@ class PlanPart(Part):
 
     to: Coordinates | None = Field(
         None,
-        description="coordinates to be reached by name, m and rad, or posture: home of the SRDF; by "
-        "default the task's target",
+        description="coordinates to be reached by name, m and rad (others are free), or posture: home of the "
+        "SRDF; by default the task's target",
     )
     through: list[Coordinates] = Field(default_factory=list, description="such goals on the way, in order")
     seconds: Positive = Field(10.0, description="limit of the search, s")

@@ -100,7 +100,8 @@ class After:
     Parameters
     ----------
     task : that task's name
-    within : bound of ‖e‖ over rows of one unit: a number, or numbers by unit ({"m": 0.005})
+    within : bound of ‖e‖ over rows of one unit: a number, or numbers by unit ({"m": 0.005}, others are
+        ignored)
     hold : how long the error has to stay there, s
     instead : whether that task then ends
 

@@ -165,7 +165,7 @@ class Orientation(PartsOfPose):
     Parameters
     ----------
     frame : a frame of the robot
-    relative_to : a frame of the robot that it is measured from; the world when not given
+    relative_to : a frame of the robot from which, in its axes, it is measured; the world when not given
 
     Examples
     --------
@@ -242,7 +242,7 @@ class Pose(PartsOfPose):
     Parameters
     ----------
     frame : a frame of the robot
-    relative_to : a frame of the robot that it is measured from; the world when not given
+    relative_to : a frame of the robot from which, in its axes, it is measured; the world when not given
 
     Examples
     --------

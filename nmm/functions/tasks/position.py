@@ -45,7 +45,7 @@ class Position(PartsOfPose):
     ----------
     frame : a frame of the robot
     axes : some of x, y, z in the order wanted: "xy", "xyz", "z"
-    relative_to : a frame of the robot that it is measured from; the world when not given
+    relative_to : a frame of the robot from which, in its axes, it is measured; the world when not given
 
     Examples
     --------
@@ -93,7 +93,7 @@ class CenterOfMass(Function):
     Parameters
     ----------
     axes : some of x, y, z in the order wanted: "xy", "xyz", "z"
-    relative_to : a frame of the robot that it is measured from; the world when not given
+    relative_to : a frame of the robot from which, in its axes, it is measured; the world when not given
 
     Examples
     --------
