@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -58,8 +59,9 @@ class Window:
         return self.page
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
+@cache
+def _launched(config: pytest.Config) -> Browser:
+    """One browser for all files of a process: beside Playwright there can be no second one."""
     names = ("chromium", "chromium-browser", "google-chrome")
     path = next((found for name in names if (found := shutil.which(name))), None)
     if path is None:
@@ -68,10 +70,20 @@ def browser() -> Iterator[Browser]:
         )
     options = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
     options += ["--webgl-antialiasing-mode=none"]  # four samples a pixel would double what a picture takes
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=path, args=options)
-        yield chromium
-        chromium.close()
+    playwright = sync_playwright().start()
+    launched = playwright.chromium.launch(executable_path=path, args=options)
+    config.add_cleanup(playwright.stop)
+    config.add_cleanup(launched.close)  # before it
+    return launched
+
+
+@pytest.fixture(scope="module")
+def browser(pytestconfig: pytest.Config) -> Iterator[Browser]:
+    """Without anything open at the end of a file."""
+    launched = _launched(pytestconfig)
+    yield launched
+    for context in launched.contexts:
+        context.close()
 
 
 #: Small: the processor draws it.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import os
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -14,6 +13,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from playback_browser import browser as browser
+from playwright.sync_api import Browser
 
 from nmm.errors import InputError, RunError
 from nmm.figure_options import FigureOptions
@@ -128,26 +129,20 @@ def test_progress_rises_to_the_end(paper: tuple[PaperReport, list[float]]) -> No
     assert len(fractions) > 100
 
 
-@pytest.mark.browser
-def test_page_opens_in_a_browser(paper: tuple[PaperReport, list[float]]) -> None:
+def test_page_opens_in_a_browser(paper: tuple[PaperReport, list[float]], browser: Browser) -> None:
     """All pictures load, nothing fails, and no width of window makes the page scroll sideways."""
-    sync_api = pytest.importorskip("playwright.sync_api")
     report, _ = paper
     wrong: list[str] = []
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path=os.environ.get("CHROMIUM", "/usr/bin/chromium"), args=["--no-sandbox"]
-        )
-        page = browser.new_page()
-        page.on("pageerror", lambda error: wrong.append(str(error)))
-        page.on("requestfailed", lambda request: wrong.append(request.url))
-        page.on("request", lambda request: request.url.startswith("file:") or wrong.append(request.url))
-        page.goto(report.index.as_uri(), wait_until="load")
-        assert page.evaluate("[...document.images].every(image => image.naturalWidth > 500)")
-        for width in (1600, 1000, 390):
-            page.set_viewport_size({"width": width, "height": 900})
-            assert page.evaluate("document.documentElement.scrollWidth") == width
-        browser.close()
+    page = browser.new_page()
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("requestfailed", lambda request: wrong.append(request.url))
+    page.on("request", lambda request: request.url.startswith("file:") or wrong.append(request.url))
+    page.goto(report.index.as_uri(), wait_until="load")
+    assert page.evaluate("[...document.images].every(image => image.naturalWidth > 500)")
+    for width in (1600, 1000, 390):
+        page.set_viewport_size({"width": width, "height": 900})
+        assert page.evaluate("document.documentElement.scrollWidth") == width
+    page.close()
     assert wrong == []
 
 
