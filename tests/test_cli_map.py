@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from small_pictures import draw_only
 
 from nmm.cli.exit_status import status_of
 from nmm.cli.mapping import map_measures
@@ -21,6 +22,7 @@ POSITION: dict[str, Any] = {"task": ["position:ee:xy"], "samples": "24"}
 @pytest.fixture(autouse=True)
 def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+    draw_only([], monkeypatch)
 
 
 def test_a_map_is_written_and_told(capsys: pytest.CaptureFixture[str]) -> None:

@@ -18,6 +18,7 @@ import pytest
 import yaml
 from command_line import Result, Terminal, page_of, process
 from ports import MOST
+from small_pictures import draw_only
 
 import nmm
 import nmm.cli.runs
@@ -33,8 +34,9 @@ Command = Callable[..., Result]
 
 @pytest.fixture
 def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Command:
-    """Run a command line in an empty folder, in this process."""
+    """Run a command line in an empty folder, in this process; pictures are empty."""
     monkeypatch.chdir(tmp_path)
+    draw_only(["comparison.png"], monkeypatch)
     return lambda *arguments: Result(status_of(arguments), *capfd.readouterr())
 
 

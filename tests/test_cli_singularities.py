@@ -14,6 +14,7 @@ import pytest
 from cli_tables import expect_report, printed, table
 from command_line import Result, Terminal, imported
 from numpy import pi
+from small_pictures import draw_only
 
 from nmm import Scenario
 from nmm.analysis import analyse, analyse_along
@@ -31,8 +32,9 @@ TIP = Position("ee", "xy")
 
 @pytest.fixture
 def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Command:
-    """Run `nmm singularities` in an empty folder, in this process."""
+    """Run `nmm singularities` in an empty folder, in this process; pictures are empty."""
     monkeypatch.chdir(tmp_path)
+    draw_only([], monkeypatch)
     return lambda *arguments: Result(status_of(["singularities", *arguments]), *capfd.readouterr())
 
 

@@ -13,6 +13,7 @@ import pinocchio as pin
 import pytest
 from findings import of_code, refused, the
 from gripping_cart import ARM, FINGERS, cart, scenario
+from small_pictures import draw_only
 from urdf_parts import write
 
 import nmm
@@ -128,6 +129,11 @@ SRDF = """<robot name="cart"><group name="arm"><chain base_link="base_link" tip_
 <group_state name="home" group="arm"><joint name="lift" value="0.4"/><joint name="bend" value="1.2"/>
 </group_state>
 <group_state name="far" group="arm"><joint name="lift" value="2.5"/></group_state></robot>"""
+
+
+@pytest.fixture(autouse=True)
+def _pictures_are_empty(monkeypatch: pytest.MonkeyPatch) -> None:
+    draw_only([], monkeypatch)
 
 
 @pytest.fixture
