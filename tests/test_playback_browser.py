@@ -360,7 +360,9 @@ def test_motions_play_live_until_the_process_ends(window: Window, tmp_path: Path
         assert page.locator("#time").inner_text() == "0.50 / 1.00 s"
 
 
+@pytest.mark.parametrize("robot", ["hand-built", "trailer_base", "omni_base"], indirect=True)
 def test_a_loop_moves_the_robot_in_the_page(robot: Robot, window: Window) -> None:
+    """With swivels, trailers and rollers; what a page draws is tried with all robots above."""
     motion = drive(robot, duration=2.0)
     angles = wheel_angles(motion)
     with LiveViewer(robot, motion.q[0]) as viewer:
