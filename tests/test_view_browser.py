@@ -222,9 +222,10 @@ def test_names_lie_neither_on_one_another_nor_on_the_tools(window: Window, file:
                 """all => all.map((one) => one.getBoundingClientRect())
                              .map(({ left, top, right, bottom }) => [left, top, right, bottom])"""
             )
+            view_width = page.evaluate("document.getElementById('view').clientWidth")
             for i, (left, top, right, bottom) in enumerate(boxes):
                 assert left >= 0
-                assert right <= page.evaluate("document.getElementById('view').clientWidth")
+                assert right <= view_width
                 for other in boxes[:i]:
                     assert right <= other[0] or other[2] <= left or bottom <= other[1] or other[3] <= top
 
