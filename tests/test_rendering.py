@@ -26,6 +26,7 @@ from playback_browser import window as window
 from playback_robot import drive
 from ports import MOST
 
+import nmm
 from nmm.errors import InputError, RunError
 from nmm.rendering import encoder, render
 from nmm.rendering.chromium import HeadlessPage
@@ -110,8 +111,8 @@ def test_a_page_that_throws_says_so(tmp_path: Path) -> None:
 
 @pytest.mark.browser
 def test_an_interrupted_video_leaves_nothing(tmp_path: Path) -> None:
-    made = process(tmp_path, "run", "unicycle_2r_position", "--set", "duration=5", "--out", "run")
-    assert made.wait(timeout=MOST) == 0, made.communicate()
+    run = nmm.Scenario.load("unicycle_2r_position", {"duration": 5.0}).run()
+    run.save(tmp_path / "run", figures=False)
     running = process(tmp_path, "render", "run", "--video", "motion.mp4", "--size", "320x200")
     end = time.monotonic() + MOST
     while not [path for path in tmp_path.iterdir() if path.name == ".motion.mp4.nmm-writing"]:
