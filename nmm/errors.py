@@ -285,8 +285,10 @@ def no_such(
     available: Iterable[object],
     where: object = "",
     error: Callable[..., E] = InputError,  # type: ignore[assignment]  # a class is called, too
+    hint: str = "",
 ) -> E:
-    """The error for a name that does not exist: `got` is the name, `what` holds the nearest match.
+    """The error for a name that does not exist: `got` is the name, `what` holds the hint, or the nearest
+    match, in upper or lower case.
 
     >>> no_such("frame", "eee", ["ee", "link1"])
     InputError("unknown frame 'eee' (did you mean 'ee'?); available: ee, link1")
@@ -295,8 +297,10 @@ def no_such(
 
     asked, names = str(name), [str(one) for one in available]
     short = [one for one in names if len(one) < LONGEST]
-    near = difflib.get_close_matches(asked, short, n=1) if len(asked) < LONGEST else []
-    hint = f" (did you mean {quoted(near[0])}?)" if near else ""
+    near = [one for one in short if one.lower() == asked.lower()]
+    if not near and len(asked) < LONGEST:
+        near = difflib.get_close_matches(asked, short, n=1)
+    hint = hint or (f" (did you mean {quoted(near[0])}?)" if near else "")
     return error(f"unknown {kind} {quoted(name)}{hint}", where=where, got=name, available=names)
 
 
