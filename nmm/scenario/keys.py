@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -26,6 +26,7 @@ from pydantic_core import CoreSchema, ErrorDetails
 
 from nmm.errors import InputError, NmmError, ScenarioError, expect_known, no_such
 from nmm.scenario.yaml_text import Place
+from nmm.text_format import quoted
 
 P = TypeVar("P")
 T = TypeVar("T")
@@ -95,9 +96,21 @@ class Part(BaseModel):
             for key in data:
                 if key in cls.renamed:
                     raise KeyedError((str(key),), f"this key is called {cls.renamed[key]} now")
-                with at(str(key)):
-                    expect_known("key", key, cls.model_fields)
+                if key not in cls.model_fields:
+                    with at(str(key)):
+                        raise no_such("key", key, cls.model_fields, hint=cls.unknown(str(key)))
         return data
+
+    @classmethod
+    def unknown(cls, key: str) -> str:
+        """What there is to say of a key that is none of this part's, behind its name."""
+        return cls.without_blank(key, cls.model_fields)
+
+    @staticmethod
+    def without_blank(key: str, keys: Container[str]) -> str:
+        """What there is to say of a text that is one of the keys, a colon and a value; "" of others."""
+        name, colon, value = key.partition(":")
+        return f": a blank after the colon, {name}: {value}" if colon and name in keys else ""
 
     def given(self, *keys: str) -> dict[str, Any]:
         """The values of these keys, of all when none is named, without those that are None."""
@@ -133,6 +146,9 @@ class OneOf:
 
     def _check(self, value: Any) -> Any:
         if isinstance(value, Mapping) and "kind" not in value:
+            for key in value:
+                if said := Part.without_blank(str(key), ("kind",)):
+                    raise KeyedError((str(key),), f"unknown key {quoted(key)}{said}")
             raise KeyedError(("kind",), "this key is missing", available=self.parts)
         return value
 

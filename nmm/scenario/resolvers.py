@@ -12,12 +12,23 @@ from nmm.scenario.constructors import MadePart, part_of
 from nmm.scenario.keys import KeyedError, OneOf
 from nmm.scenario.numbers import Positive, integer
 from nmm.scenario.tasks import TaskList, listed
+from nmm.text_format import listed as in_words
 
 
 class ResolverPart(MadePart):
     """How the redundancy is resolved."""
 
     kind: str
+
+    @classmethod
+    def unknown(cls, key: str) -> str:
+        kinds = kinds_with(key)
+        return f", a key of {in_words(kinds)}" if kinds else super().unknown(key)
+
+
+def kinds_with(key: str) -> list[str]:
+    """The kinds of resolver that have the key."""
+    return [kind for kind, part in RESOLVER_PARTS.items() if key in part.model_fields]
 
 
 def _partitions(value: object) -> object:
