@@ -70,6 +70,7 @@ SETTINGS: list[tuple[str, list[str]]] = [
     ("robot.lock.q9=1", ["robot.lock.q9", "unknown", "'q9'", "available: q1, q2"]),
     ("robot.wheels=[q9]", ["robot.wheels", "unknown", "'q9'"]),
     ("task.frame=eee", ["task.frame", "unknown frame 'eee' (did you mean 'ee'?)", "more"]),
+    ("task.frame=EE", ["task.frame", "unknown frame 'EE' (did you mean 'ee'?)"]),
     ("task.kind=posed", ["task.kind", "unknown kind 'posed' (did you mean 'pose'?)", "available: "]),
     ("task={kind: coordinates, of: q9, reference: 0}", ["task.of", "unknown coordinate 'q9'", "q1, q2"]),
     ("q0.q9=1", ["q0.q9", "unknown coordinate 'q9'", "available: x, y, theta, q1, q2"]),
@@ -83,6 +84,9 @@ SETTINGS: list[tuple[str, list[str]]] = [
     # unknown key, missing key, unknown unit
     ("speed=1", ["speed", "unknown key 'speed'", "available: "]),
     ("resolver.alfa=1", ["resolver.alfa", "unknown key 'alfa' (did you mean 'alpha'?)", "threshold"]),
+    ("resolver.added_task=1", ["resolver.added_task", "unknown key 'added_task', a key of ej", "threshold"]),
+    ("task.reference={kind:circle, radius: 1}", ["unknown key 'kind:circle': a blank after the colon"]),
+    ("resolver={kind: pg, alpha:1}", ["unknown key 'alpha:1': a blank after the colon, alpha: 1"]),
     ("task.reference={kind: circle, radius: 1}", ["task.reference.center", "missing"]),
     ("task.reference={radius: 1}", ["task.reference.kind", "missing", "circle, line"]),
     ("task.reference={kind: constant, value: [1, 1], unit: mile}", ["task.reference.unit", "'mile'", "rad"]),

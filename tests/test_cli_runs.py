@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -23,6 +24,7 @@ from small_pictures import draw_only
 import nmm
 import nmm.cli.runs
 from nmm.cli.exit_status import status_of
+from nmm.cli.options import chosen, named
 from nmm.cli.playing import runs_in
 from nmm.cli.runs import run as run_scenario
 from nmm.figure_options import FigureOptions
@@ -353,6 +355,19 @@ def test_entries_that_are_none(entries: str, messages: list[str], run: Command) 
     assert not Path("runs").exists()
     for message in messages:
         assert message in result.err
+
+
+def test_a_key_of_another_resolver_says_how_compare_takes_it(run: Command) -> None:
+    given = ("unicycle_2r_manipulability", "--resolvers")
+    result = run("compare", *given, "rg,ej", "--set", "resolver.added_task={kind: coordinates}")
+    assert (result.status, result.out) == (2, "")
+    assert "added_task is a key of ej: ej:added_task=… in --resolvers" in result.err
+    said = run("compare", *given, "rg,ej:gain=1,pg").err
+    pasted = shlex.split(said[said.index("--resolvers") : said.rindex(", got")])[1]
+    assert pasted.startswith("rg,pg,ej:gain=1:added_task={kind: coordinates")
+    for text in named(pasted, "--resolvers"):
+        chosen(text, "--resolvers").scenario(nmm.Scenario.load(given[0])).controller()
+    assert "no blanks in --resolvers rg,pg" in run("compare", *given, "rg,", "pg").err
 
 
 def test_a_comparison_shows_what_is_asked_of_the_inputs_and_when_the_error_settles(run: Command) -> None:

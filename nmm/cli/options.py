@@ -4,7 +4,8 @@ settings of its own, or one in a Python file."""
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -236,6 +237,27 @@ def check_different(resolvers: Sequence[Chosen], scenarios: Sequence[Scenario], 
     for k, one in enumerate(found):
         if one in found[:k]:
             raise _twice(option, resolvers[found.index(one)].text, resolvers[k].text)
+
+
+@contextmanager
+def of_several(several: Sequence[Chosen], one: Chosen, settings: Mapping[str, object]) -> Iterator[None]:
+    """In the block, an error that is about a key of one resolver says it as `--resolvers` takes it."""
+    try:
+        yield
+    except InputError as error:
+        from nmm.scenario.resolvers import kinds_with
+
+        key = error.got
+        kinds = kinds_with(str(key)) if error.what.startswith("unknown key") else []
+        if kinds and f"resolver.{key}" in settings:
+            what = f"{key} is a key of {listed(kinds)}: {kinds[0]}:{key}=… in --resolvers"
+            raise InputError(what, where=error.where) from None
+        before, setting, value = error.expected.partition("--set 'resolver.")
+        if not setting:
+            raise
+        others = dict.fromkeys(other.text for other in several if other is not one)
+        pasted = f"{before}--resolvers '{','.join([*others, one.text])}:{value}"
+        raise InputError(error.what, where=error.where, expected=pasted, got=error.got) from None
 
 
 def _twice(option: str, first: str, second: str) -> InputError:

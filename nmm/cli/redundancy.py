@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -189,7 +191,7 @@ def laps(
     made = Scenario.load(scenario, changed)
     folder = out or Path("runs") / f"{made.name}-laps"
     check_folder(folder, is_laps)
-    with progress(f"{made.name}, {number} laps") as report:
+    with progress(f"{made.name}, {number} laps") as report, _as_options():
         found = repeatability(made, laps=number, resolvers=kinds, period=period, progress=report)
     with shielded():
         save(found, folder, figures=drawn)
@@ -207,6 +209,25 @@ def laps(
             text = f"{one.name.upper()} {one.verdict}; the part that was computed is in {folder}"
             complain("nmm laps", text)
     return OK if found.complete else FAILED
+
+
+@contextmanager
+def _as_options() -> Iterator[None]:
+    """In the block, errors name options where Python has arguments; a key of a resolver is set with its kind,
+    since the scenario's own may have no such key."""
+    try:
+        yield
+    except InputError as error:
+        from nmm.scenario.resolvers import kinds_with
+
+        setting = "--set 'resolver."
+        what, expected = (text.replace("period=", "--period S") for text in (error.what, error.expected))
+        before, found, value = expected.partition(setting)
+        for kind in kinds_with(value.partition("=")[0])[:1]:
+            expected = f"{before}--set resolver.kind={kind} {found}{value}"
+        if (what, expected) == (error.what, error.expected):
+            raise
+        raise InputError(what, where=error.where, expected=expected, got=error.got) from None
 
 
 def _show(found: Repeatability, name: str, folder: Path) -> None:

@@ -26,6 +26,7 @@ from nmm.cli.options import (
     flag,
     form_of,
     named,
+    of_several,
     option,
     out_option,
     settings_of,
@@ -171,23 +172,32 @@ def compare(
     from nmm.folders.whole import check_folder
     from nmm.runs.table import step_time
 
+    if str(bag).partition(":")[0] in RESOLVERS and resolvers.endswith(","):
+        raise InputError(f"no blanks in --resolvers {resolvers}{bag}")
     if bag is not None:
         return compare_with_bag(scenario, bag, out)
     several = [chosen(text, "--resolvers") for text in named(resolvers, "--resolvers")]
     changed = settings_of(settings)
     drawn: dict[str, Any] = {"ellipsoids": ellipsoids.wanted(), "figures": figures.options()}
     form = form_of(table)
-    scenarios = [_load(scenario, one, changed, limits, of_robot) for one in several]
+    scenarios = []
+    for one in several:
+        with of_several(several, one, changed):
+            scenarios.append(_load(scenario, one, changed, limits, of_robot))
     check_different(several, scenarios, "--resolvers")
     name = scenarios[0].name
     run_labels = [one.label for one in several]
     if scenarios[0].parts.is_plan:
         scenarios = [scenarios[0], *(made.override("plan", False) for made in scenarios)]
+        several = [several[0], *several]
         run_labels = ["", *run_labels]
     folder = out or Path("runs") / f"{name}-compare"
     check_folder(folder, comparison.is_comparison)
     # What is wrong with the last one shows before the first one runs.
-    controllers = [made.controller() for made in scenarios]
+    controllers = []
+    for made, one in zip(scenarios, several, strict=True):
+        with of_several(several, one, changed):
+            controllers.append(made.controller())
     trajectories: list[Trajectory] = []
     for made, controller, label in zip(scenarios, controllers, run_labels, strict=True):
         trajectories.append(_run(made, controller, label=label))
@@ -210,7 +220,7 @@ def compare(
     show_table(
         ["", *(trajectory.called for trajectory in trajectories)],
         [[label, *(column.get(label, "") for column in columns)] for label in labels],
-        title=f"{name}: {scenarios[0].title}",
+        title=f"{name}: {scenarios[0].title}".removesuffix(": "),
     )
     show_table(["", ""], [["files in", str(folder)]])
     return _status("nmm compare", trajectories, folder)
