@@ -224,6 +224,7 @@ def _references() -> Iterator[Entry]:
     for name, way in (("constant", Constant([1, 2])), ("line", Line([0, 1], [3, -1], 3.5))):
         yield Entry(f"velocity of a {name}", VelocityOf(way))
     yield Entry("velocity of a spline", VelocityOf(Spline(_BREAKS, _POINTS, 5)))
+    yield Entry("velocity of a round spline", VelocityOf(Spline(_BREAKS, _POINTS, ends="periodic")))
     yield Entry("callable of time", CallableReference(lambda t: [np.sin(3 * t), t**3], 2))
     yield Entry(
         "callable of time, rate",

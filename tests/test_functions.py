@@ -11,12 +11,21 @@ import pinocchio as pin
 import pytest
 from function_grid import ENTRIES, random_configuration
 from numpy.typing import NDArray
-from scipy.interpolate import PPoly
+from scipy.interpolate import CubicSpline, PPoly
 
 from nmm.functions.function import Evaluation, Function
 from nmm.functions.objectives import JointRange, Manipulability, Quadratic, QuadraticTerm, Sum
 from nmm.functions.program import evaluate
-from nmm.functions.references import Bearing, Circle, Constant, Line, PiecewisePolynomial, Polynomial, Spline
+from nmm.functions.references import (
+    Bearing,
+    Circle,
+    Constant,
+    Line,
+    PiecewisePolynomial,
+    Polynomial,
+    Spline,
+    VelocityOf,
+)
 from nmm.functions.tasks import Heading, LinearCoordinates, Orientation, Pointing, Pose, Position
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
@@ -130,6 +139,14 @@ def test_splines_pass_their_points_smoothly(degree: int, ends: str, at: At) -> N
         for order in (1, 2):
             a, b = motion(at, spline, begin, order), motion(at, spline, end, order)
             np.testing.assert_allclose(a, b, atol=1e-6)
+        round_ = CubicSpline(TIMES, POINTS, bc_type="periodic")
+        for t in np.concatenate(
+            [begin + (end - begin) * np.linspace(-2.0, 3.0, 41), [end + 1e-9, end - 1e-9]]
+        ):
+            found = at(spline, t)
+            np.testing.assert_allclose(found.value, round_(t), atol=1e-12)
+            np.testing.assert_allclose(found.value_t, round_(t, 1), atol=1e-6)
+            np.testing.assert_allclose(at(VelocityOf(spline), t).value, round_(t, 1), atol=1e-6)
 
 
 def test_periodic_spline_takes_points_that_meet_but_for_rounding(at: At) -> None:

@@ -86,12 +86,14 @@ def test_paths_that_do_not_go_round(
         quick(with_reference(robot_2r, reference), **settings)
 
 
-def test_a_spline_that_comes_round_once_and_rests(robot_2r: Robot) -> None:
+def test_a_periodic_spline_says_its_period(robot_2r: Robot) -> None:
     points = [[1.0, 0.2], [1.1, 0.3], [1.0, 0.4], [0.9, 0.3], [1.0, 0.2]]
-    subject = with_reference(robot_2r, Spline([0, 1, 2, 3, 4], points, ends="periodic"))
-    assert quick(subject, period=4.0).period == 4.0
+    times = [0, 1, 2, 3, 4]
+    assert quick(with_reference(robot_2r, Spline(times, points, ends="periodic")), laps=2).period == 4.0
+    once = with_reference(robot_2r, Spline(times, points))
+    assert quick(once, period=4.0).period == 4.0
     with pytest.raises(InputError, match="not where it was 4 s before"):
-        quick(subject, period=4.0, laps=2)
+        quick(once, period=4.0, laps=2)
 
 
 def test_periods_without_a_common_one(robot_2r: Robot) -> None:

@@ -165,7 +165,7 @@ def laps(
     *,
     number: int = option("N", "How many; 3 or more tell whether the drift falls.", "--laps", default=5),
     resolvers: ResolversOption = "rg,pg",
-    period: float | None = option("S", "Of the path, s.", show="that of the circles in the task"),
+    period: float | None = option("S", "Of the path, s.", show="that of circles and periodic splines"),
     settings: SetOption = None,
     out: Annotated[Path | None, out_option("runs/<scenario>-laps")] = None,
     table: TableOption = None,

@@ -23,7 +23,7 @@ from nmm.errors import InputError, expect, no_such
 from nmm.findings import Finding
 from nmm.functions.function import Function
 from nmm.functions.program import evaluate
-from nmm.functions.references import Bearing, Circle, PoseReference
+from nmm.functions.references import Bearing, Circle, PiecewisePolynomial, PoseReference
 from nmm.kernels.rotations import exp3
 from nmm.progress import Progress, between
 from nmm.robots.configuration import Configuration
@@ -214,7 +214,7 @@ def repeatability(
     subject : a scenario, or (controllers by name, q0)
     laps : how many, at least 1; 3 or more tell whether the drift falls
     resolvers : kinds, for a scenario
-    period : s; not needed where all that moves are circles
+    period : s; not needed where all that moves are circles and periodic splines
     dt : s, at most; made to divide the period; the scenario's, or 0.005, when not given
     progress : called with the fraction done
 
@@ -294,6 +294,8 @@ def _periods(reference: Function, configuration: Configuration) -> list[float]:
     """The periods of what moves in a reference, s; none for what stands still."""
     if isinstance(reference, Circle):
         return [2.0 * math.pi / abs(reference.rate)] if reference.rate else []
+    if isinstance(reference, PiecewisePolynomial) and reference.repeats:
+        return [float(reference.breaks[-1] - reference.breaks[0])]
     if isinstance(reference, Bearing):
         return _periods(reference.of, configuration)
     if isinstance(reference, PoseReference):

@@ -107,7 +107,10 @@ class VelocityOf(Function):
         slopes = np.zeros((max(1, len(powers)), len(breaks) + 1, stage.rows))  # at rest before and after
         slopes[:, 1:-1] = c[:-1] * powers if len(powers) else 0.0
         around = np.concatenate([[breaks[0] - 1.0], breaks, [breaks[-1] + 1.0]])
-        numbers = np.concatenate([[len(breaks) + 1, len(slopes)], around, slopes.transpose(2, 1, 0).ravel()])
+        if self.of.repeats:
+            slopes, around = slopes[:, 1:-1], breaks
+        layout = [len(around) - 1, len(slopes), self.of.repeats]
+        numbers = np.concatenate([layout, around, slopes.transpose(2, 1, 0).ravel()])
         return (Stage(piecewise_polynomial, stage.rows, (), numbers),)
 
 

@@ -18,38 +18,43 @@ from nmm.robots.robot import Robot
 
 @kernel(FUNCTION)
 def piecewise_polynomial(at: At, frames: Frames, numbers: Array, rows: Rows) -> None:
-    """Horner's rule in the piece that holds t; at rest before the first and after the last break.
-    numbers = [pieces, coefficients a piece, breaks..., coefficients (component, piece, power)], highest power
-    first, in the time since the piece's beginning."""
+    """Horner's rule in the piece that holds t; before the first and after the last break at rest or, with
+    `repeats`, a whole number of rounds away. numbers = [pieces, coefficients a piece, repeats, breaks...,
+    coefficients (component, piece, power)], highest power first, in the time since the piece's beginning."""
     pieces = int(numbers[0])
     order = int(numbers[1])
-    breaks = numbers[2 : 3 + pieces]
+    repeats = numbers[2] != 0.0
+    breaks = numbers[3 : 4 + pieces]
+    t = at.t
+    if repeats:
+        t = breaks[0] + (t - breaks[0]) % (breaks[pieces] - breaks[0])
     piece = 0
-    while piece < pieces - 1 and at.t >= breaks[piece + 1]:
+    while piece < pieces - 1 and t >= breaks[piece + 1]:
         piece += 1
-    outside = at.t < breaks[0] or at.t > breaks[pieces]
-    local = min(max(at.t, breaks[0]), breaks[pieces]) - breaks[piece]
+    rests = not repeats and (t < breaks[0] or t > breaks[pieces])
+    local = min(max(t, breaks[0]), breaks[pieces]) - breaks[piece]
     for i in range(rows.value.shape[0]):
-        first = 3 + pieces + (i * pieces + piece) * order
+        first = 4 + pieces + (i * pieces + piece) * order
         y = 0.0
         y_t = 0.0
         for k in range(order):
             y_t = y_t * local + y
             y = y * local + numbers[first + k]
         rows.value[i] = y
-        rows.value_t[i] = 0.0 if outside else y_t
+        rows.value_t[i] = 0.0 if rests else y_t
 
 
 class PiecewisePolynomial(Function):
     """Polynomials of time, piece after piece; from SciPy: `PiecewisePolynomial(p.x, p.c)` for a `PPoly` p.
 
-    Before the first break and after the last it stays where it is, at rest.
+    Before the first break and after the last it stays where it is, at rest, unless it repeats.
 
     Parameters
     ----------
     breaks : (pieces + 1,) s, increasing
     coefficients : (order, pieces, s), highest power first, in the time since the piece's beginning
     unit : unit of the values, for tables and plots
+    repeats : whether it goes round again and again, as `extrapolate="periodic"` of a `PPoly`
 
     Examples
     --------
@@ -61,8 +66,11 @@ class PiecewisePolynomial(Function):
     array([1., 0.])
     """
 
-    def __init__(self, breaks: ArrayLike, coefficients: ArrayLike, unit: str = "m") -> None:
+    def __init__(
+        self, breaks: ArrayLike, coefficients: ArrayLike, unit: str = "m", repeats: bool = False
+    ) -> None:
         self.unit = unit
+        self.repeats = repeats
         self.breaks = vector(breaks, None, "breaks")
         self.coefficients = array(coefficients, "coefficients")
         pieces, c = self.breaks.size - 1, self.coefficients
@@ -77,7 +85,7 @@ class PiecewisePolynomial(Function):
     def stages(self, robot: Robot) -> tuple[Stage, ...]:
         order, pieces, s = self.coefficients.shape
         table = self.coefficients.transpose(2, 1, 0).ravel()
-        return (Stage(piecewise_polynomial, s, (), np.r_[pieces, order, self.breaks, table]),)
+        return (Stage(piecewise_polynomial, s, (), np.r_[pieces, order, self.repeats, self.breaks, table]),)
 
 
 class Constant(PiecewisePolynomial):
@@ -182,15 +190,15 @@ class Line(PiecewisePolynomial):
 
 
 class Spline(PiecewisePolynomial):
-    """A spline through waypoints; before the first and after the last it rests.
+    """A spline through waypoints; before the first and after the last it rests, or goes round if periodic.
 
     Parameters
     ----------
     times : (k,) s, increasing
     points : (k, s), a point a time
     degree : 3, twice continuously differentiable, or 5, four times
-    ends : "rest" (at both ends), "natural" (free ends), or "periodic" (the last point equals the first;
-        degree 3)
+    ends : "rest" (at both ends), "natural" (free ends), or "periodic" (the last point equals the first,
+        from where it goes round again; degree 3)
     unit : m, rad or 1
 
     Examples
@@ -231,7 +239,7 @@ class Spline(PiecewisePolynomial):
             # As polynomials between the breaks; `PPoly.from_spline` takes one component only.
             powers = range(spline.k, -1, -1)
             coefficients = np.array([spline(breaks[:-1], nu=nu) / math.factorial(nu) for nu in powers])
-        super().__init__(breaks, coefficients, unit)
+        super().__init__(breaks, coefficients, unit, repeats=ends == "periodic")
 
 
 def _waypoints(times: ArrayLike, points: ArrayLike) -> tuple[Array, Array]:
