@@ -227,6 +227,13 @@ EXAMPLES: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
         "rad/s",
     ),
     (
+        "start_in_degrees",
+        {"angles": {"theta": -150.0, "q1": 30.0}},
+        {},
+        "the start has theta at -150 rad (-23.9 turns) and q1 at 30 rad (4.8 turns); angles are in rad: "
+        "-150° is -5*pi/6",
+    ),
+    (
         "idle_inputs",
         {"inputs": ["steering_rate", "q5"]},
         {},

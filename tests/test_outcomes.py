@@ -55,6 +55,14 @@ def test_inputs_that_are_clipped_for_good_miss(robot_2r: Robot, tmp_path: Path) 
     assert np.array_equal(loaded.scale, np.ones((len(run), 1)))
 
 
+@pytest.mark.parametrize(("angle", "told"), [(90.0, {"theta": 90.0, "q1": -30.0}), (7.5, {"q1": -30.0})])
+def test_a_start_in_degrees_is_told(angle: float, told: dict[str, float], robot_2r: Robot) -> None:
+    """Whole numbers beyond a turn; x is no angle, and nobody means 1 degree."""
+    start = {"x": 90.0, "theta": angle, "q1": -30.0, "q2": 1.0}
+    run = nmm.simulate(nmm.Controller(robot_2r, TIP, clipped(0.3)), start, 0.02, 0.01)
+    assert the(run, "start_in_degrees").values["angles"] == told
+
+
 def test_inputs_that_are_clipped_at_the_start_are_told(robot_2r: Robot) -> None:
     """The error then follows later than promised, but ends where it was promised."""
     run = nmm.simulate(nmm.Controller(robot_2r, TIP, clipped(1.5)), START, 10.0, 0.01)

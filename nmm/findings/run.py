@@ -113,6 +113,15 @@ def _beyond(one: Mapping[str, Any]) -> str:
     return f"{one['name']} at {one['t']:.3g} s ({one['value']:.4g} {one['unit']}; {range_})"
 
 
+def _degrees(angles: Mapping[str, float], **_: Any) -> str:
+    started = [f"{name} at {angle:g} rad ({angle / math.tau:.1f} turns)" for name, angle in angles.items()]
+    first = next(iter(angles.values()))
+    common = math.gcd(round(first), 180)
+    share, over = round(first) // common, 180 // common
+    pi = {1: "pi", -1: "-pi"}.get(share, f"{share}*pi") + (f"/{over}" if over > 1 else "")
+    return f"the start has {listed(started)}; angles are in rad: {first:g}° is {pi}"
+
+
 def _tips(margin: float | None, edge: Sequence[str], t: float, **_: Any) -> str:
     said = f"the robot tips at t = {t:.4g} s"
     if margin is None:
@@ -191,6 +200,7 @@ WORDS: Mapping[str, Words] = {
         f"the start is outside limits: {', '.join(outside)}; what is outside comes back at {recovery:g} m/s "
         "or rad/s"
     ),
+    "start_in_degrees": _degrees,
     "idle_inputs": lambda inputs, **_: (
         f"without effect on task and objective: {', '.join(inputs)}; at first order nothing moves "
         f"{'it' if len(inputs) == 1 else 'them'} (an objective can)"

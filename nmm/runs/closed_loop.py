@@ -149,12 +149,20 @@ def rate_jumps(recorder: Recorder, *, follows: bool) -> Iterator[Finding]:
         yield Finding("rate_jumps", {"jumps": len(times), "size": size_of, "servo": k}, {"t": times[0]})
 
 
+def in_degrees(angle: float) -> bool:
+    """Whether an angle, rad, was probably meant in degrees: a whole number beyond a turn."""
+    return abs(angle) >= 7.0 and float(angle).is_integer()
+
+
 def _at_start(controller: Controller, q: Array, times: Array) -> Iterator[Finding]:
     """Findings about a run over the times (N,), s, before its first sample at q (n,)."""
     robot, solver = controller.robot, controller.solver
     yield from provenance_of(robot).contradictions
     yield from slip_warnings(robot)
     yield from (Finding("python_costs", {"text": one}) for one in solver.program.costs)
+    angles = (i for i in robot.following.independent if robot.q_units[i] == "rad")
+    if degrees := {robot.q_names[i]: float(q[i]) for i in angles if in_degrees(q[i])}:
+        yield Finding("start_in_degrees", {"angles": degrees})
     if controller.limits is not None:
         outside = robot.outside(q, solver.limits_on.coordinates)
         if outside:
