@@ -1,16 +1,20 @@
 """Strict YAML as plain data: no tags, one document, every key once, and the line of each."""
 
+import re
 from typing import Any, NamedTuple
 
 import yaml
 
 from nmm.errors import ScenarioError
+from nmm.text_format import quoted
 
 #: Where a value stands: mapping keys and list indices, from the top.
 Place = tuple[str | int, ...]
 
 #: How long a file may be, bytes, how many values it may have, and how deep lists and mappings may nest.
 LONGEST, MOST_NODES, DEEPEST = 20_000_000, 200_000, 100
+#: A line that begins with a key, maybe behind the - of a list.
+_KEY = re.compile(r"[ ]*(?:- +)*([^\s#:'\"{\[-][^:]*):(?:\s|$)")
 _NULL = ("", "~", "null", "Null", "NULL")
 _TRUE = ("true", "True", "TRUE")
 _FALSE = ("false", "False", "FALSE")
@@ -38,12 +42,46 @@ def read_text(text: str, name: str, *, lines: bool = True) -> Plain:
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         place = name if mark is None or not lines else f"{name}:{mark.line + 1}"
-        raise ScenarioError(f"not valid YAML: {error.problem or error.context}", where=place) from None
+        raise ScenarioError(f"not valid YAML: {_fault(error, text)}", where=place) from None
     except yaml.YAMLError as error:
         raise ScenarioError(f"not valid YAML: {error}", where=name) from None
     reader = _Reader(name)
     value = None if root is None else reader.plain(root, ())
     return Plain(value, reader.lines, reader.tied)
+
+
+def _fault(error: yaml.MarkedYAMLError, text: str) -> str:
+    """What is wrong, in the words of one who writes the file; the parser's own where it is no usual slip."""
+    said, mark, since = str(error.problem or error.context), error.problem_mark, error.context_mark
+    if mark is None:
+        return said
+    if "cannot start any token" in said:
+        begin = said.split("'")[1]
+        return (
+            "a tab: indent with spaces" if begin == "\\t" else f"text that begins with {begin} needs quotes"
+        )
+    if since is not None and "quoted scalar" in str(error.context):
+        return f"the quote of line {since.line + 1} is not closed"
+    if since is not None and (closing := re.match(r"expected ',' or '([]}])'", said)):
+        return f"a comma or {closing[1]} is missing behind what line {since.line + 1} opens"
+    lines = text.splitlines()
+    if since is not None and "expected ':'" in said:
+        return f"no colon behind {quoted(lines[since.line].strip())} in line {since.line + 1}"
+    key = _KEY.match(lines[mark.line]) if mark.line < len(lines) else None
+    if key is None:
+        return said
+    if said.startswith("mapping values") and mark.column > key.end(1):
+        return "a second colon in one line: text with a colon and a blank needs quotes"
+    before = next((line for line in reversed(lines[: mark.line]) if line.strip()), ":")
+    if said.startswith("mapping values") and ":" not in before:
+        return f"no colon behind {quoted(before.strip())} in a line before"
+    above = next((found for line in reversed(lines[: mark.line]) if (found := _KEY.match(line))), None)
+    if above is None or above.start(1) == key.start(1):
+        return said
+    return (
+        f"{quoted(key[1])} begins in column {key.start(1) + 1}, {quoted(above[1])} above it in column "
+        f"{above.start(1) + 1}: keys of one mapping begin in the same column"
+    )
 
 
 def _check_events(text: str, name: str) -> None:
