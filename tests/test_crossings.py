@@ -40,6 +40,7 @@ def test_a_singularity_between_two_samples_is_told(dt: float, method: str) -> No
     crossed_at = the(run, "extended_jacobian_crossed").values
     assert crossed_at["steps"] == [run.t[k - 1 : k + 1].tolist()]
     assert crossed_at["name"] in run.robot.u_names
+    assert not crossed_at["J_too"]
     assert "shorter_dt" not in codes(run)
     assert run.residual.max() < 1e-8  # the task alone was done at every sample
 
@@ -85,11 +86,17 @@ def test_what_is_no_crossing() -> None:
     np.testing.assert_array_equal(crossed(np.array([1, 1, 0, -1, -1, 1])), [0, 0, 0, 0, 0, 1])
     t, u = np.linspace(0.0, 1.0, 11), np.ones((11, 2))
     side = np.where(t < 0.45, 1, -1)
-    found = crossings(t, u, side, ["v", "q1"], ["m/s", "rad/s"])
+    J = np.tile([[1.0, 0.0], [0.0, 0.5]], (11, 1, 1))
+    found = crossings(t, u, side, J, ["v", "q1"], ["m/s", "rad/s"])
     assert found is not None
     assert found.values == {"steps": [pytest.approx([0.4, 0.5])], "more": 0}
     u[5:, 0] = -1.0
-    found = crossings(t, u, side, ["v", "q1"], ["m/s", "rad/s"])
+    found = crossings(t, u, side, J, ["v", "q1"], ["m/s", "rad/s"])
     assert found is not None
     assert [found.values[key] for key in ("name", "before", "after", "unit")] == ["v", 1.0, -1.0, "m/s"]
-    assert crossings(t, u, np.ones(11, dtype=int), ["v", "q1"], ["m/s", "rad/s"]) is None
+    assert crossings(t, u, np.ones(11, dtype=int), J, ["v", "q1"], ["m/s", "rad/s"]) is None
+    assert not found.values["J_too"]
+    J[5:, 1, 1] = -0.5  # singular half-way between two samples at which it is far from that
+    found = crossings(t, u, side, J, ["v", "q1"], ["m/s", "rad/s"])
+    assert found is not None
+    assert found.values["J_too"]

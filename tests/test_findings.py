@@ -212,6 +212,22 @@ EXAMPLES: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
         "the samples fall; singular: damped drives through",
     ),
     (
+        "extended_jacobian_crossed",
+        {
+            "steps": [[0.4, 0.5]],
+            "more": 0,
+            "name": "v",
+            "before": 1,
+            "after": -1,
+            "unit": "m/s",
+            "J_too": True,
+        },
+        {"t": 0.5},
+        "J_e was singular between t = 0.4 and 0.5 s (its determinant changes its sign): there v jumps from "
+        "1 to -1 m/s, and the motion from there on depends on where the samples fall; J itself is nearly "
+        "singular: dls continues",
+    ),
+    (
         "limits_binding",
         {"limits": {"u_v": 0.75, "q1": 0.125}},
         {},

@@ -122,7 +122,7 @@ class Trials:
 
 def passed(recorder: Recorder) -> Finding | None:
     robot, found = recorder.controller.robot, recorder.so_far
-    return crossings(recorder.t, found.u, found.side, robot.u_names, robot.u_units)
+    return crossings(recorder.t, found.u, found.side, found.J, robot.u_names, robot.u_units)
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,8 @@ STEPS = 10
 JUMPED = 0.5
 #: in it and in the steps beside it, where a sample is near the singularity.
 NEAR = np.array([-1, 0, 1])
+#: J whose least singular value is below this share of its largest, between two samples, is nearly singular.
+NEARLY_SINGULAR = 0.01
 #: Most singularities listed with their times.
 TOLD = 3
 
@@ -87,10 +89,10 @@ def _in_rows(flags: Flags, least: int) -> Iterator[tuple[int, Integers]]:
 
 
 def crossings(
-    t: Array, u: Array, side: Integers, names: Sequence[str], units: Sequence[str]
+    t: Array, u: Array, side: Integers, J: Array, names: Sequence[str], units: Sequence[str]
 ) -> Finding | None:
-    """Singularities of J_e between samples, of inputs u (N, m) at t (N,) and signs (N,) of det J_e; `name` is
-    an input that jumps there; other samples may name another."""
+    """Singularities of J_e between samples, of inputs u (N, m) at t (N,), signs (N,) of det J_e and J (N, s,
+    m); `name` is an input that jumps there, `J_too` whether J itself is nearly singular on the way."""
     (after,) = np.nonzero(crossed(side))
     if not after.size:
         return None
@@ -107,4 +109,8 @@ def crossings(
         row, j = divmod(int(np.argmax(np.where(far[:, np.newaxis], change, -1.0))), u.shape[1])
         k = near[row]
         values |= {"name": names[j], "before": float(u[k - 1, j]), "after": float(u[k, j]), "unit": units[j]}
+        first = after[np.argmin(np.abs(after - k))] - 1
+        way = J[first] + np.linspace(0.0, 1.0, 11)[:, np.newaxis, np.newaxis] * (J[first + 1] - J[first])
+        sigma = np.linalg.svd(way, compute_uv=False)
+        values["J_too"] = bool(np.any(sigma[:, -1] < NEARLY_SINGULAR * sigma[:, 0]))
     return Finding("extended_jacobian_crossed", values, {"t": float(t[after[0]])})

@@ -85,9 +85,12 @@ def _crossed(steps: Sequence[Sequence[float]], more: int, name: str = "", **of: 
     said = f"J_e was singular between t = {when}{also} (its determinant changes its sign)"
     if not name:
         return f"{said}; the inputs go on without a jump"
+    advice = (
+        "J itself is nearly singular: dls continues" if of.get("J_too") else "singular: damped drives through"
+    )
     return (
         f"{said}: there {name} jumps from {of['before']:.3g} to {of['after']:.3g} {of['unit']}, and the "
-        "motion from there on depends on where the samples fall; singular: damped drives through"
+        f"motion from there on depends on where the samples fall; {advice}"
     )
 
 
