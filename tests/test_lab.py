@@ -14,9 +14,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import lab_answers
 import matplotlib.pyplot as plt
 import nbformat
+import numpy as np
 import pytest
+import twin
 from lab_answers import ANSWERS
 from test_docs import script
 
@@ -145,6 +148,23 @@ def test_an_answer_is_told_right_or_in_what_it_is_wrong(
     wanted = words if words.startswith(("✓", "not yet")) else f"(?s)✗ not right: .*({words})"
     assert re.search(wanted, said), said
     assert "check stops" not in said
+
+
+def test_an_answer_that_uses_a_wrong_one_is_not_called_wrong(capsys: pytest.CaptureFixture[str]) -> None:
+    names: dict[str, Any] = {"np": np}
+    exec("def S(q):\n    return -right(q)\ndef J(q):\n    return slopes(q) @ np.array([*S(q).T]).T", names)
+    names |= {"right": twin.S, "slopes": lambda q: lab_answers.robot.J(q) @ np.linalg.pinv(twin.S(q))}
+    with checks() as check:
+        check.all_coordinates(names["S"])
+        check.jacobian(names["J"])
+        said = capsys.readouterr().out.splitlines()
+        assert said[1] == "… not yet: J uses your S, which is not right yet (check.all_coordinates)"
+        names["S"] = twin.S
+        check.jacobian(names["J"])
+        assert capsys.readouterr().out.startswith("✓ right")
+        names["S"] = lambda q: -twin.S(q)  # which no check has seen
+        check.jacobian(names["J"])
+        assert capsys.readouterr().out.startswith("✗ not right")
 
 
 def test_every_exercise_is_tried_with_right_and_wrong_answers() -> None:

@@ -5,12 +5,15 @@ from __future__ import annotations
 import functools
 import traceback
 from collections.abc import Callable, Sequence
+from fractions import Fraction
 
 import numpy as np
 
 Matrix = np.ndarray
 _MARKS = {"right": "✓", "not right": "✗", "not yet": "…"}
 _told: dict[str, str] = {}
+#: Answers by their id, with the exercise and its verdict.
+_judged: dict[int, tuple[object, str, str]] = {}
 
 
 class NotYet(Exception):
@@ -34,10 +37,33 @@ def exercise(judge: Callable[..., str]) -> Callable[..., None]:
             verdict, words = "not right", str(told)
         except Exception as error:  # a student's slip that no check foresaw is no traceback either
             verdict, words = "not right", f"the check stops with {type(error).__name__}: {error}"
+        if verdict == "not right" and (earlier := _earlier(answers[0], judge.__name__)):
+            verdict, words = "not yet", earlier
         _told[judge.__name__] = verdict
+        _judged.update({id(answer): (answer, judge.__name__, verdict) for answer in answers[:1]})
         print(f"{_MARKS[verdict]} {verdict}: {words}")
 
     return check
+
+
+def _earlier(function: object, judged: str) -> str:
+    """Which answer of an earlier exercise, not right itself, a function uses, in words; "" for none."""
+    codes = [getattr(function, "__code__", None)]
+    for code in codes:
+        for name in code.co_names if code is not None else ():
+            found = _judged.get(id(getattr(function, "__globals__", {}).get(name)))
+            if found is not None and found[1] != judged and found[2] != "right":
+                return f"{named(function)} uses your {name}, which is not right yet (check.{found[1]})"
+        codes += [inner for inner in getattr(code, "co_consts", ()) if hasattr(inner, "co_names")]
+    return ""
+
+
+def in_degrees(angle: float) -> str:
+    """How an angle that is given in degrees is written, in words."""
+    share = Fraction(angle / 180).limit_denominator(360)
+    pi = {1: "pi", -1: "-pi"}.get(share.numerator, f"{share.numerator} * pi")
+    over = "" if share.denominator == 1 else f" / {share.denominator}"
+    return f"{angle:g} is in degrees: write {pi}{over}"
 
 
 def ready(*exercises: str) -> bool:
