@@ -423,6 +423,46 @@ def test_a_mesh_of_another_radius_puts_the_ground_where_it_ends(tmp_path: Path) 
     assert "at z = -0.05 m" in given.facts["ground"]
 
 
+def boxed(folder: Path, height: float, radius: float) -> str:
+    """Two wheels of mesh, each within a box of 8 corners that stands for it where things collide."""
+    mesh = trimesh.creation.box((2 * radius, 0.04, 2 * radius))
+    mesh.export(folder / "box.stl")
+    box = '<collision><geometry><mesh filename="box.stl"/></geometry></collision>'
+    parts = tyre(folder, radius).replace("collision", "visual") + box
+    wheels = on_wheels(("left_wheel", height, radius), ("right_wheel", height, radius))
+    return re.sub("<collision>.*?</collision>", parts, wheels)
+
+
+@pytest.mark.parametrize("kind", ["cylinder", "boxed"])
+@pytest.mark.parametrize("height", [0.05, 0.0, -0.13, 0.21])
+@pytest.mark.parametrize("axle", [None, (0.3, 0.1, -0.02071)])
+def test_advice_about_the_ground_that_is_followed_puts_it_at_zero(
+    tmp_path: Path, kind: str, height: float, axle: tuple[float, float, float] | None
+) -> None:
+    """Wherever the wheels are, whatever stands for them, and also where the advice followed was another."""
+    pair = [(name, height, 0.05) for name in ("left_wheel", "right_wheel")]
+    text = on_wheels(*pair) if kind == "cylinder" else boxed(tmp_path, height, 0.05)
+    made = reported(tmp_path, text, axle=axle)
+    advice = re.search(r"--axle ([\d.e,-]+) ", made.facts["ground"])
+    assert (advice is None) == (axle is None and height == 0.05)
+    if advice is not None:
+        point = [*map(float, advice[1].split(","))]
+        assert point == pytest.approx([*(axle or (0.0, 0.0))[:2], height - 0.05], abs=5e-4)
+        made = reported(tmp_path, text, axle=point)
+    assert "at z = 0" in made.facts["ground"]
+    assert "--axle" not in made.facts["ground"]
+
+
+def test_of_shapes_that_disagree_the_one_that_touches_the_root_links_plane_counts(tmp_path: Path) -> None:
+    """A coarse collision cylinder around the wheel that is drawn; without such a height it counts itself."""
+    for height, radius in ((0.05, 0.05), (0.0, 0.06), (0.2, 0.06)):
+        wheels = on_wheels(("left_wheel", height, 0.06), ("right_wheel", height, 0.06))
+        drawn = tyre(tmp_path, 0.05).replace("collision", "visual")
+        made = reported(tmp_path, wheels.replace("<collision>", f"{drawn}<collision>"))
+        assert made.robot is not None
+        assert [wheel.radius for wheel in made.robot.wheels] == [radius, radius]
+
+
 def test_sound_robots_stand_on_their_wheels() -> None:
     """The bundled ones, and PAL's."""
     pal = "package://example-robot-data/robots/tiago{0}_description/robots/tiago{1}.urdf"
@@ -443,6 +483,8 @@ def test_the_root_link_belongs_on_the_wheels_axle(tmp_path: Path) -> None:
     np.testing.assert_allclose(warning.values["at"], [-0.25, 0.0], atol=1e-12)
     moved = nmm.load(tmp_path / "robot.urdf", axle=(-0.25, 0))
     np.testing.assert_allclose(np.mean([wheel.center for wheel in moved.wheels], axis=0)[:2], 0.0, atol=1e-15)
+    (warning,) = warned(tmp_path, wheeled(-0.25), axle=(0.1, 0.05, 0.02))  # where it is does not change
+    np.testing.assert_allclose(warning.values["at"], [-0.25, 0.0, 0.02], atol=1e-12)
 
 
 def test_wheels_that_are_not_recognised_are_told_and_why(tmp_path: Path) -> None:

@@ -63,10 +63,11 @@ def _base_of_joints(
 
 
 def _axle_elsewhere(*, root: str, at: Sequence[float], names: Sequence[str], **_: object) -> str:
-    x, y = (f"{value:.4g}" for value in at)
+    point = ", ".join(f"{value:.4g}" for value in at)
     return (
-        f"root link {root!r} is not at the wheels' axle, whose midpoint is at ({x}, {y}) m in it "
-        f"({few(names)}): give --axle {x},{y} (axle=({x}, {y})), or the robot turns about the wrong point"
+        f"root link {root!r} is not at the wheels' axle, whose midpoint is at ({point}) m in it "
+        f"({few(names)}): give --axle {point.replace(' ', '')} (axle=({point})), or the robot turns about "
+        "the wrong point"
     )
 
 

@@ -8,12 +8,9 @@ import pinocchio as pin
 from nmm.arrays import Array
 
 
-def farthest(shape: pin.GeometryObject, point: Array, along: Array) -> float:
-    """The largest distance (m) of a shape's points from an axis through a point, in its joint's frame."""
-    points, around = _points(shape.geometry)
-    placed = points @ shape.placement.rotation.T + shape.placement.translation - point
-    across = placed - np.outer(placed @ along, along)
-    return float(np.linalg.norm(across, axis=1).max(initial=0.0)) + around
+def has_width(shape: pin.GeometryObject) -> bool:
+    """Whether `width` measures it: boxes have no radius."""
+    return len(_points(shape.geometry)[0]) > 0
 
 
 def width(shape: pin.GeometryObject, along: Array) -> float:

@@ -11,8 +11,7 @@ import pinocchio as pin
 from nmm.arrays import Array
 from nmm.findings import Finding
 from nmm.platforms.wheel_layout import HITCHES
-from nmm.robots.loading.extents import farthest
-from nmm.robots.loading.joint_kinds import axis
+from nmm.robots.loading.extents import has_width
 from nmm.robots.loading.measured_joints import ROUNDED, Measured
 from nmm.robots.robot import Robot
 from nmm.robots.wheel import Wheel
@@ -21,8 +20,6 @@ from nmm.robots.wheel import Wheel
 LEVEL = 5e-3
 #: In the name of a frame that is on the ground (REP-120).
 FOOTPRINT = "footprint"
-#: A radius and a height that differ by less are the same number, m.
-SAME = 1e-9
 #: How far the axle's midpoint may be from the reference point, m.
 NEAR = 2e-3
 #: How far two directions may differ, rad.
@@ -32,12 +29,14 @@ PARALLEL = 1e-3
 @dataclass(frozen=True)
 class Ground:
     """Where wheels touch the ground, m, by the wheels' joints.
-    lowest : heights of their lowest points over the reference point; near : what counts as one height
-    shapes : how far a wheel's shapes reach from its axis, where it has some"""
+    reference : the reference point's pose in the root link, m
+    lowest : heights of their lowest points over it; near : what counts as one height
+    is_seen : whether a wheel has a shape, without which the ground is where a radius puts it"""
 
+    reference: pin.SE3
     lowest: dict[str, float]
-    shapes: dict[str, float]
     near: float
+    is_seen: bool
 
     @classmethod
     def of(cls, robot: Robot) -> Ground | None:
@@ -45,17 +44,12 @@ class Ground:
             return None
         measured = Measured(robot.model, (), robot.name)
         near = max(LEVEL, ROUNDED * max(wheel.radius for wheel in robot.wheels))
-        ground = cls({}, {}, near)
+        lowest: dict[str, float] = {}
         for wheel in robot.wheels:
             carrier = measured.placements[robot.model.getJointId(wheel.carrier)]
-            height, radius = float(carrier.act(wheel.center)[2]), wheel.radius
-            shape = _reach(robot, wheel)
-            if shape > 0.0:
-                ground.shapes[wheel.joint] = shape
-                if abs(height - radius) < SAME:  # no one gave it
-                    radius = shape
-            ground.lowest[wheel.joint] = height - radius
-        return ground
+            lowest[wheel.joint] = float(carrier.act(wheel.center)[2]) - wheel.radius
+        is_seen = any(_has_shape(robot, wheel) for wheel in robot.wheels)
+        return cls(_reference(robot), lowest, near, is_seen)
 
     @property
     def z(self) -> float:
@@ -64,14 +58,17 @@ class Ground:
 
     def fact(self, root: str) -> str:
         """In words; `root` is the root link's name."""
-        if not self.shapes:
+        if not self.is_seen:
             return "taken to be at z = 0: no wheel has a shape"
         if abs(self.z) <= self.near:
             return "the wheels touch it at z = 0"
-        return (
-            f"the wheels touch it at z = {self.z:.4g} m in link {root!r}; heights count from the ground with "
-            f"--axle 0,0,{self.z:.4g} (axle=(0, 0, {self.z:.4g}))"
-        )
+        x, y, z = self.reference.act(np.array([0.0, 0.0, self.z])) + 0.0
+        touching = f"the wheels touch it at z = {z:.4g} m in link {root!r}"
+        if abs(self.reference.rotation[1, 0]) > PARALLEL:
+            return f"{touching}; heights count from the ground where the axle's frame is there"
+        at = f"{x:.6g},{y:.6g},{z:.4g}"
+        spaced = at.replace(",", ", ")
+        return f"{touching}; heights count from the ground with --axle {at} (axle=({spaced}))"
 
     def warnings(self, robot: Robot) -> Iterator[Finding]:
         if np.ptp([*self.lowest.values()]) > self.near:
@@ -86,29 +83,28 @@ class Ground:
                     yield Finding("footprint_off_ground", {"frame": frame.name, "off": off})
 
 
-def _reach(robot: Robot, wheel: Wheel) -> float:
-    """How far a wheel's shapes reach from its axis, m: collision shapes, or those shown; 0 without any."""
-    shown = robot.display_model
+def _reference(robot: Robot) -> pin.SE3:
+    """Pose of the platform's reference point in the root link (`load`'s `axle`)."""
+    for note in robot.notes:
+        if note.code == "reference_moved":
+            return pin.SE3(pin.utils.rotate("z", note.values["yaw"]), np.array(note.values["at"]))
+    return pin.SE3.Identity()
+
+
+def _has_shape(robot: Robot, wheel: Wheel) -> bool:
+    """Whether a wheel has a shape with a radius, that is drawn or that collides."""
+    shown, shapes = robot.display_model, robot.shapes
     joint = shown.getJointId(wheel.joint)
     links = {frame.name for frame in shown.frames if frame.parentJoint == joint}
-    carried = [  # by what carries the wheel, which is no joint where things collide
-        farthest(shape, wheel.center, wheel.axis)
-        for shape in robot.shapes.collision_model.geometryObjects
-        if robot.model.frames[shape.parentFrame].name in links
-    ]
-    along = axis(shown.joints[joint], pin.neutral(shown))
-    return max(carried, default=0.0) or max(
-        (
-            farthest(shape, np.zeros(3), along)
-            for shape in robot.shapes.visual_model.geometryObjects
-            if shape.parentJoint == joint
-        ),
-        default=0.0,
+    return any(  # by link: where things collide, the wheel is part of what carries it
+        model.frames[shape.parentFrame].name in links and has_width(shape)
+        for model, drawn in ((shown, shapes.visual_model), (robot.model, shapes.collision_model))
+        for shape in drawn.geometryObjects
     )
 
 
 def wheel_advice(robot: Robot, root: str) -> list[Finding]:
-    """Warnings about the wheels of a robot loaded without `axle` and `wheels`."""
+    """Warnings about the wheels of a robot."""
     if not robot.platform.coordinates:
         return []
     notes = [note for note in robot.notes if note.code == "not_a_wheel"]
@@ -152,7 +148,8 @@ def _about_axle(robot: Robot, root: str) -> Iterator[Finding]:
     centers = [wheel.center[:2] for wheel in fixed]
     middle = 0.5 * (np.min(centers, axis=0) + np.max(centers, axis=0))
     if np.linalg.norm(middle) > NEAR:
-        yield Finding("axle_elsewhere", {"root": root, "at": middle.tolist(), **names})
+        at = _reference(robot).act(np.append(middle, 0.0)) + 0.0
+        yield Finding("axle_elsewhere", {"root": root, "at": at[: 3 if at[2] else 2].tolist(), **names})
 
 
 def _rolling(wheels: list[Wheel]) -> Array | None:

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -165,8 +165,8 @@ class Measured:
         return found, notes
 
     def radius(self, joint: int, given: float | None = None) -> float:
-        """The radius, m: as given, or the centre's height over the root link's xy plane, or the largest round
-        shape's or a mesh's where that differs; `RobotError` for none."""
+        """The radius, m: as given, or the centre's height over the root link's xy plane where a shape has
+        that radius or none has one, or else the first shape's; `RobotError` for none."""
         name = str(self.model.names[joint])
         if given is not None:
             try:
@@ -174,30 +174,34 @@ class Measured:
             except InputError as error:
                 raise error.at(self.where, RobotError) from None
         # A root link may stand on the ground (REP-120's base_footprint), or be some part of the body.
-        height, shape = float(self.placements[joint].translation[2]), self._shape_radius(joint)
-        if height > _ON_PLANE and (shape is None or abs(shape - height) <= ROUNDED * shape):
-            return height
-        if shape is None:
+        height, first = float(self.placements[joint].translation[2]), None
+        for shape in self._shape_radii(joint):
+            first = first or shape
+            if height <= _ON_PLANE:
+                break
+            if abs(shape - height) <= ROUNDED * shape:
+                return height
+        if first is None and height <= _ON_PLANE:
             raise refusal(self.where, Finding("radius_unknown", {"name": name}))
-        return shape
+        return first or height
 
-    def _shape_radius(self, joint: int) -> float | None:
-        """The largest radius among the joint's round shapes, of the first geometry model that has any; else
-        that of a mesh: what is shown is finer."""
+    def _shape_radii(self, joint: int) -> Iterator[float]:
+        """The largest radius among the joint's round shapes, of each geometry model that has any; then that
+        of its meshes, those shown first: they are finer. Meshes are only read where they are asked for."""
         for geometry in self.geometries:
             shapes = [shape.geometry for shape in geometry.geometryObjects if shape.parentJoint == joint]
             radii = [float(shape.radius) for shape in shapes if type(shape).__name__ in _SHAPES]
             if radii and math.isfinite(max(radii)) and max(radii) > 0.0:
-                return max(radii)
+                yield max(radii)
         along = axis(self.model.joints[joint], self.neutral)
         for geometry in reversed(self.geometries):
             shapes = [shape.copy() for shape in geometry.geometryObjects if shape.parentJoint == joint]
+            radius = 0.0
             with suppress(RobotError):  # one that cannot be read says so where it is drawn
                 read_meshes(shapes, self.where)
                 radius = max((width(shape, along) for shape in shapes), default=0.0)
-                if radius > 0.0:
-                    return radius
-        return None
+            if radius > 0.0:
+                yield radius
 
 
 def measure_layout(
