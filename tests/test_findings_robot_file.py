@@ -462,6 +462,11 @@ EXAMPLES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
         {},
         "platform car: wheelbase is 0.5 m as given, and 0.6 m in the file",
     ),
+    "wheel_radius_differs": (
+        {"name": "left", "given": 50.8, "measured": 0.0508},
+        {},
+        "radius of wheel 'left' is 50.8 m as given, and 0.0508 m in the file",
+    ),
     "steering_too_narrow": (
         {"platform": "unicycle", "name": "steer", "lower": -45.0, "upper": 45.0},
         {},

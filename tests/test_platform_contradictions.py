@@ -116,6 +116,27 @@ def test_a_car_without_a_steering_joint_between_its_wheels(tmp_path: Path) -> No
     assert_found(provenance_of(robot).contradictions, narrow, narrow, length("track", 0.4, TRACK))
 
 
+def test_a_wheels_radius_against_its_shape(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """In mm by mistake, or by more than 1 %: loading tells it, and so do runs, check and info."""
+    joints = ("left_wheel_joint", "right_wheel_joint")
+    near = nmm.load("unicycle_2r", wheels=dict.fromkeys(joints, 0.1009))
+    assert provenance_of(near).contradictions == ()
+    wide = dict(zip(joints, (100.0, 0.1), strict=True))
+    robot = nmm.load("unicycle_2r", wheels=wide)
+    told: Expected = ("wheel_radius_differs", {"name": joints[0], "given": 100.0, "measured": 0.1})
+    assert_found(provenance_of(robot).contradictions, told)
+    assert_found([note for note in robot.notes if note.code == told[0]], told)
+    asked = ("--wheels", ",".join(f"{name}={radius}" for name, radius in wide.items()))
+    for command in ("check", "info"):
+        assert status_of([command, "unicycle_2r", *asked]) == 0
+        printed = capsys.readouterr()
+        assert joints[0] in printed.err + printed.out
+        assert "100 m as given" in printed.err + printed.out
+    changes = {"robot.wheels": wide, "duration": 0.05, "q0": {"q2": 1}, "resolver": {"kind": "pg"}}
+    run = nmm.Scenario.load("unicycle_2r_position", changes).run()
+    assert_found(every(run, told[0]), told)
+
+
 def test_a_run_warns_of_it(tmp_path: Path) -> None:
     scenario = nmm.Scenario.load(
         "unicycle_2r_position",

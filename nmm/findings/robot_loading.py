@@ -159,6 +159,8 @@ WORDS = placed(
         "platform_misfit": "given by hand, and not what its file holds: {reason}",
         "platform_length_differs": "platform {platform}: {name} is {given:g} m as given, and "
         "{measured:.6g} m in the file",
+        "wheel_radius_differs": "radius of wheel {name!r} is {given:g} m as given, and {measured:.6g} m in "
+        "the file",
         "steering_too_narrow": "platform {platform} turns on the spot, for which the file's wheels would "
         "have to steer to 90 degrees; {name} ends at {lower:.4g} and {upper:.4g} degrees: platform car?",
         "moves_sideways": "platform {platform} moves sideways, which needs three wheels with rollers or "

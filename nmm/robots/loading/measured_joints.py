@@ -15,7 +15,7 @@ from nmm.errors import InputError, RobotError, expect_known
 from nmm.findings import Finding
 from nmm.findings.robot_file import refusal
 from nmm.platforms import Platform
-from nmm.platforms.wheel_layout import HITCHES, STEERING, SWIVELS, Layout, Pivot, RollingJoint
+from nmm.platforms.wheel_layout import HITCHES, NEAR, STEERING, SWIVELS, Layout, Pivot, RollingJoint
 from nmm.robots.loading.chain import replaced_joints
 from nmm.robots.loading.extents import width
 from nmm.robots.loading.joint_kinds import axis, is_revolute, joint_limits
@@ -175,7 +175,7 @@ class Measured:
                 raise error.at(self.where, RobotError) from None
         # A root link may stand on the ground (REP-120's base_footprint), or be some part of the body.
         height, first = float(self.placements[joint].translation[2]), None
-        for shape in self._shape_radii(joint):
+        for shape in self.shape_radii(joint):
             first = first or shape
             if height <= _ON_PLANE:
                 break
@@ -185,7 +185,7 @@ class Measured:
             raise refusal(self.where, Finding("radius_unknown", {"name": name}))
         return first or height
 
-    def _shape_radii(self, joint: int) -> Iterator[float]:
+    def shape_radii(self, joint: int) -> Iterator[float]:
         """The largest radius among the joint's round shapes, of each geometry model that has any; then that
         of its meshes, those shown first: they are finer. Meshes are only read where they are asked for."""
         for geometry in self.geometries:
@@ -282,6 +282,17 @@ def find_wheels(
     measured = Measured(model, geometries, where)
     radii, notes = measured.wheels(asked, own)
     return tuple(_wheel(measured, name, radii[name], own, platform) for name in radii), notes
+
+
+def differing_radii(
+    model: pin.Model, geometries: Sequence[pin.GeometryModel], asked: Asked, where: str
+) -> Iterator[Finding]:
+    """Where a wheel's given radius, m, is not that of any of its shapes (1 mm or 1 % may differ)."""
+    measured = Measured(model, geometries, where)
+    for name, given in asked.items() if isinstance(asked, Mapping) else ():
+        radii = [] if given is None else [*measured.shape_radii(measured.joints[name])]
+        if radii and all(abs(given - one) > max(NEAR, ROUNDED * one) for one in radii):
+            yield Finding("wheel_radius_differs", {"name": name, "given": float(given), "measured": radii[0]})
 
 
 def held_joints(model: pin.Model, asked: Asked, where: str) -> tuple[tuple[str, ...], list[Finding]]:

@@ -17,6 +17,7 @@ from nmm.robots.loading.locking import Locked, add_pairs, among_coordinates, at_
 from nmm.robots.loading.measured_joints import (
     Asked,
     Measured,
+    differing_radii,
     find_wheels,
     held_joints,
     measure_layout,
@@ -150,7 +151,11 @@ def _platform(
                 origin = "base"
         else:
             platform = platform_by_name(name).fit(layout)
-        return platform, origin, layout, () if layout is None else platform.compared(layout)
+        contradictions: tuple[Finding, ...] = ()
+        if layout is not None:
+            shapes = rebuilt.model, (collision, visual), options.wheels, source.where
+            contradictions = (*platform.compared(layout), *differing_radii(*shapes))
+        return platform, origin, layout, contradictions
     except InputError as error:
         raise error.at(source.where, RobotError) from None
 
