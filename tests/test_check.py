@@ -495,6 +495,26 @@ def test_wheels_that_are_not_recognised_are_told_and_why(tmp_path: Path) -> None
     assert_found(found, ("not_a_wheel", {"name": "spare_wheel", "why": "axis_not_level"}))
 
 
+def test_wheels_that_could_steer_and_are_casters_are_told(tmp_path: Path) -> None:
+    """Once, not as coordinates too, which they are not; no word of casters that trail or are named so."""
+
+    def steered(trail: float, name: str = "L_wheel_j1") -> str:
+        limit = '<limit lower="-2" upper="2" velocity="5" effort="5"/>'
+        up = joint(name, "base", "fork", "revolute", AXIS + limit, "")
+        at, spin = f'<origin xyz="{-trail} 0.01 0.1"/>', '<axis xyz="0 1 0"/><limit velocity="9" effort="5"/>'
+        rolling = joint("L_wheel_j2", "fork", "tyre", "continuous", spin, at)
+        return wheeled(more=link("fork", inertial()) + link("tyre", inertial()) + up + rolling)
+
+    made = reported(tmp_path, steered(0.0))
+    assert_found(made.warnings, ("taken_for_casters", {"names": ["L_wheel_j1"]}))
+    assert made.robot is not None
+    assert made.robot.q_names == ("x", "y", "theta")
+    assert not of_code(made.robot.notes, "not_a_wheel")
+    assert warned(tmp_path, steered(0.04)) == []
+    assert warned(tmp_path, steered(0.0, "L_caster_wheel")) == []
+    assert not of_code(warned(tmp_path, steered(0.0), platform="omnidirectional"), "taken_for_casters")
+
+
 # Files that are right
 
 

@@ -462,6 +462,13 @@ EXAMPLES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
         {},
         "platform car: wheelbase is 0.5 m as given, and 0.6 m in the file",
     ),
+    "taken_for_casters": (
+        {"names": ["left_turn", "right_turn"]},
+        {},
+        "each turns a wheel about an upright axis through it and is taken for a caster: left_turn, "
+        'right_turn; a platform that steers: --platform car (platform="car") with "steer" in their names, or '
+        "one whose wheels are described (WheeledPlatform)",
+    ),
     "wheel_radius_differs": (
         {"name": "left", "given": 50.8, "measured": 0.0508},
         {},

@@ -103,6 +103,11 @@ WORDS = placed(
         "not_a_wheel": lambda *, name, why, **given: (
             f"{name} stays a coordinate in spite of its name: {NO_WHEEL[why].format(**given)}"
         ),
+        "taken_for_casters": _names(
+            "each turns a wheel about an upright axis through it and is taken for a caster: {names}; a "
+            'platform that steers: --platform car (platform="car") with "steer" in their names, or one whose '
+            "wheels are described (WheeledPlatform)"
+        ),
         "no_wheel": lambda *, name, why, **given: (
             f"joint {name!r} is no wheel: {NO_WHEEL[why].format(**given)}"
         ),

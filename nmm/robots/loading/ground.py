@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from nmm.arrays import Array
 from nmm.findings import Finding
-from nmm.platforms.wheel_layout import HITCHES
+from nmm.platforms.wheel_layout import HITCHES, SWIVELS
 from nmm.robots.loading.extents import has_width
 from nmm.robots.loading.measured_joints import ROUNDED, Measured
 from nmm.robots.robot import Robot
@@ -107,7 +107,7 @@ def wheel_advice(robot: Robot, root: str) -> list[Finding]:
     """Warnings about the wheels of a robot."""
     if not robot.platform.coordinates:
         return []
-    notes = [note for note in robot.notes if note.code == "not_a_wheel"]
+    notes = [note for note in robot.notes if note.code in ("not_a_wheel", "taken_for_casters")]
     return [*notes, *_hitches(robot), *_nameless(robot), *_about_axle(robot, root)]
 
 
@@ -192,6 +192,24 @@ def slipping_wheels(robot: Robot) -> dict[str, float]:
             if sideways > SLACK:
                 found[wheel.joint] = max(sideways, found.get(wheel.joint, 0.0))
     return found
+
+
+def steered_casters(robot: Robot) -> list[Finding]:
+    """Swivels right above their wheels, as steered wheels have them: for a platform that steers none."""
+    names = [
+        wheel.swivel
+        for wheel in robot.wheels
+        if wheel.swivel
+        and not any(word in wheel.swivel.lower() for word in SWIVELS)
+        and _trail(wheel) <= NEAR
+    ]
+    return [Finding("taken_for_casters", {"names": names})] if names else []
+
+
+def _trail(wheel: Wheel) -> float:
+    """How far a wheel's contact is before or behind its swivel's axis, m."""
+    x, y = wheel.center[:2] - wheel.pivot[:2]
+    return abs(float(x * wheel.axis[1] - y * wheel.axis[0]))
 
 
 def slip_warnings(robot: Robot) -> list[Finding]:

@@ -281,7 +281,9 @@ def find_wheels(
     "caster", lw, rw). `RobotError` for no joint, no wheel, or a wheel whose radius cannot be found."""
     measured = Measured(model, geometries, where)
     radii, notes = measured.wheels(asked, own)
-    return tuple(_wheel(measured, name, radii[name], own, platform) for name in radii), notes
+    wheels = tuple(_wheel(measured, name, radii[name], own, platform) for name in radii)
+    swivels = {wheel.swivel for wheel in wheels}  # named as wheels, and left out of q as these are
+    return wheels, [note for note in notes if note.values["name"] not in swivels]
 
 
 def differing_radii(

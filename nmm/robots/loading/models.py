@@ -12,7 +12,7 @@ from nmm.errors import InputError, RobotError, expect_known
 from nmm.findings import Finding
 from nmm.platforms import AddedJoint, FixedBase, Layout, Platform, platform_by_name, usual_platform
 from nmm.robots.loading.chain import CHAIN, Rebuilt, rebuild
-from nmm.robots.loading.ground import slip_warnings
+from nmm.robots.loading.ground import slip_warnings, steered_casters
 from nmm.robots.loading.locking import Locked, add_pairs, among_coordinates, at_zero, limit_notes, with_locked
 from nmm.robots.loading.measured_joints import (
     Asked,
@@ -268,7 +268,8 @@ def _without_wheels(
         mimic_joints=mimic_joints,
         parts=replace(parts, provenance=replace(parts.provenance, reduced=tuple(names))),
     )
-    remarks = (*limit_notes(robot), *slip_warnings(robot))
+    casters = steered_casters(robot) if parts.provenance.platform == "default" else ()
+    remarks = (*limit_notes(robot), *slip_warnings(robot), *casters)
     return replace(robot, **robot.shapes._asdict(), notes=(*robot.notes, *remarks))
 
 
