@@ -291,6 +291,30 @@ def test_a_joint_that_its_limits_hold_is_told(tmp_path: Path) -> None:
     np.testing.assert_array_equal(nmm.load(tmp_path / "robot.urdf").q_limits[-1], 0.0)
 
 
+@pytest.mark.parametrize(
+    ("lower", "upper", "is_told"),
+    [(-100, 230, True), (-170, 0, True), (-10, 10, False), (-1e16, 1e16, False), (-12.5, 12.5, False)],
+)
+def test_limits_in_degrees_are_told(tmp_path: Path, lower: float, upper: float, is_told: bool) -> None:
+    """10 rad are the widest limits of known robots, 1e16 stands for none."""
+    limit = f'<limit lower="{lower}" upper="{upper}" effort="1" velocity="1"/>'
+    found = warned(tmp_path, robot(HEAVY_LINKS, joint(body=AXIS + limit)))
+    expected = ("limits_large", {"joint": "j", "lower": lower, "upper": upper})
+    assert_found(found, *([expected] if is_told else []))
+
+
+def test_places_turned_by_degrees_are_told(tmp_path: Path) -> None:
+    def turned(angle: float) -> str:
+        at = f'<origin rpy="0 {angle} 0"/>'
+        box = f'<visual>{at}<geometry><box size="1 1 1"/></geometry></visual>'
+        return robot(link("a", inertial() + box), link("b", inertial()), joint(origin=at))
+
+    assert warned(tmp_path, turned(-6.2832)) == []
+    places = {"link": "a", "part": "visual"}, {"joint": "j"}
+    told = [("rpy_large", {**place, "rpy": [0.0, 90.0, 0.0]}) for place in places]
+    assert_found(warned(tmp_path, turned(90)), *told)
+
+
 def test_followers_are_told(tmp_path: Path) -> None:
     mimic = '<mimic joint="{}" multiplier="{}"/>'
     up = '<limit lower="0" upper="1" effort="1" velocity="1"/>'

@@ -272,6 +272,16 @@ EXAMPLES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
         {"line": 4, "joint": "j"},
         "joint 'j': <limit> lets it stand at 0 only (both ends are 0 unless given)",
     ),
+    "limits_large": (
+        {"lower": -100.0, "upper": 230.0},
+        {"line": 4, "joint": "j"},
+        "joint 'j': <limit> from -100 to 230 rad: degrees?",
+    ),
+    "rpy_large": (
+        {"rpy": [90.0, 0.0, 0.0]},
+        {"line": 4, "link": "a", "part": "visual"},
+        "link 'a', visual: <origin> rpy 90 0 0 rad: degrees?",
+    ),
     "name_shared": (
         {},
         {"line": 4, "joint": "j"},

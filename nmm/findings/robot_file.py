@@ -183,6 +183,10 @@ WORDS = placed(
         "velocity_unlimited": "no <limit>, so no limit of its velocity",
         "velocity_zero": "<limit> velocity is 0, which is taken as no limit",
         "joint_held": "<limit> lets it stand at {value:g} only (both ends are 0 unless given)",
+        "limits_large": "<limit> from {lower:g} to {upper:g} rad: degrees?",
+        "rpy_large": lambda *, rpy, **_: (
+            f"<origin> rpy {' '.join(f'{angle:g}' for angle in rpy)} rad: degrees?"
+        ),
         "name_shared": "a link has that name, too: as a frame, it means the link",
     }
 )

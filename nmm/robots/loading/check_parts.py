@@ -33,6 +33,11 @@ BASES = ("planar", "floating")
 _UPRIGHT = 1e-6
 #: A body heavier than this, kg, was probably not written in kg.
 HEAVY = 1000.0
+#: Revolute limits between these, rad, were probably written in degrees: robots' own end at 10, and what is
+#: beyond the last stands for no limit.
+IN_DEGREES = 4.0 * math.pi, 1000.0
+#: Angles of an <origin> beyond a full turn, rad, and rounding, were probably written in degrees.
+FULL_TURN = 2.0 * math.pi * (1.0 + 1e-4)
 #: How far a principal moment may be above the sum of the others, as a fraction: files round.
 ROUNDED = 1e-3
 
@@ -190,6 +195,7 @@ def advice(root: Element) -> list[Finding]:
     _on_inertias(links, found)
     _on_bodies(links, joints, found)
     _on_joints(joints, found)
+    _on_turns(links, joints, found)
     named = {link.get("name") for link in links}
     for joint in joints:  # two frames, of which tasks can only speak of the link's
         if joint.get("name") in named:
@@ -259,6 +265,21 @@ def _on_joints(joints: list[Element], found: Attributes) -> None:
         lower, upper = _number(limit, "lower"), _number(limit, "upper")
         if kind != "continuous" and lower == upper:
             found.add(limit, "joint_held", owner, value=lower)
+        if kind == "revolute" and IN_DEGREES[0] < max(abs(lower), abs(upper)) < IN_DEGREES[1]:
+            found.add(limit, "limits_large", owner, lower=lower, upper=upper)
+
+
+def _on_turns(links: list[Element], joints: list[Element], found: Attributes) -> None:
+    """Places turned by more than a full turn."""
+    parts = [(joint, {"joint": joint.get("name")}) for joint in joints]
+    for link in links:
+        for tag in ("inertial", "visual", "collision"):
+            parts += [(part, {"link": link.get("name"), "part": tag}) for part in children(link, tag)]
+    for part, owner in parts:
+        origin = child(part, "origin")
+        rpy = None if origin is None else Attributes().vector(origin, "rpy", 3, owner)
+        if origin is not None and rpy is not None and max(map(abs, rpy)) > FULL_TURN:
+            found.add(origin, "rpy_large", owner, rpy=[*rpy])
 
 
 def _number(element: Element, attribute: str) -> float:
