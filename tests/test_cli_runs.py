@@ -259,7 +259,9 @@ def test_compare_makes_one_table_one_figure_one_playback(run: Command) -> None:
         assert numbers["runs"][kind]["objective_final"] == trajectory.objective[-1]
     assert (folder / "comparison.png").read_bytes()[:4] == b"\x89PNG"
     # A comparison is ours too: it may be replaced.
-    assert run("compare", "unicycle_2r_pointing", "--resolvers", "rg", *SHORT).status == 0
+    again = run("compare", "unicycle_2r_pointing", "--resolvers", "rg", *SHORT, "--set", 'title=""')
+    assert again.status == 0
+    assert again.out.splitlines()[0] == "unicycle_2r_pointing"  # without a title, without a colon
 
 
 LAWS = """\
