@@ -9,6 +9,17 @@ from math import degrees, isfinite, pi
 NEAR_PI = 5e-5
 
 
+def is_pattern(name: object) -> bool:
+    """Whether a name stands for several: * for any letters, ? for one."""
+    return isinstance(name, str) and ("*" in name or "?" in name)
+
+
+def matching(pattern: str, names: Iterable[str]) -> list[str]:
+    """The names that a pattern, or a name, stands for."""
+    wanted = re.compile(re.escape(pattern).replace(r"\*", ".*").replace(r"\?", "."))
+    return [name for name in names if wanted.fullmatch(name)]
+
+
 def listed(phrases: Sequence[str], word: str = "and") -> str:
     """ "a", "a and b", "a, b and c"."""
     if len(phrases) < 2:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -584,7 +585,7 @@ def test_links_that_touch_are_counted_and_named(run: Command) -> None:
     assert 0 < sometimes < never
     (one, other), share = max(found.sometimes.items(), key=lambda item: item[1])
     assert re.search(rf"{one} and {other} +{share:.1%}", result.out)
-    assert re.search(rf"… {sometimes + always - 10} more +[0-9.]+% at most", result.out)
+    assert re.search(rf"… {sometimes + always - 10} more \(.*--json\) +[0-9.]+% at most", result.out)
 
 
 def test_of_findings_alike_ten_are_shown(run: Command, tmp_path: Path) -> None:
@@ -610,6 +611,20 @@ def test_what_is_drawn_into_one_another_touches_always(tmp_path: Path) -> None:
     found = touching_links(nmm.load(write(tmp_path / "balls.urdf", text), platform="fixed"))
     assert found.always == [("a", "c")]
     assert found.shares == {("a", "c"): 1.0}
+
+
+def test_all_pairs_that_touch_are_in_json(run: Command, tmp_path: Path) -> None:
+    """More than are shown: a row of 8 balls, each inside all of the others."""
+    names, ball = "abcdefgh", inertial() + shape('<sphere radius="1"/>', "collision")
+    near = '<origin xyz="0.01 0 0"/>'
+    joints = [joint(f"{a}_{b}", a, b, "continuous", AXIS, near) for a, b in pairwise(names)]
+    write(tmp_path / "balls.urdf", robot(*(link(name, ball) for name in names), *joints))
+    facts = json.loads(run("check", "balls.urdf", "--platform", "fixed", "--json").out)["facts"]
+    pairs = {(a, b) for i, a in enumerate(names) for b in names[i + 2 :]}
+    assert len(pairs) == 21
+    assert {tuple(one["links"]) for one in facts["touching"]} == pairs
+    assert {one["share"] for one in facts["touching"]} == {1.0}
+    assert "21 always" in facts["collisions"]
 
 
 def test_a_report_says_what_was_used(tmp_path: Path) -> None:

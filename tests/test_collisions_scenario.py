@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from findings import the
+from urdf_parts import inertial, joint, link, robot, shape, write
 
 import nmm
 from nmm import Scenario
@@ -115,6 +117,37 @@ def test_a_motion_is_a_reference_value_and_velocity(
     assert one.twist(3.0) == pytest.approx([*velocity, 0.0, 0.0, 0.0], abs=1e-14)
 
 
+def test_ignored_pairs_by_patterns(tmp_path: Path) -> None:
+    """All that two patterns match, links and obstacles, and nothing else; a name is itself."""
+
+    def names(collisions: str) -> list[tuple[str, str]]:
+        scene = written(tmp_path, f"{{{collisions}, obstacles: [{PILLAR}]}}").controller().solver.scene
+        assert scene is not None
+        return [*scene.names]
+
+    every = names("ignore: []")
+    left = names("ignore: [['link?', 'p*r']]")
+    assert left == [pair for pair in every if not (pair[0].startswith("link") and pair[1] == "pillar")]
+    assert 0 < len(left) < len(every)
+    assert names("ignore: [['*', pillar]]") == [pair for pair in every if pair[1] != "pillar"]
+
+
+def test_links_that_touch_at_the_start_are_told_as_the_robots_own(tmp_path: Path) -> None:
+    """Two balls on slides, 0.1 m apart at the start: what helps is not another obstacle."""
+    ball, at = inertial() + shape('<sphere radius="0.2"/>', "collision"), '<origin xyz="0 0 0.05"/>'
+    slide = '<axis xyz="1 0 0"/><limit lower="0" upper="3" effort="1" velocity="1"/>'
+    joints = [
+        joint(name, parent, name + "_", "prismatic", slide, at) for name, parent in (("b", "a"), ("c", "b_"))
+    ]
+    write(tmp_path / "balls.urdf", robot(link("a", ball), link("b_"), link("c_", ball), *joints))
+    text = TEXT.replace("unicycle_3r", "balls.urdf").replace("{q1: 0.3, q2: 0.6}", "{b: 0.01}")
+    text = text.replace("frame: ee", "frame: c_").replace("collisions:\n", "collisions: true\n")
+    run = Scenario.load(write(tmp_path / "own.yaml", text)).run()
+    found = the(run, "start_too_near").values
+    assert (found["name"], found["own"]) == ("a and c_", True)
+    assert found["clearance"] < 0.0
+
+
 OBSTACLES = "{obstacles: [%s]}"
 
 
@@ -126,6 +159,7 @@ OBSTACLES = "{obstacles: [%s]}"
         ("{self: false}", "collisions.self: this key is called self_collisions now"),
         ("{band: 0.01}", "collisions.band: expected above distance"),
         ("{ignore: [[link1, nobody]]}", "collisions.ignore: unknown link, shape or obstacle 'nobody'"),
+        ("{ignore: [['no*', link1]]}", "collisions.ignore: unknown link, shape or obstacle 'no*'"),
         ("{srdf: none.srdf}", "srdf: there is no file"),
         ("{shapes: balls}", "collisions.shapes: unknown value 'balls'"),
         (

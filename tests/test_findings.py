@@ -463,6 +463,13 @@ EXAMPLES: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
         "the start is nearer than the distance to keep, 0.05 m: ee and pillar, 0.01 m; not back at the end",
     ),
     (
+        "start_too_near",
+        {"distance": 0.05, "name": "a and b", "clearance": -0.01, "back": None, "own": True},
+        {"t": 0.0},
+        "the start is nearer than the distance to keep, 0.05 m: a and b, -0.01 m; not back at the end; for "
+        "links that overlap as they are drawn: collisions.ignore (ignore=[(one, other)]), or an SRDF",
+    ),
+    (
         "distance_not_kept",
         {"distance": 0.05, "samples": 2, "name": "ee and ball", "clearance": 0.01},
         {"t": 0.5},

@@ -62,13 +62,17 @@ def check(
     if file.startswith("package://"):
         path = package_file(file, folders)
     made = file_report(path, settings, folders, **keywords)
+    facts, touch = dict(made.facts), dict[tuple[str, str], float]()
+    if made.robot is not None:
+        facts["collisions"], touch = _touching(made.robot)
     if as_json:
+        pairs = [{"links": [*pair], "share": share} for pair, share in touch.items()]
         data = {
             "file": file,
             "expanded": made.expanded,
             "problems": [finding.as_json() for finding in made.problems],
             "warnings": [finding.as_json() for finding in made.warnings],
-            "facts": dict(made.facts),
+            "facts": {**facts, "touching": pairs},
         }
         print(json.dumps(data, indent=1))
         return BAD_INPUT if made.problems else OK
@@ -84,33 +88,32 @@ def check(
         return BAD_INPUT
     if made.warnings:
         show_text()
-    facts, pairs = dict(made.facts), list[list[str]]()
-    if made.robot is not None:
-        facts["collisions"], pairs = _touching(made.robot)
     show_table(["", ""], facts.items(), title=title)
-    if pairs:
-        show_table(["links that touch", "in"], pairs)
+    if touch:
+        rows = [[f"{one} and {other}", f"{share:.1%}"] for (one, other), share in touch.items()]
+        if len(rows) > MOST_ALIKE:
+            most = rows[MOST_ALIKE][1]
+            rows[MOST_ALIKE:] = [
+                [f"… {len(rows) - MOST_ALIKE} more (all of them: --json)", f"{most} at most"]
+            ]
+        show_table(["links that touch", "in"], rows)
     return OK
 
 
-def _touching(robot: Robot) -> tuple[str, list[list[str]]]:
+def _touching(robot: Robot) -> tuple[str, dict[tuple[str, str], float]]:
     """How many of the robot's links can touch each other, and which, with how often they do."""
     from nmm.collisions.pairs import touching_links
 
     found = touching_links(robot)
     if not found.shapes:
-        return "no shapes: nothing keeps it from touching anything", []
+        return "no shapes: nothing keeps it from touching anything", {}
     if not found.shares:
-        return "no two of its links can touch: the model has no pairs", []
+        return "no two of its links can touch: the model has no pairs", {}
     counts = f"{len(found.never)} never, {len(found.sometimes)} sometimes, {len(found.always)} always"
     summary = (
         f"{len(found.shares)} pairs of links: {counts} touch, in {found.configurations} random configurations"
     )
-    often = sorted((pair for pair in found.shares.items() if pair[1] > 0.0), key=lambda pair: -pair[1])
-    rows = [[f"{one} and {other}", f"{share:.1%}"] for (one, other), share in often]
-    if len(rows) > MOST_ALIKE:
-        rows[MOST_ALIKE:] = [[f"… {len(rows) - MOST_ALIKE} more", f"{rows[MOST_ALIKE][1]} at most"]]
-    return summary, rows
+    return summary, {pair: share for pair, share in found.shares.items() if share > 0.0}
 
 
 def _lines(file: str, found: Sequence[Finding], made: FileReport, kind: str) -> Iterator[str]:

@@ -15,6 +15,7 @@ from nmm.arrays import Array
 from nmm.collisions.shapes import hull
 from nmm.errors import InputError, expect_known
 from nmm.robots.robot import Robot
+from nmm.text_format import is_pattern, matching
 
 #: Two shapes by their numbers.
 Pair = tuple[int, int]
@@ -133,17 +134,25 @@ def measured_pairs(
 
 
 def named_pairs(given: Sequence[tuple[str, str]], names: Sequence[Sequence[str]], what: str) -> set[Pair]:
-    """The pairs that names mean, by the `names` of each shape; `InputError` for unknown names, or not two."""
+    """The pairs that names mean, by the `names` of each shape, with * for any letters and ? for one;
+    `InputError` for unknown names, patterns that nothing matches, or not two."""
     known = list(dict.fromkeys(name for of_one in names for name in of_one))
     found: set[Pair] = set()
     for pair in given:
         if isinstance(pair, str) or not isinstance(pair, Sequence) or len(pair) != 2:
             raise InputError(where=what, expected="two names", got=pair)
-        first, second = ([i for i, of_one in enumerate(names) if name in of_one] for name in pair)
-        for name in pair:
-            expect_known("link, shape or obstacle", name, known, what)
+        meant = [_meant(name, known, what) for name in pair]
+        first, second = ([i for i, of_one in enumerate(names) if not one.isdisjoint(of_one)] for one in meant)
         found |= {(min(i, j), max(i, j)) for i in first for j in second}
     return found
+
+
+def _meant(name: str, known: Sequence[str], what: str) -> set[str]:
+    """The names that one stands for: itself, or those that a pattern matches."""
+    if is_pattern(name) and name not in known and (matched := matching(name, known)):
+        return {*matched}
+    expect_known("link, shape or obstacle", name, known, what)
+    return {name}
 
 
 @dataclass(frozen=True)

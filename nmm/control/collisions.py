@@ -45,7 +45,7 @@ class Collisions:
     distance : to keep, m, at least 0
     self_collisions : whether the robot also avoids itself
     obstacles : what it avoids, `Obstacle`s
-    ignore : pairs of names (links, shapes, obstacles) that are ignored
+    ignore : pairs of names (links, shapes, obstacles; * for any letters, ? for one) that are ignored
     srdf : a MoveIt file whose disabled pairs are ignored, too, or True for the robot's own (see `nmm.load`);
         disabled pairs that do touch are reported
     shapes : the shapes in place of the robot's meshes, "hulls" or "capsules"

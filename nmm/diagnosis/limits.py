@@ -147,6 +147,7 @@ def distances_short(setting: Scene, found: Swept, t: Array, counts: Counts) -> I
         values = {
             "distance": asked,
             "name": setting.words(int(found.pairs[0])),
+            "own": setting.names[int(found.pairs[0])][1] not in {one.name for one in setting.obstacles},
             "clearance": float(found.clearance[0]),
             "back": float(t[first]) if kept.size else None,
         }

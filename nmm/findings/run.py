@@ -133,6 +133,9 @@ def _tips(margin: float | None, edge: Sequence[str], t: float, **_: Any) -> str:
     return f"{said}: the zero-moment point is {outside}"
 
 
+#: What helps where two links of the robot touch before it has moved.
+_OVERLAP = "; for links that overlap as they are drawn: collisions.ignore (ignore=[(one, other)]), or an SRDF"
+
 WORDS: Mapping[str, Words] = {
     # Ready-made sentences: from a user's function, or a folder older than codes
     "said": "{text}",
@@ -282,9 +285,10 @@ WORDS: Mapping[str, Words] = {
         f"{unit}"
     ),
     "distances_note": "{text}",
-    "start_too_near": lambda distance, name, clearance, back, **_: (
+    "start_too_near": lambda distance, name, clearance, back, own=False, **_: (
         f"the start is nearer than the distance to keep, {distance:g} m: {name}, {clearance:.4g} m; "
         f"{'not back at the end' if back is None else f'back at t = {back:.3g} s'}"
+        f"{_OVERLAP if own and clearance <= 0.0 else ''}"
     ),
     "distance_not_kept": lambda distance, samples, name, clearance, t, **_: (
         f"the distance of {distance:g} m could not be kept in {counted(samples, 'sample')}: {name} came to "

@@ -134,7 +134,7 @@ class Search:
         if scene is not None and self.check.too_near(self.start) >= 0:
             distances = scene.queries.distances(0.0, self.start, range(len(scene.names)))
             touch = [scene.words(int(k)) for k in np.flatnonzero(distances < 4.0 * MARGIN)]
-            cure = "another start, or Collisions(ignore=[(one, other)]) for links that may touch"
+            cure = "another start, or for links that may touch collisions.ignore (ignore=[(one, other)])"
             raise InputError(f"{few(touch)} touch", where="plan: start", expected=cure)
 
     def shortened(self, start: Array, legs: Array, rounds: int) -> Array:

@@ -1,6 +1,5 @@
 """Models with joints fixed at given values, and with them the joints that mimic them; collision pairs."""
 
-import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -15,6 +14,7 @@ from nmm.robots.loading.chain import CHAIN, Rebuilt
 from nmm.robots.loading.joint_kinds import is_revolute
 from nmm.robots.mimic_joints import MimicJoint, first_leaders, settled
 from nmm.robots.robot import Robot
+from nmm.text_format import is_pattern, matching
 
 # Limits are decimal fractions of angles that are none.
 _SLACK = 1e-9
@@ -126,17 +126,11 @@ def _named(
     for key, value in lock.items():
         if not is_pattern(key):
             continue
-        pattern = re.compile(re.escape(key).replace(r"\*", ".*").replace(r"\?", "."))
-        matched = [name for name in free if pattern.fullmatch(name)]
+        matched = matching(key, free)
         if not matched:
             raise RobotError(f"no joint matches {key!r}", where=f"{where}: lock", got=key, available=free)
         found |= {name: value for name in matched if leaders.get(name) not in matched}
     return found | {key: value for key, value in lock.items() if not is_pattern(key)}
-
-
-def is_pattern(name: object) -> bool:
-    """Whether a name of a joint to lock stands for several: * for any letters, ? for one."""
-    return isinstance(name, str) and ("*" in name or "?" in name)
 
 
 def _value(name: str, value: float, free: Sequence[str], own: Sequence[str], where: str) -> float:
