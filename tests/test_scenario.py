@@ -361,3 +361,13 @@ def test_a_scenario_travels_to_a_process_of_its_users(tmp_path: Path) -> None:
     sent.append(short.with_resolver(nmm.ProjectedGradient(alpha=3.0)))
     with multiprocessing.get_context("spawn").Pool(1) as process:
         assert process.apply(told, (sent,)) == [one.resolved() for one in sent]
+
+
+@pytest.mark.parametrize("name", ["arm.urdf", "arm.xacro", "arm.yaml"])
+@pytest.mark.parametrize("text", ['<robot name="a: b"/>', '<?xml version="1.0"?>\n<!-- a: b -->\n<robot/>'])
+def test_a_robots_file_is_no_scenario(tmp_path: Path, name: str, text: str) -> None:
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    with pytest.raises(ScenarioError) as found:
+        Scenario.load(tmp_path / name)
+    assert found.value.where == str(tmp_path / name)
+    assert f"nmm init {tmp_path / name}" in found.value.expected

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -144,6 +145,10 @@ def _copied(value: Any) -> Any:
     return [_copied(item) for item in value] if isinstance(value, list | tuple) else value
 
 
+#: How a robot's file begins, and no scenario.
+_XML = re.compile(r"\s*<[?!\w]")
+
+
 def read_file(path: Path) -> Document:
     try:
         text = read_bytes(path, LONGEST).decode("utf-8-sig")
@@ -151,6 +156,9 @@ def read_file(path: Path) -> Document:
         raise ScenarioError(where=path, expected="UTF-8 text") from None
     except OSError as error:
         raise ScenarioError(f"cannot be read ({error.strerror})", where=path) from None
+    if _XML.match(text):
+        what = "this is XML, as robots' files are"
+        raise ScenarioError(what, where=path, expected=f"a scenario: nmm init {path} writes one for a robot")
     return document_of(text, str(path), path.resolve().parent)
 
 
