@@ -179,7 +179,7 @@ def test_what_steers_is_no_wheel_in_the_notes(known: Path) -> None:
 
 def test_an_axle_that_is_neither_point_nor_frame(known: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert status_of(["info", str(known), "--axle", "1;2"]) == 2
-    expected = "--axle: expected a frame, or X,Y (or X,Y,Z) in m with commas between, got '1;2'"
+    expected = "--axle: expected a frame, or X,Y[,Z] in m with commas between, got '1;2'"
     assert expected in capsys.readouterr().err
 
 

@@ -120,8 +120,8 @@ class Loading(OfRobot):
         show="what the file says, or a car or a unicycle, as its wheels steer",
     )
     axle: str | None = option(
-        "FRAME|X,Y",
-        "Where the platform's reference point is in the root link: a frame, or x and y in m.",
+        "FRAME|X,Y[,Z]",
+        "Where the platform's reference point is in the root link: a frame, or x, y and z in m.",
         show="the root link's origin",
     )
     package_dir: list[Path] | None = option(

@@ -87,7 +87,8 @@ def set_up(
 ) -> Scene:
     """`RobotError` without collision shapes or readable meshes; `InputError`: unknown names, no pairs."""
     if not len(robot.collision_model.geometryObjects):
-        raise RobotError("it has no collision shapes", where=robot.name)
+        what = "it has no collision shapes; <collision> in its file, a box or cylinder a link, makes some"
+        raise RobotError(what, where=robot.name)
     own_ones, own_near = own_shapes(robot, meshes, distance)
     shapes = own_ones.copy()
     count = len(shapes.geometryObjects)
