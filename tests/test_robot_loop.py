@@ -253,6 +253,32 @@ def test_a_read_that_raises_is_a_measurement_that_did_not_come() -> None:
     assert not clock.written[-1].any()
 
 
+@pytest.mark.parametrize("fails", [1, 30, 10_000])
+def test_a_write_that_raises_is_called_until_the_robot_stands(fails: int) -> None:
+    """Once; until after the stop's end, where zeros are sent later; for good."""
+    clock = Clock(make_loop())
+    write, tried = clock.write, []
+
+    def failing(u: Array) -> None:
+        clock.t += 0.001
+        tried.append(u)
+        if 80 <= len(tried) < 80 + fails:
+            raise TimeoutError(f"{len(tried)}")
+        write(u)
+
+    clock.write = failing  # type: ignore[method-assign]
+    with pytest.raises(TimeoutError, match="80"):
+        clock.run()
+    loop = clock.loop
+    assert (loop.state, loop.findings[0].values["why"]) == (nmm.LoopState.STOPPED, "TimeoutError")
+    assert not tried[-1].any()
+    assert clock.written[-1].any() == (fails == 10_000)
+    lasted = loop.findings[-1].values["lasted"] / PERIOD
+    assert lasted > 20
+    if fails == 10_000:
+        assert len(tried) - 80 == pytest.approx(2 * lasted, abs=4)
+
+
 def test_bad_input_is_told() -> None:
     robot = nmm.load("unicycle_2r")
     task = nmm.Task(nmm.Position("ee", "xy"), [1.0, 0.5])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, Protocol
 
 import numpy as np
@@ -35,6 +36,13 @@ def keep_pace(
 ) -> None:
     """See `Loop.run`."""
     raised: BaseException | None = None
+    sent, until = True, math.inf
+
+    def send(u: Array) -> None:
+        nonlocal sent
+        sent = False
+        write(u)
+        sent = True
 
     def attempt(what: Callable[..., Any], *given: Any) -> Any:
         """What it gives; None where it raises, and the robot stops. Ctrl-C a second time does not wait."""
@@ -43,20 +51,25 @@ def keep_pace(
             return what(*given)
         except BaseException as error:
             if raised is not None and not isinstance(error, Exception):
-                write(np.zeros_like(loop.u))
+                with suppress(Exception):
+                    write(np.zeros_like(loop.u))
                 raise
             raised = raised or error
             loop.stop(type(error).__name__)
             return None
 
-    began = due = clock()
-    while loop.state != "stopped":
+    began = due = running = clock()
+    while loop.state != "stopped" or (not sent and clock() < until):
         measured = attempt(read)
-        write(loop.step(clock(), *(measured or ())))
+        attempt(send, loop.step(clock(), *(measured or ())))
         if each is not None and raised is None:
             attempt(each, loop)
         if clock() - began >= duration:
             loop.stop("duration")
+        if loop.state != "stopped":
+            running = clock() if loop.state != "stopping" else running
+        elif until == math.inf:  # zeros that were not sent are tried again for as long as the stop took
+            until = 2.0 * clock() - running
         due += loop.period * max(1, math.ceil((clock() - due) / loop.period))
         if (wait := due - clock()) > 0.0:
             attempt(sleep, wait)

@@ -343,8 +343,9 @@ class Loop:
         """Keep the pace until the robot has stopped: each period read, `step`, write, at times that are
         multiples of the period after the first; those that have passed are left out.
 
-        Ctrl-C, an error of `read` or `each`, and the end of `duration` first stop the robot along the limits;
-        an error is then raised.
+        Ctrl-C, an error of `read`, `write` or `each`, and the end of `duration` first stop the robot along
+        the limits; the first error is then raised. `write` is called on meanwhile, even where it has raised,
+        and with zeros at the end for as long again as the stop took, until these are sent.
 
         Parameters
         ----------
