@@ -212,6 +212,18 @@ FAULTS: dict[str, tuple[Callable[[], dict[str, Any]], str, list[str], str | None
         ["measurement_refused", "measurements_ended", "stopped"],
         "jump",
     ),
+    "an encoder drifts by 3 rad/s": (
+        lambda: from_then(lambda t, q: (q + [0.0, 0.0, 0.0, 3.0 * (t - BEGINS), 0.0], t)),
+        "stopped",
+        ["outside_limits", "stopped"],
+        None,
+    ),
+    "an encoder in degrees": (
+        lambda: {"measure": lambda t, q: (np.where(np.arange(5) == 3, np.rad2deg(q), q), t)},
+        "waiting",
+        ["outside_limits"],
+        None,
+    ),
     "the heading wraps": (lambda: shifted([0.0, 0.0, 2.0 * np.pi, 0.0, 0.0]), "running", [], None),
     "the clock jumps back by 5 s": (
         lambda: {"clock": lambda t: t - 5.0 if t >= BEGINS else t},

@@ -31,7 +31,7 @@ def test_a_fault_is_found_and_limits_are_kept(name: str) -> None:
     assert tried.broken <= 1e-12
     most = max(loop.refused, key=loop.refused.__getitem__, default=None)
     assert most == refused
-    assert math.isnan(tried.to_rest) == (state == "running")
+    assert math.isnan(tried.to_rest) == (state != "stopped")
     if state == "running":  # and the task is done, where the loop believes that the robot is
         assert np.linalg.norm(loop.trajectory().error[-1]) < 0.15
     else:
@@ -79,6 +79,24 @@ def test_the_start_is_soft_and_within_limits() -> None:
     assert not soft.u[0].any()
     assert np.all(shares[1:10] <= (np.arange(1, 10) * PERIOD / 0.5 * 1.5))
     assert hard.u[10, 0] > soft.u[10, 0] > 0.0
+
+
+@pytest.mark.parametrize(("beyond", "given", "state"), [
+    (0.19, {}, "running"), (0.21, {}, "waiting"), (0.21, {"outside": None}, "running")
+])  # fmt: skip
+def test_a_joint_a_little_outside_its_limits_is_brought_back(
+    beyond: float, given: dict[str, Any], state: str
+) -> None:
+    """5 % of q1's 4 rad are 0.2 rad."""
+    loop = make_loop(**given)
+    held, q = HeldInputs(loop.controller.robot), loop.controller.robot.q({"q1": 2.0 + beyond, "q2": 0.9})
+    for k in range(200):
+        q = held(q, loop.step(k * PERIOD, q), PERIOD)
+    assert str(loop.state) == state
+    assert (q[3] <= 2.0 + 1e-9) == (state == "running")
+    assert [(one.code, one.values["upper"]) for one in loop.findings] == (
+        [] if state == "running" else [("outside_limits", 2.0)]
+    )
 
 
 def test_after_a_stop_it_goes_on_when_it_is_told() -> None:
@@ -315,6 +333,10 @@ EXAMPLES: dict[str, tuple[dict[str, Any], str]] = {
     "relocated": (
         {"m": 0.3, "rad": 0.2, "samples": 1, "end": 1.5},
         "the localisation has the platform 0.3 m and 0.2 rad from where it was, from t = 1.5 s on",
+    ),
+    "outside_limits": (
+        {"name": "q2", "value": 90.0, "unit": "rad", "lower": None, "upper": 4.0, "samples": 1, "end": 1.5},
+        "q2 is measured at 90 rad, outside its limits (to 4), at t = 1.5 s: another unit, or not homed?",
     ),
     "call_late": (
         {"gap": 0.03, "samples": 1, "end": 1.5},

@@ -21,6 +21,14 @@ def _refused(reason: str, samples: int, t: float, end: float) -> str:
     return f"{counted(samples, 'measurement')} {_REASONS[reason]}, from t = {t:.4g} to {end:.4g} s"
 
 
+def _outside(name: str, value: float, unit: str, lower: Any, upper: Any, t: float, **_: Any) -> str:
+    sides = [f"{word} {bound:.4g}" for word, bound in (("from", lower), ("to", upper)) if bound is not None]
+    return (
+        f"{name} is measured at {value:.4g} {unit}, outside its limits ({' '.join(sides)}), at t = {t:.4g} s: "
+        "another unit, or not homed?"
+    )
+
+
 def _stopped(why: str, lasted: float, t: float, **_: Any) -> str:
     return f"at rest at t = {t:.4g} s, {lasted:.3g} s after it began to stop ({why})"
 
@@ -30,6 +38,7 @@ WORDS: dict[str, Words] = {
     "measurements_ended": "no measurement that can be used for {silent:.3g} s at t = {t:.4g} s: stops",
     "relocated": "the localisation has the platform {m:.3g} m and {rad:.3g} rad from where it was, from t = "
     "{t:.4g} s on",
+    "outside_limits": _outside,
     "call_late": lambda samples, gap, t, **_: (
         f"{counted(samples, 'call')} late, from t = {t:.4g} s on; at most {gap:.3g} s after the one before"
     ),

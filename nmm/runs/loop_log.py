@@ -45,7 +45,7 @@ class LoopFindings:
 
 
 def _names(value: Any) -> bool:
-    return isinstance(value, str)
+    return not isinstance(value, float)
 
 
 class LoopLog:

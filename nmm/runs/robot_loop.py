@@ -50,6 +50,19 @@ class LoopState(StrEnum):
     STOPPED = "stopped"
 
 
+def far_limits(controller: Controller, share: float) -> tuple[Array, Array]:
+    """Limits of the coordinates (n, 2), and rows (2, n) that are a share of the range beyond them (of 1 m or
+    rad where one side has none); mimic joints are left to their leaders."""
+    own, robot = controller.solver.limits_on.coordinates, controller.robot
+    lower, upper = np.where(np.isfinite(robot.q_limits), robot.q_limits, own).T
+    limits = np.column_stack([np.minimum(lower, own[:, 0]), np.maximum(upper, own[:, 1])])
+    span = np.where(np.isfinite(limits).all(axis=1), limits[:, 1] - limits[:, 0], 1.0)
+    span = np.maximum(span, 1e-9)  # of a joint that is held
+    follows = [robot.coordinate(one.joint) for one in robot.mimic_joints]
+    span[follows] = math.inf
+    return limits, np.array([limits[:, 0] - share * span, limits[:, 1] + share * span])
+
+
 class Loop:
     """A controller in a robot's loop: u = loop.step(now, q, measured_at), once a period.
 
@@ -70,6 +83,9 @@ class Loop:
         before; what is farther off is a jump
     confirm : so many measurements in a row that agree with each other after a jump of the platform, and the
         localisation is believed; None for never
+    outside : share of the range between its limits (the file's, where these are wider than the controller's)
+        by which a joint may be measured beyond them; farther out it is in another unit, or not homed, and the
+        loop does not start, or stops. None for any
     keep : samples that `trajectory` has, the last ones
 
     Attributes
@@ -114,6 +130,7 @@ class Loop:
         lag: float = 0.05,
         jump: tuple[float, float] = (0.05, 0.1),
         confirm: int | None = 5,
+        outside: float | None = 0.05,
         keep: int = 10_000,
     ) -> None:
         if controller.order != 1 or controller.schedule is not None:
@@ -134,6 +151,8 @@ class Loop:
         remembered = math.ceil((2.0 * self.watchdog + tolerances.lag) / self.period) + 3
         self._history = HeldHistory(robot, remembered)
         self._measured = MeasuredState(robot, self._history, tolerances, self.period)
+        share = math.inf if outside is None else scalar(outside, "outside", least=0.0)
+        self._limits, self._far = far_limits(controller, share)
         self._found = LoopFindings(2.5 * self.period)
         self._log = LoopLog(controller, int(positive(keep, "keep")))
         self._rest = np.zeros(robot.n_u)
@@ -215,7 +234,7 @@ class Loop:
         if jump is not None:
             self._found.add("relocated", self.t, m=jump.m, rad=jump.rad)
             self._start_again()
-        if self._measured.at == -math.inf:
+        if self._measured.at == -math.inf or (refused is None and self._is_outside()):
             return self.u.copy()
         if self.state is LoopState.WAITING:
             self.controller.reset()
@@ -256,6 +275,24 @@ class Loop:
         if self.state not in (LoopState.WAITING, LoopState.STOPPED):
             self._found.add("not_called", self.t, gap=gap)
             self._begin_stop("not_called")
+
+    def _is_outside(self) -> bool:
+        """Whether a joint is measured so far outside its limits that the loop does not start; one that runs
+        begins to stop."""
+        q, far = self._measured.q, self._far
+        beyond = (q < far[0]) | (q > far[1])
+        if not beyond.any() or self.state in (LoopState.STOPPING, LoopState.STOPPED):
+            return False
+        robot = self.controller.robot
+        for i in np.flatnonzero(beyond):
+            lower, upper = (float(one) if math.isfinite(one) else None for one in self._limits[i])
+            values = {"name": robot.q_names[i], "unit": robot.q_units[i], "lower": lower, "upper": upper}
+            self._found.add("outside_limits", self.t, value=float(q[i]), **values)
+        if self.state is LoopState.WAITING:
+            self._measured.forget()
+            return True
+        self._begin_stop("outside_limits")
+        return False
 
     def _answer(self) -> None:
         """Inputs for where the robot is believed to be."""
