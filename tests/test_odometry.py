@@ -211,6 +211,25 @@ def test_counters_that_say_too_little_are_named() -> None:
     np.testing.assert_array_equal(odometry.q, np.zeros(3))
 
 
+def test_a_counter_that_jumps_by_a_turn_is_refused() -> None:
+    robot, names = base("differential_base"), ("left_wheel_joint", "right_wheel_joint")
+    odometry = robot.odometry(robot.rest, dict.fromkeys(names, 0.0), fastest={names[1]: 15.0, names[0]: 15.0})
+    for k in range(1, 51):  # at their fastest, stamps off by half a period
+        odometry.update(dict.fromkeys(names, 0.15 * k), 0.01 * k + (0.005 if k % 2 else 0.0))
+    believed = odometry.q
+    for missed in (1, 5):
+        reading = {names[0]: 7.5, names[1]: 7.5 + 2 * math.pi}
+        with pytest.raises(InputError, match=names[1]):
+            odometry.update(reading, 0.5 + 0.01 * missed)
+    np.testing.assert_array_equal(odometry.q, believed)
+    odometry.update(dict.fromkeys(names, 8.4), 0.56)
+    usual = robot.odometry(robot.rest, dict.fromkeys(names, 0.0))  # the file's limit, 30 rad/s
+    usual.update(dict.fromkeys(names, 7.5), 0.0)
+    with pytest.raises(InputError, match=names[0]):
+        usual.update(dict.fromkeys(names, 0.0), 0.1)
+    np.testing.assert_allclose(usual.update(dict.fromkeys(names, 8.4)), odometry.q, atol=1e-12)
+
+
 def test_encoders_by_name_in_any_order() -> None:
     robot = nmm.load("unicycle_2r")
     q = robot.q_from({"right_wheel_joint": 99.0, "q2": 0.2, "q1": 0.1}, base=[1.0, 2.0, 0.3])

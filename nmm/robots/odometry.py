@@ -16,6 +16,8 @@ from nmm.robots.zero_order_hold import HeldInputs
 
 #: Where Gauss and Legendre look between two readings, for two looks.
 NODES = 0.5 - math.sqrt(3.0) / 6.0, 0.5 + math.sqrt(3.0) / 6.0
+#: A counter may run so much faster than the fastest, and jump by that, rad or m: stamps are not exact.
+FASTER, JUMPS = 1.5, 0.1
 #: A turn with a smaller square root of rounding is straight, rad.
 _STRAIGHT = 1e-5
 
@@ -118,6 +120,7 @@ class Odometry:
         slip: float | Mapping[str, float] = 1.0,
         spread: float = 0.0,
         covariance: ArrayLike | None = None,
+        fastest: float | Mapping[str, float] | None = None,
     ) -> None:
         self._where = f"odometry: {robot.name}"
         if robot.platform.n_p < 3:
@@ -126,13 +129,11 @@ class Odometry:
         self.q = robot.q(q)
         counted = [name for name in encoders if name in (*counted_wheels(robot), *robot.platform.inputs)]
         self._counters = Counters(robot, dict.fromkeys(counted, 0.0), self._where)
-        self._shares = np.ones(len(counted))
-        if isinstance(slip, Mapping):
-            for name, share in slip.items():
-                expect_known("wheel", name, counted, f"{self._where}: slip")
-                self._shares[counted.index(name)] = scalar(share, f"{self._where}: slip of {name}")
-        else:
-            self._shares[:] = scalar(slip, f"{self._where}: slip")
+        self._shares = self._by_counter(slip, np.ones(len(counted)), "slip")
+        own = {wheel.joint: wheel.velocity for wheel in robot.wheels}
+        usual = np.array([own.get(name, math.inf) for name in counted])
+        self._fastest = self._by_counter(fastest, usual, "fastest")
+        self._t = math.nan
         self._spread = scalar(spread, f"{self._where}: spread", least=0.0)
         self.covariance = np.zeros((3, 3))
         if covariance is not None:
@@ -144,14 +145,24 @@ class Odometry:
         M, _ = self._counters.matrix(self.q[3 : robot.platform.n_p])
         self._counters.solved(M, self._counts, dict.fromkeys(self._counters.steered, 0.0))  # or says why not
 
-    def update(self, encoders: Mapping[str, float]) -> Array:
+    def update(self, encoders: Mapping[str, float], t: float | None = None) -> Array:
         """q (n,) at these readings, rad or m: of the wheels that were counted at first, and of the joints.
+
+        Parameters
+        ----------
+        encoders : by name
+        t : when they were read, s; since the reading before, no counter can have moved more than half as much
+            again as its `fastest`, and 0.1 rad or m
 
         Raises
         ------
-        InputError : a wheel or joint is missing, a number is not finite; nothing is changed then
+        InputError : a wheel or joint is missing, a number is not finite, a counter jumped; nothing is changed
+            then
         """
         counts, ahead = self._read(encoders)
+        if t is not None:
+            t = scalar(t, f"{self._where}: t")
+            self._check_jumps(counts - self._counts, max(t - self._t, 0.0))
         robot, n_p = self.robot, self.robot.platform.n_p
         turned = self._shares * (counts - self._counts)
         before, after = self.q[3:n_p], ahead[3:n_p]
@@ -185,7 +196,27 @@ class Odometry:
             added = noise * (self._spread * np.abs(counts - self._counts)) @ noise.T
             self.covariance = carried @ self.covariance @ carried.T + added
         self.q, self._counts = ahead, counts
+        self._t = math.nan if t is None else t
         return ahead.copy()
+
+    def _check_jumps(self, turned: Array, lasted: float) -> None:
+        """`lasted` nan: no reading before."""
+        with np.errstate(invalid="ignore"):  # infinite in no time
+            most = FASTER * self._fastest * lasted + JUMPS
+        for k in np.flatnonzero(np.abs(turned) > most)[:1]:
+            what = f"{self._counters.names[k]} jumped: it cannot turn so far in {lasted:.3g} s"
+            raise InputError(what, where=self._where, expected=f"at most {most[k]:.3g}", got=float(turned[k]))
+
+    def _by_counter(self, given: float | Mapping[str, float] | None, usual: Array, what: str) -> Array:
+        """Numbers (k,), one a counter: the same for all, or by name."""
+        names, where = self._counters.names, f"{self._where}: {what}"
+        if isinstance(given, Mapping):
+            for name, number in given.items():
+                expect_known("wheel", name, names, where)
+                usual[names.index(name)] = scalar(number, f"{where} of {name}")
+        elif given is not None:
+            usual[:] = scalar(given, where)
+        return usual
 
     def correct(self, pose: ArrayLike, covariance: ArrayLike | None = None) -> None:
         """Put the platform at a pose (3,) that was measured, m and rad, with its covariance (3, 3), zero by

@@ -229,6 +229,8 @@ class Robot(Coordinates):
         slip : the share of a wheel's turning that moves the platform, 1 by default: a number, or by name
         spread : variance of a wheel's turning for each radian that it turns, rad²/rad; 0 by default
         covariance : of x, y, theta (3, 3) at first; zero by default
+        fastest : turning rate of a wheel (rad/s; of an input its own unit) beyond which `update` refuses a
+            reading whose time it is given: a number, or by name; the file's limit by default
 
         Raises
         ------
