@@ -213,7 +213,7 @@ FAULTS: dict[str, tuple[Callable[[], dict[str, Any]], str, list[str], str | None
         "jump",
     ),
     "an encoder drifts by 3 rad/s": (
-        lambda: from_then(lambda t, q: (q + [0.0, 0.0, 0.0, 3.0 * (t - BEGINS), 0.0], t)),
+        lambda: from_then(lambda t, q: (q + 3.0 * (t - BEGINS) * np.eye(5)[3], t)),
         "stopped",
         ["outside_limits", "stopped"],
         None,
@@ -245,6 +245,12 @@ FAULTS: dict[str, tuple[Callable[[], dict[str, Any]], str, list[str], str | None
     ),
     "no calls for 30 ms": (
         lambda: {"called": lambda t: not BEGINS <= t < BEGINS + 0.03},
+        "running",
+        ["call_late"],
+        None,
+    ),
+    "each fifth call is missed": (
+        lambda: {"called": lambda t: t < BEGINS or round(t / PERIOD) % 5 != 0},
         "running",
         ["call_late"],
         None,

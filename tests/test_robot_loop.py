@@ -27,6 +27,8 @@ def test_a_fault_is_found_and_limits_are_kept(name: str) -> None:
     _, state, codes, refused = FAULTS[name]
     tried = try_fault(name)
     loop = tried.loop
+    late = [one.values["samples"] for one in loop.findings if one.code == "call_late"]
+    assert late == ([loop.late_calls] if loop.late_calls and loop.state == "running" else [])
     assert (str(loop.state), [*dict.fromkeys(tried.codes)]) == (state, codes)
     assert tried.broken <= 1e-12
     most = max(loop.refused, key=loop.refused.__getitem__, default=None)
@@ -340,7 +342,7 @@ EXAMPLES: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "call_late": (
         {"gap": 0.03, "samples": 1, "end": 1.5},
-        "1 call late, from t = 1.5 s on; at most 0.03 s after the one before",
+        "1 call late, from t = 1.5 to 1.5 s; at most 0.03 s after the one before",
     ),
     "clock_jumped": ({"by": -5.0, "samples": 1, "end": 1.5}, "the clock jumped by -5 s at t = 1.5 s"),
     "not_called": (

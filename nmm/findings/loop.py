@@ -24,8 +24,8 @@ def _refused(reason: str, samples: int, t: float, end: float) -> str:
 def _outside(name: str, value: float, unit: str, lower: Any, upper: Any, t: float, **_: Any) -> str:
     sides = [f"{word} {bound:.4g}" for word, bound in (("from", lower), ("to", upper)) if bound is not None]
     return (
-        f"{name} is measured at {value:.4g} {unit}, outside its limits ({' '.join(sides)}), at t = {t:.4g} s: "
-        "another unit, or not homed?"
+        f"{name} is measured at {value:.4g} {unit}, outside its limits ({' '.join(sides)}), "
+        f"at t = {t:.4g} s: another unit, or not homed?"
     )
 
 
@@ -39,8 +39,9 @@ WORDS: dict[str, Words] = {
     "relocated": "the localisation has the platform {m:.3g} m and {rad:.3g} rad from where it was, from t = "
     "{t:.4g} s on",
     "outside_limits": _outside,
-    "call_late": lambda samples, gap, t, **_: (
-        f"{counted(samples, 'call')} late, from t = {t:.4g} s on; at most {gap:.3g} s after the one before"
+    "call_late": lambda samples, gap, t, end: (
+        f"{counted(samples, 'call')} late, from t = {t:.4g} to {end:.4g} s; "
+        f"at most {gap:.3g} s after the one before"
     ),
     "clock_jumped": "the clock jumped by {by:.4g} s at t = {t:.4g} s",
     "not_called": "not called for {gap:.3g} s before t = {t:.4g} s, or the clock jumped: stops",

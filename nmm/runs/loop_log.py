@@ -29,12 +29,14 @@ class LoopFindings:
         self._apart = apart
         self._found: deque[tuple[str, dict[str, Any], float]] = deque(maxlen=FINDINGS)
 
-    def add(self, code: str, t: float, **values: Any) -> None:
-        """Found at t, s; of numbers that go on the largest counts."""
+    def add(self, code: str, t: float, apart: float | None = None, **values: Any) -> None:
+        """Found at t, s; of numbers that go on the largest counts. It goes on if it is `apart` (s, the next
+        call or two unless given) from the last time."""
+        apart = self._apart if apart is None else apart
         for known, earlier, _ in reversed(self._found):
-            if t - earlier["end"] > self._apart:
-                break
             if known == code and all(earlier[name] == x for name, x in values.items() if _names(x)):
+                if t - earlier["end"] > apart:
+                    break
                 numbers = {name: max(earlier[name], x) for name, x in values.items() if not _names(x)}
                 earlier.update(numbers, end=t, samples=earlier["samples"] + 1)
                 return

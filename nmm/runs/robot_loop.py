@@ -258,7 +258,7 @@ class Loop:
         if 0.0 < gap <= self.watchdog:
             if gap > LATE * self.period:
                 self.late_calls += 1
-                self._found.add("call_late", self.t + gap, gap=gap)
+                self._found.add("call_late", self.t + gap, math.inf, gap=gap)
             self.t, self._now = now - self._offset, float(now)
             return
         self.t += self.period
