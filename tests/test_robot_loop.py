@@ -101,6 +101,29 @@ def test_a_joint_a_little_outside_its_limits_is_brought_back(
     )
 
 
+def test_what_blocks_it_is_told_and_an_error_stops_it() -> None:
+    """A pillar stands in its way for good; in the first second it is on its way."""
+
+    def run(duration: float, x: float, error: tuple[float, float] | None = None) -> nmm.Loop:
+        pillar = nmm.Obstacle(nmm.Sphere(0.3), [x, 0.0, 0.3], name="pillar")
+        task = nmm.Task(nmm.Position("ee", "xy"), [4.0, 0.0], gain=2.0, speed=0.5)
+        limits = nmm.Limits({"platform": 0.8, "arm": 1.5}, acceleration={"platform": 2.0, "arm": 4.0})
+        distances = nmm.Collisions(0.05, obstacles=[pillar])
+        given = {"limits": limits, "collisions": distances}
+        controller = nmm.Controller(nmm.load("unicycle_2r"), task, nmm.DampedLeastSquares(), **given)
+        return drive(nmm.Loop(controller, PERIOD, error=error), duration).loop
+
+    loop = run(8.0, 2.0)
+    blocked = [one for one in loop.findings if one.code == "blocked"]
+    assert {pair.split(" and ")[1] for one in blocked for pair in one.values["pairs"]} == {"pillar"}
+    assert len(blocked) == len({*blocked[0].values["pairs"]} | {*blocked[-1].values["pairs"]})
+    assert blocked[0].values["end"] == pytest.approx(loop.t)
+    assert not any(one.code == "blocked" for one in run(8.0, 9.0).findings)
+    size = float(loop.trajectory().error_norm[50:].max())  # after its soft start
+    assert [one.code for one in run(1.0, 2.0, (0.99 * size, 9.0)).findings] == ["off_task", "stopped"]
+    assert not run(1.0, 2.0, (1.01 * size, 1e-9)).findings
+
+
 def test_after_a_stop_it_goes_on_when_it_is_told() -> None:
     loop = make_loop()
     with pytest.raises(nmm.InputError, match="at rest"):
@@ -335,6 +358,10 @@ EXAMPLES: dict[str, tuple[dict[str, Any], str]] = {
     "relocated": (
         {"m": 0.3, "rad": 0.2, "samples": 1, "end": 1.5},
         "the localisation has the platform 0.3 m and 0.2 rad from where it was, from t = 1.5 s on",
+    ),
+    "off_task": (
+        {"m": 0.5, "rad": 0.0, "samples": 1, "end": 1.5},
+        "the task error is 0.5 m and 0 rad at t = 1.5 s, more than allowed: stops",
     ),
     "outside_limits": (
         {"name": "q2", "value": 90.0, "unit": "rad", "lower": None, "upper": 4.0, "samples": 1, "end": 1.5},

@@ -38,6 +38,7 @@ WORDS: dict[str, Words] = {
     "measurements_ended": "no measurement that can be used for {silent:.3g} s at t = {t:.4g} s: stops",
     "relocated": "the localisation has the platform {m:.3g} m and {rad:.3g} rad from where it was, from t = "
     "{t:.4g} s on",
+    "off_task": "the task error is {m:.3g} m and {rad:.3g} rad at t = {t:.4g} s, more than allowed: stops",
     "outside_limits": _outside,
     "call_late": lambda samples, gap, t, end: (
         f"{counted(samples, 'call')} late, from t = {t:.4g} to {end:.4g} s; "

@@ -152,7 +152,10 @@ WORDS: Mapping[str, Words] = {
         f"task {task} never began: at the end of the run, "
         f"{', '.join(missing) or 'its conditions did not hold at one time'}"
     ),
-    "blocked": lambda pairs, **_: f"blocked by the distance of {', '.join(pairs)}",
+    "blocked": lambda pairs, t=None, end=None, **_: (
+        f"blocked by the distance of {', '.join(pairs)}"
+        + ("" if end is None else f", from t = {t:.4g} to {end:.4g} s")
+    ),
     "collided": "{name} ran into each other from t = {t:.3g} s on, by up to {depth:.3g} m",
     # The error against its expected decay, and why
     "promise_left": _above_decay,

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from nmm.arrays import Array, positive, scalar
 from nmm.control.controller import Controller
+from nmm.control.goal import norms, unit_codes
 from nmm.errors import InputError
 from nmm.findings import Finding
 from nmm.runs.held_history import HeldHistory
@@ -24,6 +25,8 @@ from nmm.runs.trajectory import Trajectory
 
 #: A call so many periods after the one before is late.
 LATE = 1.5
+#: Of its rate the task gets less than that share for so long, s: distances block the robot.
+BLOCKED, BLOCKED_FOR = 0.1, 0.5
 #: Measurements that did not come, or came again, are no fault: a sensor may be slower than the loop.
 QUIET = (Refused.LOST, Refused.REPEATED)
 
@@ -86,6 +89,7 @@ class Loop:
     outside : share of the range between its limits (the file's, where these are wider than the controller's)
         by which a joint may be measured beyond them; farther out it is in another unit, or not homed, and the
         loop does not start, or stops. None for any
+    error : m and rad, norms of the task error beyond which a loop that runs stops; None for any
     keep : samples that `trajectory` has, the last ones
 
     Attributes
@@ -131,6 +135,7 @@ class Loop:
         jump: tuple[float, float] = (0.05, 0.1),
         confirm: int | None = 5,
         outside: float | None = 0.05,
+        error: tuple[float, float] | None = None,
         keep: int = 10_000,
     ) -> None:
         if controller.order != 1 or controller.schedule is not None:
@@ -153,6 +158,9 @@ class Loop:
         self._measured = MeasuredState(robot, self._history, tolerances, self.period)
         share = math.inf if outside is None else scalar(outside, "outside", least=0.0)
         self._limits, self._far = far_limits(controller, share)
+        self._error = None if error is None else tuple(positive(most, "error") for most in error)
+        self._units = unit_codes(controller.solver.rows)
+        self._free_at = 0.0
         self._found = LoopFindings(2.5 * self.period)
         self._log = LoopLog(controller, int(positive(keep, "keep")))
         self._rest = np.zeros(robot.n_u)
@@ -306,6 +314,7 @@ class Loop:
                 self._do_without(type(error).__name__)
             else:
                 self._soften(earlier)
+                self._look_at_task()
         if self.state is LoopState.HOLDING:
             self._within(lambda: solver.take_nearest(self.t, q, self.u))
         elif self.state in (LoopState.STOPPING, LoopState.STOPPED):
@@ -324,6 +333,24 @@ class Loop:
         self._found.add("resolver_silent", self.t, why=why)
         if self.t - self._silent_since >= self.hold - 1e-9:
             self._begin_stop("resolver_silent")
+
+    def _look_at_task(self) -> None:
+        """Whether distances block the robot, and whether it is off its task."""
+        if self.state is not LoopState.RUNNING:
+            self._free_at = self.t
+            return
+        solver = self.controller.solver
+        if solver.scene is not None and solver.found.answer.nu.min() < BLOCKED:
+            if self.t - self._free_at > BLOCKED_FOR:
+                for pair in self.controller.report.blocking():
+                    self._found.add("blocked", self.t, BLOCKED_FOR, pairs=[pair])
+        else:
+            self._free_at = self.t
+        if self._error is not None:
+            m, rad = norms(solver.found.task.error, self._units)
+            if m > self._error[0] or rad > self._error[1]:
+                self._found.add("off_task", self.t, m=m, rad=rad)
+                self._begin_stop("off_task")
 
     def _soften(self, earlier: Array) -> None:
         """Where it has just started, less than what the controller wants."""
