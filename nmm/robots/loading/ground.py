@@ -63,6 +63,7 @@ class Ground:
         if abs(self.z) <= self.near:
             return "the wheels touch it at z = 0"
         x, y, z = self.reference.act(np.array([0.0, 0.0, self.z])) + 0.0
+        z = 0.0 if abs(z) <= self.near else z  # as without a reference point of its own
         touching = f"the wheels touch it at z = {z:.4g} m in link {root!r}"
         if abs(self.reference.rotation[1, 0]) > PARALLEL:
             return f"{touching}; heights count from the ground where the axle's frame is there"
