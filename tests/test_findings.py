@@ -157,6 +157,12 @@ EXAMPLES: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
         "the inputs did not do all that the task asked (clipped, scaled or damped)",
     ),
     (
+        "inputs_fell_short",
+        {"sigma": 0.018, "threshold": 0.05},
+        {},
+        "the inputs did not do all that the task asked (damped: σ 0.018 is below 0.05)",
+    ),
+    (
         "still_moving",
         {"name": "v", "mean": 0.5, "unit": "m/s", "duration": 0.4},
         {},

@@ -226,6 +226,27 @@ def test_a_target_that_moves_as_its_rate_says_is_not_blamed(robot_2r: Robot) -> 
     assert "target_jumps" not in codes(run)
 
 
+@pytest.mark.parametrize("weighted", [False, True])
+def test_small_wheels_are_damped_unless_weights_know_their_radius(weighted: bool) -> None:
+    """With weights r² a motion does not depend on r; without, small wheels creep, and the run says why."""
+    ends = []
+    for r in (0.03, 0.1):
+        robot = nmm.load("unicycle_3r", platform=nmm.DifferentialDrive(r, 0.5))
+        limits = nmm.Limits({"platform": 0.5 / r, "arm": 2.0}, acceleration={"platform": 1.0 / r, "arm": 5.0})
+        task = nmm.Task(nmm.Position("ee"), [3.0, 1.0, 1.0], gain=3.0, speed=0.5)
+        resolver = nmm.DampedLeastSquares(alpha=1, weights={"platform": r * r} if weighted else None)
+        posture = nmm.PreferredPosture({"q2": 0.6, "q3": 0.8})
+        controller = nmm.Controller(robot, task, resolver, posture, limits=limits, dt=0.01)
+        run = nmm.simulate(controller, {"q2": 0.6, "q3": 0.8}, 15.0, 0.01, "zoh")
+        ends.append(run.q[-1])
+        assert run.complete == (weighted or r == 0.1)
+        if not run.complete:
+            values = the(run, "inputs_fell_short").values
+            assert values["sigma"] == pytest.approx(run.sigma_min.min(), rel=0.5)
+            assert values["sigma"] < values["threshold"] == 0.05
+    assert np.allclose(*ends, rtol=0, atol=1e-6) == weighted
+
+
 # Chattering
 
 

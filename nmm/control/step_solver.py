@@ -68,6 +68,7 @@ class StepSolver:
     Attributes
     ----------
     rows : the task's components
+    dimensions : what a resolver is set up with
     sizes : of a sample in a record: n, m, s, priority levels, values with limits
     limits_on : the limits, resolved for the robot
     scene : the shapes whose distances are kept; None without collisions
@@ -93,7 +94,7 @@ class StepSolver:
         self.rows: tuple[Row, ...] = given.task.rows(robot)
         self.scene: Scene | None = None if collisions is None else collisions.on(robot)
         laid = lay_out(given, steered)
-        self.program, self.found, self._dimensions = laid.program, laid.step, laid.dimensions
+        self.program, self.found, self.dimensions = laid.program, laid.step, laid.dimensions
         self.state: State = laid.state
         self.limits_on, self._steerable, self._terms = laid.kept, laid.steered, laid.terms
         self.steered: Steered | None = None
@@ -181,7 +182,7 @@ class StepSolver:
         """The status after the resolver's Python part, if any, and what a step does with its inputs."""
         answer = self.found.answer
         if not self._whole:
-            self.resolver.finish(self.found.problem, self._dimensions, answer)
+            self.resolver.finish(self.found.problem, self.dimensions, answer)
             finish(q, *self.blocks)
             if self.second:
                 follow_answer(*self.blocks)

@@ -282,7 +282,7 @@ def _seen(
     with controller.without_limits():
         why = [
             reasons.out_of_reach(controller, q[left.worst], target[left.worst]),
-            reasons.inputs_fell_short(samples, left),
+            reasons.inputs_fell_short(controller, samples, left),
             reasons.still_moving(controller, samples),
             *reasons.singularity(controller, samples, q, left),
             reasons.switching(samples, left),

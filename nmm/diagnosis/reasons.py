@@ -10,6 +10,8 @@ from nmm.control.directions import WORLD_PARTS, in_world_axes, lost_directions, 
 from nmm.diagnosis.error_bound import Departure, Samples
 from nmm.findings import Finding
 from nmm.functions.function import Row, row_scales
+from nmm.resolvers.base import metric_root
+from nmm.resolvers.damped_least_squares import DampedLeastSquares
 from nmm.robots.configuration import Configuration
 from nmm.robots.reach import Reach, joint_position, reach
 
@@ -107,9 +109,20 @@ def switching(samples: Samples, found: Departure) -> Finding | None:
     return Finding("partition_switching", {"times": count}) if count >= SWITCHES else None
 
 
-def inputs_fell_short(samples: Samples, found: Departure) -> Finding | None:
+def inputs_fell_short(controller: Controller, samples: Samples, found: Departure) -> Finding | None:
+    """With what damped them, where damped least squares did at the worst sample."""
     excess = float(np.linalg.norm(samples.error[found.worst]) - found.bound[found.worst])
-    return None if found.unmet[found.worst] < 0.5 * excess else Finding("inputs_fell_short")
+    if found.unmet[found.worst] < 0.5 * excess:
+        return None
+    resolver, J = controller.resolver, samples.J[found.worst]
+    values: dict[str, float] = {}
+    if isinstance(resolver, DampedLeastSquares):
+        C = metric_root(resolver.weights, controller.solver.dimensions).reshape(-1, J.shape[1])
+        scaled = J / row_scales(controller.rows, controller.robot)[:, np.newaxis]
+        sigma = np.linalg.svd(scaled @ C if C.size else scaled, compute_uv=False)[-1]
+        if sigma < resolver.threshold:
+            values = {"sigma": float(sigma), "threshold": resolver.threshold}
+    return Finding("inputs_fell_short", values)
 
 
 def still_moving(controller: Controller, samples: Samples) -> Finding | None:

@@ -176,7 +176,10 @@ WORDS: Mapping[str, Words] = {
         "no smooth feedback brings a {platform} platform to a pose x, y, theta that stands (Brockett 1983); "
         "nmm.Parking (task kind parking) and nmm.plan (scenario key plan) do"
     ),
-    "inputs_fell_short": "the inputs did not do all that the task asked (clipped, scaled or damped)",
+    "inputs_fell_short": lambda sigma=None, threshold=None, **_: (
+        "the inputs did not do all that the task asked ("
+        + ("clipped, scaled or damped)" if sigma is None else f"damped: σ {sigma:.2g} is below {threshold:.2g})")
+    ),
     "still_moving": (
         "the robot has not come to rest: |{name}| is {mean:.3g} {unit} on average over the last "
         "{duration:.3g} s"
