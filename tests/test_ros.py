@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gripping_cart import cart
 
 import nmm
 from nmm.errors import InputError
@@ -199,36 +200,69 @@ def test_a_missing_rate_is_asked_for_by_name() -> None:
         nmm.ros.inputs(robot, robot.rest, [0.5, 0, 0], {"q1": 0.1, "q2": math.nan})
 
 
-def test_the_node_s_logic_leads_a_robot_by_messages_alone() -> None:
-    """docs/tutorials/follow.py: its robot is q_dot = S(q) u, which gets and sends serialised messages."""
+def parts(state: Any) -> list[Any]:
+    """Two messages of it, the first with a joint that is none of the robot's."""
+    header, names, values = state.header, [*state.name, "lid"], [*state.position, 0.5]
+    return [
+        SimpleNamespace(header=header, name=names[some], position=values[some], velocity=[])
+        for some in (slice(2, None), slice(0, 2))
+    ]
+
+
+def test_a_part_that_comes_no_more_is_noticed() -> None:
+    robot = nmm.load("unicycle_2r")
+    messages, states = nmm.ros.Messages(robot, STORE.types), nmm.ros.JointStates(robot)
+    for t in (1.0, 2.0):
+        states.add(
+            messages.joint_state(t, robot.q({"q1": t, "q2": 0.5}), wheels={"left_wheel_joint": (t, 0.0)})
+        )
+    later = messages.joint_state(3.0, robot.q({"q1": 0.3}))
+    first = SimpleNamespace(header=later.header, name=["q1"], position=[0.3])
+    assert states.add(first)
+    assert (states.joints["q1"], states.joints["q2"], states.stamp) == (0.3, 0.5, 2.0)
+    with pytest.raises(InputError):
+        states.add(SimpleNamespace(header=later.header, name=["q2", "q1"], position=[math.nan, 1.0]))
+    assert states.joints["q1"] == 0.3
+
+
+@pytest.mark.parametrize("name", ["unicycle_3r", "cart"])
+def test_the_node_s_logic_leads_a_robot_by_messages_alone(name: str, tmp_path: Path) -> None:
+    """docs/tutorials/follow.py: its robot here is q_dot = S(q) u, which gets and sends serialised messages. The cart is a
+    car that steers as v and ω ask, with a mimic joint; its joints come in two messages, with others."""
     folder = Path(__file__).parents[1] / "docs" / "tutorials"
     compile((folder / "ros_node.py").read_text("utf-8"), "ros_node.py", "exec")
     found = runpy.run_path(str(folder / "follow.py"))
-    robot = nmm.load("unicycle_3r")
-    messages = nmm.ros.Messages(robot, STORE.types)
-    follow, q, dt = (
-        found["Follow"](robot, "ee", messages),
-        robot.q({"q2": 0.6, "q3": 0.8, "theta": 9.0}),
-        0.01,
-    )
+    car, dt = name == "cart", 0.01
+    robot = nmm.load(cart(tmp_path / "cart.urdf", mimic=True) if car else name)
+    messages, frame = nmm.ros.Messages(robot, STORE.types), "grasp" if car else "ee"
+    follow = found["Follow"](robot, frame, messages)
+    q = robot.q({"lift": 0.6, "bend": 0.9, "tilt": 0.4} if car else {"q2": 0.6, "q3": 0.8, "theta": 9.0})
     goal = np.eye(4)
-    goal[:3, 3] = 1.0, 0.3, 1.0
+    goal[:3, 3] = (3.0, 0.5, 0.8) if car else (1.0, 0.3, 1.0)
     follow.on_target(sent(messages.pose(0.0, goal, "map")))
     twist, rates = follow.commands(0.0)
-    assert nmm.ros.twist(twist).tolist() == [0.0, 0.0, 0.0] == [*rates.values()]  # nothing was measured
+    assert not np.any([*nmm.ros.twist(twist), *rates.values()])  # nothing was measured
     follow.on_tf(sent(messages.tf([(0.0, "map", "odom", np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))])))
     for k in range(1200):
         t = k * dt
         follow.on_tf(sent(messages.transforms(t, q)))
-        follow.on_joint_state(sent(messages.joint_state(t, q)))
+        for state in parts(sent(messages.joint_state(t, q))) if car else [sent(messages.joint_state(t, q))]:
+            try:
+                follow.on_joint_state(state)
+            except InputError as error:  # as the node does
+                assert (k, error.what[:14]) == (0, "no measurement")
         twist, rates = follow.commands(t + 0.001)
-        u = nmm.ros.inputs(robot, q, nmm.ros.twist(sent(twist)), rates)
+        vx, _, omega = nmm.ros.twist(sent(twist))
+        assert {*rates} == {*robot.u_names[2:]}
+        u = nmm.ros.inputs(robot, q, [vx, 0.0, omega], rates)
+        if car and vx:
+            u[1] = (math.atan(robot.platform.wheelbase * omega / vx) - q[3]) / dt
         q = q + dt * robot.S(q) @ u
-    tip = nmm.Configuration(robot, q).placement("ee").translation
+    tip = nmm.Configuration(robot, q).placement(frame).translation
     assert np.linalg.norm(tip - goal[:3, 3]) < 1e-3
     assert np.any(u)
     bad = messages.joint_state(9.0, q)
-    bad.position[1] = math.nan
+    bad.position[-1] = math.nan
     with pytest.raises(InputError):
         follow.on_joint_state(bad)
     for k in range(1200, 1300):

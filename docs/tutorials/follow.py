@@ -4,17 +4,17 @@ import nmm
 
 
 class Follow:
-    """Keeps a frame at a target that comes as a PoseStamped."""
+    """Keeps a hand at a target that comes as a PoseStamped; speaks in messages."""
 
     def __init__(self, robot, frame, messages, dt=0.01):
         self.robot, self.messages, self.dt = robot, messages, dt
         self.target = nmm.LiveTarget([0.5, 0.0, 1.1])
         task = nmm.Task(nmm.Position(frame), self.target, gain=2.0, speed=0.3)
         limits = nmm.Limits(
-            velocity={"v": 0.5, "omega": 1.0, "arm": 1.0}, acceleration={"platform": 1.0, "arm": 3.0}
+            velocity={"platform": 0.5, "arm": 1.0}, acceleration={"platform": 1.0, "arm": 3.0}
         )
         self.loop = nmm.Loop(nmm.Controller(robot, task, nmm.DampedLeastSquares(), limits=limits, dt=dt))
-        self.frames = nmm.ros.Transforms()
+        self.frames, self.states = nmm.ros.Transforms(), nmm.ros.JointStates(robot)
         self.q, self.measured = None, None
 
     def on_tf(self, message):
@@ -24,13 +24,17 @@ class Follow:
         self.target.set(nmm.ros.placement(message)[:3, 3])
 
     def on_joint_state(self, message):
-        base = self.frames.base("map", self.messages.base)
-        self.q = self.robot.q_from(nmm.ros.joints(message), base, near=self.q)
-        self.measured = nmm.ros.stamp(message)
+        if self.states.add(message):  # which may have further joints, or a part of them
+            base = self.frames.base("map", self.messages.base)
+            self.q = self.robot.q_from(self.states.joints, base, near=self.q)
+            self.measured = self.states.stamp
 
     def commands(self, t):
-        """(Twist, {joint: rate}) at the time t, s, once every dt; at rest where nothing is measured."""
+        """(Twist, {joint: rate}) at the time t, s, once every dt; they stop a robot that is no longer measured."""
         u = self.loop.step(t, self.q, self.measured)
         q = self.robot.rest if self.q is None else self.q
-        rates = dict(zip(self.robot.u_names, map(float, u), strict=True))
-        return self.messages.twist(q, u), {name: rates[name] for name in self.robot.q_names[3:]}
+        ahead = q + self.dt * self.robot.S(q) @ u  # a car's steering is to be there by then
+        p = self.robot.platform.p
+        return self.messages.twist(ahead, u), dict(
+            zip(self.robot.u_names[p:], map(float, u[p:]), strict=True)
+        )

@@ -178,7 +178,11 @@ WORDS: Mapping[str, Words] = {
     ),
     "inputs_fell_short": lambda sigma=None, threshold=None, **_: (
         "the inputs did not do all that the task asked ("
-        + ("clipped, scaled or damped)" if sigma is None else f"damped: σ {sigma:.2g} is below {threshold:.2g})")
+        + (
+            "clipped, scaled or damped)"
+            if sigma is None
+            else f"damped: σ {sigma:.2g} is below {threshold:.2g})"
+        )
     ),
     "still_moving": (
         "the robot has not come to rest: |{name}| is {mean:.3g} {unit} on average over the last "

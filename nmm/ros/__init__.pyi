@@ -1,3 +1,4 @@
+from .joint_states import JointStates as JointStates
 from .making import Messages as Messages
 from .reading import Transforms as Transforms
 from .reading import base as base

@@ -16,6 +16,7 @@ from nmm.files import expect_file
 from nmm.robots.configuration import Configuration
 from nmm.robots.robot import Robot
 from nmm.ros import reading
+from nmm.ros.joint_states import JointStates
 from nmm.ros.log import INPUTS, JOINTS, MAP, ODOMETRY, TF, TF_STATIC, rosbags, typestore
 from nmm.ros.making import root_link
 from nmm.runs.trajectory import Trajectory
@@ -123,9 +124,7 @@ class _Reader:
         self.robot, self.file, self.base = robot, file, base
         self.topics = {joints: "joints", odometry: "odometry", TF: "tf", TF_STATIC: "tf", INPUTS: "inputs"}
         self._own = robot.q_names[min(3, robot.platform.n_p) :]
-        passive = {joint for wheel in robot.wheels for joint in wheel.joints}
-        self._known = {*self._own, *robot.locked, *passive}
-        self._latest: dict[str, float] = {}
+        self._states = JointStates(robot)
         self._missing: InputError | None = None
         self.joints, self.rates, self.inputs = Track(), Track(), Track()
         self.odometry, self.twists, self.map, self.moved = Track(), Track(), Track(), Track()
@@ -193,14 +192,12 @@ class _Reader:
                     track.add(reading.nanoseconds(message), self._frames.base(frame, self.base))
 
     def _take_joints(self, message: Any) -> None:
-        positions = {name: x for name, x in reading.joints(message).items() if name in self._known}
-        self._latest.update(positions)
-        if not positions:
+        if not self._states.add(message):
             return
         try:
             base = np.zeros(3) if self.robot.platform.n_p else None
             near = self.joints.rows[-1] if self.joints.rows else None
-            q = self.robot.q_from(self._latest, base, near)
+            q = self.robot.q_from(self._states.joints, base, near)
         except InputError as error:
             self._missing = error  # told if it stays so
             return
