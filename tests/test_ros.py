@@ -249,8 +249,8 @@ def test_the_node_s_logic_leads_a_robot_by_messages_alone(name: str, tmp_path: P
         for state in parts(sent(messages.joint_state(t, q))) if car else [sent(messages.joint_state(t, q))]:
             try:
                 follow.on_joint_state(state)
-            except InputError as error:  # as the node does
-                assert (k, error.what[:14]) == (0, "no measurement")
+            except InputError:  # as the node does
+                assert k == 0
         twist, rates = follow.commands(t + 0.001)
         vx, _, omega = nmm.ros.twist(sent(twist))
         assert {*rates} == {*robot.u_names[2:]}

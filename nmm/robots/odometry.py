@@ -130,8 +130,8 @@ class Odometry:
         counted = [name for name in encoders if name in (*counted_wheels(robot), *robot.platform.inputs)]
         self._counters = Counters(robot, dict.fromkeys(counted, 0.0), self._where)
         self._shares = self._by_counter(slip, np.ones(len(counted)), "slip")
-        own = {wheel.joint: wheel.velocity for wheel in robot.wheels}
-        usual = np.array([own.get(name, math.inf) for name in counted])
+        limits = {wheel.joint: wheel.velocity for wheel in robot.wheels}
+        usual = np.array([limits.get(name, math.inf) for name in counted])
         self._fastest = self._by_counter(fastest, usual, "fastest")
         self._t = math.nan
         self._spread = scalar(spread, f"{self._where}: spread", least=0.0)

@@ -25,9 +25,10 @@ class JointStates:
     Examples
     --------
     >>> from types import SimpleNamespace as M
-    >>> def message(t, **at): return M(header=M(stamp=M(sec=t, nanosec=0)), name=[*at], position=[*at.values()])
+    >>> def state(sec, **at):
+    ...     return M(header=M(stamp=M(sec=sec, nanosec=0)), name=[*at], position=[*at.values()])
     >>> states = nmm.ros.JointStates(nmm.load("unicycle_2r"))
-    >>> states.add(message(3, q1=0.1, lid=1.0)), states.add(message(4, q2=0.5)), states.add(message(5, lid=0.0))
+    >>> states.add(state(3, q1=0.1, lid=1.0)), states.add(state(4, q2=0.5)), states.add(state(5, lid=0.0))
     (True, True, False)
     >>> states.joints, states.stamp
     ({'q1': 0.1, 'q2': 0.5}, 3.0)

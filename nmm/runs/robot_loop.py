@@ -8,6 +8,7 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -294,8 +295,9 @@ class Loop:
         robot = self.controller.robot
         for i in np.flatnonzero(beyond):
             lower, upper = (float(one) if math.isfinite(one) else None for one in self._limits[i])
-            values = {"name": robot.q_names[i], "unit": robot.q_units[i], "lower": lower, "upper": upper}
-            self._found.add("outside_limits", self.t, value=float(q[i]), **values)
+            place = {"unit": robot.q_units[i], "lower": lower, "upper": upper}
+            values: dict[str, Any] = {"name": robot.q_names[i], "value": float(q[i]), **place}
+            self._found.add("outside_limits", self.t, **values)
         if self.state is LoopState.WAITING:
             self._measured.forget()
             return True
