@@ -6,7 +6,6 @@ import math
 from typing import Any
 
 from nmm.robots.robot import Robot
-from nmm.robots.wheel_rates import steered_wheels
 from nmm.ros.reading import joints, nanoseconds
 
 
@@ -35,7 +34,9 @@ class JointStates:
     """
 
     def __init__(self, robot: Robot) -> None:
-        self._timed = {*robot.q_names[min(3, robot.platform.n_p) :], *steered_wheels(robot)}
+        steers = robot.platform.n_p > 3  # else swivels are casters'
+        self._timed = {*robot.q_names[min(3, robot.platform.n_p) :]}
+        self._timed |= {wheel.swivel for wheel in robot.wheels if steers}
         wheels = {joint for wheel in robot.wheels for joint in wheel.joints}
         self._known = self._timed | wheels | {*robot.locked}
         self.joints: dict[str, float] = {}
