@@ -1,7 +1,7 @@
 """A robot's loop in which something goes wrong, and what it does then.
 
-python -m tests.loop_faults            the table of docs/deploy.md
-python -m tests.loop_faults 1000000    so many calls: memory, and how long they take
+python tests/loop_faults.py            the table of docs/deploy.md
+python tests/loop_faults.py 1000000    so many calls: memory, and how long they take
 """
 
 from __future__ import annotations
