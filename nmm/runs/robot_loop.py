@@ -8,7 +8,6 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from enum import StrEnum
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +17,7 @@ from nmm.control.controller import Controller
 from nmm.control.goal import norms, unit_codes
 from nmm.errors import InputError
 from nmm.findings import Finding
+from nmm.runs.far_limits import FarLimits
 from nmm.runs.held_history import HeldHistory
 from nmm.runs.loop_log import LoopFindings, LoopLog
 from nmm.runs.measured_state import MeasuredState, Refused, Tolerances
@@ -52,19 +52,6 @@ class LoopState(StrEnum):
     HOLDING = "holding"
     STOPPING = "stopping"
     STOPPED = "stopped"
-
-
-def far_limits(controller: Controller, share: float) -> tuple[Array, Array]:
-    """Limits of the coordinates (n, 2), and rows (2, n) that are a share of the range beyond them (of 1 m or
-    rad where one side has none); mimic joints are left to their leaders."""
-    own, robot = controller.solver.limits_on.coordinates, controller.robot
-    lower, upper = np.where(np.isfinite(robot.q_limits), robot.q_limits, own).T
-    limits = np.column_stack([np.minimum(lower, own[:, 0]), np.maximum(upper, own[:, 1])])
-    span = np.where(np.isfinite(limits).all(axis=1), limits[:, 1] - limits[:, 0], 1.0)
-    span = np.maximum(span, 1e-9)  # of a joint that is held
-    follows = [robot.coordinate(one.joint) for one in robot.mimic_joints]
-    span[follows] = math.inf
-    return limits, np.array([limits[:, 0] - share * span, limits[:, 1] + share * span])
 
 
 class Loop:
@@ -158,7 +145,7 @@ class Loop:
         self._history = HeldHistory(robot, remembered)
         self._measured = MeasuredState(robot, self._history, tolerances, self.period)
         share = math.inf if outside is None else scalar(outside, "outside", least=0.0)
-        self._limits, self._far = far_limits(controller, share)
+        self._far = FarLimits(controller.robot, controller.solver.limits_on.coordinates, share)
         self._error = None if error is None else tuple(positive(most, "error") for most in error)
         self._units = unit_codes(controller.solver.rows)
         self._free_at = 0.0
@@ -288,15 +275,12 @@ class Loop:
     def _is_outside(self) -> bool:
         """Whether a joint is measured so far outside its limits that the loop does not start; one that runs
         begins to stop."""
-        q, far = self._measured.q, self._far
-        beyond = (q < far[0]) | (q > far[1])
-        if not beyond.any() or self.state in (LoopState.STOPPING, LoopState.STOPPED):
+        if self.state in (LoopState.STOPPING, LoopState.STOPPED):
             return False
-        robot = self.controller.robot
-        for i in np.flatnonzero(beyond):
-            lower, upper = (float(one) if math.isfinite(one) else None for one in self._limits[i])
-            place = {"unit": robot.q_units[i], "lower": lower, "upper": upper}
-            values: dict[str, Any] = {"name": robot.q_names[i], "value": float(q[i]), **place}
+        beyond = self._far.beyond(self._measured.q)
+        if not beyond:
+            return False
+        for values in beyond:
             self._found.add("outside_limits", self.t, **values)
         if self.state is LoopState.WAITING:
             self._measured.forget()
