@@ -227,8 +227,8 @@ def test_a_part_that_comes_no_more_is_noticed() -> None:
 
 @pytest.mark.parametrize("name", ["unicycle_3r", "cart"])
 def test_the_node_s_logic_leads_a_robot_by_messages_alone(name: str, tmp_path: Path) -> None:
-    """docs/tutorials/follow.py: its robot here is q_dot = S(q) u, which gets and sends serialised messages. The cart is a
-    car that steers as v and ω ask, with a mimic joint; its joints come in two messages, with others."""
+    """docs/tutorials/follow.py: its robot is q_dot = S(q) u, which gets and sends messages. The cart is a car
+    that steers as v and ω ask, with a mimic joint; its joints come in two messages, with others."""
     folder = Path(__file__).parents[1] / "docs" / "tutorials"
     compile((folder / "ros_node.py").read_text("utf-8"), "ros_node.py", "exec")
     found = runpy.run_path(str(folder / "follow.py"))

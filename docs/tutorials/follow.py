@@ -30,7 +30,7 @@ class Follow:
             self.measured = self.states.stamp
 
     def commands(self, t):
-        """(Twist, {joint: rate}) at the time t, s, once every dt; they stop a robot that is no longer measured."""
+        """(Twist, {joint: rate}) at the time t, s, once every dt; they stop a robot that nothing measures."""
         u = self.loop.step(t, self.q, self.measured)
         q = self.robot.rest if self.q is None else self.q
         ahead = q + self.dt * self.robot.S(q) @ u  # a car's steering is to be there by then
