@@ -167,7 +167,7 @@ def _begin(request: Request) -> None:
     except SystemExit as ended:
         if request.number:  # Python's own end belongs to the moments at which a signal may come
             raise
-        threading._shutdown()  # type: ignore[attr-defined]
+        threading._shutdown()  # type: ignore[attr-defined]  # as the interpreter does at its end
         atexit._run_exitfuncs()
         sys.stdout.flush()
         sys.stderr.flush()

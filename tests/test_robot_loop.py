@@ -309,7 +309,7 @@ def test_a_write_that_raises_is_called_until_the_robot_stands(fails: int) -> Non
             raise TimeoutError(f"{len(tried)}")
         write(u)
 
-    clock.write = failing  # type: ignore[method-assign]
+    clock.write = failing  # type: ignore[method-assign]  # a bus that is gone
     with pytest.raises(TimeoutError, match="80"):
         clock.run()
     loop = clock.loop
