@@ -30,7 +30,7 @@ WATCH = """() => {
     requestAnimationFrame(frame);
   };
   requestAnimationFrame(frame);
-  document.getElementById("view").addEventListener("pointermove", (event) => {
+  for (const name of ["pointerrawupdate", "pointermove"]) window.addEventListener(name, (event) => {
     if (nmm.gizmos.held && moved === null) [moved, longest] = [event.timeStamp, 0];
   }, true);
   const pose = nmm.hooks.pose;

@@ -18,19 +18,26 @@
   const send = (message) => nmm.send && nmm.send(message);
   const order = (what) => send({ type: "order", what });
 
-  // What has been aimed at since the last picture goes out with the next one.
+  // What is aimed at goes out at once, but for what follows within a few ms: that goes with the next picture.
+  const SOON = 4;
   const aims = new Map();
+  let told = 0;
+  function tell() {
+    for (const [task, value] of aims) send({ type: "aim", task, value });
+    aims.clear();
+    told = performance.now();
+  }
   function aim(target, value) {
     if (nmm.ended) return;
     target.value = value;
     target.awaited = performance.now();
     aims.set(target.number, value);
+    if (target.awaited - told >= SOON) tell();
     show(target);
   }
   function flush() {
     requestAnimationFrame(flush);
-    for (const [task, value] of aims) send({ type: "aim", task, value });
-    aims.clear();
+    if (aims.size) tell();
     stick();
     nmm.border.update(drive.targets);
   }

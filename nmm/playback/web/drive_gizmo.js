@@ -178,8 +178,15 @@
       return light(hit);
     }
     event.stopPropagation();
-    return held.ring ? turn(event, held) : shift(event, held);
+    return drag(event);
   }, true);
+  // The same, as the pointer moves: browsers keep "pointermove" for the next picture.
+  view.addEventListener("pointerrawupdate", (event) => gizmos.held && drag(event), true);
+
+  function drag(event) {
+    const { held } = gizmos;
+    return held.ring ? turn(event, held) : shift(event, held);
+  }
 
   function shift(event, held) {
     const at = under(event, held);
