@@ -135,6 +135,40 @@ def test_an_arrow_goes_along_its_axis_and_keys_too(window: Window, setup: Scenar
         assert target(page)[1] == before[1]
 
 
+def test_a_target_brought_back_stays_while_old_pictures_arrive(window: Window, setup: ScenarioSetup) -> None:
+    """Messages are held back: pictures show where it was before, and in one of them it is where it is now."""
+    with driven(setup) as url:
+        page = opened(window, url)
+        box = page.get_by_label("ee: x in m, as a number")
+
+        def put(x: float) -> None:
+            box.fill(str(x))
+            box.press("Enter")
+
+        put(0.25)
+        page.wait_for_function("nmm.drive.targets[0].awaited === undefined")
+        page.evaluate("""() => {
+          window.held = { messages: [], shown: [], send: nmm.send };
+          nmm.send = (message) => held.messages.push(message);
+          const drive = nmm.hooks.drive;
+          nmm.hooks.drive = (picture) => {
+            drive(picture);
+            held.shown.push([picture.targets[0][0], nmm.drive.targets[0].value[0]]);
+          };
+        }""")
+        put(0.5)
+        put(0.25)
+        shown = "held.shown.some(([program]) => program === {0})"
+        page.wait_for_function("held.messages.length === 2")
+        page.evaluate("held.shown.length = 0")
+        page.wait_for_function(shown.format(0.25))
+        page.evaluate("held.send(held.messages[0])")
+        page.wait_for_function(shown.format(0.5))
+        page.evaluate("held.send(held.messages[1])")
+        page.wait_for_function("nmm.drive.targets[0].awaited === undefined")
+        assert {mine for _, mine in page.evaluate("held.shown")} == {0.25}
+
+
 def ball_from(page: Page, at: tuple[float, float]) -> float:
     """How far the first ball is from a point of the window, px."""
     page.evaluate("viewer.scene.updateMatrixWorld(true)")

@@ -492,6 +492,20 @@ def test_an_aim_shows_before_the_next_picture_is_due(monkeypatch: pytest.MonkeyP
         wait_for(lambda: loop.latest().splitlines()[-2] != first)
 
 
+def test_pictures_say_which_aim_they_know_of() -> None:
+    def aim(value: list[float], number: int) -> dict[str, object]:
+        message = {"type": "aim", "task": 0, "value": value, "number": number}
+        loop.session.receive(json.dumps(message))
+        wait_for(lambda: loop.picture()["heard"] == [number])
+        return loop.picture()
+
+    with Loop(scenario()) as loop:
+        wait_for(lambda: loop.picture()["heard"] == [None])
+        assert aim([1.0, 0.5, 0.6], 7)["targets"] == [[1.0, 0.5, 0.6]]
+        # What cannot be aimed at is heard too: no page waits for it.
+        assert aim([1.0, 0.5], 9)["targets"] == [[1.0, 0.5, 0.6]]
+
+
 def test_targets_are_brought_to_where_the_robot_is() -> None:
     with Loop(scenario()) as loop:
         wait_for(lambda: loop.picture()["t"] > 0.2)

@@ -47,10 +47,11 @@ _Place = Annotated[float, Field(ge=-FAR, le=FAR)]
 
 @dataclass(frozen=True, config=_STRICT)
 class Aim:
-    """Put the target of task number `task` at `value` (s,)."""
+    """Put the target of task number `task` at `value` (s,); pictures that know of it carry its `number`."""
 
     task: Annotated[int, Field(ge=0, lt=1000)]
     value: Annotated[tuple[_Place, ...], Field(min_length=1, max_length=100)]
+    number: Annotated[int, Field(ge=0, lt=2**53)] = 0
     type: Literal["aim"] = "aim"
 
 
@@ -131,6 +132,8 @@ class DriveSession(RobotSession):
         self._aimed = threading.Event()
         self._samples: deque[tuple[int, list[float | None]]] = deque(maxlen=KEPT)
         self._picks: dict[str, object] = {}
+        #: The number of the last aim that each task's target has had.
+        self._heard: dict[int, int] = {}
         self._making: Future[Made] | None = None
         self._paused = False
         self._notice, self._until = "", 0.0
@@ -261,6 +264,7 @@ class DriveSession(RobotSession):
             message = self._waiting.popleft()
             try:
                 if isinstance(message, Aim):
+                    self._heard[message.task] = message.number
                     self._driven.aim(message.task, np.array(message.value))
                     self._planning.aims(message.task)
                 elif isinstance(message, Pick):
@@ -304,6 +308,7 @@ class DriveSession(RobotSession):
             "type": "drive",
             "t": look.t,
             "targets": driven.places,
+            "heard": [self._heard.get(task) for task in range(len(driven.places))],
             "at": finite(look.at),
             "paused": self._paused,
             "plans": self._planning.on,

@@ -20,24 +20,25 @@
 
   // What is aimed at goes out at once, but for what follows within a few ms: that goes with the next picture.
   const SOON = 4;
-  const aims = new Map();
-  let told = 0;
+  const aimed = new Set();
+  let [told, count] = [0, Math.floor(Math.random() * 2 ** 52)]; // no two pages count alike
   function tell() {
-    for (const [task, value] of aims) send({ type: "aim", task, value });
-    aims.clear();
+    for (const { number: task, value, awaited: number } of aimed) send({ type: "aim", task, value, number });
+    aimed.clear();
     told = performance.now();
   }
   function aim(target, value) {
     if (nmm.ended) return;
     target.value = value;
-    target.awaited = performance.now();
-    aims.set(target.number, value);
-    if (target.awaited - told >= SOON) tell();
+    target.since = performance.now();
+    target.awaited = ++count;
+    aimed.add(target);
+    if (target.since - told >= SOON) tell();
     show(target);
   }
   function flush() {
     requestAnimationFrame(flush);
-    if (aims.size) tell();
+    if (aimed.size) tell();
     stick();
     nmm.border.update(drive.targets);
   }
@@ -222,7 +223,7 @@
     if (drive.plan) drive.followed += 1;
   };
 
-  nmm.hooks.drive = ({ t, targets, at, samples, paused, plans, told, wrong }) => {
+  nmm.hooks.drive = ({ t, targets, heard, at, samples, paused, plans, told, wrong }) => {
     remember(samples);
     drive.plans = plans;
     parts.plan.setAttribute("aria-pressed", String(plans));
@@ -232,9 +233,8 @@
     Object.assign(nmm.player, { time: t, range: { from: Math.max(0, t - WINDOW), to: Math.max(t, 1) } });
     drive.targets.forEach((target, i) => {
       target.at = at[i];
-      // Pictures on their way know nothing of what has just been aimed at.
-      const echoed = targets[i].every((x, k) => x === target.value[k]);
-      if (echoed || performance.now() - target.awaited > PATIENCE) target.awaited = undefined;
+      // Pictures on their way know nothing of what has just been aimed at, even where the target has been there before.
+      if (heard[i] === target.awaited || performance.now() - target.since > PATIENCE) target.awaited = undefined;
       const busy = target.awaited !== undefined || (nmm.gizmos.held && nmm.gizmos.held.gizmo === target.gizmo);
       if (!busy) {
         target.value = targets[i];
