@@ -122,11 +122,11 @@ Combination = Annotated[str | dict[str, float], BeforeValidator(_combination)]
 #: A direction by its name or as three numbers.
 Direction = Annotated[str | list[float], BeforeValidator(lambda v: v if isinstance(v, str) else nested(v))]
 Weights = Annotated[dict[str, float] | list[Any], BeforeValidator(_weights)]
-#: A function of time or of the configuration, or what stands for one: see `nmm.scenario.functions`.
-REFERENCE = ForwardRef("Reference")
-#: Such a function too, or the name of a frame, for its origin.
-POINT = ForwardRef("Point")
-ORIENTATION = ForwardRef("FixedOrientation")
+#: A function of time or of the configuration, or what stands for one; such a function too, or the name of a
+#: frame, for its origin; an orientation that does not move. They are made of parts, which are made here.
+REFERENCE, POINT, ORIENTATION = (
+    ForwardRef(name, module="nmm.scenario.functions") for name in ("Reference", "Point", "FixedOrientation")
+)
 
 #: By the annotation of a constructor's parameter, as it is written there, without "| None".
 SPELLINGS: dict[str, Any] = {

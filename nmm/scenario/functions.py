@@ -165,14 +165,7 @@ REFERENCE_PARTS = {
 REFERENCE_PARTS |= {kind: part for kind, part in FUNCTION_PARTS.items() if kind not in REFERENCE_PARTS}
 
 Reference = Annotated[FunctionPart, OneOf(REFERENCE_PARTS), WrapValidator(_reference)]
-#: What annotations of parts that hold functions stand for (`nmm.scenario.constructors`).
-REFERENCES_BY_NAME: dict[str, Any] = {
-    "Reference": Reference,
-    "Point": Annotated[Reference, BeforeValidator(_point)],
-    "FixedOrientation": FixedOrientation,
-}
-for _part in {*FUNCTION_PARTS.values(), *REFERENCE_PARTS.values()}:
-    _part.model_rebuild(_types_namespace=REFERENCES_BY_NAME)
+Point = Annotated[Reference, BeforeValidator(_point)]
 
 P = TypeVar("P", bound=FunctionPart)
 

@@ -24,7 +24,7 @@ from nmm.scenario.constructors import (
     listed,
     part_of,
 )
-from nmm.scenario.functions import REFERENCES_BY_NAME, Reference
+from nmm.scenario.functions import Reference
 from nmm.scenario.keys import FUNCTION, NUMBER, OneOf, Part, at, each, is_path
 from nmm.scenario.numbers import Number, Positive
 
@@ -130,9 +130,6 @@ OBJECTIVE_PARTS: dict[str, type[ObjectivePart]] = {
     kind: SPECIAL.get(kind) or part_of(kind, made, BASES.get(kind, ObjectivePart))
     for kind, made in OBJECTIVES.items()
 }
-
-for _part in OBJECTIVE_PARTS.values():
-    _part.model_rebuild(_types_namespace=REFERENCES_BY_NAME)
 
 #: One objective, a list that is added up, or nothing.
 ObjectiveList = Annotated[
