@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -73,13 +74,19 @@ def places(subjects: Sequence[Subject], ground: Ground, scale: float) -> list[Pl
         free = ground.free(candidates, half) & _clear(candidates, half, found, leads)
         candidates, outwards = candidates[free], np.tile(outwards, len(gaps))[free]
         apart, feet = _apart(candidates, half, edges[number])
-        others = [_apart(candidates, half, one)[0] for one in (*edges[:number], *edges[number + 1 :])]
-        unclear = np.min(others, axis=0, initial=np.inf) < apart
-        cost = apart + (unclear * _UNCLEAR - 0.02 * outwards) * scale
+        others = np.vstack([np.zeros((0, 2)), *edges[:number], *edges[number + 1 :]])
+        clear, unclear = apart - 0.02 * outwards * scale, apart + (_UNCLEAR - 0.02 * outwards) * scale
+        # The cheapest first; whether another subject is nearer, which costs more, is asked of those reached.
+        queue = [(cost, k, False) for k, cost in enumerate(clear.tolist())]
+        heapq.heapify(queue)
         place = None
-        for k in np.argsort(cost, kind="stable").tolist():
+        while queue:
+            _, k, is_unclear = heapq.heappop(queue)
+            if not is_unclear and _nearest(candidates[k], half, others) < apart[k]:
+                heapq.heappush(queue, (float(unclear[k]), k, True))
+                continue
             foot = feet[k]
-            if apart[k] <= _FAR * scale and not unclear[k]:
+            if apart[k] <= _FAR * scale and not is_unclear:
                 place = Place(candidates[k], half, None)
                 break
             lead = _sampled([np.array([foot, candidates[k]])], cell)
@@ -111,10 +118,19 @@ def _sampled(lines: Sequence[Array], spacing: float) -> Array:
 
 def _apart(middles: Array, half: Array, points: Array) -> tuple[Array, Array]:
     """How far boxes around `middles` (P, 2) are from the nearest of points, (P,) m, and that, (P, 2)."""
-    ways = np.abs(middles[:, None] - points) - half
-    away = np.hypot(*np.maximum(ways, 0.0).transpose(2, 0, 1))
+    away = _distances(middles[:, None], half, points)
     nearest = np.argmin(away, axis=1)
     return away[np.arange(len(away)), nearest], points[nearest]
+
+
+def _nearest(middle: Array, half: Array, points: Array) -> float:
+    """How far a box is from the nearest of points, m; inf from none."""
+    return float(_distances(middle, half, points).min(initial=np.inf))
+
+
+def _distances(middles: Array, half: Array, points: Array) -> Array:
+    away: Array = np.hypot(*np.moveaxis(np.maximum(np.abs(middles - points) - half, 0.0), -1, 0))
+    return away
 
 
 def _clear(middles: Array, half: Array, texts: Sequence[Place], leads: Array) -> Flags:
