@@ -6,9 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from live_pages import unpacked
 
 import nmm
 from nmm.playback import Body, Carried, Motion, Surroundings
+from nmm.playback.extent import corners
 from nmm.playback.scene import playback_scene
 
 SCENE = {
@@ -118,6 +120,12 @@ def test_motions_of_ones_own_carry_shapes_too() -> None:
         at = at @ matrices.get("/".join(parts[:k]), np.eye(4))
     expected = nmm.Configuration(robot, robot.rest).placement("ee").homogeneous @ place
     np.testing.assert_allclose(at, expected, atol=1e-12)
+    # The picture holds all of it.
+    held = unpacked(stage["view"]).reshape(-1, 3)
+    tray = corners(np.array([[-0.1, -0.15, -0.01], [0.1, 0.15, 0.01]]))
+    there = tray @ expected[:3, :3].T + expected[:3, 3]
+    assert np.all(held.min(axis=0) <= there.min(axis=0) + 1e-12)
+    assert np.all(held.max(axis=0) >= there.max(axis=0) - 1e-12)
     told = {one["text"] for one in commands if one["type"] == "obstacles"}
     assert told == {"scenery"}
     with pytest.raises(nmm.InputError, match="elbow"):

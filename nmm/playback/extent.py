@@ -14,6 +14,7 @@ from nmm.playback.rolling import Rolling
 from nmm.playback.sticks import appearance
 from nmm.robots.motion import Motion
 from nmm.robots.robot import Robot
+from nmm.robots.surroundings import Carried
 
 _CORNERS = np.array(list(itertools.product((0, 1), repeat=3)))
 #: Height of a robot's name tag, as a multiple of the robot's.
@@ -27,8 +28,9 @@ def corners(boxes: Array) -> Array:
     return np.stack([boxes[..., _CORNERS[:, axis], axis] for axis in range(3)], axis=-1)
 
 
-def robot_boxes(robot: Robot, q: Array, wheels: Array) -> Array:
-    """Boxes along the world's axes around everything visible, (K, 2, 3) m, for q (K, n) and wheels (K, D)."""
+def robot_boxes(robot: Robot, q: Array, wheels: Array, carried: Sequence[Carried] = ()) -> Array:
+    """Boxes along the world's axes around everything visible, what is carried too, (K, 2, 3) m, for q (K, n)
+    and wheels (K, D)."""
     placements = Placements(robot)
     model, visuals = robot.display_model, appearance(robot).shapes
     data, geometry_data = model.createData(), visuals.createData()
@@ -42,6 +44,11 @@ def robot_boxes(robot: Robot, q: Array, wheels: Array) -> Array:
             for box, placement in zip(local, geometry_data.oMg, strict=True)
             if box is not None
         ]
+        for one in carried:
+            if (box := shape_corners(one.geometry)) is not None:
+                frame = model.frames[model.getFrameId(one.frame)]
+                place = (data.oMi[frame.parentJoint] * frame.placement).homogeneous @ one.place
+                points.append(box @ place[:3, :3].T + place[:3, 3])
         # A robot of shapes without bounds is as large as its skeleton.
         everything = np.vstack(points or [data.oMi[i].translation for i in range(model.njoints)])
         boxes[k] = everything.min(axis=0), everything.max(axis=0)

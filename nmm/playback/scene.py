@@ -77,7 +77,10 @@ def playback_scene(
     times = np.linspace(start, end, INSTANTS)
     at = [[interpolated(times, frame.t, values) for values in (frame.q, frame.wheels)] for frame in frames]
     boxes = np.array(
-        [extent.robot_boxes(motion.robot, *now) for motion, now in zip(motions, at, strict=True)]
+        [
+            extent.robot_boxes(motion.robot, *now, motion.surroundings.carried)
+            for motion, now in zip(motions, at, strict=True)
+        ]
     )
     shown = _ellipsoids(motions, frames, ellipsoids)
     if shown is not None:
