@@ -15,6 +15,7 @@ from playback_browser import (
     Window,
     assert_in_picture,
     assert_same,
+    draw_frames,
     drawn_visuals,
     expected_visuals,
     file_url,
@@ -174,6 +175,7 @@ def test_ghosts_stand_where_the_robot_passes(small_robot: Robot, window: Window,
         expected = [part @ place[:3, :3].T + place[:3, 3] for part, place in zip(parts, world, strict=True)]
         drawn = np.array(page.evaluate(CORNERS, [f"/nmm/motion 0/ghosts/{k}/robot", "/nmm"]))
         np.testing.assert_allclose(drawn, np.vstack([*expected, *expected]), atol=1e-6)
+    page.evaluate("nmm.actions.grid()")  # names of axes give way to the copies' texts
     calls, opaque = page.evaluate(CALLS), np.array(page.evaluate(OPACITIES))
     page.evaluate("nmm.actions.ghosts()")
     # What is opaque stays so: else the page's ground would shine through.
@@ -190,6 +192,8 @@ def test_copies_of_large_meshes_are_coarse_and_where_the_robot_is(window: Window
     q[:, 0] = np.linspace(0.0, 6.0, 61)
     motion = Motion(robot, np.linspace(0.0, 6.0, 61), q, np.zeros((61, robot.n_u)), label="RG")
     page = window.open(file_url([motion, replace(motion, label="PG")], tmp_path))
+    page.evaluate("nmm.player.seek(3)")  # a copy gives way to a robot
+    draw_frames(page)
     copies = page.evaluate(
         """() => nmm.ghosts.map((run) => run.children.filter(({ visible }) => visible).map((copy) => {
              const { index, boundingBox } = copy.children[0].children[0].children[0].geometry;
@@ -203,6 +207,7 @@ def test_copies_of_large_meshes_are_coarse_and_where_the_robot_is(window: Window
         expected = robot_boxes(robot, q[[round(10 * sample)]], wheel_angles(motion)[:1])[0]
         np.testing.assert_allclose(box, expected, atol=0.03)
     page.evaluate("nmm.apart.set(1)")
+    draw_frames(page)
     shown = "nmm.ghosts.map((run) => run.children.filter(({ visible }) => visible).length)"
     assert page.evaluate(shown) == [4, 4]
 

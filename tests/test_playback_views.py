@@ -283,3 +283,72 @@ def test_from_above_the_view_is_a_plan(robot: Robot, window: Window, tmp_path: P
     page.evaluate("nmm.camera.look('iso'); nmm.camera.put([0, -2, 3, 0, 0, 0])")
     heights.append(abs(np.subtract(*np.array(page.evaluate(PROJECT, [[0, 0, 0], [0, 0.1, 0]]))[:, 1])))
     assert heights[0] == pytest.approx(heights[1], rel=0.05)
+
+
+def test_a_name_is_above_its_robot_as_that_stands_now(robot: Robot, window: Window, tmp_path: Path) -> None:
+    """Over one another and set apart; Coal says where the robot's shapes are."""
+    motion = drive(robot, label="RG")
+    page = window.open(file_url([motion, drive(robot, label="PG")], tmp_path))
+    for share in (0.0, 1.0):
+        page.evaluate(f"nmm.apart.set({share})")
+        for k in (0, len(motion.t) // 2, len(motion.t) - 1):
+            page.evaluate(f"nmm.player.seek({motion.t[k]})")
+            draw_frames(page)
+            found = page.evaluate(
+                """() => nmm.motions.map(({ path, tag }) => {
+                  const at = nmm.node(path).children.find((part) => part.isSprite).position;
+                  return at.toArray();
+                })"""
+            )
+            wheels = wheel_angles(motion)[k : k + 1]
+            (low, high) = robot_boxes(robot, motion.q[k : k + 1], wheels)[0]
+            above = [*(0.5 * (low + high))[:2], high[2]]
+            np.testing.assert_allclose(found, [above, above], atol=0.03)
+
+
+def test_a_copy_gives_way_to_the_robot_that_stands_there(
+    robot: Robot, window: Window, tmp_path: Path
+) -> None:
+    q = np.zeros((61, robot.n))
+    q[:, 0] = np.linspace(0.0, 9.0, 61)
+    t = np.linspace(0.0, 6.0, 61)
+    page = window.open(file_url([Motion(robot, t, q, np.zeros((61, robot.n_u)))], tmp_path))
+    shown = "() => nmm.ghosts[0].children.map((copy) => copy.visible)"
+    for k, at in enumerate((0.0, 2.0, 4.0, 6.0)):
+        page.evaluate(f"nmm.player.seek({at})")
+        draw_frames(page)
+        assert page.evaluate(shown) == [i != k for i in range(4)]
+    page.evaluate("nmm.player.seek(3)")
+    draw_frames(page)
+    assert page.evaluate(shown) == [True] * 4
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_texts_have_a_rim_and_names_of_axes_lie_on_none(
+    robot: Robot, window: Window, tmp_path: Path, scheme: str
+) -> None:
+    window.page.set_viewport_size({"width": 1280, "height": 800})
+    page = window.open(file_url([drive(robot)], tmp_path, ghosts=0))
+    page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]  # mypy takes each for any text
+    axes = """() => {
+      viewer.render();
+      return nmm.texts.all.filter(({ rank }) => rank === 4).map(({ sprite }) => sprite.material.visible);
+    }"""
+    assert page.evaluate(axes) == [True] * 3
+    # How dark and how light a text is, from 0 to 1.
+    low, high = page.evaluate(
+        """() => {
+          const { sprite } = nmm.texts.all.find(({ rank }) => rank === 4);
+          nmm.texts.add("12 s", sprite.getWorldPosition(new MeshCat.THREE.Vector3()));
+          const added = nmm.texts.all[nmm.texts.all.length - 1].sprite;
+          viewer.scene.add(added);
+          const { image } = added.material.map;
+          const { data } = image.getContext("2d").getImageData(0, 0, image.width, image.height);
+          const seen = [];
+          for (let i = 0; i < data.length; i += 4) if (data[i + 3] > 190) seen.push(data[i] / 255);
+          return [Math.min(...seen), Math.max(...seen)];
+        }"""
+    )
+    assert low < 0.35
+    assert high > 0.65
+    assert page.evaluate(axes) == [False, True, True]

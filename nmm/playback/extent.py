@@ -17,8 +17,6 @@ from nmm.robots.robot import Robot
 from nmm.robots.surroundings import Carried
 
 _CORNERS = np.array(list(itertools.product((0, 1), repeat=3)))
-#: Height of a robot's name tag, as a multiple of the robot's.
-TAG = 1.1
 #: Random poses that measure the room a robot can take.
 POSES = 100
 
@@ -115,13 +113,9 @@ def view_points(boxes: Array, motions: Sequence[Motion]) -> Array:
     return np.vstack(points)
 
 
-def tag_places(motions: Sequence[Motion], boxes: Array, times: Array) -> Array:
-    """Where the motions' name tags are at the times, (P, 3); the page writes them so high above the roots."""
-    found = []
-    for i, motion in enumerate(motions):
-        at = interpolated(times, motion.t, base_position(motion.robot, motion.q))
-        found.append(np.column_stack([at, np.full(len(at), TAG * boxes[i, 0, 1, 2])]))
-    return np.vstack(found)
+def tag_places(boxes: Array) -> Array:
+    """Where names of robots in boxes (…, 2, 3) are, (P, 3): above their middle, as the page writes them."""
+    return np.concatenate([boxes.mean(axis=-2)[..., :2], boxes[..., 1, 2:]], axis=-1).reshape(-1, 3)
 
 
 def held(boxes: Array, middle: Array) -> dict[str, float]:

@@ -20,8 +20,8 @@ from nmm.playback.scene import Shown, playback_scene
 HEIGHT = 600
 #: In the order in which they depend on one another.
 _NAMES = (
-    "commands elements theme runs legend scenery texts ghosts ellipsoids obstacles sights apart camera "
-    "curves plots values facts player film webm record keys embedded address start"
+    "commands elements theme runs legend scenery texts ghosts rooms ellipsoids obstacles sights apart "
+    "camera curves plots values facts player film webm record keys embedded address start"
 )
 SCRIPTS = tuple(f"{name}.js" for name in _NAMES.split())
 

@@ -100,7 +100,7 @@ def playback_scene(
         start=start,
         duration=end - start,
         view=packed(view, np.float64),
-        tags=packed(extent.tag_places(motions, boxes, times) if several else np.zeros((0, 3)), np.float64),
+        tags=packed(extent.tag_places(boxes) if several else np.zeros((0, 3)), np.float64),
         follow=extent.held(boxes, extent.middle(motions, frames, times)),
         wall=extent.wall(motions),
         size=size,
@@ -117,7 +117,6 @@ def playback_scene(
         robot.carry(drawing, motion.surroundings.carried)
         robot.place(frame.q[0], frame.wheels[0])
         animations += robot.animations(frame, start)
-        height = extent.TAG * float(boxes[i, 0, 1, 2])
         tag = look.name if several else ""
         if ghosts is None:
             round_times = ghost_times(float(motion.t[0]), float(motion.t[-1]), times, boxes[i])
@@ -130,9 +129,7 @@ def playback_scene(
             drawing.commands.append({**ghosts_of, "clear": ghosts is None})
         # Unlabelled, the page attributes the line to the end-effector.
         label = look.name or ("" if motion.driven is not None else motion.robot.name)
-        drawing.add(
-            "motion", path=path, root=robot.root, label=label, color=list(color), tag=tag, height=height
-        )
+        drawing.add("motion", path=path, root=robot.root, label=label, color=list(color), tag=tag)
         drawn = samples_kept(motion.t, fps)
         for name, points, thick in (
             ("path", motion.driven, 1.0),
@@ -206,7 +203,6 @@ def live_scene(
         label=robot.name,
         color=list(looks([""])[0].rgb),
         tag="",
-        height=extent.TAG * float(box[1, 2]),
     )
     drawing.add("ready")
     return drawing.commands, drawn

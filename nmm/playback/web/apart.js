@@ -53,15 +53,11 @@
       if (apart.share > 0) apart.ways.push(new THREE.Vector3(by.x, by.z, -by.y));
     });
     show();
-    nmm.clearGhosts();
     if (!nmm.camera.moved) nmm.camera.reset();
     nmm.viewer.set_dirty();
     nmm.address.changed();
   };
-  apart.start = () => {
-    document.body.classList.toggle("several", nmm.motions.length > 1);
-    nmm.clearGhosts();
-  };
+  apart.start = () => document.body.classList.toggle("several", nmm.motions.length > 1);
   nmm.runs.listeners.push(show);
   slider.addEventListener("input", () => apart.set(Number(slider.value)));
 }

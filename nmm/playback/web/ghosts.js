@@ -3,7 +3,8 @@
 {
   const THREE = MeshCat.THREE;
   const [SLATE, PALE] = [nmm.color([0.36, 0.44, 0.54]), nmm.color([0.78, 0.84, 0.9])];
-  const SHARED = 0.2; // of a copy's room on the floor, what may be another's
+  // Of a copy's room on the floor, what may be another's, and a robot's that is there now.
+  const [SHARED, BESIDE] = [0.2, 0.4];
   const all = [];
   let copies = 0;
 
@@ -111,28 +112,25 @@
   nmm.hooks.believed = ({ paths, color }) =>
     nmm.legend({ kind: "box", color, text: "where odometry has it", path: paths });
 
-  // Of copies that overlap, seen from above, the first one is shown.
-  function clear() {
+  // Whether of two boxes, seen from above, one takes more than a share of the other's room.
+  function overlap(one, other, share) {
+    const [a, b] = [one.getSize(new THREE.Vector3()), other.getSize(new THREE.Vector3())];
+    const common = one.clone().intersect(other).getSize(new THREE.Vector3());
+    return common.x * common.y > share * Math.min(a.x * a.y, b.x * b.y);
+  }
+
+  // Copies are shown where no robot is now; of those that overlap, the first one.
+  nmm.clearGhosts = (rooms) => {
     const shown = [];
     for (const { group, box, node } of all) {
       const run = nmm.runs.find((one) => one.path === node);
-      const { x, y } = nmm.node(node).position;
-      const now = { minX: box.min.x + x, maxX: box.max.x + x, minY: box.min.y + y, maxY: box.max.y + y };
-      const area = (one) => Math.max(one.maxX - one.minX, 0) * Math.max(one.maxY - one.minY, 0);
-      const covers = (one) => {
-        const common = {
-          minX: Math.max(one.minX, now.minX), maxX: Math.min(one.maxX, now.maxX),
-          minY: Math.max(one.minY, now.minY), maxY: Math.min(one.maxY, now.maxY),
-        };
-        return common.maxX > common.minX && area(common) > SHARED * Math.min(area(one), area(now));
-      };
       if (run && run.hidden) continue;
-      group.visible = !shown.some(covers);
-      if (group.visible) shown.push(now);
+      const now = box.clone().translate(nmm.node(node).position);
+      const free = !shown.some((one) => overlap(one, now, SHARED));
+      if (free) shown.push(now);
+      group.visible = free && !rooms.some((room) => overlap(room, now, BESIDE));
     }
-  }
-  nmm.runs.listeners.push(clear);
-  nmm.clearGhosts = clear;
+  };
 
   nmm.hooks.ghosts = ({ path, joints, texts, clear: only = false }) => {
     nmm.viewer.scene.updateMatrixWorld(true);

@@ -19,8 +19,7 @@
 
   nmm.hooks.motion = (motion) => {
     const row = nmm.motions.push(motion) - 1;
-    const { tag, color, height } = motion;
-    if (tag) nmm.scenery.tag(nmm.node(motion.root), tag, color, height);
+    if (motion.tag) nmm.scenery.tag(motion.path, motion.tag, motion.color);
     if (nmm.stage.live) return;
     const text = motion.label || "end-effector";
     const act = (on) => nmm.hide(nmm.runs[row], !on);

@@ -1,4 +1,4 @@
-// What stands around the robots: light, ground, axes, the tubes of the paths, name tags.
+// What stands around the robots: light, ground, axes, the tubes of the paths, texts.
 "use strict";
 {
   const THREE = MeshCat.THREE;
@@ -127,7 +127,7 @@
       const painted = material(rgb, 1);
       const shaft = new THREE.Mesh(new THREE.CylinderGeometry(radius, radius, 0.86 * length, 16), painted);
       const head = new THREE.Mesh(new THREE.ConeGeometry(2.6 * radius, 0.14 * length, 20), painted);
-      const tag = label(name, rgb, false, 0.9);
+      const tag = nmm.texts.put(label(name, rgb, false, 0.9), "axis");
       shaft.position.y = 0.43 * length;
       head.position.y = 0.93 * length;
       tag.position.y = 1.1 * length;
@@ -155,7 +155,8 @@
     scenery.fit();
   };
 
-  // A text that faces the viewer and keeps its size on the screen.
+  // A text that faces the viewer and keeps its size on the screen: white on a plate of its colour, or in its colour
+  // with a rim of the page's, so that it can be read over a robot. rgb: or a function that tells it.
   function label(text, rgb, filled, part = 1) {
     const canvas = document.createElement("canvas");
     const pen = canvas.getContext("2d");
@@ -163,20 +164,26 @@
     pen.font = font;
     const [width, height] = [Math.ceil(pen.measureText(text).width) + 36, 60];
     Object.assign(canvas, { width, height });
-    const css = `rgb(${rgb.map((c) => Math.round(255 * c)).join(",")})`;
-    pen.font = font;
-    pen.textAlign = "center";
-    pen.textBaseline = "middle";
-    if (filled) {
-      pen.fillStyle = css;
-      pen.beginPath();
-      pen.arc(30, 30, 28, Math.PI / 2, 1.5 * Math.PI);
-      pen.arc(width - 30, 30, 28, -Math.PI / 2, Math.PI / 2);
-      pen.fill();
-    }
-    pen.fillStyle = filled ? "white" : css;
-    pen.fillText(text, width / 2, height / 2 + 2);
     const map = new THREE.CanvasTexture(canvas);
+    const themed = () => {
+      const css = `rgb(${(typeof rgb === "function" ? rgb() : rgb).map((c) => Math.round(255 * c)).join(",")})`;
+      pen.clearRect(0, 0, width, height);
+      Object.assign(pen, { font, textAlign: "center", textBaseline: "middle", lineWidth: 8, lineJoin: "round", fillStyle: css });
+      if (filled) {
+        pen.beginPath();
+        pen.arc(30, 30, 28, Math.PI / 2, 1.5 * Math.PI);
+        pen.arc(width - 30, 30, 28, -Math.PI / 2, Math.PI / 2);
+        pen.fill();
+        pen.fillStyle = "white";
+      } else {
+        pen.strokeStyle = nmm.theme.dark ? "rgba(22,28,35,0.8)" : "rgba(255,255,255,0.8)";
+        pen.strokeText(text, width / 2, height / 2 + 2);
+      }
+      pen.fillText(text, width / 2, height / 2 + 2);
+      map.needsUpdate = true;
+    };
+    themed();
+    nmm.theme.listeners.push(themed);
     map.encoding = THREE.sRGBEncoding;
     map.minFilter = THREE.LinearFilter;
     const sprite = new THREE.Sprite(
@@ -188,12 +195,6 @@
   }
 
   scenery.label = label;
-  scenery.tag = (parent, text, rgb, height) => {
-    const sprite = nmm.texts.put(label(text, rgb, true), "robot");
-    sprite.position.z = height;
-    parent.add(sprite);
-  };
-
   // A tube along points: one ring of vertices a point, with both ends closed.
   function tube(points, radius) {
     const rings = points.length + 2;

@@ -1,5 +1,6 @@
 // The texts over the scene: each right above its point, moved aside or upwards where another one has the room. Names of
-// robots come first, then distances, names of obstacles, and the times of the robot's copies.
+// robots come first, then distances, names of obstacles, the times of the robot's copies, and names of axes, which are
+// at the axes' ends or nowhere.
 "use strict";
 {
   const THREE = MeshCat.THREE;
@@ -7,21 +8,19 @@
   const [ROWS, ASIDE] = [[0, 1, -1, 2, -2, 3, -3, 4, 5, 6], [0, -1, 1, -2, 2]];
   const STACK = [0, 1, 2, 3, 4, 5, 6, 7, -1, -2, -3];
   const COLORS = { light: [0.31, 0.38, 0.46], dark: [0.72, 0.78, 0.85] };
-  const RANKS = ["robot", "distance", "obstacle", "time"];
+  const RANKS = ["robot", "distance", "obstacle", "time", "axis"];
+  const AXIS = RANKS.indexOf("axis");
   const view = document.getElementById("view");
   // before: what else is to be done before each picture, with the eye.
   const texts = (nmm.texts = { all: [], before: [] });
   let cards = [];
 
   texts.add = (text, place) => {
-    const sprite = nmm.scenery.label(text, [1, 1, 1], false, 0.75);
+    const sprite = nmm.scenery.label(text, () => COLORS[nmm.theme.dark ? "dark" : "light"], false, 0.75);
     sprite.position.copy(place);
     sprite.renderOrder = 900;
     // What is cut off by a robot before it says another time.
     sprite.material.depthTest = false;
-    const themed = () => sprite.material.color.copy(nmm.color(COLORS[nmm.theme.dark ? "dark" : "light"]));
-    themed();
-    nmm.theme.listeners.push(themed);
     return texts.put(sprite, "time");
   };
 
@@ -44,9 +43,10 @@
   // The nearest free place: above the point, beside that, or rows higher or lower.
   function free(taken, { x, y, wide, high, rank }, width) {
     // Names of robots are stacked.
-    for (const row of rank === 0 ? STACK : ROWS) {
-      for (const aside of rank === 0 ? [0] : ASIDE) {
-        const [left, top] = [x - 0.5 * wide + aside * (wide + GAP + 1), y - ABOVE - high - row * (high + 1)];
+    for (const row of [STACK, ROWS, ROWS, ROWS, [0]][rank]) {
+      for (const aside of rank % AXIS ? ASIDE : [0]) {
+        const above = rank === AXIS ? -0.5 * high : ABOVE;
+        const [left, top] = [x - 0.5 * wide + aside * (wide + GAP + 1), y - above - high - row * (high + 1)];
         const box = { left, top, right: left + wide, bottom: top + high };
         const clear = (other) =>
           box.left > other.right + GAP || other.left > box.right + GAP || box.top > other.bottom || other.top > box.bottom;
