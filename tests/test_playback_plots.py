@@ -313,6 +313,27 @@ WRITTEN = """() => {
   pen.fillText = write;
   return found;
 }"""
+
+
+def test_a_long_name_ends_before_the_values_and_keeps_its_unit(plotted: Plotted) -> None:
+    page = plotted.page
+    page.evaluate("nmm.plots.open(['inputs'])")
+    page.evaluate("nmm.seek(1)")
+    lane = "nmm.lanes.find(({ key }) => key === 'u_omega')"
+    short = page.evaluate(f"{lane}.text")
+    page.evaluate(f"{lane}.text = 'rate of shoulder_lift_joint_of_the_left_arm'")
+    (name,) = (one for one in page.evaluate(WRITTEN) if one[1].startswith("rate of"))
+    now = page.evaluate(
+        f"""() => {lane}.now.getBoundingClientRect().left
+          - document.querySelector("[data-panel=inputs] canvas").getBoundingClientRect().left"""
+    )
+    page.evaluate(f"{lane}.text = '{short}'")
+    page.evaluate("nmm.plots.open(nmm.plots.first)")
+    assert name[1].endswith("… [rad/s]")
+    assert 0.0 <= name[2] < name[3] <= now
+    assert name[3] - name[2] > 80.0
+
+
 #: A quantity that two decimals or a power of ten tell.
 NUMBER = re.compile(r"−?[\d.]+(e−?\d+)?")
 
