@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 from playback_browser import PROJECT, SIZE, UPRIGHT, WALK, Window, draw_frames, file_url
 from playback_browser import browser as browser
 from playback_browser import empty_page as empty_page
@@ -352,3 +354,28 @@ def test_texts_have_a_rim_and_names_of_axes_lie_on_none(
     assert low < 0.35
     assert high > 0.65
     assert page.evaluate(axes) == [False, True, True]
+
+
+@pytest.mark.parametrize(("scheme", "least"), [("light", 1.6), ("dark", 2.0)])
+def test_a_path_ahead_can_be_told_from_the_floor(
+    robot: Robot, window: Window, tmp_path: Path, scheme: str, least: float
+) -> None:
+    """As WCAG's contrast has it, for the darkest colour of a run."""
+    window.page.set_viewport_size({"width": 1280, "height": 800})
+    window.page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]  # mypy takes each for any text
+    q = np.zeros((61, robot.n))
+    q[:, 0] = np.linspace(0.0, 4.0, 61)
+    t = np.linspace(0.0, 6.0, 61)
+    motion = Motion(robot, t, q, np.zeros((61, robot.n_u)), frame="ee", label="RG")
+    page = window.open(file_url([motion], tmp_path, ghosts=0))
+    page.evaluate("nmm.actions.grid()")
+    ((x, y, _),) = page.evaluate(PROJECT, [[2.5, 0.0, 0.0]])  # the platform's path
+    draw_frames(page)
+    at = 640 * (1 + x) - 12, 400 * (1 - y) - 12
+    shot = page.screenshot(clip={"x": at[0], "y": at[1], "width": 24, "height": 24})
+    pixels = np.asarray(Image.open(io.BytesIO(shot)).convert("RGB")) / 255.0
+    linear = np.where(pixels <= 0.04045, pixels / 12.92, ((pixels + 0.055) / 1.055) ** 2.4)
+    luminance = linear @ [0.2126, 0.7152, 0.0722] + 0.05
+    floor = np.median(luminance)
+    page.emulate_media(color_scheme="light")
+    assert max(luminance.max() / floor, floor / luminance.min()) > least

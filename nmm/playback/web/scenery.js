@@ -3,6 +3,7 @@
 {
   const THREE = MeshCat.THREE;
   const SIDES = 8;
+  const PAPER = new THREE.Color(1, 1, 1);
   const scenery = (nmm.scenery = { trails: [], desired: [] });
 
   function add(path, object) {
@@ -271,7 +272,10 @@
       const driven = tube(kept, 1.25 * radius);
       const faint = driven.clone();
       const ahead = material(color, 0.22);
-      const themed = () => (ahead.opacity = nmm.theme.dark ? 0.5 : 0.25);
+      const themed = () => {
+        ahead.opacity = nmm.theme.dark ? 0.6 : 0.35;
+        for (const part of [ahead.color, ahead.emissive]) part.copy(nmm.color(color)).lerp(PAPER, nmm.theme.dark ? 0.15 : 0);
+      };
       themed();
       nmm.theme.listeners.push(themed);
       group.add(new THREE.Mesh(faint, ahead), new THREE.Mesh(driven, material(color, 1)));
