@@ -105,6 +105,34 @@ def test_a_resolver_has_the_colour_of_its_runs_and_pairs_of_dots_a_key(
     assert "pg and 0.01, pg and 0.02, rg and 0.01, rg and 0.02" in page.inner_text("#legend")
 
 
+def test_a_logarithmic_axis_has_round_numbers(page: Page) -> None:
+    """As many as there is room for, within a part of a decade and over many."""
+    for low, high in ((0.3, 1.4), (17.0, 37.0), (1.0, 90.0), (2e-4, 5e3), (1e-12, 1.0)):
+        found = page.evaluate(f"decades(Math.log10({low}), Math.log10({high}), 8)")
+        assert 3 <= len(found) <= 12
+        assert low <= found[0] * (1 + 1e-9)
+        assert found[-1] <= high * (1 + 1e-9)
+        assert all(float(f"{mark:.2g}") == pytest.approx(mark, rel=1e-9) for mark in found)
+
+
+def test_a_dot_of_the_front_keeps_its_colour(page: Page) -> None:
+    page.select_option("#colour", "resolver.kind")
+    page.set_checked("#front", True)
+    drawn, wanted = page.evaluate(
+        """() => {
+          const row = frontOf(numbersOf(byName.get($("x").value)), numbersOf(byName.get($("y").value)))[0];
+          const [x, y] = points.places[row].map((place) => Math.round(place * devicePixelRatio));
+          const pen = points.canvas.getContext("2d");
+          const of = (data) => [...data].slice(0, 3);
+          const drawn = of(pen.getImageData(x, y, 1, 1).data);
+          pen.fillStyle = colouring(byName.get("resolver.kind")).of(row);
+          pen.fillRect(0, 0, 4, 4);
+          return [drawn, of(pen.getImageData(1, 1, 1, 1).data)];
+        }"""
+    )
+    assert drawn == pytest.approx(wanted, abs=12)
+
+
 def test_details_stand_beside_the_plot_and_within_the_window(page: Page) -> None:
     page.locator("tbody tr").first.click()
     plot, one = (page.locator(name).bounding_box() for name in ("#points", "#one"))

@@ -27,10 +27,21 @@ function axisOf(column, log, from, to) {
       if (value === null || (log && value <= 0)) return NaN;
       return place(log ? Math.log10(value) : value);
     },
-    marks: ticks(low, high, few)
-      .filter((mark) => !log || high - low < 1.5 || Number.isInteger(Math.round(mark * 1e6) / 1e6))
-      .map((mark) => [place(mark), written(log ? 10 ** mark : Number(mark.toPrecision(12)))]),
+    marks: (log ? decades(low, high, few) : ticks(low, high, few))
+      .map((mark) => Number(mark.toPrecision(12)))
+      .map((mark) => [place(log ? Math.log10(mark) : mark), written(mark)]),
   };
+}
+
+// Round numbers between two powers of ten: powers of ten, also 2 and 5 times those, or equal steps within one of them.
+function decades(low, high, few) {
+  if (high - low < 0.8) return ticks(10 ** low, 10 ** high, few);
+  const every = Math.max(1, Math.ceil((high - low) / few));
+  const found = [];
+  for (let k = Math.floor(low / every) * every; k <= high; k += every) {
+    for (const factor of high - low < 0.4 * few ? [1, 2, 5] : [1]) found.push(k + Math.log10(factor));
+  }
+  return found.filter((mark) => mark >= low && mark <= high).map((mark) => 10 ** mark);
 }
 
 // How many values a listed column has, where they are at equal distances.
@@ -87,7 +98,7 @@ function drawPoints() {
       else disc(context, x, y, radius);
     }
   }
-  if ($("front").checked) drawFront(context, numbersOf(xs), numbersOf(ys));
+  if ($("front").checked) drawFront(context, frontOf(numbersOf(xs), numbersOf(ys)), colours, radius);
   if (chosen >= 0 && points.places[chosen].every((place) => !Number.isNaN(place))) {
     context.strokeStyle = style("--ink");
     context.lineWidth = 2;
@@ -107,13 +118,18 @@ function frontOf(xs, ys) {
   return rows.filter((row) => ys[row] < least && ((least = ys[row]), true));
 }
 
-function drawFront(context, xs, ys) {
-  const places = frontOf(xs, ys).map((row) => points.places[row]).filter((place) => !place.some(Number.isNaN));
-  const stairs = places.flatMap((place, k) => (k ? [[place[0], places[k - 1][1]], place] : [place]));
-  context.strokeStyle = context.fillStyle = style("--ink");
+// A line along the front, and a ring around each dot of it, which keeps its colour.
+function drawFront(context, rows, colours, radius) {
+  const seen = rows.filter((row) => !points.places[row].some(Number.isNaN));
+  const places = seen.map((row) => points.places[row]);
+  context.strokeStyle = style("--ink");
   context.lineWidth = 1.5;
-  line(context, stairs);
-  for (const [x, y] of places) disc(context, x, y, 3);
+  line(context, places.flatMap((place, k) => (k ? [[place[0], places[k - 1][1]], place] : [place])));
+  seen.forEach((row, k) => {
+    context.fillStyle = colours.of(row);
+    disc(context, ...places[k], radius);
+    context.stroke();
+  });
 }
 
 function line(context, places) {
