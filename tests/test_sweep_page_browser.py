@@ -115,6 +115,17 @@ def test_a_logarithmic_axis_has_round_numbers(page: Page) -> None:
         assert all(float(f"{mark:.2g}") == pytest.approx(mark, rel=1e-9) for mark in found)
 
 
+def test_a_logarithmic_axis_leaves_out_nothing(page: Page) -> None:
+    """A start from -1 m to 1 m, chosen where the axis before was logarithmic."""
+    page.select_option("#x", "effort")
+    page.set_checked("#log-x", True)
+    page.select_option("#x", "q0.x")
+    assert page.locator("#log-x").is_disabled()
+    assert page.evaluate("points.places.every(([x]) => !Number.isNaN(x))")
+    page.select_option("#x", "effort")
+    assert page.locator("#log-x").is_enabled()
+
+
 def test_a_dot_of_the_front_keeps_its_colour(page: Page) -> None:
     page.select_option("#colour", "resolver.kind")
     page.set_checked("#front", True)

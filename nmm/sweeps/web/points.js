@@ -52,12 +52,19 @@ function cellsOf(column, log) {
   return values.every((value, k) => Math.abs(value - values[0] - k * step) < 1e-6 * step) ? values.length : 0;
 }
 
+// Whether the box asks for it, which it cannot where a logarithmic axis would leave out what is negative.
+function logOf(id, column) {
+  const box = $(id);
+  box.disabled = isText(column) || numbersOf(column).some((value) => value !== null && value < 0);
+  return box.checked && !box.disabled;
+}
+
 function drawPoints() {
   const { context, width, height } = fitted(points.canvas);
   const [xs, ys, hue] = ["x", "y", "colour"].map((id) => byName.get($(id).value));
   const margin = { left: 66, right: 14, top: 12, bottom: 44 };
-  const across = axisOf(xs, $("log-x").checked, margin.left, width - margin.right);
-  const up = axisOf(ys, $("log-y").checked, height - margin.bottom, margin.top);
+  const across = axisOf(xs, logOf("log-x", xs), margin.left, width - margin.right);
+  const up = axisOf(ys, logOf("log-y", ys), height - margin.bottom, margin.top);
   const colours = colouring(hue);
   context.clearRect(0, 0, width, height);
   context.strokeStyle = style("--line");
