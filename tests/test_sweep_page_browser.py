@@ -101,8 +101,10 @@ def test_a_resolver_has_the_colour_of_its_runs_and_pairs_of_dots_a_key(
     found = page.evaluate("[...Array(N).keys()].map(colouring(byName.get('resolver.kind')).of)")
     assert found == [resolver_styles()[kind][0] for kind in kinds]
     page.select_option("#x", "q0.x")
-    page.select_option("#y", "q0.x")
-    assert "pg and 0.01, pg and 0.02, rg and 0.01, rg and 0.02" in page.inner_text("#legend")
+    for up in ("q0.x", "error_rms"):  # all resolvers' errors are one where no limit is met
+        page.select_option("#y", up)
+        assert "pg and 0.01, pg and 0.02, rg and 0.01, rg and 0.02" in page.inner_text("#legend")
+        assert len(set(page.evaluate("points.places.slice(0, 4).map(([x]) => x)"))) == 4
 
 
 def test_a_logarithmic_axis_has_round_numbers(page: Page) -> None:

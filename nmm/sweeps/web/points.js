@@ -90,8 +90,8 @@ function drawPoints() {
 
   const cells = across.cell && up.cell ? [Math.max(across.cell - 1, 1), Math.max(up.cell - 1, 1)] : null;
   const radius = N > 4000 ? 1.6 : N > 800 ? 2.4 : 3.6;
-  // Rollouts of one point, with different listed values, stand side by side.
-  const together = !cells && DATA.combinations > 1 && DATA.combinations <= 5 && sampled(xs) && sampled(ys);
+  // Rollouts of one point, with different listed values, are at one place across: they stand side by side there.
+  const together = !cells && DATA.combinations > 1 && DATA.combinations <= 5 && sampled(xs);
   showLegend(hue, colours, together);
   const aside = (row) => (together ? ((row % DATA.combinations) - (DATA.combinations - 1) / 2) * 1.7 * radius : 0);
   points.places = Array.from({ length: N }, (_, row) => [across.of(row) + aside(row), up.of(row)]);
